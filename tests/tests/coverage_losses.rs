@@ -3,18 +3,13 @@
 //!
 //! `FLOCKMATE_LOSSES=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_LOSSES_FROM` others.
 
-use companion::swarm::fleet::DivisionInput;
 use flockmate_tests::areas::Shape;
 use flockmate_tests::{areas, covered, number};
-use host_sim::capacity::WAYPOINTS;
-use host_sim::coverage::CoveragePlan;
 use host_sim::mission::Mission;
-use host_sim::mission::stretches::next_division_inputs;
 use host_sim::progress::Progress;
 use host_sim::result::{MissionResult, VehicleResult};
 use host_sim::scenario;
 use planner_core::Point;
-use planner_core::flight::{Flight, Task};
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -365,134 +360,4 @@ fn are_whole(draw: Draw) {
     let rare = if draw.radio == Radio::Rough || draw.struck > 1 { incomplete } else { short };
     println!("{incomplete} incomplete");
     assert!(draw.most_in_three * all.len() >= 3 * rare);
-}
-
-/// Places of the pictures that a flight takes up to a place of its path.
-fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
-    let Task::Photograph(photographs) = &flight.task else { return Vec::new() };
-    let places = photographs.stretches(&flight.path);
-    let places = places.flat_map(|shots| (0..shots.count).map(move |k| shots.picture_at_m(k)));
-    places
-        .filter(|at_m| *at_m <= along_m + 0.01)
-        .filter_map(|at_m| flight.path.point_at(at_m))
-        .collect()
-}
-
-/// Whatever is lost, and wherever the others hold, each waypoint is photographed once: by the
-/// vehicle that kept it, or by the one that has it now.
-#[test]
-fn divisions_leave_nothing_out_and_give_nothing_twice() {
-    let one = |seed: u64| -> usize {
-        let mut random = Pcg32::seed_from_u64(seed);
-        let vehicles = 2 + (random.next_u32() % 5) as usize;
-        let text = areas::lossy_radio_scenario(&mut random, vehicles, 0.0);
-        let scenario = scenario::parse(&text, "area").expect("a scenario");
-        let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
-        let Ok(mut plan) = mission.plan() else { return 0 };
-        let mut whole: Vec<Point> =
-            plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)).collect();
-        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<DivisionInput>>::new());
-        let mut lives = vec![true; vehicles];
-        let mut divided = 0;
-        for _ in 0..3 {
-            let living: Vec<usize> = (0..vehicles).filter(|i| lives[*i]).collect();
-            if living.len() < 2 {
-                break;
-            }
-            lives[living[random.next_u32() as usize % living.len()]] = false;
-            let lot = |i: usize, random: &mut Pcg32| {
-                let flight = &plan.flights[i];
-                let dm = (flight.path.length_m() * 10.0) as u32;
-                let on_pad = flight.climb_m > 0.0 && random.next_u32().is_multiple_of(5);
-                let flown = if on_pad || dm == 0 { 0 } else { 1 + random.next_u32() % dm };
-                DivisionInput { alive: lives[i], along_dm: flown.min(65_535) as u16 }
-            };
-            let lots: Vec<DivisionInput> = (0..vehicles).map(|i| lot(i, &mut random)).collect();
-            let before = plan;
-            losses.push(lots.clone());
-            // Where vehicles hold nearer to each other than any order of departures allows there is
-            // none, nor where a path would need more corners than it may have.
-            match mission.plan_remaining(&[], losses.iter().map(|lots| &lots[..])) {
-                Ok(divided) => plan = divided,
-                Err(error) => {
-                    let text = format!("{error:#}");
-                    let known = ["cannot pass", "too many corners"]
-                        .iter()
-                        .any(|known| text.contains(known));
-                    assert!(known, "seed {seed}: {text}");
-                    return divided;
-                }
-            }
-            divided += 1;
-            for (flight, lot) in before.flights.iter().zip(&lots) {
-                let mut done = pictures(flight, f32::from(lot.along_dm) / 10.0);
-                if !lot.alive {
-                    done.pop();
-                }
-                kept.extend(done);
-            }
-            for (i, flight) in plan.flights.iter().enumerate() {
-                assert!(lives[i] || !flight.task.leaves_pad(), "seed {seed}: {i} is lost");
-            }
-            let mut all = kept.clone();
-            all.extend(plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)));
-            let key = |p: &Point| [p.x, p.y];
-            let order = |a: &Point, b: &Point| key(a).partial_cmp(&key(b)).expect("finite");
-            assert_eq!(all.len(), whole.len(), "seed {seed}");
-            whole.sort_by(order);
-            for place in &all {
-                let near = whole.iter().filter(|p| (*p - place).xy().norm() < 0.02).count();
-                assert!(near >= 1, "seed {seed}: {place:?} is no waypoint");
-            }
-            for place in &whole {
-                let taken = all.iter().filter(|p| (*p - place).xy().norm() < 0.02).count();
-                let twins = whole.iter().filter(|p| (*p - place).xy().norm() < 0.02).count();
-                assert_eq!(taken, twins, "seed {seed}: {place:?}");
-            }
-        }
-        divided
-    };
-    let count = number("FLOCKMATE_DIVIDED", 40);
-    let divided: usize = (0..count).into_par_iter().map(one).sum();
-    println!("{divided} divisions of {count} areas");
-    assert!(divided as u64 > count);
-}
-
-/// Routes that take more than one path each: nobody is lost, and all hold again and again.
-#[test]
-fn stretches_leave_nothing_out_and_give_nothing_twice() {
-    let one = |seed: u64| -> usize {
-        let mut random = Pcg32::seed_from_u64(seed);
-        let text = areas::many_lanes_scenario(&mut random, Shape::Convex, 1 + (seed % 3) as usize);
-        let Ok(scenario) = scenario::parse(&text, "area") else { return 0 };
-        let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
-        let mut plan = mission.plan().expect("it was planned");
-        let planned = CoveragePlan::plan_as_companions(&mission.scenario).expect("it was planned");
-        let whole = (0..planned.tracks.waypoint_count())
-            .filter_map(|number| planned.tracks.waypoint(number));
-        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<DivisionInput>>::new());
-        while let Some(lots) = next_division_inputs(&plan) {
-            for (flight, lot) in plan.flights.iter().zip(&lots) {
-                kept.extend(pictures(flight, lot.along_m()));
-            }
-            losses.push(lots);
-            plan = mission
-                .plan_remaining(&[], losses.iter().map(|lots| &lots[..]))
-                .expect("it was divided before");
-        }
-        kept.extend(plan.flights.iter().flat_map(|flight| pictures(flight, f32::INFINITY)));
-        let mut count = 0;
-        for place in whole {
-            count += 1;
-            let taken = kept.iter().filter(|p| (p.xy() - place).norm() < 0.02).count();
-            assert_eq!(taken, 1, "seed {seed}: {place:?}");
-        }
-        assert_eq!(kept.len(), count, "seed {seed}");
-        losses.len()
-    };
-    let count = number("FLOCKMATE_DIVIDED", 40);
-    let divided: Vec<usize> = (0..count).into_par_iter().map(one).collect();
-    let all: usize = divided.iter().sum();
-    println!("{all} divisions of {count} areas, at most {:?}", divided.iter().max());
-    assert!(all >= count as usize / 4);
 }

@@ -16,10 +16,12 @@ use super::transit::Transit;
 use super::{CoverageError, Flat};
 use crate::flight::{Task, WaypointRange, WaypointSet};
 use crate::plan::{PlanError, SwarmPlan};
-use crate::schedule::ScheduleWorkspace;
+use crate::schedule::{ScheduleError, ScheduleWorkspace};
 
 /// Most separate ranges of waypoints that are photographed or promised.
 const MAX_DONE_RANGES: usize = 128;
+/// Number of times that vehicles exchange their routes where no take-off times keep them apart.
+const MAX_EXCHANGES: usize = 3;
 
 /// Status of one vehicle at a division. All vehicles agree on it before the area is divided again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -133,6 +135,8 @@ impl From<PlanError> for Error {
 /// Divides the remaining waypoints. On entry `routes` and `out` are the routes and flights of the
 /// plan before; on success they are those of the division.
 ///
+/// Where no take-off times keep the vehicles apart, they exchange their routes.
+///
 /// Those of [`divide::remaining_lanes`], [`pack::binpat`] and [`flights::plan_flights`];
 /// [`CoverageError::Vehicles`] if fates, routes and vehicles are inconsistent;
 /// [`CoverageError::Setting`] for an `along_m` that is NaN or negative.
@@ -180,7 +184,37 @@ pub fn redivide_work<
         held_layers: ws.held_layers,
         ..*swarm
     };
-    Ok(flights::plan_flights(&work, routes, &swarm, schedule, out)?)
+    let mut exchanges = routes.routes.len().min(MAX_EXCHANGES + 1);
+    loop {
+        exchanges = exchanges.saturating_sub(1);
+        match flights::plan_flights(&work, routes, &swarm, schedule, out) {
+            // Two vehicles that hold close to each other may each bar the other's path.
+            Err(PlanError::Schedule(_, ScheduleError::Blocked)) if exchanges > 0 => {
+                exchange_routes(&work, routes)?;
+            }
+            done => return Ok(done?),
+        }
+    }
+}
+
+/// Gives each route the vehicle of the next one, and the last that of the first.
+fn exchange_routes<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    routes: &mut Plan<K>,
+) -> Result<(), CoverageError> {
+    let Some(mut vehicle) = routes.routes.first().map(|route| route.vehicle) else { return Ok(()) };
+    for route in routes.routes.iter_mut().rev() {
+        core::mem::swap(&mut route.vehicle, &mut vehicle);
+        (route.ground_m, route.heading) = work.ground_distance_m(
+            &work.vehicles[usize::from(route.vehicle)],
+            &work.route_ends(route.first, route.end),
+        );
+        if !route.ground_m.is_finite() {
+            return Err(CoverageError::Unreachable);
+        }
+    }
+    pack::set_costs(work, routes);
+    Ok(())
 }
 
 /// The bit of a transit layer in `held_layers`.
