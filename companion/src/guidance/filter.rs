@@ -82,7 +82,7 @@ pub(crate) struct SafetyFilter {
     landing_held_since: Option<Instant>,
     /// Since when the filter has kept the vehicle from continuing, and when it last did; gaps
     /// shorter than [`FREE_AFTER`] count as part of it.
-    hindered_since: Option<Instant>,
+    hindered_since: Instant,
     hindered_at: Instant,
     /// Whether this vehicle was to yield when the filter last kept it from continuing.
     hindered_yields: bool,
@@ -120,9 +120,8 @@ impl SafetyFilter {
     /// Time for which the filter has kept the vehicle from continuing although the vehicle goes
     /// first; zero once the last such step is `free` ago.
     pub(crate) fn blocked_for(&self, now: Instant, free: Duration) -> Duration {
-        let since =
-            self.hindered_since.filter(|_| !self.hindered_yields && now - self.hindered_at < free);
-        since.map_or(Duration::default(), |at| now - at)
+        let blocked = !self.hindered_yields && now - self.hindered_at < free;
+        if blocked { now - self.hindered_since } else { Duration::default() }
     }
 
     /// Time for which the filter has kept the vehicle from continuing because of a neighbour that
@@ -185,8 +184,8 @@ impl SafetyFilter {
     /// Time for which the filter has kept the vehicle from continuing, stops and short flights
     /// between them together.
     pub(crate) fn hindered_for(&self, now: Instant) -> Duration {
-        let since = self.hindered_since.filter(|_| now - self.hindered_at < HINDERED_WITHIN);
-        since.map_or(Duration::default(), |at| now - at)
+        let hindered = now - self.hindered_at < HINDERED_WITHIN;
+        if hindered { now - self.hindered_since } else { Duration::default() }
     }
 
     /// Time since the filter last kept the vehicle from continuing because of one that comes down
@@ -228,9 +227,8 @@ impl SafetyFilter {
 impl SafetyFilter {
     fn note_hindered(&mut self, yields: bool, now: Instant) {
         if now - self.hindered_at > FREE_AFTER {
-            self.hindered_since = None;
+            self.hindered_since = now;
         }
-        self.hindered_since.get_or_insert(now);
         (self.hindered_at, self.hindered_yields) = (now, yields);
     }
 

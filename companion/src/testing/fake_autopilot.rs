@@ -293,6 +293,17 @@ impl Bench {
         assert_eq!(self.state(), state, "{:?} at {:?}", self.texts, self.enu);
     }
 
+    /// Runs until the vehicle has left the ground.
+    pub fn run_until_lifted(&mut self) {
+        for _ in 0..400 {
+            if self.enu.z > 0.5 {
+                return;
+            }
+            self.tick();
+        }
+        panic!("still on the ground: {:?}", self.texts);
+    }
+
     /// A bench whose mission is started while vehicle 77 stands on its pad, following the plan.
     pub fn started_with_neighbour(config: Config<4>) -> Self {
         let mut bench = Self::new(config);

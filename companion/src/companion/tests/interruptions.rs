@@ -79,6 +79,7 @@ fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<
         TakeOff => b.run_until(TakeOff, 20.0),
         Climb => {
             b.run_until(Climb, 20.0);
+            b.run_until_lifted();
             b.run(0.7);
         }
         Follow => {
@@ -213,7 +214,7 @@ fn after_an_interruption_of_the_climb_the_climb_goes_on_and_the_goal_is_reached(
             let mut b = bench(kind);
             b.start();
             b.run_until(State::Climb, 20.0);
-            b.run(0.4);
+            b.run_until_lifted();
             b.stuck = lost;
             if paused {
                 assert_eq!(pause(&mut b), Some(ACCEPTED));

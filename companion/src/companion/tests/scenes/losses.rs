@@ -90,6 +90,8 @@ pub(super) fn another_leaves(scenes: &mut Scenes) {
 }
 
 pub(super) fn the_others_give_it_up(scenes: &mut Scenes) {
+    let unheard_below_its_layer = |b: &mut Bench| (b.neighbour, b.stuck) = (None, true);
+    scenes.play(over_a_field(Climb), unheard_below_its_layer, Aborted, 60.0);
     let given_up = |b: &mut Bench| tells(b, MemberStatus::Lost, MemberStatus::Alive);
     for state in [Climb, Follow, Scheduled, Streaming] {
         scenes.play(over_a_field(state), given_up, Aborted, 60.0);

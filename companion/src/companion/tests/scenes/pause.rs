@@ -18,10 +18,19 @@ pub(super) fn in_flight(scenes: &mut Scenes) {
     scenes.play(flying(), for_too_long, Aborted, 30.0);
     // In the climb, and called back.
     let called_back = |b: &mut Bench| {
+        b.run_until_lifted();
         pause(b);
         back(b);
     };
     scenes.play(to(Climb), called_back, Land, 1.0);
+    // Before it has left the ground.
+    scenes.play(to(Climb), pause, Scheduled, 6.0);
+    // Others take it to be down after a while.
+    let unheard = |b: &mut Bench| {
+        pause(b);
+        b.neighbour = None;
+    };
+    scenes.play(accompanied(Follow, 1.0), unheard, Aborted, 60.0);
 }
 
 pub(super) fn on_the_ground(scenes: &mut Scenes) {
