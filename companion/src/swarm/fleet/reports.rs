@@ -1,0 +1,107 @@
+//! What the vehicles of a fleet report to each other, and how a report changes what this one knows.
+
+use super::{Fleet, FleetMember, INCARNATIONS, status_in_division};
+use crate::link::roster::{MAX_ENTRIES, MemberStatus, RosterReport, RosterReportEntry};
+
+impl<const V: usize> Fleet<V> {
+    /// Handles the roster report of the vehicle of rank `sender`; `waits`: this vehicle was not
+    /// started.
+    pub fn handle_roster(&mut self, sender: usize, roster: &RosterReport, waits: bool) {
+        if sender >= self.members.len() || sender == self.own {
+            return;
+        }
+        let here = self.divisions.len() as u8;
+        if roster.divisions > here && !self.adopt_division(roster) {
+            self.excluded = !waits;
+        }
+        let same = usize::from(roster.divisions) == self.divisions.len();
+        if same {
+            self.members[sender].hash = roster.hash;
+        }
+        for (rank, entry) in
+            roster.entries.iter().enumerate().map(|(i, e)| (i + usize::from(roster.first), e))
+        {
+            if rank == self.own {
+                self.handle_own_entry(entry, waits);
+            } else if rank < self.members.len() {
+                let behind = roster.divisions < self.divisions.len() as u8 && rank != sender;
+                // The member may have finished its share of a division that the sender does not
+                // know; it reports that itself.
+                if !(behind
+                    && entry.status == MemberStatus::Left
+                    && self.members[rank].heard_itself)
+                {
+                    self.merge_entry(rank, entry, same);
+                }
+                if same && entry.agrees && rank != sender && roster.hash != 0 {
+                    self.members[rank].hash = roster.hash;
+                }
+            }
+        }
+    }
+
+    /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
+    /// then the others counted on that. Returns whether it did.
+    fn adopt_division(&mut self, roster: &RosterReport) -> bool {
+        let here = self.divisions.len() as u8;
+        if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
+            return false;
+        }
+        if roster.committed_hash == self.previous_hash {
+            (self.division_inputs, self.hash) = (self.previous_inputs.clone(), self.previous_hash);
+        }
+        let reported = roster.committed_hash == self.hash;
+        if reported {
+            self.commit_division();
+        }
+        reported
+    }
+
+    fn merge_entry(&mut self, rank: usize, entry: &RosterReportEntry, same: bool) {
+        let member = &mut self.members[rank];
+        let newer = entry.incarnation.wrapping_sub(member.entry.incarnation) % INCARNATIONS;
+        if newer >= INCARNATIONS / 2 {
+            return;
+        }
+        if newer > 0 {
+            let RosterReportEntry { incarnation, .. } = *entry;
+            member.entry = RosterReportEntry { incarnation, ..RosterReportEntry::default() };
+        }
+        let known = &mut member.entry;
+        known.status = known.status.max(status_in_division(entry.status, same));
+        if same {
+            known.progress_dm = known.progress_dm.max(entry.progress_dm);
+            known.commitment_dm = known.commitment_dm.or(entry.commitment_dm);
+            known.holds |= entry.holds;
+        }
+    }
+
+    /// Handles the entry about this vehicle in another one's report.
+    fn handle_own_entry(&mut self, entry: &RosterReportEntry, waits: bool) {
+        let own = self.members[self.own].entry;
+        let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
+        let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.status > own.status);
+        match (outlived, waits) {
+            (false, _) => {}
+            // This vehicle was restarted: the others report its flight before.
+            (true, true) => self.rejoin((entry.incarnation + 1) % INCARNATIONS),
+            (true, false) => self.excluded = true,
+        }
+    }
+
+    /// The roster report of this vehicle, with the entries from rank `first` on.
+    pub fn roster_message(&self, first: usize) -> RosterReport {
+        // A vehicle that has left computes no divisions: its hash would soon be outdated.
+        let hash = if self.is_alive(self.own) { self.hash } else { 0 };
+        let entry =
+            |m: &FleetMember| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
+        RosterReport {
+            divisions: self.divisions.len() as u8,
+            first: first as u8,
+            committed_hash: self.committed_hash,
+            hash,
+            entries: self.members.iter().skip(first).take(MAX_ENTRIES).map(entry).collect(),
+            ..RosterReport::default()
+        }
+    }
+}
