@@ -81,27 +81,36 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// The vehicle of this rank was started again: it is a new vehicle.
+    /// The vehicle of this rank was started again. In a flight under way it keeps its status and
+    /// progress: of two sides that do not hear each other one might count it again and the other
+    /// not, and both be a majority. Before that flight and after it, it is a new vehicle.
     fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, waits: bool) {
-        if !waits && !self.is_alive(usize::from(self.own)) && !self.knows_flight() {
+        let (alive, flight) = (self.is_alive(usize::from(self.own)), self.knows_flight());
+        if !waits && !alive && !flight {
             // The flight in which this vehicle left is over, and another one begins.
             self.forget_plan();
         }
         let member = &mut self.members[rank];
-        member.entry = RosterReportEntry { incarnation, ..RosterReportEntry::default() };
+        let RosterReportEntry { status, progress_dm, .. } = member.entry;
+        let kept = RosterReportEntry { status, progress_dm, ..RosterReportEntry::default() };
+        let kept = if alive && (!waits || flight) { kept } else { RosterReportEntry::default() };
+        member.entry = RosterReportEntry { incarnation, ..kept };
         member.hash = 0;
     }
 
     /// Handles the entry about this vehicle in another one's report.
     fn handle_own_entry(&mut self, entry: &RosterReportEntry, waits: bool) {
-        let own = self.members[usize::from(self.own)].entry;
+        let flies = self.knows_flight();
+        let own = &mut self.members[usize::from(self.own)].entry;
         let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
         let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.status > own.status);
         match (outlived, waits) {
             (false, _) => {}
             // This vehicle was restarted: the others report its flight before.
-            (true, true) => self.rejoin((entry.incarnation + 1) % INCARNATIONS),
-            (true, false) => self.excluded = true,
+            (true, true) if !flies => self.rejoin((entry.incarnation + 1) % INCARNATIONS),
+            // It was restarted in their flight, in which it is no new vehicle.
+            (true, true) => own.incarnation = entry.incarnation,
+            (true, false) => (own.incarnation, self.excluded) = (entry.incarnation, true),
         }
     }
 

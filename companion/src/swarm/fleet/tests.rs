@@ -302,4 +302,120 @@ proptest! {
             prop_assert!((0..count).all(|rank| fleet.is_alive(rank)), "{own}: {fleet:?}");
         }
     }
+
+    /// One that has finished or left, or was lost, is started again while others fly; then the
+    /// fleet falls apart. Of any two parts one at most is a majority and takes the other's part.
+    #[test]
+    fn one_started_again_in_the_flight_of_others_makes_no_second_majority(
+        count in 3usize..=MOST, seed in any::<u64>(), lossy in any::<bool>(),
+        status in proptest::sample::select(&[MemberStatus::Finished, MemberStatus::Left][..]),
+        resets in any::<bool>(), side in any::<u32>(), apart_before in any::<bool>(),
+        late_s in proptest::option::of(3u32..9),
+    ) {
+        let mut swarm =
+            Swarm::flying(count, if lossy { 0.3 } else { 0.0 }, seed, PLANS[0]);
+        let again = swarm.below(count as u32) as usize;
+        let other = (again + 1) % count;
+        if let Some(late_s) = late_s {
+            // It is started again after one of the others was: the rest wait, and have heard that.
+            for own in 0..count {
+                swarm.end(own, MemberStatus::Left);
+            }
+            swarm.run_s(5);
+            for own in (0..count).filter(|own| *own != again) {
+                swarm.plan(own, PLANS[0]);
+            }
+            swarm.run_s(READY_S);
+            swarm.start(other);
+            swarm.run_s(late_s);
+        } else {
+            swarm.run_s(20);
+            swarm.end(again, status);
+            swarm.run_s(5);
+        }
+        let part = |swarm: &mut Swarm| {
+            let apart = |own: usize| (0..count)
+                .filter(|rank| (side >> rank ^ side >> own) & 1 == 0)
+                .fold(0, |bits, rank| bits | 1 << rank);
+            (0..count).for_each(|own| swarm.links[own] = apart(own));
+        };
+        if apart_before {
+            part(&mut swarm);
+            swarm.run_s(5);
+        }
+        if resets {
+            swarm.reset(again);
+            swarm.run_s(2);
+        }
+        swarm.plan(again, PLANS[0]);
+        if late_s.is_some() {
+            for own in (0..count).filter(|own| *own != again) {
+                swarm.start(own);
+                swarm.step();
+            }
+        }
+        swarm.run_s(READY_S);
+        swarm.start(again);
+        swarm.run_s(2);
+        (0..count).for_each(|own| swarm.vehicles[own].on_pad = swarm.vehicles[own].waits);
+        part(&mut swarm);
+        for second in 0..120 {
+            swarm.run_s(1);
+            // By then each side's lease ended that a majority of it does not hear.
+            let holds = |own: &usize| {
+                let vehicle = &swarm.vehicles[*own];
+                !vehicle.waits
+                    && vehicle.status == MemberStatus::Alive
+                    && vehicle.fleet.has_lease(vehicle.clock(swarm.now))
+            };
+            let leases = (0..count).filter(holds).fold(0u32, |bits, own| bits | 1 << own);
+            let sides = [leases & side, leases & !side];
+            prop_assert!(
+                second < 30 || sides.contains(&0),
+                "{second} s: vehicle {again}, side {:b}, leases {leases:b}: {:#?}",
+                side & ((1 << count) - 1),
+                swarm.vehicles.iter().map(|v| &v.fleet).collect::<Vec<_>>()
+            );
+        }
+    }
+
+    /// A board that restarts in the air in any flight leaves, with the progress that others heard.
+    #[test]
+    fn a_board_that_restarts_in_the_air_leaves_with_its_progress(
+        count in 2usize..=MOST, seed in any::<u64>(), lossy in any::<bool>(),
+        flights in 1u32..4, hears in 0u32..6,
+    ) {
+        let mut swarm = Swarm::flying(count, if lossy { 0.3 } else { 0.0 }, seed, PLANS[0]);
+        for flight in 1..flights {
+            swarm.run_s(10);
+            for own in 0..count {
+                swarm.end(own, MemberStatus::Finished);
+            }
+            swarm.run_s(5);
+            for own in 0..count {
+                swarm.plan(own, PLANS[flight as usize % 2]);
+            }
+            swarm.run_s(READY_S);
+            for own in 0..count {
+                swarm.start(own);
+                swarm.vehicles[own].on_pad = false;
+            }
+        }
+        let flown_s = 20 + swarm.below(100);
+        swarm.run_s(flown_s);
+        let struck = swarm.below(count as u32) as usize;
+        let progress_dm = swarm.vehicles[struck].progress_dm;
+        swarm.reset(struck);
+        // Until it finds itself in the air it may hear others.
+        (0..hears).for_each(|_| swarm.step());
+        swarm.start(struck);
+        swarm.end(struck, MemberStatus::Left);
+        swarm.run_s(60);
+        for own in (0..count).filter(|own| *own != struck) {
+            let lots = swarm.lots(own);
+            prop_assert_eq!(lots.len(), 1, "{}: {:?}", own, &swarm.vehicles[own].fleet);
+            let lot = lots[0][struck];
+            prop_assert!(!lot.alive && lot.along_dm + 50 >= progress_dm, "{progress_dm}: {lot:?}");
+        }
+    }
 }
