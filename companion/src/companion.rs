@@ -255,7 +255,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     ) {
         self.now = now;
         match (wanted, self.mission.state(), outcome) {
-            (PlanKind::Mission, State::Planning, Ok(plan)) => self.mission.set_plan(plan),
+            (PlanKind::Mission, State::Planning, Ok(plan)) => {
+                self.mission.set_plan(plan);
+                self.neighbours.fleet_mut().into_iter().for_each(|f| f.set_plan(plan.plan_crc));
+            }
             (PlanKind::Mission, State::Planning, Err(failure)) => self.mission.set_failure(failure),
             (PlanKind::Detour, ..) if !self.detours.is_request_read() => return,
             (PlanKind::Detour, State::Replanning | State::PadReplanning, Ok(plan)) => {

@@ -5,12 +5,12 @@
 //!
 //! | byte | type | field |
 //! |---|---|---|
-//! | 0 | u8 | version, 1 |
+//! | 0 | u8 | version, 2 |
 //! | 1 | u8 | system id |
-//! | 2 | u8 | number of committed divisions: those on whose hash all that take part agreed |
+//! | 2 | u8 | bits 0–3: number of committed divisions, those on whose hash all that take part agreed; 6: whether the sender hears a vehicle that sets bit 7; 7: whether the sender was started and takes part |
 //! | 3 | u8 | rank of the first vehicle below |
 //! | 4 | u8 | number of vehicles n, 1…22 |
-//! | 5 | u8 | 0 |
+//! | 5 | u8 | plan of the sender's flight, before any division: the four bytes of its CRC-32 combined by exclusive or, 1 for 0; 0 while it has none |
 //! | 6 | u32 | CRC-32 of the mission file |
 //! | 10 | u32 | hash of the last committed division; 0 for none |
 //! | 14 | u32 | hash of the division under way, as the sender computed it; 0 for none |
@@ -23,12 +23,16 @@ use heapless::Vec;
 /// Private payload type of TUNNEL, in the range 32768…65535 that MAVLink leaves free.
 pub const PAYLOAD_TYPE: u16 = 0xF10E;
 /// Version of the payload's layout.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 /// Most vehicles in one message.
 pub const MAX_ENTRIES: usize = 22;
 const TUNNEL_HEADER_LEN: usize = 5;
 const HEADER_LEN: usize = 18;
 const ENTRY_LEN: usize = 5;
+/// Bits of the number of committed divisions.
+const DIVISIONS: u8 = 15;
+const HEARS_FLIGHT: u8 = 1 << 6;
+const IN_FLIGHT: u8 = 1 << 7;
 /// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
 pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_ENTRIES * ENTRY_LEN;
 
@@ -77,10 +81,18 @@ pub struct RosterReportEntry {
 pub struct RosterReport {
     /// MAVLink system id of the sender.
     pub system_id: u8,
-    /// Number of committed divisions, on whose hash all that take part agreed, as the sender knows.
+    /// Number of committed divisions, on whose hash all that take part agreed, as the sender knows;
+    /// at most 15.
     pub divisions: u8,
+    /// Whether the sender was started and takes part.
+    pub in_flight: bool,
+    /// Whether the sender hears another vehicle that was started and takes part.
+    pub hears_flight: bool,
     /// Rank of the vehicle of the first entry.
     pub first: u8,
+    /// 8 bits of the CRC of the plan of the sender's flight, before any division; 0 while it has
+    /// none. Places along paths and divisions are of that plan.
+    pub plan: u8,
     /// CRC-32 of the mission file.
     pub mission_crc: u32,
     /// Hash of the last committed division; 0 for none.
@@ -99,7 +111,11 @@ impl RosterReport {
         (out[2], out[3], out[4]) = (0, 0, len as u8);
         let body = &mut out[TUNNEL_HEADER_LEN..];
         let count = self.entries.len() as u8;
-        body[..6].copy_from_slice(&[VERSION, self.system_id, self.divisions, self.first, count, 0]);
+        let Self { system_id, first, plan, .. } = *self;
+        let divisions = self.divisions & DIVISIONS
+            | if self.hears_flight { HEARS_FLIGHT } else { 0 }
+            | if self.in_flight { IN_FLIGHT } else { 0 };
+        body[..6].copy_from_slice(&[VERSION, system_id, divisions, first, count, plan]);
         body[6..10].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[10..14].copy_from_slice(&self.committed_hash.to_le_bytes());
         body[14..18].copy_from_slice(&self.hash.to_le_bytes());
@@ -148,8 +164,11 @@ impl RosterReport {
         };
         Some(Self {
             system_id: sender,
-            divisions: body[2],
+            divisions: body[2] & DIVISIONS,
+            in_flight: body[2] & IN_FLIGHT != 0,
+            hears_flight: body[2] & HEARS_FLIGHT != 0,
             first: body[3],
+            plan: body[5],
             mission_crc: word(6),
             committed_hash: word(10),
             hash: word(14),
@@ -177,7 +196,8 @@ mod tests {
                 (0u8..8, 0usize..4, any::<u16>(), any::<Option<u16>>(), any::<[bool; 2]>()),
                 1..=MAX_ENTRIES,
             ),
-            head in any::<(u8, u8, u32, u32, u32)>(),
+            head in (0u8..16, any::<u8>(), any::<u8>(), any::<u32>(), any::<u32>(), any::<u32>()),
+            [in_flight, hears_flight] in any::<[bool; 2]>(),
         ) {
             let entries = entries
                 .iter()
@@ -192,11 +212,14 @@ mod tests {
                     }
                 })
                 .collect();
-            let (divisions, first, mission_crc, counted, hash) = head;
+            let (divisions, first, plan, mission_crc, counted, hash) = head;
             let roster = RosterReport {
                 system_id: 9,
                 divisions,
+                in_flight,
+                hears_flight,
                 first,
+                plan,
                 mission_crc,
                 committed_hash: counted,
                 hash,
@@ -204,7 +227,7 @@ mod tests {
             };
             prop_assert_eq!(RosterReport::decode(&padded(&roster), 9), Some(roster.clone()));
             prop_assert_eq!(RosterReport::decode(&padded(&roster), 8), None);
-            for (at, value) in [(0, 0), (4, 17), (5, 2), (9, 0), (9, 23)] {
+            for (at, value) in [(0, 0), (4, 17), (5, 1), (9, 0), (9, 23)] {
                 let mut bad = padded(&roster);
                 bad[at] = value;
                 prop_assert_eq!(RosterReport::decode(&bad, 9), None);

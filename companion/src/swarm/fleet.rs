@@ -13,10 +13,13 @@
 use heapless::Vec;
 use planner_core::file::CRC32;
 
-use crate::link::roster::{MAX_ENTRIES, MemberStatus, RosterReport, RosterReportEntry};
+use crate::link::roster::{MemberStatus, RosterReportEntry};
 use crate::time::{Duration, Instant};
 
 mod lots;
+mod reports;
+#[cfg(test)]
+mod tests;
 mod timeouts;
 
 pub use lots::{DivisionInput, DivisionInputs};
@@ -78,7 +81,7 @@ struct FleetMember {
 /// What this vehicle knows of all vehicles of the roster, itself included, and of their divisions.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Fleet<const V: usize> {
-    own: usize,
+    own: u8,
     members: Vec<FleetMember, V>,
     /// Inputs of the binding divisions, oldest first.
     divisions: Vec<DivisionInputs<V>, MAX_DIVISIONS>,
@@ -91,6 +94,16 @@ pub struct Fleet<const V: usize> {
     previous_hash: u32,
     lease_at: Instant,
     excluded: bool,
+    /// 8 bits of the CRC of the plan that this flight began with; 0 while there is none.
+    plan: u8,
+    /// Whether this vehicle waits for its start, and knows of none that was started: there is no
+    /// flight in which one could be lost or leave.
+    idle: bool,
+    /// Ranks of the vehicles in flight, by what they report themselves, as bits: those that were
+    /// started, and take part.
+    in_flight: u32,
+    /// Ranks of the other vehicles that report that they hear one in flight, as bits.
+    hear_flight: u32,
     limits: FleetTimeouts,
 }
 
@@ -99,7 +112,7 @@ impl<const V: usize> Fleet<V> {
     pub fn new(own: usize, count: usize, limits: FleetTimeouts) -> Self {
         let member = FleetMember { in_roster: true, ..FleetMember::default() };
         Self {
-            own,
+            own: own as u8,
             members: core::iter::repeat_n(member, count.min(V)).collect(),
             divisions: Vec::new(),
             committed_hash: 0,
@@ -109,28 +122,56 @@ impl<const V: usize> Fleet<V> {
             previous_hash: 0,
             lease_at: Instant::ZERO,
             excluded: false,
+            plan: 0,
+            idle: false,
+            in_flight: 0,
+            hear_flight: 0,
             limits,
         }
     }
 
-    /// Begins a flight, or a new plan: all silence before is forgotten. A vehicle that was lost,
-    /// has left or flew a division takes part again under a new incarnation number.
+    /// Begins a flight, or a new plan: all silence before, and what was flown of the plan before,
+    /// is forgotten. A vehicle that was lost, has left or flew a division takes part again under a
+    /// new incarnation number.
     pub fn begin_flight(&mut self, now: Instant) {
-        let entry = self.members[self.own].entry;
+        let entry = self.members[usize::from(self.own)].entry;
         if entry.status != MemberStatus::Alive || self.excluded || !self.divisions.is_empty() {
             self.rejoin((entry.incarnation + 1) % INCARNATIONS);
         }
+        self.forget_plan();
+        (self.in_flight, self.hear_flight) = (0, 0);
         self.members.iter_mut().for_each(|member| member.heard_at = now);
         self.lease_at = now;
+    }
+
+    /// Sets the plan of this flight, by its CRC: places along paths and divisions that others report
+    /// count only if they are of the same plan.
+    pub fn set_plan(&mut self, plan_crc: u32) {
+        // 0 stands for no plan.
+        self.plan = plan_crc.to_le_bytes().into_iter().fold(0, |bits, byte| bits ^ byte).max(1);
+    }
+
+    /// Forgets the plan, its divisions, and all places along its paths.
+    fn forget_plan(&mut self) {
+        (self.plan, self.committed_hash, self.hash, self.previous_hash) = (0, 0, 0, 0);
+        self.divisions.clear();
+        self.division_inputs.clear();
+        self.previous_inputs.clear();
+        for member in &mut self.members {
+            member.entry = entry_in_division(&member.entry, false);
+            (member.in_roster, member.hash) = (true, 0);
+        }
     }
 
     /// Forgets what is known of the fleet, and takes part again under this incarnation number.
     fn rejoin(&mut self, incarnation: u8) {
         *self = Self {
             lease_at: self.lease_at,
-            ..Self::new(self.own, self.members.len(), self.limits)
+            in_flight: self.in_flight,
+            hear_flight: self.hear_flight,
+            ..Self::new(usize::from(self.own), self.members.len(), self.limits)
         };
-        self.members[self.own].entry.incarnation = incarnation;
+        self.members[usize::from(self.own)].entry.incarnation = incarnation;
     }
 
     /// One step: updates this vehicle's entry, the reception of the others, the lease, and the
@@ -143,43 +184,92 @@ impl<const V: usize> Fleet<V> {
     ) {
         // This vehicle may not yet have the path of the last division.
         let caught_up = own.division == self.divisions.len();
-        let entry = &mut self.members[self.own].entry;
+        let entry = &mut self.members[usize::from(self.own)].entry;
         // The path of a vehicle that has left is no part of its share: its progress does not count.
         if caught_up && entry.status == MemberStatus::Alive {
             entry.progress_dm = entry.progress_dm.max(own.progress_dm);
         }
         entry.status = entry.status.max(status_in_division(own.status, caught_up));
-        let mut linked = 1u32 << self.own.min(31);
+        let takes_off = !own.waits && entry.status == MemberStatus::Alive;
+        self.note_flight(usize::from(self.own), takes_off, false);
+        let mut linked = self.own_bit();
         for (rank, member) in self.members.iter_mut().enumerate() {
             let heard = hearing(rank);
             let lately = heard.heard_at.is_some_and(|at| now - at <= self.limits.heard);
-            if rank == self.own || lately || heard.heard_by_others {
+            if rank == usize::from(self.own) || lately || heard.heard_by_others {
                 member.heard_at = now;
             }
             member.heard_itself = lately;
+            if now - member.heard_at >= self.limits.silent {
+                self.hear_flight &= !(1 << rank.min(31));
+            }
             linked |= u32::from(lately && heard.hears_us) << rank.min(31);
         }
         if self.is_majority(|rank, _| linked >> rank & 1 != 0) {
             self.lease_at = now;
         }
-        if self.has_lease(now) {
-            let silent = self.limits.silent;
-            for member in
-                self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= silent)
-            {
-                member.entry.status = member.entry.status.max(MemberStatus::Lost);
-            }
+        self.idle = own.waits && !self.knows_flight();
+        if self.idle {
+            self.forget_earlier_flight(now);
         }
-        let asks = own.wants_division && self.is_alive(self.own) && !self.divisions.is_full();
+        if self.has_lease(now) {
+            self.count_silent_as_lost(now);
+        }
+        let asks =
+            own.wants_division && self.is_alive(usize::from(self.own)) && !self.divisions.is_full();
         if (self.is_dividing() || asks) && caught_up {
             // This vehicle's promise, in its next report, also requests the division from the
             // others.
-            let entry = &mut self.members[self.own].entry;
+            let entry = &mut self.members[usize::from(self.own)].entry;
             entry.commitment_dm = entry.commitment_dm.or(own.commitment_dm);
             entry.holds |= own.holds && entry.commitment_dm.is_some();
             self.prepare_division_inputs(now);
             if self.is_division_agreed(now) {
                 self.commit_division();
+            }
+        }
+    }
+
+    fn count_silent_as_lost(&mut self, now: Instant) {
+        let silent = self.limits.silent;
+        for member in self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= silent)
+        {
+            member.entry.status = member.entry.status.max(MemberStatus::Lost);
+        }
+    }
+
+    /// Notes what the vehicle of this rank reports: whether it is in flight, and hears one that is.
+    fn note_flight(&mut self, rank: usize, flies: bool, hears: bool) {
+        let bit = 1u32 << rank.min(31);
+        for (bits, set) in [(&mut self.in_flight, flies), (&mut self.hear_flight, hears)] {
+            *bits = if set { *bits | bit } else { *bits & !bit };
+        }
+    }
+
+    /// Whether another vehicle is in flight, as far as this one has heard, or as one that it hears
+    /// has. A vehicle that fell silent in flight may still fly.
+    fn knows_flight(&self) -> bool {
+        self.heard_flights() | self.hear_flight & !self.own_bit() != 0
+    }
+
+    /// Ranks of the other vehicles that this one knows to be in flight, as bits.
+    fn heard_flights(&self) -> u32 {
+        let counts = |rank: &usize| self.members[*rank].entry.status <= MemberStatus::Lost;
+        let known = (0..self.members.len()).filter(counts).fold(0, |bits, rank| bits | 1 << rank);
+        self.in_flight & known & !self.own_bit()
+    }
+
+    fn own_bit(&self) -> u32 {
+        1 << self.own.min(31)
+    }
+
+    /// Before a start vehicles come up one after the other, and report places along their paths of
+    /// an earlier flight: neither silence nor progress counts yet.
+    fn forget_earlier_flight(&mut self, now: Instant) {
+        for (rank, member) in self.members.iter_mut().enumerate() {
+            member.heard_at = now;
+            if rank != usize::from(self.own) {
+                member.entry = entry_in_division(&member.entry, false);
             }
         }
     }
@@ -194,7 +284,7 @@ impl<const V: usize> Fleet<V> {
             MemberStatus::Finished => false,
         };
         let asked = self.members.iter().any(|m| m.in_roster && asks(m));
-        self.is_alive(self.own) && !self.divisions.is_full() && asked
+        self.is_alive(usize::from(self.own)) && !self.idle && !self.divisions.is_full() && asked
     }
 
     /// Whether the vehicle of this rank takes part in the mission.
@@ -267,7 +357,7 @@ impl<const V: usize> Fleet<V> {
             }
             // 0 stands for no hash.
             self.hash = digest.finalize().max(1);
-            self.members[self.own].hash = self.hash;
+            self.members[usize::from(self.own)].hash = self.hash;
         }
     }
 
@@ -294,125 +384,23 @@ impl<const V: usize> Fleet<V> {
         for (member, lot) in self.members.iter_mut().zip(&lots) {
             member.in_roster &= lot.alive;
             member.hash = 0;
-            let RosterReportEntry { incarnation, status: standing, .. } = member.entry;
-            let standing = status_in_division(standing, !lot.alive);
-            member.entry =
-                RosterReportEntry { incarnation, status: standing, ..RosterReportEntry::default() };
+            member.entry = entry_in_division(&member.entry, !lot.alive);
         }
         // With `MAX_DIVISIONS` no further one is ever under way.
         let _ = self.divisions.push(lots);
     }
 
-    /// Handles the roster report of the vehicle of rank `sender`; `waits`: this vehicle was not
-    /// started.
-    pub fn handle_roster(&mut self, sender: usize, roster: &RosterReport, waits: bool) {
-        if sender >= self.members.len() || sender == self.own {
-            return;
-        }
-        let here = self.divisions.len() as u8;
-        if roster.divisions > here && !self.adopt_division(roster) {
-            self.excluded = !waits;
-        }
-        let same = usize::from(roster.divisions) == self.divisions.len();
-        if same {
-            self.members[sender].hash = roster.hash;
-        }
-        for (rank, entry) in
-            roster.entries.iter().enumerate().map(|(i, e)| (i + usize::from(roster.first), e))
-        {
-            if rank == self.own {
-                self.handle_own_entry(entry, waits);
-            } else if rank < self.members.len() {
-                let behind = roster.divisions < self.divisions.len() as u8 && rank != sender;
-                // The member may have finished its share of a division that the sender does not
-                // know; it reports that itself.
-                if !(behind
-                    && entry.status == MemberStatus::Left
-                    && self.members[rank].heard_itself)
-                {
-                    self.merge_entry(rank, entry, same);
-                }
-                if same && entry.agrees && rank != sender && roster.hash != 0 {
-                    self.members[rank].hash = roster.hash;
-                }
-            }
-        }
-    }
-
-    /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
-    /// then the others counted on that. Returns whether it did.
-    fn adopt_division(&mut self, roster: &RosterReport) -> bool {
-        let here = self.divisions.len() as u8;
-        if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
-            return false;
-        }
-        if roster.committed_hash == self.previous_hash {
-            (self.division_inputs, self.hash) = (self.previous_inputs.clone(), self.previous_hash);
-        }
-        let reported = roster.committed_hash == self.hash;
-        if reported {
-            self.commit_division();
-        }
-        reported
-    }
-
-    fn merge_entry(&mut self, rank: usize, entry: &RosterReportEntry, same: bool) {
-        let member = &mut self.members[rank];
-        let newer = entry.incarnation.wrapping_sub(member.entry.incarnation) % INCARNATIONS;
-        if newer >= INCARNATIONS / 2 {
-            return;
-        }
-        if newer > 0 {
-            let RosterReportEntry { incarnation, .. } = *entry;
-            member.entry = RosterReportEntry { incarnation, ..RosterReportEntry::default() };
-        }
-        let known = &mut member.entry;
-        known.status = known.status.max(status_in_division(entry.status, same));
-        if same {
-            known.progress_dm = known.progress_dm.max(entry.progress_dm);
-            known.commitment_dm = known.commitment_dm.or(entry.commitment_dm);
-            known.holds |= entry.holds;
-        }
-    }
-
-    /// Handles the entry about this vehicle in another one's report.
-    fn handle_own_entry(&mut self, entry: &RosterReportEntry, waits: bool) {
-        let own = self.members[self.own].entry;
-        let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
-        let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.status > own.status);
-        match (outlived, waits) {
-            (false, _) => {}
-            // This vehicle was restarted: the others report its flight before.
-            (true, true) => self.rejoin((entry.incarnation + 1) % INCARNATIONS),
-            (true, false) => self.excluded = true,
-        }
-    }
-
-    /// The roster report of this vehicle, with the entries from rank `first` on.
-    pub fn roster_message(&self, first: usize) -> RosterReport {
-        // A vehicle that has left computes no divisions: its hash would soon be outdated.
-        let hash = if self.is_alive(self.own) { self.hash } else { 0 };
-        let entry =
-            |m: &FleetMember| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
-        RosterReport {
-            divisions: self.divisions.len() as u8,
-            first: first as u8,
-            committed_hash: self.committed_hash,
-            hash,
-            entries: self.members.iter().skip(first).take(MAX_ENTRIES).map(entry).collect(),
-            ..RosterReport::default()
-        }
-    }
-
     /// Moves all times to a clock that shows `then` where the old one shows `now`; ages past every
-    /// limit are cut to that limit. Fleets that will act alike become equal, so a search recognises
-    /// a state that it has visited.
+    /// limit are cut to that limit, and which others are in flight is forgotten: that matters only
+    /// before a start. Fleets that will act alike become equal, so a search recognises a state that
+    /// it has visited.
     pub fn move_to_clock(&mut self, now: Instant, then: Instant) {
         let FleetTimeouts { lease, silent, down, .. } = self.limits;
         let moved = |at: Instant, most: Duration| {
             let age = (now - at).min(most);
             Instant::from_micros(then.as_micros().saturating_sub(age.as_micros()))
         };
+        (self.in_flight, self.hear_flight) = (self.in_flight & self.own_bit(), 0);
         self.lease_at = moved(self.lease_at, Duration::from_micros(2 * lease.as_micros()));
         for member in &mut self.members {
             let counts = member.in_roster && member.entry.status <= MemberStatus::Lost;
@@ -433,7 +421,7 @@ impl<const V: usize> Fleet<V> {
     /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
     /// takes no part, and needs no lease.
     pub fn unheard_for(&self, now: Instant) -> Duration {
-        if self.is_alive(self.own) { now - self.lease_at } else { Duration::default() }
+        if self.is_alive(usize::from(self.own)) { now - self.lease_at } else { Duration::default() }
     }
 
     /// Hash of the inputs of all binding divisions, and of the one that is to be computed.
@@ -449,13 +437,13 @@ impl<const V: usize> Fleet<V> {
     /// Place where this vehicle promised to hold, decimetres along its path, while a division is
     /// under way; `None` before its promise.
     pub fn commitment_dm(&self) -> Option<u16> {
-        self.members[self.own].entry.commitment_dm.filter(|_| self.is_dividing())
+        self.members[usize::from(self.own)].entry.commitment_dm.filter(|_| self.is_dividing())
     }
 
     /// Place where this vehicle held for the last binding division, decimetres along its path
     /// before it.
     pub fn held_at_dm(&self) -> u16 {
-        let lots = self.divisions.last().and_then(|lots| lots.get(self.own));
+        let lots = self.divisions.last().and_then(|lots| lots.get(usize::from(self.own)));
         lots.map_or(0, |lot| lot.along_dm)
     }
 
@@ -472,17 +460,17 @@ impl<const V: usize> Fleet<V> {
     /// Whether the others count this vehicle as lost, or have divided its part; false for one that
     /// has finished its part.
     pub fn is_excluded(&self) -> bool {
-        self.excluded && self.members[self.own].entry.status != MemberStatus::Finished
+        self.excluded && self.members[usize::from(self.own)].entry.status != MemberStatus::Finished
     }
 
     /// Whether this vehicle flies its part of the area, or will.
     pub(crate) fn takes_part(&self) -> bool {
-        self.is_alive(self.own)
+        self.is_alive(usize::from(self.own))
     }
 
     /// Whether this vehicle has left the mission and reported that.
     pub(crate) fn has_reported_leaving(&self) -> bool {
-        self.members[self.own].entry.status == MemberStatus::Left
+        self.members[usize::from(self.own)].entry.status == MemberStatus::Left
     }
 
     /// Whether a vehicle that takes part has not been heard for `span`.
@@ -493,8 +481,16 @@ impl<const V: usize> Fleet<V> {
     }
 }
 
-/// The status that counts for another division than that of the report: one that had finished its
-/// part then may have another part now, so it counts as having left.
+/// The status that counts for another plan or division than that of the report: one that had
+/// finished its part then may have another part now, so it counts as having left.
 fn status_in_division(standing: MemberStatus, same: bool) -> MemberStatus {
     if standing == MemberStatus::Finished && !same { MemberStatus::Left } else { standing }
+}
+
+/// The entry with which a vehicle enters another plan or division: without places along the path
+/// before it. `same` as in [`status_in_division`].
+fn entry_in_division(entry: &RosterReportEntry, same: bool) -> RosterReportEntry {
+    let RosterReportEntry { incarnation, status, .. } = *entry;
+    let status = status_in_division(status, same);
+    RosterReportEntry { incarnation, status, ..RosterReportEntry::default() }
 }

@@ -409,6 +409,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
             let roster = RosterReport {
                 system_id,
                 first: first as u8,
+                plan: PLAN_CRC as u8,
                 mission_crc,
                 entries,
                 ..RosterReport::default()

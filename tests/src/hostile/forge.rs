@@ -223,6 +223,10 @@ fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> 
     let roster = RosterReport {
         system_id: if how & 8 == 0 { NEIGHBOUR } else { bits as u8 },
         divisions: if ahead { (bits >> 8) as u8 } else { 0 },
+        in_flight: bits >> 4 & 1 != 0,
+        hears_flight: bits >> 5 & 1 != 0,
+        // The plan of the flight, whose CRC is 5, or another one.
+        plan: if how & 32 == 0 { 5 } else { (bits >> 16) as u8 },
         first: if how & 64 == 0 { 0 } else { 1 + (bits >> 16) as u8 % 255 },
         mission_crc: if how & 16 == 0 { 0xC0FFEE } else { bits as u32 },
         committed_hash: (bits >> 24) as u32 % 3,

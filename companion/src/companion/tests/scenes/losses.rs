@@ -32,8 +32,14 @@ pub(super) fn over_a_field_with(plan: Plan, state: State) -> Bench {
 fn tells(b: &mut Bench, own: MemberStatus, other: MemberStatus) {
     let entry = |standing| RosterReportEntry { status: standing, ..RosterReportEntry::default() };
     let entries = [entry(own), entry(other)].into_iter().collect();
-    let roster =
-        RosterReport { system_id: 77, mission_crc: 0xC0FFEE, entries, ..RosterReport::default() };
+    let plan = super::super::divisions::own_roster(b).plan;
+    let roster = RosterReport {
+        system_id: 77,
+        mission_crc: 0xC0FFEE,
+        plan,
+        entries,
+        ..RosterReport::default()
+    };
     let mut payload = [0; roster::MAX_LEN];
     let len = roster.encode(&mut payload);
     tunnels(b, &payload[..len]);

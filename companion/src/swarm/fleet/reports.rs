@@ -1,0 +1,135 @@
+//! What the vehicles of a fleet report to each other, and how a report changes what this one knows.
+
+use super::{Fleet, FleetMember, INCARNATIONS, status_in_division};
+use crate::link::roster::{MAX_ENTRIES, MemberStatus, RosterReport, RosterReportEntry};
+
+impl<const V: usize> Fleet<V> {
+    /// Handles the roster report of the vehicle of rank `sender`; `waits`: this vehicle was not
+    /// started.
+    pub fn handle_roster(&mut self, sender: usize, roster: &RosterReport, waits: bool) {
+        if sender >= self.members.len() || sender == usize::from(self.own) {
+            return;
+        }
+        self.note_flight(sender, roster.in_flight, roster.hears_flight);
+        let here = self.divisions.len() as u8;
+        // The sender may fly, or have flown, by another plan: before a restart, or without what was
+        // photographed meanwhile. Its divisions and places are none of this vehicle's plan.
+        let same_plan = roster.plan == self.plan;
+        if same_plan && roster.divisions > here && !self.adopt_division(roster) {
+            self.excluded = !waits;
+        }
+        let same = same_plan && usize::from(roster.divisions) == self.divisions.len();
+        if same || !same_plan {
+            self.members[sender].hash = if same { roster.hash } else { 0 };
+        }
+        for (rank, entry) in
+            roster.entries.iter().enumerate().map(|(i, e)| (i + usize::from(roster.first), e))
+        {
+            if rank == usize::from(self.own) {
+                self.handle_own_entry(entry, waits);
+            } else if rank < self.members.len() {
+                let behind =
+                    same_plan && roster.divisions < self.divisions.len() as u8 && rank != sender;
+                // The member may have finished its share of a division that the sender does not
+                // know; it reports that itself.
+                if !(behind
+                    && entry.status == MemberStatus::Left
+                    && self.members[rank].heard_itself)
+                {
+                    self.merge_entry(rank, entry, same, waits);
+                }
+                if same && entry.agrees && rank != sender && roster.hash != 0 {
+                    self.members[rank].hash = roster.hash;
+                }
+            }
+        }
+    }
+
+    /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
+    /// then the others counted on that. Returns whether it did.
+    fn adopt_division(&mut self, roster: &RosterReport) -> bool {
+        let here = self.divisions.len() as u8;
+        if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
+            return false;
+        }
+        if roster.committed_hash == self.previous_hash {
+            (self.division_inputs, self.hash) = (self.previous_inputs.clone(), self.previous_hash);
+        }
+        let reported = roster.committed_hash == self.hash;
+        if reported {
+            self.commit_division();
+        }
+        reported
+    }
+
+    /// Merges what another vehicle reports of the vehicle of this rank; `waits` as above.
+    fn merge_entry(&mut self, rank: usize, entry: &RosterReportEntry, same: bool, waits: bool) {
+        let newer =
+            entry.incarnation.wrapping_sub(self.members[rank].entry.incarnation) % INCARNATIONS;
+        if newer >= INCARNATIONS / 2 {
+            return;
+        }
+        if newer > 0 {
+            self.take_newer_incarnation(rank, entry.incarnation, waits);
+        }
+        let known = &mut self.members[rank].entry;
+        known.status = known.status.max(status_in_division(entry.status, same));
+        if same {
+            known.progress_dm = known.progress_dm.max(entry.progress_dm);
+            known.commitment_dm = known.commitment_dm.or(entry.commitment_dm);
+            known.holds |= entry.holds;
+        }
+    }
+
+    /// The vehicle of this rank was started again. In a flight under way it keeps its status and
+    /// progress: of two sides that do not hear each other one might count it again and the other
+    /// not, and both be a majority. Before that flight and after it, it is a new vehicle.
+    fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, waits: bool) {
+        let (alive, flight) = (self.is_alive(usize::from(self.own)), self.knows_flight());
+        if !waits && !alive && !flight {
+            // The flight in which this vehicle left is over, and another one begins.
+            self.forget_plan();
+        }
+        let member = &mut self.members[rank];
+        let RosterReportEntry { status, progress_dm, .. } = member.entry;
+        let kept = RosterReportEntry { status, progress_dm, ..RosterReportEntry::default() };
+        let kept = if alive && (!waits || flight) { kept } else { RosterReportEntry::default() };
+        member.entry = RosterReportEntry { incarnation, ..kept };
+        member.hash = 0;
+    }
+
+    /// Handles the entry about this vehicle in another one's report.
+    fn handle_own_entry(&mut self, entry: &RosterReportEntry, waits: bool) {
+        let flies = self.knows_flight();
+        let own = &mut self.members[usize::from(self.own)].entry;
+        let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
+        let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.status > own.status);
+        match (outlived, waits) {
+            (false, _) => {}
+            // This vehicle was restarted: the others report its flight before.
+            (true, true) if !flies => self.rejoin((entry.incarnation + 1) % INCARNATIONS),
+            // It was restarted in their flight, in which it is no new vehicle.
+            (true, true) => own.incarnation = entry.incarnation,
+            (true, false) => (own.incarnation, self.excluded) = (entry.incarnation, true),
+        }
+    }
+
+    /// The roster report of this vehicle, with the entries from rank `first` on.
+    pub fn roster_message(&self, first: usize) -> RosterReport {
+        // A vehicle that has left computes no divisions: its hash would soon be outdated.
+        let hash = if self.is_alive(usize::from(self.own)) { self.hash } else { 0 };
+        let entry =
+            |m: &FleetMember| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
+        RosterReport {
+            divisions: self.divisions.len() as u8,
+            first: first as u8,
+            plan: self.plan,
+            in_flight: self.in_flight & self.own_bit() != 0,
+            hears_flight: self.heard_flights() != 0,
+            committed_hash: self.committed_hash,
+            hash,
+            entries: self.members.iter().skip(first).take(MAX_ENTRIES).map(entry).collect(),
+            ..RosterReport::default()
+        }
+    }
+}
