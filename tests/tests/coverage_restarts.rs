@@ -75,8 +75,8 @@ fn what_landed_vehicles_report_of_their_flight_does_not_count_in_the_next() {
     none_is_wrong(restarted);
 }
 
-/// One vehicle is heard, and knows its position, 72 to 82 s after the others, before which nobody is
-/// started. From this height a lost one would be down by then.
+/// One vehicle is heard, and knows its position, 72 to 82 s after the others, before which nobody
+/// is started. From this height a lost one would be down by then.
 #[test]
 fn a_vehicle_that_comes_up_late_flies_its_part() {
     none_is_wrong(|seed| {

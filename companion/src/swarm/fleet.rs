@@ -144,8 +144,8 @@ impl<const V: usize> Fleet<V> {
         self.lease_at = now;
     }
 
-    /// Sets the plan of this flight, by its CRC: places along paths and divisions that others report
-    /// count only if they are of the same plan.
+    /// Sets the plan of this flight, by its CRC: places along paths and divisions that others
+    /// report count only if they are of the same plan.
     pub fn set_plan(&mut self, plan_crc: u32) {
         // 0 stands for no plan.
         self.plan = plan_crc.to_le_bytes().into_iter().fold(0, |bits, byte| bits ^ byte).max(1);

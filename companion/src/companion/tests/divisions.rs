@@ -139,6 +139,8 @@ struct Watch {
     ends: bool,
     /// Ticks for which it waits on its way back.
     returns: u32,
+    /// Whether the other vehicle, heard or not, was last near.
+    near: bool,
     log: Vec<String>,
 }
 
@@ -161,7 +163,8 @@ impl Watch {
         let left = fleet.roster_message(0).entries[0].status == MemberStatus::Left;
         assert!(!left || !flies, "flies on though it left: {said}");
         // On the way back there are no gates.
-        let far = b.neighbour.is_none() || b.neighbour == FAR_AWAY;
+        self.near &= b.neighbour != FAR_AWAY;
+        let far = !self.near && (b.neighbour.is_none() || b.neighbour == FAR_AWAY);
         let halted = far && state == Follow && homeward && guidance.advice.stop_within_m <= 0.05;
         self.returns = if halted { self.returns + 1 } else { 0 };
         assert!(self.returns < 20, "waits on its way back: {said}");
@@ -209,6 +212,7 @@ impl Watch {
             Return => self.ends |= order(b, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
             Battery => b.battery = 2,
         }
+        self.near |= matches!(what, LiesAhead | HoversAhead);
         let ticks = if matches!(what, MuteLong) { 420 } else { 0 };
         (0..ticks).for_each(|_| self.tick(b));
     }
@@ -229,6 +233,7 @@ proptest::proptest! {
             other: Other { mute: true, counts_after, ..Other::default() },
             ends: false,
             returns: 0,
+            near: false,
             log: Vec::new(),
         };
         if !waits {

@@ -88,7 +88,8 @@ fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<
         }
         Paused => {
             b.run_until(paused_in?, 20.0);
-            b.run(0.5);
+            b.run_until_lifted();
+            b.run(0.3);
             assert_eq!(pause(&mut b), Some(ACCEPTED));
             b.run(3.0);
         }

@@ -15,7 +15,11 @@ pub(super) fn over_a_field(state: State) -> Bench {
 
 /// The same by this plan.
 pub(super) fn over_a_field_with(plan: Plan, state: State) -> Bench {
-    let mut config = two_vehicles();
+    over_a_field_of(two_vehicles(), plan, state)
+}
+
+/// The same with this roster.
+fn over_a_field_of(mut config: Config<4>, plan: Plan, state: State) -> Bench {
     config.lost_vehicle_down_s = Some(60.0);
     let mut bench = Bench::new(config);
     bench.answer_plan = Some(Ok(plan));
@@ -96,8 +100,13 @@ pub(super) fn another_leaves(scenes: &mut Scenes) {
 }
 
 pub(super) fn the_others_give_it_up(scenes: &mut Scenes) {
+    // Of three it hears none: no majority.
+    let mut three = two_vehicles();
+    let start = Point::new(8.0, 28.0, 1.5);
+    three.roster.push(RosterEntry { system_id: 78, start }).unwrap();
     let unheard_below_its_layer = |b: &mut Bench| (b.neighbour, b.stuck) = (None, true);
-    scenes.play(over_a_field(Climb), unheard_below_its_layer, Aborted, 60.0);
+    let climbs = over_a_field_of(three, field_plan(), Climb);
+    scenes.play(climbs, unheard_below_its_layer, Aborted, 60.0);
     let given_up = |b: &mut Bench| tells(b, MemberStatus::Lost, MemberStatus::Alive);
     for state in [Climb, Follow, Scheduled, Streaming] {
         scenes.play(over_a_field(state), given_up, Aborted, 60.0);
