@@ -259,7 +259,7 @@ pub static TABLE: &[TransitionRow] = &[
     info_row(&[Climb],               G::PausedBeforeLiftOff, AT_ONCE, CancelStart, A::RequestDisarming, "Paused on the pad"),
     info_row(&[Climb, Follow, Alone, Blocked, Replanning, Dividing], G::PauseCommanded, AT_ONCE, Paused, A::BrakeOnPath, "Paused"),
     warning_row(&[Follow, Blocked, Dividing], G::NeighboursSilent, secs(1), Alone, A::BrakeOnPath,      "Neighbours silent: stopping"),
-    // Others take what they do not hear to be down after a while: no state may keep it up for longer.
+    // Others take what they do not hear to be down after a while: no state keeps it up longer.
     warning_row(&[Paused, AutopilotSilent], G::NeighboursSilent, secs(20), Land,  A::RequestLandMode,   "Neighbours silent while it stands: landing"),
     warning_row(&[TakeOff, Climb],   G::LeaseLost,       secs(20),   Land,        A::RequestLandMode,   "Neighbours silent in the climb: landing"),
     warning_row(&[Follow],           G::PadTaken,        secs(20),   Replanning,  A::RequestLanding,    "No room to land: seeking a place aside"),

@@ -34,9 +34,7 @@ use planner_core::detour;
 use planner_core::frames::Geodetic;
 use planner_core::{Length, Point};
 
-use self::beside::{
-    AreaDetourSearches, BLOCKED_BEYOND_STOP_M, DETOUR_MARGIN_M, STAYS_BLOCKED_BEYOND_M,
-};
+use self::beside::AreaDetourSearches;
 use self::flown::{DetourPurpose, FlownPath};
 use self::homeward::HomewardSearch;
 use crate::link::commands::{ACCEPTED, Command};
@@ -90,8 +88,6 @@ const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Sway, metres: a stopped vehicle this near to the end of a path aside counts as at the end.
 const SWAY_ASIDE_M: f32 = 0.5;
-/// Deviation, metres: a neighbour within the safety distance plus this of the path blocks it.
-const BLOCKED_WITHIN_M: f32 = 0.25;
 
 /// What blocks the path ahead, and the detour that is requested or flown.
 #[derive(Clone, Debug, Default)]
@@ -436,11 +432,7 @@ impl Detours {
         let waits = view.config.lost_vehicle_down_s.is_some()
             && view.mission.state() == State::Blocked
             && self.obstructed;
-        let (beside_m, beyond_m) = if waits {
-            (DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + STAYS_BLOCKED_BEYOND_M)
-        } else {
-            (BLOCKED_WITHIN_M, BLOCKED_BEYOND_STOP_M)
-        };
+        let [beside_m, beyond_m] = beside::blocking_distances_m(waits);
         let apart_m = view.config.safety_distance_m + beside_m;
         let (now, neighbours) = (view.now, view.neighbours);
         let new = self.obstacles.new_ones();

@@ -75,8 +75,8 @@ pub(super) struct CameraControl {
     beside_m: f32,
     /// Whether the vehicle flies a detour beside its path.
     beside: bool,
-    /// The trigger between the first picture of a stretch, or of a detour, and the last: by distance
-    /// the autopilot's is on. `None` elsewhere.
+    /// The trigger between the first picture of a stretch, or of a detour, and the last: by
+    /// distance the autopilot's is on. `None` elsewhere.
     running: Option<Trigger>,
     commands: Deque<CameraCommand, MAX_COMMANDS>,
     /// Number of commands sent since the last answer, repetitions included, and (`sent_at`) when

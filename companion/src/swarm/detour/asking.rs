@@ -5,11 +5,9 @@
 
 use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
-use super::beside::{self, DETOUR_MARGIN_M};
+use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_MARGIN_M};
 use super::flown::{DetourPurpose, FlownPath};
-use super::{
-    BLOCKED_WITHIN_M, DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER,
-};
+use super::{DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER};
 use crate::guidance::evade;
 use crate::mission::State;
 use crate::swarm::view::DetourView;

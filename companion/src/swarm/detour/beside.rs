@@ -18,13 +18,15 @@ use planner_core::{Length, Point};
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
+/// Deviation, metres: a neighbour within the safety distance plus this of the path blocks it.
+pub(super) const BLOCKED_WITHIN_M: f32 = 0.25;
 /// Distance beyond where the vehicle can stop within which a keep-out zone blocks its path, metres:
 /// what of the path is before that, it photographs, and no more of it than this is cut off by the
 /// detour. As far as 15 m/s lead while the zones of 32 vehicles are compared with the path.
-pub(super) const BLOCKED_BEYOND_STOP_M: f32 = 8.0;
+const BLOCKED_BEYOND_STOP_M: f32 = 8.0;
 /// Further distance within which it stays blocked once it is, metres: where the vehicle stops a
 /// little sooner than expected.
-pub(super) const STAYS_BLOCKED_BEYOND_M: f32 = 4.0;
+const STAYS_BLOCKED_BEYOND_M: f32 = 4.0;
 /// Distance ahead along the path within which zones count for the place where a detour returns to
 /// it, metres.
 const LOOK_AHEAD_M: f32 = 60.0;
@@ -70,6 +72,16 @@ impl AreaDetourSearches {
     /// [`MAX_DETOURS`] times at most.
     pub(super) fn may_seek(&self, now: Instant) -> bool {
         self.found < MAX_DETOURS && self.missed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
+    }
+}
+
+/// How near to the path a zone blocks it, and how far beyond where the vehicle can stop, metres;
+/// `waits`: it is blocked already.
+pub(super) const fn blocking_distances_m(waits: bool) -> [f32; 2] {
+    if waits {
+        [DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + STAYS_BLOCKED_BEYOND_M]
+    } else {
+        [BLOCKED_WITHIN_M, BLOCKED_BEYOND_STOP_M]
     }
 }
 

@@ -221,12 +221,6 @@ impl NeighbourEntry {
             || (!self.reports(OUT_OF_PLAN) && self.is_dead(now) && !self.heard_within(now, down))
     }
 
-    /// Whether the neighbour counts as dead, but may still be in the air: silent for less than
-    /// `down`, it last reported itself neither on the ground nor out of the plan.
-    pub(super) fn comes_down_unheard(&self, now: Instant, down: Duration) -> bool {
-        !self.reports(GROUNDED | OUT_OF_PLAN) && self.is_dead(now) && self.heard_within(now, down)
-    }
-
     /// Whether the neighbour is out of the plan, or lately reported that it stands until another
     /// vehicle moves, or lands after its detour.
     pub(super) fn is_waiting(&self, now: Instant) -> bool {

@@ -4,7 +4,7 @@
 use super::Neighbours;
 use super::contact::NeighbourEntry;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, OUT_OF_PLAN};
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 impl<const V: usize> Neighbours<V> {
     /// Whether all vehicles of the roster last reported that they have landed or are out of the
@@ -72,5 +72,13 @@ impl<const V: usize> Neighbours<V> {
     /// plan; true where there is none.
     pub fn are_all_at_rest(&self) -> bool {
         self.contacts[..self.roster_count].iter().all(|c| c.reports(LANDED | OUT_OF_PLAN))
+    }
+}
+
+impl NeighbourEntry {
+    /// Whether the neighbour counts as dead, but may still be in the air: silent for less than
+    /// `down`, it last reported itself neither on the ground nor out of the plan.
+    fn comes_down_unheard(&self, now: Instant, down: Duration) -> bool {
+        !self.reports(GROUNDED | OUT_OF_PLAN) && self.is_dead(now) && self.heard_within(now, down)
     }
 }

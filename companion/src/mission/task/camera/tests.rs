@@ -238,7 +238,8 @@ proptest! {
             taken_before = if on_path { fake.pictures_m.len() } else { taken_before };
             at_m += MPS * STEP_S;
             let place = if on_path { PathRelation::OnPath } else { PathRelation::Elsewhere };
-            camera.step(&photographs, &path, PathProgress { progress_m: at_m, place }, now, &mut links);
+            let along = PathProgress { progress_m: at_m, place };
+            camera.step(&photographs, &path, along, now, &mut links);
             fake.fly(at_m);
             for frame in sent_frames(&mut links, &mut framer, now) {
                 let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
