@@ -25,7 +25,8 @@ fn drawn(seed: u64) -> (String, f64) {
     let (mut at_s, mut last_s) = (20 + random.next_u32() % 150, 0);
     for vehicle in (2..=count).rev() {
         text += &format!("[[faults]]\nat_s = {at_s}.0\nkind = \"kill\"\nvehicle = {vehicle}\n");
-        (last_s, at_s) = (at_s, at_s + 180 + random.next_u32() % 60);
+        // The first loss counts from the start on, and the others hold until that one is down.
+        (last_s, at_s) = (at_s, (at_s + 180).max(300) + random.next_u32() % 60);
     }
     (text, f64::from(last_s))
 }
