@@ -26,6 +26,8 @@ use std::sync::atomic::{AtomicU16, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
+use rayon::prelude::*;
+
 /// Path of a file of the shared real data; `None`, with a printed line that says what is skipped,
 /// if it is absent.
 pub fn shared_data(name: &str) -> Option<PathBuf> {
@@ -175,6 +177,18 @@ pub fn chromium() -> Option<PathBuf> {
         println!("skipped: no chromium here; FLOCKMATE_CHROMIUM can name one");
     }
     found
+}
+
+/// Flies the seeds 0 to `usual` - 1 in parallel, or as many from as many on as the environment
+/// variables `name` and `name`_FROM say, and fails if one is wrong. `one` is `None` for a mission
+/// that cannot be planned, which less than half may be.
+pub fn assert_no_seed_is_wrong(name: &str, usual: u64, one: impl Fn(u64) -> Option<bool> + Sync) {
+    let (from, count) = (number(&format!("{name}_FROM"), 0), number(name, usual));
+    let flown: Vec<(u64, bool)> =
+        (from..from + count).into_par_iter().filter_map(|seed| Some((seed, one(seed)?))).collect();
+    let wrong: Vec<u64> = flown.iter().filter(|(_, wrong)| *wrong).map(|(seed, _)| *seed).collect();
+    println!("{} flown, wrong {wrong:?}", flown.len());
+    assert!(wrong.is_empty() && 2 * flown.len() as u64 > count);
 }
 
 /// A number from the environment variable `name`, by which a test can draw more instances than

@@ -3,10 +3,9 @@
 //!
 //! `FLOCKMATE_ALONE=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_ALONE_FROM` others.
 
-use flockmate_tests::{areas, covered, number};
+use flockmate_tests::{areas, assert_no_seed_is_wrong, covered};
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
-use rayon::prelude::*;
 
 const MISSIONS: u64 = 16;
 
@@ -33,7 +32,7 @@ fn drawn(seed: u64) -> (String, f64) {
 
 #[test]
 fn the_last_vehicle_photographs_all_that_is_left() {
-    let one = |seed: u64| -> Option<(u64, bool)> {
+    let one = |seed: u64| -> Option<bool> {
         let (text, struck_s) = drawn(seed);
         if std::env::var("FLOCKMATE_ALONE").is_ok_and(|n| n == "1") {
             println!("{text}");
@@ -55,20 +54,16 @@ fn the_last_vehicle_photographs_all_that_is_left() {
                 coverage.left
             );
         }
-        Some((seed, wrong))
+        Some(wrong)
     };
-    let (from, count) = (number("FLOCKMATE_ALONE_FROM", 0), number("FLOCKMATE_ALONE", MISSIONS));
-    let all: Vec<(u64, bool)> = (from..from + count).into_par_iter().filter_map(one).collect();
-    let wrong: Vec<u64> = all.iter().filter(|(_, wrong)| *wrong).map(|(seed, _)| *seed).collect();
-    println!("{} flown, wrong {wrong:?}", all.len());
-    assert!(wrong.is_empty() && 2 * all.len() as u64 > count);
+    assert_no_seed_is_wrong("FLOCKMATE_ALONE", MISSIONS, one);
 }
 
 /// The other has left, and its pilot keeps it in the air, unheard after a while: no lease lands it,
 /// so the last one keeps clear of where it was last heard for as long as it flies.
 #[test]
 fn an_unheard_vehicle_that_its_pilot_keeps_in_the_air_is_kept_clear_of() {
-    let one = |seed: u64| -> Option<(u64, bool)> {
+    let one = |seed: u64| -> Option<bool> {
         let mut random = Pcg32::seed_from_u64(seed);
         let mut text = areas::lossy_radio_scenario(&mut random, 2, 0.1);
         let taken_s = 20 + random.next_u32() % 150;
@@ -82,11 +77,7 @@ fn an_unheard_vehicle_that_its_pilot_keeps_in_the_air_is_kept_clear_of() {
         if wrong {
             println!("seed {seed}: {safety:?}\n{text}\n{log}");
         }
-        Some((seed, wrong))
+        Some(wrong)
     };
-    let (from, count) = (number("FLOCKMATE_ALONE_FROM", 0), number("FLOCKMATE_ALONE", MISSIONS));
-    let all: Vec<(u64, bool)> = (from..from + count).into_par_iter().filter_map(one).collect();
-    let wrong: Vec<u64> = all.iter().filter(|(_, wrong)| *wrong).map(|(seed, _)| *seed).collect();
-    println!("{} flown, too near in {wrong:?}", all.len());
-    assert!(wrong.is_empty() && 2 * all.len() as u64 > count);
+    assert_no_seed_is_wrong("FLOCKMATE_ALONE", MISSIONS, one);
 }

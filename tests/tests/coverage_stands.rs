@@ -4,11 +4,10 @@
 //! `FLOCKMATE_STANDS=N` flies N missions of each test, `FLOCKMATE_STANDS_FROM` others; with N = 1
 //! the scenario is printed.
 
-use flockmate_tests::{areas, covered, number};
+use flockmate_tests::{areas, assert_no_seed_is_wrong, covered};
 use host_sim::result::MissionResult;
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
-use rayon::prelude::*;
 
 const MISSIONS: u64 = 8;
 
@@ -27,7 +26,7 @@ fn is_not_whole(result: &MissionResult) -> bool {
 
 /// Flies what `draw` draws, and fails where `wrong` says so of the result and the log.
 fn fly_all(draw: fn(&mut Pcg32) -> String, wrong: impl Fn(&MissionResult, &str) -> bool + Sync) {
-    let one = |seed: u64| -> Option<(u64, bool)> {
+    let one = |seed: u64| -> Option<bool> {
         let text = draw(&mut Pcg32::seed_from_u64(seed));
         if std::env::var("FLOCKMATE_STANDS").is_ok_and(|n| n == "1") {
             println!("{text}");
@@ -40,13 +39,9 @@ fn fly_all(draw: fn(&mut Pcg32) -> String, wrong: impl Fn(&MissionResult, &str) 
             let share = 100.0 * coverage.covered_share;
             println!("seed {seed}: {share:.2} %, left {}, {safety:?}\n{log}", coverage.left);
         }
-        Some((seed, wrong))
+        Some(wrong)
     };
-    let (from, count) = (number("FLOCKMATE_STANDS_FROM", 0), number("FLOCKMATE_STANDS", MISSIONS));
-    let all: Vec<(u64, bool)> = (from..from + count).into_par_iter().filter_map(one).collect();
-    let wrong: Vec<u64> = all.iter().filter(|(_, wrong)| *wrong).map(|(seed, _)| *seed).collect();
-    println!("{} flown, wrong {wrong:?}", all.len());
-    assert!(wrong.is_empty() && 2 * all.len() as u64 > count);
+    assert_no_seed_is_wrong("FLOCKMATE_STANDS", MISSIONS, one);
 }
 
 /// Others take a silent vehicle to be down after a while, and fly where it was: so no state may

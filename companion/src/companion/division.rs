@@ -131,8 +131,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether this vehicle, not started, has not been able to start for so long that the others
-    /// are to divide its share: without a promise of its own they cannot divide otherwise. Once it
-    /// can start, it plans again, and takes part as a new vehicle.
+    /// are to divide its share: without a promise of its own they cannot divide otherwise. In their
+    /// flight it then takes no part any more.
     fn is_start_hopeless(&self) -> bool {
         let waits_for_autopilot =
             matches!(self.mission.state(), State::WaitAutopilot | State::WaitPosition);

@@ -82,6 +82,23 @@ fn sent_frames(links: &mut Links, framer: &mut Framer, now: Instant) -> Vec<Fram
     core::iter::from_fn(|| framer.next(now, &mut bytes)).collect()
 }
 
+/// Hands all that was sent to the autopilot, which is at this place and accepts it.
+fn deliver(
+    camera: &mut CameraControl,
+    fake: &mut Fake,
+    links: &mut Links,
+    framer: &mut Framer,
+    now: Instant,
+    at_m: f32,
+) {
+    for frame in sent_frames(links, framer, now) {
+        let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
+        fake.command(&command, at_m);
+        let command = command.command as u32 as u16;
+        camera.handle_ack(&Ack { command, result: ACCEPTED, to: (1, 191) }, links);
+    }
+}
+
 /// Flies the path. Returns where pictures were taken, and whether a trigger was left on.
 fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32>, bool) {
     let path = path();
@@ -203,12 +220,7 @@ proptest! {
             if step % looks_every == 0 {
                 fake.fly(at_m);
             }
-            for frame in sent_frames(&mut links, &mut framer, now) {
-                let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
-                fake.command(&command, at_m);
-                let command = command.command as u32 as u16;
-                camera.handle_ack(&Ack { command, result: ACCEPTED, to: (1, 191) }, &mut links);
-            }
+            deliver(&mut camera, &mut fake, &mut links, &mut framer, now, at_m);
         }
         let near = fake.pictures_m.iter().any(|m| (m - hold_m).abs() <= HELD_WITHIN_M);
         prop_assert!(near, "held at {} m: {:?}", hold_m, fake.pictures_m);
@@ -241,12 +253,7 @@ proptest! {
             let along = PathProgress { progress_m: at_m, place };
             camera.step(&photographs, &path, along, now, &mut links);
             fake.fly(at_m);
-            for frame in sent_frames(&mut links, &mut framer, now) {
-                let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
-                fake.command(&command, at_m);
-                let command = command.command as u32 as u16;
-                camera.handle_ack(&Ack { command, result: ACCEPTED, to: (1, 191) }, &mut links);
-            }
+            deliver(&mut camera, &mut fake, &mut links, &mut framer, now, at_m);
         }
         let last_m = *fake.pictures_m.last().unwrap();
         prop_assert!((last_m - leaves_m).abs() <= LATE_M, "{} m: {:?}", leaves_m, fake.pictures_m);
