@@ -47,7 +47,7 @@ fn drain(companion: &mut Small, now: Instant) -> usize {
         println!("{now:?} {event:?}");
         if let Event::PlanRequested(wanted) = event {
             // The answer may come any time later: setpoints do not wait for it.
-            companion.handle_plan(now, wanted, Err(PlanFailure::NoRoadmap));
+            companion.handle_plan(now, wanted, Err(PlanFailure::RoadmapUnusable));
         }
     }
     let (mut sent, mut buffer) = (0, [0; MAX_FRAME_LEN]);

@@ -184,8 +184,8 @@ pub struct Ground {
 /// Reason why the shell's planner computed no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanFailure {
-    /// The roadmap is absent or damaged.
-    NoRoadmap,
+    /// The roadmap or field of heights is absent, damaged or not that of the mission.
+    RoadmapUnusable,
     /// No route leads to the goal.
     Unreachable,
     /// No departure time keeps this vehicle clear of the other vehicles' flights.

@@ -81,8 +81,8 @@ pub enum Event {
         /// Whether the row's text is a warning: the mission leaves its usual course.
         warning: bool,
     },
-    /// This vehicle is back on its path over an area after a detour. Waypoints that the detour
-    /// passed by are not photographed; the next start of the mission flies them.
+    /// This vehicle is back on its path in a coverage mission after a detour. Waypoints that the
+    /// detour passed by are not photographed; the next start of the mission flies them.
     FlownAround {
         /// Number of waypoints that are left.
         left: u32,

@@ -66,12 +66,12 @@ const STANDING_SETPOINT_MPS: f32 = 0.05;
 const CLIMBED_M: f32 = 0.12;
 /// A guided descent is done less than this high above its lower end, metres.
 const DESCENDED_M: f32 = 0.2;
-/// Time for which the setpoint has stood at the end of a guided descent, after which the
-/// autopilot's landing takes over, wherever the vehicle is.
+/// Time for which the setpoint rests at the end of a guided descent before the autopilot's landing
+/// mode takes over, even if the vehicle has not reached that point.
 const LAND_AFTER: Duration = Duration::from_secs(2);
 /// Time without progress of a landing that setpoints lead down, after which the autopilot's own
 /// landing takes over.
-const LEADS_FOR: Duration = Duration::from_secs(4);
+const GUIDED_LANDING_STALL_TIMEOUT: Duration = Duration::from_secs(4);
 /// Greatest distance of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
 const LEG_LEAD_M: f32 = 1.5;
 /// Greatest speed with which the setpoint of a vehicle on its pad follows the position estimate
@@ -180,7 +180,7 @@ pub struct Guidance {
     /// Since when the vehicle has been below one that descends, unable to leave along its path.
     trapped_since: Option<Instant>,
     /// Whether the path ends aside or back on the plan's path, where the vehicle does not land.
-    pub ends_aside: bool,
+    pub ends_away_from_goal: bool,
     /// Height above the ground from which a guided descent is slow, or an autopilot that is not led
     /// to the ground lands by itself, metres.
     low_height_m: f32,
@@ -237,7 +237,7 @@ impl Guidance {
             back_to_m: None,
             no_better_place: false,
             trapped_since: None,
-            ends_aside: false,
+            ends_away_from_goal: false,
             lowest_ground_m: config.ground.map_or(f32::INFINITY, |ground| ground.low_m),
             low_height_m: libm::fminf(
                 config.required_clearance_m - config.radius_m,
@@ -261,7 +261,7 @@ impl Guidance {
         self.phase = Phase::Hold;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
-        (self.on_path, self.returning, self.ends_aside) = (false, false, false);
+        (self.on_path, self.returning, self.ends_away_from_goal) = (false, false, false);
         self.known_way = known_way::KnownWay::of_new_path(Instant::ZERO);
         self.reported_m = f32::NEG_INFINITY;
         self.advice = NO_ADVICE_YET;

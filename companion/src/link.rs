@@ -118,7 +118,7 @@ impl Links {
         let numbers = [numbers[0], numbers[1], 0];
         self.outboxes
             .iter_mut()
-            .for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
+            .for_each(|outbox| outbox.push(Outgoing::TextWithNumbers { warning, text, numbers }));
     }
 
     /// Whether an answer may be queued now: its rate limit and the link's queue have room. If so,
@@ -170,7 +170,7 @@ impl Links {
                 link,
                 sender,
                 AnswerKind::Text,
-                Outgoing::Count { warning, text, numbers },
+                Outgoing::TextWithNumbers { warning, text, numbers },
             );
         }
     }

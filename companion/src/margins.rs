@@ -37,9 +37,9 @@ pub const ACCURACY_FACTOR: f32 = 3.0;
 /// Age from which a reported accuracy counts as unknown.
 pub const MAX_ACCURACY_AGE: Duration = Duration::from_secs(3);
 
-/// Distance by which two vehicles over an area may be nearer than their estimates say, metres: for
-/// each of the two, the part of the clearance that is left for its estimate. Where no gates
-/// separate them, this is added to the safety distance.
+/// Distance by which two vehicles in a coverage mission may be nearer than their estimates say,
+/// metres: for each of the two, the part of the clearance that is left for its estimate. Where no
+/// gates separate them, this is added to the safety distance.
 pub(crate) fn pair_position_error_m(clearance_m: f32, radius_m: f32) -> f32 {
     2.0 * libm::fmaxf(estimate_margin_m(clearance_m, radius_m, TRACKING_M), 0.0)
 }

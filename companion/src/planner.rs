@@ -64,7 +64,7 @@ impl From<PlanError> for PlanFailure {
 fn plan_failure(error: &PlanError) -> PlanFailure {
     match error {
         PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => {
-            PlanFailure::NoRoadmap
+            PlanFailure::RoadmapUnusable
         }
         PlanError::Config(_)
         | PlanError::BadTask(_)

@@ -83,9 +83,9 @@ impl Services {
     }
 
     /// Stores the photographed waypoints in flash.
-    pub(crate) fn store_photographed(&mut self, photographed: store::PhotographedRecord) {
+    pub(crate) fn set_photographed_record(&mut self, photographed: store::PhotographedRecord) {
         if let Some(store) = &mut self.store {
-            store.store_photographed(photographed);
+            store.set_photographed_record(photographed);
         }
     }
 
@@ -132,7 +132,7 @@ impl Services {
 
     /// Handles a frame of one of the services; returns whether it was one.
     pub(crate) fn handle_frame(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) -> bool {
-        let (p, own) = (heard.frame.padded(), (heard.own, crate::COMPANION_COMPONENT));
+        let (p, own) = (heard.frame.padded_payload(), (heard.own, crate::COMPANION_COMPONENT));
         if heard.sender_ids() == own {
             return false;
         }
@@ -169,7 +169,7 @@ impl Services {
     }
 
     fn handle_parameter_read(&self, heard: &ReceivedFrame<'_>, links: &mut Links) {
-        let p = heard.frame.padded();
+        let p = heard.frame.padded_payload();
         let index = i16::from_le_bytes([p[0], p[1]]);
         let found = match usize::try_from(index) {
             Ok(index) => Some(index).filter(|index| *index < parameters::PARAMETER_COUNT),
@@ -206,7 +206,7 @@ impl Services {
     }
 
     fn handle_parameter_set(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) {
-        let p = heard.frame.padded();
+        let p = heard.frame.padded_payload();
         let (value, kind) = (f32::from_le_bytes([p[0], p[1], p[2], p[3]]), p[22]);
         let found = Parameters::index_of(parameter_name(&p[6..22]));
         let result = match found {
@@ -254,10 +254,11 @@ fn refuse_parameter(
 /// Answers a TIMESYNC request to this vehicle or to all. Bytes 16 and 17 of its payload are the
 /// target's system and component id, 0 for all.
 fn answer_timesync(heard: &ReceivedFrame<'_>, links: &mut Links) {
-    let p = heard.frame.padded();
-    let to_us =
+    let p = heard.frame.padded_payload();
+    let to_our_system =
         (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == crate::COMPANION_COMPONENT);
-    let request = heard.frame.decode::<TIMESYNC_DATA>().filter(|request| request.tc1 == 0 && to_us);
+    let request =
+        heard.frame.decode::<TIMESYNC_DATA>().filter(|request| request.tc1 == 0 && to_our_system);
     if let Some(request) = request {
         let tc1 = heard.now.as_micros() as i64 * 1000;
         heard.queue_answer(

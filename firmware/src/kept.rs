@@ -29,7 +29,7 @@ const UNKNOWN_RESTART: &str = "Restarted: watchdog, reset key or brown-out";
 /// table.
 static RECORD_CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
-/// How a run of the firmware ended; the numbers are kept in memory.
+/// How a run of the firmware ended. The values are stored in RAM that survives a warm reset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
 enum RunEnd {

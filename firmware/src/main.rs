@@ -236,12 +236,14 @@ fn find_mission(
 fn start_links(
     links: SendSpawner,
     shell: &'static Shell,
-    for_autopilot: bool,
+    restart_on_autopilot: bool,
     autopilot: UartEnds,
     swarm: UartEnds,
 ) {
     let once = "there is one such task for each link";
-    links.spawn(receive_task(shell, Link::Autopilot, autopilot.0, for_autopilot).expect(once));
+    links.spawn(
+        receive_task(shell, Link::Autopilot, autopilot.0, restart_on_autopilot).expect(once),
+    );
     links.spawn(receive_task(shell, Link::Swarm, swarm.0, false).expect(once));
     links.spawn(transmit_task(shell, Link::Autopilot, autopilot.1).expect(once));
     links.spawn(transmit_task(shell, Link::Swarm, swarm.1).expect(once));
@@ -249,8 +251,13 @@ fn start_links(
 }
 
 #[task(pool_size = 2)]
-async fn receive_task(shell: &'static Shell, link: Link, uart: Receiver, for_autopilot: bool) {
-    shell.receive(link, uart, for_autopilot).await
+async fn receive_task(
+    shell: &'static Shell,
+    link: Link,
+    uart: Receiver,
+    restart_on_autopilot: bool,
+) {
+    shell.receive(link, uart, restart_on_autopilot).await
 }
 
 #[task(pool_size = 2)]

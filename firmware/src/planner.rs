@@ -140,7 +140,7 @@ impl Planner<'_> {
         &mut self,
         detour: Option<&DetourRequest>,
     ) -> Result<&VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
-        let Some(mission) = &self.mission else { return Err(PlanFailure::NoRoadmap) };
+        let Some(mission) = &self.mission else { return Err(PlanFailure::RoadmapUnusable) };
         let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
         let schedule = &mission.header().schedule;
         if let MissionKind::Coverage(area) = mission.kind() {
@@ -149,7 +149,7 @@ impl Planner<'_> {
                 None => plan_area(mission, self.field, index, &mut self.memory),
             };
         }
-        let Some(roadmap) = &self.roadmap else { return Err(PlanFailure::NoRoadmap) };
+        let Some(roadmap) = &self.roadmap else { return Err(PlanFailure::RoadmapUnusable) };
         let PlanningMemory { scratch, swarm, own } = &mut self.memory;
         let ws = scratch.planner();
         if let Some(request) = detour {

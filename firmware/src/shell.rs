@@ -53,7 +53,7 @@ pub struct Shell {
     /// Kinds of plan that the companion requested and that are not made yet.
     plan_requests: PlanRequests,
     /// Wakes `run_planner_and_flash`, because a plan or a flash operation may have been requested.
-    work_due: TaskSignal<()>,
+    plan_or_flash_due: TaskSignal<()>,
     /// Time at which a restart was requested, milliseconds since the start; 0 without a request.
     restart_requested_ms: AtomicU32,
     /// Whether an erasure, programming or reading of the flash runs.
@@ -79,20 +79,20 @@ enum FlashOperation {
 /// within 1.1 s after the first HEARTBEAT the one with most frames, since an autopilot may forward
 /// others' messages. `None` if no HEARTBEAT comes within 3 s.
 pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
-    let mut ear = AutopilotListener::new();
+    let mut listener = AutopilotListener::new();
     let mut until = Instant::now() + FIRST_AUTOPILOT_WITHIN;
     let mut chunk = [0; UART_CHUNK];
     while let Ok(received) =
         with_timeout(until.saturating_duration_since(Instant::now()), uart.read(&mut chunk)).await
     {
-        let known = ear.most_heard().is_some();
+        let known = listener.most_heard().is_some();
         // A UART error loses bytes, nothing else.
-        ear.handle_bytes(&chunk[..received.unwrap_or_default()]);
-        if !known && ear.most_heard().is_some() {
+        listener.handle_bytes(&chunk[..received.unwrap_or_default()]);
+        if !known && listener.most_heard().is_some() {
             until = Instant::now() + OTHER_AUTOPILOTS_WITHIN;
         }
     }
-    ear.most_heard()
+    listener.most_heard()
 }
 
 /// System id of a board that has heard no autopilot and has none set: files can be uploaded to it.
@@ -163,7 +163,7 @@ impl Shell {
             send_due: [Signal::new(), Signal::new()],
             timer_changed: Signal::new(),
             plan_requests: PlanRequests::new(),
-            work_due: Signal::new(),
+            plan_or_flash_due: Signal::new(),
             restart_requested_ms: AtomicU32::new(0),
             flash_busy: AtomicBool::new(false),
             checked_in_ms: [const { AtomicU32::new(0) }; TASK_COUNT],
@@ -227,7 +227,7 @@ impl Shell {
             result
         });
         self.send_due.iter().for_each(|sends| sends.signal(()));
-        self.work_due.signal(());
+        self.plan_or_flash_due.signal(());
         self.timer_changed.signal(());
         result
     }
@@ -246,23 +246,30 @@ impl Shell {
         self.checked_in_ms[task].store(now_ms(), Ordering::Relaxed);
     }
 
-    /// Task: passes `uart`'s bytes to the companion as those of `link`; sends UART errors as texts.
+    /// Task: passes bytes from `uart` to the companion as those of `link`; reports UART errors as
+    /// STATUSTEXT.
     ///
-    /// `for_autopilot`: the board started without an autopilot; it restarts when it hears one.
-    pub async fn receive(&'static self, link: Link, mut uart: impl Read, for_autopilot: bool) -> ! {
+    /// `restart_on_autopilot`: the board started without an autopilot, and restarts when it hears
+    /// one.
+    pub async fn receive(
+        &'static self,
+        link: Link,
+        mut uart: impl Read,
+        restart_on_autopilot: bool,
+    ) -> ! {
         let mut chunk = [0; UART_CHUNK];
-        let mut ear = for_autopilot.then(AutopilotListener::new);
+        let mut listener = restart_on_autopilot.then(AutopilotListener::new);
         let errors = &self.line_errors[link as usize];
-        let (mut reported, mut tells_at) = (0, Instant::MIN);
+        let (mut reported, mut next_report_at) = (0, Instant::MIN);
         loop {
             match with_timeout(CHECK_IN_EVERY, uart.read(&mut chunk)).await {
                 Ok(Ok(length)) => {
                     self.with_companion(|companion, now| {
                         companion.handle_bytes(link, now, &chunk[..length]);
                     });
-                    if let Some(ear) = &mut ear {
-                        ear.handle_bytes(&chunk[..length]);
-                        if ear.most_heard().is_some() {
+                    if let Some(listener) = &mut listener {
+                        listener.handle_bytes(&chunk[..length]);
+                        if listener.most_heard().is_some() {
                             self.request_restart();
                         }
                     }
@@ -272,8 +279,8 @@ impl Shell {
                 Err(_) => {}
             }
             let count = errors.load(Ordering::Relaxed);
-            if count != reported && Instant::now() >= tells_at {
-                (reported, tells_at) = (count, Instant::now() + UART_REPORT_EVERY);
+            if count != reported && Instant::now() >= next_report_at {
+                (reported, next_report_at) = (count, Instant::now() + UART_REPORT_EVERY);
                 self.with_companion(|companion, _| {
                     let counters = companion.counters(link);
                     let damaged = counters.bad_crc.wrapping_add(counters.expired);
@@ -302,7 +309,7 @@ impl Shell {
                     self.setpoints.note_setpoint(now_ms());
                 }
                 // There is room in the send queue: work that waited for it may go on.
-                self.work_due.signal(());
+                self.plan_or_flash_due.signal(());
                 if uart.write_all(&frame[..length]).await.is_err() {
                     self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed);
                 }
@@ -344,7 +351,7 @@ impl Shell {
                 continue;
             }
             if !self.serve_flash(flash).await {
-                self.work_due.wait().await;
+                self.plan_or_flash_due.wait().await;
             }
         }
     }

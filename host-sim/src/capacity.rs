@@ -57,7 +57,7 @@ pub struct BoardCapacity {
     pub lanes: usize,
 }
 
-/// Most outward corners of an area's no-fly zones; the same on every board.
+/// Most convex corners of an area's no-fly zones; the same on every board.
 pub const BOARD_CORNERS: usize = 32;
 
 const fn roadmap_bytes(layout: &FlashLayout) -> usize {

@@ -82,7 +82,7 @@ pub struct TerrainResult {
     pub ground_least_m: f64,
     /// Greatest height above the ground of any of them, metres.
     pub ground_most_m: f64,
-    /// Slope of the steepest leg among them, metres of height a metre over ground.
+    /// Greatest slope of any of them: rise divided by horizontal distance.
     pub steepest: f64,
     /// Number of legs that come too near to the ground.
     pub too_low: u64,

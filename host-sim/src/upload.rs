@@ -177,7 +177,7 @@ impl FtpClient {
         let (us, frames) = ((self.own_system, COMPONENT_ID), self.receive_frames()?);
         let for_us = frames
             .iter()
-            .map(Frame::padded)
+            .map(Frame::padded_payload)
             .zip(&frames)
             .filter(|(p, frame)| frame.message_id == MESSAGE_ID && (p[1], p[2]) == us);
         let read = |p: &[u8; 255]| Answer {

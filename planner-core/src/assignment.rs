@@ -47,8 +47,8 @@ pub struct AssignmentWorkspace<const N: usize> {
     row: [f32; N],
     previous: [u16; N],
     settled: [u16; N],
-    row_of: [u16; N],
-    col_of: [u16; N],
+    row_of_col: [u16; N],
+    col_of_row: [u16; N],
     free: [u16; N],
 }
 
@@ -64,8 +64,8 @@ impl<const N: usize> AssignmentWorkspace<N> {
             row: [0.0; N],
             previous: [0; N],
             settled: [0; N],
-            row_of: [0; N],
-            col_of: [0; N],
+            row_of_col: [0; N],
+            col_of_row: [0; N],
             free: [0; N],
         }
     }
@@ -77,8 +77,8 @@ impl<const N: usize> AssignmentWorkspace<N> {
     ) -> (MatchingState<'_>, AugmentingPaths<'_>) {
         let state = MatchingState {
             price: &mut self.price[..cols],
-            row_of: &mut self.row_of[..cols],
-            col_of: &mut self.col_of[..rows],
+            row_of_col: &mut self.row_of_col[..cols],
+            col_of_row: &mut self.col_of_row[..rows],
             row: &mut self.row[..cols],
             free: &mut self.free[..rows],
         };
@@ -113,7 +113,7 @@ pub fn assign<const N: usize>(
 ) -> Result<Assignment, AssignmentError> {
     let costs = check_inputs(costs, rows, cols, N, out)?;
     solve(&costs, ws);
-    Ok(write_assignment(&costs, &ws.col_of, out))
+    Ok(write_assignment(&costs, &ws.col_of_row, out))
 }
 
 /// The assignment with the most pairs, among those the least largest cost, and among those the
@@ -139,7 +139,7 @@ pub fn assign_bottleneck<const N: usize>(
     }
     costs.limit = limit;
     solve(&costs, ws);
-    Ok(write_assignment(&costs, &ws.col_of, out))
+    Ok(write_assignment(&costs, &ws.col_of_row, out))
 }
 
 fn check_inputs<'a>(
@@ -170,11 +170,15 @@ fn solve<const N: usize>(costs: &CostMatrix<'_>, ws: &mut AssignmentWorkspace<N>
     }
 }
 
-fn write_assignment(costs: &CostMatrix<'_>, col_of: &[u16], out: &mut [Option<u16>]) -> Assignment {
+fn write_assignment(
+    costs: &CostMatrix<'_>,
+    col_of_row: &[u16],
+    out: &mut [Option<u16>],
+) -> Assignment {
     out.fill(None);
     let mut result = Assignment { pairs: 0, total: 0.0, largest: f32::NEG_INFINITY };
     for (row, &col) in
-        col_of[..costs.rows].iter().enumerate().filter(|(_, col)| **col != UNASSIGNED)
+        col_of_row[..costs.rows].iter().enumerate().filter(|(_, col)| **col != UNASSIGNED)
     {
         let cost = costs.cost_at(row as u16, col);
         let (from, to) = if costs.transposed { (usize::from(col), row as u16) } else { (row, col) };

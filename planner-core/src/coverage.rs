@@ -56,7 +56,7 @@ pub enum CoverageError {
     /// The polygon is invalid: see [`area::AreaError`].
     Area(area::AreaError),
     /// The setting with this name is outside its range.
-    Setting(&'static str),
+    SettingOutOfRange(&'static str),
     /// Lanes are further apart than an image is wide, or waypoints further than it is long, so that
     /// ground between images is missed.
     Gaps,

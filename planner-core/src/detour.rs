@@ -145,7 +145,7 @@ impl BoundingBox {
 
     /// For each of the box's six faces a bit: whether the point is beyond that face. If two points
     /// are beyond the same face, the segment between them is outside the box.
-    fn outer_faces(&self, p: &Point) -> u8 {
+    fn outcode(&self, p: &Point) -> u8 {
         let (low, high) = (&self.low, &self.high);
         u8::from(p.x < low.x)
             | u8::from(p.x > high.x) << 1
@@ -186,10 +186,10 @@ pub fn is_path_blocked<const W: usize>(
     let place = if along_m > begun.along_m { path.point_at(along_m) } else { Some(begun.position) };
     let mut from = place.unwrap_or(first.position);
     let room = BoundingBox::of_zone(&obstacle);
-    let mut beside = room.outer_faces(&from);
+    let mut beside = room.outcode(&from);
     let mut from_m = fmaxf(along_m, begun.along_m);
     let mut touches = |to: Point| {
-        let was_beside = core::mem::replace(&mut beside, room.outer_faces(&to));
+        let was_beside = core::mem::replace(&mut beside, room.outcode(&to));
         let leg = (core::mem::replace(&mut from, to), to);
         was_beside & beside == 0 && obstacle.comes_near(&leg.0, &leg.1)
     };

@@ -399,7 +399,7 @@ fn search<const N: usize>(
     Ok(())
 }
 
-/// Resets the workspace to a search of which only `from` is reached, at distance 0.
+/// Resets the workspace for a search that starts at node `from`, at distance 0.
 fn start_search<const N: usize>(
     view: &RoadmapView<'_>,
     from: u16,

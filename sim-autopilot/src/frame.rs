@@ -46,7 +46,7 @@ pub struct Frame {
 
 impl Frame {
     /// The payload, padded with the zeros that MAVLink 2 cuts from its end.
-    pub fn padded(&self) -> &[u8; 255] {
+    pub fn padded_payload(&self) -> &[u8; 255] {
         &self.payload
     }
 

@@ -32,7 +32,7 @@ pub fn forward_to_other_ports(ports: &mut [Port], from: usize, own_system: u8, f
     }
     ports[from].learn_route(sender);
     let target = target_system_offset(frame.message_id).map_or((0, 0), |at| {
-        let payload = frame.padded();
+        let payload = frame.padded_payload();
         // SET_MODE has no target component.
         (payload[at], if frame.message_id == 11 { AUTOPILOT_COMPONENT } else { payload[at + 1] })
     });

@@ -122,8 +122,8 @@ impl Bench {
         self.run(0.016);
         self.received[before..]
             .iter()
-            .filter(|(_, f)| f.message_id == 77 && f.padded()[..2] == id.to_le_bytes())
-            .map(|(_, f)| f.padded()[2])
+            .filter(|(_, f)| f.message_id == 77 && f.padded_payload()[..2] == id.to_le_bytes())
+            .map(|(_, f)| f.padded_payload()[2])
             .collect()
     }
 
@@ -151,12 +151,12 @@ impl Bench {
     /// Last HEARTBEAT: custom mode, base mode, system status.
     fn heartbeat(&self) -> (u32, u8, u8) {
         let (_, frame) = self.of(0).last().unwrap();
-        let b = frame.padded();
+        let b = frame.padded_payload();
         (u32::from_le_bytes([b[0], b[1], b[2], b[3]]), b[6], b[7])
     }
 
     fn landed_state(&self) -> u8 {
-        self.of(245).last().unwrap().1.padded()[1]
+        self.of(245).last().unwrap().1.padded_payload()[1]
     }
 
     /// Armed in Offboard, hovering over the start at `up` metres.

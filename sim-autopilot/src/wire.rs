@@ -13,7 +13,7 @@ pub struct PayloadReader<'a>(&'a [u8; 255]);
 impl<'a> PayloadReader<'a> {
     /// The payload of `frame`.
     pub fn new(frame: &'a Frame) -> Self {
-        Self(frame.padded())
+        Self(frame.padded_payload())
     }
 
     fn bytes<const N: usize>(&self, at: usize) -> [u8; N] {

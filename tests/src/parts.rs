@@ -25,16 +25,16 @@ pub fn parts<const V: usize>(
     };
     let mut parts = share(&left, &living);
     let mut hash = 17u32;
-    for lots in fleet.inputs_of_divisions() {
+    for inputs in fleet.inputs_of_divisions() {
         let mut done = Vec::new();
-        for (rank, lot) in lots.iter().enumerate() {
-            let taken = usize::from(lot.along_dm / WAYPOINT_DM).min(parts[rank].len());
-            let sure = lot.alive || lot.along_dm == DivisionInput::WHOLE_PATH;
+        for (rank, input) in inputs.iter().enumerate() {
+            let taken = usize::from(input.along_dm / WAYPOINT_DM).min(parts[rank].len());
+            let sure = input.alive || input.along_dm == DivisionInput::WHOLE_PATH;
             done.extend(&parts[rank][..if sure { taken } else { taken.saturating_sub(1) }]);
-            living[rank] = lot.alive;
+            living[rank] = input.alive;
             hash = hash
                 .wrapping_mul(31)
-                .wrapping_add(u32::from(lot.along_dm) * 2 + u32::from(lot.alive));
+                .wrapping_add(u32::from(input.along_dm) * 2 + u32::from(input.alive));
         }
         left.retain(|waypoint| !done.contains(waypoint));
         parts = share(&left, &living);

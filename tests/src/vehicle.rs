@@ -323,7 +323,7 @@ impl Heard {
                 self.setpoints_us.push(at_us);
             }
             COMMAND_LONG_DATA::ID => {
-                let p = frame.padded();
+                let p = frame.padded_payload();
                 let command = u32::from(u16::from_le_bytes([p[28], p[29]]));
                 self.commands.push((command, f32::from_le_bytes([p[0], p[1], p[2], p[3]])));
             }

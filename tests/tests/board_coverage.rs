@@ -92,19 +92,19 @@ kind = "kill"
 vehicle = 3
 "#;
 
-/// Each vehicle that is left flies one division: what the desk plans from the same lots, bit by
+/// Each vehicle that is left flies one division: what the desk plans from the same inputs, bit by
 /// bit.
 fn divides_as_planned(mission: &Mission, flight: &Flight, left: [u8; 2]) {
     for vehicle in left {
-        let told: Vec<_> = flight.divisions.iter().filter(|d| d.vehicle == vehicle).collect();
-        assert_eq!(told.len(), 1, "vehicle {vehicle}: {:?}", flight.divisions);
-        let lots = &told[0].lots;
+        let reported: Vec<_> = flight.divisions.iter().filter(|d| d.vehicle == vehicle).collect();
+        assert_eq!(reported.len(), 1, "vehicle {vehicle}: {:?}", flight.divisions);
+        let inputs = &reported[0].inputs;
         let plan = mission
-            .plan_remaining(&[], std::iter::once(&lots[..]))
+            .plan_remaining(&[], std::iter::once(&inputs[..]))
             .expect("the desk divides it too");
-        println!("{:?}", told[0]);
-        assert_eq!(lots.iter().map(|lot| lot.alive).collect::<Vec<_>>(), [true, true, false]);
-        assert_eq!(told[0].plan_crc, plan.crc, "vehicle {vehicle}: {lots:?}");
+        println!("{:?}", reported[0]);
+        assert_eq!(inputs.iter().map(|input| input.alive).collect::<Vec<_>>(), [true, true, false]);
+        assert_eq!(reported[0].plan_crc, plan.crc, "vehicle {vehicle}: {inputs:?}");
     }
 }
 

@@ -61,19 +61,19 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
                 break;
             }
             lives[living[random.next_u32() as usize % living.len()]] = false;
-            let lot = |i: usize, random: &mut Pcg32| {
+            let input = |i: usize, random: &mut Pcg32| {
                 let flight = &plan.flights[i];
                 let dm = (flight.path.length_m() * 10.0) as u32;
                 let on_pad = flight.climb_m > 0.0 && random.next_u32().is_multiple_of(5);
                 let flown = if on_pad || dm == 0 { 0 } else { 1 + random.next_u32() % dm };
                 DivisionInput { alive: lives[i], along_dm: flown.min(65_535) as u16 }
             };
-            let lots: Vec<DivisionInput> = (0..vehicles).map(|i| lot(i, &mut random)).collect();
+            let inputs: Vec<DivisionInput> = (0..vehicles).map(|i| input(i, &mut random)).collect();
             let before = plan;
-            losses.push(lots.clone());
+            losses.push(inputs.clone());
             // Where vehicles hold nearer to each other than any order of departures allows there is
             // none, nor where a path would need more corners than it may have.
-            match mission.plan_remaining(&[], losses.iter().map(|lots| &lots[..])) {
+            match mission.plan_remaining(&[], losses.iter().map(|inputs| &inputs[..])) {
                 Ok(divided) => plan = divided,
                 Err(error) => {
                     let text = format!("{error:#}");
@@ -86,9 +86,9 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
                 return [divided, 0];
             }
             divided += 1;
-            for (flight, lot) in before.flights.iter().zip(&lots) {
-                let mut done = pictures(flight, f32::from(lot.along_dm) / 10.0);
-                if !lot.alive {
+            for (flight, input) in before.flights.iter().zip(&inputs) {
+                let mut done = pictures(flight, f32::from(input.along_dm) / 10.0);
+                if !input.alive {
                     done.pop();
                 }
                 kept.extend(done);
@@ -134,13 +134,13 @@ fn stretches_leave_nothing_out_and_give_nothing_twice() {
         let whole = (0..planned.tracks.waypoint_count())
             .filter_map(|number| planned.tracks.waypoint(number));
         let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<DivisionInput>>::new());
-        while let Some(lots) = next_division_inputs(&plan) {
-            for (flight, lot) in plan.flights.iter().zip(&lots) {
-                kept.extend(pictures(flight, lot.along_m()));
+        while let Some(inputs) = next_division_inputs(&plan) {
+            for (flight, input) in plan.flights.iter().zip(&inputs) {
+                kept.extend(pictures(flight, input.along_m()));
             }
-            losses.push(lots);
+            losses.push(inputs);
             plan = mission
-                .plan_remaining(&[], losses.iter().map(|lots| &lots[..]))
+                .plan_remaining(&[], losses.iter().map(|inputs| &inputs[..]))
                 .expect("it was divided before");
         }
         kept.extend(plan.flights.iter().flat_map(|flight| pictures(flight, f32::INFINITY)));

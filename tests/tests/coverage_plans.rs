@@ -65,7 +65,7 @@ impl Client {
                 let now = Instant::from_micros(self.autopilot.time_us());
                 let mut bytes = &buffer[..len];
                 while let Some(frame) = self.framer.next(now, &mut bytes) {
-                    let b = frame.padded();
+                    let b = frame.padded_payload();
                     match frame.message_id {
                         46 => self.reached.push(u16::from_le_bytes([b[0], b[1]])),
                         47 => self.acks.push((47, b[2])),

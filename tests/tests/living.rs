@@ -162,7 +162,7 @@ impl Pair {
     /// COMMAND_LONG the companion sent since: command, first parameter.
     fn asked(&self, since_us: u64, command: u16) -> Vec<f32> {
         let sent = self.said.iter().filter(|(at, f)| *at > since_us && f.message_id == 76);
-        let fields = sent.map(|(_, f)| f.padded());
+        let fields = sent.map(|(_, f)| f.padded_payload());
         let wanted = fields.filter(|p| p[28..30] == command.to_le_bytes());
         wanted.map(|p| f32::from_le_bytes([p[0], p[1], p[2], p[3]])).collect()
     }

@@ -195,7 +195,7 @@ impl Victims {
         while let Some(frame) = self.heard[at].next(self.now, &mut bytes) {
             self.said += 1;
             if frame.message_id == SETPOINT {
-                let fields = frame.padded()[4..28].chunks_exact(4);
+                let fields = frame.padded_payload()[4..28].chunks_exact(4);
                 let finite = |b: &[u8]| f32::from_le_bytes([b[0], b[1], b[2], b[3]]).is_finite();
                 assert!(fields.into_iter().all(finite), "a setpoint that is no number");
             }
@@ -325,7 +325,7 @@ fn forged_payloads_are_survived() {
                 continue;
             };
             let (system, component) = senders[below(rng, senders.len())];
-            let mut payload = *frame.padded();
+            let mut payload = *frame.padded_payload();
             let used = frame.payload().len();
             for _ in 0..below(rng, 4) {
                 payload[below(rng, used)] = match below(rng, 3) {

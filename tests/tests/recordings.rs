@@ -53,7 +53,7 @@ struct Story {
 
 impl Story {
     fn hear(&mut self, t_s: f64, frame: &Frame) {
-        let p = frame.padded();
+        let p = frame.padded_payload();
         match frame.message_id {
             COMMAND_ACK => self.acks.push((t_s, u16::from_le_bytes([p[0], p[1]]), p[2])),
             HEARTBEAT => {
@@ -211,7 +211,7 @@ fn play(
         let Some(heard) = &entry.frame else { continue };
         story.hear(entry.t_s, heard);
         if heard.message_id == EXTENDED_SYS_STATE {
-            let on_ground = heard.padded()[1] == 1;
+            let on_ground = heard.padded_payload()[1] == 1;
             if grounded.last() != Some(&on_ground) {
                 grounded.push(on_ground);
             }

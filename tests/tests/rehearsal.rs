@@ -125,7 +125,7 @@ impl Ground {
             let now = Instant::from_micros(self.began.elapsed().as_micros() as u64);
             let mut input = &buffer[..length];
             while let Some(heard) = self.framer.next(now, &mut input) {
-                if heard.message_id == 0 && heard.padded()[7] == state {
+                if heard.message_id == 0 && heard.padded_payload()[7] == state {
                     return;
                 }
             }

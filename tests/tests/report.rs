@@ -457,12 +457,12 @@ fn page_of_a_paper_draws_its_figures() {
         let values = series.flat_map(|series| series["values"].as_array().expect("values"));
         let mut drawn: Vec<f64> = values.map(|value| value.as_f64().expect("a number")).collect();
         let both = rows.iter().flat_map(|row| [&row["ours_summary"], &row["theirs_summary"]]);
-        let mut told: Vec<f64> =
+        let mut reported: Vec<f64> =
             both.map(|summary| summary[value].as_f64().expect("a number")).collect();
-        assert_eq!(told.len(), 2 * 12 * 6);
+        assert_eq!(reported.len(), 2 * 12 * 6);
         drawn.sort_by(f64::total_cmp);
-        told.sort_by(f64::total_cmp);
-        assert_eq!(drawn, told, "{value}");
+        reported.sort_by(f64::total_cmp);
+        assert_eq!(drawn, reported, "{value}");
     }
     let paths = figures[2]["panels"].as_array().expect("panels").iter().map(|panel| {
         let routes = panel["routes"].as_array().expect("routes").iter();

@@ -130,7 +130,7 @@ impl Requests {
         links: &mut Links,
     ) -> bool {
         self.next_stream = 0;
-        // In flight the limits that bound the setpoints do not change.
+        // The limits that bound the setpoints must not change in flight, so they are read before.
         let reads = !s.state.streams_setpoints() && !telemetry.armed;
         if reads {
             self.limits = telemetry.kind().default_limits();
@@ -175,7 +175,7 @@ impl Requests {
     /// hide the value.
     pub(crate) fn handle_param_value(&mut self, telemetry: &Telemetry, frame: &Frame) -> bool {
         const ID: core::ops::Range<usize> = 8..24;
-        let p = frame.padded();
+        let p = frame.padded_payload();
         let value = f32::from_le_bytes([p[0], p[1], p[2], p[3]]);
         let name = p[ID].split(|b| *b == 0).next().unwrap_or_default();
         let mut changed = false;

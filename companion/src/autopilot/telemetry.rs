@@ -239,7 +239,7 @@ impl Telemetry {
         match frame.message_id {
             // Decoded field by field: the command may be one that the crate does not know.
             COMMAND_ACK_DATA::ID => {
-                let p = frame.padded();
+                let p = frame.padded_payload();
                 let command = u16::from_le_bytes([p[0], p[1]]);
                 self.ack = Some(Ack { command, result: p[2], to: (p[8], p[9]) });
                 TelemetryChange::Updated
@@ -247,7 +247,7 @@ impl Telemetry {
             // Decoded field by field: a vehicle type newer than the crate must not make the
             // autopilot silent.
             HEARTBEAT => {
-                let p = frame.padded();
+                let p = frame.padded_payload();
                 let Some(kind) = AutopilotKind::from_heartbeat(p[5]) else {
                     return TelemetryChange::None;
                 };
@@ -262,7 +262,7 @@ impl Telemetry {
                 TelemetryChange::Updated
             }
             EXTENDED_SYS_STATE => {
-                let landed = frame.padded()[1];
+                let landed = frame.padded_payload()[1];
                 if landed != 0 {
                     self.on_ground = Some(landed == LANDED_STATE_ON_GROUND);
                 }
@@ -284,7 +284,7 @@ impl Telemetry {
             },
             EKF_STATUS_REPORT_DATA::ID => {
                 // Decoded field by field: flags newer than the crate's must not hide the others.
-                let p = frame.padded();
+                let p = frame.padded_payload();
                 self.estimator_ready =
                     ardupilot::estimator_ready(u16::from_le_bytes([p[20], p[21]]));
                 let ratio =
@@ -303,7 +303,7 @@ impl Telemetry {
             }
             ESTIMATOR_STATUS_DATA::ID if self.kind == Some(AutopilotKind::Px4) => {
                 // Decoded field by field: flags newer than the crate's must not hide the accuracy.
-                let p = frame.padded();
+                let p = frame.padded_payload();
                 let metres =
                     |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
                 let (across_m, height_m) = (metres(32), metres(36));

@@ -66,7 +66,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// PREFLIGHT_REBOOT_SHUTDOWN: requests a restart of this companion from the shell, unless the
     /// vehicle is armed.
     pub(crate) fn handle_restart_command(&mut self, command: &Command) -> u8 {
-        let asked = command.param2 == 1.0 || (command.to_component && command.param1 == 1.0);
+        let asked = command.param2 == 1.0 || (command.to_our_component && command.param1 == 1.0);
         if !asked {
             return DENIED;
         }

@@ -9,7 +9,7 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::roster::MemberStatus;
 use crate::mission::State;
-use crate::swarm::detour::flown::RejoinPlace;
+use crate::swarm::detour::path_kind::RejoinPlace;
 use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, OwnReport};
 use crate::time::Duration;
 
@@ -79,7 +79,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         let state = self.mission.state();
         let off_plan = self.guidance.returning
-            || self.guidance.ends_aside
+            || self.guidance.ends_away_from_goal
             || self.detours.is_on_detour()
             || self.detours.is_homeward()
             || self.detours.has_left_plan();
@@ -156,14 +156,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             state => matches!(state, State::Dividing | State::Follow | State::Blocked),
         };
         resumes
-            && !self.is_landing_off_plan()
+            && !self.will_land_off_plan()
             && self.neighbours.fleet().is_some_and(Fleet::has_reported_leaving)
     }
 
     /// Whether this vehicle flies home, back along its path, or aside, and lands at the end.
-    fn is_landing_off_plan(&self) -> bool {
+    fn will_land_off_plan(&self) -> bool {
         let home = self.guidance.returning || self.detours.is_homeward();
-        home || (self.guidance.ends_aside && !self.detours.is_beside_plan())
+        home || (self.guidance.ends_away_from_goal && !self.detours.is_beside_plan())
             || self.detours.lands_at_end()
             || self.detours.seeks_landing()
     }
@@ -172,7 +172,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// count it as lost.
     pub(super) fn is_excluded(&self) -> bool {
         let excluded = self.neighbours.fleet().is_some_and(Fleet::is_excluded);
-        (excluded && !self.is_landing_off_plan()) || self.resumes_too_late()
+        (excluded && !self.will_land_off_plan()) || self.resumes_too_late()
     }
 
     /// Place along its path where its last descent begins, above its pad, metres.
@@ -216,7 +216,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn division_hold_m(&self) -> Option<f32> {
         // A promise is a place along its own path, and binds no vehicle that is off that path. The
         // fleet learns of a command only in the next step.
-        let elsewhere = self.is_landing_off_plan() || self.detours.is_beside_plan();
+        let elsewhere = self.will_land_off_plan() || self.detours.is_beside_plan();
         let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !elsewhere)?;
         let behind = fleet.division_count() > self.mission.division_count();
         let held_dm = behind.then(|| fleet.held_at_dm());

@@ -123,25 +123,25 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         // Only a frame that decodes updates the sender's sequence number.
         if frame.message_id == TUNNEL_DATA::ID {
-            if let Some(relay) = Relay::decode(frame.padded(), id) {
+            if let Some(relay) = Relay::decode(frame.padded_payload(), id) {
                 let ours = self.mission.plan().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
                 if ours && relay.mission_crc == self.config.mission_crc {
                     self.neighbours.handle_relay(self.now, id, &relay);
                 }
                 return;
             }
-            if let Some(roster) = RosterReport::decode(frame.padded(), id) {
+            if let Some(roster) = RosterReport::decode(frame.padded_payload(), id) {
                 if roster.mission_crc == self.config.mission_crc {
                     let waits = self.is_not_started();
                     self.neighbours.handle_roster(id, &roster, waits);
                 }
                 return;
             }
-            if let Some(report) = PhotographedReport::decode(frame.padded(), id) {
+            if let Some(report) = PhotographedReport::decode(frame.padded_payload(), id) {
                 self.handle_done_report(&report);
                 return;
             }
-            if let Some(intent) = Intent::decode(frame.padded(), id) {
+            if let Some(intent) = Intent::decode(frame.padded_payload(), id) {
                 self.handle_intent(id, frame.sequence, &intent);
             }
         } else if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
@@ -181,7 +181,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Denies a command from a sender that is no ground station of the mission.
     pub(super) fn reject_command(&mut self, link: Link, sender: SenderKind, command: &Command) {
-        if command.to_us {
+        if command.to_our_system {
             let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };
             self.links.queue_answer(self.now, link, sender, AnswerKind::Ack, ack);
         }
@@ -219,19 +219,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 )
             }
             None if command.command == commands::REBOOT
-                && (command.to_component || command.param2 == 1.0) =>
+                && (command.to_our_component || command.param2 == 1.0) =>
             {
                 self.handle_restart_command(command)
             }
             // An unknown command to all components is meant for another one.
-            None if !command.to_component => return None,
+            None if !command.to_our_component => return None,
             None => UNSUPPORTED,
         };
         let restarts = command.command == commands::REBOOT && result == ACCEPTED;
         if restarts || *self.mission.pending() != before || self.detours.obstacle_count() != known {
             self.links.log_command(self.now, sender, command);
         }
-        command.to_us.then_some(result)
+        command.to_our_system.then_some(result)
     }
 
     pub(super) fn handle_message_request(

@@ -20,13 +20,14 @@ const STANDING_DRIFT_M: f32 = 0.3;
 /// Greatest difference between the estimated height on the pad and the pad's height in the plan
 /// with which a vehicle takes off, metres: real estimates on the ground were up to 1.1 m off.
 const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
-/// Time without its lease renewed, after which silence counts over an area: 1 s before the lease
-/// ends. The row `NeighboursSilent` stops the vehicle 1 s later.
+/// Time without its lease renewed, after which silence counts in a coverage mission: 1 s before the
+/// lease ends. The row `NeighboursSilent` stops the vehicle 1 s later.
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
 /// Time after a lost vehicle is down within which a division becomes binding, seconds.
 const DIVIDES_WITHIN_S: f32 = 60.0;
-/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle over an area may be off a setpoint
-/// that stands before it lands: gusts push it further there than walls would allow indoors.
+/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle in a coverage mission may be off a
+/// setpoint that stands before it lands: gusts push it further there than walls would allow
+/// indoors.
 const MAX_SWAY_OVER_AREA: Duration = Duration::from_secs(60);
 /// Greatest distance from its setpoint at which that additional time applies, metres.
 const MAX_SWAY_M: f32 = 2.0;
@@ -103,13 +104,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plans_differ: self.hears_another_plan(),
             holds_to_divide: self.is_holding_for_division(),
             division_ready: self.mission.is_division_plan_ready(),
-            undivided: self.is_undivided() && !self.detours.is_own_plan_outstanding(),
+            undivided: self.is_undivided() && !self.detours.is_off_own_path(),
             plan_ready: self.mission.plan().is_some(),
             plan_failed: self.mission.plan_failure().is_some(),
-            roadmap_bad: self.mission.plan_failure() == Some(PlanFailure::NoRoadmap),
+            roadmap_bad: self.mission.plan_failure() == Some(PlanFailure::RoadmapUnusable),
             has_goal: self.mission.plan().is_some_and(|plan| plan.task.leaves_pad()),
             plans_as_others: self.plans_as_others(),
-            at_start: self.is_at_start(),
+            at_pad: self.is_at_start(),
             imprecise: self.mission.state() == State::Ready
                 && self.guidance.estimate_speed_share < 1.0,
             imprecise_for: self.mission.estimate_imprecise_for(now),
@@ -192,7 +193,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             can_land_aside: can_leave && self.detours.can_land_aside(&view),
             seeks_landing: self.detours.seeks_landing(),
             lands_aside: self.detours.seeks_landing() || self.detours.lands_at_end(),
-            aside_reached: follow
+            landing_place_reached: follow
                 && self.detours.lands_at_end()
                 && self.guidance.is_at_end(scene)
                 && standing,
@@ -223,8 +224,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         away.xy().length() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m
     }
 
-    /// Time for which this vehicle has been unheard, beyond what it may fly on for; over an area
-    /// since shortly before its lease ended.
+    /// Time for which this vehicle has been unheard, beyond what it may fly on for; in a coverage
+    /// mission since shortly before its lease ended.
     fn neighbour_age(&self) -> Duration {
         let (now, state) = (self.now, self.mission.state());
         if let Some(fleet) = self.neighbours.fleet() {
@@ -263,8 +264,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let descends = self.guidance.is_descending();
         match follow && (homeward || (descends && self.config.lost_vehicle_down_s.is_some())) {
             true if homeward && descends => self.guidance.filter.hindered_for(self.now),
-            // The end of its path over an area is above its pad: there is no other way down to
-            // that.
+            // The end of its path in a coverage mission is above its pad: there is no other way
+            // down to that.
             true => self.guidance.filter.blocked_for_good_for(self.now),
             false => Duration::default(),
         }
@@ -290,11 +291,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.has_left_plan()
             || self.detours.is_on_detour();
         let ranged = self.config.radio_range_m < REACHES_ALL_M;
-        // Slower by a parameter or by its autopilot, it is not where the others reckon it to be.
-        // Over an area the lease says how far it flies on.
-        let paced = self.guidance.cruise_mps() >= self.config.slowest_mps;
+        // A vehicle slowed by a parameter or by its autopilot is not where the others predict it to
+        // be. In a coverage mission its lease states how far it flies, not this rule.
+        let keeps_pace = self.guidance.cruise_mps() >= self.config.slowest_mps;
         ranged
-            && paced
+            && keeps_pace
             && self.neighbours.fleet().is_none()
             && follows
             && !left

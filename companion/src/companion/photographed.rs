@@ -56,7 +56,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let crc = self.config.mission_crc;
         if let Some(kept) = self.mission.photographed_mut().record_to_store(crc, !flies) {
-            self.services.store_photographed(kept);
+            self.services.set_photographed_record(kept);
         }
         [Link::Autopilot, Link::Swarm]
             .into_iter()

@@ -10,7 +10,7 @@ use crate::events::{Event, PlanKind};
 use crate::guidance::GuidanceInputs;
 use crate::mission::State;
 use crate::swarm::detour::asking::RetryOutlook;
-use crate::swarm::detour::flown::{DetourPurpose, RejoinPlace, RejoinPlaces};
+use crate::swarm::detour::path_kind::{DetourPurpose, RejoinPlace, RejoinPlaces};
 use crate::swarm::view::DetourView;
 
 /// Greatest distance between the end of a detour and the place where the vehicle is to come back to
@@ -93,7 +93,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Some(RejoinPlaces { own, beyond: beyond.unwrap_or(own) })
     }
 
-    /// The first free place along its path over an area beyond what blocks the path.
+    /// The first free place along its path in a coverage mission beyond what blocks the path.
     // Inlined into both callers it would take half a kilobyte of flash.
     #[inline(never)]
     fn place_beyond_block(&self) -> Option<RejoinPlace> {
@@ -106,8 +106,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Some(RejoinPlace { along_m, position })
     }
 
-    /// Requests a detour around the obstacle on its path over an area, which leads back to the
-    /// path.
+    /// Requests a detour around the obstacle on its path in a coverage mission, which leads back to
+    /// the path.
     pub(super) fn request_detour_back_to_path(&mut self) {
         let rejoin = match self.detours.is_beside_plan() {
             true => self.detours.rejoin_from_aside(&self.detour_view()),
@@ -123,13 +123,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// The detour that [`PlanKind::Detour`] requests from the shell; `None` if none is requested,
-    /// or none can be planned. `tell` is called with each keep-out zone. The next answer counts for
-    /// this request: an answer before the shell has read a request belongs to an older request and
+    /// or none can be planned. `visit` is called with each keep-out zone. The next answer counts
+    /// for this request: an answer before the shell has read a request belongs to an older one and
     /// is ignored.
-    pub fn detour_request(&mut self, tell: impl FnMut(KeepOutZone)) -> Option<DetourRequest> {
+    pub fn detour_request(&mut self, visit: impl FnMut(KeepOutZone)) -> Option<DetourRequest> {
         let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);
         self.detours.note_request_read();
-        if replans { self.detours.detour_request(&self.detour_view(), tell) } else { None }
+        if replans { self.detours.detour_request(&self.detour_view(), visit) } else { None }
     }
 
     /// Switches to the detour that the shell has planned, or refuses it where it starts or ends
@@ -153,7 +153,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // first.
         if self.mission.state() == State::Replanning {
             self.guidance.begin_path(self.now);
-            self.guidance.ends_aside = self.detours.ends_aside();
+            self.guidance.ends_away_from_goal = self.detours.ends_away_from_goal();
         }
     }
 

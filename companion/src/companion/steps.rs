@@ -10,7 +10,7 @@ use crate::margins;
 use crate::mission::task::{PathProgress, PathRelation};
 use crate::mission::{self, Action, State, TransitionRow};
 use crate::storage::store::ErasePermission;
-use crate::swarm::detour::flown::DetourPurpose;
+use crate::swarm::detour::path_kind::DetourPurpose;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -64,8 +64,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Sends the commands of the task (pictures, camera) that are due at the vehicle's place.
     fn step_task(&mut self) {
         let state = self.mission.state();
-        let off_plan =
-            self.guidance.returning || self.guidance.ends_aside || self.detours.is_on_detour();
+        let off_plan = self.guidance.returning
+            || self.guidance.ends_away_from_goal
+            || self.detours.is_on_detour();
         self.update_photographed(off_plan);
         let along = PathProgress {
             progress_m: self.guidance.progress_m(state, &self.guidance_inputs()),
@@ -165,7 +166,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.run_action(from, to, row);
         // Leaving a replanning state ends the search for a detour.
         if matches!(from, State::Replanning | State::PadReplanning) {
-            self.detours.end_search();
+            self.detours.cancel_request();
         }
         if to == State::Follow {
             self.detours.take_up_plan();
@@ -261,8 +262,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         self.timers.set(Timer::Request, self.now);
         let position = self.telemetry.position;
-        // Others keep clear of where an unheard vehicle may lie, so it is led straight down. A
-        // landing that was held continues as it began, led or by the autopilot.
+        // Others avoid the place where an unheard vehicle may be on the ground, so setpoints guide
+        // it straight down. A held landing continues as it began: by setpoints or the autopilot.
         if from == Alone || (from == LandingHeld && self.guidance.is_guiding_landing()) {
             return self.guidance.begin_guided_landing(self.now);
         }

@@ -355,7 +355,7 @@ fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
         }
         // On both links.
         assert!(expected.contains(&named(&bench)), "{flags:?}: {:?}", bench.texts);
-        let told = bench.events.contains(&Event::WaitsForStart { id: 77 });
-        assert_eq!(told, flags != Some(flying), "{:?}", bench.events);
+        let reported = bench.events.contains(&Event::WaitsForStart { id: 77 });
+        assert_eq!(reported, flags != Some(flying), "{:?}", bench.events);
     }
 }

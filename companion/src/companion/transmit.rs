@@ -19,9 +19,9 @@ use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
 
-/// Longest time for which a vehicle over an area flies on along its part after it was last heard,
-/// seconds: its lease of 20 s, 1.8 s for the age of the report that renewed it, 2 s of message
-/// delay, and half of the longest stop.
+/// Longest time for which a vehicle in a coverage mission flies on along its part after it was last
+/// heard, seconds: its lease of 20 s, 1.8 s for the age of the report that renewed it, 2 s of
+/// message delay, and half of the longest stop.
 const LEASE_FLIGHT_S: f32 = 20.0 + 1.8 + 2.0 + 2.5;
 /// Bit of `type_mask` in SET_POSITION_TARGET_LOCAL_NED: the yaw is ignored.
 const MASK_YAW_IGNORED: u16 = 0x400;
@@ -306,8 +306,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Appends, over an area, the corners of the path beyond the points ahead, along which this
-    /// vehicle flies if no other vehicle hears it: as far as its lease takes it, or to the end
+    /// Appends, in a coverage mission, the corners of the path beyond the points ahead, along which
+    /// this vehicle flies if no other vehicle hears it: as far as its lease takes it, or to the end
     /// where it has left the mission and needs no lease.
     fn add_unheard_points(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
         let flies = self.mission.state().flies_on_lease();
@@ -329,8 +329,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         path.point_at(most_m).filter(|_| most_m > stops_m).into_iter().for_each(add);
     }
 
-    /// Place along this vehicle's path, metres, up to which it flies over an area while no other
-    /// vehicle hears it; `None` in a mission without an area.
+    /// Place along this vehicle's path, metres, up to which it flies in a coverage mission while no
+    /// other vehicle hears it; `None` in a mission without an area.
     fn unheard_limit_m(&self) -> Option<f32> {
         let (fleet, plan) = (self.neighbours.fleet()?, self.mission.plan()?);
         let lease_m = LEASE_FLIGHT_S * self.config.cruise_mps;

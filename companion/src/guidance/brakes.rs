@@ -21,8 +21,8 @@ const UNHEARD_LANDING_DRIFT_M: f32 = 0.5;
 /// A vehicle this little beyond the part of its path that others know does not fly back, metres.
 const BEYOND_KNOWN_M: f32 = 0.3;
 
-/// A setpoint faster than this is leaving the column below a vehicle that descends, m/s.
-const ESCAPES_MPS: f32 = 0.5;
+/// Setpoint speed above which a vehicle below one that descends no longer counts as trapped, m/s.
+const NOT_TRAPPED_MPS: f32 = 0.5;
 
 impl Guidance {
     /// Notes that another vehicle has acknowledged the intent sent at `sent_at`, whose points lead
@@ -60,18 +60,18 @@ impl Guidance {
         // A vehicle in its climb or descent, or on its way aside, is not moved.
         let waits = state.is_on_path()
             && matches!(self.phase, Phase::Path | Phase::Join)
-            && !(self.ends_aside && follows);
+            && !(self.ends_away_from_goal && follows);
         let lands_m = along_m.min(self.expected_up_to_m(alone, neighbours));
         let beyond = alone && along_m > lands_m + BEYOND_KNOWN_M;
         let wait_m = if follows { along_m + advice.stop_within_m.max(0.0) } else { lands_m };
         let beside_m = safety_m + evade::EVADE_MARGIN_M;
         let waits_there = waits && (!follows || advice.stop_within_m < WAIT_WITHIN_M);
         if waits_there {
-            self.evade_search.continue_search(path, wait_m, neighbours.len(), |i, tell| {
+            self.evade_search.continue_search(path, wait_m, neighbours.len(), |i, visit| {
                 if alone {
-                    neighbours.column_above(i, safety_m + UNHEARD_LANDING_DRIFT_M, tell);
+                    neighbours.column_above(i, safety_m + UNHEARD_LANDING_DRIFT_M, visit);
                 } else {
-                    neighbours.landing_column(i, now, beside_m, tell);
+                    neighbours.landing_column(i, now, beside_m, visit);
                 }
             });
         } else {
@@ -94,8 +94,8 @@ impl Guidance {
     }
 
     /// Place along its path up to which others expect an `alone` vehicle, metres: gates that opened
-    /// since may have led it beyond what it could report. ∞ for any other vehicle, over an area,
-    /// and with a known radio range, where they expect it further on.
+    /// since may have led it beyond what it could report. ∞ for any other vehicle, in a coverage
+    /// mission, and with a known radio range, where they expect it further on.
     fn expected_up_to_m<const V: usize>(&self, alone: bool, neighbours: &Neighbours<V>) -> f32 {
         let expected = alone && neighbours.fleet().is_none() && !neighbours.knows_range();
         if expected { self.known_way.from_m.max(self.known_way.to_m) } else { f32::INFINITY }
@@ -108,7 +108,7 @@ impl Guidance {
         if self.no_better_place || (self.back_to_m.is_some() && barred) {
             self.trapped_since.get_or_insert(now);
         } else if !self.evading
-            || self.smoother.velocity().norm_squared() > ESCAPES_MPS * ESCAPES_MPS
+            || self.smoother.velocity().norm_squared() > NOT_TRAPPED_MPS * NOT_TRAPPED_MPS
         {
             self.trapped_since = None;
         }

@@ -6,7 +6,7 @@
 //! column in which that one may come down (`neighbours.rs`). A vehicle that is to wait at a place
 //! in there waits at the nearest free place before it on its path; one that holds its place there
 //! flies back from where it stands. It came that way, so the way is free of walls. It comes no
-//! nearer to a vehicle behind it than [`FOLLOWER_STRAY_M`] beyond the safety distance.
+//! nearer to a vehicle behind it than [`TRAILING_VEHICLE_MARGIN_M`] beyond the safety distance.
 //!
 //! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several
 //! steps: one for the column of one neighbour, a dozen among the most columns there can be; in
@@ -23,9 +23,9 @@ use crate::swarm::sweep::IncrementalScan;
 /// Drift of the vehicle that descends and sway of the one below, together, metres: kept beyond the
 /// safety distance.
 pub const EVADE_MARGIN_M: f32 = 0.6;
-/// Deviation of two vehicles from their paths, together, metres: kept beyond the safety distance
-/// from a vehicle behind.
-const FOLLOWER_STRAY_M: f32 = 0.6;
+/// Margin beyond the safety distance to a vehicle behind on the path, metres: the path-tracking
+/// errors of both vehicles together.
+const TRAILING_VEHICLE_MARGIN_M: f32 = 0.6;
 /// Spacing of the places along the path that are compared with the columns, metres.
 const PLACE_STEP_M: f32 = 0.25;
 /// Maximum number of places along the path that one search compares.
@@ -70,14 +70,14 @@ pub struct EvadeSearch {
 
 impl EvadeSearch {
     /// Continues the search, back along the path from `wait_m`, where the vehicle would wait.
-    /// `tell` calls its second argument with each column of the neighbour with the given index,
+    /// `visit` calls its second argument with each column of the neighbour with the given index,
     /// which is below `neighbours`.
     pub fn continue_search<const W: usize>(
         &mut self,
         path: &Path<W>,
         wait_m: f32,
         neighbours: usize,
-        tell: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
+        visit: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
     ) {
         // While the vehicle steps back, `wait_m` falls and the search goes on. Where `wait_m`
         // grows, the search begins there.
@@ -101,7 +101,7 @@ impl EvadeSearch {
             budget = budget.saturating_sub(PLACE_COST);
             match self
                 .sweep
-                .continue_scan(neighbours, &mut budget, 1, &tell, |column| column.contains(&place))
+                .continue_scan(neighbours, &mut budget, 1, &visit, |column| column.contains(&place))
             {
                 None => return,
                 Some(true) => self.covered_places += 1,
@@ -141,7 +141,7 @@ pub fn step_back<const W: usize>(
         let apart = |p: &Point| (n.position - p).length();
         !n.grounded
             && n.progress_m.is_some()
-            && apart(&back) < (safety_m + FOLLOWER_STRAY_M).min(apart(&here))
+            && apart(&back) < (safety_m + TRAILING_VEHICLE_MARGIN_M).min(apart(&here))
     };
     if neighbours.iter().find(follows).is_some() {
         return None;
@@ -205,8 +205,8 @@ mod tests {
         for steps in 1.. {
             // A neighbour gives up to 16.
             let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
-            search.continue_search(&path, 9.0, 31, |i, tell| {
-                of(i).iter().for_each(|column| tell(*column));
+            search.continue_search(&path, 9.0, 31, |i, visit| {
+                of(i).iter().for_each(|column| visit(*column));
             });
             if search.found != EvadeTarget::Back(99.0) {
                 return (search.found, steps);
@@ -230,7 +230,7 @@ mod tests {
         );
         // A place to wait at that is no whole number of steps from the start of the path.
         let mut search = EvadeSearch::default();
-        search.continue_search(&path(), 1.1, 1, |_, tell| tell(column(2.1, 0.0, 2.0)));
+        search.continue_search(&path(), 1.1, 1, |_, visit| visit(column(2.1, 0.0, 2.0)));
         assert_eq!(search.found, EvadeTarget::Back(0.0), "its start is the last place");
     }
 

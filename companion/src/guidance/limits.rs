@@ -40,8 +40,8 @@ pub struct MotionLimits {
     pub accel_mps2: f32,
     /// Greatest vertical acceleration of the reference, m/s².
     pub accel_z_mps2: f32,
-    /// Greatest acceleration of a setpoint, horizontal and vertical, m/s²: a corner adds to the
-    /// braking before it and the acceleration behind it.
+    /// Greatest acceleration of a setpoint, horizontal and vertical, m/s². It is above that of the
+    /// reference: at a corner the change of direction adds to braking and acceleration.
     pub max_accel_mps2: [f32; 2],
     /// Greatest jerk of a setpoint, m/s³.
     pub jerk_mps3: f32,

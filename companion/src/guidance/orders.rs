@@ -56,7 +56,7 @@ impl Guidance {
         self.phase = Phase::Path;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
-        self.ends_aside = false;
+        self.ends_away_from_goal = false;
         self.guides_landing = false;
         self.reported_m = f32::NEG_INFINITY;
         self.gates_open = 0;

@@ -32,8 +32,8 @@ impl Guidance {
             // vehicle.
             return Setpoint::None;
         }
-        // ArduCopter's Guided mode takes no acceleration: its velocity is that of the setpoint
-        // `lead_s` ahead, but no faster than the setpoint will be.
+        // Setpoints to ArduCopter carry no acceleration (`MASK_POSITION_VELOCITY`). Instead their
+        // velocity is that of the setpoint `lead_s` ahead, limited to the raw setpoint's speed.
         let lead_s = scene.telemetry.kind.map_or(0.0, AutopilotKind::velocity_lead_s);
         let velocity = smoother.velocity() + smoother.acceleration() * lead_s;
         let most = smoother.velocity().length().max(smoother.raw_speed_mps());

@@ -109,7 +109,7 @@ impl Guidance {
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
         !self.returning
-            && !self.ends_aside
+            && !self.ends_away_from_goal
             && scene.plan.is_some_and(|plan| self.has_reached_end(&plan.path))
     }
 
@@ -165,7 +165,10 @@ impl Guidance {
     ) -> bool {
         if self.is_algorithm2() {
             let stands = self.is_standing() && scene.telemetry.velocity.length() < AT_REST_MPS;
-            return stands && self.on_path && self.waypoints.is_completed() && !self.ends_aside;
+            return stands
+                && self.on_path
+                && self.waypoints.is_completed()
+                && !self.ends_away_from_goal;
         }
         let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
         let Some(low) = leg.waypoints().last() else { return false };
@@ -192,7 +195,7 @@ impl Guidance {
         let Some(plan) = scene.plan else { return false };
         self.has_reached_end(&plan.path)
             && !self.is_algorithm2()
-            && !self.ends_aside
+            && !self.ends_away_from_goal
             && self.is_standing()
             && plan.path.point_at(plan.path.length_m()).is_some_and(|end| {
                 (end - scene.telemetry.position).length() < ARRIVED_M

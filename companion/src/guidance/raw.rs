@@ -8,8 +8,8 @@ use planner_core::{Length, Point};
 use super::limits::JOIN_MPS;
 use super::smoother::TICK_S;
 use super::{
-    DESCENDED_M, FENCE_MARGIN_M, Guidance, GuidanceInputs, LEADS_FOR, LEG_LEAD_M, MIN_LEG_M, Phase,
-    SETTLE_WINDOW_M, TOUCHDOWN_MPS,
+    DESCENDED_M, FENCE_MARGIN_M, GUIDED_LANDING_STALL_TIMEOUT, Guidance, GuidanceInputs,
+    LEG_LEAD_M, MIN_LEG_M, Phase, SETTLE_WINDOW_M, TOUCHDOWN_MPS,
 };
 use crate::autopilot::AutopilotKind;
 use crate::guidance::evade;
@@ -248,7 +248,7 @@ impl Guidance {
                 && low.is_some_and(|low| scene.telemetry.position.z - low.position.z < DESCENDED_M)
         };
         let ended = self.phase == Phase::Descent && self.leg.as_ref().is_some_and(down);
-        self.guides_landing = !ended && now - self.progress_at < LEADS_FOR;
+        self.guides_landing = !ended && now - self.progress_at < GUIDED_LANDING_STALL_TIMEOUT;
         self.guides_landing && self.phase == Phase::Descent && self.filter.column_clear()
     }
 

@@ -65,16 +65,16 @@ pub struct Command {
     /// Sender: system and component id.
     pub from: (u8, u8),
     /// Whether the command names this vehicle's system id, so that it is answered.
-    pub to_us: bool,
+    pub to_our_system: bool,
     /// Whether the command names the companion's component id.
-    pub to_component: bool,
+    pub to_our_component: bool,
 }
 
 impl Command {
     /// Whether the command changes something (mission, obstacles, a restart), and so counts only
     /// from a ground station that the mission names.
     pub(crate) fn needs_authority(&self) -> bool {
-        let restarts = self.command == REBOOT && (self.to_component || self.param2 == 1.0);
+        let restarts = self.command == REBOOT && (self.to_our_component || self.param2 == 1.0);
         restarts
             || matches!(
                 self.command,
@@ -102,7 +102,7 @@ impl Command {
 /// Decodes a command for the vehicle of system id `system`. `None` for a frame that is no command,
 /// is addressed to others, or was sent by this companion itself.
 pub fn read_command(frame: &Frame, system: u8) -> Option<Command> {
-    let p = frame.padded();
+    let p = frame.padded_payload();
     if frame.message_id != COMMAND_INT && frame.message_id != COMMAND_LONG {
         return None;
     }
@@ -125,8 +125,8 @@ pub fn read_command(frame: &Frame, system: u8) -> Option<Command> {
             && matches!(p[32], FRAME_GLOBAL | FRAME_GLOBAL_INT))
         .then(|| (whole(16), whole(20), float(24))),
         from: (frame.system, frame.component),
-        to_us: target_system == system,
-        to_component: target_component == crate::COMPANION_COMPONENT,
+        to_our_system: target_system == system,
+        to_our_component: target_component == crate::COMPANION_COMPONENT,
     })
 }
 
@@ -160,7 +160,7 @@ impl CommandHistory {
         let same = |seen: &&AnsweredCommand| {
             seen.from == (frame.system, frame.component)
                 && (seen.sequence, seen.message) == (frame.sequence, frame.message_id)
-                && seen.payload[..] == frame.padded()[..COMPARED_LEN]
+                && seen.payload[..] == frame.padded_payload()[..COMPARED_LEN]
                 && now - seen.at < DUPLICATE_WINDOW
         };
         self.seen.iter().flatten().find(same).map(|seen| seen.result)
@@ -169,7 +169,7 @@ impl CommandHistory {
     /// Stores a frame and its answer in place of the oldest one.
     pub fn remember(&mut self, frame: &Frame, result: Option<u8>, at: Instant) {
         let mut payload = [0; COMPARED_LEN];
-        payload.copy_from_slice(&frame.padded()[..COMPARED_LEN]);
+        payload.copy_from_slice(&frame.padded_payload()[..COMPARED_LEN]);
         let (from, sequence, message) =
             ((frame.system, frame.component), frame.sequence, frame.message_id);
         self.seen[self.next] =
@@ -235,8 +235,8 @@ pub fn apply_command(
             pending.start = true;
             return Some(ACCEPTED);
         }
-        // After its flight over an area, a vehicle starts again from its pad: it photographs
-        // waypoints that other vehicles left.
+        // After its flight in a coverage mission, a vehicle starts again from its pad: it
+        // photographs waypoints that other vehicles left.
         MISSION_START if state == Done && inputs.area => {
             pending.start = true;
             return Some(ACCEPTED);

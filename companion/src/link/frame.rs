@@ -66,7 +66,7 @@ impl Frame {
     }
 
     /// The payload filled up with zeros to 255 bytes: V2 senders cut trailing zeros.
-    pub fn padded(&self) -> &[u8; 255] {
+    pub fn padded_payload(&self) -> &[u8; 255] {
         &self.payload
     }
 

@@ -91,7 +91,7 @@ pub enum Outgoing {
         text: &'static str,
     },
     /// STATUSTEXT with numbers: each `#` of the text is replaced by the next number.
-    Count {
+    TextWithNumbers {
         /// Severity WARNING if true, INFO if false.
         warning: bool,
         /// The text, at most 50 bytes with its numbers.
@@ -191,14 +191,14 @@ impl Outbox {
                 return frame::encode(header, &set, out);
             }
             Outgoing::ParameterValue { index, count, name, value } => {
-                let told = PARAM_VALUE_DATA {
+                let reported = PARAM_VALUE_DATA {
                     param_value: value,
                     param_count: count,
                     param_index: index as u16,
                     param_id: name.into(),
                     param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
                 };
-                return frame::encode(header, &told, out);
+                return frame::encode(header, &reported, out);
             }
             Outgoing::ParameterError { index, id, why, to } => {
                 // Encoded field by field: the requested name may be any bytes.
@@ -253,7 +253,7 @@ impl Outbox {
                     out,
                 );
             }
-            Outgoing::Count { warning, text, numbers } => {
+            Outgoing::TextWithNumbers { warning, text, numbers } => {
                 let (severity, text) = (text_severity(warning), format_text(text, numbers));
                 return frame::encode(
                     header,

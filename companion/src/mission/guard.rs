@@ -47,7 +47,7 @@ pub enum Guard {
     /// MISSION_START, but the vehicle is outside the geofence.
     StartOutside,
     /// The position is younger than 0.5 s, and not at the vehicle's pad.
-    AwayFromStart,
+    AwayFromPad,
     /// The battery's charge is below the configured limit.
     ChargeLow,
     /// The vehicle is outside the geofence, or stands at it.
@@ -193,7 +193,7 @@ pub enum Guard {
     /// the limit.
     NoPlaceAside,
     /// The vehicle stands at the place aside where it is to land.
-    AsideReached,
+    LandingPlaceReached,
     /// The battery's charge is below half of the configured limit.
     BatteryCritical,
     /// The battery's charge is below the configured limit, no neighbour is below, and the vehicle
@@ -282,11 +282,11 @@ impl Guard {
             Self::OwnPlanLost => i.own_plan_lost,
             Self::StartOverField => i.start && i.area,
             Self::StartWithoutGoal => i.start && !i.has_goal && i.plans_as_others,
-            Self::StartElsewhere => i.start && !i.at_start,
+            Self::StartElsewhere => i.start && !i.at_pad,
             Self::StartArmed => i.start && i.armed,
             Self::StartBatteryLow => i.start && i.battery_low,
             Self::StartOutside => i.start && i.outside,
-            Self::AwayFromStart => i.position_age < MAX_POSITION_AGE && !i.at_start,
+            Self::AwayFromPad => i.position_age < MAX_POSITION_AGE && !i.at_pad,
             Self::ChargeLow => i.battery_low,
             Self::Outside => i.outside,
             Self::StartVague => i.start && i.imprecise && i.in_state >= limit,
@@ -352,7 +352,7 @@ impl Guard {
             Self::NoRoomHere => i.is_landing_blocked_for(limit) && i.offboard && i.can_land_aside,
             Self::PadTaken => i.pad_blocked_for >= limit && i.can_land_aside,
             Self::NoPlaceAside => i.seeks_landing && (i.plan_failed || i.in_state >= limit),
-            Self::AsideReached => i.aside_reached,
+            Self::LandingPlaceReached => i.landing_place_reached,
             Self::LandingClear => i.column_clear_for >= limit,
             Self::ColumnBlocked => i.column_blocked_for.min(i.in_state) >= limit,
             Self::StartBarred => i.start_barred_for >= limit && i.others_fly,

@@ -26,7 +26,7 @@ pub struct GuardInputs {
     /// vehicle, in this state; zero once all have landed or left the plan.
     pub neighbour_age: Duration,
     /// Time in `Dividing` after which a division is due: a lost vehicle is down by then, and a
-    /// minute has passed since. Zero in other missions than those over an area.
+    /// minute has passed since. Zero in other missions than coverage missions.
     pub division_due_after: Duration,
     /// Whether this vehicle may fly on unheard: all others are out of radio range, and its next
     /// gate is open or none is left.
@@ -63,7 +63,7 @@ pub struct GuardInputs {
     /// enough to report another one. True in other missions.
     pub plans_as_others: bool,
     /// Whether the position is within the start tolerance of the pad, horizontally and in height.
-    pub at_start: bool,
+    pub at_pad: bool,
     /// Whether, in `Ready`, the position estimate's error bound exceeds what the margin leaves for
     /// it at cruise speed.
     pub imprecise: bool,
@@ -181,7 +181,7 @@ pub struct GuardInputs {
     /// Whether a place aside to land at is being sought, flown to, or reached.
     pub lands_aside: bool,
     /// Whether the vehicle stands at the end of its path to a place aside where it is to land.
-    pub aside_reached: bool,
+    pub landing_place_reached: bool,
     /// Whether the vehicle must land whatever is below it: the battery is nearly empty, or the
     /// position is not known.
     pub must_land: bool,

@@ -74,7 +74,7 @@ pub(crate) fn quiet(state: State) -> GuardInputs {
     let mut i = GuardInputs {
         armed: !on_ground,
         airborne: !on_ground,
-        at_start: true,
+        at_pad: true,
         ..GuardInputs::default()
     };
     (i.has_goal, i.has_flown, i.own_mode) = (true, !on_ground, !on_ground);
@@ -180,27 +180,27 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::PlanReady => i.plan_ready = true,
         G::PlanFailed => i.plan_failed = true,
         G::RoadmapBad => (i.plan_failed, i.roadmap_bad) = (true, true),
-        G::StartCommanded => (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false),
+        G::StartCommanded => (i.start, i.has_goal, i.at_pad, i.armed) = (true, true, true, false),
         G::StartWithoutGoal => {
-            (i.start, i.plans_as_others, i.at_start, i.armed) = (true, true, true, false);
+            (i.start, i.plans_as_others, i.at_pad, i.armed) = (true, true, true, false);
         }
         G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
-        G::StartArmed => (i.start, i.has_goal, i.at_start) = (true, true, true),
+        G::StartArmed => (i.start, i.has_goal, i.at_pad) = (true, true, true),
         G::StartVague => {
-            (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false);
+            (i.start, i.has_goal, i.at_pad, i.armed) = (true, true, true, false);
             (i.imprecise, i.in_state) = (true, long);
         }
         G::EstimateVague => i.imprecise_for = long,
         G::OriginMoved => i.origin_moved = true,
         G::GatesOpen => i.gates_open = true,
         G::StartBatteryLow => {
-            (i.start, i.has_goal, i.at_start, i.armed, i.battery_low) =
+            (i.start, i.has_goal, i.at_pad, i.armed, i.battery_low) =
                 (true, true, true, false, true);
         }
         G::StartOutside => {
-            (i.start, i.has_goal, i.at_start, i.armed, i.outside) = (true, true, true, false, true);
+            (i.start, i.has_goal, i.at_pad, i.armed, i.outside) = (true, true, true, false, true);
         }
-        G::AwayFromStart => i.armed = false,
+        G::AwayFromPad => i.armed = false,
         G::ChargeLow => (i.armed, i.battery_low) = (false, true),
         G::Outside => (i.armed, i.outside) = (false, true),
         G::DisarmedAtGoal => (i.armed, i.at_goal) = (false, true),
@@ -258,7 +258,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::NoRoomHere => (i.column_blocked_for, i.offboard, i.can_land_aside) = (long, true, true),
         G::PadTaken => (i.pad_blocked_for, i.can_land_aside) = (long, true),
         G::NoPlaceAside => (i.plan_failed, i.seeks_landing) = (true, true),
-        G::AsideReached => i.aside_reached = true,
+        G::LandingPlaceReached => i.landing_place_reached = true,
         G::ColumnBlocked => (i.column_blocked_for, i.in_state) = (long, long),
         G::Yielded => (i.yielded_for, i.hindered_for) = (long, long),
         G::WayFree => i.way_free = true,
@@ -318,7 +318,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
                 inputs.heartbeat_age = Duration::from_secs(3600);
             }
             // On the pad, where it should be.
-            inputs.at_start |= !matches!(row.guard, G::AwayFromStart | G::StartElsewhere);
+            inputs.at_pad |= !matches!(row.guard, G::AwayFromPad | G::StartElsewhere);
             let taken = first_applicable_row(*from, &inputs).expect("a row");
             assert!(core::ptr::eq(taken, row), "{from:?} with {:?}: {}", row.guard, taken.text);
             if row.min_duration > AT_ONCE {

@@ -29,7 +29,7 @@ use crate::swarm::fleet::DivisionInput;
 pub const MAX_ORDER_CHANGES: u32 = 2000;
 /// Most rings of an area that a companion plans.
 pub const MAX_RINGS: usize = 128;
-/// Clearance that every leg over an area is planned with, metres: there are no walls.
+/// Clearance that every leg in a coverage mission is planned with, metres: there are no walls.
 const OPEN_FIELD_CLEARANCE_M: f32 = 10.0;
 
 /// Memory of the planner for areas of at most `X` vertices, `L` lanes and `K` vehicles.
@@ -120,7 +120,7 @@ impl From<Error> for PlanFailure {
     fn from(error: Error) -> Self {
         match error {
             Error::Plan(error) => plan_failure(&error),
-            Error::NoField => Self::NoRoadmap,
+            Error::NoField => Self::RoadmapUnusable,
             Error::Coverage(
                 CoverageError::Area(AreaError::AreaFull)
                 | CoverageError::LanesFull
@@ -316,12 +316,12 @@ pub fn plan_flights<
         schedule,
         out,
     )?;
-    for lots in losses {
+    for inputs in losses {
         let mut fates: Vec<VehicleStatus, K> = Vec::new();
         for pad in &pads {
             let rank = pads.iter().filter(|other| other.id < pad.id).count();
-            let lot = lots.get(rank).ok_or(CoverageError::Vehicles)?;
-            let fate = VehicleStatus { alive: lot.alive, along_m: lot.along_m() };
+            let input = inputs.get(rank).ok_or(CoverageError::Vehicles)?;
+            let fate = VehicleStatus { alive: input.alive, along_m: input.along_m() };
             fates.push(fate).map_err(|_| CoverageError::Vehicles)?;
         }
         let loss = Loss { work: &whole, swarm: &swarm, fates: &fates };

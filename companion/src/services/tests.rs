@@ -79,10 +79,13 @@ fn parameters_are_listed_read_set_and_kept() {
         let list = PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: 0 };
         let listed = values(&ground.ask(link, &list));
         assert_eq!(listed.len(), TABLE.len());
-        for (i, (told, parameter)) in listed.iter().zip(TABLE).enumerate() {
-            assert_eq!((told.param_index, told.param_count), (i as u16, TABLE.len() as u16));
+        for (i, (reported, parameter)) in listed.iter().zip(TABLE).enumerate() {
             assert_eq!(
-                (told.param_id.to_str(), told.param_value),
+                (reported.param_index, reported.param_count),
+                (i as u16, TABLE.len() as u16)
+            );
+            assert_eq!(
+                (reported.param_id.to_str(), reported.param_value),
                 (Ok(parameter.name), parameter.default)
             );
         }
@@ -197,7 +200,7 @@ fn time_and_version_are_told_on_either_link() {
         assert_eq!((answer.tc1, answer.ts1), (ground.bench.now.as_micros() as i64 * 1000, 42));
         let frame = heard.iter().find(|f| f.message_id == TIMESYNC_DATA::ID).unwrap();
         assert_eq!(
-            (frame.padded()[16], frame.padded()[17]),
+            (frame.padded_payload()[16], frame.padded_payload()[17]),
             GROUND,
             "an autopilot does not forward its own"
         );
@@ -215,7 +218,8 @@ fn time_and_version_are_told_on_either_link() {
             ..COMMAND_LONG_DATA::default()
         };
         let heard = ground.ask(link, &request);
-        let version = heard.iter().find_map(Frame::decode::<AUTOPILOT_VERSION_DATA>).expect("told");
+        let version =
+            heard.iter().find_map(Frame::decode::<AUTOPILOT_VERSION_DATA>).expect("reported");
         assert!(version.capabilities.contains(MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP));
         assert!(version.flight_sw_version > 0);
     }

@@ -154,7 +154,7 @@ impl Store {
     }
 
     /// Sets the record of photographed waypoints; it is written to flash by a later request.
-    pub(crate) fn store_photographed(&mut self, photographed: PhotographedRecord) {
+    pub(crate) fn set_photographed_record(&mut self, photographed: PhotographedRecord) {
         self.photographed = photographed;
         self.unsaved_photographed = true;
     }

@@ -25,8 +25,8 @@
 
 pub(crate) mod asking;
 mod beside;
-pub(crate) mod flown;
 mod homeward;
+pub(crate) mod path_kind;
 mod reported;
 mod returning;
 
@@ -35,8 +35,8 @@ use planner_core::frames::Geodetic;
 use planner_core::{Length, Point};
 
 use self::beside::AreaDetourSearches;
-use self::flown::{DetourPurpose, FlownPath};
 use self::homeward::HomewardSearch;
+use self::path_kind::{DetourPurpose, PathKind};
 use crate::link::commands::{ACCEPTED, Command};
 use crate::mission::State;
 use crate::swarm::neighbours::MAX_HOVER_MPS;
@@ -97,13 +97,13 @@ pub(crate) struct Detours {
     blocked: bool,
     /// Whether this vehicle was out of the plan once, or got a path that does not lead back to it.
     left_plan: bool,
-    flown: FlownPath,
+    path_kind: PathKind,
     /// Purpose of the path requested from the shell, and whether the shell has read the request.
     sought: Option<DetourPurpose>,
     request_read: bool,
-    /// The search for a path straight home over an area.
+    /// The search for a path straight home in a coverage mission.
     pub(crate) home: HomewardSearch,
-    /// Searches for a detour over an area that leads back to the plan's path.
+    /// Searches for a detour in a coverage mission that leads back to the plan's path.
     area_searches: AreaDetourSearches,
     /// Progress along the plan's path at which the vehicle left it for a detour, metres.
     left_at_m: f32,
@@ -153,7 +153,8 @@ impl Detours {
         self.obstacles.forget_avoided();
     }
 
-    /// Begins a new flight over an area: the vehicle no longer counts as having left the plan.
+    /// Begins a new flight in a coverage mission: the vehicle no longer counts as having left the
+    /// plan.
     pub(crate) fn begin_flight(&mut self) {
         self.left_plan = false;
     }
@@ -199,8 +200,8 @@ impl Detours {
         self.left_plan
     }
 
-    /// First free place along the path over an area beyond the block, metres, for the end of a
-    /// detour; `None` if there is none.
+    /// First free place along the path in a coverage mission beyond the block, metres, for the end
+    /// of a detour; `None` if there is none.
     pub(crate) fn rejoin_m<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -208,8 +209,8 @@ impl Detours {
         beside::first_rejoin_m(view, self.obstacles.all())
     }
 
-    /// Whether the vehicle, in the air over an area, is on its plan's path, or beside it on a
-    /// detour that leads back to it.
+    /// Whether the vehicle, in the air in a coverage mission, is on its plan's path, or beside it
+    /// on a detour that leads back to it.
     pub(crate) fn keeps_to_plan_over_area<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -223,7 +224,8 @@ impl Detours {
             && view.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
     }
 
-    /// Whether a stopped vehicle over an area may now seek a detour that leads back to its path.
+    /// Whether a stopped vehicle in a coverage mission may now seek a detour that leads back to its
+    /// path.
     pub(crate) fn may_detour_over_area<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -236,13 +238,13 @@ impl Detours {
             && self.area_searches.may_seek(view.now)
     }
 
-    /// Ends a detour over an area. If the vehicle's own plan `came` from the shell, it flies that
-    /// next; else it does not return to its plan.
+    /// Ends a detour in a coverage mission. If the vehicle's own plan `came` from the shell, it
+    /// flies that next; else it does not return to its plan.
     pub(crate) fn end_area_detour(&mut self, came: bool) {
         if came {
             let field_searches = self.area_searches;
             self.forget_plan();
-            (self.flown, self.area_searches) = (FlownPath::PlanReturned, field_searches);
+            (self.path_kind, self.area_searches) = (PathKind::PlanReturned, field_searches);
         } else {
             self.give_up_plan();
         }
@@ -371,12 +373,12 @@ impl Detours {
         let near_m = if stands { SWAY_ASIDE_M } else { 0.0 };
         let length_m = view.mission.plan().map_or(0.0, |plan| plan.path.length_m());
         let at_end = view.guidance.along_m() >= length_m - near_m;
-        let astray = match self.flown {
+        let astray = match self.path_kind {
             _ if self.seeks_landing() => false,
-            FlownPath::Plan | FlownPath::PlanReturned => self.left_plan,
-            FlownPath::Detour(DetourPurpose::Aside(_)) => at_end,
-            FlownPath::Detour(_) => false,
-            FlownPath::Astray => true,
+            PathKind::Plan | PathKind::PlanReturned => self.left_plan,
+            PathKind::Detour(DetourPurpose::Aside(_)) => at_end,
+            PathKind::Detour(_) => false,
+            PathKind::Astray => true,
         };
         let dead_end = self.is_stopped_by_others(view)
             && !Self::is_freed_over_area(view)
@@ -404,7 +406,7 @@ impl Detours {
     }
 
     /// Whether the safety filter has kept the vehicle from flying on for 20 s although it goes
-    /// first; over an area also if it yields to a neighbour off the plan.
+    /// first; in a coverage mission also if it yields to a neighbour off the plan.
     fn is_stopped_for_long<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -427,8 +429,8 @@ impl Detours {
         let here = if on_ground { view.mission.pad_position() } else { view.telemetry.position };
         let along_m = view.guidance.along_m();
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
-        // A hovering vehicle sways. So over an area an obstacle that has blocked the path does so
-        // until it is as far from the path as a detour keeps.
+        // A hovering vehicle sways. So in a coverage mission an obstacle that has blocked the path
+        // does so until it is as far from the path as a detour keeps.
         let waits = view.config.lost_vehicle_down_s.is_some()
             && view.mission.state() == State::Blocked
             && self.obstructed;
@@ -440,9 +442,9 @@ impl Detours {
             new.len() + neighbours.len(),
             &mut (cost.max(MAX_STRETCHES_PER_STEP) as u16),
             cost as u16,
-            |source, tell| match new.get(source) {
-                Some(obstacle) => tell(*obstacle),
-                None => neighbours.for_each_zone_of(source - new.len(), now, apart_m, tell),
+            |source, visit| match new.get(source) {
+                Some(obstacle) => visit(*obstacle),
+                None => neighbours.for_each_zone_of(source - new.len(), now, apart_m, visit),
             },
             // Over an area only the path just ahead counts: the vehicle goes on taking pictures
             // until it is near the obstacle.

@@ -16,13 +16,13 @@ use planner_core::file::CRC32;
 use crate::link::roster::{MemberStatus, RosterReportEntry};
 use crate::time::{Duration, Instant};
 
-mod lots;
+mod division_input;
 mod reports;
 #[cfg(test)]
 mod tests;
 mod timeouts;
 
-pub use lots::{DivisionInput, DivisionInputs};
+pub use division_input::{DivisionInput, DivisionInputs};
 pub use timeouts::{FleetTimeouts, LEASE, LEASE_HEARD_WITHIN, SILENT_AFTER};
 
 /// Time of flight for which a vehicle promises to fly on, seconds: up to the last picture that it
@@ -317,12 +317,12 @@ impl<const V: usize> Fleet<V> {
             return;
         }
         // A vehicle that has no part since an earlier division gets none in this one.
-        let lot = |m: &FleetMember| {
+        let input = |m: &FleetMember| {
             if m.in_roster { DivisionInput::from_entry(&m.entry) } else { DivisionInput::default() }
         };
-        if !self.members.iter().map(lot).eq(self.division_inputs.iter().copied()) {
+        if !self.members.iter().map(input).eq(self.division_inputs.iter().copied()) {
             self.withdraw_inputs();
-            self.division_inputs = self.members.iter().map(lot).collect();
+            self.division_inputs = self.members.iter().map(input).collect();
         }
     }
 
@@ -342,7 +342,7 @@ impl<const V: usize> Fleet<V> {
     /// The inputs of every binding division, and of the one under way where that is to be computed.
     pub fn inputs_of_divisions(&self) -> impl Iterator<Item = &[DivisionInput]> {
         let under_way = self.needs_division().then_some(&self.division_inputs);
-        self.divisions.iter().chain(under_way).map(|lots| &lots[..])
+        self.divisions.iter().chain(under_way).map(|inputs| &inputs[..])
     }
 
     /// Sets the hash of the division under way from the CRC of the computed plan and from the
@@ -351,9 +351,9 @@ impl<const V: usize> Fleet<V> {
         if self.needs_division() {
             let mut digest = CRC32.digest();
             digest.update(&plan_crc.to_le_bytes());
-            for lot in &self.division_inputs {
-                let [low, high] = lot.along_dm.to_le_bytes();
-                digest.update(&[u8::from(lot.alive), low, high]);
+            for input in &self.division_inputs {
+                let [low, high] = input.along_dm.to_le_bytes();
+                digest.update(&[u8::from(input.alive), low, high]);
             }
             // 0 stands for no hash.
             self.hash = digest.finalize().max(1);
@@ -377,17 +377,17 @@ impl<const V: usize> Fleet<V> {
 
     /// Makes the division under way binding: vehicles without a part in it leave the fleet.
     fn commit_division(&mut self) {
-        let lots = core::mem::take(&mut self.division_inputs);
+        let inputs = core::mem::take(&mut self.division_inputs);
         self.committed_hash = self.hash;
         (self.hash, self.previous_hash) = (0, 0);
         self.previous_inputs.clear();
-        for (member, lot) in self.members.iter_mut().zip(&lots) {
-            member.in_roster &= lot.alive;
+        for (member, input) in self.members.iter_mut().zip(&inputs) {
+            member.in_roster &= input.alive;
             member.hash = 0;
-            member.entry = entry_in_division(&member.entry, !lot.alive);
+            member.entry = entry_in_division(&member.entry, !input.alive);
         }
         // With `MAX_DIVISIONS` no further one is ever under way.
-        let _ = self.divisions.push(lots);
+        let _ = self.divisions.push(inputs);
     }
 
     /// Moves all times to a clock that shows `then` where the old one shows `now`; ages past every
@@ -427,9 +427,9 @@ impl<const V: usize> Fleet<V> {
     /// Hash of the inputs of all binding divisions, and of the one that is to be computed.
     pub fn division_hash(&self) -> u32 {
         let mut digest = CRC32.digest();
-        for lot in self.inputs_of_divisions().flatten() {
-            let [low, high] = lot.along_dm.to_le_bytes();
-            digest.update(&[u8::from(lot.alive), low, high]);
+        for input in self.inputs_of_divisions().flatten() {
+            let [low, high] = input.along_dm.to_le_bytes();
+            digest.update(&[u8::from(input.alive), low, high]);
         }
         digest.finalize()
     }
@@ -443,8 +443,8 @@ impl<const V: usize> Fleet<V> {
     /// Place where this vehicle held for the last binding division, decimetres along its path
     /// before it.
     pub fn held_at_dm(&self) -> u16 {
-        let lots = self.divisions.last().and_then(|lots| lots.get(usize::from(self.own)));
-        lots.map_or(0, |lot| lot.along_dm)
+        let inputs = self.divisions.last().and_then(|inputs| inputs.get(usize::from(self.own)));
+        inputs.map_or(0, |input| input.along_dm)
     }
 
     /// Number of divisions that are binding.

@@ -65,8 +65,8 @@ pub struct Neighbours<const V: usize> {
     ground: Option<Ground>,
     /// Silence after which a vehicle is on the ground.
     down_after: Duration,
-    /// Distance by which two vehicles in the air over an area may be nearer than their estimates
-    /// say, metres; 0 in other missions.
+    /// Distance by which two vehicles in the air in a coverage mission may be nearer than their
+    /// estimates say, metres; 0 in other missions.
     pair_position_error_m: f32,
     /// Rank of the vehicle with which the next roster report begins.
     roster_next: u16,
@@ -403,7 +403,7 @@ impl<const V: usize> Neighbours<V> {
                 .all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }
 
-    /// Whether this vehicle holds the lease over an area.
+    /// Whether this vehicle holds the lease in a coverage mission.
     #[inline(never)]
     pub(crate) fn holds_lease(&self, now: Instant) -> bool {
         self.fleet().is_some_and(|fleet| fleet.has_lease(now))

@@ -63,10 +63,10 @@ impl Obstacles {
             return ACCEPTED;
         }
         let radius_m = command.param1 + clearance_m;
-        let told = |o: &KeepOutZone| {
+        let reported = |o: &KeepOutZone| {
             (o.from - centre).length() < SAME_OBSTACLE_M && o.radius_m >= radius_m
         };
-        if self.known.iter().any(told) {
+        if self.known.iter().any(reported) {
             return ACCEPTED;
         }
         match self.known.push(KeepOutZone {

@@ -21,7 +21,7 @@ pub struct IncrementalScan {
 }
 
 impl IncrementalScan {
-    /// Continues the scan. `tell` calls back with each zone of a source; a zone costs `each` of
+    /// Continues the scan. `visit` calls back with each zone of a source; a zone costs `each` of
     /// `budget`, a source 1. Returns `Some(true)` at the first zone that `is_in_the_way`,
     /// `Some(false)` when no zone of all `sources` is; the next call begins a new scan. `None` when
     /// the budget is spent; it has to be at least `each`. Where the number of sources changes, the
@@ -31,7 +31,7 @@ impl IncrementalScan {
         sources: usize,
         budget: &mut u16,
         each: u16,
-        tell: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
+        visit: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
         is_in_the_way: impl Fn(&KeepOutZone) -> bool,
     ) -> Option<bool> {
         let sources = sources as u16;
@@ -40,21 +40,21 @@ impl IncrementalScan {
             self.restart();
         }
         while self.sources_checked < sources {
-            let (mut told, mut things, mut found) = (0, self.zones_checked, false);
+            let (mut visited, mut things, mut found) = (0, self.zones_checked, false);
             self.source %= sources;
-            tell(usize::from(self.source), &mut |keep_off| {
-                if told == things && !found && *budget >= each {
+            visit(usize::from(self.source), &mut |keep_off| {
+                if visited == things && !found && *budget >= each {
                     *budget -= each;
                     things += 1;
                     found = is_in_the_way(&keep_off);
                 }
-                told += 1;
+                visited += 1;
             });
             if found {
                 self.restart();
                 return Some(true);
             }
-            if things < told {
+            if things < visited {
                 self.zones_checked = things;
                 return None;
             }
@@ -83,10 +83,10 @@ mod tests {
     /// own.
     const THINGS: [usize; 7] = [0, 3, 16, 0, 1, 0, 2];
 
-    fn tell(source: usize, tell: &mut dyn FnMut(KeepOutZone)) {
+    fn visit(source: usize, visit: &mut dyn FnMut(KeepOutZone)) {
         for i in 0..THINGS[source] {
             let at = Point::new(source as f32, i as f32, 0.0);
-            tell(KeepOutZone { from: at, to: at, radius_m: 1.0, kind: ZoneKind::Static });
+            visit(KeepOutZone { from: at, to: at, radius_m: 1.0, kind: ZoneKind::Static });
         }
     }
 
@@ -96,7 +96,7 @@ mod tests {
             let mut budget = 5;
             let is =
                 |k: &KeepOutZone| at.is_some_and(|(source, i)| k.from.x == source && k.from.y == i);
-            if let Some(found) = sweep.continue_scan(THINGS.len(), &mut budget, each, tell, is) {
+            if let Some(found) = sweep.continue_scan(THINGS.len(), &mut budget, each, visit, is) {
                 return (found, steps);
             }
             assert!(steps < 100);
@@ -117,7 +117,7 @@ mod tests {
             }
         }
         assert_eq!(
-            IncrementalScan::default().continue_scan(0, &mut 5, 1, tell, |_| true),
+            IncrementalScan::default().continue_scan(0, &mut 5, 1, visit, |_| true),
             Some(false),
             "nobody is there"
         );
@@ -135,11 +135,11 @@ mod tests {
     #[test]
     fn where_sources_come_or_go_all_are_asked_again() {
         let mut sweep = IncrementalScan::default();
-        assert_eq!(sweep.continue_scan(7, &mut 12, 1, tell, |_| false), None);
-        assert_eq!(sweep.continue_scan(2, &mut 12, 1, tell, |_| false), Some(false));
-        assert_eq!(sweep.continue_scan(2, &mut 2, 1, tell, |_| false), None);
+        assert_eq!(sweep.continue_scan(7, &mut 12, 1, visit, |_| false), None);
+        assert_eq!(sweep.continue_scan(2, &mut 12, 1, visit, |_| false), Some(false));
+        assert_eq!(sweep.continue_scan(2, &mut 2, 1, visit, |_| false), None);
         // The first zones were checked already.
         let first = |k: &KeepOutZone| k.from.x == 1.0 && k.from.y == 0.0;
-        assert_eq!(sweep.continue_scan(7, &mut 99, 1, tell, first), Some(true));
+        assert_eq!(sweep.continue_scan(7, &mut 99, 1, visit, first), Some(true));
     }
 }

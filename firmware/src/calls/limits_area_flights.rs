@@ -87,14 +87,14 @@ pub(super) fn call_area_flights(
     coverage::call_coverage(to, area);
     let mut transit = ZoneTransit::empty();
     transit.set_area(coverage::test_area()).expect("there is room");
-    let good = coverage_work(&area.tracks, &transit);
+    let good = division_work(&area.tracks, &transit);
     call_flight_plans(to, &good, &area.plan, schedule, out);
     let pack = &mut area.powell.pack;
     call_divisions(to, &good, &area.plan, &mut BorrowedWorkspaces { losses, pack, schedule, out });
     call_ways_home(to, &transit, own);
 }
 
-fn coverage_work<'a>(tracks: &'a Lanes, transit: &'a ZoneTransit<'a>) -> Work<'a, LANES, CORNERS> {
+fn division_work<'a>(tracks: &'a Lanes, transit: &'a ZoneTransit<'a>) -> Work<'a, LANES, CORNERS> {
     Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint }
 }
 
@@ -299,7 +299,7 @@ fn call_divisions(
                 let loss = Loss { work: good, swarm: &SWARM, fates };
                 let divided = call_redivide(to, &loss, memory, &mut routes);
                 assert!(fates.len() == VEHICLES || divided == Err(CoverageError::Vehicles.into()));
-                let setting = Err(CoverageError::Setting("along_m").into());
+                let setting = Err(CoverageError::SettingOutOfRange("along_m").into());
                 assert!(fates.len() != VEHICLES || hard >= 0.0 || divided == setting);
                 to.add_count(routes.routes.len());
                 // The same loss again: waypoints that are already done must not be divided again.

@@ -101,7 +101,7 @@ impl EmulatedBoard {
         });
         let mut board = Self { qemu, input, answers, now_us: 0 };
         ensure!(
-            board.finish_grant()?.restarted,
+            board.wait_for_grant()?.restarted,
             "the firmware is none for lock step: {}",
             quoted_path(program)
         );
@@ -114,7 +114,7 @@ impl EmulatedBoard {
     }
 
     /// Grants the board time until `until_us`, and hands over the bytes that its ports receive
-    /// until then, sorted by time. The caller has to call [`finish_grant`](Self::finish_grant)
+    /// until then, sorted by time. The caller has to call [`wait_for_grant`](Self::wait_for_grant)
     /// next.
     ///
     /// # Errors
@@ -137,20 +137,20 @@ impl EmulatedBoard {
     ///
     /// # Errors
     /// The board does not answer within 10 s, or its process has ended.
-    pub fn finish_grant(&mut self) -> anyhow::Result<GrantResult> {
-        self.finish_grant_within(ANSWER_TIMEOUT)
+    pub fn wait_for_grant(&mut self) -> anyhow::Result<GrantResult> {
+        self.wait_for_grant_within(ANSWER_TIMEOUT)
     }
 
-    /// As [`finish_grant`](Self::finish_grant), with another limit of wall-clock time: a board that
-    /// hangs until its watchdog resets it takes the host seconds.
+    /// As [`wait_for_grant`](Self::wait_for_grant), with another limit of wall-clock
+    /// time: a board that hangs until its watchdog resets it takes the host seconds.
     ///
     /// # Errors
-    /// As [`finish_grant`](Self::finish_grant).
-    pub fn finish_grant_within(&mut self, patience: Duration) -> anyhow::Result<GrantResult> {
-        let answer = match self.answers.recv_timeout(patience) {
+    /// As [`wait_for_grant`](Self::wait_for_grant).
+    pub fn wait_for_grant_within(&mut self, timeout: Duration) -> anyhow::Result<GrantResult> {
+        let answer = match self.answers.recv_timeout(timeout) {
             Ok(answer) => answer?,
             Err(RecvTimeoutError::Timeout) => {
-                bail!("the board hangs: no answer in {} s", patience.as_secs())
+                bail!("the board hangs: no answer in {} s", timeout.as_secs())
             }
             Err(RecvTimeoutError::Disconnected) => bail!("the board is gone"),
         };
@@ -161,14 +161,14 @@ impl EmulatedBoard {
     /// Grants the board time until `until_us`, and waits until it has used it up.
     ///
     /// # Errors
-    /// As [`begin_grant`](Self::begin_grant) and [`finish_grant`](Self::finish_grant).
+    /// As [`begin_grant`](Self::begin_grant) and [`wait_for_grant`](Self::wait_for_grant).
     pub fn run_grant(
         &mut self,
         until_us: u64,
         pieces: &[PortBytes],
     ) -> anyhow::Result<GrantResult> {
         self.begin_grant(until_us, pieces)?;
-        self.finish_grant()
+        self.wait_for_grant()
     }
 
     fn send(&mut self, message: &[u8]) -> anyhow::Result<()> {

@@ -33,7 +33,7 @@ impl EmulatedBoard {
         while memory.len() < length {
             let len = (length - memory.len()).min(MEMORY_CHUNK) as u16;
             self.send(&ToBoard::Peek { address: address + memory.len() as u32, len }.to_bytes())?;
-            memory.extend(self.finish_grant()?.memory);
+            memory.extend(self.wait_for_grant()?.memory);
         }
         Ok(memory)
     }
@@ -49,7 +49,7 @@ impl EmulatedBoard {
                 len: bytes.len() as u16,
             };
             self.send(&[&head.to_bytes(), bytes].concat())?;
-            self.finish_grant()?;
+            self.wait_for_grant()?;
         }
         Ok(())
     }
@@ -58,16 +58,16 @@ impl EmulatedBoard {
     /// Returns when the board waits for the desk again, or has reset.
     ///
     /// # Errors
-    /// The QEMU process has ended, or the board does not answer within `patience` of wall-clock
+    /// The QEMU process has ended, or the board does not answer within `timeout` of wall-clock
     /// time.
     pub fn call_function(
         &mut self,
         address: u32,
         argument: u32,
-        patience: Duration,
+        timeout: Duration,
     ) -> anyhow::Result<GrantResult> {
         self.send(&ToBoard::Call { address, argument }.to_bytes())?;
-        self.finish_grant_within(patience)
+        self.wait_for_grant_within(timeout)
     }
 
     /// Writes the image `bank` into the board's flash bank, with its word marks.

@@ -462,7 +462,7 @@ fn explain_error(error: CoverageError, wanted: &coverage::Area, vehicles: usize)
     let place = &wanted.place;
     let why = match error {
         CoverageError::Area(area) => format!("{area:?}"),
-        CoverageError::Setting(name) => format!("{name} is out of its range"),
+        CoverageError::SettingOutOfRange(name) => format!("{name} is out of its range"),
         CoverageError::Gaps => "the spacings leave gaps between the pictures".to_owned(),
         CoverageError::LanesFull => {
             format!(
@@ -471,7 +471,7 @@ fn explain_error(error: CoverageError, wanted: &coverage::Area, vehicles: usize)
         }
         CoverageError::NoFlyFull => {
             format!(
-                "no-fly zones have more than {MAX_CORNERS} outward corners\nhint: draw them with fewer"
+                "no-fly zones have more than {MAX_CORNERS} convex corners\nhint: draw them with fewer"
             )
         }
         CoverageError::NothingToCover if wanted.obstacles.is_some() => {

@@ -59,7 +59,7 @@ pub struct Obstacles {
 }
 
 impl Obstacles {
-    /// The obstacles of a map; `ground_m` is the height of the ground at a place.
+    /// The obstacles of a map: its occupied cells without those that count as ground.
     pub fn new(map: &OccupancyMap, unknown: Unknown, clearance_m: f32) -> Self {
         let mut map = VoxelMap {
             seen_obstacle_words: None,

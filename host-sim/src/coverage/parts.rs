@@ -61,23 +61,24 @@ pub fn flown_layers(
     let mut shown: Vec<Division> = Vec::new();
     let (mut before, mut gone, mut losses) =
         (WaypointOwners::new(), Vec::new(), Vec::<&[DivisionInput]>::new());
-    let whole = Begun { t_s: 0.0, vehicle: 0, number: 0, lots: Vec::new(), plan_crc: 0 };
+    let whole = Begun { t_s: 0.0, vehicle: 0, number: 0, inputs: Vec::new(), plan_crc: 0 };
     for division in std::iter::once(&whole).chain(&flight.divisions) {
         // Skipped: a division already shown, which another vehicle begins to fly later, or one
         // whose inputs no vehicle reported, which cannot be planned here.
         if usize::from(division.number) != shown.len()
-            || (division.number > 0 && division.lots.is_empty())
+            || (division.number > 0 && division.inputs.is_empty())
         {
             continue;
         }
-        losses.extend((division.number > 0).then_some(&division.lots[..]));
+        losses.extend((division.number > 0).then_some(&division.inputs[..]));
         let rest = match losses.is_empty() && flight.done.is_empty() {
             true => None,
             false => Some(mission.plan_remaining(&flight.done, losses.iter().copied())?),
         };
         let flights = rest.as_ref().map_or(&plan.flights, |rest| &rest.flights);
         let own = waypoint_owners(flights);
-        let lost = ids.iter().zip(&division.lots).filter(|(_, lot)| !lot.alive).map(|(id, _)| *id);
+        let lost =
+            ids.iter().zip(&division.inputs).filter(|(_, input)| !input.alive).map(|(id, _)| *id);
         let lost: Vec<u8> = lost.filter(|id| !gone.contains(id)).collect();
         gone.extend(&lost);
         shown.push(Division {

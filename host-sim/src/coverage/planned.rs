@@ -13,7 +13,7 @@ use crate::scenario::coverage::{self, Method};
 pub const MAX_VEHICLES: usize = 32;
 /// Most lanes over an area that the desk plans.
 pub const MAX_LANES: usize = 8192;
-/// Most outward corners of no-fly zones that the desk plans around.
+/// Most convex corners of no-fly zones that the desk plans around.
 pub const MAX_CORNERS: usize = 256;
 
 /// One flight of a vehicle on one battery.

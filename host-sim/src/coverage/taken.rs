@@ -12,10 +12,10 @@
 //!   than the spacing plus `max_along_m`: one of them is then as far off as a picture may be.
 //!
 //! A picture belongs to a lane if it is within half a lane spacing of it, or within
-//! [`Tolerance::beside_m`] where that is more. A missing picture leaves a gap of two spacings, so
-//! it is found while a spacing is more than `max_along_m`. On a short lane whose waypoints are
-//! nearer than the spacing it may not be found; the check of cells then decides whether the area is
-//! photographed.
+//! [`Tolerance::cross_track_m`] where that is more. A missing picture leaves a gap of two
+//! spacings, so it is found while a spacing is more than `max_along_m`. On a short lane whose
+//! waypoints are nearer than the spacing it may not be found; the check of cells then decides
+//! whether the area is photographed.
 //!
 //! A waypoint is flown twice if vehicles came to it twice: each picture counts for its nearest
 //! waypoint, and consecutive pictures of one vehicle there count as one pass. Metres, ENU in the
@@ -47,7 +47,7 @@ pub struct Picture {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tolerance {
     /// Distance beside the path from tracking, estimate and gusts, metres.
-    pub beside_m: f32,
+    pub cross_track_m: f32,
     /// Distance flown at cruise speed between the due place of a picture and its true place,
     /// metres.
     pub late_m: f32,
@@ -59,7 +59,7 @@ impl Tolerance {
         let scenario = planned.scenario;
         let distances = margins::required_distances(&scenario.simulation, 0.0, &scenario.vehicles);
         Self {
-            beside_m: distances.margin_m,
+            cross_track_m: distances.margin_m,
             late_m: margins::TRIGGER_DELAY_S * scenario.mission.cruise_mps,
         }
     }
@@ -67,7 +67,7 @@ impl Tolerance {
     /// Greatest distance along the lane between a waypoint and its picture, metres;
     /// [`margins::usable_footprint`] plans with the same.
     pub fn max_along_m(&self) -> f32 {
-        self.beside_m + self.late_m
+        self.cross_track_m + self.late_m
     }
 }
 
@@ -81,7 +81,7 @@ pub fn count_left_and_twice(planned: &CoveragePlan<'_>, pictures: &[Picture]) ->
 }
 
 /// Distance of a point along a lane from its first waypoint, and distance beside the lane, metres.
-fn along_and_beside(lane: &Lane, place: &Flat) -> (f32, f32) {
+fn along_and_cross_track(lane: &Lane, place: &Flat) -> (f32, f32) {
     let (way, from) = (lane.to - lane.from, place - lane.from);
     let length_m = lane.length_m();
     if length_m > 0.0 {
@@ -98,15 +98,15 @@ fn count_left_on_lane(
     tolerance: &Tolerance,
 ) -> u64 {
     let spacing = planned.area_settings.spacing;
-    let beside_m = tolerance.beside_m.max(spacing.lane_m / 2.0);
+    let cross_track_m = tolerance.cross_track_m.max(spacing.lane_m / 2.0);
     let near_m = tolerance.max_along_m().max(spacing.waypoint_m / 2.0);
     let widest_m = spacing.waypoint_m + tolerance.max_along_m();
-    let places = pictures.iter().map(|picture| along_and_beside(lane, &picture.position.xy()));
+    let places = pictures.iter().map(|picture| along_and_cross_track(lane, &picture.position.xy()));
     let mut taken: Vec<f32> =
-        places.filter(|(_, off_m)| *off_m <= beside_m).map(|(along_m, _)| along_m).collect();
+        places.filter(|(_, off_m)| *off_m <= cross_track_m).map(|(along_m, _)| along_m).collect();
     taken.sort_by(f32::total_cmp);
     let has_picture = |k: &u32| {
-        let at_m = along_and_beside(lane, &lane.waypoint(*k)).0;
+        let at_m = along_and_cross_track(lane, &lane.waypoint(*k)).0;
         let next = taken.partition_point(|along_m| *along_m < at_m);
         let before = next.checked_sub(1).map(|index| at_m - taken[index]);
         let behind = taken.get(next).map(|along_m| along_m - at_m);
@@ -120,7 +120,7 @@ fn count_left_on_lane(
 /// Number of the waypoint nearest to a picture taken at `place`; `None` if there are no lanes.
 fn nearest_waypoint(lanes: &[Lane], place: &Flat) -> Option<u32> {
     let nearest = |lane: &Lane| {
-        let share = along_and_beside(lane, place).0 / lane.length_m().max(f32::MIN_POSITIVE);
+        let share = along_and_cross_track(lane, place).0 / lane.length_m().max(f32::MIN_POSITIVE);
         let last = lane.count.saturating_sub(1);
         let k = (share * last as f32).round().clamp(0.0, last as f32) as u32;
         (lane.first + k, (lane.waypoint(k) - place).norm())

@@ -337,7 +337,7 @@ impl Mission {
             .map(|area| Transit::<BOARD_CORNERS>::empty().set_area(area));
         if matches!(zones, Ok(Err(_))) {
             return Some(format!(
-                "more outward corners of no-fly zones, {} holds {BOARD_CORNERS}",
+                "more convex corners of no-fly zones, {} holds {BOARD_CORNERS}",
                 board.name
             ));
         }

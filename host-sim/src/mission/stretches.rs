@@ -60,8 +60,8 @@ impl Mission {
     pub(super) fn check_stretches(&self, plan: &SwarmPlan) -> anyhow::Result<()> {
         let mut losses: Vec<Vec<DivisionInput>> = Vec::new();
         let mut next = next_division_inputs(plan);
-        while let Some(lots) = next {
-            losses.push(lots);
+        while let Some(inputs) = next {
+            losses.push(inputs);
             if losses.len() > MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES {
                 bail!(
                     "area too large: {}: its routes take more than {} stretches of {WAYPOINTS} corners each\nhint: more \
@@ -71,7 +71,7 @@ impl Mission {
                 );
             }
             next = next_division_inputs(
-                &*self.plan_remaining(&[], losses.iter().map(|lots| &lots[..]))?,
+                &*self.plan_remaining(&[], losses.iter().map(|inputs| &inputs[..]))?,
             );
         }
         Ok(())

@@ -2,9 +2,9 @@
 //! the paper's values, and draws the paper's Figs. 8 to 10, 12 and 13 in the report.
 //!
 //! The paper states neither areas nor places of the vehicles, camera, V_a, V_d or Δh. Ours are in
-//! [`SHORT_TRACK`], [`LONG_TRACK`], [`CONVEX`], [`COMPARED_AREAS`] and [`SMALL`]; V_a 3 m/s, V_d 1
-//! m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to A12 were flown in Gazebo; ours are
-//! the planned costs C_k, without turns. CV is 100 · SD / Av in both, SD the sample's.
+//! [`SHORT_TRACK`], [`LONG_TRACK`], [`CONVEX`], [`COMPARED_AREAS`] and [`TABLE_4_AREA`]; V_a 3 m/s,
+//! V_d 1 m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to A12 were flown in Gazebo;
+//! ours are the planned costs C_k, without turns. CV is 100 · SD / Av in both, SD the sample's.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use super::cpp_data::{
     COSTS_M, FLIGHT_TIMES_TABLES, LONG_TRACK_COLUMNS, MEAN_LARGEST_TIME_S, PLANNING_S, REAL_S,
-    SHORT_COLUMNS, TABLE_4_COSTS_M,
+    SHORT_TRACK_COLUMNS, TABLE_4_COSTS_M,
 };
 use super::cpp_figures;
 use super::cpp_rows::{Row, Summary};
@@ -39,9 +39,9 @@ const COMPARED_AREAS: [&str; 2] = [
     "[[0, 0], [200, -15], [260, 120], [90, 200]]",
 ];
 /// Polygon of Table 4, east and north in metres: so small that the flight to it counts.
-const SMALL: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
+const TABLE_4_AREA: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
 /// Starts of the three UAVs of Table 4, east and north in metres: the first is far away.
-const STARTS_ONE_FAR: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
+const TABLE_4_STARTS: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
 const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
 /// Number of plans timed for each method and fleet size; Table 3 gets the median time.
 const TIMED_RUNS: usize = 51;
@@ -179,7 +179,7 @@ fn paper_figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
         paper_scenario(COMPARED_AREAS[0], &in_a_row(3), 10.0, 35.0)?,
         paper_scenario(COMPARED_AREAS[1], &in_a_row(3), 10.0, 35.0)?,
     ];
-    let small = paper_scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
+    let small = paper_scenario(TABLE_4_AREA, &TABLE_4_STARTS, 10.0, 35.0)?;
     let [fig_8, fig_9, fig_10] = cpp_figures::route_figures(&convex, &compared, &small)?;
     let [fig_12, fig_13] = cpp_figures::spread_figures(&tables.rows);
     Ok(vec![fig_8, fig_9, fig_10, fig_12, fig_13])
@@ -215,7 +215,7 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
 /// Table 4: one vehicle stands so far away that the fleet finishes sooner if it stays on the
 /// ground.
 fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
-    let scenario = paper_scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
+    let scenario = paper_scenario(TABLE_4_AREA, &TABLE_4_STARTS, 10.0, 35.0)?;
     for (method, theirs) in METHODS[1..].iter().zip(TABLE_4_COSTS_M) {
         let ours = tables.plan_costs(&scenario, *method, "m")?;
         tables.add("4", *method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
@@ -230,7 +230,7 @@ fn flown(tables: &mut Tables) -> anyhow::Result<()> {
         let (polygon, columns) = if table.long {
             (LONG_TRACK, LONG_TRACK_COLUMNS)
         } else {
-            (SHORT_TRACK, SHORT_COLUMNS)
+            (SHORT_TRACK, SHORT_TRACK_COLUMNS)
         };
         for (spacing, theirs) in columns.into_iter().zip(table.times_s) {
             let scenario = paper_scenario(polygon, &in_a_row(theirs.len()), spacing.0, spacing.1)?;

@@ -14,7 +14,7 @@ pub(super) struct FlightTimesTable {
 }
 
 /// Columns of the tables of the short track: spacing and height, metres.
-pub(super) const SHORT_COLUMNS: [(f64, f64); 6] =
+pub(super) const SHORT_TRACK_COLUMNS: [(f64, f64); 6] =
     [(10.0, 35.0), (10.0, 45.0), (10.0, 55.0), (5.0, 35.0), (5.0, 45.0), (5.0, 55.0)];
 /// Columns of the tables of the long track: spacing and height, metres.
 pub(super) const LONG_TRACK_COLUMNS: [(f64, f64); 6] =

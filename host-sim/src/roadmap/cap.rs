@@ -202,8 +202,8 @@ fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[b
     losses
 }
 
-/// Lengths of the shortest paths from `source` to all nodes over edges of at least `class`, metres;
-/// infinite where longer than `most_m`.
+/// Lengths of the shortest paths from `source` to all nodes over edges whose clearance class is at
+/// least `class`, metres; infinite where longer than `most_m`.
 fn shortest_distances_within(
     source: usize,
     rows: &[Vec<OutgoingEdge>],

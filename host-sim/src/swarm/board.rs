@@ -123,7 +123,7 @@ impl Board {
             return Ok(None);
         };
         if core::mem::take(runs) {
-            board.finish_grant()?;
+            board.wait_for_grant()?;
         }
         board.max_stack_used().map(Some)
     }
@@ -212,7 +212,7 @@ impl Board {
         match frame.message_id {
             HEARTBEAT_DATA::ID => self.state = reported_state(frame).unwrap_or(self.state),
             TUNNEL_DATA::ID => {
-                let intent = Intent::decode(frame.padded(), frame.system);
+                let intent = Intent::decode(frame.padded_payload(), frame.system);
                 self.progress_m = intent.map(|intent| intent.progress_m).or(self.progress_m);
             }
             STATUSTEXT_DATA::ID => {
@@ -231,7 +231,7 @@ impl LockStep {
         if !core::mem::take(&mut self.runs) {
             return Ok(Vec::new());
         }
-        let answer = self.board.finish_grant()?;
+        let answer = self.board.wait_for_grant()?;
         if answer.restarted {
             self.started_us = now_us;
         }

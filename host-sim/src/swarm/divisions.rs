@@ -24,7 +24,7 @@ pub struct Division {
     pub number: u8,
     /// Inputs of this division, one a vehicle in the order of the vehicles' ids; empty if no
     /// vehicle reported them.
-    pub lots: Vec<DivisionInput>,
+    pub inputs: Vec<DivisionInput>,
     /// CRC of the plan that the vehicle flies after this division.
     pub plan_crc: u32,
 }
@@ -36,7 +36,7 @@ struct Reported {
     number: u8,
     counted: u32,
     /// Number of the division whose plan the vehicle flies; `flown_crc` is the CRC of that plan.
-    flies: u8,
+    flown_number: u8,
     flown_crc: u32,
 }
 
@@ -45,7 +45,7 @@ struct Reported {
 pub struct DivisionLog {
     vehicles: HashMap<u8, Reported>,
     /// Inputs of each division, by the hash that the vehicles reported for it.
-    lots: HashMap<u32, Vec<DivisionInput>>,
+    inputs: HashMap<u32, Vec<DivisionInput>>,
     reported: Vec<Division>,
 }
 
@@ -59,9 +59,9 @@ impl DivisionLog {
             let Some(frame) = frame.filter(|frame| frame.message_id == TUNNEL_DATA::ID) else {
                 continue;
             };
-            if let Some(roster) = RosterReport::decode(frame.padded(), frame.system) {
+            if let Some(roster) = RosterReport::decode(frame.padded_payload(), frame.system) {
                 self.take_roster(t_s, &roster);
-            } else if let Some(intent) = Intent::decode(frame.padded(), frame.system) {
+            } else if let Some(intent) = Intent::decode(frame.padded_payload(), frame.system) {
                 self.take_intent(t_s, &intent);
             }
         }
@@ -70,7 +70,7 @@ impl DivisionLog {
     fn take_roster(&mut self, t_s: f32, roster: &RosterReport) {
         let reported = self.vehicles.entry(roster.system_id).or_default();
         (reported.number, reported.counted) = (roster.divisions, roster.committed_hash);
-        if reported.number == reported.flies {
+        if reported.number == reported.flown_number {
             reported.flown_crc = reported.plan_crc;
         }
         self.note_division(t_s, roster.system_id);
@@ -78,13 +78,13 @@ impl DivisionLog {
             return;
         }
         // A vehicle that took no part in the division before takes none in this one.
-        let before = self.lots.get(&roster.committed_hash).cloned().unwrap_or_default();
-        let lots = self.lots.entry(roster.hash).or_default();
+        let before = self.inputs.get(&roster.committed_hash).cloned().unwrap_or_default();
+        let inputs = self.inputs.entry(roster.hash).or_default();
         for (i, entry) in roster.entries.iter().enumerate() {
             let rank = i + usize::from(roster.first);
-            lots.resize(lots.len().max(rank + 1), DivisionInput::default());
-            if before.get(rank).is_none_or(|lot| lot.alive) {
-                lots[rank] = DivisionInput::from_entry(entry);
+            inputs.resize(inputs.len().max(rank + 1), DivisionInput::default());
+            if before.get(rank).is_none_or(|input| input.alive) {
+                inputs[rank] = DivisionInput::from_entry(entry);
             }
         }
     }
@@ -98,11 +98,11 @@ impl DivisionLog {
     /// plan.
     fn note_division(&mut self, t_s: f32, vehicle: u8) {
         let reported = self.vehicles.entry(vehicle).or_default();
-        if reported.number > reported.flies && reported.plan_crc != reported.flown_crc {
-            (reported.flies, reported.flown_crc) = (reported.number, reported.plan_crc);
+        if reported.number > reported.flown_number && reported.plan_crc != reported.flown_crc {
+            (reported.flown_number, reported.flown_crc) = (reported.number, reported.plan_crc);
             let Reported { number, counted, plan_crc, .. } = *reported;
-            let lots = self.lots.get(&counted).cloned().unwrap_or_default();
-            self.reported.push(Division { t_s, vehicle, number, lots, plan_crc });
+            let inputs = self.inputs.get(&counted).cloned().unwrap_or_default();
+            self.reported.push(Division { t_s, vehicle, number, inputs, plan_crc });
         }
     }
 

@@ -471,7 +471,7 @@ impl SimulatedVehicle {
         }
     }
 
-    /// Takes the pictures that the vehicle's autopilot has taken.
+    /// Removes and returns the photos that the autopilot has taken since the last call.
     pub fn take_pictures(&mut self) -> Vec<Picture> {
         let vehicle = Some(self.system_id());
         let picture = |photo: Photo| Picture {

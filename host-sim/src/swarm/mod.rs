@@ -275,8 +275,8 @@ impl<'a> SimulationRun<'a> {
                 let nearest_m = &mut self.nearest_goal_m[i];
                 *nearest_m = match plan.flights[i].task.goal() {
                     Some(_) => nearest_m.min(off.norm()),
-                    // A flight over an area ends above its own pad, so the distance counts from its
-                    // return on.
+                    // A flight in a coverage mission ends above its own pad, so the distance counts
+                    // from its return on.
                     None if off.xy().norm() > OFF_PAD_M => f32::INFINITY,
                     None => nearest_m.min(off.xy().norm()),
                 };
@@ -415,7 +415,7 @@ fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
     let middle = damaged.len() / 2;
     damaged[middle] ^= 1;
     match RoadmapView::parse(&damaged) {
-        Err(_) => Err(PlanFailure::NoRoadmap),
+        Err(_) => Err(PlanFailure::RoadmapUnusable),
         // Not reached: the CRC detects every single changed bit.
         Ok(_) => Err(PlanFailure::Invalid),
     }
@@ -437,7 +437,7 @@ fn vehicle_result(
     nearest_goal_m: f32,
     now_s: f64,
 ) -> VehicleResult {
-    // A flight over an area ends where it began: only a landing shows that it is over.
+    // A flight in a coverage mission ends where it began: only a landing shows that it is over.
     let landed = member.landed_s.is_some();
     let reached = nearest_goal_m <= REACHED_M && (landed || flight.task.goal().is_some());
     let end = match (has_flight(member, flight), member.state()) {

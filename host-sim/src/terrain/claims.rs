@@ -25,12 +25,12 @@ pub(super) fn check_declared_sizes<R: Read + Seek>(
 }
 
 /// Reads little-endian numbers at byte offsets of a file.
-struct Numbers<'a, R> {
+struct NumberReader<'a, R> {
     file: &'a mut R,
     length: u64,
 }
 
-impl<R: Read + Seek> Numbers<'_, R> {
+impl<R: Read + Seek> NumberReader<'_, R> {
     /// The number of `bytes` bytes at offset `at`; 0 beyond the end, which the cloud's readers
     /// detect.
     fn read_number(&mut self, at: u64, bytes: u64) -> io::Result<u64> {
@@ -43,9 +43,9 @@ impl<R: Read + Seek> Numbers<'_, R> {
         Ok(u64::from_le_bytes(number))
     }
 
-    /// Length of a chunk's first return, bytes, and number of layers of a chunk, from the
-    /// compressor's record; `None` if its chunks have no layers.
-    fn read_layers(&mut self) -> io::Result<Option<(u64, u64)>> {
+    /// Length of a chunk's first point record, which is stored uncompressed, bytes, and number of
+    /// layers of a chunk, from the compressor's record; `None` if its chunks have no layers.
+    fn read_chunk_layout(&mut self) -> io::Result<Option<(u64, u64)>> {
         let (mut at, count) = (self.read_number(94, 2)?, self.read_number(100, 4)?);
         for _ in 0..count.min(self.length / 54) {
             let (id, size) = (self.read_number(at + 18, 2)?, self.read_number(at + 20, 2)?);
@@ -74,7 +74,7 @@ impl<R: Read + Seek> Numbers<'_, R> {
 }
 
 fn check_sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(), &'static str>> {
-    let mut numbers = Numbers { file, length };
+    let mut numbers = NumberReader { file, length };
     let (minor, returns_at, format) =
         (numbers.read_number(25, 1)?, numbers.read_number(96, 4)?, numbers.read_number(104, 1)?);
     if returns_at > length {
@@ -108,10 +108,10 @@ fn check_sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(
     if chunks > u64::from(MAX_CHUNKS) || chunks > length || table_at > length {
         return Ok(Err("it has more chunks than bytes"));
     }
-    let Some((first, layers)) = numbers.read_layers()? else { return Ok(Ok(())) };
+    let Some((first, layers)) = numbers.read_chunk_layout()? else { return Ok(Ok(())) };
     let mut at = returns_at + 8;
     while at < table_at {
-        // A chunk: its first return, a count, the size of each layer, then the layers.
+        // A chunk: its first point record, a count, the size of each layer, then the layers.
         let sizes_at = at + first + 4;
         at = sizes_at + 4 * layers;
         for layer in 0..layers {

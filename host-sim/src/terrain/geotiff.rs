@@ -117,7 +117,8 @@ fn read_heights<R: Read + Seek>(
     Ok(heights_m)
 }
 
-/// Whether a value means "no height"; as decimal text that marker may not equal its float exactly.
+/// Whether a value is the no-data value. GDAL writes that as decimal text, which may differ from
+/// the raster's f32 in the last digits, so they are also compared as f32.
 fn is_missing_value(value: f64, missing: f64) -> bool {
     value == missing || value as f32 == missing as f32
 }

@@ -30,7 +30,9 @@ pub(super) fn augment_from_free_rows(
 ) -> bool {
     paths.distance.fill(f64::INFINITY);
     let mut least = f64::INFINITY;
-    for row in (0..costs.rows as u16).filter(|&row| state.col_of[usize::from(row)] == UNASSIGNED) {
+    for row in
+        (0..costs.rows as u16).filter(|&row| state.col_of_row[usize::from(row)] == UNASSIGNED)
+    {
         least = relax_columns(costs.row_costs(row, state.row), state.price, 0.0, row, paths);
     }
     augment_shortest_path(costs, state, paths, least)
@@ -55,7 +57,12 @@ fn augment_shortest_path(
                 break None;
             }
             let from = queued;
-            match nearest_columns(paths.distance, state.row_of, least, &mut paths.settled[from..]) {
+            match nearest_columns(
+                paths.distance,
+                state.row_of_col,
+                least,
+                &mut paths.settled[from..],
+            ) {
                 NearestColumns::Free(col) => break Some(col),
                 NearestColumns::Taken(count) => queued += count,
             }
@@ -66,7 +73,7 @@ fn augment_shortest_path(
             }
         }
         let col = paths.settled[done];
-        let row = state.row_of[usize::from(col)];
+        let row = state.row_of_col[usize::from(col)];
         let offset = f64::from(costs.cost_at(row, col))
             - paths.settled_price[done]
             - paths.settled_distance[done];
@@ -141,7 +148,7 @@ enum NearestColumns {
 /// to `queue`.
 fn nearest_columns(
     distance: &[f64],
-    row_of: &[u16],
+    row_of_col: &[u16],
     least: f64,
     queue: &mut [u16],
 ) -> NearestColumns {
@@ -149,7 +156,7 @@ fn nearest_columns(
     let mut offer = |first: usize, distances: &[f64]| {
         for (k, _) in distances.iter().enumerate().filter(|(_, d)| **d == least) {
             let col = (first + k) as u16;
-            if row_of[first + k] == UNASSIGNED {
+            if row_of_col[first + k] == UNASSIGNED {
                 return Some(col);
             }
             queue[count] = col;
@@ -177,7 +184,7 @@ fn flip_augmenting_path(state: &mut MatchingState<'_>, previous: &[u16], end: u1
     let mut col = end;
     while col != UNASSIGNED {
         let row = previous[usize::from(col)];
-        let released = state.col_of[usize::from(row)];
+        let released = state.col_of_row[usize::from(row)];
         state.match_pair(row, col);
         col = released;
     }
@@ -195,7 +202,9 @@ pub(super) fn augment_bottleneck(
     let done = &mut *paths.settled_price;
     done.fill(0.0);
     paths.distance.fill(f64::INFINITY);
-    for row in (0..costs.rows as u16).filter(|&row| state.col_of[usize::from(row)] == UNASSIGNED) {
+    for row in
+        (0..costs.rows as u16).filter(|&row| state.col_of_row[usize::from(row)] == UNASSIGNED)
+    {
         relax_by_largest_cost(
             costs.row_costs(row, state.row),
             f64::NEG_INFINITY,
@@ -210,7 +219,7 @@ pub(super) fn augment_bottleneck(
         if least == f64::INFINITY {
             return None;
         }
-        match nearest_columns(paths.distance, state.row_of, least, paths.settled) {
+        match nearest_columns(paths.distance, state.row_of_col, least, paths.settled) {
             NearestColumns::Free(col) => {
                 flip_augmenting_path(state, paths.previous, col);
                 return Some(least as f32);
@@ -221,7 +230,7 @@ pub(super) fn augment_bottleneck(
                     paths.distance[usize::from(col)] = f64::INFINITY;
                 }
                 for &col in &paths.settled[..count] {
-                    let row = state.row_of[usize::from(col)];
+                    let row = state.row_of_col[usize::from(col)];
                     let line = costs.row_costs(row, state.row);
                     relax_by_largest_cost(line, least, row, done, paths.distance, paths.previous);
                 }

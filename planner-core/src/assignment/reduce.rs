@@ -57,7 +57,7 @@ fn reduce_columns(
     for col in (0..costs.cols as u16).rev() {
         let row = paths.previous[usize::from(col)];
         paths.settled[usize::from(row)] += 1;
-        if state.col_of[usize::from(row)] == UNASSIGNED {
+        if state.col_of_row[usize::from(row)] == UNASSIGNED {
             state.match_pair(row, col);
         }
     }
@@ -69,7 +69,7 @@ fn reduce_columns(
                 left += 1;
             }
             1 => {
-                let own = usize::from(state.col_of[usize::from(row)]);
+                let own = usize::from(state.col_of_row[usize::from(row)]);
                 // With its price at minus infinity the row's own column cannot be the least of the
                 // others.
                 let price = core::mem::replace(&mut state.price[own], f64::NEG_INFINITY);
@@ -162,12 +162,12 @@ fn reduce_rows(
         let falls = price < state.price[usize::from(col)] && budget > 0;
         if falls {
             state.price[usize::from(col)] = price;
-        } else if state.row_of[usize::from(col)] != UNASSIGNED && two.second == two.least {
+        } else if state.row_of_col[usize::from(col)] != UNASSIGNED && two.second == two.least {
             col = two.second_col;
         }
-        let evicted = state.row_of[usize::from(col)];
+        let evicted = state.row_of_col[usize::from(col)];
         if evicted != UNASSIGNED {
-            state.col_of[usize::from(evicted)] = UNASSIGNED;
+            state.col_of_row[usize::from(evicted)] = UNASSIGNED;
             if falls {
                 at -= 1;
                 budget -= 1;

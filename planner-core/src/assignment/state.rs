@@ -10,8 +10,8 @@ pub(super) const SIMD_LANES: usize = 8;
 /// never more rows than columns.
 pub(super) struct MatchingState<'w> {
     pub(super) price: &'w mut [f64],
-    pub(super) row_of: &'w mut [u16],
-    pub(super) col_of: &'w mut [u16],
+    pub(super) row_of_col: &'w mut [u16],
+    pub(super) col_of_row: &'w mut [u16],
     /// Buffer for a copy of one row of costs.
     pub(super) row: &'w mut [f32],
     /// Rows without a column, in the order in which they are matched.
@@ -21,13 +21,13 @@ pub(super) struct MatchingState<'w> {
 impl MatchingState<'_> {
     pub(super) fn reset(&mut self) {
         self.price.fill(0.0);
-        self.row_of.fill(UNASSIGNED);
-        self.col_of.fill(UNASSIGNED);
+        self.row_of_col.fill(UNASSIGNED);
+        self.col_of_row.fill(UNASSIGNED);
     }
 
     pub(super) fn match_pair(&mut self, row: u16, col: u16) {
-        self.row_of[usize::from(col)] = row;
-        self.col_of[usize::from(row)] = col;
+        self.row_of_col[usize::from(col)] = row;
+        self.col_of_row[usize::from(row)] = col;
     }
 }
 

@@ -15,7 +15,7 @@ use crate::flight::WaypointRange;
 /// its old one.
 ///
 /// # Errors
-/// [`CoverageError::Setting`] for ranges out of order or beyond the path,
+/// [`CoverageError::SettingOutOfRange`] for ranges out of order or beyond the path,
 /// [`CoverageError::LanesFull`], [`CoverageError::NothingToCover`] if no waypoint is left,
 /// [`CoverageError::Unreachable`].
 pub fn remaining_lanes<const L: usize, const N: usize>(
@@ -27,7 +27,7 @@ pub fn remaining_lanes<const L: usize, const N: usize>(
     if !is_sorted_disjoint(done)
         || done.last().is_some_and(|range| range.end > tracks.waypoint_count())
     {
-        return Err(CoverageError::Setting("done"));
+        return Err(CoverageError::SettingOutOfRange("done"));
     }
     left.lanes.clear();
     left.along = tracks.along;

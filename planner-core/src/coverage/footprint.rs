@@ -57,19 +57,27 @@ impl Camera {
     pub fn check(&self) -> Result<(), CoverageError> {
         let positive = |name, value: f32| match value > 0.0 && value.is_finite() {
             true => Ok(()),
-            false => Err(CoverageError::Setting(name)),
+            false => Err(CoverageError::SettingOutOfRange(name)),
         };
         match *self {
             Self::Diagonal { fov_deg, aspect } => {
                 positive("fov_deg", fov_deg)?;
                 positive("aspect", aspect)?;
-                if fov_deg >= 180.0 { Err(CoverageError::Setting("fov_deg")) } else { Ok(()) }
+                if fov_deg >= 180.0 {
+                    Err(CoverageError::SettingOutOfRange("fov_deg"))
+                } else {
+                    Ok(())
+                }
             }
             Self::Sensor { sides_mm, focal_mm, pixels } => {
                 positive("sensor_mm", sides_mm[0])?;
                 positive("sensor_mm", sides_mm[1])?;
                 positive("focal_mm", focal_mm)?;
-                if pixels.contains(&0) { Err(CoverageError::Setting("pixels")) } else { Ok(()) }
+                if pixels.contains(&0) {
+                    Err(CoverageError::SettingOutOfRange("pixels"))
+                } else {
+                    Ok(())
+                }
             }
         }
     }
@@ -93,7 +101,7 @@ impl Camera {
     pub fn footprint(&self, height_m: f32) -> Result<Footprint, CoverageError> {
         self.check()?;
         if !(height_m > 0.0 && height_m.is_finite()) {
-            return Err(CoverageError::Setting("height_m"));
+            return Err(CoverageError::SettingOutOfRange("height_m"));
         }
         let [along, across] = self.ground_sides_per_m();
         Ok(Footprint { along_m: along * height_m, across_m: across * height_m })
@@ -107,10 +115,10 @@ impl Camera {
     pub fn height_for_gsd(&self, gsd_m: f32) -> Result<f32, CoverageError> {
         self.check()?;
         let Self::Sensor { sides_mm, focal_mm, pixels } = *self else {
-            return Err(CoverageError::Setting("pixels"));
+            return Err(CoverageError::SettingOutOfRange("pixels"));
         };
         if !(gsd_m > 0.0 && gsd_m.is_finite()) {
-            return Err(CoverageError::Setting("gsd_m"));
+            return Err(CoverageError::SettingOutOfRange("gsd_m"));
         }
         Ok(gsd_m * pixels[0] as f32 * focal_mm / sides_mm[0])
     }
@@ -128,7 +136,7 @@ impl Spacing {
             ("lane_m", self.lane_m),
             ("waypoint_m", self.waypoint_m),
         ];
-        crate::all_positive(&sides).map_err(|error| CoverageError::Setting(error.0))?;
+        crate::all_positive(&sides).map_err(|error| CoverageError::SettingOutOfRange(error.0))?;
         // Spacings that were computed from the footprint may exceed it by a rounding.
         let beyond = |spacing: f32, side: f32| spacing > side * (1.0 + 1e-5);
         if beyond(self.lane_m, self.footprint.across_m)

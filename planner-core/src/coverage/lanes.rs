@@ -11,7 +11,8 @@ use super::{CoverageError, Flat};
 /// Most waypoints of an area: up to here f32 counts exactly.
 const MAX_WAYPOINTS: f32 = (1 << 24) as f32;
 
-/// Settings by which lanes are laid over an area: spacings, direction, margin, search effort.
+/// Settings by which lanes are laid over an area: spacings, direction, margin, search
+/// effort.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LanePattern {
     /// Footprint of an image, and spacings.
@@ -131,7 +132,7 @@ impl<const L: usize> Tracks<L> {
         for lane in &mut self.lanes {
             let steps = ceilf(lane.length_m() / spacing.waypoint_m - 1e-3);
             if steps > MAX_WAYPOINTS {
-                return Err(CoverageError::Setting("waypoint_m"));
+                return Err(CoverageError::SettingOutOfRange("waypoint_m"));
             }
             lane.count = if lane.length_m() < super::area::SAME_VERTEX_M {
                 1
@@ -156,7 +157,7 @@ impl<const L: usize> Tracks<L> {
             (lane.first, lane.start_m) = (first, start_m);
             first += lane.count;
             if first as f32 > MAX_WAYPOINTS {
-                return Err(CoverageError::Setting("waypoint_m"));
+                return Err(CoverageError::SettingOutOfRange("waypoint_m"));
             }
             start_m += lane.length_m();
             before = Some(lane.to);

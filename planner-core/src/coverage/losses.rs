@@ -139,7 +139,7 @@ impl From<PlanError> for Error {
 ///
 /// Those of [`divide::remaining_lanes`], [`pack::binpat`] and [`flights::plan_flights`];
 /// [`CoverageError::Vehicles`] if fates, routes and vehicles are inconsistent;
-/// [`CoverageError::Setting`] for an `along_m` that is NaN or negative.
+/// [`CoverageError::SettingOutOfRange`] for an `along_m` that is NaN or negative.
 pub fn redivide_work<
     const L: usize,
     const N: usize,
@@ -164,7 +164,7 @@ pub fn redivide_work<
         return Err(CoverageError::Vehicles.into());
     }
     if !fates.iter().all(|fate| fate.along_m >= 0.0) {
-        return Err(CoverageError::Setting("along_m").into());
+        return Err(CoverageError::SettingOutOfRange("along_m").into());
     }
     add_done_waypoints(fates, ws, out)?;
     set_start_places(loss, ws, out)?;

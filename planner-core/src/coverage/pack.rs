@@ -183,7 +183,7 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
     /// Checks that all settings are in range.
     ///
     /// # Errors
-    /// [`CoverageError::Setting`] with the name of the setting that is out of range;
+    /// [`CoverageError::SettingOutOfRange`] with the name of the setting that is out of range;
     /// [`CoverageError::Vehicles`] for no vehicle or more than `K`;
     /// [`CoverageError::NothingToCover`] without lanes.
     pub fn check<const K: usize>(&self) -> Result<(), CoverageError> {
@@ -194,23 +194,24 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
             return Err(CoverageError::NothingToCover);
         }
         let heights = [("height_m", self.heights.mission_m), ("layer_m", self.heights.layer_m)];
-        crate::all_positive(&heights).map_err(|error| CoverageError::Setting(error.0))?;
+        crate::all_positive(&heights).map_err(|error| CoverageError::SettingOutOfRange(error.0))?;
         for vehicle in self.vehicles {
             let speeds = [
                 ("cruise_mps", vehicle.cruise_mps),
                 ("climb_mps", vehicle.climb_mps),
                 ("descend_mps", vehicle.descend_mps),
             ];
-            crate::all_positive(&speeds).map_err(|error| CoverageError::Setting(error.0))?;
+            crate::all_positive(&speeds)
+                .map_err(|error| CoverageError::SettingOutOfRange(error.0))?;
             if !(vehicle.weight >= 0.0 && vehicle.weight.is_finite()) {
-                return Err(CoverageError::Setting("weight"));
+                return Err(CoverageError::SettingOutOfRange("weight"));
             }
             if !(vehicle.place.norm_squared() + vehicle.home.norm_squared()).is_finite() {
-                return Err(CoverageError::Setting("place"));
+                return Err(CoverageError::SettingOutOfRange("place"));
             }
         }
         if self.vehicles.iter().all(|vehicle| vehicle.weight == 0.0) {
-            return Err(CoverageError::Setting("weight"));
+            return Err(CoverageError::SettingOutOfRange("weight"));
         }
         Ok(())
     }
@@ -291,8 +292,8 @@ pub fn binpat<const L: usize, const N: usize, const K: usize>(
 /// BINPAT with given shares, such as those that POWELL found: any vehicle may get any bin.
 ///
 /// # Errors
-/// Those of [`Work::check`]; [`CoverageError::Setting`] unless there is one share per vehicle, all
-/// finite and at least 0, and not all 0.
+/// Those of [`Work::check`]; [`CoverageError::SettingOutOfRange`] unless there is one share per
+/// vehicle, all finite and at least 0, and not all 0.
 pub fn binpat_by_shares<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     shares: &[f32],
@@ -303,7 +304,7 @@ pub fn binpat_by_shares<const L: usize, const N: usize, const K: usize>(
     let sound = |share: &f32| *share >= 0.0 && share.is_finite();
     let some = shares.iter().any(|share| *share > 0.0);
     if shares.len() != work.vehicles.len() || !shares.iter().all(sound) || !some {
-        return Err(CoverageError::Setting("shares"));
+        return Err(CoverageError::SettingOutOfRange("shares"));
     }
     ws.shares[..shares.len()].copy_from_slice(shares);
     pack_routes(work, BinEligibility::Anyone, ws, out)

@@ -84,7 +84,7 @@ fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
     let across = spacing.footprint.across_m;
     let spare = fmaxf(across - strips.strip_width_m, 0.0) / 2.0;
     let reach = across / 2.0 - fminf(spacing.lane_m / 19.0, spare * 0.99);
-    // A strip as wide as an image has no spare; a difference by rounding is allowed.
+    // A strip as wide as an image leaves no overlap, so a rounding error is tolerated.
     let most = reach + strips.strip_width_m * WIDTH_ROUNDING;
     v - low <= most && high - v <= most
 }

@@ -34,7 +34,7 @@ pub fn build_lanes<const L: usize, const V: usize, const N: usize>(
 ) -> Result<(), CoverageError> {
     pattern.spacing.check()?;
     if !(pattern.margin_m >= 0.0 && pattern.margin_m.is_finite()) {
-        return Err(CoverageError::Setting("margin_m"));
+        return Err(CoverageError::SettingOutOfRange("margin_m"));
     }
     if area.vertices().len() > V {
         return Err(AreaError::AreaFull.into());
@@ -42,7 +42,7 @@ pub fn build_lanes<const L: usize, const V: usize, const N: usize>(
     let LaneWorkspace { vertices, sets } = ws;
     let direction = match pattern.angle_deg {
         Some(angle) if angle.is_finite() => LaneDirection::at_deg(angle),
-        Some(_) => return Err(CoverageError::Setting("angle_deg")),
+        Some(_) => return Err(CoverageError::SettingOutOfRange("angle_deg")),
         None => direction_of_least_width(area, vertices)?,
     };
     out.lanes.clear();

@@ -105,13 +105,13 @@ impl StraightPart {
         if fits { Ok(()) } else { Err(ScheduleError::SegmentsFull) }
     }
 
-    /// Passes the part's timed segments, the leg's at most `segment_m` long, to `tell` in order.
+    /// Passes the part's timed segments, the leg's at most `segment_m` long, to `visit` in order.
     /// Not inlined: a board has little flash.
     #[inline(never)]
-    pub(super) fn for_each_segment(&self, segment_m: f32, tell: &mut dyn FnMut(TimedSegment)) {
-        self.before.into_iter().for_each(&mut *tell);
-        self.leg.segments(self.from_m, self.to_m, segment_m).for_each(&mut *tell);
-        self.after.into_iter().for_each(tell);
+    pub(super) fn for_each_segment(&self, segment_m: f32, visit: &mut dyn FnMut(TimedSegment)) {
+        self.before.into_iter().for_each(&mut *visit);
+        self.leg.segments(self.from_m, self.to_m, segment_m).for_each(&mut *visit);
+        self.after.into_iter().for_each(visit);
     }
 }
 

@@ -50,7 +50,7 @@ proptest! {
                 (heard.system, heard.component, heard.sequence, heard.message_id)
             );
             prop_assert_eq!(known, (*system, *component, *sequence, *id));
-            prop_assert_eq!(frame.padded(), heard.padded());
+            prop_assert_eq!(frame.padded_payload(), heard.padded_payload());
             let mut passed = Vec::new();
             frame.write(&mut passed);
             prop_assert_eq!(&passed, &ours);
@@ -107,7 +107,7 @@ fn version_1_and_signed_frames_are_read() {
     let mut framer = Framer::default();
     let found = all(&mut framer, 0, &[first, signed.clone()].concat());
     assert_eq!(found.iter().map(|frame| frame.sequence).collect::<Vec<_>>(), [7, 8]);
-    assert_eq!(found[0].padded()[..9], [0, 0, 0, 0, 2, 12, 1, 3, 3]);
+    assert_eq!(found[0].padded_payload()[..9], [0, 0, 0, 0, 2, 12, 1, 3, 3]);
     // A flag that nobody knows may change the whole frame.
     signed[2] = 2;
     assert!(all(&mut framer, 0, &signed).is_empty());

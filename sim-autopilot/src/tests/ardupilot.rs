@@ -40,7 +40,7 @@ impl Bench {
 
     pub(super) fn texts(&self) -> Vec<String> {
         let text = |f: &Frame| {
-            String::from_utf8_lossy(&f.padded()[1..51]).trim_end_matches('\0').to_owned()
+            String::from_utf8_lossy(&f.padded_payload()[1..51]).trim_end_matches('\0').to_owned()
         };
         self.of(253).map(|(_, frame)| text(frame)).collect()
     }

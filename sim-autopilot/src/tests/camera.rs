@@ -32,7 +32,7 @@ fn said(bench: &Bench, personality: AutopilotKind) -> Vec<(u32, [f64; 2])> {
     bench
         .of(id)
         .map(|(_, frame)| {
-            let b = frame.padded();
+            let b = frame.padded_payload();
             let place = Geodetic {
                 lat_deg: f64::from(long(b, lat)) * 1e-7,
                 lon_deg: f64::from(long(b, lon)) * 1e-7,
@@ -64,7 +64,10 @@ fn by_distance_it_photographs_where_it_says_and_at_that_distance() {
         // At once, then every 5 m.
         bench.command(DISTANCE, [5.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
         bench.run(0.06);
-        assert!(bench.of(77).any(|(_, f)| f.padded()[..3] == [206, 0, 0]), "206 is accepted");
+        assert!(
+            bench.of(77).any(|(_, f)| f.padded_payload()[..3] == [206, 0, 0]),
+            "206 is accepted"
+        );
         let photos = fly_north(&mut bench, 42.0, 20.0);
         assert_eq!(photos.len(), 9, "{personality:?}: at 0, 5 … 40 m");
         for pair in photos.windows(2) {
@@ -114,7 +117,10 @@ fn at_once_it_photographs_at_once_and_knows_how_it_was_turned() {
         for (parameter, photos) in [(1.0, 1), (0.0, 0), (2.0, 0)] {
             bench.command(DIGICAM, [0.0, 0.0, 0.0, 0.0, parameter, 0.0, 0.0]);
             bench.run(0.1);
-            assert!(bench.of(77).any(|(_, f)| f.padded()[..3] == [203, 0, 0]), "203 is accepted");
+            assert!(
+                bench.of(77).any(|(_, f)| f.padded_payload()[..3] == [203, 0, 0]),
+                "203 is accepted"
+            );
             let taken = bench.autopilot.take_photos();
             assert_eq!(taken.len(), photos, "{personality:?}, parameter 5 is {parameter}");
             for photo in taken {

@@ -11,7 +11,11 @@ fn lost_setpoints_start_the_return_within_1_23_s_and_a_stream_ends_it_by_itself(
     bench.run(1.1);
     assert_eq!(bench.heartbeat(), (RETURN, 157, 5));
     let gimbal = |f: &Frame| {
-        (u16::from_le_bytes([f.padded()[28], f.padded()[29]]), f.padded()[30], f.padded()[31])
+        (
+            u16::from_le_bytes([f.padded_payload()[28], f.padded_payload()[29]]),
+            f.padded_payload()[30],
+            f.padded_payload()[31],
+        )
     };
     let commands: Vec<_> = bench.of(76).map(|(_, frame)| gimbal(frame)).collect();
     assert_eq!(

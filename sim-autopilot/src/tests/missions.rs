@@ -52,7 +52,7 @@ impl Bench {
             self.send(73, &payload);
             self.run(0.004);
         }
-        assert_eq!(self.of(47).last().map(|(_, f)| f.padded()[2]), Some(0), "accepted");
+        assert_eq!(self.of(47).last().map(|(_, f)| f.padded_payload()[2]), Some(0), "accepted");
     }
 
     /// Ready to fly a mission that is uploaded: armed where that is another command.
@@ -70,7 +70,9 @@ impl Bench {
     }
 
     fn reached(&self) -> Vec<u16> {
-        self.of(46).map(|(_, f)| u16::from_le_bytes([f.padded()[0], f.padded()[1]])).collect()
+        self.of(46)
+            .map(|(_, f)| u16::from_le_bytes([f.padded_payload()[0], f.padded_payload()[1]]))
+            .collect()
     }
 }
 

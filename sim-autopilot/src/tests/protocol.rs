@@ -50,7 +50,7 @@ fn ned_is_about_its_own_ekf_origin() {
     let ekf = frames::enu_to_geodetic(&world, &Point::new(1200.0, -700.0, 12.0));
     let mut bench = Bench::with(&Config { ekf_origin: ekf, ..Config::default() });
     bench.run(0.5);
-    let b = *bench.of(32).last().unwrap().1.padded();
+    let b = *bench.of(32).last().unwrap().1.padded_payload();
     let said = |at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
     let truth = frames::enu_to_geodetic(&world, &bench.autopilot.true_state().position);
     let expected = frames::geodetic_to_ned(AutopilotKind::Px4.projection(), &ekf, &truth);
@@ -76,7 +76,7 @@ fn the_origin_comes_once_on_change_and_on_request() {
     bench.autopilot.set_ekf_origin(moved);
     bench.run(5.0);
     assert_eq!(bench.of(49).count(), 3);
-    let b = bench.of(49).last().unwrap().1.padded();
+    let b = bench.of(49).last().unwrap().1.padded_payload();
     assert_eq!(i32::from_le_bytes([b[0], b[1], b[2], b[3]]), 474_000_000);
 }
 
@@ -89,7 +89,7 @@ fn commands_are_answered_as_px4_answers_them() {
     assert_eq!(ask(&mut bench, 511, 9999.0, 1e5), [4], "bad message id");
     assert_eq!(ask(&mut bench, 511, 30.0, 1e5), [0]);
     assert_eq!(ask(&mut bench, 510, 30.0, 0.0), [0]);
-    let b = bench.of(244).last().unwrap().1.padded();
+    let b = bench.of(244).last().unwrap().1.padded_payload();
     assert_eq!(
         (i32::from_le_bytes([b[0], b[1], b[2], b[3]]), u16::from_le_bytes([b[4], b[5]])),
         (100_000, 30)
@@ -119,15 +119,15 @@ fn parameters_are_listed_read_and_set_bytewise() {
     bench.send(21, &[1, 1]);
     bench.run(2.0);
     let total = usize::from(u16::from_le_bytes(
-        bench.of(22).next().unwrap().1.padded()[4..6].try_into().unwrap(),
+        bench.of(22).next().unwrap().1.padded_payload()[4..6].try_into().unwrap(),
     ));
     assert_eq!(bench.of(22).count(), total);
     bench.set_param("COM_OBL_RC_ACT", f32::from_bits(5), 6);
-    let b = bench.of(22).last().unwrap().1.padded();
+    let b = bench.of(22).last().unwrap().1.padded_payload();
     assert_eq!((u32::from_le_bytes([b[0], b[1], b[2], b[3]]), b[24]), (5, 6));
     // The wrong type is refused, and answered with the value that stands.
     bench.set_param("COM_OBL_RC_ACT", 4.0, 9);
-    let b = bench.of(22).last().unwrap().1.padded();
+    let b = bench.of(22).last().unwrap().1.padded_payload();
     assert_eq!(u32::from_le_bytes([b[0], b[1], b[2], b[3]]), 5);
 }
 
@@ -135,10 +135,10 @@ fn parameters_are_listed_read_and_set_bytewise() {
 fn an_empty_mission_is_answered() {
     let mut bench = Bench::new();
     bench.send(43, &[1, 1, 0]);
-    let b = bench.of(44).last().unwrap().1.padded();
+    let b = bench.of(44).last().unwrap().1.padded_payload();
     assert_eq!(&b[..5], &[0, 0, 1, 191, 0]);
     bench.send(45, &[1, 1, 0]);
-    assert_eq!(bench.of(47).last().unwrap().1.padded()[2], 0);
+    assert_eq!(bench.of(47).last().unwrap().1.padded_payload()[2], 0);
 }
 
 #[test]
@@ -146,12 +146,12 @@ fn ping_and_timesync_are_answered() {
     let mut bench = Bench::new();
     bench.run(0.5);
     bench.send(4, &telemetry::ping_payload(123, 9, 0, 0));
-    let b = bench.of(4).last().unwrap().1.padded();
+    let b = bench.of(4).last().unwrap().1.padded_payload();
     assert_eq!((b[0], b[8], b[12], b[13]), (123, 9, 1, 191));
     let mut payload = [0; 16];
     payload[8] = 77;
     bench.send(111, &payload);
-    let b = bench.of(111).last().unwrap().1.padded();
+    let b = bench.of(111).last().unwrap().1.padded_payload();
     assert_eq!(
         i64::from_le_bytes(b[..8].try_into().unwrap()),
         bench.autopilot.time_us() as i64 * 1000

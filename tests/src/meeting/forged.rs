@@ -47,7 +47,7 @@ pub(super) fn forge(frame: &frame::Frame, lie: Lie) -> Option<Vec<u8>> {
     if frame.message_id != TUNNEL_DATA::ID {
         return None;
     }
-    let mut intent = Intent::decode(frame.padded(), frame.system)?;
+    let mut intent = Intent::decode(frame.padded_payload(), frame.system)?;
     match lie {
         Lie::Progress(ahead_m) => intent.progress_m += ahead_m,
         Lie::Points(off) => intent.points.iter_mut().for_each(|point| *point += off),

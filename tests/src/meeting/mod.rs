@@ -287,7 +287,7 @@ impl<'a> World<'a> {
             let (place, velocity) = place_of(&data);
             RadioContent::Position(place, velocity, data.time_boot_ms)
         } else if frame.message_id == TUNNEL_DATA::ID {
-            Intent::decode(frame.padded(), frame.system)
+            Intent::decode(frame.padded_payload(), frame.system)
                 .map_or(RadioContent::Other, RadioContent::Intent)
         } else {
             if let Some(data) = frame.decode::<STATUSTEXT_DATA>()

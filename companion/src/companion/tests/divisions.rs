@@ -369,7 +369,7 @@ fn lie() -> impl proptest::strategy::Strategy<Value = Lie> {
 }
 
 impl Lie {
-    fn told(&self, b: &Bench) -> RosterReport {
+    fn reported(&self, b: &Bench) -> RosterReport {
         const ALL: [MemberStatus; 4] =
             [MemberStatus::Alive, MemberStatus::Lost, MemberStatus::Left, MemberStatus::Finished];
         let mut roster = own_roster(b);
@@ -411,7 +411,7 @@ proptest::proptest! {
         }
         for (i, (lie, ticks)) in lies.iter().enumerate() {
             let before = std::boxed::Box::new(b.companion.neighbours.fleet().cloned());
-            b.companion.handle_bytes(Link::Swarm, b.now, &bytes(&lie.told(&b), i as u8));
+            b.companion.handle_bytes(Link::Swarm, b.now, &bytes(&lie.reported(&b), i as u8));
             let of_roster = lie.crc && matches!(lie.system_id, 77 | 78);
             proptest::prop_assert!(
                 of_roster || *before == b.companion.neighbours.fleet().cloned(),

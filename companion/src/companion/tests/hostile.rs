@@ -459,7 +459,7 @@ fn the_swarm_is_told_where_it_is_and_where_it_goes() {
         .filter_map(crate::link::frame::Frame::decode::<GLOBAL_POSITION_INT_DATA>)
         .collect();
     let intents: Vec<_> =
-        bench.swarm.iter().filter_map(|f| Intent::decode(f.padded(), SYSTEM)).collect();
+        bench.swarm.iter().filter_map(|f| Intent::decode(f.padded_payload(), SYSTEM)).collect();
     assert_eq!((places.len(), intents.len()), (5, 5));
     let last = &places[4];
     let place = planner_core::frames::Geodetic {

@@ -1,5 +1,5 @@
-//! A vehicle that no other vehicle hears any more over an area is found where it last said that it
-//! may be.
+//! A vehicle that no other vehicle hears any more in a coverage mission is found where it last said
+//! that it may be.
 
 use super::State::*;
 use super::divisions::over_a_field;
@@ -29,19 +29,20 @@ fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
                 bench.run(0.1);
             }
             bench.run(tenths as f32 * 0.1);
-            let told = bench.swarm.iter().rev().find_map(|f| Intent::decode(f.padded(), SYSTEM));
-            let (told, from) = (told.expect("five a second"), bench.enu);
+            let reported =
+                bench.swarm.iter().rev().find_map(|f| Intent::decode(f.padded_payload(), SYSTEM));
+            let (reported, from) = (reported.expect("five a second"), bench.enu);
             bench.neighbour = None;
-            beyond += usize::from(told.unheard_point_count > 0);
+            beyond += usize::from(reported.unheard_point_count > 0);
             for _ in 0..500 {
                 bench.run(0.1);
                 if !matches!(bench.state(), TakeOff | Climb | Follow) {
                     break;
                 }
-                let off_m = beside_m(&told, &from, &bench.enu);
+                let off_m = beside_m(&reported, &from, &bench.enu);
                 assert!(
                     off_m < 1.0,
-                    "{off_m} m off, {tenths}: {told:?} from {from:?}, {:?}",
+                    "{off_m} m off, {tenths}: {reported:?} from {from:?}, {:?}",
                     bench.enu
                 );
                 furthest_m = furthest_m.max((bench.enu - from).norm());

@@ -85,7 +85,8 @@ impl Guidance {
         let lands = matches!(state, State::Land | State::LandingHeld);
         let hears_nobody = neighbours.hears_nobody(now);
         let deaf = lands && hears_nobody;
-        // Like a landing, a guided descent over an area checks for unheard vehicles on the ground.
+        // Like a landing, a guided descent in a coverage mission checks for unheard vehicles on the
+        // ground.
         let comes_down = lands || (self.is_descending() && neighbours.fleet().is_some());
         let floor_m =
             scene.plan.filter(|_| comes_down).map(|plan| self.landing_height_m(state, scene, plan));
@@ -144,8 +145,8 @@ impl Guidance {
             // landing place.
             let last_place = self.returning || !self.on_path || deaf;
             let lies = met.motion.grounded || met.lost || (deaf && silent);
-            // The end of its path over an area is above its pad; by then it has sought a place
-            // aside in vain.
+            // The end of its path in a coverage mission is above its pad; by then it has sought a
+            // place aside in vain.
             let at_end =
                 || contact.is_leased() && scene.plan.is_some_and(|p| self.has_reached_end(&p.path));
             let rests = lies && held >= LATE_LANDING_AFTER && (last_place || at_end());

@@ -26,7 +26,7 @@ struct Greedy {
     /// Bytes that went to the radio, and when.
     sent: Vec<(Instant, usize)>,
     /// Intents among them, and reports of a coverage mission.
-    told: usize,
+    reported: usize,
     /// Roster reports among them.
     rosters: usize,
 }
@@ -35,7 +35,7 @@ impl Greedy {
     fn new(mut bench: Bench) -> Self {
         let mut flash = Flash::new(3);
         bench.companion.attach_store(started(&mut flash));
-        Self { bench, flash, sequence: 0, packet: 0, sent: Vec::new(), told: 0, rosters: 0 }
+        Self { bench, flash, sequence: 0, packet: 0, sent: Vec::new(), reported: 0, rosters: 0 }
     }
 
     fn ask<M: MessageData>(&mut self, message: &M) {
@@ -87,7 +87,7 @@ impl Greedy {
         for frame in self.bench.swarm.drain(..) {
             let tunnel = frame.message_id == TUNNEL_DATA::ID;
             let roster = tunnel && frame.payload().starts_with(&roster::PAYLOAD_TYPE.to_le_bytes());
-            self.told += usize::from(tunnel);
+            self.reported += usize::from(tunnel);
             self.rosters += usize::from(roster);
             self.sent.push((now, frame.payload().len() + 12));
         }
@@ -95,7 +95,7 @@ impl Greedy {
 
     /// So many seconds in which all is asked for forty times each.
     fn run(&mut self, seconds: u32) {
-        (self.told, self.rosters, self.bench.swarm) = (0, 0, Vec::new());
+        (self.reported, self.rosters, self.bench.swarm) = (0, 0, Vec::new());
         self.sent.clear();
         for _ in 0..seconds * 20 {
             self.ask_all();
@@ -156,7 +156,11 @@ fn the_radio_gets_no_more_whatever_is_asked() {
         "{}",
         air.bytes()
     );
-    assert!(air.told >= 20 * usize::from(HZ) - 1, "the state goes out all the same: {}", air.told);
+    assert!(
+        air.reported >= 20 * usize::from(HZ) - 1,
+        "the state goes out all the same: {}",
+        air.reported
+    );
 }
 
 #[test]

@@ -108,7 +108,7 @@ pub struct Request {
 
 impl Request {
     pub fn read(link: usize, frame: &Frame) -> Self {
-        let p = &frame.padded()[3..];
+        let p = &frame.padded_payload()[3..];
         let mut data = [0; MAX_DATA];
         data.copy_from_slice(&p[HEADER_LEN..HEADER_LEN + MAX_DATA]);
         Self {

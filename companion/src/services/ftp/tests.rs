@@ -266,8 +266,8 @@ fn a_client_whose_answers_are_lost_is_told_the_same_late_and_under_other_numbers
         for (i, piece) in file.chunks(MAX_DATA).enumerate() {
             assert_eq!(world.ask(0, op::WRITE, (i * MAX_DATA) as u32, piece).opcode, ACK);
         }
-        let told = if damaged { NAK } else { ACK };
-        assert_eq!(ask_three_times(&mut world, renumbers, op::TERMINATE, &[]), [told; 3]);
+        let reported = if damaged { NAK } else { ACK };
+        assert_eq!(ask_three_times(&mut world, renumbers, op::TERMINATE, &[]), [reported; 3]);
         assert_eq!(world.texts.len(), 1, "{:?}", world.texts);
         world.now = world.now + Duration::from_secs(10);
         assert_eq!(world.ask(0, op::TERMINATE, 0, &[]).opcode, NAK, "there is no session");

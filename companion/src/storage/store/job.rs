@@ -8,8 +8,8 @@ use super::records::JournalRecord;
 pub enum FlashJob {
     /// No work.
     None,
-    /// The upload was dropped while a request was open: its outcome is ignored.
-    Ignored,
+    /// The upload was aborted while a flash operation was in progress: its result is discarded.
+    Abandoned,
     /// Read bytes for a caller of the store.
     Read { at: u32, len: usize },
     /// Compute the running CRC-32 of a file for a caller of the store: done up to `at`.

@@ -36,7 +36,7 @@ impl Store {
         self.request_pending = true;
         let layout = &self.layout;
         Some(match self.job {
-            FlashJob::None | FlashJob::Ignored => {
+            FlashJob::None | FlashJob::Abandoned => {
                 self.request_pending = false;
                 return None;
             }
@@ -191,7 +191,7 @@ impl Store {
         }
         let job = core::mem::replace(&mut self.job, FlashJob::None);
         match (job, outcome) {
-            (FlashJob::None | FlashJob::Ignored, _) => {}
+            (FlashJob::None | FlashJob::Abandoned, _) => {}
             (FlashJob::Read { .. }, Ok(bytes)) => return Some(ReadOutcome::Bytes(bytes)),
             (FlashJob::Read { .. } | FlashJob::Sum { .. }, Err(_)) => {
                 return Some(ReadOutcome::Failed);
@@ -342,6 +342,6 @@ impl Store {
             FlashJob::Flush(_) => {}
             _ => return,
         }
-        self.job = if self.request_pending { FlashJob::Ignored } else { FlashJob::None };
+        self.job = if self.request_pending { FlashJob::Abandoned } else { FlashJob::None };
     }
 }

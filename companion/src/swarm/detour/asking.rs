@@ -6,7 +6,7 @@
 use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
 use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_MARGIN_M};
-use super::flown::{DetourPurpose, FlownPath};
+use super::path_kind::{DetourPurpose, PathKind};
 use super::{DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER};
 use crate::guidance::evade;
 use crate::mission::State;
@@ -33,8 +33,8 @@ pub(crate) enum RetryOutlook {
 }
 
 impl Detours {
-    /// Whether a blocked vehicle over an area is held no longer, by a gate or by the safety filter:
-    /// what blocked its path has come down.
+    /// Whether a blocked vehicle in a coverage mission is held no longer, by a gate or by the
+    /// safety filter: what blocked its path has come down.
     pub(super) fn is_freed_over_area<const V: usize, const W: usize, const G: usize>(
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
@@ -82,7 +82,7 @@ impl Detours {
     /// back to the plan's path, the vehicle gives up returning to that.
     pub(crate) fn note_request(&mut self, purpose: DetourPurpose) {
         if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Rejoin(_)) {
-            self.flown = self.flown.without_return();
+            self.path_kind = self.path_kind.without_return();
         }
         (self.sought, self.request_read) = (Some(purpose), false);
         self.obstacles.mark_requested();
@@ -99,12 +99,12 @@ impl Detours {
         self.request_read
     }
 
-    /// The request for the shell's planner; `None` without a plan or a request. `tell` is called
+    /// The request for the shell's planner; `None` without a plan or a request. `visit` is called
     /// with each keep-out zone.
     pub(crate) fn detour_request<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
-        mut tell: impl FnMut(KeepOutZone),
+        mut visit: impl FnMut(KeepOutZone),
     ) -> Option<DetourRequest> {
         let (sought, plan) = (self.sought?, view.mission.plan()?);
         let points = plan.path.waypoints();
@@ -116,21 +116,21 @@ impl Detours {
         let ahead = points.get(next)?;
         let behind = points.get(next.saturating_sub(1))?;
         let apart_m = view.config.safety_distance_m;
-        self.obstacles.all().iter().for_each(|obstacle| tell(*obstacle));
+        self.obstacles.all().iter().for_each(|obstacle| visit(*obstacle));
         match view.config.lost_vehicle_down_s {
-            Some(_) if !sought.is_aside() => beside::zones_of_others(view, &mut tell),
+            Some(_) if !sought.is_aside() => beside::zones_of_others(view, &mut visit),
             _ => {
                 // The zone of a grounded vehicle is only as wide as what blocks a path, so that a
                 // goal planned beside it can be reached.
                 let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_WITHIN_M];
-                view.neighbours.for_each_place(view.now, apart, &mut tell);
+                view.neighbours.for_each_place(view.now, apart, &mut visit);
             }
         }
         if sought.is_aside() {
             view.neighbours.for_each_landing_column(
                 view.now,
                 apart_m + evade::EVADE_MARGIN_M,
-                &mut tell,
+                &mut visit,
             );
         }
         if sought == DetourPurpose::Landing {
@@ -138,7 +138,7 @@ impl Detours {
             view.neighbours.for_each_landing_zone(
                 view.now,
                 [apart_m + DETOUR_MARGIN_M, height_m],
-                tell,
+                visit,
             );
         }
         let (goal, descent_m) = match view.config.lost_vehicle_down_s {
@@ -178,7 +178,7 @@ impl Detours {
         now: Instant,
         progress_at: Instant,
     ) {
-        let on_detour = self.flown.is_detour();
+        let on_detour = self.path_kind.is_detour();
         let stuck = on_detour && now - progress_at > STUCK_AFTER;
         let fruitless = if stuck { self.detours_without_progress.saturating_add(1) } else { 0 };
         self.obstacles.avoid_requested();
@@ -189,7 +189,7 @@ impl Detours {
             obstacles: core::mem::take(&mut self.obstacles),
             left_plan: self.left_plan || !purpose.keeps_to_plan(),
             left_at_m: if on_detour { self.left_at_m } else { progress_m },
-            flown: FlownPath::Detour(purpose),
+            path_kind: PathKind::Detour(purpose),
             detour_ready: true,
             detours_without_progress: fruitless,
             home,

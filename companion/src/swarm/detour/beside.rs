@@ -1,4 +1,5 @@
-//! Detours over an area: around an obstacle or vehicle on the path, and back to the path beyond it.
+//! Detours in a coverage mission: around an obstacle or vehicle on the path, and back to the path
+//! beyond it.
 //!
 //! The vehicle stops, requests from its shell the way to the first free place of its path beyond
 //! the obstacle, flies it beside the plan, and then requests its own plan again, to continue from
@@ -49,8 +50,8 @@ const BLOCK_SEARCH_BEYOND_M: f32 = 1.0;
 /// very edge the same zone would block the path again.
 const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 
-/// Searches of a vehicle for detours that lead back to its path over an area: when one failed, and
-/// how many succeeded.
+/// Searches of a vehicle for detours that lead back to its path in a coverage mission: when one
+/// failed, and how many succeeded.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct AreaDetourSearches {
     missed_at: Option<Instant>,
@@ -92,32 +93,32 @@ fn source_count<const V: usize, const W: usize, const G: usize>(
     2 * view.neighbours.len()
 }
 
-/// Passes the keep-out zones of source number `source` over an area to `tell`. The first half of
-/// the numbers stands for each neighbour's places, the second half for the column in which each may
-/// come down if it is in the air off the plan.
+/// Passes the keep-out zones of source number `source` in a coverage mission to `visit`. The first
+/// half of the numbers stands for each neighbour's places, the second half for the column in which
+/// each may come down if it is in the air off the plan.
 fn zones_of_source<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     source: usize,
-    tell: &mut dyn FnMut(KeepOutZone),
+    visit: &mut dyn FnMut(KeepOutZone),
 ) {
     let apart_m = view.config.safety_distance_m + DETOUR_MARGIN_M;
     match source.checked_sub(view.neighbours.len()) {
-        None => view.neighbours.places_of(source, view.now, [apart_m; 2], tell),
+        None => view.neighbours.places_of(source, view.now, [apart_m; 2], visit),
         Some(i) => {
             let beside_m = apart_m + view.neighbours.pair_position_error_m();
             view.neighbours.landing_column(i, view.now, beside_m, |column| {
-                tell(KeepOutZone { kind: ZoneKind::Static, ..column });
+                visit(KeepOutZone { kind: ZoneKind::Static, ..column });
             });
         }
     }
 }
 
-/// Passes the keep-out zones of all other vehicles over an area to `tell`.
+/// Passes the keep-out zones of all other vehicles in a coverage mission to `visit`.
 pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
-    tell: &mut dyn FnMut(KeepOutZone),
+    visit: &mut dyn FnMut(KeepOutZone),
 ) {
-    (0..source_count(view)).for_each(|source| zones_of_source(view, source, tell));
+    (0..source_count(view)).for_each(|source| zones_of_source(view, source, visit));
 }
 
 /// Distance of a place from the surface of a zone, metres; negative inside.

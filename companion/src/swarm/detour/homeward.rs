@@ -1,7 +1,7 @@
-//! The way home over an area. A vehicle that is ordered back, or whose path stays blocked, does not
-//! fly its lanes back. It stops, requests from its shell the way straight home in its own layer,
-//! and flies that. It is off the plan from the moment at which it turns: the others divide what it
-//! leaves.
+//! The way home in a coverage mission. A vehicle that is ordered back, or whose path stays blocked,
+//! does not fly its lanes back. It stops, requests from its shell the way straight home in its own
+//! layer, and flies that. It is off the plan from the moment at which it turns: the others divide
+//! what it leaves.
 //!
 //! Constant work.
 
@@ -14,7 +14,7 @@ const RETURN_RETRY: Duration = Duration::from_secs(5);
 /// path home.
 const MAX_RETURNS: u8 = 4;
 
-/// The search of a vehicle for its path home over an area.
+/// The search of a vehicle for its path home in a coverage mission.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct HomewardSearch {
     /// Since when the vehicle has been stopping to seek a path home; `None` if it does not.
@@ -57,8 +57,8 @@ impl HomewardSearch {
         self.is_seeking() && self.missed_at.is_none_or(|at| now - at >= RETURN_RETRY)
     }
 
-    /// Whether the vehicle can turn home: it is on its path over an area, and has turned fewer than
-    /// `MAX_RETURNS` times.
+    /// Whether the vehicle can turn home: it is on its path in a coverage mission, and has turned
+    /// fewer than `MAX_RETURNS` times.
     pub(crate) fn can_turn<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,

@@ -2,7 +2,7 @@
 //!
 //! Constant work but for [`Detours::rejoin_from_aside`], once a search.
 
-use super::flown::{DetourPurpose, FlownPath, RejoinPlace, RejoinPlaces};
+use super::path_kind::{DetourPurpose, PathKind, RejoinPlace, RejoinPlaces};
 use super::{Detours, beside};
 use crate::swarm::view::DetourView;
 use crate::time::Duration;
@@ -17,7 +17,7 @@ const MAX_REJOIN_SEARCH_S: u64 = 90;
 impl Detours {
     /// Whether the path that is flown is not the plan's.
     pub(crate) fn is_on_detour(&self) -> bool {
-        self.flown.is_detour()
+        self.path_kind.is_detour()
     }
 
     /// Purpose of the path that is requested from the shell; `None` if none is.
@@ -26,44 +26,48 @@ impl Detours {
     }
 
     /// Forgets the request for a path: the vehicle stays on the path that it flies.
-    pub(crate) fn end_search(&mut self) {
+    pub(crate) fn cancel_request(&mut self) {
         (self.sought, self.request_read, self.detour_ready) = (None, false, false);
     }
 
-    /// Whether the vehicle flies straight home over an area, stops for that, or seeks the way.
+    /// Whether the vehicle flies straight home in a coverage mission, stops for that, or seeks the
+    /// way.
     pub(crate) fn is_homeward(&self) -> bool {
-        self.home.is_seeking() || self.flown == FlownPath::Detour(DetourPurpose::Home)
+        self.home.is_seeking() || self.path_kind == PathKind::Detour(DetourPurpose::Home)
     }
 
-    /// Whether the path that is flown ends aside, or back on the plan's path, not over the
-    /// vehicle's goal.
-    pub(crate) fn ends_aside(&self) -> bool {
-        self.flown.purpose().is_some_and(|purpose| purpose.is_aside() || purpose.keeps_to_plan())
+    /// Whether the path that is flown does not end at the vehicle's goal, but at a place to its
+    /// side or back on the plan's path.
+    pub(crate) fn ends_away_from_goal(&self) -> bool {
+        self.path_kind
+            .purpose()
+            .is_some_and(|purpose| purpose.is_aside() || purpose.keeps_to_plan())
     }
 
-    /// Whether the vehicle flies a detour over an area after which it comes back to its plan.
+    /// Whether the vehicle flies a detour in a coverage mission after which it comes back to its
+    /// plan.
     pub(crate) fn is_beside_plan(&self) -> bool {
-        self.flown.purpose().is_some_and(|purpose| purpose.keeps_to_plan())
+        self.path_kind.purpose().is_some_and(|purpose| purpose.keeps_to_plan())
     }
 
-    /// Whether the detour that is flown ends on the plan's path over an area.
+    /// Whether the detour that is flown ends on the plan's path in a coverage mission.
     pub(crate) fn leads_back(&self) -> bool {
-        matches!(self.flown, FlownPath::Detour(DetourPurpose::Rejoin(_)))
+        matches!(self.path_kind, PathKind::Detour(DetourPurpose::Rejoin(_)))
     }
 
-    /// Places where the vehicle is to come back to its path over an area; `None` if it does not
-    /// come back.
+    /// Places where the vehicle is to come back to its path in a coverage mission; `None` if it
+    /// does not come back.
     pub(crate) fn rejoin_places(&self) -> Option<RejoinPlaces> {
-        match self.flown {
-            FlownPath::Detour(DetourPurpose::Aside(places)) => places,
+        match self.path_kind {
+            PathKind::Detour(DetourPurpose::Aside(places)) => places,
             _ => self.rejoin().map(|own| RejoinPlaces { own, beyond: own }),
         }
     }
 
-    /// Place where the vehicle is to come back to its path over an area; `None` if it does not come
-    /// back.
+    /// Place where the vehicle is to come back to its path in a coverage mission; `None` if it does
+    /// not come back.
     pub(crate) fn rejoin(&self) -> Option<RejoinPlace> {
-        self.flown.purpose().and_then(|purpose| purpose.rejoin())
+        self.path_kind.purpose().and_then(|purpose| purpose.rejoin())
     }
 
     /// Place where a vehicle aside comes back to its path now: where it left that; or beyond the
@@ -84,30 +88,30 @@ impl Detours {
 
     /// Gives up the return to the plan's path: a vehicle beside it is from now on astray.
     pub(crate) fn give_up_plan(&mut self) {
-        self.flown = self.flown.without_return();
+        self.path_kind = self.path_kind.without_return();
     }
 
     /// Makes the plan's path the one flown, if it has come again from the shell.
     pub(crate) fn take_up_plan(&mut self) {
         if self.is_own_plan_ready() {
-            self.flown = FlownPath::Plan;
+            self.path_kind = PathKind::Plan;
         }
     }
 
     /// Whether the plan's path has come again from the shell after a detour, and is not flown yet.
     pub(crate) fn is_own_plan_ready(&self) -> bool {
-        self.flown == FlownPath::PlanReturned
+        self.path_kind == PathKind::PlanReturned
     }
 
-    /// Whether the vehicle is beside its plan's path, or about to fly it again, or has to fly home
-    /// without it.
-    pub(crate) fn is_own_plan_outstanding(&self) -> bool {
+    /// Whether the vehicle is off its plan's path: on a detour that leads back to it, about to
+    /// resume it, or unable to return to it.
+    pub(crate) fn is_off_own_path(&self) -> bool {
         self.is_own_plan_ready() || self.is_own_plan_lost() || self.is_beside_plan()
     }
 
     /// Whether the vehicle is beside its plan's path and will not come back to it.
     pub(crate) fn is_own_plan_lost(&self) -> bool {
-        self.flown == FlownPath::Astray
+        self.path_kind == PathKind::Astray
     }
 
     /// Whether the vehicle seeks a landing place aside.
@@ -117,6 +121,6 @@ impl Detours {
 
     /// Whether the vehicle lands at the end of the detour that it flies.
     pub(crate) fn lands_at_end(&self) -> bool {
-        self.flown == FlownPath::Detour(DetourPurpose::Landing)
+        self.path_kind == PathKind::Detour(DetourPurpose::Landing)
     }
 }

@@ -137,11 +137,11 @@ fn who_died_may_have_been_flown_back_to_its_pad() {
     bench.run(1.0);
     bench.neighbour = None;
     bench.run(60.0);
-    let mut told = Vec::new();
-    bench.companion.neighbours.for_each_place(bench.now, [1.5; 2], |place| told.push(place));
+    let mut reported = Vec::new();
+    bench.companion.neighbours.for_each_place(bench.now, [1.5; 2], |place| reported.push(place));
     assert!(
-        told.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5),
-        "{told:?}"
+        reported.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5),
+        "{reported:?}"
     );
 }
 
@@ -155,9 +155,9 @@ fn kept_off(flags: u8, moves: bool) -> Vec<KeepOutZone> {
         bench.neighbour_clock = Some(bench.now);
     }
     bench.run(30.0);
-    let mut told = Vec::new();
-    bench.companion.neighbours.for_each_place(bench.now, [1.5; 2], |place| told.push(place));
-    told
+    let mut reported = Vec::new();
+    bench.companion.neighbours.for_each_place(bench.now, [1.5; 2], |place| reported.push(place));
+    reported
 }
 
 #[test]

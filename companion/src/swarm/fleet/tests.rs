@@ -198,8 +198,8 @@ impl Swarm {
     }
 
     /// The inputs of the divisions that count for a vehicle.
-    fn lots(&self, own: usize) -> Vec<Vec<DivisionInput>> {
-        self.vehicles[own].fleet.divisions.iter().map(|lots| lots.to_vec()).collect()
+    fn inputs(&self, own: usize) -> Vec<Vec<DivisionInput>> {
+        self.vehicles[own].fleet.divisions.iter().map(|inputs| inputs.to_vec()).collect()
     }
 
     /// A flight in which the vehicles leave one after the other, at any time: the others divide
@@ -262,12 +262,12 @@ proptest! {
             let vehicle = &swarm.vehicles[own];
             prop_assert!(!vehicle.fleet.is_excluded(), "{own} of {again:?} is excluded");
             prop_assert!(vehicle.progress_dm > 50, "{own} of {again:?} does not fly");
-            let lots = swarm.lots(own);
-            prop_assert_eq!(lots.len(), usize::from(again.len() < count));
-            for (rank, lot) in lots.iter().flat_map(|lots| lots.iter().enumerate()) {
+            let inputs = swarm.inputs(own);
+            prop_assert_eq!(inputs.len(), usize::from(again.len() < count));
+            for (rank, input) in inputs.iter().flat_map(|inputs| inputs.iter().enumerate()) {
                 let starts = again.contains(&rank);
-                prop_assert_eq!(lot.alive, starts);
-                prop_assert!(starts || lot.along_dm == 0, "{own}: {rank} counts {lot:?}");
+                prop_assert_eq!(input.alive, starts);
+                prop_assert!(starts || input.along_dm == 0, "{own}: {rank} counts {input:?}");
             }
         }
     }
@@ -412,10 +412,11 @@ proptest! {
         swarm.end(struck, MemberStatus::Left);
         swarm.run_s(60);
         for own in (0..count).filter(|own| *own != struck) {
-            let lots = swarm.lots(own);
-            prop_assert_eq!(lots.len(), 1, "{}: {:?}", own, &swarm.vehicles[own].fleet);
-            let lot = lots[0][struck];
-            prop_assert!(!lot.alive && lot.along_dm + 50 >= progress_dm, "{progress_dm}: {lot:?}");
+            let inputs = swarm.inputs(own);
+            prop_assert_eq!(inputs.len(), 1, "{}: {:?}", own, &swarm.vehicles[own].fleet);
+            let input = inputs[0][struck];
+            let kept = !input.alive && input.along_dm + 50 >= progress_dm;
+            prop_assert!(kept, "{progress_dm}: {input:?}");
         }
     }
 }

@@ -6,8 +6,8 @@ use crate::time::Duration;
 
 /// Speed below which a vehicle counts as hovering, m/s: its sway.
 pub(crate) const MAX_HOVER_MPS: f32 = 0.3;
-/// Difference of `time_boot_ms` to the last position, milliseconds: a position older by less than
-/// this is late and dropped; older by more, its sender was restarted.
+/// Difference of `time_boot_ms` to that of the last position, milliseconds. A position older by
+/// less is late and is dropped; if it is older by more, its sender has restarted.
 pub(super) const RESTART_MS: u32 = 10_000;
 /// Age of its last message within which a neighbour counts as heard: four positions and intents.
 pub(super) const HEARD_WITHIN: Duration = Duration::from_millis(800);
@@ -39,8 +39,8 @@ pub(super) const MAX_UNHEARD_FLIGHT_S: f32 = 75.0;
 pub(super) const UNHEARD_WAIT: Duration = Duration::from_secs(15);
 /// Silence after which a vehicle is on the ground, from the highest floors too: 50 m at 1.5 m/s.
 pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
-/// Silence after which the column of a vehicle that left the plan in the air over an area is free
-/// again: the vehicle is down by then, whatever it flew there.
+/// Silence after which the column of a vehicle that left the plan in the air in a coverage mission
+/// is free again: the vehicle is down by then, whatever it flew there.
 pub(super) const COLUMN_KEPT_FOR: Duration = Duration::from_secs(600);
 /// Stretch of its path that an unheard vehicle may have flown, metres: the vehicle notices after
 /// [`HEARD_WITHIN`] and 1 s, and stops. Over an area it flies on as long as its lease allows.
@@ -50,14 +50,14 @@ pub(super) const UNHEARD_STRETCH_M: f32 = 6.0;
 pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
-/// Silence after which a vehicle over an area may have landed further along its path than
+/// Silence after which a vehicle in a coverage mission may have landed further along its path than
 /// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `Alone` waits. No vehicle leaves the
 /// plan for that silence earlier.
 pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 /// Rounding of the length of a path of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
-/// Maximum number of spacings of the places on the unheard stretch over an area, where it is as
-/// long as the lease allows: with eight corners a neighbour makes 17 keep-out zones.
+/// Maximum number of spacings of the places on the unheard stretch in a coverage mission, where it
+/// is as long as the lease allows: with eight corners a neighbour makes 17 keep-out zones.
 pub(super) const STRETCH_PLACES: f32 = 8.0;
 /// Height of the column in which a vehicle lies somewhere on the ground, metres; the planner
 /// shortens the column where it knows the ground.

@@ -14,7 +14,7 @@ use crate::link::echo::MessageDelay;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, MAX_POINTS, ON_DETOUR, OUT_OF_PLAN, WAITING};
 use crate::time::{Duration, Instant};
 
-/// Where and when silent vehicles come down in a mission over an area.
+/// Where and when silent vehicles come down in a coverage mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AreaGround {
     /// Heights of the ground, where it is not level.
@@ -56,7 +56,7 @@ pub(crate) struct NeighbourEntry {
     /// Greatest distance of the points, up to its stop for now, from the first of them, metres.
     pub(super) extent_m: f32,
     /// Length of all its points from its position on, metres, if it flies to the last of them
-    /// unheard: over an area, where it reports as many as its lease allows. Negative elsewhere.
+    /// unheard, as in a coverage mission: as many as its lease allows. Negative elsewhere.
     pub(super) unheard_way_m: f32,
     /// Whether the neighbour may come down from where it is; and the height of the ground below it,
     /// ENU up, metres, NaN if it never reported any.
@@ -99,7 +99,7 @@ impl NeighbourEntry {
         }
     }
 
-    /// Whether the neighbour flies to the last of its points even unheard: over an area.
+    /// Whether the neighbour flies to the last of its points even unheard: in a coverage mission.
     pub(crate) fn is_leased(&self) -> bool {
         self.unheard_way_m >= 0.0
     }
@@ -258,13 +258,13 @@ impl NeighbourEntry {
             && (silent || (self.state.progress_m.is_none() && !self.reports(ON_DETOUR)))
     }
 
-    /// Calls `tell` with the columns, of radius `apart_m`, in which the neighbour may come down;
+    /// Calls `visit` with the columns, of radius `apart_m`, in which the neighbour may come down;
     /// unheard, below all places up to `upto_m` along its points.
     pub(super) fn landing_columns(
         &self,
         now: Instant,
         [apart_m, upto_m]: [f32; 2],
-        tell: &mut dyn FnMut(KeepOutZone),
+        visit: &mut dyn FnMut(KeepOutZone),
     ) {
         let here = self.state.position;
         let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
@@ -273,11 +273,11 @@ impl NeighbourEntry {
                 let radius_m = fpu::sqrtf(apart_m * apart_m + wider_m * wider_m);
                 let (from, to) =
                     (place + up(COLUMN_TOP_ABOVE_M), place - up(self.column_depth_m(&place)));
-                tell(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
+                visit(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
             });
         }
         let mut column = |from: Point, below_m: f32, nature: ZoneKind| {
-            tell(KeepOutZone {
+            visit(KeepOutZone {
                 from: from + up(COLUMN_TOP_ABOVE_M),
                 to: from - up(below_m),
                 radius_m: apart_m,
@@ -299,7 +299,7 @@ impl NeighbourEntry {
         }
     }
 
-    /// Depth of the column below a place on its path, metres: over an area to the ground.
+    /// Depth of the column below a place on its path, metres: in a coverage mission to the ground.
     pub(super) fn column_depth_m(&self, place: &Point) -> f32 {
         // NaN, a ground never reported, counts as none.
         if self.is_leased() {
@@ -319,9 +319,9 @@ impl NeighbourEntry {
         (climbs && top.z > here.z + CLIMB_TOP_M).then_some(top.z)
     }
 
-    /// Length of the way along its points that the neighbour may fly unheard, metres: over an area
-    /// all of it; elsewhere what a stop takes, more where messages are late, its own and those by
-    /// which it learns that no vehicle hears it.
+    /// Length of the way along its points that the neighbour may fly unheard, metres: in a coverage
+    /// mission all of it; elsewhere what a stop takes, more where messages are late, its own and
+    /// those by which it learns that no vehicle hears it.
     pub(super) fn unheard_distance_m(&self) -> f32 {
         // The slack keeps rounding from cutting off the last corner.
         libm::fmaxf(self.unheard_way_m + LEGS_ROUNDING_M, self.unheard_stop_m())
@@ -337,7 +337,7 @@ impl NeighbourEntry {
         !self.reports(GROUNDED | LANDED) || self.unheard_point_count > 0
     }
 
-    /// Whether the neighbour is silent over an area, and may fly on by its lease or its autopilot.
+    /// Whether the neighbour, silent in a coverage mission, may fly on by lease or autopilot.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
         self.is_leased()
             && self.is_under_way()
@@ -345,8 +345,8 @@ impl NeighbourEntry {
             && !self.heard_within(now, MAY_LAND_AFTER)
     }
 
-    /// Where the neighbour may have fallen with its motors off, if silent over an area: the line
-    /// from its position to where its speed carried it, and the distance beside that line, metres.
+    /// Where the neighbour, silent in a coverage mission, may have fallen without power: the line
+    /// from its position to where its speed carried it, and the distance beside it, metres.
     #[inline(never)]
     pub(super) fn fall(&self, now: Instant) -> Option<([Point; 2], f32)> {
         let silent =
@@ -373,26 +373,26 @@ impl NeighbourEntry {
         self.may_fly_on(now) && self.pad.is_some_and(near)
     }
 
-    /// Calls `tell` with the neighbour's position and each leg along its points that it may have
+    /// Calls `each` with the neighbour's position and each leg along its points that it may have
     /// flown unheard, `left_m` in all: both ends, and metres of the leg and of its flown part.
     #[inline(never)]
-    pub(super) fn for_each_leg(&self, mut left_m: f32, tell: &mut dyn FnMut([Point; 2], [f32; 2])) {
+    pub(super) fn for_each_leg(&self, mut left_m: f32, each: &mut dyn FnMut([Point; 2], [f32; 2])) {
         let mut at = self.state.position;
-        tell([at; 2], [0.0; 2]);
+        each([at; 2], [0.0; 2]);
         for next in &self.points {
             let leg_m = (next - at).length();
             if leg_m > left_m {
-                return tell([at, *next], [leg_m, left_m]);
+                return each([at, *next], [leg_m, left_m]);
             }
             left_m -= leg_m;
-            tell([core::mem::replace(&mut at, *next), *next], [leg_m; 2]);
+            each([core::mem::replace(&mut at, *next), *next], [leg_m; 2]);
         }
     }
 
-    /// Calls `tell` with places along its points that the neighbour may have come to unheard,
+    /// Calls `visit` with places along its points that the neighbour may have come to unheard,
     /// `upto_m` in all, and with its greatest distance from the nearest of them, metres.
     #[inline(never)]
-    pub(super) fn for_each_place(&self, upto_m: f32, tell: &mut dyn FnMut(Point, f32)) {
+    pub(super) fn for_each_place(&self, upto_m: f32, visit: &mut dyn FnMut(Point, f32)) {
         let step_m = if upto_m > self.unheard_stop_m() {
             upto_m / STRETCH_PLACES
         } else {
@@ -402,10 +402,10 @@ impl NeighbourEntry {
         self.for_each_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {
             for step in 1..=(flown_m / step_m) as u32 {
                 let along_m = step as f32 * step_m;
-                tell(at + (next - at) * (along_m / leg_m), wider_m);
+                visit(at + (next - at) * (along_m / leg_m), wider_m);
             }
             // The end of the flown part too.
-            tell(
+            visit(
                 if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
                 wider_m,
             );
@@ -429,14 +429,14 @@ impl NeighbourEntry {
         libm::fmaxf(self.ground_m, libm::fminf(ground.high_m, place.z - below_m))
     }
 
-    /// Calls `tell` with the keep-out zones, of radius `apart_m`, of all places where the neighbour
-    /// may be from now on; unheard up to `upto_m` along its points, over an area on its ground.
+    /// Calls `visit` with the keep-out zones, of radius `apart_m`, of all places where
+    /// the neighbour may be from now on; unheard up to `upto_m` along its points.
     pub(super) fn keep_out_zones(
         &self,
         now: Instant,
         [apart_m, upto_m]: [f32; 2],
         field: Option<AreaGround>,
-        tell: &mut dyn FnMut(KeepOutZone),
+        visit: &mut dyn FnMut(KeepOutZone),
     ) {
         let here = self.state.position;
         // Wider in the air only: vehicles on the ground lie beside each other's pads.
@@ -448,24 +448,24 @@ impl NeighbourEntry {
             KeepOutZone { from, to, radius_m: apart_m + VAGUE_POSITION_M, kind: nature }
         };
         if self.reports(GROUNDED) && self.reports(OUT_OF_PLAN) && self.lacks_position() {
-            tell(column(here, ZoneKind::Grounded));
+            visit(column(here, ZoneKind::Grounded));
         } else if self.reports(GROUNDED)
             && (self.reports(OUT_OF_PLAN | WAITING | LANDED) || !self.is_dead(now))
         {
-            tell(place(apart_m));
+            visit(place(apart_m));
         } else if self.reports(OUT_OF_PLAN)
             && (field.is_none() || self.heard_within(now, COLUMN_KEPT_FOR))
         {
             let below = column(here, ZoneKind::Static);
-            tell(KeepOutZone { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
+            visit(KeepOutZone { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
             // The neighbour's place is not to be approached from above or the side either, whatever
             // its column leaves.
-            tell(place(wide_m + PAIR_SWAY_M));
+            visit(place(wide_m + PAIR_SWAY_M));
         } else if self.is_dead(now) && self.flies_plan_unheard() {
             // The neighbour is where its gates let it fly: gates keep it apart, no zone.
         } else if self.is_dead(now) {
             if let Some(pad) = self.pad {
-                tell(KeepOutZone { from: pad, to: pad, ..place(apart_m) });
+                visit(KeepOutZone { from: pad, to: pad, ..place(apart_m) });
             }
             let down = !self.heard_within(now, field.map_or(DOWN_AFTER, |field| field.down_after));
             if let Some(field) = field.filter(|_| down && !self.ground_m.is_nan()) {
@@ -477,9 +477,9 @@ impl NeighbourEntry {
                     let next =
                         if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next };
                     let (from, lies) = (high(next), place(apart_m + VAGUE_POSITION_M));
-                    tell(KeepOutZone { from, to: high(at), ..lies });
+                    visit(KeepOutZone { from, to: high(at), ..lies });
                     if from.z > self.ground_m {
-                        tell(KeepOutZone { from, to: low(next, self.ground_m), ..lies });
+                        visit(KeepOutZone { from, to: low(next, self.ground_m), ..lies });
                     }
                 });
             }
@@ -488,13 +488,13 @@ impl NeighbourEntry {
             self.for_each_place(upto_m, &mut |at, wider_m| {
                 let far_m = apart_m + beside_m;
                 let radius_m = fpu::sqrtf(far_m * far_m + wider_m * wider_m);
-                tell(KeepOutZone { radius_m, ..column(at, nature) });
+                visit(KeepOutZone { radius_m, ..column(at, nature) });
             });
         } else {
             if self.is_landing_after_detour(now) {
-                tell(column(here, ZoneKind::Static));
+                visit(column(here, ZoneKind::Static));
             }
-            tell(place(wide_m + PAIR_SWAY_M));
+            visit(place(wide_m + PAIR_SWAY_M));
         }
     }
 }

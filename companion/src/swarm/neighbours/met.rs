@@ -50,11 +50,11 @@ pub(crate) struct ReachQuery<'a> {
     pub(crate) on_plan: bool,
     /// Whether this vehicle hears no other one: then the others are assumed to fly on.
     pub(crate) hears_nobody: bool,
-    /// Whether this vehicle holds the lease over an area: heard by it or not, no other one then
-    /// flies on for long.
+    /// Whether this vehicle holds the lease in a coverage mission: heard by it or not, no other one
+    /// then flies on for long.
     pub(crate) holds_lease: bool,
-    /// Whether this vehicle lands, or descends over an area: then places count where unheard
-    /// vehicles may lie.
+    /// Whether this vehicle lands, or descends in a coverage mission: then places count where
+    /// unheard vehicles may lie.
     pub(crate) lands: bool,
 }
 
@@ -153,8 +153,8 @@ impl NeighbourEntry {
             reaches(self.rest_radius_m(reach));
         }
         let mut away_sq = across_sq;
-        let told = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
-        if let Some(first) = self.points.first().filter(|_| told) {
+        let reported = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
+        if let Some(first) = self.points.first().filter(|_| reported) {
             away_sq = away_sq.min(reach.own.distance_from_box(first).xy().norm_squared());
             reaches(if self.is_leased() { self.unheard_distance_m() } else { self.extent_m });
         }

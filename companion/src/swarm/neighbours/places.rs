@@ -16,7 +16,7 @@ impl<const V: usize> Neighbours<V> {
         self.pair_position_error_m
     }
 
-    /// Ground and landing time for a mission over an area; `None` in other missions.
+    /// Ground and landing time in a coverage mission; `None` in other missions.
     pub(super) fn area_ground(&self) -> Option<AreaGround> {
         self.fleet.is_some().then_some(AreaGround {
             ground: self.ground,
@@ -35,14 +35,14 @@ impl<const V: usize> Neighbours<V> {
         if far { contact.unheard_distance_m() } else { contact.unheard_stop_m() }
     }
 
-    /// Calls `tell` with the keep-out zones, of radius `apart_m`, of contact `i` where it is out of
-    /// the plan, unless the present detour already avoids that place.
+    /// Calls `visit` with the keep-out zones, of radius `apart_m`, of contact `i` where it is out
+    /// of the plan, unless the present detour already avoids that place.
     pub fn for_each_zone_of(
         &self,
         i: usize,
         now: Instant,
         apart_m: f32,
-        mut tell: impl FnMut(KeepOutZone),
+        mut visit: impl FnMut(KeepOutZone),
     ) {
         let avoided =
             |c: &NeighbourEntry| (c.avoided_at - c.state.position).length() < VAGUE_POSITION_M;
@@ -53,7 +53,7 @@ impl<const V: usize> Neighbours<V> {
                 now,
                 [apart_m, self.unheard_progress_m(contact, now)],
                 self.area_ground(),
-                &mut tell,
+                &mut visit,
             );
         }
     }
@@ -68,72 +68,77 @@ impl<const V: usize> Neighbours<V> {
         self.clear_at >= at
     }
 
-    /// Calls `tell` with the keep-out zones of the roster's other vehicles where they stand now, or
-    /// rest out of the plan. `apart`: radius for one in the air, and for one that lies, which no
-    /// longer deviates.
-    pub fn for_each_place(&self, now: Instant, apart: [f32; 2], mut tell: impl FnMut(KeepOutZone)) {
-        (0..self.roster_count).for_each(|i| self.places_of(i, now, apart, &mut tell));
+    /// Calls `visit` with the keep-out zones of the roster's other vehicles where they stand now,
+    /// or rest out of the plan. `apart`: radius for one in the air, and for one on the ground,
+    /// which no longer deviates.
+    pub fn for_each_place(
+        &self,
+        now: Instant,
+        apart: [f32; 2],
+        mut visit: impl FnMut(KeepOutZone),
+    ) {
+        (0..self.roster_count).for_each(|i| self.places_of(i, now, apart, &mut visit));
     }
 
-    /// Calls `tell` with the keep-out zones of contact `i` of the roster where it stands or rests:
+    /// Calls `visit` with the keep-out zones of contact `i` of the roster where it stands or rests:
     /// of radius `lying_m` if it is on the ground, else `apart_m`.
     pub(crate) fn places_of(
         &self,
         i: usize,
         now: Instant,
         [apart_m, lying_m]: [f32; 2],
-        tell: &mut dyn FnMut(KeepOutZone),
+        visit: &mut dyn FnMut(KeepOutZone),
     ) {
         let rostered = self.contacts[..self.roster_count].get(i);
         if let Some(contact) = rostered.filter(|c| c.position_at.is_some()) {
             let far_m = if contact.is_on_ground(now, self.down_after) { lying_m } else { apart_m };
             let reach = [far_m, self.unheard_progress_m(contact, now)];
-            contact.keep_out_zones(now, reach, self.area_ground(), tell);
+            contact.keep_out_zones(now, reach, self.area_ground(), visit);
         }
     }
 
-    /// Calls `tell` with the columns, of radius `apart_m`, in which vehicles may come down that
+    /// Calls `visit` with the columns, of radius `apart_m`, in which vehicles may come down that
     /// land without looking.
     pub fn for_each_landing_column(
         &self,
         now: Instant,
         apart_m: f32,
-        mut tell: impl FnMut(KeepOutZone),
+        mut visit: impl FnMut(KeepOutZone),
     ) {
-        (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut tell));
+        (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut visit));
     }
 
-    /// Calls `tell` with the columns, of radius `apart_m`, in which contact `i` may come down, if
+    /// Calls `visit` with the columns, of radius `apart_m`, in which contact `i` may come down, if
     /// it may land without looking.
     pub fn landing_column(
         &self,
         i: usize,
         now: Instant,
         apart_m: f32,
-        mut tell: impl FnMut(KeepOutZone),
+        mut visit: impl FnMut(KeepOutZone),
     ) {
         let landing = |c: &&NeighbourEntry| c.position_at.is_some() && c.may_land_unseen(now);
         if let Some(contact) = self.contacts.get(i).filter(landing) {
             contact.landing_columns(
                 now,
                 [apart_m, self.unheard_progress_m(contact, now)],
-                &mut tell,
+                &mut visit,
             );
         }
     }
 
-    /// Calls `tell` with the zones in which a landing would end within `apart_m` of another
+    /// Calls `visit` with the zones in which a landing would end within `apart_m` of another
     /// vehicle: a path may lead through them, but not end there. Over an area a silent vehicle may
     /// come down anywhere along its points, or at its pad: that bars places at height `height_m`.
     pub fn for_each_landing_zone(
         &self,
         now: Instant,
         [apart_m, height_m]: [f32; 2],
-        mut tell: impl FnMut(KeepOutZone),
+        mut visit: impl FnMut(KeepOutZone),
     ) {
         for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
             let mut zone = |from: Point, to: Point, radius_m: f32| {
-                tell(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
+                visit(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
             };
             let from = contact.state.position;
             zone(from, from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M), apart_m);
@@ -161,13 +166,13 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Calls `tell` with the column above the last position of contact `i`, of radius `apart_m`:
+    /// Calls `visit` with the column above the last position of contact `i`, of radius `apart_m`:
     /// there this vehicle might come down on it.
-    pub fn column_above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOutZone)) {
+    pub fn column_above(&self, i: usize, apart_m: f32, mut visit: impl FnMut(KeepOutZone)) {
         if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
             let from = contact.state.position;
             let to = from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M);
-            tell(KeepOutZone { from, to, radius_m: apart_m, kind: ZoneKind::Static });
+            visit(KeepOutZone { from, to, radius_m: apart_m, kind: ZoneKind::Static });
         }
     }
 

@@ -44,8 +44,8 @@ pub(super) fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
 pub(super) fn joined(at_ms: u64) -> Neighbours<4> {
     let mut table = table();
     for system_id in [3, 9] {
-        let told = Intent { system_id, heard_bits: 0, ..intent(0, 1, 2) };
-        table.handle_intent(Instant::from_millis(at_ms), 1, &told, 1, None);
+        let reported = Intent { system_id, heard_bits: 0, ..intent(0, 1, 2) };
+        table.handle_intent(Instant::from_millis(at_ms), 1, &reported, 1, None);
     }
     table
 }
@@ -176,8 +176,8 @@ proptest::proptest! {
             if position && id != 3 && id != 9 {
                 table.handle_position(at(now), &ORIGIN, id, &place(now as u32, 0));
             } else {
-                let told = Intent { system_id: id, ..intent(flags, mission, 2) };
-                table.handle_intent(at(now), 1, &told, 1, Some(2));
+                let reported = Intent { system_id: id, ..intent(flags, mission, 2) };
+                table.handle_intent(at(now), 1, &reported, 1, Some(2));
             }
             let heard = table.states_at(at(now));
             proptest::prop_assert!(heard.len() <= 4);
@@ -275,7 +275,7 @@ proptest::proptest! {
     ) {
         let place_of = |table: &Neighbours<4>| table.contacts[1].state.progress_m;
         let (mut honest, mut lying) = (joined(0), joined(0));
-        let told = |progress_m| Intent { progress_m, ..intent(ON_PLAN, 1, 2) };
+        let reported = |progress_m| Intent { progress_m, ..intent(ON_PLAN, 1, 2) };
         let (mut last, mut heard_ms) = (None::<(f32, Instant)>, 0);
         for (i, delay_ms) in delays_ms.iter().enumerate() {
             // Overtaken messages are dropped before.
@@ -283,10 +283,10 @@ proptest::proptest! {
             heard_ms = heard_ms.max(sent_ms + delay_ms);
             let now = Instant::from_millis(heard_ms);
             let true_m = begin_m + speed_mps * sent_ms as f32 * 1e-3;
-            honest.handle_intent(now, 1, &told(true_m), 1, Some(2));
+            honest.handle_intent(now, 1, &reported(true_m), 1, Some(2));
             proptest::prop_assert_eq!(place_of(&honest), Some(true_m));
             let reported_m = lies_m.get(i).copied().unwrap_or(true_m);
-            lying.handle_intent(now, 1, &told(reported_m), 1, Some(2));
+            lying.handle_intent(now, 1, &reported(reported_m), 1, Some(2));
             let believed_m = place_of(&lying).unwrap();
             proptest::prop_assert!(believed_m <= reported_m);
             if let Some((before_m, at)) = last {
@@ -302,7 +302,7 @@ proptest::proptest! {
         // A landing that reports its whole way is believed after the time that it takes to fly it.
         for second in 1..200 {
             let now = Instant::from_millis(heard_ms + second * 1000);
-            lying.handle_intent(now, 1, &told(250.0), 1, Some(2));
+            lying.handle_intent(now, 1, &reported(250.0), 1, Some(2));
         }
         proptest::prop_assert_eq!(place_of(&lying), Some(250.0));
     }
@@ -435,8 +435,8 @@ fn nobody_falls_up() {
         let here = Point::from_fn(|_, _| uniform(&mut rng, -4.0, 4.0));
         let points: heapless::Vec<Point, { crate::link::intent::MAX_POINTS }> =
             (0..3).map(|_| here + Point::from_fn(|_, _| uniform(&mut rng, -3.0, 3.0))).collect();
-        let told = Intent { points: points.clone(), ..intent(0, 1, 2) };
-        table.handle_intent(Instant::from_millis(500), 1, &told, 1, None);
+        let reported = Intent { points: points.clone(), ..intent(0, 1, 2) };
+        table.handle_intent(Instant::from_millis(500), 1, &reported, 1, None);
         table.handle_position(Instant::from_millis(500), &ORIGIN, 9, &place(50, 0));
         // Where the position says it is.
         let from = table.contacts[1].state.position;

@@ -21,8 +21,8 @@ pub(crate) fn sphere(at: Point, radius_m: f32) -> Command {
             place.alt_m as f32,
         )),
         from: (255, 190),
-        to_us: true,
-        to_component: true,
+        to_our_system: true,
+        to_our_component: true,
     }
 }
 

@@ -19,7 +19,7 @@ const YAW_IGNORED: u16 = 0x400;
 
 impl Bench {
     pub(super) fn receive(&mut self, link: Link, frame: Frame) {
-        let p = frame.padded();
+        let p = frame.padded_payload();
         if frame.message_id == COMMAND_ACK_DATA::ID {
             self.acks.push((u16::from_le_bytes([p[0], p[1]]), p[2], p[8], p[9]));
         }

@@ -98,7 +98,8 @@ impl Bench {
         }
         let rank =
             usize::from(self.companion.config.own_roster_entry().expect("it is in the roster").0);
-        let held_dm = self.companion.division_inputs().last().map_or(0, |lots| lots[rank].along_dm);
+        let held_dm =
+            self.companion.division_inputs().last().map_or(0, |inputs| inputs[rank].along_dm);
         // On a detour beside its path the companion's current plan is the detour.
         let beside = self.companion.detours.is_beside_plan();
         let plan = if beside { self.own_plan.as_ref() } else { self.companion.mission.plan() };

@@ -199,23 +199,23 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
         }
         meter.call("fleet::Fleet::division_hash", bytes, || fleet.division_hash());
         for first in [0, roster::MAX_ENTRIES] {
-            let mut told =
+            let mut reported =
                 meter.call("fleet::Fleet::roster_message", bytes, || fleet.roster_message(first));
             let mut payload = [0; roster::MAX_LEN];
-            meter.call("roster::RosterReport::encode", 0, || told.encode(&mut payload));
+            meter.call("roster::RosterReport::encode", 0, || reported.encode(&mut payload));
             let mut padded = [0; 255];
             padded[..roster::MAX_LEN].copy_from_slice(&payload);
             let read = meter.call("roster::RosterReport::decode", 0, || {
-                RosterReport::decode(&padded, told.system_id)
+                RosterReport::decode(&padded, reported.system_id)
             });
-            assert!(read.is_some_and(|read| read == told));
-            for entry in &mut told.entries {
+            assert!(read.is_some_and(|read| read == reported));
+            for entry in &mut reported.entries {
                 (entry.progress_dm, entry.commitment_dm, entry.holds) =
                     (10 * round + 5, promise_dm, true);
             }
             let sender = 1 + usize::from(round) % (VEHICLES / 2);
             meter.call("fleet::Fleet::handle_roster, 32", bytes, || {
-                fleet.handle_roster(sender, &told, false)
+                fleet.handle_roster(sender, &reported, false)
             });
         }
     }

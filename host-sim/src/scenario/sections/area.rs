@@ -28,8 +28,8 @@ use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text, Value};
 use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
 
-/// Time limit of a simulated flight over an area if the scenario gives none, seconds: longer than a
-/// battery lasts.
+/// Time limit of a simulated flight in a coverage mission if the scenario gives none, seconds:
+/// longer than a battery lasts.
 const DEFAULT_AREA_TIME_LIMIT_S: f32 = 3600.0;
 
 /// Cell of the level ground that a coverage mission has in place of a map, metres.

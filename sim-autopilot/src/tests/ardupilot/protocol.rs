@@ -18,10 +18,10 @@ fn unasked_it_says_heartbeat_and_next_to_nothing() {
             frame.message_id
         );
     }
-    let beat = bench.of(0).last().unwrap().1.padded();
+    let beat = bench.of(0).last().unwrap().1.padded_payload();
     assert_eq!((beat[4], beat[5], beat[6]), (2, 3, 0x51), "quadrotor, ArduPilot, STABILIZE");
     bench.run(0.1);
-    let stray = bench.of(22).next().expect("a stray PARAM_VALUE").1.padded();
+    let stray = bench.of(22).next().expect("a stray PARAM_VALUE").1.padded_payload();
     assert_eq!(
         (&stray[8..20], f32::from_le_bytes([stray[0], stray[1], stray[2], stray[3]])),
         (&b"STAT_RUNTIME"[..], 30.0)
@@ -36,7 +36,7 @@ fn streams_come_when_asked_for_and_positions_when_the_estimator_is_ready() {
     }
     let flags = |bench: &Bench| {
         let (_, frame) = bench.of(193).last().unwrap();
-        u16::from_le_bytes([frame.padded()[20], frame.padded()[21]])
+        u16::from_le_bytes([frame.padded_payload()[20], frame.padded_payload()[21]])
     };
     bench.run(2.0);
     assert_eq!(flags(&bench), 0x400);
@@ -85,7 +85,7 @@ fn refusals_are_as_seen() {
 fn integers_are_cast_and_answers_to_names_carry_no_index() {
     let mut bench = Bench::copter();
     bench.set_param("FS_GCS_ENABLE", 1.0, 2);
-    let b = *bench.of(22).last().unwrap().1.padded();
+    let b = *bench.of(22).last().unwrap().1.padded_payload();
     let wire = f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
     assert_eq!((wire, u16::from_le_bytes([b[6], b[7]]), b[24]), (1.0, u16::MAX, 2));
     bench.send(21, &[1, 1]);
@@ -94,7 +94,10 @@ fn integers_are_cast_and_answers_to_names_carry_no_index() {
     let bench_total = bench.of(22).count() - 1;
     assert_eq!(bench_total, total);
     for (k, (_, frame)) in bench.of(22).skip(1).enumerate() {
-        assert_eq!(usize::from(u16::from_le_bytes([frame.padded()[6], frame.padded()[7]])), k);
+        assert_eq!(
+            usize::from(u16::from_le_bytes([frame.padded_payload()[6], frame.padded_payload()[7]])),
+            k
+        );
     }
 }
 
@@ -112,7 +115,7 @@ fn a_reboot_forgets_streams_and_keeps_parameters_and_missions() {
     bench.run(2.0);
     assert_eq!(bench.of(30).count(), before, "streams are forgotten");
     bench.send(20, &[255, 255, 1, 1, b'R', b'T', b'L', b'_', b'A', b'L', b'T', 0]);
-    let b = bench.of(22).last().unwrap().1.padded();
+    let b = bench.of(22).last().unwrap().1.padded_payload();
     assert_eq!(f32::from_le_bytes([b[0], b[1], b[2], b[3]]), 900.0);
 }
 
@@ -123,7 +126,7 @@ fn ned_is_in_its_own_projection_about_its_own_origin() {
     let mut bench = Bench::with(&Config { ekf_origin: ekf, ..config() });
     bench.want(32);
     bench.run(f64::from(READY_S) + 1.0);
-    let b = *bench.of(32).last().unwrap().1.padded();
+    let b = *bench.of(32).last().unwrap().1.padded_payload();
     let said = |at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
     let truth = frames::enu_to_geodetic(&world, &bench.at());
     let expected = frames::geodetic_to_ned(Projection::ArduPilot, &ekf, &truth);

@@ -63,7 +63,7 @@ impl Faller {
     }
 
     /// The planner of the vehicle below: aside, away from what comes down, at once; around in a
-    /// while, over an area once that is down.
+    /// while, in a coverage mission once that is down.
     fn plan_away(&mut self, b: &mut Bench) {
         let over_area = b.companion.config.lost_vehicle_down_s.is_some();
         let answered = |request: &DetourRequest| request.aside || !over_area;
@@ -218,8 +218,8 @@ fn faller(state: State, seed: u64) -> Faller {
     }
 }
 
-/// The least distance to what comes down, and whether the vehicle is down in the end; over an area
-/// its part is flown by then.
+/// The least distance to what comes down, and whether the vehicle is down in the end; in a coverage
+/// mission its part is flown by then.
 fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
     let mut faller = faller(state, seed);
     let mut b = holding(state, over_area, &mut faller);

@@ -60,16 +60,16 @@ pub(super) fn is_blocked(scenes: &mut Scenes) {
     scenes.play(over_a_field(Follow), blocked, Aborted, 1.0);
     // It sways: the path is clear for a moment now and then.
     let sways = |b: &mut Bench| {
-        let told = |b: &Bench, text: &str| b.texts.iter().any(|told| told == text);
+        let reported = |b: &Bench, text: &str| b.texts.iter().any(|reported| reported == text);
         for _ in 0..20 {
-            let turns = told(b, "Path blocked for 2 min: planning the way home");
+            let turns = reported(b, "Path blocked for 2 min: planning the way home");
             b.answer_detour = if turns { Some(Ok(())) } else { detours::NO_WAY };
             b.neighbour = below_the_path(OUT_OF_PLAN);
             b.run(8.0);
             b.neighbour = on_pad(ON_PLAN);
             b.run(0.8);
         }
-        assert!(told(b, "Path clear again") && told(b, "Flying home"), "{:?}", b.texts);
+        assert!(reported(b, "Path clear again") && reported(b, "Flying home"), "{:?}", b.texts);
         is_home(b);
     };
     scenes.play(over_a_field(Follow), sways, Aborted, 1.0);

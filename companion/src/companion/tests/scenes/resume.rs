@@ -30,13 +30,13 @@ fn reports(b: &mut Bench, report: &PhotographedReport) {
 
 pub(super) fn others_know_of_more(scenes: &mut Scenes) {
     for state in [Ready, Scheduled] {
-        let told = |b: &mut Bench| {
+        let reported = |b: &mut Bench| {
             knows(b, 20, 0, false);
             b.run(1.0);
             assert_eq!(b.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
         };
         let end = if state == Ready { Ready } else { Follow };
-        scenes.play(over_a_field(state), told, end, 20.0);
+        scenes.play(over_a_field(state), reported, end, 20.0);
     }
 }
 

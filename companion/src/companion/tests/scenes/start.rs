@@ -58,7 +58,7 @@ pub(super) fn planned(scenes: &mut Scenes) {
     };
     let idle = VehiclePlan { task: Task::Stay, path: Default::default(), ..plan() };
     scenes.play(answered(Some(Ok(idle))), start, Done, 1.0);
-    for failure in [PlanFailure::NoRoadmap, PlanFailure::Unreachable] {
+    for failure in [PlanFailure::RoadmapUnusable, PlanFailure::Unreachable] {
         scenes.play(answered(Some(Err(failure))), |b| b.run(6.0), Aborted, 1.0);
     }
 }

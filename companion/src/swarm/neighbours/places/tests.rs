@@ -8,8 +8,8 @@ use super::super::{GROUNDED, OUT_OF_PLAN, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
 
-/// Whatever way a vehicle reports over an area: wherever on it it is after it fell silent, nobody
-/// lands below, and no place below is taken for free.
+/// Whatever way a vehicle reports in a coverage mission: wherever on it it is after it fell silent,
+/// nobody lands below, and no place below is taken for free.
 #[test]
 fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
     let mut rng = Pcg32::seed_from_u64(14);
@@ -32,13 +32,13 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
             })
             .collect();
         let beyond = (rng.next_u32() % count) as u8;
-        let told = Intent {
+        let reported = Intent {
             points: points.clone(),
             unheard_point_count: beyond,
             ground_m: 0.0,
             ..intent(0, 1, 2)
         };
-        table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+        table.handle_intent(Instant::ZERO, 1, &reported, 1, Some(2));
         let leg = rng.next_u32() as usize % points.len();
         let before = if leg == 0 { from } else { points[leg - 1] };
         let truly = before + (points[leg] - before) * uniform(&mut rng, 0.0, 1.0);
@@ -91,9 +91,9 @@ fn where_a_vehicle_may_have_fallen_nobody_lands() {
         let mut velocity = Point::from_fn(|_, _| uniform(&mut rng, -6.0, 6.0));
         velocity.z = uniform(&mut rng, -1.0, 0.0);
         let points = [from, Point::new(0.0, 0.0, 0.0)].into_iter().collect();
-        let told = Intent { points, ground_m: 0.0, ..intent(0, 1, 2) };
+        let reported = Intent { points, ground_m: 0.0, ..intent(0, 1, 2) };
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 0));
-        table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+        table.handle_intent(Instant::ZERO, 1, &reported, 1, Some(2));
         let contact = &mut table.contacts[1];
         (contact.state.position, contact.state.velocity) = (from, velocity);
         if case % 4 == 0 {
@@ -208,8 +208,8 @@ fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             let mut table = joined(0);
             table.form_fleet(64.0, None, stray_m);
             table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
-            let told = Intent { ground_m: 0.0, ..intent(flags, 1, 2) };
-            table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+            let reported = Intent { ground_m: 0.0, ..intent(flags, 1, 2) };
+            table.handle_intent(Instant::ZERO, 1, &reported, 1, Some(2));
             // Whatever shape was reported, no place is free that may truly be too near.
             let away = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0)
                 .normalize();
@@ -237,8 +237,8 @@ fn over_an_area_the_column_of_who_left_it_in_the_air_is_kept_off_for_ten_minutes
             table.form_fleet(64.0, None, 1.0);
         }
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
-        let told = Intent { ground_m: -30.0, ..intent(OUT_OF_PLAN, 1, 2) };
-        table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+        let reported = Intent { ground_m: -30.0, ..intent(OUT_OF_PLAN, 1, 2) };
+        table.handle_intent(Instant::ZERO, 1, &reported, 1, Some(2));
         let here = table.contacts[1].state.position;
         let below = here - Point::new(0.0, 0.0, uniform(&mut rng, 3.0, here.z + 25.0));
         let silent_s = uniform(&mut rng, 1.0, 1200.0);

@@ -14,7 +14,7 @@ pub(crate) struct RejoinPlace {
     pub position: Point,
 }
 
-/// Places where a vehicle that went aside over an area comes back to its path.
+/// Places where a vehicle that went aside in a coverage mission comes back to its path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RejoinPlaces {
     /// Place where the vehicle left its path, or where it is to hold for a division.
@@ -29,20 +29,20 @@ pub(crate) struct RejoinPlaces {
 pub(crate) enum DetourPurpose {
     /// A detour to the goal of the plan.
     Goal,
-    /// Aside, out of the column under a vehicle that lands; over an area with the places where it
-    /// comes back to its path.
+    /// Aside, out of the column under a vehicle that lands; in a coverage mission with the places
+    /// where it comes back to its path.
     Aside(Option<RejoinPlaces>),
     /// Aside, to land where no other vehicle lies.
     Landing,
-    /// Straight home over an area.
+    /// Straight home in a coverage mission.
     Home,
-    /// Around an obstacle over an area, back to this place on the own path.
+    /// Around an obstacle in a coverage mission, back to this place on the own path.
     Rejoin(RejoinPlace),
 }
 
 /// Kind of path that a vehicle flies.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) enum FlownPath {
+pub(crate) enum PathKind {
     /// The path of its plan.
     #[default]
     Plan,
@@ -61,7 +61,8 @@ impl DetourPurpose {
         matches!(self, Self::Aside(_) | Self::Landing)
     }
 
-    /// Place where the vehicle comes back to its own path over an area; `None` if it does not.
+    /// Place where the vehicle comes back to its own path in a coverage mission; `None` if it does
+    /// not.
     pub(crate) fn rejoin(&self) -> Option<RejoinPlace> {
         match self {
             Self::Rejoin(back) => Some(*back),
@@ -76,7 +77,7 @@ impl DetourPurpose {
     }
 }
 
-impl FlownPath {
+impl PathKind {
     /// Purpose of the detour that is flown; `None` on the plan's path, or astray.
     pub(crate) fn purpose(&self) -> Option<DetourPurpose> {
         match self {
