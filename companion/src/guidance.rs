@@ -30,7 +30,7 @@ mod waypoints;
 
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, OwnVehicle};
 use planner_core::flight::Path;
-use planner_core::track::{ReferenceState, TrackConfig};
+use planner_core::track::{self, ReferenceState, TrackConfig};
 use planner_core::{Length, Point};
 
 use self::filter::SafetyFilter;
@@ -315,9 +315,10 @@ impl Guidance {
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
             let along_m = if self.on_path { along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
-                // Also while stopped: the filter checks the path up to the advised stop.
+                // Also while stopped: the filter checks up to the stop, also if advised too late.
                 State::Follow | State::Blocked | State::Replanning => {
-                    along_m + self.advice.stop_within_m.max(0.0)
+                    let least_m = track::braking_distance_m(&self.track, &plan.path, &self.tracker);
+                    along_m + self.advice.stop_within_m.max(least_m)
                 }
                 _ => self.setpoint_m + self.smoother.stopping_distance_m(false),
             };

@@ -265,6 +265,21 @@ pub fn advance<const W: usize>(
     })
 }
 
+/// Distance that the reference still flies if it is to stop now, metres.
+pub fn braking_distance_m<const W: usize>(
+    cfg: &TrackConfig,
+    path: &Path<W>,
+    tracker: &ReferenceState,
+) -> f32 {
+    let points = path.waypoints();
+    let next = points.partition_point(|w| w.along_m <= tracker.along_m);
+    let leg = next.clamp(1, max_usize(points.len(), 2) - 1);
+    let (Some(from), Some(to)) = (points.get(leg - 1), points.get(leg)) else { return 0.0 };
+    let (_, accel) = limits_along(cfg, &unit_direction(from, to));
+    let speed_mps = fmaxf(tracker.speed_mps, 0.0);
+    speed_mps * speed_mps / (2.0 * accel)
+}
+
 /// Greatest distance of the vehicle behind the reference on a leg of this clearance, at this speed
 /// of the reference, metres.
 fn max_lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
@@ -290,6 +305,25 @@ fn max_usize(a: usize, b: usize) -> usize {
 mod tests {
     use super::*;
     use crate::flight::tests::corner_path;
+
+    #[test]
+    fn a_stop_that_is_advised_too_late_is_as_long_as_flown() {
+        let mut path = Path::<2>::new();
+        path.push(Point::zeros(), 10.0).unwrap();
+        path.push(Point::new(200.0, 0.0, 0.0), 10.0).unwrap();
+        let cfg = TrackConfig { cruise_mps: 15.0, ..TrackConfig::default() };
+        let mut tracker = ReferenceState::default();
+        while tracker.along_m < 80.0 {
+            advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.02).unwrap();
+        }
+        let (from_m, brakes_m) = (tracker.along_m, braking_distance_m(&cfg, &path, &tracker));
+        let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 2 };
+        while tracker.speed_mps > 0.0 {
+            advance(&cfg, &path, &mut tracker, &stop, 0.02).unwrap();
+        }
+        let flown_m = tracker.along_m - from_m;
+        assert!(flown_m > 10.0 && (brakes_m - flown_m).abs() < 0.3, "{brakes_m} {flown_m}");
+    }
 
     #[test]
     fn a_vehicle_that_follows_arrives_and_slows_in_the_corner() {

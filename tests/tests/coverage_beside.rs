@@ -93,3 +93,40 @@ fn who_flies_around_and_is_struck_touches_nothing() {
     println!("{around} of {count} flew around something and were struck, {} wrong", wrong.len());
     assert!(wrong.is_empty() && 4 * around as u64 >= count, "{around} of {count}");
 }
+
+/// A field for two vehicles at 15 m/s whose radios lose half of all messages.
+const FAST_FIELD: &str = "[area]
+polygon = [[0, 0], [300, 0], [300, 160], [0, 160]]
+camera = { fov_deg = 73.7, aspect = 1.5 }
+height_m = 40.0
+[mission]
+cruise_mps = 15.0
+[[vehicles]]
+id = 1
+speed_max_mps = 20.0
+start = [0, -20, 0]
+[[vehicles]]
+id = 2
+speed_max_mps = 20.0
+personality = \"ardupilot\"
+start = [10, -20, 0]
+[deconfliction]
+separation_m = 6.0
+[simulation]
+gust_mps = 1.0
+radio_loss = 0.5
+";
+
+/// A stop that is advised too late takes longer than advised: the safety filter counts all of it.
+#[test]
+fn who_flies_fast_stops_before_one_that_hovers() {
+    let one = |at_s: u16| -> Option<String> {
+        let text = FAST_FIELD.to_owned() + &fault("companion-reset", f32::from(at_s), 2);
+        let (result, log) = covered::fly_text(&text).expect("it can be flown");
+        let safety = &result.safety;
+        let touches = (safety.wall_contacts, safety.violations) != (0, 0);
+        touches.then(|| format!("struck at {at_s} s: {safety:?}\n{log}"))
+    };
+    let wrong: Vec<String> = (102..126).into_par_iter().step_by(6).filter_map(one).collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
