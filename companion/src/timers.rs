@@ -32,11 +32,15 @@ pub(crate) enum Timer {
     Limit,
     /// From then on "Setpoint out of limits" may be sent again.
     HeldReport,
+    /// From then on a division under way is overdue.
+    DivisionDue,
+    /// From then on a vehicle on the ground that can promise nothing leaves its share to the others.
+    LeaveUnstarted,
     /// From then on "EKF origin # km away" may be sent again.
     OriginReport,
 }
 
-const TIMER_COUNT: usize = 12;
+const TIMER_COUNT: usize = 14;
 /// Timers that wake the shell.
 const WAKING_TIMERS: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 
@@ -57,6 +61,12 @@ impl Timers {
     pub(crate) fn set_no_later(&mut self, timer: Timer, at: Instant) {
         let due_at = &mut self.due_at[timer as usize];
         *due_at = (*due_at).min(at);
+    }
+
+    /// Sets when a timer is due, unless it is due later already.
+    pub(crate) fn set_no_earlier(&mut self, timer: Timer, at: Instant) {
+        let due_at = &mut self.due_at[timer as usize];
+        *due_at = (*due_at).max(at);
     }
 
     /// Whether a timer is due at `now`.

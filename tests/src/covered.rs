@@ -13,7 +13,7 @@ use host_sim::{scenario, swarm};
 
 /// Log texts that explain why a vehicle without a fault lands before its part is done: it was not
 /// heard by a majority, or a failed vehicle hovers on its path.
-pub const EARLY_LANDING_TEXTS: [&str; 10] = [
+pub const EARLY_LANDING_TEXTS: [&str; 11] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
     "Vehicle on the path: planning the way home",
@@ -24,6 +24,7 @@ pub const EARLY_LANDING_TEXTS: [&str; 10] = [
     "No way around: landing",
     "No progress for 10 min: landing",
     "Start barred for 3 min: others take its part",
+    "Climb takes too long: landing",
 ];
 
 /// Log text of a vehicle that lands beside its pad, since another one may lie or come down there.

@@ -91,3 +91,22 @@ fn a_vehicle_that_comes_up_late_flies_its_part() {
         text
     });
 }
+
+/// A board that is restarted on the ground again and again counts an incarnation more each time.
+/// Whoever is restarted after that, and knows nothing, takes its count as it is.
+#[test]
+fn any_number_of_restarts_on_the_ground_keeps_nobody_from_dividing() {
+    none_is_wrong(|seed| {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let mut text = SMALL_FIELD.replace("id =", "endurance_s = 4000.0\nid =");
+        let (lands, again) = (1 + random.next_u32() % 3, random.next_u32() % 3);
+        let other = 1 + (lands + again % 2) % 3;
+        fault(&mut text, "land-order", lands, 50);
+        (1..=3).filter(|v| *v != lands).for_each(|v| fault(&mut text, "return-order", v, 100));
+        for nth in 0..1 + random.next_u32() % 9 {
+            fault(&mut text, "companion-reset", lands, 250 + 20 * nth);
+        }
+        fault(&mut text, "companion-reset", other, 480);
+        text
+    });
+}

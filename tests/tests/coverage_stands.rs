@@ -70,8 +70,9 @@ fn a_vehicle_that_stands_unheard_is_down_before_others_fly_there() {
     fly_all(draw, |result, _| is_not_whole(result));
 }
 
-/// One without a position on its pad, or that a restart left without one in the field, is heard but
-/// promises nothing: the others divide its share all the same, after a loss and without one.
+/// One without a position or plan on its pad, one that hears nobody, or one that a restart left
+/// without a position in the field is heard but promises nothing: the others divide its share all
+/// the same, after a loss and without one.
 #[test]
 fn what_cannot_start_leaves_its_share_to_the_others() {
     let draw = |random: &mut Pcg32| {
@@ -79,9 +80,14 @@ fn what_cannot_start_leaves_its_share_to_the_others() {
         let mut text = area(random, count);
         let vehicle = 1 + random.next_u32() as usize % count;
         let for_long = "duration_s = 3000.0\n";
-        text += &match random.next_u32() % 3 {
+        text += &match random.next_u32() % 5 {
             0 => fault(0.0, "gps-loss", vehicle, for_long),
-            1 => {
+            1 => fault(0.0, "late-plan", vehicle, for_long),
+            2 => {
+                let deaf = format!("{for_long}direction = \"rx\"\n");
+                fault(0.0, "radio-cut", vehicle, &deaf)
+            }
+            3 => {
                 let held = fault(0.5, "pause-order", vehicle, "duration_s = 20.0\n");
                 held + &fault(15.0, "gps-loss", vehicle, for_long)
             }
@@ -110,9 +116,65 @@ fn a_pause_in_the_start_ends_no_mission() {
         let count = 2;
         let text = area(random, count);
         let vehicle = 1 + random.next_u32() as usize % count;
-        let at_s = 0.5 + f64::from(random.next_u32() % 100) / 10.0;
+        // ArduPilots are ready after 40 s, PX4s at once.
+        let ready_s = f64::from(random.next_u32() % 2) * 40.0;
+        let at_s = ready_s + 0.5 + f64::from(random.next_u32() % 100) / 10.0;
         let for_s = 12.0 + f64::from(random.next_u32() % 20);
         text + &fault(at_s, "pause-order", vehicle, &format!("duration_s = {for_s:.1}\n"))
     };
     fly_all(draw, |result, _| !result.complete);
+}
+
+/// Another vehicle is lost while all wait until the first one is down, from high up or slowly: they
+/// wait for that one too, and then divide.
+#[test]
+fn a_loss_during_a_division_delays_it_and_lands_nobody() {
+    let draw = |random: &mut Pcg32| {
+        let height_m = [25, 90][random.next_u32() as usize % 2];
+        let descend_mps = 0.4 + f64::from(random.next_u32() % 16) / 10.0;
+        let mut text = String::from(
+            "[area]\npolygon = [[0, 0], [350, 10], [380, 190], [180, 260], [-10, 170]]\n\
+             camera = { fov_deg = 73.7, aspect = 1.5 }\n\
+             [mission]\ncruise_mps = 5.0\n[simulation]\ntime_limit_s = 7200.0\n",
+        );
+        text = text.replace("[mission]", &format!("height_m = {height_m}.0\n[mission]"));
+        for id in 1..=5 {
+            let x = 10 * id;
+            text += &format!(
+                "[[vehicles]]\nid = {id}\nstart = [{x}, -20, 0]\nendurance_s = 7200.0\n\
+                 descend_mps = {descend_mps:.1}\n"
+            );
+        }
+        let first = 1 + random.next_u32() as usize % 5;
+        let second = 1 + (first + random.next_u32() as usize % 4) % 5;
+        let at_s = 120.0 + f64::from(random.next_u32() % 60);
+        let after_s = f64::from(random.next_u32() % 300);
+        text += &fault(at_s, "kill", first, "");
+        text + &fault(at_s + after_s, "kill", second, "")
+    };
+    fly_all(draw, |result, _| is_not_whole(result));
+}
+
+/// A vehicle whose pad is so far away that the others finish sooner without it has no part. It stays
+/// in reserve, and takes over where one of two others is lost.
+#[test]
+fn who_has_no_part_takes_over_from_a_lost_vehicle() {
+    let draw = |random: &mut Pcg32| {
+        let far_m = 600 + random.next_u32() % 300;
+        let far = 1 + random.next_u32() as usize % 3;
+        let mut text = String::from(
+            "[area]\npolygon = [[0, 0], [160, 0], [160, 100], [0, 100]]\n\
+             camera = { fov_deg = 73.7, aspect = 1.5 }\nheight_m = 25.0\n\
+             [mission]\ncruise_mps = 5.0\n\
+             [simulation]\nradio_range_m = 3000.0\ntime_limit_s = 7200.0\n",
+        );
+        for id in 1..=3 {
+            let x = if id == far { -f64::from(far_m) } else { 10.0 * id as f64 };
+            text +=
+                &format!("[[vehicles]]\nid = {id}\nstart = [{x}, -20, 0]\nendurance_s = 7200.0\n");
+        }
+        let lost = 1 + (far + random.next_u32() as usize % 2) % 3;
+        text + &fault(30.0 + f64::from(random.next_u32() % 100), "kill", lost, "")
+    };
+    fly_all(draw, |result, _| is_not_whole(result) || !result.complete);
 }

@@ -221,6 +221,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             let own_view = OwnReport {
                 status: standing,
                 waits: false,
+                airborne: true,
                 division: vehicle.division,
                 progress_dm: vehicle.along_dm,
                 commitment_dm: Some(promise_dm),

@@ -9,9 +9,11 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::roster::MemberStatus;
 use crate::mission::State;
+use crate::mission::table::STARTED_ON_PAD;
 use crate::swarm::detour::path_kind::RejoinPlace;
-use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, OwnReport};
+use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, LEASE, OwnReport};
 use crate::time::Duration;
+use crate::timers::Timer;
 
 /// Margin beyond the stopping distance at which a vehicle promises to hold at the earliest, metres.
 const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
@@ -23,9 +25,11 @@ const AT_HOLD_M: f32 = 0.2;
 pub(super) const MISSED_AFTER: Duration = Duration::from_secs(3);
 /// Time under a pilot's control after which a vehicle counts as having left the mission.
 const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
-/// Time for which a vehicle that cannot start (autopilot or position missing, or not at its pad)
-/// keeps its share while another one flies.
-const CANNOT_START_MOST: Duration = Duration::from_secs(60);
+/// Time for which a vehicle on the ground that can promise nothing keeps its share while another
+/// one flies.
+pub(super) const CANNOT_START_MOST: Duration = Duration::from_secs(60);
+/// Time after a lost vehicle is down within which a division becomes binding.
+const DIVIDES_WITHIN: Duration = Duration::from_secs(60);
 /// Stands for the plan's CRC where the planner cannot divide the rest of the area.
 const UNDIVIDED: u32 = u32::MAX;
 /// Time after which an unanswered request for a division is sent to the shell again.
@@ -49,6 +53,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let now = self.now;
         if self.neighbours.fleet().is_none() {
             return;
+        }
+        if !self.lacks_promise() {
+            self.timers.set(Timer::LeaveUnstarted, now + CANNOT_START_MOST);
+        }
+        let down_at =
+            self.neighbours.fleet().and_then(|fleet| fleet.last_down_at(now, MISSED_AFTER));
+        if self.mission.state() != State::Dividing {
+            self.timers.set(Timer::DivisionDue, now);
+        } else if let Some(at) = down_at {
+            self.timers.set_no_earlier(Timer::DivisionDue, at + DIVIDES_WITHIN);
         }
         let own = self.own_fleet_report();
         self.neighbours.step_fleet(&own, now);
@@ -90,22 +104,26 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             PilotControl | PilotReturned => {
                 self.mission.time_with_pilot(self.now) >= PILOT_KEEPS_AFTER
             }
-            _ => (off_plan && !beside) || self.is_start_hopeless(),
+            _ => {
+                (off_plan && !beside)
+                    || (self.lacks_promise() && self.timers.is_due(Timer::LeaveUnstarted, self.now))
+            }
         };
+        let on_pad = matches!(state, Ready | Scheduled | PadReplanning);
         let along_m = self.guidance.progress_m(state, &self.guidance_inputs());
         let flies = self.guidance.along_m() >= 0.0 && !off_plan;
         // A vehicle that holds above its pad may have overshot the start of its descent a little.
         let descends = self.guidance.along_m() > self.last_descent_start_m() + AT_HOLD_M;
-        let nearly_down = flies && descends && self.division_hold_m().is_none();
+        let nearly_down = flies && descends && !on_pad && self.division_hold_m().is_none();
         let standing = match ends || nearly_down {
             true if self.mission.has_all_pictures(along_m) => MemberStatus::Finished,
             _ if ends => MemberStatus::Left,
             _ => MemberStatus::Alive,
         };
-        let on_pad = matches!(state, Ready | Scheduled | PadReplanning);
         OwnReport {
             status: standing,
             waits: self.is_not_started(),
+            airborne: self.telemetry.armed && self.telemetry.on_ground == Some(false),
             division: self.mission.division_count(),
             progress_dm: if flies {
                 (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16
@@ -130,16 +148,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && photographs.last_picture_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
     }
 
-    /// Whether this vehicle, not started, has not been able to start for so long that the others
-    /// are to divide its share: without a promise of its own they cannot divide otherwise. In their
-    /// flight it then takes no part any more.
-    fn is_start_hopeless(&self) -> bool {
-        let waits_for_autopilot =
-            matches!(self.mission.state(), State::WaitAutopilot | State::WaitPosition);
-        let elsewhere = self.mission.state() == State::Ready && !self.is_at_start();
-        (waits_for_autopilot || elsewhere)
-            && self.mission.time_in_state(self.now) >= CANNOT_START_MOST
-            && self.neighbours.does_another_take_part(self.now, MISSED_AFTER)
+    /// Whether this vehicle on the ground can promise nothing, so that others, if any fly, could not
+    /// divide: ready, it is heard by no majority; or while another one flies it has no autopilot,
+    /// position or plan, is away from its pad, or has another plan than that one.
+    fn lacks_promise(&self) -> bool {
+        use State::*;
+        let Some(fleet) = self.neighbours.fleet() else { return false };
+        let lacks = match self.mission.state() {
+            WaitAutopilot | WaitPosition | Planning => true,
+            Ready | Scheduled | PadReplanning if !fleet.has_lease(self.now) => return true,
+            Ready => !self.is_at_start() || self.hears_another_plan(),
+            Scheduled | PadReplanning => self.hears_another_plan(),
+            _ => false,
+        };
+        lacks && self.neighbours.does_another_take_part(self.now, LEASE)
     }
 
     /// Whether this vehicle is on its pad and was not started: it may take part as a new vehicle.
@@ -160,6 +182,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && self.neighbours.fleet().is_some_and(Fleet::has_reported_leaving)
     }
 
+    /// Whether this vehicle was started after it reported that it leaves, and another one flies.
+    fn starts_too_late(&self) -> bool {
+        STARTED_ON_PAD.contains(&self.mission.state())
+            && self
+                .neighbours
+                .fleet()
+                .is_some_and(|fleet| fleet.has_reported_leaving() && fleet.has_lease(self.now))
+    }
+
     /// Whether this vehicle flies home, back along its path, or aside, and lands at the end.
     fn will_land_off_plan(&self) -> bool {
         let home = self.guidance.returning || self.detours.is_homeward();
@@ -172,7 +203,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// count it as lost.
     pub(super) fn is_excluded(&self) -> bool {
         let excluded = self.neighbours.fleet().is_some_and(Fleet::is_excluded);
-        (excluded && !self.will_land_off_plan()) || self.resumes_too_late()
+        (excluded && !self.will_land_off_plan())
+            || self.resumes_too_late()
+            || self.starts_too_late()
     }
 
     /// Place along its path where its last descent begins, above its pad, metres.

@@ -8,8 +8,10 @@ use crate::autopilot::requests::is_battery_known;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::mission::{GuardInputs, MAX_POSITION_AGE, State, UNFOLLOWED_MOST};
+use crate::swarm::fleet::Fleet;
 use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::time::{Duration, Instant};
+use crate::timers::Timer;
 
 /// Greatest horizontal distance from the place where landing was commanded in flight to the
 /// touchdown, metres: the stopping distance from cruise.
@@ -23,8 +25,11 @@ const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
 /// Time without its lease renewed, after which silence counts in a coverage mission: 1 s before the
 /// lease ends. The row `NeighboursSilent` stops the vehicle 1 s later.
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
-/// Time after a lost vehicle is down within which a division becomes binding, seconds.
-const DIVIDES_WITHIN_S: f32 = 60.0;
+/// Height above the pad below which a climb is not interrupted by a pause, metres: lower, an
+/// autopilot may take a hovering vehicle for landed, and disarm it.
+const MIN_PAUSE_HEIGHT_M: f32 = 1.0;
+/// Time unheard after which a vehicle without a part no longer waits for one.
+const RESERVE_UNHEARD_MOST: Duration = Duration::from_secs(300);
 /// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle in a coverage mission may be off a
 /// setpoint that stands before it lands: gusts push it further there than walls would allow
 /// indoors.
@@ -57,6 +62,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             _ => !offboard,
         };
         let beneath = self.mission.uninterrupted_state();
+        let area = self.config.lost_vehicle_down_s.is_some();
         let follow = self.mission.state() == State::Follow;
         let on_ground = t.on_ground == Some(true);
         let fence = self.config.geofence;
@@ -95,7 +101,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             unfollowed_for,
             blocked_for: self.detours.blocked_for(now),
             neighbour_age: self.neighbour_age(),
-            division_due_after: self.division_due_after(),
+            division_overdue: self.timers.is_due(Timer::DivisionDue, now),
             way_free: self.is_flying_unheard(),
             out_of_range: self.neighbours.are_all_out_of_range(),
             neighbour_heard: self.is_linked(),
@@ -108,7 +114,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan_ready: self.mission.plan().is_some(),
             plan_failed: self.mission.plan_failure().is_some(),
             roadmap_bad: self.mission.plan_failure() == Some(PlanFailure::RoadmapUnusable),
-            has_goal: self.mission.plan().is_some_and(|plan| plan.task.leaves_pad()),
+            has_goal: self.has_goal(),
+            in_reserve: self.is_in_reserve(),
             plans_as_others: self.plans_as_others(),
             at_pad: self.is_at_start(),
             imprecise: self.mission.state() == State::Ready
@@ -117,12 +124,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             origin_moved: t.origin_moved,
             start: self.mission.pending().start,
             pause: self.mission.pending().pause,
+            lifting_off: self.mission.state() == State::Climb
+                && t.position.z - self.mission.pad_position().z
+                    < MIN_PAUSE_HEIGHT_M.min(self.mission.climb_m() / 2.0),
             resume: self.mission.pending().resume,
             land: self.mission.pending().land,
             turn_back: self.mission.pending().turn_back
                 && !self.guidance.returning
                 && !self.detours.is_homeward(),
-            area: self.config.lost_vehicle_down_s.is_some(),
+            area,
             can_fly_home: over_field,
             descends: self.guidance.is_descending(),
             may_fly_beside: standing
@@ -154,7 +164,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,
             airborne: t.armed && t.on_ground == Some(false),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
-            gates_open: self.guidance.advice.stop_within_m > 0.05
+            gates_open: self.has_goal()
+                && self.guidance.advice.stop_within_m > 0.05
                 && self.guidance.filter.column_clear()
                 && self.mission.departure_due(now)
                 && !self.hears_another_plan()
@@ -162,7 +173,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && is_battery_known(t, self.config.battery_low_percent, now)
                 && !self.detours.is_blocked()
                 && self.neighbours.is_path_clear_since(self.mission.entered_at())
-                && (self.is_linked() || self.neighbours.are_all_at_rest()),
+                && match self.neighbours.fleet() {
+                    Some(fleet) => fleet.takes_part() && self.is_linked(),
+                    None => self.is_linked() || self.neighbours.are_all_at_rest(),
+                },
             climb_done: self.mission.state() == State::Climb && self.guidance.is_climb_done(scene),
             // The ground may be higher than the plan says: a reported landing ends the descent.
             path_done: follow
@@ -211,9 +225,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    fn division_due_after(&self) -> Duration {
-        let due_s = self.config.lost_vehicle_down_s.map_or(0.0, |down_s| down_s + DIVIDES_WITHIN_S);
-        Duration::from_millis((1000.0 * due_s) as u64)
+    /// Whether this vehicle has no part of the area, but may get one if another one is lost.
+    fn is_in_reserve(&self) -> bool {
+        let needed = |fleet: &Fleet<V>| {
+            fleet.is_reserve_needed() && fleet.lease_age(self.now) < RESERVE_UNHEARD_MOST
+        };
+        !self.has_goal() && self.neighbours.fleet().is_some_and(needed)
+    }
+
+    fn has_goal(&self) -> bool {
+        self.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
     }
 
     /// Whether this vehicle is at its start, within the tolerances.

@@ -1,5 +1,6 @@
 //! The control step, and the actions of the mission table's rows.
 
+use super::division::CANNOT_START_MOST;
 use super::{Companion, IDLE_STEP_EVERY, MAX_ROWS_PER_STEP, REPORT_EVERY, SETPOINT_EVERY};
 use crate::autopilot::requests::DISARM_EVERY;
 use crate::config::PlanFailure;
@@ -202,6 +203,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     .photographed_mut()
                     .prepare_plan_request(self.config.skips_photographed);
                 if let Some(fleet) = self.neighbours.fleet_mut() {
+                    if fleet.has_reported_leaving() {
+                        // It takes part again: others have to hear it first.
+                        self.timers.set(Timer::LeaveUnstarted, now + CANNOT_START_MOST);
+                    }
                     fleet.begin_flight(now);
                     self.detours.begin_flight();
                 }

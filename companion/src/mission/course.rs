@@ -12,9 +12,7 @@ use crate::link::commands::{self, Command, PendingCommands};
 use crate::mission::photographed::PhotographedWaypoints;
 use crate::mission::task::{PathProgress, Tasks};
 use crate::mission::waits::{BarredStart, Waits};
-use crate::mission::{
-    Action, Guard, GuardInputs, InterruptedStates, State, TargetState, TransitionRow,
-};
+use crate::mission::{Action, GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
 use crate::time::{Duration, Instant};
 
 /// Greatest distance between the first point of a path and the place where it must begin, metres; a
@@ -216,7 +214,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         };
         self.interrupted.record_interruption(from, to, lands);
         (self.state, self.entered_at) = (to, now);
-        if row.guard == Guard::StartCommanded {
+        if (from, to) == (State::Ready, State::Scheduled) {
             (self.started_at, self.mode_before) = (now, custom_mode);
         }
         if to == State::PilotControl && from != State::PilotReturned {

@@ -35,9 +35,11 @@ pub enum Guard {
     StartAgain,
     /// MISSION_START in a coverage mission.
     StartOverField,
-    /// MISSION_START, but the plan does not leave the pad; in a coverage mission all others heard
-    /// have the same plan.
+    /// MISSION_START, but the plan does not leave the pad, and no vehicle will leave a part to this
+    /// one; in a coverage mission all others heard have the same plan.
     StartWithoutGoal,
+    /// As `StartWithoutGoal`, in a coverage mission: others may leave a part to this vehicle.
+    StartInReserve,
     /// MISSION_START, but the vehicle is not at its pad.
     StartElsewhere,
     /// MISSION_START, but the motors are already armed.
@@ -174,6 +176,8 @@ pub enum Guard {
     NoRoomToLand,
     /// Before take-off: the column above the pad has not been free for the limit.
     ColumnBlocked,
+    /// In a coverage mission, on the pad without a part: no vehicle will leave one to it any more.
+    ReserveEnds,
     /// In a coverage mission, on the pad: a vehicle above the pad or an obstacle on the path has
     /// barred the start for the limit, and another vehicle that takes part flies.
     StartBarred,
@@ -281,7 +285,8 @@ impl Guard {
             Self::OwnPlanReady => i.own_plan_ready,
             Self::OwnPlanLost => i.own_plan_lost,
             Self::StartOverField => i.start && i.area,
-            Self::StartWithoutGoal => i.start && !i.has_goal && i.plans_as_others,
+            Self::StartWithoutGoal => i.start && !i.has_goal && i.plans_as_others && !i.in_reserve,
+            Self::StartInReserve => i.start && i.in_reserve && i.plans_as_others,
             Self::StartElsewhere => i.start && !i.at_pad,
             Self::StartArmed => i.start && i.armed,
             Self::StartBatteryLow => i.start && i.battery_low,
@@ -326,7 +331,7 @@ impl Guard {
             Self::PathDone => i.path_done,
             Self::Stalled => i.stalled_for >= limit,
             Self::Unfollowed => i.unfollowed_for >= limit,
-            Self::PauseCommanded => i.pause,
+            Self::PauseCommanded => i.pause && !i.lifting_off,
             Self::ResumeCommanded => i.resume,
             Self::BackOnPath => i.position_age < MAX_POSITION_AGE && i.near_path,
             Self::BackOffPath => i.position_age < MAX_POSITION_AGE && !i.near_path,
@@ -355,7 +360,8 @@ impl Guard {
             Self::LandingPlaceReached => i.landing_place_reached,
             Self::LandingClear => i.column_clear_for >= limit,
             Self::ColumnBlocked => i.column_blocked_for.min(i.in_state) >= limit,
-            Self::StartBarred => i.start_barred_for >= limit && i.others_fly,
+            Self::ReserveEnds => i.area && !i.has_goal && !i.in_reserve,
+            Self::StartBarred => i.start_barred_for >= limit && i.others_fly && i.has_goal,
             Self::Yielded => i.yielded_for >= limit && i.seeking_home_for.is_none(),
             Self::Hindered => i.hindered_for >= limit && i.seeking_home_for.is_none(),
             Self::BatteryCritical => i.battery_critical,
@@ -363,7 +369,7 @@ impl Guard {
             Self::OutsideGeofence => i.outside && i.room_below,
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::LeaseLost => i.area && i.neighbour_age > limit,
-            Self::NotDivided => i.in_state >= limit.max(i.division_due_after),
+            Self::NotDivided => i.in_state >= limit && i.division_overdue,
             Self::PausedBeforeLiftOff => i.pause && i.on_ground && !i.vertical,
             Self::WayFree => i.way_free,
             Self::OutOfRange => i.out_of_range && i.in_state >= limit,

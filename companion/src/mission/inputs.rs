@@ -25,9 +25,8 @@ pub struct GuardInputs {
     /// Time for which this vehicle has heard no neighbour, or none has reported that it hears this
     /// vehicle, in this state; zero once all have landed or left the plan.
     pub neighbour_age: Duration,
-    /// Time in `Dividing` after which a division is due: a lost vehicle is down by then, and a
-    /// minute has passed since. Zero in other missions than coverage missions.
-    pub division_due_after: Duration,
+    /// Whether all lost vehicles have been down for a minute: from then on a division is due.
+    pub division_overdue: bool,
     /// Whether this vehicle may fly on unheard: all others are out of radio range, and its next
     /// gate is open or none is left.
     pub way_free: bool,
@@ -59,6 +58,9 @@ pub struct GuardInputs {
     pub roadmap_bad: bool,
     /// Whether the plan makes this vehicle leave its pad.
     pub has_goal: bool,
+    /// In a coverage mission: whether this vehicle has no part, but may get one of a vehicle that is
+    /// lost: a majority heard it within the last 5 min, and others take part.
+    pub in_reserve: bool,
     /// In a coverage mission: whether all neighbours heard have this vehicle's plan, after time
     /// enough to report another one. True in other missions.
     pub plans_as_others: bool,
@@ -76,6 +78,8 @@ pub struct GuardInputs {
     pub start: bool,
     /// Whether DO_PAUSE_CONTINUE 0 is pending.
     pub pause: bool,
+    /// Whether the climb has only begun.
+    pub lifting_off: bool,
     /// Whether DO_PAUSE_CONTINUE 1 is pending.
     pub resume: bool,
     /// Whether NAV_LAND is pending.

@@ -184,6 +184,11 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::StartWithoutGoal => {
             (i.start, i.plans_as_others, i.at_pad, i.armed) = (true, true, true, false);
         }
+        G::StartInReserve => {
+            (i.start, i.in_reserve, i.plans_as_others, i.at_pad, i.armed) =
+                (true, true, true, true, false);
+        }
+        G::ReserveEnds => (i.area, i.armed) = (true, false),
         G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
         G::StartArmed => (i.start, i.has_goal, i.at_pad) = (true, true, true),
         G::StartVague => {
@@ -248,7 +253,9 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::StartAgain => i.start = true,
         G::StartOverField => (i.start, i.area) = (true, true),
         G::StalledOverField => (i.stalled_for, i.can_fly_home) = (long, true),
-        G::StartBarred => (i.start_barred_for, i.others_fly) = (long, true),
+        G::StartBarred => {
+            (i.start_barred_for, i.others_fly, i.has_goal) = (long, true, true);
+        }
         G::StandsToReturn => i.stands_to_return = true,
         G::WayHomeReady => (i.detour_ready, i.homeward) = (true, true),
         G::NoWayHome => (i.seeking_home_for, i.can_turn_back) = (Some(long), true),
@@ -269,7 +276,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::OutsideGeofence => (i.outside, i.room_below) = (true, true),
         G::NeighboursSilent => i.neighbour_age = long,
         G::LeaseLost => (i.area, i.neighbour_age) = (true, long),
-        G::NotDivided => i.in_state = long,
+        G::NotDivided => (i.in_state, i.division_overdue) = (long, true),
         G::PausedBeforeLiftOff => (i.pause, i.on_ground) = (true, true),
         G::NeighbourHeard => i.neighbour_heard = true,
         G::OnGround => (i.on_ground, i.has_flown) = (true, true),

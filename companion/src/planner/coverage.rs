@@ -149,7 +149,12 @@ fn packing_vehicle(
         cruise_mps: libm::fminf(mission.header().cruise_mps, vehicle.speed_max_mps),
         climb_mps: share.map_or(0.0, |s| s.climb_mps),
         descend_mps: share.map_or(0.0, |s| s.descend_mps),
-        weight: share.map_or(0.0, |s| s.weight),
+        // Otherwise weights are sizes of parts, not of vehicles: whoever flies on after a loss gets
+        // an equal share.
+        weight: match view.header().parts {
+            PartEligibility::SameWeight => share.map_or(0.0, |s| s.weight),
+            PartEligibility::Anyone => 1.0,
+        },
     }
 }
 

@@ -32,6 +32,8 @@ pub const COMMITMENT_S: f32 = 10.0;
 /// Maximum number of divisions of a mission; after the last one the waypoints that a vehicle leaves
 /// stay unphotographed.
 pub const MAX_DIVISIONS: usize = 12;
+/// Silence of a vehicle that was in flight after which it has landed, whatever it flew on.
+const MAX_FLIGHT: Duration = Duration::from_secs(1800);
 /// Number of distinct incarnations, the counts of a vehicle's flights: 3 bits.
 const INCARNATIONS: u8 = 8;
 
@@ -42,6 +44,8 @@ pub struct OwnReport {
     pub status: MemberStatus,
     /// Whether this vehicle was not started yet: it may take part again as a new vehicle.
     pub waits: bool,
+    /// Whether this vehicle is in the air.
+    pub airborne: bool,
     /// Number of divisions from which its path follows: the fields below are along that path.
     pub division: usize,
     /// Progress along its path, decimetres.
@@ -104,6 +108,11 @@ pub struct Fleet<const V: usize> {
     in_flight: u32,
     /// Ranks of the other vehicles that report that they hear one in flight, as bits.
     hear_flight: u32,
+    /// Ranks of the vehicles that have reported their own entry, as bits: until then this vehicle,
+    /// just switched on, knows none of their incarnations.
+    introduced: u32,
+    /// Whether this vehicle is in the air.
+    airborne: bool,
     limits: FleetTimeouts,
 }
 
@@ -126,6 +135,8 @@ impl<const V: usize> Fleet<V> {
             idle: false,
             in_flight: 0,
             hear_flight: 0,
+            introduced: 0,
+            airborne: false,
             limits,
         }
     }
@@ -141,7 +152,8 @@ impl<const V: usize> Fleet<V> {
         self.forget_plan();
         (self.in_flight, self.hear_flight) = (0, 0);
         self.members.iter_mut().for_each(|member| member.heard_at = now);
-        self.lease_at = now;
+        // A majority has to hear this vehicle before it takes off.
+        self.lease_at = Instant::ZERO;
     }
 
     /// Sets the plan of this flight, by its CRC: places along paths and divisions that others
@@ -169,6 +181,7 @@ impl<const V: usize> Fleet<V> {
             lease_at: self.lease_at,
             in_flight: self.in_flight,
             hear_flight: self.hear_flight,
+            airborne: self.airborne,
             ..Self::new(usize::from(self.own), self.members.len(), self.limits)
         };
         self.members[usize::from(self.own)].entry.incarnation = incarnation;
@@ -182,6 +195,7 @@ impl<const V: usize> Fleet<V> {
         own: &OwnReport,
         hearing: impl Fn(usize) -> MemberReception,
     ) {
+        self.airborne = own.airborne;
         // This vehicle may not yet have the path of the last division.
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[usize::from(self.own)].entry;
@@ -200,8 +214,14 @@ impl<const V: usize> Fleet<V> {
                 member.heard_at = now;
             }
             member.heard_itself = lately;
-            if now - member.heard_at >= self.limits.silent {
-                self.hear_flight &= !(1 << rank.min(31));
+            let (silence, bit) = (now - member.heard_at, 1 << rank.min(31));
+            if silence >= self.limits.silent {
+                self.hear_flight &= !bit;
+            }
+            // A majority has counted it as lost, so it has landed; or its battery is empty by now.
+            let down = member.entry.status == MemberStatus::Lost && silence >= self.limits.down;
+            if rank != usize::from(self.own) && (down || silence >= MAX_FLIGHT) {
+                self.in_flight &= !bit;
             }
             linked |= u32::from(lately && heard.hears_us) << rank.min(31);
         }
@@ -211,6 +231,17 @@ impl<const V: usize> Fleet<V> {
         self.idle = own.waits && !self.knows_flight();
         if self.idle {
             self.forget_earlier_flight(now);
+        }
+        let RosterReportEntry { incarnation, status, .. } =
+            self.members[usize::from(self.own)].entry;
+        if status == MemberStatus::Left
+            && own.status == MemberStatus::Alive
+            && !self.airborne
+            && !self.knows_flight()
+            && self.has_lease(now)
+        {
+            // On the ground it could not start, or no vehicle heard it. Now it can.
+            self.rejoin((incarnation + 1) % INCARNATIONS);
         }
         if self.has_lease(now) {
             self.count_silent_as_lost(now);
@@ -391,8 +422,8 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// Moves all times to a clock that shows `then` where the old one shows `now`; ages past every
-    /// limit are cut to that limit, and which others are in flight is forgotten: that matters only
-    /// before a start. Fleets that will act alike become equal, so a search recognises a state that
+    /// limit are cut to that limit, and which others are in flight or were never heard is forgotten:
+    /// that matters only before a start. Fleets that will act alike become equal, so a search recognises a state that
     /// it has visited.
     pub fn move_to_clock(&mut self, now: Instant, then: Instant) {
         let FleetTimeouts { lease, silent, down, .. } = self.limits;
@@ -401,6 +432,7 @@ impl<const V: usize> Fleet<V> {
             Instant::from_micros(then.as_micros().saturating_sub(age.as_micros()))
         };
         (self.in_flight, self.hear_flight) = (self.in_flight & self.own_bit(), 0);
+        self.introduced = u32::MAX;
         self.lease_at = moved(self.lease_at, Duration::from_micros(2 * lease.as_micros()));
         for member in &mut self.members {
             let counts = member.in_roster && member.entry.status <= MemberStatus::Lost;
@@ -416,6 +448,11 @@ impl<const V: usize> Fleet<V> {
     /// Whether this vehicle has its lease: a majority lately reported that they hear it.
     pub fn has_lease(&self, now: Instant) -> bool {
         now - self.lease_at <= self.limits.lease
+    }
+
+    /// Time since a majority last reported that they hear this vehicle.
+    pub(crate) fn lease_age(&self, now: Instant) -> Duration {
+        now - self.lease_at
     }
 
     /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
@@ -471,6 +508,22 @@ impl<const V: usize> Fleet<V> {
     /// Whether this vehicle has left the mission and reported that.
     pub(crate) fn has_reported_leaving(&self) -> bool {
         self.members[usize::from(self.own)].entry.status == MemberStatus::Left
+    }
+
+    /// Whether another vehicle takes part, or left a part that is not divided yet.
+    pub(crate) fn is_reserve_needed(&self) -> bool {
+        let others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own));
+        self.is_dividing() || others.into_iter().any(|rank| self.is_alive(rank))
+    }
+
+    /// When the last of the vehicles that may be lost, silent for `span`, is down; `None` if there
+    /// is none.
+    pub(crate) fn last_down_at(&self, now: Instant, span: Duration) -> Option<Instant> {
+        let falls = |m: &&FleetMember| {
+            let takes_part = matches!(m.entry.status, MemberStatus::Alive | MemberStatus::Lost);
+            m.in_roster && takes_part && now - m.heard_at >= span
+        };
+        self.members.iter().filter(falls).map(|m| m.heard_at + self.limits.down).max()
     }
 
     /// Whether a vehicle that takes part has not been heard for `span`.

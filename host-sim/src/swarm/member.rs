@@ -150,6 +150,12 @@ impl SimulatedVehicle {
         self.config.system_id
     }
 
+    /// Silence after which the vehicles of a coverage mission take another one to be on the ground,
+    /// seconds; 0 in other missions.
+    pub fn lost_vehicle_down_s(&self) -> f32 {
+        self.config.lost_vehicle_down_s.unwrap_or(0.0)
+    }
+
     /// Whether the vehicle has lost all power (`kill`).
     pub fn is_powerless(&self) -> bool {
         self.killed
@@ -482,6 +488,12 @@ impl SimulatedVehicle {
         };
         self.autopilot.take_photos().into_iter().map(picture).collect()
     }
+}
+
+/// Whether a vehicle in this state was started: one without a goal may get a part of an area later.
+pub fn is_started(state: State) -> bool {
+    use State::*;
+    !matches!(state, WaitAutopilot | WaitPosition | Planning | Ready)
 }
 
 /// Whether a vehicle in this state does not move any more: its mission is done or aborted.

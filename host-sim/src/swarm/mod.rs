@@ -30,7 +30,7 @@ use self::divisions::{Division, DivisionLog};
 use self::faults::{FaultScript, FaultTargets};
 use self::gateway::Gateway;
 use self::ground_station::GroundStation;
-use self::member::{Planner, SimulatedVehicle, is_finished};
+use self::member::{Planner, SimulatedVehicle, is_finished, is_started};
 use self::radio::{Radio, RadioConfig};
 use self::referee::{Referee, Sample};
 use self::step::STEP_US;
@@ -268,12 +268,16 @@ impl<'a> SimulationRun<'a> {
                 member.answer_plan(now_us, wanted, own.as_deref().map_err(|failure| *failure));
             }
             places[i] = member.autopilot.true_state().position;
-            if let (true, Some(end)) =
-                (plan.flights[i].task.leaves_pad(), plan.flights[i].path.waypoints().last())
-            {
-                let off = places[i] - end.position;
+            let flight = &plan.flights[i];
+            // A vehicle without a part of an area may get one later: it too comes back to its pad.
+            let end = match flight.task.leaves_pad() {
+                true => flight.path.waypoints().last().map(|end| end.position),
+                false => Some(mission.scenario.vehicles[i].start),
+            };
+            if let Some(end) = end {
+                let off = places[i] - end;
                 let nearest_m = &mut self.nearest_goal_m[i];
-                *nearest_m = match plan.flights[i].task.goal() {
+                *nearest_m = match flight.task.goal() {
                     Some(_) => nearest_m.min(off.norm()),
                     // A flight in a coverage mission ends above its own pad, so the distance counts
                     // from its return on.
@@ -299,15 +303,18 @@ impl<'a> SimulationRun<'a> {
         let started = self.ground_station.is_started();
         let done = |i: usize| {
             let at_rest = is_finished(members[i].state()) || members[i].is_powerless();
+            let has_no_goal = !plan.flights[i].task.leaves_pad();
             at_rest
-                || (!plan.flights[i].task.leaves_pad() && started)
+                || (has_no_goal && started && !is_started(members[i].state()))
                 || is_left_to_pilot(&members[i])
         };
         let still = |m: &SimulatedVehicle| !m.autopilot.true_state().armed || is_left_to_pilot(m);
         if !(self.script.is_over() && started && members.iter().all(still)) {
             self.moved_s = self.t_s;
         }
-        let over = (0..members.len()).all(done) || self.t_s - self.moved_s > STANDSTILL_S;
+        // In a coverage mission those on the ground wait until a lost vehicle is down.
+        let still_s = STANDSTILL_S + f64::from(members[0].lost_vehicle_down_s());
+        let over = (0..members.len()).all(done) || self.t_s - self.moved_s > still_s;
         if self.ends_at_s.is_infinite() && self.script.is_over() && over {
             self.ends_at_s = self.t_s + AFTERMATH_S;
         }
@@ -426,8 +433,8 @@ fn has_flight(
     member: &SimulatedVehicle,
     flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,
 ) -> bool {
-    let stays = member.state() == State::Done && member.took_off_s.is_none();
-    flight.task.leaves_pad() && !stays
+    let stays = !flight.task.leaves_pad() || member.state() == State::Done;
+    member.took_off_s.is_some() || !stays
 }
 
 fn vehicle_result(

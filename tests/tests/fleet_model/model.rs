@@ -241,6 +241,7 @@ impl FleetModel {
         let own = OwnReport {
             status: standing,
             waits: false,
+            airborne: true,
             division: vehicle.division,
             progress_dm: vehicle.along * WAYPOINT_DM,
             commitment_dm: Some((vehicle.along + 1).min(path.len() as u16) * WAYPOINT_DM),

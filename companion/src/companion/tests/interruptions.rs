@@ -215,7 +215,11 @@ fn after_an_interruption_of_the_climb_the_climb_goes_on_and_the_goal_is_reached(
             let mut b = bench(kind);
             b.start();
             b.run_until(State::Climb, 20.0);
+            // A pause waits until the climb is past its half.
             b.run_until_lifted();
+            while b.enu.z < 0.8 {
+                b.run(0.05);
+            }
             b.stuck = lost;
             if paused {
                 assert_eq!(pause(&mut b), Some(ACCEPTED));

@@ -13,6 +13,7 @@ use crate::link::intent::{FLYING, GROUNDED, LANDED, ON_PLAN, OUT_OF_PLAN};
 use crate::testing::fake_autopilot::*;
 use crate::{Config, RosterEntry};
 use planner_core::Point;
+use planner_core::flight::Task;
 
 mod autopilot;
 mod beneath;
@@ -82,6 +83,7 @@ fn every_row_has_its_scene() {
         losses::another_leaves,
         losses::the_others_give_it_up,
         losses::another_bars_the_start,
+        losses::it_is_in_reserve,
         homeward::is_ordered,
         homeward::flies_around,
         homeward::is_blocked,

@@ -36,7 +36,7 @@ impl<const V: usize> Fleet<V> {
                     && entry.status == MemberStatus::Left
                     && self.members[rank].heard_itself)
                 {
-                    self.merge_entry(rank, entry, same, waits);
+                    self.merge_entry(rank, entry, [same, waits, rank == sender]);
                 }
                 if same && entry.agrees && rank != sender && roster.hash != 0 {
                     self.members[rank].hash = roster.hash;
@@ -62,11 +62,19 @@ impl<const V: usize> Fleet<V> {
         reported
     }
 
-    /// Merges what another vehicle reports of the vehicle of this rank; `waits` as above.
-    fn merge_entry(&mut self, rank: usize, entry: &RosterReportEntry, same: bool, waits: bool) {
+    /// Merges what another vehicle reports of the vehicle of this rank; `waits` as above,
+    /// `introduces`: it is the sender's own entry.
+    fn merge_entry(
+        &mut self,
+        rank: usize,
+        entry: &RosterReportEntry,
+        [same, waits, introduces]: [bool; 3],
+    ) {
         let newer =
             entry.incarnation.wrapping_sub(self.members[rank].entry.incarnation) % INCARNATIONS;
-        if newer >= INCARNATIONS / 2 {
+        let first = introduces && self.introduced >> rank.min(31) & 1 == 0;
+        self.introduced |= u32::from(introduces) << rank.min(31);
+        if newer >= INCARNATIONS / 2 && !first {
             return;
         }
         if newer > 0 {
@@ -86,7 +94,7 @@ impl<const V: usize> Fleet<V> {
     /// not, and both be a majority. Before that flight and after it, it is a new vehicle.
     fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, waits: bool) {
         let (alive, flight) = (self.is_alive(usize::from(self.own)), self.knows_flight());
-        if !waits && !alive && !flight {
+        if !waits && !alive && !flight && !self.airborne {
             // The flight in which this vehicle left is over, and another one begins.
             self.forget_plan();
         }

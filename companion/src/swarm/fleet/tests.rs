@@ -154,6 +154,7 @@ impl Swarm {
         };
         let holds_dm = v.fleet.commitment_dm();
         let report = OwnReport {
+            airborne: !v.on_pad,
             status: v.status,
             waits: v.waits,
             division: v.division,

@@ -32,6 +32,14 @@ fn over_a_field_of(mut config: Config<4>, plan: Plan, state: State) -> Bench {
     bench
 }
 
+/// Three vehicles: alone each is no majority.
+fn three() -> Config<4> {
+    let mut config = two_vehicles();
+    let start = Point::new(8.0, 28.0, 1.5);
+    config.roster.push(RosterEntry { system_id: 78, start }).unwrap();
+    config
+}
+
 /// The other vehicle reports what it knows of this one and of itself.
 fn tells(b: &mut Bench, own: MemberStatus, other: MemberStatus) {
     let entry = |standing| RosterReportEntry { status: standing, ..RosterReportEntry::default() };
@@ -101,11 +109,8 @@ pub(super) fn another_leaves(scenes: &mut Scenes) {
 
 pub(super) fn the_others_give_it_up(scenes: &mut Scenes) {
     // Of three it hears none: no majority.
-    let mut three = two_vehicles();
-    let start = Point::new(8.0, 28.0, 1.5);
-    three.roster.push(RosterEntry { system_id: 78, start }).unwrap();
     let unheard_below_its_layer = |b: &mut Bench| (b.neighbour, b.stuck) = (None, true);
-    let climbs = over_a_field_of(three, field_plan(), Climb);
+    let climbs = over_a_field_of(three(), field_plan(), Climb);
     scenes.play(climbs, unheard_below_its_layer, Aborted, 60.0);
     let given_up = |b: &mut Bench| tells(b, MemberStatus::Lost, MemberStatus::Alive);
     for state in [Climb, Follow, Scheduled, Streaming] {
@@ -140,6 +145,33 @@ pub(super) fn another_bars_the_start(scenes: &mut Scenes) {
         b.neighbour = on_pad(ON_PLAN);
     };
     scenes.play(over_a_field(Ready), with_its_pilot, Follow, 30.0);
+}
+
+/// A vehicle without a part waits for one that another may leave.
+pub(super) fn it_is_in_reserve(scenes: &mut Scenes) {
+    let without_part = || Plan { task: Task::Stay, ..field_plan() };
+    let started = |b: &mut Bench| {
+        b.run(6.0);
+        b.start();
+        b.run_until(Scheduled, 10.0);
+        b.run(200.0);
+        assert_eq!(b.state(), Scheduled);
+    };
+    let none_is_left = |b: &mut Bench| {
+        started(b);
+        tells(b, MemberStatus::Alive, MemberStatus::Finished);
+    };
+    scenes.play(over_a_field_with(without_part(), Ready), none_is_left, Done, 5.0);
+    // Of three it hears none: no majority.
+    let unheard = |b: &mut Bench| {
+        b.run(6.0);
+        b.start();
+        b.run_until(Scheduled, 10.0);
+        b.neighbour = None;
+        b.run(290.0);
+        assert_eq!(b.state(), Scheduled);
+    };
+    scenes.play(over_a_field_of(three(), without_part(), Ready), unheard, Done, 30.0);
 }
 
 /// What the others know of a flight before does not keep a vehicle from a new one.
