@@ -43,16 +43,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         !self.plans_with_others() && !matches!(self.mission.state(), State::Done | State::Aborted)
     }
 
-    /// Notes, stores and reports the photographed waypoints; those of the own path only while it is
-    /// on its plan.
-    pub(super) fn update_photographed(&mut self, off_plan: bool) {
-        if !self.is_area_mission() || !self.timers.take_due(Timer::Done, self.now, NOTE_EVERY) {
-            return;
-        }
+    /// Notes, stores and reports the photographed waypoints; those of the own path only where
+    /// pictures are taken up to `pictures_to_m` metres along it, at the latest where the vehicle
+    /// leaves it.
+    pub(super) fn update_photographed(&mut self, pictures_to_m: Option<f32>, leaves_path: bool) {
+        let due = self.is_area_mission() && self.timers.take_due(Timer::Done, self.now, NOTE_EVERY);
         let flies = self.has_left_pad();
-        let along_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
-        if flies && !off_plan && !self.detours.has_left_plan() && self.guidance.along_m() >= 0.0 {
+        if (due || leaves_path)
+            && flies
+            && !self.detours.has_left_plan()
+            && self.guidance.along_m() >= 0.0
+            && let Some(along_m) = pictures_to_m
+        {
             self.mission.note_photographed(along_m);
+        }
+        if !due {
+            return;
         }
         let crc = self.config.mission_crc;
         if let Some(kept) = self.mission.photographed_mut().record_to_store(crc, !flies) {

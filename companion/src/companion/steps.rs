@@ -68,7 +68,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let off_plan = self.guidance.returning
             || self.guidance.ends_away_from_goal
             || self.detours.is_on_detour();
-        self.update_photographed(off_plan);
         let along = PathProgress {
             progress_m: self.guidance.progress_m(state, &self.guidance_inputs()),
             // A vehicle that brakes along its path still takes the pictures that it passes.
@@ -80,7 +79,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 _ => PathRelation::Elsewhere,
             },
         };
-        self.mission.step_task(along, self.now, &mut self.links);
+        let leaves_path = self.mission.step_task(along, self.now, &mut self.links);
+        // Braking to land, the vehicle goes on along its path, and takes no pictures.
+        let photographs = along.place == PathRelation::OnPath
+            || (!off_plan && (leaves_path || self.guidance.is_at_end(&self.guidance_inputs())));
+        self.update_photographed(photographs.then_some(along.progress_m), leaves_path);
     }
 
     /// Notes whether a vehicle that is due to depart is kept on its pad by another vehicle in the

@@ -332,11 +332,17 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         (self.division, self.division_plan_ready) = (division, false);
     }
 
-    /// Sends the task's commands to the autopilot that are due at this place of the path.
-    pub(crate) fn step_task(&mut self, along: PathProgress, now: Instant, links: &mut Links) {
-        if let Some(plan) = &self.plan {
-            self.tasks.step(&plan.task, &plan.path, along, now, links);
-        }
+    /// Sends the task's commands to the autopilot that are due at this place of the path. Returns
+    /// whether the vehicle leaves its path here, and takes no more pictures.
+    pub(crate) fn step_task(
+        &mut self,
+        along: PathProgress,
+        now: Instant,
+        links: &mut Links,
+    ) -> bool {
+        self.plan
+            .as_ref()
+            .is_some_and(|plan| self.tasks.step(&plan.task, &plan.path, along, now, links))
     }
 
     /// The photographed waypoints of the area.

@@ -27,7 +27,8 @@ impl Tasks {
         self.camera.begin_path();
     }
 
-    /// Sends the task's commands to the autopilot that are due at this place of the path.
+    /// Sends the task's commands to the autopilot that are due at this place of the path. Returns
+    /// whether the vehicle leaves its path here, and takes no more pictures.
     pub(crate) fn step<const W: usize>(
         &mut self,
         task: &Task,
@@ -35,9 +36,12 @@ impl Tasks {
         along: PathProgress,
         now: Instant,
         links: &mut Links,
-    ) {
+    ) -> bool {
         match task {
-            Task::Stay | Task::Goto(_) => self.camera.send_current_command(now, links),
+            Task::Stay | Task::Goto(_) => {
+                self.camera.send_current_command(now, links);
+                false
+            }
             Task::Photograph(photographs) => self.camera.step(photographs, path, along, now, links),
         }
     }

@@ -1,13 +1,14 @@
 //! How far along its path a vehicle is, and on which path.
 
 /// Which path a vehicle flies, for its task.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum PathRelation {
     /// The path of its plan.
     OnPath,
     /// A detour near that path, around a keep-out zone on it and back to it.
     Beside,
     /// Another path, or none: no pictures are taken.
+    #[default]
     Elsewhere,
 }
 

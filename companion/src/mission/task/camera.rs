@@ -73,8 +73,8 @@ pub(super) struct CameraControl {
     picture: u32,
     /// On a detour beside the path: place along the detour where the next picture is taken, metres.
     beside_m: f32,
-    /// Whether the vehicle flies a detour beside its path.
-    beside: bool,
+    /// Which path the vehicle flies.
+    place: PathRelation,
     /// The trigger between the first picture of a stretch, or of a detour, and the last: by
     /// distance the autopilot's is on. `None` elsewhere.
     running: Option<Trigger>,
@@ -92,6 +92,7 @@ pub(super) struct CameraControl {
 
 impl CameraControl {
     /// Queues the camera commands that are due at this place, and sends the first queued command.
+    /// Returns whether the vehicle leaves its path here, and takes no more pictures.
     pub(super) fn step<const W: usize>(
         &mut self,
         photographs: &PicturePlan,
@@ -99,10 +100,11 @@ impl CameraControl {
         along: PathProgress,
         now: Instant,
         links: &mut Links,
-    ) {
+    ) -> bool {
+        let before = core::mem::replace(&mut self.place, along.place);
         if photographs.trigger != Trigger::None {
             let beside = along.place == PathRelation::Beside;
-            if core::mem::replace(&mut self.beside, beside) != beside {
+            if beside != (before == PathRelation::Beside) {
                 // Pictures begin again where the vehicle leaves its path, and where it comes back:
                 // neither place may lie in a gap between two pictures.
                 self.beside_m = 0.0;
@@ -118,6 +120,7 @@ impl CameraControl {
             }
         }
         self.send_current_command(now, links);
+        (before, along.place) == (PathRelation::OnPath, PathRelation::Elsewhere)
     }
 
     /// Begins another path, once the queued commands are sent. A vehicle that holds where a picture
@@ -130,7 +133,7 @@ impl CameraControl {
             None => self.switch_off(),
         }
         (self.stretch, self.picture, self.running) = (0, 0, None);
-        (self.beside, self.beside_m) = (false, 0.0);
+        (self.place, self.beside_m) = (PathRelation::Elsewhere, 0.0);
     }
 
     fn switch_off(&mut self) {
