@@ -10,7 +10,6 @@ use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario::coverage::Method;
 use host_sim::scenario::{self, Scenario};
-use planner_core::coverage::Flat;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -109,78 +108,6 @@ fn powell_is_no_worse_than_binpat_and_exact_is_the_best() {
     assert_eq!(costs.powell_over_binpat, 0, "POWELL is worse than BINPAT");
     assert_eq!(costs.below_exact, 0, "`exact` is not the best");
     assert!(costs.powell_over_simple * 20 <= costs.areas && costs.gaps[2] <= 8.0, "{costs:?}");
-}
-
-/// The least largest cost of waypoints `from` on for these vehicles and layers, by trying
-/// everything.
-fn brute_force(planned: &CoveragePlan<'_>, from: u32, vehicles: &[usize], layers: &[u8]) -> f64 {
-    let count = planned.tracks.waypoint_count();
-    if from == count {
-        return 0.0;
-    }
-    let distance = |a: &Flat, b: &Flat| f64::from(a.x - b.x).hypot(f64::from(a.y - b.y));
-    let place = |number: u32| planned.tracks.waypoint(number).expect("a waypoint");
-    let heights = planned.area_settings.heights;
-    let mut best = f64::INFINITY;
-    for (i, &v) in vehicles.iter().enumerate() {
-        for (j, &layer) in layers.iter().enumerate() {
-            let vehicle = &planned.vehicles[v];
-            let top_m =
-                f64::from(heights.mission_m) + f64::from(layer) * f64::from(heights.layer_m);
-            let delay_s =
-                top_m / f64::from(vehicle.climb_mps) + top_m / f64::from(vehicle.descend_mps);
-            let mut inside_m = 0.0;
-            for end in from + 1..=count {
-                if end > from + 1 {
-                    inside_m += distance(&place(end - 2), &place(end - 1));
-                }
-                let transit_m = distance(&vehicle.place, &place(from))
-                    + distance(&place(end - 1), &vehicle.home);
-                let own_s = (inside_m + transit_m) / f64::from(vehicle.cruise_mps) + delay_s;
-                let others = [&vehicles[..i], &vehicles[i + 1..]].concat();
-                let above = [&layers[..j], &layers[j + 1..]].concat();
-                best = best.min(own_s.max(brute_force(planned, end, &others, &above)));
-            }
-        }
-    }
-    best
-}
-
-#[test]
-fn exact_is_what_trying_everything_finds() {
-    let mut tried = 0;
-    for seed in 0..400 {
-        let mut random = Pcg32::seed_from_u64(seed);
-        let vehicles = 1 + (seed % 3) as usize;
-        let mut text = areas::scenario(&mut random, Shape::Convex, vehicles);
-        // Pictures so large that there are few.
-        text = text.replace("height_m = ", "height_m = 1");
-        for id in 1..=vehicles {
-            let speeds =
-                [areas::unit(&mut random), areas::unit(&mut random)].map(|unit| 0.5 + 4.0 * unit);
-            let extra = format!(
-                "id = {id}\nclimb_mps = {:.2}\ndescend_mps = {:.2}\n",
-                speeds[0], speeds[1]
-            );
-            text = text.replace(&format!("id = {id}\n"), &extra);
-        }
-        let Ok(scenario) = scenario::parse(&text, "random") else { continue };
-        let Ok(planned) = CoveragePlan::new(&scenario, Method::Exact) else { continue };
-        if !(2..=12).contains(&planned.tracks.waypoint_count()) {
-            continue;
-        }
-        let all: Vec<usize> = (0..vehicles).collect();
-        let layers: Vec<u8> = (1..=vehicles as u8).collect();
-        let best = brute_force(&planned, 0, &all, &layers);
-        let found = f64::from(planned.plan.max_cost_s());
-        assert!(
-            (found - best).abs() <= best * 1e-4,
-            "seed {seed}: {found} instead of {best}\n{text}"
-        );
-        tried += 1;
-    }
-    println!("{tried} areas tried");
-    assert!(tried >= 50, "{tried}");
 }
 
 /// `[area]` for a real file: one picture shows about 15 by 10 lanes' units.
@@ -359,45 +286,6 @@ fn bad_areas_are_refused_by_name_or_covered() {
             other => panic!("{shown} {more}: {other:?}, expected {why:?}"),
         }
     }
-}
-
-/// Companions plan by shares alone: an exact division is one that they find too, as good, or it is
-/// refused.
-#[test]
-fn exact_divisions_are_planned_by_companions_or_refused_by_name() {
-    let one = |seed: u64| -> Option<bool> {
-        let mut random = Pcg32::seed_from_u64(seed);
-        let text = areas::scenario(&mut random, Shape::Convex, 2 + (seed % 4) as usize);
-        let text = text
-            .replacen("[area]\n", "[area]\nmethod = \"exact\"\n", 1)
-            .replace("id = ", "endurance_s = 7200\nid = ");
-        let scenario = scenario::parse(&text, "exact").ok()?;
-        let best_s = CoveragePlan::plan_as_companions(&scenario).ok()?.plan.max_cost_s();
-        match Mission::prepare(scenario.clone(), &Progress::hidden()) {
-            Ok(_) => {
-                let powell =
-                    CoveragePlan::new(&scenario, Method::PowellBinpat).expect("it was planned");
-                assert!(best_s <= powell.plan.max_cost_s() * 1.0001, "seed {seed}");
-                Some(true)
-            }
-            Err(error) => {
-                let error = format!("{error:#}");
-                let known = [
-                    "least sum of their ways",
-                    "too many corners",
-                    "to land beside",
-                    "cannot keep",
-                    "pictures too low",
-                ];
-                assert!(known.iter().any(|why| error.contains(why)), "seed {seed}: {error}");
-                error.contains(known[0]).then_some(false)
-            }
-        }
-    };
-    let all: Vec<bool> = (0..60_u64).into_par_iter().filter_map(one).collect();
-    let flown = all.iter().filter(|flown| **flown).count();
-    println!("{flown} of {} exact divisions are planned by companions", all.len());
-    assert!(all.len() >= 20 && 2 * flown >= all.len(), "{flown} of {}", all.len());
 }
 
 /// What is asked of the vehicles and cannot be flown: the error says why, for `cover` and `fly`.
