@@ -22,7 +22,7 @@ const MAX_CHECKED_CELLS: f64 = 4e7;
 /// Result of the check.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CoverageFindings {
-    /// Photographed cells divided by all cells that count, 0 to 1.
+    /// Photographed cells divided by all cells that count, 0 to 1; 0 if none counts.
     pub covered_share: f64,
     /// Number of cells that count.
     pub cells: u64,
@@ -48,9 +48,11 @@ pub struct CoverageFindings {
 }
 
 impl CoverageFindings {
-    /// Whether the area is covered, each waypoint flown once, and no other fault was found.
+    /// Whether the area is covered, each waypoint flown once, and no other fault was found. An area
+    /// of which no cell counts is not judged, so it is not clean.
     pub fn is_clean(&self) -> bool {
-        self.covered_share >= 1.0
+        self.cells > 0
+            && self.covered_share >= 1.0
             && self.missed_waypoints
                 + self.repeated_waypoints
                 + self.broken_routes
@@ -220,15 +222,16 @@ impl CoverageCells {
     /// A grid whose cells are halved until at least one of them counts, so that an area narrower
     /// than a cell is checked too; stops at [`MAX_CHECKED_CELLS`].
     fn fine_enough(planned: &CoveragePlan<'_>) -> Self {
-        let mut cells = Self::new(planned);
-        let most = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= MAX_CHECKED_CELLS;
-        while !cells.points_inside_area(planned, cells.size, 0.5).contains(&true)
-            && most(cells.size)
-        {
-            cells.side /= 2.0;
-            cells.size = cells.size.map(|count| 2 * count);
+        Self::new(planned).halved_until_one_counts(planned, MAX_CHECKED_CELLS)
+    }
+
+    fn halved_until_one_counts(mut self, planned: &CoveragePlan<'_>, most: f64) -> Self {
+        let fits = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= most;
+        while !self.points_inside_area(planned, self.size, 0.5).contains(&true) && fits(self.size) {
+            self.side /= 2.0;
+            self.size = self.size.map(|count| 2 * count);
         }
-        cells
+        self
     }
 
     fn to_lane_frame(&self, place: &Flat) -> [f64; 2] {
@@ -399,6 +402,35 @@ impl CoverageCells {
         let good =
             counted.iter().zip(&shown).filter(|(counted, shown)| **counted && **shown).count();
         findings.covered_share =
-            if findings.cells == 0 { 1.0 } else { good as f64 / findings.cells as f64 };
+            if findings.cells == 0 { 0.0 } else { good as f64 / findings.cells as f64 };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario;
+    use crate::scenario::coverage::Method;
+
+    /// Without a cell that counts nothing is known of the area: that is a fault, not a whole area.
+    #[test]
+    fn an_area_without_a_cell_that_counts_is_not_clean() {
+        let text = "[area]\npolygon = [[0, 0], [400, 0], [400, 0.05], [0, 0.05]]\nheight_m = 20.0\n\
+                    lane_m = 10.0\nwaypoint_m = 5.0\n[mission]\ncruise_mps = 5.0\n\
+                    [[vehicles]]\nid = 1\nstart = [-10, -10, 0]\n";
+        let scenario = scenario::parse(text, "narrow").unwrap();
+        let planned = CoveragePlan::new(&scenario, Method::Binpat).unwrap();
+        let fine = check_plan(&planned);
+        assert!(fine.is_clean() && fine.cells > 0 && fine.covered_share == 1.0, "{fine:?}");
+        // Cells of a metre, of which the middles lie beside the area.
+        let coarse = CoverageCells::new(&planned).halved_until_one_counts(&planned, 0.0);
+        let mut findings = CoverageFindings::default();
+        let flights = planned.flights();
+        let pictures = planned_pictures(&planned, &flights_to_check(&planned, &flights));
+        coarse.count_photographed_cells(&planned, pictures, &mut findings);
+        assert_eq!((findings.cells, findings.covered_share), (0, 0.0));
+        assert!(!findings.is_clean() && !CoverageFindings::default().is_clean());
+        let whole = CoverageFindings { covered_share: 1.0, ..CoverageFindings::default() };
+        assert!(!whole.is_clean());
     }
 }
