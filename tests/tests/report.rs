@@ -445,9 +445,16 @@ fn page_of_a_paper_draws_its_figures() {
     assert_eq!(names, ["Fig. 8", "Fig. 9", "Fig. 10", "Fig. 12", "Fig. 13"]);
     let tables = fs::read(dir.path().join("tables.json")).expect("the tables are there");
     let tables: serde_json::Value = serde_json::from_slice(&tables).expect("JSON");
+    let tables = tables.as_array().expect("rows");
+    let has = |name: &str| tables.iter().any(|row| row["table"] == name);
+    assert!(["2", "3", "4", "5, short", "5, long", "6", "A1", "A12"].into_iter().all(has));
+    let planning = tables.iter().filter(|row| row["table"] == "3");
+    let times = planning.flat_map(|row| ["ours", "theirs"].map(|whose| &row[whose]));
+    let times: Vec<&serde_json::Value> =
+        times.flat_map(|times| times.as_array().expect("times")).collect();
+    assert_eq!(times.len(), 3 * 2 * 6, "methods, ours and theirs, 2 to 7 vehicles");
+    assert!(times.iter().all(|ms| ms.as_f64().is_some_and(|ms| ms > 0.0)), "{times:?}");
     let rows: Vec<_> = tables
-        .as_array()
-        .expect("rows")
         .iter()
         .filter(|row| row["table"].as_str().expect("a name").starts_with('A'))
         .collect();
