@@ -140,10 +140,20 @@ pub fn many_lanes_scenario(random: &mut impl Rng, shape: Shape, vehicles: usize)
     text.lines().map(drawn).collect()
 }
 
-/// A random convex area with minutes of work for each of so many vehicles; their radio loses the
-/// share `loss` of messages.
+/// As [`lossy_radio_scenario_of`], over a convex area.
 pub fn lossy_radio_scenario(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
-    let mut text = flyable_scenario(random, Shape::Convex, vehicles);
+    lossy_radio_scenario_of(random, Shape::Convex, vehicles, loss)
+}
+
+/// A random area with minutes of work for each of so many vehicles; their radio loses the share
+/// `loss` of messages.
+pub fn lossy_radio_scenario_of(
+    random: &mut impl Rng,
+    shape: Shape,
+    vehicles: usize,
+    loss: f32,
+) -> String {
+    let mut text = flyable_scenario(random, shape, vehicles);
     let keep = |line: &&str| !line.starts_with("radio_loss") && !line.starts_with("cruise_mps");
     text = text.lines().filter(keep).map(|line| format!("{line}\n")).collect();
     text = text.replace(
