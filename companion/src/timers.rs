@@ -34,7 +34,7 @@ pub(crate) enum Timer {
     HeldReport,
     /// From then on a division under way is overdue.
     DivisionDue,
-    /// From then on a vehicle on the ground that can promise nothing leaves its share to the others.
+    /// From then on a vehicle on the ground that can promise nothing leaves its share to others.
     LeaveUnstarted,
     /// From then on "EKF origin # km away" may be sent again.
     OriginReport,

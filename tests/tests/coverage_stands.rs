@@ -155,8 +155,8 @@ fn a_loss_during_a_division_delays_it_and_lands_nobody() {
     fly_all(draw, |result, _| is_not_whole(result));
 }
 
-/// A vehicle whose pad is so far away that the others finish sooner without it has no part. It stays
-/// in reserve, and takes over where one of two others is lost.
+/// A vehicle whose pad is so far away that the others finish sooner without it has no part. It
+/// stays in reserve, and takes over where one of two others is lost.
 #[test]
 fn who_has_no_part_takes_over_from_a_lost_vehicle() {
     let draw = |random: &mut Pcg32| {

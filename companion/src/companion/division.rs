@@ -148,7 +148,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && photographs.last_picture_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
     }
 
-    /// Whether this vehicle on the ground can promise nothing, so that others, if any fly, could not
+    /// Whether this vehicle on the ground can promise nothing, so that others in flight could not
     /// divide: ready, it is heard by no majority; or while another one flies it has no autopilot,
     /// position or plan, is away from its pad, or has another plan than that one.
     fn lacks_promise(&self) -> bool {

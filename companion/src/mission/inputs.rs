@@ -58,8 +58,8 @@ pub struct GuardInputs {
     pub roadmap_bad: bool,
     /// Whether the plan makes this vehicle leave its pad.
     pub has_goal: bool,
-    /// In a coverage mission: whether this vehicle has no part, but may get one of a vehicle that is
-    /// lost: a majority heard it within the last 5 min, and others take part.
+    /// In a coverage mission: whether this vehicle has no part, but may get one of a vehicle that
+    /// is lost: a majority heard it within the last 5 min, and others take part.
     pub in_reserve: bool,
     /// In a coverage mission: whether all neighbours heard have this vehicle's plan, after time
     /// enough to report another one. True in other missions.

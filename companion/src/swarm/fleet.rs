@@ -17,6 +17,7 @@ use crate::link::roster::{MemberStatus, RosterReportEntry};
 use crate::time::{Duration, Instant};
 
 mod division_input;
+mod lease;
 mod reports;
 #[cfg(test)]
 mod tests;
@@ -232,17 +233,7 @@ impl<const V: usize> Fleet<V> {
         if self.idle {
             self.forget_earlier_flight(now);
         }
-        let RosterReportEntry { incarnation, status, .. } =
-            self.members[usize::from(self.own)].entry;
-        if status == MemberStatus::Left
-            && own.status == MemberStatus::Alive
-            && !self.airborne
-            && !self.knows_flight()
-            && self.has_lease(now)
-        {
-            // On the ground it could not start, or no vehicle heard it. Now it can.
-            self.rejoin((incarnation + 1) % INCARNATIONS);
-        }
+        self.rejoin_if_ready(now, own.status);
         if self.has_lease(now) {
             self.count_silent_as_lost(now);
         }
@@ -258,14 +249,6 @@ impl<const V: usize> Fleet<V> {
             if self.is_division_agreed(now) {
                 self.commit_division();
             }
-        }
-    }
-
-    fn count_silent_as_lost(&mut self, now: Instant) {
-        let silent = self.limits.silent;
-        for member in self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= silent)
-        {
-            member.entry.status = member.entry.status.max(MemberStatus::Lost);
         }
     }
 
@@ -322,16 +305,6 @@ impl<const V: usize> Fleet<V> {
     pub(crate) fn is_alive(&self, rank: usize) -> bool {
         let member = &self.members[rank];
         member.in_roster && member.entry.status == MemberStatus::Alive
-    }
-
-    /// Whether the vehicles `among` are a majority of those that take part, or were lost; of two
-    /// halves, the one with the lowest rank is.
-    fn is_majority(&self, among: impl Fn(usize, &FleetMember) -> bool) -> bool {
-        let counts = |m: &FleetMember| m.in_roster && m.entry.status <= MemberStatus::Lost;
-        let all = || self.members.iter().enumerate().filter(|(_, m)| counts(m));
-        let these = all().filter(|(rank, m)| among(*rank, m)).count();
-        let lowest = all().next().is_some_and(|(rank, m)| among(rank, m));
-        2 * these > all().count() || (2 * these == all().count() && lowest)
     }
 
     /// Computes the inputs of the division, once all vehicles that live have promised, and this
@@ -422,9 +395,9 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// Moves all times to a clock that shows `then` where the old one shows `now`; ages past every
-    /// limit are cut to that limit, and which others are in flight or were never heard is forgotten:
-    /// that matters only before a start. Fleets that will act alike become equal, so a search recognises a state that
-    /// it has visited.
+    /// limit are cut to that limit, and which others are in flight or were never heard is
+    /// forgotten: that matters only before a start. Fleets that will act alike become equal, so a
+    /// search recognises a state that it has visited.
     pub fn move_to_clock(&mut self, now: Instant, then: Instant) {
         let FleetTimeouts { lease, silent, down, .. } = self.limits;
         let moved = |at: Instant, most: Duration| {
@@ -443,22 +416,6 @@ impl<const V: usize> Fleet<V> {
     /// Number of vehicles in the roster.
     pub(crate) fn vehicle_count(&self) -> usize {
         self.members.len()
-    }
-
-    /// Whether this vehicle has its lease: a majority lately reported that they hear it.
-    pub fn has_lease(&self, now: Instant) -> bool {
-        now - self.lease_at <= self.limits.lease
-    }
-
-    /// Time since a majority last reported that they hear this vehicle.
-    pub(crate) fn lease_age(&self, now: Instant) -> Duration {
-        now - self.lease_at
-    }
-
-    /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
-    /// takes no part, and needs no lease.
-    pub fn unheard_for(&self, now: Instant) -> Duration {
-        if self.is_alive(usize::from(self.own)) { now - self.lease_at } else { Duration::default() }
     }
 
     /// Hash of the inputs of all binding divisions, and of the one that is to be computed.
@@ -492,45 +449,6 @@ impl<const V: usize> Fleet<V> {
     /// Hash of the last binding division; 0 before the first.
     pub fn committed_hash(&self) -> u32 {
         self.committed_hash
-    }
-
-    /// Whether the others count this vehicle as lost, or have divided its part; false for one that
-    /// has finished its part.
-    pub fn is_excluded(&self) -> bool {
-        self.excluded && self.members[usize::from(self.own)].entry.status != MemberStatus::Finished
-    }
-
-    /// Whether this vehicle flies its part of the area, or will.
-    pub(crate) fn takes_part(&self) -> bool {
-        self.is_alive(usize::from(self.own))
-    }
-
-    /// Whether this vehicle has left the mission and reported that.
-    pub(crate) fn has_reported_leaving(&self) -> bool {
-        self.members[usize::from(self.own)].entry.status == MemberStatus::Left
-    }
-
-    /// Whether another vehicle takes part, or left a part that is not divided yet.
-    pub(crate) fn is_reserve_needed(&self) -> bool {
-        let others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own));
-        self.is_dividing() || others.into_iter().any(|rank| self.is_alive(rank))
-    }
-
-    /// When the last of the vehicles that may be lost, silent for `span`, is down; `None` if there
-    /// is none.
-    pub(crate) fn last_down_at(&self, now: Instant, span: Duration) -> Option<Instant> {
-        let falls = |m: &&FleetMember| {
-            let takes_part = matches!(m.entry.status, MemberStatus::Alive | MemberStatus::Lost);
-            m.in_roster && takes_part && now - m.heard_at >= span
-        };
-        self.members.iter().filter(falls).map(|m| m.heard_at + self.limits.down).max()
-    }
-
-    /// Whether a vehicle that takes part has not been heard for `span`.
-    pub fn is_any_missing(&self, now: Instant, span: Duration) -> bool {
-        let missed =
-            |rank: &usize| self.is_alive(*rank) && now - self.members[*rank].heard_at >= span;
-        (0..self.members.len()).any(|rank| missed(&rank))
     }
 }
 

@@ -150,8 +150,7 @@ impl SimulatedVehicle {
         self.config.system_id
     }
 
-    /// Silence after which the vehicles of a coverage mission take another one to be on the ground,
-    /// seconds; 0 in other missions.
+    /// Silence after which a vehicle of a coverage mission is on the ground, seconds; else 0.
     pub fn lost_vehicle_down_s(&self) -> f32 {
         self.config.lost_vehicle_down_s.unwrap_or(0.0)
     }
@@ -492,8 +491,7 @@ impl SimulatedVehicle {
 
 /// Whether a vehicle in this state was started: one without a goal may get a part of an area later.
 pub fn is_started(state: State) -> bool {
-    use State::*;
-    !matches!(state, WaitAutopilot | WaitPosition | Planning | Ready)
+    !matches!(state, State::WaitAutopilot | State::WaitPosition | State::Planning | State::Ready)
 }
 
 /// Whether a vehicle in this state does not move any more: its mission is done or aborted.

@@ -1,0 +1,95 @@
+//! The lease of a vehicle, and what silence of the others means.
+
+use super::{Fleet, FleetMember, INCARNATIONS};
+use crate::link::roster::{MemberStatus, RosterReportEntry};
+use crate::time::{Duration, Instant};
+
+impl<const V: usize> Fleet<V> {
+    /// Whether the vehicles `among` are a majority of those that take part, or were lost; of two
+    /// halves, the one with the lowest rank is.
+    pub(super) fn is_majority(&self, among: impl Fn(usize, &FleetMember) -> bool) -> bool {
+        let counts = |m: &FleetMember| m.in_roster && m.entry.status <= MemberStatus::Lost;
+        let all = || self.members.iter().enumerate().filter(|(_, m)| counts(m));
+        let these = all().filter(|(rank, m)| among(*rank, m)).count();
+        let lowest = all().next().is_some_and(|(rank, m)| among(rank, m));
+        2 * these > all().count() || (2 * these == all().count() && lowest)
+    }
+
+    /// Whether this vehicle has its lease: a majority lately reported that they hear it.
+    pub fn has_lease(&self, now: Instant) -> bool {
+        now - self.lease_at <= self.limits.lease
+    }
+
+    /// Time since a majority last reported that they hear this vehicle.
+    pub(crate) fn lease_age(&self, now: Instant) -> Duration {
+        now - self.lease_at
+    }
+
+    /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
+    /// takes no part, and needs no lease.
+    pub fn unheard_for(&self, now: Instant) -> Duration {
+        if self.is_alive(usize::from(self.own)) { now - self.lease_at } else { Duration::default() }
+    }
+
+    /// Whether the others count this vehicle as lost, or have divided its part; false for one that
+    /// has finished its part.
+    pub fn is_excluded(&self) -> bool {
+        self.excluded && self.members[usize::from(self.own)].entry.status != MemberStatus::Finished
+    }
+
+    /// Whether this vehicle flies its part of the area, or will.
+    pub(crate) fn takes_part(&self) -> bool {
+        self.is_alive(usize::from(self.own))
+    }
+
+    /// Whether this vehicle has left the mission and reported that.
+    pub(crate) fn has_reported_leaving(&self) -> bool {
+        self.members[usize::from(self.own)].entry.status == MemberStatus::Left
+    }
+
+    /// Whether another vehicle takes part, or left a part that is not divided yet.
+    pub(crate) fn is_reserve_needed(&self) -> bool {
+        let others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own));
+        self.is_dividing() || others.into_iter().any(|rank| self.is_alive(rank))
+    }
+
+    /// When the last of the vehicles that may be lost, silent for `span`, is down; `None` if there
+    /// is none.
+    pub(crate) fn last_down_at(&self, now: Instant, span: Duration) -> Option<Instant> {
+        let falls = |m: &&FleetMember| {
+            let takes_part = matches!(m.entry.status, MemberStatus::Alive | MemberStatus::Lost);
+            m.in_roster && takes_part && now - m.heard_at >= span
+        };
+        self.members.iter().filter(falls).map(|m| m.heard_at + self.limits.down).max()
+    }
+
+    /// Whether a vehicle that takes part has not been heard for `span`.
+    pub fn is_any_missing(&self, now: Instant, span: Duration) -> bool {
+        let missed =
+            |rank: &usize| self.is_alive(*rank) && now - self.members[*rank].heard_at >= span;
+        (0..self.members.len()).any(|rank| missed(&rank))
+    }
+
+    pub(super) fn count_silent_as_lost(&mut self, now: Instant) {
+        let silent = self.limits.silent;
+        for member in self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= silent)
+        {
+            member.entry.status = member.entry.status.max(MemberStatus::Lost);
+        }
+    }
+
+    /// Takes part again on the ground after this vehicle could not start, or no vehicle heard it,
+    /// once it can and no flight is under way.
+    pub(super) fn rejoin_if_ready(&mut self, now: Instant, own: MemberStatus) {
+        let RosterReportEntry { incarnation, status, .. } =
+            self.members[usize::from(self.own)].entry;
+        if status == MemberStatus::Left
+            && own == MemberStatus::Alive
+            && !self.airborne
+            && !self.knows_flight()
+            && self.has_lease(now)
+        {
+            self.rejoin((incarnation + 1) % INCARNATIONS);
+        }
+    }
+}
