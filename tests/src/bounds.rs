@@ -77,6 +77,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("flight::Path::points_from, 16", "w and the points"),
     ("flight::Path::project", "w"),
     ("track::advance", "w"),
+    ("track::braking_distance_m", "log w"),
     ("footprint::Camera::footprint", "constant"),
     ("footprint::Camera::height_for_gsd", "constant"),
     ("area::Area::new, 256", "edges²"),

@@ -224,6 +224,8 @@ fn far_away() -> Point {
 const FILTER_ROUNDS: usize = 40;
 const FILTERED: [u8; 4] =
     [AIR, AIR | intent::ON_DETOUR, intent::FLYING, intent::FLYING | intent::OUT_OF_PLAN];
+/// Steps after which a majority says again that it hears this vehicle, before it takes off.
+const LEASE_RENEWED_EVERY: usize = 10;
 const AIR: u8 = intent::FLYING | intent::ON_PLAN;
 /// Pairs of which each neighbour gets one at random: its intent's flags, and whether it falls
 /// silent.
@@ -278,6 +280,9 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         for step in 0..MAX_TAKE_OFF_STEPS {
             if step.is_multiple_of(4) {
                 self.send_state_from(0, &mut rng);
+            }
+            if step.is_multiple_of(LEASE_RENEWED_EVERY) && self.has_area() {
+                self.send_states_from(&mut rng, |_| true);
             }
             if self.companion.state() == companion::State::Ready {
                 let mut order = [0; 33];

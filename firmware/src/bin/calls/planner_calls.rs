@@ -359,6 +359,9 @@ fn measure_paths(meter: &mut impl Meter) {
         meter.call("track::advance", size_of::<ReferenceState>(), || {
             track::advance(&track, &path, &mut tracker, &Advice::FREE, 0.05)
         });
+        meter.call("track::braking_distance_m", 0, || {
+            track::braking_distance_m(&track, &path, &tracker)
+        });
         let obstacle = KeepOutZone { from: near, to: near, radius_m: 1.0, kind: ZoneKind::Static };
         meter.call("detour::is_path_blocked", 0, || {
             detour::is_path_blocked(

@@ -1,5 +1,6 @@
 //! The model as Stateright searches it.
 
+use companion::swarm::fleet::{MemberReception, OwnReport};
 use stateright::{Model, Property};
 
 use super::{FleetModel, Flight, Known, MOST, NOW, Radio, State, Vehicle};
@@ -17,6 +18,14 @@ impl Model for FleetModel {
                 let stands = stands >> rank & 1 != 0;
                 let mut vehicle = Vehicle { flight: Flight::Flies, stands, ..self.dead(rank, 0) };
                 vehicle.fleet.begin_flight(NOW);
+                // All heard each other when they took off.
+                let heard =
+                    MemberReception { heard_at: Some(NOW), hears_us: true, heard_by_others: true };
+                vehicle.fleet.step(
+                    NOW,
+                    &OwnReport { airborne: true, ..OwnReport::default() },
+                    |_| heard,
+                );
                 vehicle.fleet.move_to_clock(NOW, NOW);
                 *number = self.number(known, vehicle);
             }
