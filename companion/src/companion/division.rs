@@ -20,9 +20,6 @@ const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
 /// A vehicle within this distance before the place where it promised to hold has reached it,
 /// metres.
 const AT_HOLD_M: f32 = 0.2;
-/// Silence of another vehicle after which this one, at the end of its path, waits above its pad
-/// instead of descending: it may get a part of the silent vehicle's waypoints.
-pub(super) const MISSED_AFTER: Duration = Duration::from_secs(3);
 /// Time under a pilot's control after which a vehicle counts as having left the mission.
 const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 /// Time for which a vehicle on the ground that can promise nothing keeps its share while another
@@ -57,11 +54,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if !self.lacks_promise() {
             self.timers.set(Timer::LeaveUnstarted, now + CANNOT_START_MOST);
         }
-        let down_at =
-            self.neighbours.fleet().and_then(|fleet| fleet.last_down_at(now, MISSED_AFTER));
         if self.mission.state() != State::Dividing {
             self.timers.set(Timer::DivisionDue, now);
-        } else if let Some(at) = down_at {
+        } else if let Some(at) = self.neighbours.fleet().and_then(Fleet::last_down_at) {
             self.timers.set_no_earlier(Timer::DivisionDue, at + DIVIDES_WITHIN);
         }
         let own = self.own_fleet_report();
@@ -69,8 +64,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(fleet) = self.neighbours.fleet() else { return };
         let (home_m, around) = (self.last_descent_start_m(), self.detours.is_beside_plan());
         // Only a vehicle that still takes part waits above its pad.
-        let waits =
-            fleet.takes_part() && (fleet.is_dividing() || fleet.is_any_missing(now, MISSED_AFTER));
+        let waits = fleet.takes_part() && (fleet.is_dividing() || fleet.is_any_missing());
         let halt_m = match self.division_hold_m() {
             Some(holds_at_m) => holds_at_m,
             // On a detour the end of the path is not above the pad.
@@ -79,9 +73,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let behind = fleet.division_count() > self.mission.division_count();
         let wants = fleet.needs_division() || ((behind || around) && self.is_at_division_start());
-        let fingerprint = fleet.division_hash();
+        let fingerprint = wants.then(|| fleet.division_hash());
         self.guidance.set_halt_m(halt_m);
-        if wants && self.mission.should_request_division(fingerprint, now, REQUEST_RETRY) {
+        let requests = |hash| self.mission.should_request_division(hash, now, REQUEST_RETRY);
+        if fingerprint.is_some_and(requests) {
             // The queue is full only if the shell does not drain; then the request is repeated
             // after `REQUEST_RETRY`.
             let _ = self.events.push_back(Event::PlanRequested(PlanKind::Division));

@@ -2,13 +2,12 @@
 
 use planner_core::{Length, Point};
 
-use super::division::MISSED_AFTER;
 use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::requests::is_battery_known;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::mission::{GuardInputs, MAX_POSITION_AGE, State, UNFOLLOWED_MOST};
-use crate::swarm::fleet::Fleet;
+use crate::swarm::fleet::{Fleet, MISSED_AFTER};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::time::{Duration, Instant};
 use crate::timers::Timer;

@@ -33,6 +33,9 @@ pub const COMMITMENT_S: f32 = 10.0;
 /// Maximum number of divisions of a mission; after the last one the waypoints that a vehicle leaves
 /// stay unphotographed.
 pub const MAX_DIVISIONS: usize = 12;
+/// Silence of another vehicle after which it may be lost, and get no part: this one waits for that
+/// before it comes down.
+pub(crate) const MISSED_AFTER: Duration = Duration::from_secs(3);
 /// Silence of a vehicle that was in flight after which it has landed, whatever it flew on.
 const MAX_FLIGHT: Duration = Duration::from_secs(1800);
 /// Number of distinct incarnations, the counts of a vehicle's flights: 3 bits.
@@ -114,6 +117,10 @@ pub struct Fleet<const V: usize> {
     introduced: u32,
     /// Whether this vehicle is in the air.
     airborne: bool,
+    /// When the last of the vehicles that may be lost is down; 0 if there is none.
+    down_at: Instant,
+    /// Whether a vehicle that takes part has not been heard for [`MISSED_AFTER`].
+    any_missing: bool,
     limits: FleetTimeouts,
 }
 
@@ -138,6 +145,8 @@ impl<const V: usize> Fleet<V> {
             hear_flight: 0,
             introduced: 0,
             airborne: false,
+            down_at: Instant::ZERO,
+            any_missing: false,
             limits,
         }
     }
@@ -197,6 +206,7 @@ impl<const V: usize> Fleet<V> {
         hearing: impl Fn(usize) -> MemberReception,
     ) {
         self.airborne = own.airborne;
+        (self.down_at, self.any_missing) = (Instant::ZERO, false);
         // This vehicle may not yet have the path of the last division.
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[usize::from(self.own)].entry;
@@ -216,13 +226,19 @@ impl<const V: usize> Fleet<V> {
             }
             member.heard_itself = lately;
             let (silence, bit) = (now - member.heard_at, 1 << rank.min(31));
+            if silence >= MISSED_AFTER && member.in_roster {
+                let falls = member.entry.status <= MemberStatus::Lost;
+                let down_at = member.heard_at + self.limits.down;
+                self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
+                self.any_missing |= member.entry.status == MemberStatus::Alive;
+            }
             if silence >= self.limits.silent {
                 self.hear_flight &= !bit;
-            }
-            // A majority has counted it as lost, so it has landed; or its battery is empty by now.
-            let down = member.entry.status == MemberStatus::Lost && silence >= self.limits.down;
-            if rank != usize::from(self.own) && (down || silence >= MAX_FLIGHT) {
-                self.in_flight &= !bit;
+                // A majority has counted it as lost, so it has landed; or its battery is empty.
+                let lost = member.entry.status == MemberStatus::Lost;
+                if (lost && silence >= self.limits.down) || silence >= MAX_FLIGHT {
+                    self.in_flight &= !bit;
+                }
             }
             linked |= u32::from(lately && heard.hears_us) << rank.min(31);
         }
@@ -405,7 +421,7 @@ impl<const V: usize> Fleet<V> {
             Instant::from_micros(then.as_micros().saturating_sub(age.as_micros()))
         };
         (self.in_flight, self.hear_flight) = (self.in_flight & self.own_bit(), 0);
-        self.introduced = u32::MAX;
+        (self.introduced, self.down_at, self.any_missing) = (u32::MAX, Instant::ZERO, false);
         self.lease_at = moved(self.lease_at, Duration::from_micros(2 * lease.as_micros()));
         for member in &mut self.members {
             let counts = member.in_roster && member.entry.status <= MemberStatus::Lost;

@@ -41,8 +41,7 @@ pub const FILTER: &str = "Companion::query_filter, 32 near";
 /// Row of the table: any other control step.
 pub const OTHER_STEP: &str = "Companion::handle_timeout, else";
 const SYSTEM: u8 = 1;
-/// Cruise speed, m/s: faster than indoors, so that many corners lie within the braking distance of
-/// 8 m.
+/// Cruise speed, m/s: so fast that many corners lie within the braking distance of 8 m.
 pub const CRUISE_MPS: f32 = 5.0;
 const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
@@ -224,8 +223,6 @@ fn far_away() -> Point {
 const FILTER_ROUNDS: usize = 40;
 const FILTERED: [u8; 4] =
     [AIR, AIR | intent::ON_DETOUR, intent::FLYING, intent::FLYING | intent::OUT_OF_PLAN];
-/// Steps after which a majority says again that it hears this vehicle, before it takes off.
-const LEASE_RENEWED_EVERY: usize = 10;
 const AIR: u8 = intent::FLYING | intent::ON_PLAN;
 /// Pairs of which each neighbour gets one at random: its intent's flags, and whether it falls
 /// silent.
@@ -279,10 +276,9 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         self.send_states_from(&mut rng, |_| true);
         for step in 0..MAX_TAKE_OFF_STEPS {
             if step.is_multiple_of(4) {
-                self.send_state_from(0, &mut rng);
-            }
-            if step.is_multiple_of(LEASE_RENEWED_EVERY) && self.has_area() {
-                self.send_states_from(&mut rng, |_| true);
+                // Before it takes off over an area a majority has to hear it.
+                let count = if self.has_area() { self.others.len() } else { 1 };
+                (0..count).for_each(|i| self.send_state_from(i, &mut rng));
             }
             if self.companion.state() == companion::State::Ready {
                 let mut order = [0; 33];

@@ -8,11 +8,16 @@ impl<const V: usize> Fleet<V> {
     /// Whether the vehicles `among` are a majority of those that take part, or were lost; of two
     /// halves, the one with the lowest rank is.
     pub(super) fn is_majority(&self, among: impl Fn(usize, &FleetMember) -> bool) -> bool {
-        let counts = |m: &FleetMember| m.in_roster && m.entry.status <= MemberStatus::Lost;
-        let all = || self.members.iter().enumerate().filter(|(_, m)| counts(m));
-        let these = all().filter(|(rank, m)| among(*rank, m)).count();
-        let lowest = all().next().is_some_and(|(rank, m)| among(rank, m));
-        2 * these > all().count() || (2 * these == all().count() && lowest)
+        let (mut all, mut these, mut lowest) = (0, 0, false);
+        for (rank, member) in self.members.iter().enumerate() {
+            if member.in_roster && member.entry.status <= MemberStatus::Lost {
+                let is_among = among(rank, member);
+                lowest |= is_among && all == 0;
+                all += 1;
+                these += usize::from(is_among);
+            }
+        }
+        2 * these > all || (2 * these == all && lowest)
     }
 
     /// Whether this vehicle has its lease: a majority lately reported that they hear it.
@@ -53,21 +58,16 @@ impl<const V: usize> Fleet<V> {
         self.is_dividing() || others.into_iter().any(|rank| self.is_alive(rank))
     }
 
-    /// When the last of the vehicles that may be lost, silent for `span`, is down; `None` if there
-    /// is none.
-    pub(crate) fn last_down_at(&self, now: Instant, span: Duration) -> Option<Instant> {
-        let falls = |m: &&FleetMember| {
-            let takes_part = matches!(m.entry.status, MemberStatus::Alive | MemberStatus::Lost);
-            m.in_roster && takes_part && now - m.heard_at >= span
-        };
-        self.members.iter().filter(falls).map(|m| m.heard_at + self.limits.down).max()
+    /// When the last of the vehicles that may be lost is down: of those that have been silent for
+    /// [`MISSED_AFTER`](super::MISSED_AFTER). `None` if there is none.
+    pub(crate) fn last_down_at(&self) -> Option<Instant> {
+        Some(self.down_at).filter(|at| *at > Instant::ZERO)
     }
 
-    /// Whether a vehicle that takes part has not been heard for `span`.
-    pub fn is_any_missing(&self, now: Instant, span: Duration) -> bool {
-        let missed =
-            |rank: &usize| self.is_alive(*rank) && now - self.members[*rank].heard_at >= span;
-        (0..self.members.len()).any(|rank| missed(&rank))
+    /// Whether a vehicle that takes part was not heard for [`MISSED_AFTER`](super::MISSED_AFTER)
+    /// at the last step.
+    pub fn is_any_missing(&self) -> bool {
+        self.any_missing
     }
 
     pub(super) fn count_silent_as_lost(&mut self, now: Instant) {

@@ -66,8 +66,7 @@ impl<const V: usize> Neighbours<V> {
     /// Whether another vehicle that takes part is in flight, and none of those has been silent for
     /// `missed_after`: while a vehicle may be lost, each that lives counts for a majority.
     pub(crate) fn does_another_fly_its_part(&self, now: Instant, missed_after: Duration) -> bool {
-        let whole =
-            |fleet: &Fleet<V>| !fleet.is_dividing() && !fleet.is_any_missing(now, missed_after);
+        let whole = |fleet: &Fleet<V>| !fleet.is_dividing() && !fleet.is_any_missing();
         self.fleet.as_ref().is_some_and(whole) && self.does_another_take_part(now, missed_after)
     }
 
