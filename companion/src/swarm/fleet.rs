@@ -205,8 +205,7 @@ impl<const V: usize> Fleet<V> {
         own: &OwnReport,
         hearing: impl Fn(usize) -> MemberReception,
     ) {
-        self.airborne = own.airborne;
-        (self.down_at, self.any_missing) = (Instant::ZERO, false);
+        (self.airborne, self.down_at, self.any_missing) = (own.airborne, Instant::ZERO, false);
         // This vehicle may not yet have the path of the last division.
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[usize::from(self.own)].entry;

@@ -298,6 +298,10 @@ fn call_tracking(to: &mut Results<'_, impl Listener>, path: &Path<4>, hard: f32,
             })
             .expect("a path with waypoints");
         assert!(reference.position.iter().all(|c| c.is_finite()), "{hard} {other} {reference:?}");
+        let brakes_m = to.call("track::braking_distance_m", || {
+            track::braking_distance_m(&track, path, &tracker)
+        });
+        assert!(brakes_m >= 0.0, "{hard} {other} {brakes_m}");
         assert!((0.0..=length_m).contains(&tracker.along_m), "{hard} {other} {tracker:?}");
         let waits = dt_s.is_nan() || dt_s <= 0.0;
         assert!(!waits || tracker == ReferenceState { along_m: 0.5 * length_m, speed_mps: 1.0 });
