@@ -59,13 +59,12 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// When the last of the vehicles that may be lost is down: of those that have been silent for
-    /// [`MISSED_AFTER`](super::MISSED_AFTER). `None` if there is none.
+    /// `MISSED_AFTER`. `None` if there is none.
     pub(crate) fn last_down_at(&self) -> Option<Instant> {
         Some(self.down_at).filter(|at| *at > Instant::ZERO)
     }
 
-    /// Whether a vehicle that takes part was not heard for [`MISSED_AFTER`](super::MISSED_AFTER)
-    /// at the last step.
+    /// Whether a vehicle that takes part had not been heard for 3 s at the last step.
     pub fn is_any_missing(&self) -> bool {
         self.any_missing
     }
