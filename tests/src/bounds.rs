@@ -161,7 +161,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("Companion::handle_timeout, 32 speak", "advice, w, v, 4 rows of the table"),
     (
         "Companion::handle_timeout, most gone",
-        "the same; 112 legs against what is out, 96 columns of what comes down",
+        "the same; 160 legs against what is out, 96 columns of what comes down",
     ),
     ("Companion::handle_timeout, else", "the same"),
     ("a control step, 32 near", "the same as `Companion::handle_timeout`"),

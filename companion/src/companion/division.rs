@@ -9,7 +9,7 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::roster::MemberStatus;
 use crate::mission::State;
-use crate::mission::table::STARTED_ON_PAD;
+use crate::mission::table::{ON_PAD, STARTED_ON_PAD};
 use crate::swarm::detour::path_kind::RejoinPlace;
 use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, LEASE, OwnReport};
 use crate::time::Duration;
@@ -118,7 +118,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         OwnReport {
             status: standing,
             waits: self.is_not_started(),
-            airborne: self.telemetry.armed && self.telemetry.on_ground == Some(false),
+            // By the state: an autopilot may report the ground in flight.
+            airborne: !(self.is_not_started()
+                || ON_PAD.contains(&state)
+                || matches!(state, Done | Aborted)),
             division: self.mission.division_count(),
             progress_dm: if flies {
                 (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16

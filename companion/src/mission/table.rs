@@ -166,10 +166,10 @@ pub static TABLE: &[TransitionRow] = &[
     // On the pad: somebody else arms or moves the vehicle, or a condition of the start fails before
     // arming.
     warning_row(STARTED_ON_PAD,      G::Armed,           AT_ONCE,    Aborted,     A::ForgetStart,       "Armed by someone else: start cancelled"),
-    warning_row(STARTED_ON_PAD,      G::AwayFromPad,   AT_ONCE,    Aborted,     A::ForgetStart,       "Not at its start: start cancelled"),
+    warning_row(STARTED_ON_PAD,      G::AwayFromPad,     AT_ONCE,    Aborted,     A::ForgetStart,       "Not at its start: start cancelled"),
     warning_row(STARTED_ON_PAD,      G::ChargeLow,       AT_ONCE,    Aborted,     A::ForgetStart,       "Battery low: start cancelled"),
     warning_row(STARTED_ON_PAD,      G::Outside,         AT_ONCE,    Aborted,     A::ForgetStart,       "Outside the geofence: start cancelled"),
-    warning_row(&[Arming],           G::AwayFromPad,   AT_ONCE,    CancelStart, A::CancelStart,       "Not at its start: start cancelled"),
+    warning_row(&[Arming],           G::AwayFromPad,     AT_ONCE,    CancelStart, A::CancelStart,       "Not at its start: start cancelled"),
     warning_row(&[Arming],           G::ChargeLow,       AT_ONCE,    CancelStart, A::CancelStart,       "Battery low: start cancelled"),
     warning_row(&[Arming],           G::Outside,         AT_ONCE,    CancelStart, A::CancelStart,       "Outside the geofence: start cancelled"),
     warning_row(FLYING_LINKED,       G::OriginMoved,     AT_ONCE,    Land,        A::RequestLandMode,   "EKF origin moved: landing"),
@@ -265,7 +265,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Paused, AutopilotSilent], G::NeighboursSilent, secs(20), Land,  A::RequestLandMode,   "Neighbours silent while it stands: landing"),
     warning_row(&[TakeOff, Climb],   G::LeaseLost,       secs(20),   Land,        A::RequestLandMode,   "Neighbours silent in the climb: landing"),
     warning_row(&[Follow],           G::PadTaken,        secs(20),   Replanning,  A::RequestLanding,    "No room to land: seeking a place aside"),
-    info_row(&[Follow],              G::LandingPlaceReached,    AT_ONCE,    Land,        A::RequestLandMode,   "Landing aside"),
+    info_row(&[Follow],              G::LandingPlaceReached, AT_ONCE, Land,        A::RequestLandMode,   "Landing aside"),
     warning_row(&[Follow],           G::PathBlocked,     AT_ONCE,    Blocked,     A::BrakeOnPath,       "Path blocked: waiting until all others stand"),
     warning_row(&[Follow, Blocked],  G::Unfollowed,      UNFOLLOWED_MOST, Land,   A::RequestLandMode,   "Setpoint not followed: landing"),
     warning_row(&[Follow],           G::StalledOverField, secs(600), Blocked,     A::TurnHome,          "No progress for 10 min: planning the way home"),

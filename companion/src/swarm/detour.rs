@@ -49,7 +49,7 @@ use crate::time::{Duration, Instant};
 const BLOCKED_CHECK_EVERY: Duration = Duration::from_millis(500);
 /// Maximum number of comparisons of a path segment with a keep-out zone in one step, or those of
 /// the whole path with one zone if they are more.
-const MAX_STRETCHES_PER_STEP: usize = 112;
+const MAX_STRETCHES_PER_STEP: usize = 160;
 /// Cost of computing one keep-out zone, as a number of comparisons of it with a path segment.
 const ZONE_COST: usize = 12;
 /// Time for which all other vehicles have to stand before this one claims the turn, seconds: longer

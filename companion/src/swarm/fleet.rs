@@ -112,8 +112,7 @@ pub struct Fleet<const V: usize> {
     in_flight: u32,
     /// Ranks of the other vehicles that report that they hear one in flight, as bits.
     hear_flight: u32,
-    /// Ranks of the vehicles that have reported their own entry, as bits: until then this vehicle,
-    /// just switched on, knows none of their incarnations.
+    /// Ranks of the vehicles that have reported their own entry, as bits.
     introduced: u32,
     /// Whether this vehicle is in the air.
     airborne: bool,

@@ -33,7 +33,7 @@ impl<const V: usize> Fleet<V> {
     /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
     /// takes no part, and needs no lease.
     pub fn unheard_for(&self, now: Instant) -> Duration {
-        if self.is_alive(usize::from(self.own)) { now - self.lease_at } else { Duration::default() }
+        if self.is_alive(usize::from(self.own)) { self.lease_age(now) } else { Duration::default() }
     }
 
     /// Whether the others count this vehicle as lost, or have divided its part; false for one that
@@ -54,8 +54,8 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether another vehicle takes part, or left a part that is not divided yet.
     pub(crate) fn is_reserve_needed(&self) -> bool {
-        let others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own));
-        self.is_dividing() || others.into_iter().any(|rank| self.is_alive(rank))
+        let mut others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own));
+        self.is_dividing() || others.any(|rank| self.is_alive(rank))
     }
 
     /// When the last of the vehicles that may be lost is down: of those that have been silent for

@@ -28,6 +28,9 @@ impl<const V: usize> Fleet<V> {
             if rank == usize::from(self.own) {
                 self.handle_own_entry(entry, waits);
             } else if rank < self.members.len() {
+                if rank == sender {
+                    self.introduce(sender, entry.incarnation, waits);
+                }
                 let behind =
                     same_plan && roster.divisions < self.divisions.len() as u8 && rank != sender;
                 // The member may have finished its share of a division that the sender does not
@@ -36,7 +39,7 @@ impl<const V: usize> Fleet<V> {
                     && entry.status == MemberStatus::Left
                     && self.members[rank].heard_itself)
                 {
-                    self.merge_entry(rank, entry, [same, waits, rank == sender]);
+                    self.merge_entry(rank, entry, same, waits);
                 }
                 if same && entry.agrees && rank != sender && roster.hash != 0 {
                     self.members[rank].hash = roster.hash;
@@ -62,19 +65,21 @@ impl<const V: usize> Fleet<V> {
         reported
     }
 
-    /// Merges what another vehicle reports of the vehicle of this rank; `waits` as above,
-    /// `introduces`: it is the sender's own entry.
-    fn merge_entry(
-        &mut self,
-        rank: usize,
-        entry: &RosterReportEntry,
-        [same, waits, introduces]: [bool; 3],
-    ) {
+    /// Takes a sender's incarnation as it is the first time that it reports itself: this vehicle,
+    /// just switched on, knew none, and could not tell a newer one from an older one.
+    fn introduce(&mut self, sender: usize, incarnation: u8, waits: bool) {
+        let bit = 1 << sender.min(31);
+        if self.introduced & bit == 0 && self.members[sender].entry.incarnation != incarnation {
+            self.take_newer_incarnation(sender, incarnation, waits);
+        }
+        self.introduced |= bit;
+    }
+
+    /// Merges what another vehicle reports of the vehicle of this rank; `waits` as above.
+    fn merge_entry(&mut self, rank: usize, entry: &RosterReportEntry, same: bool, waits: bool) {
         let newer =
             entry.incarnation.wrapping_sub(self.members[rank].entry.incarnation) % INCARNATIONS;
-        let first = introduces && self.introduced >> rank.min(31) & 1 == 0;
-        self.introduced |= u32::from(introduces) << rank.min(31);
-        if newer >= INCARNATIONS / 2 && !first {
+        if newer >= INCARNATIONS / 2 {
             return;
         }
         if newer > 0 {

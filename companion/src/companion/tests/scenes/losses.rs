@@ -174,6 +174,25 @@ pub(super) fn it_is_in_reserve(scenes: &mut Scenes) {
     scenes.play(over_a_field_of(three(), without_part(), Ready), unheard, Done, 30.0);
 }
 
+/// A vehicle that reported that it leaves is no new one in flight, whatever its autopilot says of
+/// the ground.
+#[test]
+fn a_vehicle_that_has_left_in_flight_never_takes_part_again() {
+    for false_ground in [false, true] {
+        let mut b = over_a_field(Follow);
+        pilot_takes(&mut b);
+        b.run(25.0);
+        b.false_ground = false_ground;
+        b.run(1.0);
+        b.mode = px4::OFFBOARD;
+        b.run(2.0);
+        resume(&mut b);
+        b.run(1.0);
+        let own = super::super::divisions::own_roster(&b).entries[0].status;
+        assert_eq!(own, MemberStatus::Left, "{false_ground}: {:?} {:?}", b.state(), b.texts);
+    }
+}
+
 /// What the others know of a flight before does not keep a vehicle from a new one.
 #[test]
 fn a_vehicle_that_was_restarted_comes_back_as_a_new_one() {
