@@ -80,8 +80,8 @@ fn wrong(scenario: &Scenario, planned: &CoveragePlan<'_>, boxes: &[Block]) -> Op
     if (obstacles.clearance_m - 1.5).abs() > 1e-5 {
         return Some(format!("the clearance is {} m", obstacles.clearance_m));
     }
-    for (_, stops, _) in planned.flights() {
-        for leg in stops.windows(2) {
+    for (_, points, _) in planned.flights() {
+        for leg in points.windows(2) {
             let [a, b] = [0, 1].map(|end| leg[end].position.cast::<f64>());
             let parts = ((b - a).norm() / 0.1).ceil().max(1.0);
             for part in 0..=parts as u32 {

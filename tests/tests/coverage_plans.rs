@@ -8,7 +8,7 @@ use companion::time::Instant;
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::{self, Picture};
 use host_sim::coverage::export::{self, MissionItem};
-use host_sim::coverage::flight::{Stop, StopAction};
+use host_sim::coverage::flight::{FlightPoint, PointAction};
 use host_sim::scenario;
 use host_sim::scenario::coverage::Method;
 use planner_core::Point;
@@ -118,12 +118,12 @@ impl Client {
 /// Flies one vehicle's plan and returns its pictures.
 fn fly(
     planned: &CoveragePlan<'_>,
-    stops: &[Stop],
+    points: &[FlightPoint],
     items: &[MissionItem],
     personality: AutopilotKind,
 ) -> Vec<Photo> {
     let origin = planned.area_settings.origin;
-    let start = stops[0].position;
+    let start = points[0].position;
     let config = Config {
         autopilot: personality,
         world_origin: origin,
@@ -169,7 +169,7 @@ fn fly(
     }
     client.run(0.1);
     let off =
-        (client.autopilot.true_state().position - stops[stops.len() - 1].position).xy().norm();
+        (client.autopilot.true_state().position - points[points.len() - 1].position).xy().norm();
     assert!(off < 1.0, "{personality:?} came home {off} m off");
     let all: Vec<u16> =
         (u16::from(personality == AutopilotKind::Ardupilot)..items.len() as u16).collect();
@@ -186,7 +186,7 @@ fn off_by(photo: &Photo, place: &Point) -> (f32, f32) {
 
 /// By distance: pictures of a lane are nowhere further apart than they are planned, but for the
 /// look that they wait for.
-fn judge_gaps(photos: &[Photo], wanted: &[&Stop], label: &str) {
+fn judge_gaps(photos: &[Photo], wanted: &[&FlightPoint], label: &str) {
     for lane in wanted.chunk_by(|a, b| a.lane == b.lane) {
         let [first, .., last] = lane else { continue };
         let (from, way) = (first.position.xy(), (last.position - first.position).xy());
@@ -216,19 +216,19 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
     let planned = CoveragePlan::new(&scenario, Method::Binpat).expect("a plan");
     let flights = planned.flights();
     assert_eq!(flights.len(), 2);
-    for (sortie, stops, _) in &flights {
-        let items = export::flight_items(&planned, sortie, stops);
-        let photos = fly(&planned, stops, &items, personality);
-        let wanted: Vec<&Stop> =
-            stops.iter().filter(|s| matches!(s.action, StopAction::Photo(_))).collect();
+    for (sortie, points, _) in &flights {
+        let items = export::flight_items(&planned, sortie, points);
+        let photos = fly(&planned, points, &items, personality);
+        let wanted: Vec<&FlightPoint> =
+            points.iter().filter(|s| matches!(s.action, PointAction::Photo(_))).collect();
         assert!(wanted.len() > 10);
         let lanes = 1 + wanted.windows(2).filter(|pair| pair[0].lane != pair[1].lane).count();
         let label = format!("{personality:?}, {trigger}: {} of {}", photos.len(), wanted.len());
         match trigger {
             "waypoint" => {
                 assert_eq!(photos.len(), wanted.len(), "{label}");
-                for (photo, stop) in photos.iter().zip(&wanted) {
-                    let (across, up) = off_by(photo, &stop.position);
+                for (photo, point) in photos.iter().zip(&wanted) {
+                    let (across, up) = off_by(photo, &point.position);
                     assert!(
                         across < PASSED_M && up < PASSED_UP_M,
                         "{label}: {across} m, {up} m off"
@@ -242,14 +242,14 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
                 judge_gaps(&photos, &wanted, &label);
                 // Both ends of a lane as they are passed; between them each is late by the looks
                 // before it.
-                for (k, stop) in wanted.iter().enumerate() {
+                for (k, point) in wanted.iter().enumerate() {
                     let before =
-                        wanted[..k].iter().rev().take_while(|s| s.lane == stop.lane).count();
+                        wanted[..k].iter().rev().take_while(|s| s.lane == point.lane).count();
                     let near = |photo: &Photo| {
-                        let (across, up) = off_by(photo, &stop.position);
+                        let (across, up) = off_by(photo, &point.position);
                         across < PASSED_M + LATE_M * before as f32 && up < PASSED_UP_M
                     };
-                    assert!(photos.iter().any(near), "{label}: none at {}", stop.position);
+                    assert!(photos.iter().any(near), "{label}: none at {}", point.position);
                 }
             }
             _ => assert_eq!(photos.len(), 0, "{label}"),
@@ -302,9 +302,11 @@ fn plans_above_terrain_are_flown_as_planned() {
             let found = scenario::parse(&text, "plans").expect("a scenario");
             let planned = CoveragePlan::new(&found, Method::Binpat).expect("a plan");
             let flights = planned.flights();
-            let heights =
-                flights.iter().flat_map(|(_, stops, _)| stops).filter(|stop| stop.lane.is_some());
-            let heights: Vec<f32> = heights.map(|stop| stop.position.z).collect();
+            let heights = flights
+                .iter()
+                .flat_map(|(_, points, _)| points)
+                .filter(|point| point.lane.is_some());
+            let heights: Vec<f32> = heights.map(|point| point.position.z).collect();
             let rise_m = heights.iter().fold(0.0, |most: f32, z| most.max(z - heights[0]));
             assert!(rise_m > 5.0, "its lanes rise over the ridge: {rise_m}");
         }
@@ -323,9 +325,9 @@ fn plans_flown_without_a_companion_photograph_the_whole_area() {
             let scenario = scenario::parse(&text, "plans").expect("a scenario");
             let planned = CoveragePlan::new(&scenario, Method::Binpat).expect("a plan");
             let mut pictures = Vec::new();
-            for (sortie, stops, _) in &planned.flights() {
-                let items = export::flight_items(&planned, sortie, stops);
-                pictures.extend(fly(&planned, stops, &items, personality).iter().map(|photo| {
+            for (sortie, points, _) in &planned.flights() {
+                let items = export::flight_items(&planned, sortie, points);
+                pictures.extend(fly(&planned, points, &items, personality).iter().map(|photo| {
                     Picture {
                         vehicle: None,
                         t_s: photo.time_us as f32 * 1e-6,

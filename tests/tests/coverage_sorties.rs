@@ -25,9 +25,11 @@ fn with_batteries(text: &str, endurance_s: f32) -> String {
 
 /// From pad to pad, with stops at both ends of each lane and over the pad.
 fn flown_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
-    let stops = flight::route_stops(planned, route);
-    let steady_s =
-        flight::stop_times_s(planned, route, &stops).last().copied().expect("a flight has stops");
+    let points = flight::route_points(planned, route);
+    let steady_s = flight::passing_times_s(planned, route, &points)
+        .last()
+        .copied()
+        .expect("a flight has points");
     let (speed, accel) = (planned.vehicles[usize::from(route.vehicle)].cruise_mps, 1.5f32);
     // Over a leg from rest to rest.
     let lost_s = |leg_m: f32| match leg_m < speed * speed / accel {
@@ -133,8 +135,8 @@ fn judge_rounds(planned: &CoveragePlan<'_>) {
 }
 
 fn written(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Vec<String> {
-    let plan = |(sortie, stops, _): &SortieFlight| {
-        let items = export::flight_items(planned, sortie, stops);
+    let plan = |(sortie, points, _): &SortieFlight| {
+        let items = export::flight_items(planned, sortie, points);
         export::qgc_plan(planned, &sortie.route, &items).to_string()
     };
     flights.iter().map(plan).chain([export::flights_csv(planned, flights)]).collect()

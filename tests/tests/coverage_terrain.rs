@@ -6,7 +6,7 @@ use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::hills::Hills;
 use flockmate_tests::shared_data;
 use host_sim::coverage::check::{CoverageFindings, check_plan};
-use host_sim::coverage::flight::{Stop, StopAction};
+use host_sim::coverage::flight::{FlightPoint, PointAction};
 use host_sim::coverage::{CoveragePlan, heights};
 use host_sim::margins;
 use host_sim::scenario::{self, Scenario};
@@ -87,12 +87,12 @@ impl<'a> Ceiling<'a> {
 
 /// Random places around pictures that no picture shows where the ground is as high as there, not as
 /// below the camera: the plan need not see them, but overlaps should.
-fn hidden(planned: &CoveragePlan<'_>, stops: &[&Stop], places: usize) -> usize {
+fn hidden(planned: &CoveragePlan<'_>, points: &[&FlightPoint], places: usize) -> usize {
     let (area, along) = (planned.area_settings, planned.tracks.lane_direction());
-    let pictures: Vec<Point> = stops
+    let pictures: Vec<Point> = points
         .iter()
-        .filter(|stop| matches!(stop.action, StopAction::Photo(_)))
-        .map(|stop| stop.position)
+        .filter(|point| matches!(point.action, PointAction::Photo(_)))
+        .map(|point| point.position)
         .collect();
     let mut random = Pcg32::seed_from_u64(pictures.len() as u64);
     let mut beside = |side: f32| (areas::unit(&mut random) as f32 - 0.5) * side;
@@ -131,17 +131,17 @@ fn judge(scenario: &Scenario, looks: usize) -> Result<CoverageFindings, String> 
     let flights = planned.flights();
     let low: Vec<_> = flights
         .iter()
-        .flat_map(|(_, stops, _)| stops)
+        .flat_map(|(_, points, _)| points)
         .filter(|s| heights::is_at_lane_height(s))
         .collect();
     let hidden = hidden(&planned, &low, 500);
     if hidden > 0 {
         return Err(format!("{hidden} of 500 places are hidden by their own height"));
     }
-    for stop in low.iter().step_by(1 + low.len() / looks) {
-        let most_m = ceiling.over(&stop.position.xy()) + area.height_m + tolerance_m + 0.2;
-        if stop.position.z > most_m {
-            return Err(format!("too high: {:?}, not {most_m}", stop.position));
+    for point in low.iter().step_by(1 + low.len() / looks) {
+        let most_m = ceiling.over(&point.position.xy()) + area.height_m + tolerance_m + 0.2;
+        if point.position.z > most_m {
+            return Err(format!("too high: {:?}, not {most_m}", point.position));
         }
     }
     Ok(findings)

@@ -108,14 +108,14 @@ fn add_flights(
     results: &mut ResultFiles,
 ) -> anyhow::Result<Vec<String>> {
     let mut written = Vec::new();
-    for (sortie, stops, _) in flights {
+    for (sortie, points, _) in flights {
         let route = &sortie.route;
         let id = planned.scenario.vehicles[usize::from(route.vehicle)].id;
         let name = match sortie.of {
             1 => format!("vehicle-{id}"),
             _ => format!("vehicle-{id}-sortie-{}", sortie.number),
         };
-        let items = export::flight_items(planned, sortie, stops);
+        let items = export::flight_items(planned, sortie, points);
         let plan = result::json(&export::qgc_plan(planned, route, &items))?;
         let waypoints = export::waypoints_file(planned, route, &items);
         for (kind, text) in [("plan", plan), ("waypoints", waypoints)] {

@@ -11,7 +11,7 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
 pub use super::flight::TimedFlight;
-use super::flight::{Stop, StopAction};
+use super::flight::{FlightPoint, PointAction};
 use super::heights::{self, HeightFindings};
 pub use super::taken::Picture;
 use super::{CoveragePlan, SortieFlight, taken};
@@ -73,9 +73,9 @@ pub fn flights_to_check<'f>(
     planned: &CoveragePlan<'_>,
     flights: &'f [SortieFlight],
 ) -> Vec<TimedFlight<'f>> {
-    let flown = |(sortie, stops, times_s): &'f SortieFlight| {
+    let flown = |(sortie, points, times_s): &'f SortieFlight| {
         let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
-        TimedFlight { vehicle, stops, times_s }
+        TimedFlight { vehicle, points, times_s }
     };
     flights.iter().map(flown).collect()
 }
@@ -85,10 +85,10 @@ pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) ->
     let mut findings = CoverageFindings::default();
     count_waypoints(planned, flights, &mut findings);
     for flight in flights {
-        let enters = |pair: &&[Stop]| {
+        let enters = |pair: &&[FlightPoint]| {
             does_leg_enter_zone(planned, &pair[0].position.xy(), &pair[1].position.xy())
         };
-        findings.legs_in_no_fly_zones += flight.stops.windows(2).filter(enters).count() as u64;
+        findings.legs_in_no_fly_zones += flight.points.windows(2).filter(enters).count() as u64;
     }
     findings.heights = heights::check_heights(planned, flights);
     CoverageCells::fine_enough(planned).count_photographed_cells(
@@ -99,16 +99,16 @@ pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) ->
     findings
 }
 
-/// Pictures at the photo stops of planned flights, each with the lanes' direction as its heading.
+/// Pictures at the photo points of planned flights, each with the lanes' direction as its heading.
 pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> Vec<Picture> {
     let along = planned.tracks.lane_direction();
     let heading = along.y.atan2(along.x);
     let taken = |flight: &TimedFlight<'_>| {
         let vehicle = Some(flight.vehicle);
-        let stops = flight.stops.iter().zip(flight.times_s);
-        let photos = stops.filter(|(stop, _)| matches!(stop.action, StopAction::Photo(_)));
+        let points = flight.points.iter().zip(flight.times_s);
+        let photos = points.filter(|(point, _)| matches!(point.action, PointAction::Photo(_)));
         let taken =
-            photos.map(|(stop, &t_s)| Picture { vehicle, t_s, position: stop.position, heading });
+            photos.map(|(point, &t_s)| Picture { vehicle, t_s, position: point.position, heading });
         taken.collect::<Vec<_>>()
     };
     flights.iter().flat_map(taken).collect()
@@ -142,8 +142,8 @@ fn count_waypoints(
 ) {
     let mut times = vec![0u32; planned.tracks.waypoint_count() as usize];
     for flight in flights {
-        let photos = flight.stops.iter().filter_map(|stop| match stop.action {
-            StopAction::Photo(number) => Some(number),
+        let photos = flight.points.iter().filter_map(|point| match point.action {
+            PointAction::Photo(number) => Some(number),
             _ => None,
         });
         let numbers: Vec<u32> = photos.collect();

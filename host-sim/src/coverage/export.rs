@@ -13,7 +13,7 @@ use planner_core::coverage::pack::Route;
 use planner_core::frames::Geodetic;
 use serde_json::{Value, json};
 
-use super::flight::{Stop, StopAction, course_deg};
+use super::flight::{FlightPoint, PointAction, course_deg};
 use super::sorties::Sortie;
 use super::{CoveragePlan, SortieFlight};
 use crate::scenario::AutopilotKind;
@@ -62,15 +62,15 @@ fn home_position(planned: &CoveragePlan<'_>, route: &Route) -> Geodetic {
     }
 }
 
-/// Yaw commanded at stop `index`, degrees clockwise from north, rounded to 0.01: the lanes' common
-/// direction, or, with [`HeadingRule::Lane`], the direction of flight along the stop's lane.
-fn yaw_deg(planned: &CoveragePlan<'_>, stops: &[Stop], index: usize) -> f64 {
+/// Yaw commanded at point `index`, degrees clockwise from north, rounded to 0.01: the lanes' common
+/// direction, or, with [`HeadingRule::Lane`], the direction of flight along the point's lane.
+fn yaw_deg(planned: &CoveragePlan<'_>, points: &[FlightPoint], index: usize) -> f64 {
     let along = planned.tracks.lane_direction();
     let sweep = course_deg(&Point::zeros(), &Point::new(along.x, along.y, 0.0));
-    let own = stops[index].lane;
+    let own = points[index].lane;
     let neighbours = [index.checked_sub(1).map(|i| (i, index)), Some((index, index + 1))];
     let step = neighbours.into_iter().flatten().find_map(|(a, b)| {
-        let (from, to) = (stops.get(a)?, stops.get(b)?);
+        let (from, to) = (points.get(a)?, points.get(b)?);
         let apart = (to.position - from.position).xy().norm() > 1e-3;
         (apart && own.is_some() && from.lane == own && to.lane == own)
             .then(|| course_deg(&from.position, &to.position))
@@ -86,7 +86,7 @@ fn yaw_deg(planned: &CoveragePlan<'_>, stops: &[Stop], index: usize) -> f64 {
 pub fn flight_items(
     planned: &CoveragePlan<'_>,
     sortie: &Sortie,
-    stops: &[Stop],
+    points: &[FlightPoint],
 ) -> Vec<MissionItem> {
     let (scenario, route) = (planned.scenario, &sortie.route);
     let home = home_position(planned, route);
@@ -102,11 +102,11 @@ pub fn flight_items(
     let waypoint = |index: usize| MissionItem {
         command: NAV_WAYPOINT,
         frame: FRAME_RELATIVE,
-        params: [Some(0.0), Some(0.0), Some(0.0), Some(yaw_deg(planned, stops, index))],
-        place: place(&stops[index].position),
+        params: [Some(0.0), Some(0.0), Some(0.0), Some(yaw_deg(planned, points, index))],
+        place: place(&points[index].position),
     };
     let speed = f64::from(planned.vehicles[usize::from(route.vehicle)].cruise_mps);
-    let top = stops.get(1).map_or(0.0, |stop| f64::from(stop.position.z - start.z));
+    let top = points.get(1).map_or(0.0, |point| f64::from(point.position.z - start.z));
     let mut items = Vec::new();
     if sortie.depart_s > 0.0 {
         items.push(MissionItem::from_command(
@@ -123,15 +123,15 @@ pub fn flight_items(
         },
         MissionItem::from_command(DO_CHANGE_SPEED, [1.0, round_to(speed, 1e3), -1.0, 0.0]),
     ]);
-    for (index, stop) in stops.iter().enumerate().skip(2) {
-        let lane_at = |i: Option<usize>| i.and_then(|i| stops.get(i)).and_then(|stop| stop.lane);
-        let begins = stop.lane.is_some() && lane_at(index.checked_sub(1)) != stop.lane;
-        let ends = stop.lane.is_some() && lane_at(Some(index + 1)) != stop.lane;
-        match (stop.action, planned.area_settings.trigger) {
-            (StopAction::Pad, _) => {
+    for (index, point) in points.iter().enumerate().skip(2) {
+        let lane_at = |i: Option<usize>| i.and_then(|i| points.get(i)).and_then(|point| point.lane);
+        let begins = point.lane.is_some() && lane_at(index.checked_sub(1)) != point.lane;
+        let ends = point.lane.is_some() && lane_at(Some(index + 1)) != point.lane;
+        match (point.action, planned.area_settings.trigger) {
+            (PointAction::Pad, _) => {
                 items.push(MissionItem::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4]));
             }
-            (StopAction::Photo(_), Trigger::Waypoint) => {
+            (PointAction::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));
                 items.push(MissionItem::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
                 // Parameter 5 of DO_DIGICAM_CONTROL, 1, takes a picture; its slot is `place[0]`.
@@ -139,16 +139,16 @@ pub fn flight_items(
                     last.place[0] = 1.0;
                 }
             }
-            (StopAction::Photo(_), trigger) => {
+            (PointAction::Photo(_), trigger) => {
                 if begins || ends {
                     items.push(waypoint(index));
                 }
                 if trigger == Trigger::Distance && begins && !ends {
                     let mut later =
-                        stops[index + 1..].iter().take_while(|next| next.lane == stop.lane);
-                    let next = later.find(|next| matches!(next.action, StopAction::Photo(_)));
+                        points[index + 1..].iter().take_while(|next| next.lane == point.lane);
+                    let next = later.find(|next| matches!(next.action, PointAction::Photo(_)));
                     let step = next.map_or(planned.area_settings.spacing.waypoint_m, |next| {
-                        (next.position - stop.position).xy().norm()
+                        (next.position - point.position).xy().norm()
                     });
                     // Takes a picture at once, then one each `step` metres.
                     let trigger = [round_to(f64::from(step), 1e3), 0.0, 1.0, 0.0];
@@ -164,7 +164,7 @@ pub fn flight_items(
                     ));
                 }
             }
-            (StopAction::Transit | StopAction::Lane, _) => items.push(waypoint(index)),
+            (PointAction::Transit | PointAction::Lane, _) => items.push(waypoint(index)),
         }
     }
     items
@@ -252,22 +252,22 @@ pub fn waypoints_file(planned: &CoveragePlan<'_>, route: &Route, items: &[Missio
     text
 }
 
-/// A CSV table with every stop of every flight: vehicle, order, time, action, waypoint number where
-/// a picture is taken, WGS84 and ENU position, sortie, and height of the ground there.
+/// A CSV table with every point of every flight: vehicle, order, time, action, waypoint number
+/// where a picture is taken, WGS84 and ENU position, sortie, and height of the ground there.
 pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> String {
     let mut text =
         "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie,ground_m\n"
             .to_owned();
-    for (sortie, stops, times) in flights {
+    for (sortie, points, times) in flights {
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
-        for (order, (stop, time)) in stops.iter().zip(times).enumerate() {
-            let (act, number) = match stop.action {
-                StopAction::Pad => ("pad", String::new()),
-                StopAction::Transit => ("transit", String::new()),
-                StopAction::Lane => ("lane", String::new()),
-                StopAction::Photo(number) => ("photo", number.to_string()),
+        for (order, (point, time)) in points.iter().zip(times).enumerate() {
+            let (act, number) = match point.action {
+                PointAction::Pad => ("pad", String::new()),
+                PointAction::Transit => ("transit", String::new()),
+                PointAction::Lane => ("lane", String::new()),
+                PointAction::Photo(number) => ("photo", number.to_string()),
             };
-            let p = stop.position;
+            let p = point.position;
             let place = planned.geodetic(&p);
             text += &format!(
                 "{id},{order},{time:.2},{act},{number},{:.9},{:.9},{:.3},{:.3},{:.3},{},{:.3}\n",
@@ -304,12 +304,12 @@ pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Val
             }));
         }
     }
-    for (sortie, stops, _) in flights {
-        let photos = stops
+    for (sortie, points, _) in flights {
+        let photos = points
             .iter()
-            .filter(|stop| matches!(stop.action, StopAction::Photo(_) | StopAction::Lane));
+            .filter(|point| matches!(point.action, PointAction::Photo(_) | PointAction::Lane));
         let places: Vec<Value> =
-            photos.map(|stop| place(stop.position.x, stop.position.y)).collect();
+            photos.map(|point| place(point.position.x, point.position.y)).collect();
         let geometry = match places.as_slice() {
             [one] => json!({ "type": "Point", "coordinates": one }),
             all => json!({ "type": "LineString", "coordinates": all }),

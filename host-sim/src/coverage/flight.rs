@@ -1,4 +1,4 @@
-//! The stops of one vehicle's flight: up to its layer, over to the first waypoint, down, along the
+//! The points of one vehicle's flight: up to its layer, over to the first waypoint, down, along the
 //! lanes, up, home in its layer, down.
 //!
 //! Metres, ENU in the mission frame. Over level ground all pictures are at one height above the
@@ -18,9 +18,9 @@ use crate::scenario::coverage::Trigger;
 /// A corner of the path within this distance of a picture is at the picture's position, metres.
 const SAME_PLACE_M: f32 = 0.01;
 
-/// Action of a vehicle at a stop of its flight.
+/// Action of a vehicle at a point of its flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StopAction {
+pub enum PointAction {
     /// The vehicle stands on its pad.
     Pad,
     /// The vehicle passes at the height of its layer.
@@ -33,27 +33,27 @@ pub enum StopAction {
 
 /// A point that a flight passes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stop {
+pub struct FlightPoint {
     /// Position, metres ENU.
     pub position: Point,
-    /// Action at the stop.
-    pub action: StopAction,
-    /// Index of the lane that the stop lies on; `None` outside lanes.
+    /// Action at the point.
+    pub action: PointAction,
+    /// Index of the lane that the point lies on; `None` outside lanes.
     pub lane: Option<u16>,
 }
 
-/// The flight of one vehicle: its stops, and the time at which it passes each.
+/// The flight of one vehicle: its points, and the time at which it passes each.
 pub struct TimedFlight<'a> {
     /// MAVLink system id of the vehicle.
     pub vehicle: u8,
-    /// The stops, in the order of flight.
-    pub stops: &'a [Stop],
-    /// Time at which each stop is passed, seconds after the mission's start.
+    /// The points, in the order of flight.
+    pub points: &'a [FlightPoint],
+    /// Time at which each point is passed, seconds after the mission's start.
     pub times_s: &'a [f32],
 }
 
-/// All stops of a route's flight, from pad to pad.
-pub fn route_stops(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Stop> {
+/// All points of a route's flight, from pad to pad.
+pub fn route_points(planned: &CoveragePlan<'_>, route: &Route) -> Vec<FlightPoint> {
     let (vehicle, pad) = {
         let index = usize::from(route.vehicle);
         (&planned.vehicles[index], planned.scenario.vehicles[index].start)
@@ -61,31 +61,34 @@ pub fn route_stops(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Stop> {
     let heights = planned.area_settings.heights;
     let layer_m = heights.mission_m + f32::from(route.layer) * heights.layer_m;
     let at = |place: &Flat, height_m: f32| Point::new(place.x, place.y, height_m);
-    let stop = |position: Point, act: StopAction| Stop { position, action: act, lane: None };
+    let point =
+        |position: Point, act: PointAction| FlightPoint { position, action: act, lane: None };
     let (first, last) = route.end_waypoints();
     let ends = [first, last].map(|number| planned.tracks.waypoint(number).unwrap_or(vehicle.place));
-    let mut stops =
-        vec![stop(pad, StopAction::Pad), stop(at(&vehicle.place, layer_m), StopAction::Transit)];
-    stops.extend(
+    let mut points = vec![
+        point(pad, PointAction::Pad),
+        point(at(&vehicle.place, layer_m), PointAction::Transit),
+    ];
+    points.extend(
         corners_between(planned, &vehicle.place, &ends[0])
             .iter()
-            .map(|c| stop(at(c, layer_m), StopAction::Transit)),
+            .map(|c| point(at(c, layer_m), PointAction::Transit)),
     );
-    stops.push(stop(at(&ends[0], layer_m), StopAction::Transit));
-    add_lane_stops(planned, route, &mut stops);
-    stops.push(stop(at(&ends[1], layer_m), StopAction::Transit));
-    stops.extend(
+    points.push(point(at(&ends[0], layer_m), PointAction::Transit));
+    add_lane_points(planned, route, &mut points);
+    points.push(point(at(&ends[1], layer_m), PointAction::Transit));
+    points.extend(
         corners_between(planned, &ends[1], &vehicle.home)
             .iter()
-            .map(|c| stop(at(c, layer_m), StopAction::Transit)),
+            .map(|c| point(at(c, layer_m), PointAction::Transit)),
     );
-    stops.push(stop(at(&vehicle.home, layer_m), StopAction::Transit));
-    stops.push(stop(Point::new(vehicle.home.x, vehicle.home.y, pad.z), StopAction::Pad));
-    stops
+    points.push(point(at(&vehicle.home, layer_m), PointAction::Transit));
+    points.push(point(Point::new(vehicle.home.x, vehicle.home.y, pad.z), PointAction::Pad));
+    points
 }
 
-/// Appends the stops on the lanes of a route and on the ways between them.
-fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Stop>) {
+/// Appends the points on the lanes of a route and on the ways between them.
+fn add_lane_points(planned: &CoveragePlan<'_>, route: &Route, points: &mut Vec<FlightPoint>) {
     let numbers: Vec<u32> = route.waypoints().collect();
     let mut here: Option<Point> = None;
     for own in numbers.chunk_by(|a, b| planned.tracks.lane_of(*a) == planned.tracks.lane_of(*b)) {
@@ -104,15 +107,18 @@ fn add_lane_stops(planned: &CoveragePlan<'_>, route: &Route, stops: &mut Vec<Sto
                     from = between.last().copied().unwrap_or(from);
                 }
                 between.pop();
-                let stop =
-                    |position: Point| Stop { position, action: StopAction::Lane, lane: None };
-                stops.extend(between.into_iter().map(stop));
+                let point = |position: Point| FlightPoint {
+                    position,
+                    action: PointAction::Lane,
+                    lane: None,
+                };
+                points.extend(between.into_iter().map(point));
                 from
             }
         };
         let path: Vec<Point> =
             std::iter::once(from).chain(leg_corners(planned, &from, end)).collect();
-        add_picture_stops(planned, &path, &places, lane, stops);
+        add_picture_points(planned, &path, &places, lane, points);
         here = path.last().copied();
     }
 }
@@ -143,14 +149,14 @@ fn leg_corners(planned: &CoveragePlan<'_>, from: &Point, to: &Flat) -> Vec<Point
     }
 }
 
-/// Appends the stops along one lane: its pictures, and corners of `path` (over terrain) between
+/// Appends the points along one lane: its pictures, and corners of `path` (over terrain) between
 /// them.
-fn add_picture_stops(
+fn add_picture_points(
     planned: &CoveragePlan<'_>,
     path: &[Point],
     places: &[(u32, Flat)],
     lane: Option<u16>,
-    stops: &mut Vec<Stop>,
+    points: &mut Vec<FlightPoint>,
 ) {
     let along_m = |place: &Flat| (place - path[0].xy()).norm();
     let by_waypoint = planned.area_settings.trigger == Trigger::Waypoint;
@@ -160,9 +166,9 @@ fn add_picture_stops(
         while leg + 2 < path.len() && along_m(&path[leg + 1].xy()) <= at_m + SAME_PLACE_M {
             leg += 1;
             let corner = path[leg];
-            // With trigger by waypoint the stop of the picture already stands for this corner.
+            // With trigger by waypoint the point of the picture already stands for this corner.
             if !by_waypoint || (along_m(&corner.xy()) - at_m).abs() > SAME_PLACE_M {
-                stops.push(Stop { position: corner, action: StopAction::Lane, lane });
+                points.push(FlightPoint { position: corner, action: PointAction::Lane, lane });
             }
         }
         let end = path[(leg + 1).min(path.len() - 1)];
@@ -174,7 +180,7 @@ fn add_picture_stops(
         };
         let height_m = path[leg].z + (end.z - path[leg].z) * share;
         let position = Point::new(place.x, place.y, height_m);
-        stops.push(Stop { position, action: StopAction::Photo(*number), lane });
+        points.push(FlightPoint { position, action: PointAction::Photo(*number), lane });
     }
 }
 
@@ -193,13 +199,17 @@ pub fn course_deg(from: &Point, to: &Point) -> f32 {
     (to.x - from.x).atan2(to.y - from.y).to_degrees().rem_euclid(360.0)
 }
 
-/// Time at which each stop is passed, seconds after the departure: at cruise speed and the
+/// Time at which each point is passed, seconds after the departure: at cruise speed and the
 /// vehicle's climb and descent speeds, without braking at corners.
-pub fn stop_times_s(planned: &CoveragePlan<'_>, route: &Route, stops: &[Stop]) -> Vec<f32> {
+pub fn passing_times_s(
+    planned: &CoveragePlan<'_>,
+    route: &Route,
+    points: &[FlightPoint],
+) -> Vec<f32> {
     let vehicle = &planned.vehicles[usize::from(route.vehicle)];
     let mut time_s = 0.0;
     let mut times = vec![time_s];
-    for pair in stops.windows(2) {
+    for pair in points.windows(2) {
         let step = pair[1].position - pair[0].position;
         let vertical =
             if step.z > 0.0 { step.z / vehicle.climb_mps } else { -step.z / vehicle.descend_mps };

@@ -45,9 +45,9 @@ pub const MAX_ORDER_CHANGES: u32 = 20_000_000;
 /// Greatest height of a start above or below the ground, metres.
 const MAX_OFF_GROUND_M: f32 = 1.5;
 
-/// A sortie, its stops, and the time at which each stop is passed, seconds after the mission's
+/// A sortie, its points, and the time at which each point is passed, seconds after the mission's
 /// start.
-pub type SortieFlight = (Sortie, Vec<flight::Stop>, Vec<f32>);
+pub type SortieFlight = (Sortie, Vec<flight::FlightPoint>, Vec<f32>);
 
 impl<'a> CoveragePlan<'a> {
     /// Plans the coverage mission of a scenario by the given method.
@@ -151,14 +151,14 @@ impl<'a> CoveragePlan<'a> {
         found
     }
 
-    /// The flight of each sortie: its stops, and the time at which each is passed, seconds after
+    /// The flight of each sortie: its points, and the time at which each is passed, seconds after
     /// the mission's start.
     pub fn flights(&self) -> Vec<SortieFlight> {
         let flight = |sortie: &Sortie| {
-            let stops = flight::route_stops(self, &sortie.route);
-            let mut times_s = flight::stop_times_s(self, &sortie.route, &stops);
+            let points = flight::route_points(self, &sortie.route);
+            let mut times_s = flight::passing_times_s(self, &sortie.route, &points);
             times_s.iter_mut().for_each(|time| *time += sortie.begin_s + sortie.depart_s);
-            (*sortie, stops, times_s)
+            (*sortie, points, times_s)
         };
         self.sorties.iter().map(flight).collect()
     }
@@ -227,7 +227,7 @@ impl<'a> CoveragePlan<'a> {
         for round in flights.chunk_by(|a, b| a.0.number == b.0.number) {
             let timed: Vec<_> = round
                 .iter()
-                .map(|(_, stops, times_s)| separation::DepartureFlight { stops, times_s })
+                .map(|(_, points, times_s)| separation::DepartureFlight { points, times_s })
                 .collect();
             let Some((departures_s, least_m)) = separation::plan_departures(&timed, separation_m)
             else {
@@ -254,11 +254,11 @@ impl<'a> CoveragePlan<'a> {
     fn check_fence(&self) -> anyhow::Result<()> {
         let Some(fence) = &self.scenario.mission.geofence else { return Ok(()) };
         for sortie in &self.sorties {
-            let stops = flight::route_stops(self, &sortie.route);
-            let Some(stop) = stops.iter().find(|stop| !fence.contains(&stop.position)) else {
+            let points = flight::route_points(self, &sortie.route);
+            let Some(point) = points.iter().find(|point| !fence.contains(&point.position)) else {
                 continue;
             };
-            let (place, index) = (stop.position, usize::from(sortie.route.vehicle));
+            let (place, index) = (point.position, usize::from(sortie.route.vehicle));
             bail!(
                 "outside mission.geofence: {}: vehicle {} would fly to [{:.1}, {:.1}, {:.1}]\nhint: a geofence around area \
                  and pads, up to the highest layer, or a smaller area",

@@ -6,7 +6,7 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
 use super::check::CoverageFindings;
-use super::flight::Stop;
+use super::flight::FlightPoint;
 use super::{CoveragePlan, SortieFlight, parts};
 use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
@@ -24,8 +24,11 @@ pub fn report_data(
     let vehicles = scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
         let own =
             flights.iter().filter(|(sortie, _, _)| usize::from(sortie.route.vehicle) == index);
-        let passed = own.flat_map(|(_, stops, times)| stops.iter().zip(times));
-        let at = |(stop, time): (&Stop, &f32)| TrackPoint { t_s: *time, position: stop.position };
+        let passed = own.flat_map(|(_, points, times)| points.iter().zip(times));
+        let at = |(point, time): (&FlightPoint, &f32)| TrackPoint {
+            t_s: *time,
+            position: point.position,
+        };
         let track: Vec<TrackPoint> = passed.map(at).collect();
         VehicleTrack {
             id: vehicle.id,
@@ -70,12 +73,12 @@ fn coverage_plots(
 /// metres, over time.
 fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Plot {
     let mut curves = Vec::new();
-    for (sortie, stops, times_s) in flights {
+    for (sortie, points, times_s) in flights {
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         let mut path =
             Curve { name: format!("vehicle {id}"), vehicle: Some(id), ..Curve::default() };
         let mut ground = Curve { name: format!("ground below {id}"), ..Curve::default() };
-        for (leg, times) in stops.windows(2).zip(times_s.windows(2)) {
+        for (leg, times) in points.windows(2).zip(times_s.windows(2)) {
             let step = leg[1].position - leg[0].position;
             let parts = (step.xy().norm() / PROFILE_SPACING_M).ceil().max(1.0) as usize;
             for share in (0..=parts).map(|part| part as f32 / parts as f32) {

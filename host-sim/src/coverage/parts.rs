@@ -10,7 +10,7 @@ use planner_core::flight::{Flight as PathFlight, Task, WaypointRange};
 use super::CoveragePlan;
 use super::SortieFlight;
 use super::check::{self, Picture};
-use super::flight::{Stop, StopAction};
+use super::flight::{FlightPoint, PointAction};
 use crate::capacity::WAYPOINTS;
 use crate::mission::{Mission, SwarmPlan};
 use crate::report::{CoverageLayers, Division, Footprint, Part, WaypointTransfer};
@@ -23,9 +23,9 @@ type WaypointOwners = BTreeMap<u32, u8>;
 /// Coverage data of the report page for a plan that was not flown.
 pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> CoverageLayers {
     let mut parts: Vec<Part> = Vec::new();
-    for (sortie, stops, _) in flights {
-        let photos = |stop: &&Stop| matches!(stop.action, StopAction::Photo(_));
-        let photos: Vec<&Stop> = stops.iter().filter(photos).collect();
+    for (sortie, points, _) in flights {
+        let photos = |point: &&FlightPoint| matches!(point.action, PointAction::Photo(_));
+        let photos: Vec<&FlightPoint> = points.iter().filter(photos).collect();
         let lanes = photos.chunk_by(|a, b| a.lane == b.lane);
         let lanes = lanes.flat_map(|lane| [lane[0].position, lane[lane.len() - 1].position]);
         let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
@@ -35,7 +35,7 @@ pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> C
         });
         let part = &mut parts[index];
         part.waypoints += photos.len() as u32;
-        part.path.extend(stops.iter().map(|stop| stop.position));
+        part.path.extend(points.iter().map(|point| point.position));
         part.lanes.extend(lanes);
     }
     parts.sort_by_key(|part| part.vehicle);

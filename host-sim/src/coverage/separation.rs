@@ -9,7 +9,7 @@
 
 use planner_core::Point;
 
-use super::flight::Stop;
+use super::flight::FlightPoint;
 
 /// Time between two comparisons of the vehicles' planned positions, seconds.
 const COMPARISON_STEP_S: f32 = 0.25;
@@ -22,9 +22,9 @@ const MAX_GROUND_WAIT_S: f32 = 900.0;
 
 /// One planned flight; its times count from its own departure.
 pub struct DepartureFlight<'a> {
-    /// Stops of the flight.
-    pub stops: &'a [Stop],
-    /// Time at which each stop is passed, seconds after the departure.
+    /// Points of the flight.
+    pub points: &'a [FlightPoint],
+    /// Time at which each point is passed, seconds after the departure.
     pub times_s: &'a [f32],
 }
 
@@ -75,7 +75,7 @@ fn sample_positions(flight: &DepartureFlight<'_>) -> Vec<Point> {
         }
         let (from, to) = (flight.times_s[next - 1], flight.times_s[next]);
         let share = if to > from { ((time_s - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
-        flight.stops[next - 1].position.lerp(&flight.stops[next].position, share)
+        flight.points[next - 1].position.lerp(&flight.points[next].position, share)
     };
     (0..=(end_s / COMPARISON_STEP_S).ceil() as usize).map(place).collect()
 }
@@ -110,17 +110,20 @@ fn min_distance_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coverage::flight::StopAction;
+    use crate::coverage::flight::PointAction;
 
-    fn flight(places: &[[f32; 3]]) -> (Vec<Stop>, Vec<f32>) {
-        let stop =
-            |p: &[f32; 3]| Stop { position: Point::from(*p), action: StopAction::Lane, lane: None };
-        let stops: Vec<Stop> = places.iter().map(stop).collect();
+    fn flight(places: &[[f32; 3]]) -> (Vec<FlightPoint>, Vec<f32>) {
+        let point = |p: &[f32; 3]| FlightPoint {
+            position: Point::from(*p),
+            action: PointAction::Lane,
+            lane: None,
+        };
+        let points: Vec<FlightPoint> = places.iter().map(point).collect();
         let mut times = vec![0.0];
-        for pair in stops.windows(2) {
+        for pair in points.windows(2) {
             times.push(times[times.len() - 1] + (pair[1].position - pair[0].position).norm() / 5.0);
         }
-        (stops, times)
+        (points, times)
     }
 
     #[test]
@@ -128,8 +131,10 @@ mod tests {
         let long =
             flight(&[[0.0, 0.0, 0.0], [0.0, 0.0, 30.0], [100.0, 0.0, 30.0], [0.0, 9.0, 30.0]]);
         let beside = flight(&[[0.0, 3.0, 0.0], [0.0, 1.0, 30.0], [100.0, 1.0, 30.0]]);
-        let timed =
-            |f: &'static (Vec<Stop>, Vec<f32>)| DepartureFlight { stops: &f.0, times_s: &f.1 };
+        let timed = |f: &'static (Vec<FlightPoint>, Vec<f32>)| DepartureFlight {
+            points: &f.0,
+            times_s: &f.1,
+        };
         let (long, beside) = (&*Box::leak(Box::new(long)), &*Box::leak(Box::new(beside)));
         let (departures_s, least_m) =
             plan_departures(&[timed(beside), timed(long)], 2.0).expect("they can wait");

@@ -19,7 +19,7 @@ use planner_core::coverage::pack::Route;
 use sim_autopilot::VehicleLimits;
 
 use super::CoveragePlan;
-use super::flight::StopAction;
+use super::flight::PointAction;
 pub use super::planned::Sortie;
 use crate::scenario;
 
@@ -65,12 +65,12 @@ pub fn route_duration_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
 /// at the corners at which its path rises or falls, seconds.
 fn terrain_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let vehicle = &planned.vehicles[usize::from(route.vehicle)];
-    let stops = super::flight::route_stops(planned, route);
-    let ups = stops.windows(2).map(|pair| match pair[1].position.z - pair[0].position.z {
+    let points = super::flight::route_points(planned, route);
+    let ups = points.windows(2).map(|pair| match pair[1].position.z - pair[0].position.z {
         up_m if up_m > 0.0 => up_m / vehicle.climb_mps,
         down_m => -down_m / vehicle.descend_mps,
     });
-    let corners = stops.iter().filter(|stop| stop.action == StopAction::Lane).count() as f32;
+    let corners = points.iter().filter(|point| point.action == PointAction::Lane).count() as f32;
     ups.sum::<f32>() + corners * vehicle.cruise_mps / PLANNED_ACCEL_MPS2
 }
 

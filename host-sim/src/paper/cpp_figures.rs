@@ -100,8 +100,9 @@ fn route_map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
             own.map_or((0.0, 0.0), |(sortie, _, _)| (sortie.route.cost_m, sortie.route.cost_s));
         costs.push(cost_m);
         most_s = most_s.max(cost_s);
-        let path = own
-            .map_or(Vec::new(), |(_, stops, _)| stops.iter().map(|stop| stop.position).collect());
+        let path = own.map_or(Vec::new(), |(_, points, _)| {
+            points.iter().map(|point| point.position).collect()
+        });
         MapRoute { vehicle: vehicle.id, start: vehicle.start, path }
     };
     let routes = vehicles.map(route).collect();
