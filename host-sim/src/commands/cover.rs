@@ -158,7 +158,7 @@ pub(crate) fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindin
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;
     let makespan_s = planned.sorties.iter().map(Sortie::end_s).fold(0.0, f32::max);
-    let least_m = planned.least_separation_m;
+    let least_m = planned.closest_approach_m;
     CoverResult {
         command: "cover",
         scenario: scenario.path.clone(),

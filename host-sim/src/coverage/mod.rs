@@ -122,7 +122,7 @@ impl<'a> CoveragePlan<'a> {
             tracks,
             transit,
             sorties: Vec::new(),
-            least_separation_m: f32::INFINITY,
+            closest_approach_m: f32::INFINITY,
             plan,
             shares,
             lower_bound_s,
@@ -237,7 +237,7 @@ impl<'a> CoveragePlan<'a> {
                     self.area_settings.place
                 );
             };
-            self.least_separation_m = self.least_separation_m.min(least_m);
+            self.closest_approach_m = self.closest_approach_m.min(least_m);
             let own = self.sorties.iter_mut().filter(|sortie| sortie.number == round[0].0.number);
             let mut end_s = begin_s;
             for (sortie, depart_s) in own.zip(departures_s) {

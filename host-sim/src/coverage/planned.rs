@@ -68,7 +68,7 @@ pub struct CoveragePlan<'a> {
     /// All sorties, by round: one for each battery; without `batteries` one for each route.
     pub sorties: Vec<Sortie>,
     /// Least planned distance between two vehicles, metres; infinite for a single vehicle.
-    pub least_separation_m: f32,
+    pub closest_approach_m: f32,
     /// Computing times of lanes, of ways around no-fly zones, and of routes, seconds.
     pub computing_s: [f64; 3],
 }
