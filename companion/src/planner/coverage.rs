@@ -300,7 +300,7 @@ pub fn plan_flights<
         HeadingRule::Sweep => HeadingMode::Fixed(libm::atan2f(along.y, along.x)),
         HeadingRule::Lane => HeadingMode::Ahead,
     };
-    let swarm = FlightInputs {
+    let flight_inputs = FlightInputs {
         pads: &pads,
         capture: CaptureSettings {
             waypoint_m: header.spacing.waypoint_m,
@@ -317,7 +317,7 @@ pub fn plan_flights<
     flights::plan_flights(
         &work,
         &ws.routes,
-        &FlightInputs { photographed: done, ..swarm },
+        &FlightInputs { photographed: done, ..flight_inputs },
         schedule,
         out,
     )?;
@@ -329,7 +329,7 @@ pub fn plan_flights<
             let fate = VehicleStatus { alive: input.alive, along_m: input.along_m() };
             fates.push(fate).map_err(|_| CoverageError::Vehicles)?;
         }
-        let loss = Loss { work: &whole, swarm: &swarm, fates: &fates };
+        let loss = Loss { work: &whole, flight_inputs: &flight_inputs, fates: &fates };
         losses::redivide_work(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
     }
     Ok(())

@@ -45,7 +45,7 @@ const SCHEDULE: ScheduleConfig = ScheduleConfig {
     vertical_mps: DESCEND_MPS,
 };
 /// Flight settings for lanes 10 m apart; its list of pads is empty, to be filled in.
-pub(super) const SWARM: FlightInputs<'static> = FlightInputs {
+pub(super) const FLIGHT_INPUTS: FlightInputs<'static> = FlightInputs {
     pads: &[],
     capture: CaptureSettings {
         waypoint_m: 10.0,
@@ -339,11 +339,11 @@ fn measure_division(
     };
     losses.start_plan(tracks, &transit, &[]).expect("nothing is done");
     pack::binpat(&work, pack, routes).expect("routes");
-    let manner = CaptureSettings { waypoint_m: case.lane_m, ..SWARM.capture };
-    let swarm = FlightInputs { pads: &pads, capture: manner, ..SWARM };
+    let manner = CaptureSettings { waypoint_m: case.lane_m, ..FLIGHT_INPUTS.capture };
+    let flight_inputs = FlightInputs { pads: &pads, capture: manner, ..FLIGHT_INPUTS };
     meter
         .call(flights_name, size_of_val(schedule), || {
-            flights::plan_flights(&work, routes, &swarm, schedule, out)
+            flights::plan_flights(&work, routes, &flight_inputs, schedule, out)
         })
         .expect("flights");
     add_to_checksum(sum, out);
@@ -352,7 +352,7 @@ fn measure_division(
     let fate =
         |k: usize| VehicleStatus { alive: k > 0, along_m: 0.5 * out.flights[k].path.length_m() };
     let fates: Vec<VehicleStatus, VEHICLES> = (0..case.count).map(fate).collect();
-    let loss = Loss { work: &work, swarm: &swarm, fates: &fates };
+    let loss = Loss { work: &work, flight_inputs: &flight_inputs, fates: &fates };
     meter
         .call(again_name, bytes, || {
             losses::redivide_work(&loss, losses, pack, schedule, routes, out)

@@ -66,7 +66,7 @@ const PADS: [Pad; VEHICLES] = [
     Pad { id: 2, start: Point::new(5.0, -5.0, 1.5), ..PAD },
     Pad { id: 3, start: Point::new(15.0, -5.0, 1.5), ..PAD },
 ];
-const SWARM: FlightInputs<'_> = FlightInputs {
+const FLIGHT_INPUTS: FlightInputs<'_> = FlightInputs {
     pads: &PADS,
     capture: CaptureSettings {
         waypoint_m: 10.0,
@@ -74,7 +74,7 @@ const SWARM: FlightInputs<'_> = FlightInputs {
         trigger: Trigger::None,
     },
     max_gates: GATES,
-    ..coverage_flights::SWARM
+    ..coverage_flights::FLIGHT_INPUTS
 };
 
 /// Makes all calls on coverage: areas and lanes, flights, divisions, detours home.
@@ -113,52 +113,59 @@ fn call_flight_plans(
 ) {
     let mut plan = |work: &Work<'_, LANES, CORNERS>,
                     routes: &Plan<VEHICLES>,
-                    swarm: &FlightInputs<'_>| {
-        let result = to
-            .call("flights::plan_flights", || flights::plan_flights(work, routes, swarm, ws, out));
+                    flight_inputs: &FlightInputs<'_>| {
+        let result = to.call("flights::plan_flights", || {
+            flights::plan_flights(work, routes, flight_inputs, ws, out)
+        });
         to.add_bool(result.is_ok());
-        assert!(result.is_err() || is_finite(out), "{swarm:?}");
+        assert!(result.is_err() || is_finite(out), "{flight_inputs:?}");
         result
     };
-    assert_eq!(plan(good, routes, &SWARM), Ok(()));
+    assert_eq!(plan(good, routes, &FLIGHT_INPUTS), Ok(()));
     for hard in HARD_NUMBERS {
         for heights in
             [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }]
         {
-            let planned = plan(&Work { heights, ..*good }, routes, &SWARM);
+            let planned = plan(&Work { heights, ..*good }, routes, &FLIGHT_INPUTS);
             assert_eq!(matches!(planned, Err(PlanError::Config(_))), !is_good(hard));
         }
         call_hard_vehicles(&mut plan, good, routes, hard);
         for look in [HeadingMode::Ahead, HeadingMode::Fixed(hard)] {
             for clearance_m in [10.0, hard] {
-                let manner =
-                    CaptureSettings { waypoint_m: hard, heading_mode: look, ..SWARM.capture };
-                let planned =
-                    plan(good, routes, &FlightInputs { capture: manner, clearance_m, ..SWARM });
+                let manner = CaptureSettings {
+                    waypoint_m: hard,
+                    heading_mode: look,
+                    ..FLIGHT_INPUTS.capture
+                };
+                let planned = plan(
+                    good,
+                    routes,
+                    &FlightInputs { capture: manner, clearance_m, ..FLIGHT_INPUTS },
+                );
                 assert!(is_good(hard) || planned.is_err());
             }
         }
-        let schedule = ScheduleConfig { separation_m: hard, ..SWARM.schedule };
-        let planned = plan(good, routes, &FlightInputs { schedule, ..SWARM });
+        let schedule = ScheduleConfig { separation_m: hard, ..FLIGHT_INPUTS.schedule };
+        let planned = plan(good, routes, &FlightInputs { schedule, ..FLIGHT_INPUTS });
         assert!(is_good(hard) || matches!(planned, Err(PlanError::Config(_))));
     }
     let pads = [PADS[0], PADS[0], PADS[2]];
     assert_eq!(
-        plan(good, routes, &FlightInputs { pads: &pads, ..SWARM }),
+        plan(good, routes, &FlightInputs { pads: &pads, ..FLIGHT_INPUTS }),
         Err(PlanError::SameId(1))
     );
     assert_eq!(
-        plan(good, routes, &FlightInputs { pads: &PADS[1..], ..SWARM }),
+        plan(good, routes, &FlightInputs { pads: &PADS[1..], ..FLIGHT_INPUTS }),
         Err(PlanError::Terminals)
     );
     let ranges = [WaypointRange { first: 4, end: 9 }, WaypointRange { first: 8, end: u32::MAX }];
-    let planned = plan(good, routes, &FlightInputs { photographed: &ranges, ..SWARM });
+    let planned = plan(good, routes, &FlightInputs { photographed: &ranges, ..FLIGHT_INPUTS });
     assert_eq!(planned, Err(PlanError::Terminals));
     for done in [&ranges[..1], &ranges[1..]] {
-        let _ = plan(good, routes, &FlightInputs { photographed: done, ..SWARM });
+        let _ = plan(good, routes, &FlightInputs { photographed: done, ..FLIGHT_INPUTS });
     }
     for (max_gates, held_layers) in [(0, 0), (usize::MAX, u64::MAX)] {
-        let _ = plan(good, routes, &FlightInputs { max_gates, held_layers, ..SWARM });
+        let _ = plan(good, routes, &FlightInputs { max_gates, held_layers, ..FLIGHT_INPUTS });
     }
     unusual_routes(&mut plan, good, routes);
     call_field_plans(&mut plan, good, routes);
@@ -179,7 +186,7 @@ fn call_hard_vehicles(
         Vehicle { descend_mps: hard, ..vehicle },
     ] {
         let vehicles = [FLEET[0], vehicle, FLEET[2]];
-        let planned = plan(&Work { vehicles: &vehicles, ..*good }, routes, &SWARM);
+        let planned = plan(&Work { vehicles: &vehicles, ..*good }, routes, &FLIGHT_INPUTS);
         assert!(hard.is_finite() || planned == Err(PlanError::BadTask(2)));
     }
     let pad = PADS[1];
@@ -191,7 +198,7 @@ fn call_hard_vehicles(
         Pad { start: Point::new(hard, hard, 30.0), climb_m: 0.0, airborne: true, ..pad },
     ] {
         let pads = [PADS[0], pad, PADS[2]];
-        let planned = plan(good, routes, &FlightInputs { pads: &pads, ..SWARM });
+        let planned = plan(good, routes, &FlightInputs { pads: &pads, ..FLIGHT_INPUTS });
         assert!(hard.is_finite() || planned == Err(PlanError::BadTask(2)));
     }
 }
@@ -213,20 +220,20 @@ fn unusual_routes(
     ] {
         let mut routes = routes.clone();
         routes.routes[0] = route;
-        assert_eq!(plan(good, &routes, &SWARM), Err(PlanError::Terminals));
+        assert_eq!(plan(good, &routes, &FLIGHT_INPUTS), Err(PlanError::Terminals));
     }
     for (heading, layer) in [(RouteDirection::Backward, 0), (RouteDirection::Forward, u8::MAX)] {
         let mut routes = routes.clone();
         routes.routes[0] = Route { heading, layer, ..first };
-        let _ = plan(good, &routes, &SWARM);
+        let _ = plan(good, &routes, &FLIGHT_INPUTS);
     }
     let aloft = PADS.map(|pad| Pad {
         start: pad.start + Point::new(0.0, 0.0, 40.0),
         airborne: true,
         ..pad
     });
-    assert_eq!(plan(good, &Plan::new(), &FlightInputs { pads: &aloft, ..SWARM }), Ok(()));
-    assert_eq!(plan(good, &Plan::new(), &SWARM), Ok(()));
+    assert_eq!(plan(good, &Plan::new(), &FlightInputs { pads: &aloft, ..FLIGHT_INPUTS }), Ok(()));
+    assert_eq!(plan(good, &Plan::new(), &FLIGHT_INPUTS), Ok(()));
 }
 
 /// Plans flights above a height field, with extreme settings for terrain following.
@@ -245,7 +252,8 @@ fn call_field_plans(
             TerrainFollowing { tolerance_m: hard, ..usual },
             TerrainFollowing { slope: hard, ..usual },
         ] {
-            let _ = plan(good, routes, &FlightInputs { following: Some(following), ..SWARM });
+            let _ =
+                plan(good, routes, &FlightInputs { following: Some(following), ..FLIGHT_INPUTS });
         }
     }
 }
@@ -293,10 +301,10 @@ fn call_divisions(
                 [&[fate, hit, fate][..], &[hit; VEHICLES], &[lost, hit, lost], &[hit, fate], &[]]
             {
                 memory.losses.start_plan(good.tracks, good.transit, &[]).expect("nothing is done");
-                flights::plan_flights(good, routes, &SWARM, memory.schedule, memory.out)
+                flights::plan_flights(good, routes, &FLIGHT_INPUTS, memory.schedule, memory.out)
                     .expect("as before");
                 let mut routes = routes.clone();
-                let loss = Loss { work: good, swarm: &SWARM, fates };
+                let loss = Loss { work: good, flight_inputs: &FLIGHT_INPUTS, fates };
                 let divided = call_redivide(to, &loss, memory, &mut routes);
                 assert!(fates.len() == VEHICLES || divided == Err(CoverageError::Vehicles.into()));
                 let setting = Err(CoverageError::SettingOutOfRange("along_m").into());

@@ -99,24 +99,24 @@ pub fn plan_flights<
 >(
     work: &Work<'_, L, N>,
     routes: &Plan<K>,
-    swarm: &FlightInputs<'_>,
+    inputs: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
-    check_inputs(work, &routes.routes, swarm)?;
+    check_inputs(work, &routes.routes, inputs)?;
     out.flights.clear();
     let used = |layer: u8| routes.routes.iter().any(|route| route.layer == layer);
-    let mut layers = free_layers(swarm.held_layers).filter(|layer| !used(*layer));
-    for (index, pad) in swarm.pads.iter().enumerate() {
+    let mut layers = free_layers(inputs.held_layers).filter(|layer| !used(*layer));
+    for (index, pad) in inputs.pads.iter().enumerate() {
         let flight = match routes.routes.iter().find(|route| usize::from(route.vehicle) == index) {
-            Some(route) => route_flight(work, route, swarm, pad),
+            Some(route) => route_flight(work, route, inputs, pad),
             None if pad.airborne => {
                 // Cannot fail: there are more layers than vehicles.
                 flight_home(
                     work,
                     layers.next().unwrap_or(u8::MAX),
                     &work.vehicles[index],
-                    swarm,
+                    inputs,
                     pad,
                 )
             }
@@ -125,13 +125,19 @@ pub fn plan_flights<
         let flight = flight.map_err(|e| PlanError::Path(pad.id, e))?;
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
-    let most_gates = schedule_departures(swarm, ws, out)?;
-    let crowded = |index: &usize| most_gates[*index] as usize > swarm.max_gates;
+    let most_gates = schedule_departures(inputs, ws, out)?;
+    let crowded = |index: &usize| most_gates[*index] as usize > inputs.max_gates;
     for (index, flight) in out.flights.iter().enumerate().filter(|(index, _)| crowded(index)) {
-        schedule::gate_merge_distance_m(&swarm.schedule, &out.flights, index, swarm.max_gates, ws)
-            .map_err(|e| PlanError::Schedule(flight.id, e))?;
+        schedule::gate_merge_distance_m(
+            &inputs.schedule,
+            &out.flights,
+            index,
+            inputs.max_gates,
+            ws,
+        )
+        .map_err(|e| PlanError::Schedule(flight.id, e))?;
     }
-    out.set_crc(&swarm.schedule);
+    out.set_crc(&inputs.schedule);
     Ok(())
 }
 
@@ -139,13 +145,13 @@ pub fn plan_flights<
 fn check_inputs<const L: usize, const N: usize>(
     work: &Work<'_, L, N>,
     routes: &[Route],
-    swarm: &FlightInputs<'_>,
+    inputs: &FlightInputs<'_>,
 ) -> Result<(), PlanError> {
-    swarm.schedule.check().map_err(PlanError::Config)?;
+    inputs.schedule.check().map_err(PlanError::Config)?;
     let settings = [
         ("mission_m", work.heights.mission_m),
         ("layer_m", work.heights.layer_m),
-        ("waypoint_m", swarm.capture.waypoint_m),
+        ("waypoint_m", inputs.capture.waypoint_m),
     ];
     crate::all_positive(&settings).map_err(PlanError::Config)?;
     let all = work.tracks.waypoint_count();
@@ -154,13 +160,13 @@ fn check_inputs<const L: usize, const N: usize>(
             && route.end <= all
             && usize::from(route.vehicle) < work.vehicles.len()
     };
-    if swarm.pads.len() != work.vehicles.len()
+    if inputs.pads.len() != work.vehicles.len()
         || !routes.iter().all(within)
-        || !divide::is_sorted_disjoint(swarm.photographed)
+        || !divide::is_sorted_disjoint(inputs.photographed)
     {
         return Err(PlanError::Terminals);
     }
-    for (index, (pad, vehicle)) in swarm.pads.iter().zip(work.vehicles).enumerate() {
+    for (index, (pad, vehicle)) in inputs.pads.iter().zip(work.vehicles).enumerate() {
         let speeds = [
             ("cruise_mps", vehicle.cruise_mps),
             ("climb_mps", vehicle.climb_mps),
@@ -179,7 +185,7 @@ fn check_inputs<const L: usize, const N: usize>(
         {
             return Err(PlanError::BadTask(pad.id));
         }
-        if swarm.pads[..index].iter().any(|other| other.id == pad.id) {
+        if inputs.pads[..index].iter().any(|other| other.id == pad.id) {
             return Err(PlanError::SameId(pad.id));
         }
     }
@@ -195,11 +201,11 @@ pub(super) fn free_layers(held: u64) -> impl Iterator<Item = u8> {
 /// before it allow. One for which they leave no take-off time is moved to the front, and all are
 /// scheduled again. Returns an upper bound of each vehicle's number of gates.
 fn schedule_departures<const V: usize, const W: usize>(
-    swarm: &FlightInputs<'_>,
+    inputs: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<[u32; V], PlanError> {
-    let cfg = &swarm.schedule;
+    let cfg = &inputs.schedule;
     let mut order: Vec<(bool, f32, u16), V> = Vec::new();
     for (flight, i) in out.flights.iter().zip(0..) {
         // Cannot overflow: one entry per flight.
@@ -295,7 +301,7 @@ fn lane_part_of_route(lane: &Lane, route: &Route) -> (u32, u32) {
 fn heading_mode<const L: usize, const N: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
-    swarm: &FlightInputs<'_>,
+    inputs: &FlightInputs<'_>,
 ) -> HeadingMode {
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
     let alone = |lane: usize| {
@@ -305,7 +311,7 @@ fn heading_mode<const L: usize, const N: usize>(
         )
     };
     let along = work.tracks.lane_direction();
-    match swarm.capture.heading_mode {
+    match inputs.capture.heading_mode {
         HeadingMode::Ahead if lanes.into_iter().any(alone) => {
             HeadingMode::Fixed(libm::atan2f(along.y, along.x))
         }
@@ -317,13 +323,13 @@ fn heading_mode<const L: usize, const N: usize>(
 fn route_flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
-    swarm: &FlightInputs<'_>,
+    inputs: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
     let mut most = work.tracks.lane_of(route.end - 1) - work.tracks.lane_of(route.first) + 1;
     loop {
         let mut laid = 0;
-        let error = match partial_route_flight(work, route, swarm, pad, (most, &mut laid)) {
+        let error = match partial_route_flight(work, route, inputs, pad, (most, &mut laid)) {
             Ok(flight) if flight.path.length_m() <= MAX_PATH_LENGTH_M => return Ok(flight),
             Ok(flight) => {
                 laid = (most as f32 * MAX_PATH_LENGTH_M / flight.path.length_m()) as usize;
@@ -344,15 +350,18 @@ fn route_flight<const L: usize, const N: usize, const W: usize>(
 fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
-    swarm: &FlightInputs<'_>,
+    inputs: &FlightInputs<'_>,
     pad: &Pad,
     (most, laid): (usize, &mut usize),
 ) -> Result<Flight<W>, PathError> {
     let vehicle = &work.vehicles[usize::from(route.vehicle)];
-    let CaptureSettings { waypoint_m, trigger, .. } = swarm.capture;
-    let look = heading_mode(work, route, swarm);
-    let done =
-        swarm.photographed.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add);
+    let CaptureSettings { waypoint_m, trigger, .. } = inputs.capture;
+    let look = heading_mode(work, route, inputs);
+    let done = inputs
+        .photographed
+        .iter()
+        .map(|range| range.end - range.first)
+        .fold(0, u32::saturating_add);
     let area = work.tracks.waypoint_count().saturating_add(done);
     let backward = route.heading == RouteDirection::Backward;
     let mut photographs = PicturePlan::new(waypoint_m, look, trigger).with_area(area, backward);
@@ -360,7 +369,7 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
     let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);
     let mut draft =
-        FlightPathBuilder::new(work.transit, swarm.clearance_m, swarm.following, pad.start);
+        FlightPathBuilder::new(work.transit, inputs.clearance_m, inputs.following, pad.start);
     draft.add_straight_leg(pad.start)?;
     draft.add_straight_leg(point_at_height(&vehicle.place, layer_m))?;
     draft.add_legs_around_zones(&place(route.end_waypoints().0)?, layer_m)?;
@@ -371,7 +380,7 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
         let lane = if backward { high - (lane - low) } else { lane };
         let Some(lane) = work.tracks.lanes().get(lane) else { continue };
         let (begin, end) = lane_part_of_route(lane, route);
-        let first = divide::original_waypoint_number(swarm.photographed, begin);
+        let first = divide::original_waypoint_number(inputs.photographed, begin);
         let waypoints = WaypointRange { first, end: first.saturating_add(end + 1 - begin) };
         let (begin, end) = if backward { (end, begin) } else { (begin, end) };
         let (begin, end) = (place(begin)?, place(end)?);
@@ -383,7 +392,7 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
         photographs.add_stretch(from, to, waypoints)?;
         *laid += 1;
     }
-    finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, swarm, pad)
+    finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, inputs, pad)
 }
 
 /// The flight home of a vehicle in the air without a route; it takes no pictures.
@@ -391,16 +400,16 @@ fn flight_home<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     layer: u8,
     vehicle: &Vehicle,
-    swarm: &FlightInputs<'_>,
+    inputs: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
-    let CaptureSettings { waypoint_m, heading_mode: look, trigger } = swarm.capture;
+    let CaptureSettings { waypoint_m, heading_mode: look, trigger } = inputs.capture;
     let layer_m = work.heights.mission_m + f32::from(layer) * work.heights.layer_m;
     let mut draft =
-        FlightPathBuilder::new(work.transit, swarm.clearance_m, swarm.following, pad.start);
+        FlightPathBuilder::new(work.transit, inputs.clearance_m, inputs.following, pad.start);
     draft.add_straight_leg(pad.start)?;
     let photographs = PicturePlan::new(waypoint_m, look, trigger);
-    finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, swarm, pad)
+    finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, inputs, pad)
 }
 
 /// Inputs for the end of a flight, from the last lane to home.
@@ -416,7 +425,7 @@ struct ReturnInputs<'a> {
 fn finish_with_return<const N: usize, const W: usize>(
     mut draft: FlightPathBuilder<'_, N, W>,
     way_home: &ReturnInputs<'_>,
-    swarm: &FlightInputs<'_>,
+    inputs: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
     let ReturnInputs { layer_m, vehicle, .. } = *way_home;
@@ -428,7 +437,7 @@ fn finish_with_return<const N: usize, const W: usize>(
         let z_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
         leg_duration_s(way_m, vehicle.cruise_mps) + leg_duration_s(libm::fabsf(up_m), z_mps)
     };
-    draft.path.set_times_by_leg(pad.climb_m / swarm.schedule.vertical_mps, seconds);
+    draft.path.set_times_by_leg(pad.climb_m / inputs.schedule.vertical_mps, seconds);
     let mut flight = Flight {
         id: pad.id,
         task: Task::Photograph(way_home.photographs),

@@ -106,7 +106,7 @@ pub struct Loss<'a, const L: usize, const N: usize> {
     /// The lanes of the whole area and all vehicles, as before any loss.
     pub work: &'a Work<'a, L, N>,
     /// Pads and settings with which the flights before the loss were planned.
-    pub swarm: &'a FlightInputs<'a>,
+    pub flight_inputs: &'a FlightInputs<'a>,
     /// Status of each vehicle, in the order of [`Work::vehicles`].
     pub fates: &'a [VehicleStatus],
 }
@@ -154,10 +154,10 @@ pub fn redivide_work<
     routes: &mut Plan<K>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), Error> {
-    let Loss { work, swarm, fates } = *loss;
+    let Loss { work, flight_inputs, fates } = *loss;
     let known = |route: &Route| usize::from(route.vehicle) < fates.len();
     if fates.len() != work.vehicles.len()
-        || swarm.pads.len() != fates.len()
+        || flight_inputs.pads.len() != fates.len()
         || out.flights.len() != fates.len()
         || !routes.routes.iter().all(known)
     {
@@ -178,16 +178,16 @@ pub fn redivide_work<
         Err(error) => return Err(error.into()),
     }
     let work = Work { tracks: &ws.remaining, vehicles: &ws.vehicles, ..*work };
-    let swarm = FlightInputs {
+    let flight_inputs = FlightInputs {
         pads: &ws.pads,
         photographed: ws.done.ranges(),
         held_layers: ws.held_layers,
-        ..*swarm
+        ..*flight_inputs
     };
     let mut exchanges = routes.routes.len().min(MAX_EXCHANGES + 1);
     loop {
         exchanges = exchanges.saturating_sub(1);
-        match flights::plan_flights(&work, routes, &swarm, schedule, out) {
+        match flights::plan_flights(&work, routes, &flight_inputs, schedule, out) {
             // Two vehicles that hold close to each other may each bar the other's path.
             Err(PlanError::Schedule(_, ScheduleError::Blocked)) if exchanges > 0 => {
                 exchange_routes(&work, routes)?;
@@ -254,10 +254,10 @@ fn set_start_places<
     ws: &mut Workspace<L, K>,
     before: &SwarmPlan<V, W>,
 ) -> Result<(), CoverageError> {
-    let Loss { work, swarm, fates } = *loss;
+    let Loss { work, flight_inputs, fates } = *loss;
     ws.vehicles.clear();
     ws.pads.clear();
-    for (index, (vehicle, pad)) in work.vehicles.iter().zip(swarm.pads).enumerate() {
+    for (index, (vehicle, pad)) in work.vehicles.iter().zip(flight_inputs.pads).enumerate() {
         let (mut vehicle, mut pad) = (*vehicle, *pad);
         let (fate, flight) = (&fates[index], &before.flights[index]);
         pad.airborne =
