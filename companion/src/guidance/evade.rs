@@ -34,12 +34,12 @@ const MAX_PLACES: u16 = 48;
 /// [`PLACE_COST`] for each place.
 const MAX_SEARCH_COST: u16 = 96;
 const PLACE_COST: u16 = 4;
-/// Greatest speed back along a straight leg, m/s.
-const MAX_LEG_MPS: f32 = 1.5;
-/// Greatest speed back through a waypoint, m/s: at this speed the vehicle deviates from a right
+/// Greatest speed backward along a straight segment of the own path, m/s.
+const MAX_EVADE_MPS: f32 = 1.5;
+/// Greatest speed backward through a waypoint, m/s: at this speed the vehicle deviates from a right
 /// angle by 0.47 m.
 const MAX_CORNER_MPS: f32 = 0.6;
-/// Acceleration back along the path, m/s².
+/// Acceleration backward along the path, m/s².
 const EVADE_MPS2: f32 = 1.0;
 /// Deceleration of a vehicle that still flies forward, before it turns back, m/s².
 const BRAKING_MPS2: f32 = 1.5;
@@ -152,7 +152,7 @@ pub fn step_back<const W: usize>(
     let ahead =
         allowed(MAX_CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
     // `speed_mps` is positive forward along the path, and negative on the way back.
-    let speed = ahead.min(MAX_LEG_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));
+    let speed = ahead.min(MAX_EVADE_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));
     tracker.speed_mps = -speed;
     tracker.along_m = (tracker.along_m - speed * dt_s).max(to_m);
     point_at(path, tracker)

@@ -13,9 +13,9 @@ use crate::config::Config;
 pub const MAX_JERK_MPS3: f32 = 4.0;
 /// Greatest jerk of a setpoint while the safety filter stops the vehicle, m/s³.
 pub const MAX_URGENT_JERK_MPS3: f32 = 8.0;
-/// Greatest acceleration of a setpoint as a multiple of the nominal one, unless the autopilot's
-/// limit is lower.
-const MAX_CORNER_ACCEL_SHARE: f32 = 1.5;
+/// Greatest acceleration of a setpoint as a multiple of the reference's, which corners need, unless
+/// the autopilot's limit is lower.
+const MAX_SETPOINT_ACCEL_FACTOR: f32 = 1.5;
 
 /// Longest window of the smoother's moving averages, seconds: where a low limit of jerk would need
 /// a longer one, the acceleration is lowered.
@@ -66,7 +66,7 @@ impl MotionLimits {
             accel_mps2: fminf(accel_mps2, across_mps2),
             accel_z_mps2: fminf(accel_mps2, vertical_mps2),
             max_accel_mps2: [across_mps2, vertical_mps2]
-                .map(|most| fminf(MAX_CORNER_ACCEL_SHARE * accel_mps2, most)),
+                .map(|most| fminf(MAX_SETPOINT_ACCEL_FACTOR * accel_mps2, most)),
             jerk_mps3,
         }
     }
