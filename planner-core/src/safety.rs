@@ -383,8 +383,8 @@ impl NeighbourMotion<'_> {
         0.5 * bounds.braking.accel_mps2 * self.data_age_s() * self.data_age_s()
     }
 
-    /// Set of places where the neighbour can be until it has stopped; along its points also where
-    /// it can be within `ahead_s` more seconds.
+    /// Set of places where the neighbour can be until it has stopped. Along its points it flies on
+    /// for `ahead_s` seconds before it brakes.
     pub fn reachable_set(&self, bounds: &MotionBounds, ahead_s: f32) -> ReachableSet {
         let mut set = ReachableSet::at(self.position);
         if self.grounded {

@@ -240,7 +240,7 @@ impl Flight {
         self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
         bytes.clear();
         self.bytes = bytes;
-        self.neighbour();
+        self.report_honest_neighbour();
         attack(self);
         if self.companion.poll_timeout().is_some_and(|due| due <= self.now) {
             self.companion.handle_timeout(self.now);
@@ -253,7 +253,7 @@ impl Flight {
 
     /// An honest neighbour that stands on its pad reports its intent and position, five times a
     /// second.
-    fn neighbour(&mut self) {
+    fn report_honest_neighbour(&mut self) {
         if !(self.now.as_micros() / 25_000).is_multiple_of(8) {
             return;
         }
@@ -263,10 +263,10 @@ impl Flight {
             progress_m: -3.0,
             ..intent()
         };
-        self.give_neighbour(&intent, &place);
+        self.deliver_neighbour_report(&intent, &place);
     }
 
-    fn give_neighbour(&mut self, intent: &Intent, place: &Point) {
+    fn deliver_neighbour_report(&mut self, intent: &Intent, place: &Point) {
         let geodetic = frames::enu_to_geodetic(&ORIGIN, place);
         let data = GLOBAL_POSITION_INT_DATA {
             time_boot_ms: self.now.as_boot_ms(),

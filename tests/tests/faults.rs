@@ -134,7 +134,9 @@ fn fly(mission: &Mission, plan: &SwarmPlan) -> Flight {
 /// What came of one flight; whatever must not be is a text in `wrong`.
 struct Outcome {
     complete: bool,
+    /// Events in which a falling vehicle hits another.
     hit: usize,
+    /// Events in which two vehicles come nearer than the safety distance.
     too_near: usize,
     notes: Vec<String>,
     wrong: Vec<String>,

@@ -204,7 +204,8 @@ impl Guidance {
         Some(reference.position)
     }
 
-    /// Whether the raw point has reached the end of its straight leg.
+    /// Whether the raw point has reached the end of its straight leg: of a climb, a join or a
+    /// descent.
     pub(super) fn is_leg_done(&self) -> bool {
         self.leg.as_ref().is_some_and(|leg| self.leg_tracker.along_m >= leg.length_m())
     }

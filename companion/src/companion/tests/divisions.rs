@@ -284,7 +284,7 @@ proptest::proptest! {
     }
 }
 
-/// Another vehicle that is silent keeps none above its pad that was ordered home.
+/// A vehicle that was ordered home lands on its pad although another one is silent.
 #[test]
 fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
     for run_s in [3.0, 5.0, 7.0] {

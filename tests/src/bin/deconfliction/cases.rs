@@ -16,7 +16,7 @@ const RESOLUTION_M: f32 = 0.25;
 /// Edge of a map cell in the map with a doorway 1.6 m wide, metres.
 const DOORWAY_RESOLUTION_M: f32 = 0.2;
 /// Height of starts and goals above the top of the floor, metres.
-const HEIGHT_M: f32 = 1.5;
+const START_GOAL_HEIGHT_M: f32 = 1.5;
 /// TOML of the gusts of every case: those that missions are planned for.
 pub const GUSTS: &str = "gust_mps = 3.0\n";
 
@@ -137,7 +137,7 @@ fn indoors() -> Meeting {
 
 /// All meetings; their maps are written to `dir`.
 pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
-    let z = RESOLUTION_M + HEIGHT_M;
+    let z = RESOLUTION_M + START_GOAL_HEIGHT_M;
     let ends = [Point::new(1.5, 2.0, z), Point::new(28.5, 2.0, z)];
     let corridor = Meeting {
         cases: three([

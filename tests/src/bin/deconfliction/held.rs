@@ -98,7 +98,7 @@ pub fn cause(
     let ground = over - Point::new(0.0, 0.0, plan.flights[held].descent_m);
     let others: Vec<Ball> = (0..flight.tracks.len())
         .filter(|i| *i != held && *i != struck.index)
-        .filter_map(|i| place_at(&flight.tracks[i], left_s))
+        .filter_map(|i| first_place_since(&flight.tracks[i], left_s))
         .map(|place| (place, apart_m))
         .collect();
     let lies = flight.tracks[struck.index].last().map(|(_, place)| (*place, apart_m));
@@ -141,7 +141,8 @@ fn gave_up(track: &[(f32, Point)]) -> Option<(f32, Point)> {
     track.iter().rev().find(|(_, place)| place.z > rest.z + ALOFT_M).or(track.last()).copied()
 }
 
-fn place_at(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
+/// Place of the first sample at this time or later, or of the last sample.
+fn first_place_since(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
     let after = track.partition_point(|(at_s, _)| *at_s < t_s);
     track.get(after).or(track.last()).map(|(_, place)| *place)
 }
@@ -152,7 +153,7 @@ pub fn rest_offsets_m(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Opti
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
     let (_, rest) = track.last()?;
-    let heard = place_at(track, struck.at_s)?;
+    let heard = first_place_since(track, struck.at_s)?;
     let steps = (path.length_m() / FINE_M) as usize;
     let nearest = |to: &Point| {
         let away = |m: f32| Some((m, (path.point_at(m)? - to).xy().norm()));
@@ -173,7 +174,8 @@ fn possible_rest_places(
 ) -> Vec<Ball> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
-    let (Some(heard), Some((_, rest))) = (place_at(track, struck.at_s), track.last()) else {
+    let (Some(heard), Some((_, rest))) = (first_place_since(track, struck.at_s), track.last())
+    else {
         return Vec::new();
     };
     let steps = (path.length_m() / STEP_M) as usize;
