@@ -244,7 +244,7 @@ impl Detours {
         if came {
             let field_searches = self.area_searches;
             self.forget_plan();
-            (self.path_kind, self.area_searches) = (PathKind::PlanReturned, field_searches);
+            (self.path_kind, self.area_searches) = (PathKind::PlanReady, field_searches);
         } else {
             self.give_up_plan();
         }
@@ -375,7 +375,7 @@ impl Detours {
         let at_end = view.guidance.along_m() >= length_m - near_m;
         let astray = match self.path_kind {
             _ if self.seeks_landing() => false,
-            PathKind::Plan | PathKind::PlanReturned => self.left_plan,
+            PathKind::Plan | PathKind::PlanReady => self.left_plan,
             PathKind::Detour(DetourPurpose::Aside(_)) => at_end,
             PathKind::Detour(_) => false,
             PathKind::Astray => true,
@@ -444,7 +444,7 @@ impl Detours {
             cost as u16,
             |source, visit| match new.get(source) {
                 Some(obstacle) => visit(*obstacle),
-                None => neighbours.for_each_zone_of(source - new.len(), now, apart_m, visit),
+                None => neighbours.for_each_new_zone_of(source - new.len(), now, apart_m, visit),
             },
             // Over an area only the path just ahead counts: the vehicle goes on taking pictures
             // until it is near the obstacle.

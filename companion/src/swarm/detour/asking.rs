@@ -82,7 +82,7 @@ impl Detours {
     /// back to the plan's path, the vehicle gives up returning to that.
     pub(crate) fn note_request(&mut self, purpose: DetourPurpose) {
         if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Rejoin(_)) {
-            self.path_kind = self.path_kind.without_return();
+            self.path_kind = self.path_kind.without_rejoin();
         }
         (self.sought, self.request_read) = (Some(purpose), false);
         self.obstacles.mark_requested();

@@ -48,7 +48,7 @@ pub(crate) enum PathKind {
     Plan,
     /// The path of its plan after a detour: it has come from the shell, and the vehicle has not
     /// begun it yet.
-    PlanReturned,
+    PlanReady,
     /// A path that was requested for this purpose.
     Detour(DetourPurpose),
     /// A path beside the plan's, to which the vehicle does not come back any more.
@@ -92,9 +92,9 @@ impl PathKind {
     }
 
     /// The kind of path once the vehicle has given up coming back to its plan.
-    pub(crate) fn without_return(self) -> Self {
+    pub(crate) fn without_rejoin(self) -> Self {
         match self {
-            Self::PlanReturned => Self::Plan,
+            Self::PlanReady => Self::Plan,
             Self::Detour(purpose) if purpose.keeps_to_plan() => Self::Astray,
             other => other,
         }

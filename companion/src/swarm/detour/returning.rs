@@ -86,9 +86,9 @@ impl Detours {
         }
     }
 
-    /// Gives up the return to the plan's path: a vehicle beside it is from now on astray.
+    /// Gives up rejoining the plan's path: a vehicle beside it is from now on astray.
     pub(crate) fn give_up_plan(&mut self) {
-        self.path_kind = self.path_kind.without_return();
+        self.path_kind = self.path_kind.without_rejoin();
     }
 
     /// Makes the plan's path the one flown, if it has come again from the shell.
@@ -100,7 +100,7 @@ impl Detours {
 
     /// Whether the plan's path has come again from the shell after a detour, and is not flown yet.
     pub(crate) fn is_own_plan_ready(&self) -> bool {
-        self.path_kind == PathKind::PlanReturned
+        self.path_kind == PathKind::PlanReady
     }
 
     /// Whether the vehicle is off its plan's path: on a detour that leads back to it, about to

@@ -55,7 +55,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
                 .for_each_landing_zone(now, [apart_m, place.z], |off| ends |= off.contains(&place));
             let low = place - Point::new(0.0, 0.0, 20.0);
             table.landing_column(1, now, apart_m, |off| columns |= off.contains(&low));
-            table.for_each_zone_of(1, now, apart_m, |off| columns |= off.contains(&low));
+            table.for_each_new_zone_of(1, now, apart_m, |off| columns |= off.contains(&low));
             assert!(
                 ends && (columns || silent_s < 40.0),
                 "{silent_s} s, {points:?}, {here:?}: {ends} {columns}"
@@ -243,10 +243,15 @@ fn over_an_area_the_column_of_who_left_it_in_the_air_is_kept_off_for_ten_minutes
         let below = here - Point::new(0.0, 0.0, uniform(&mut rng, 3.0, here.z + 25.0));
         let silent_s = uniform(&mut rng, 1.0, 1200.0);
         let (mut kept, mut lies) = (false, false);
-        table.for_each_zone_of(1, Instant::from_millis((1000.0 * silent_s) as u64), 2.0, |off| {
-            kept |= off.from.z >= below.z && off.to.z <= below.z;
-            lies |= off.to.z <= -29.0;
-        });
+        table.for_each_new_zone_of(
+            1,
+            Instant::from_millis((1000.0 * silent_s) as u64),
+            2.0,
+            |off| {
+                kept |= off.from.z >= below.z && off.to.z <= below.z;
+                lies |= off.to.z <= -29.0;
+            },
+        );
         assert_eq!(kept, !over_area || silent_s < 600.0, "{silent_s} s, {here:?}, {below:?}");
         assert!(lies, "{silent_s} s: it lies there");
     }
