@@ -9,7 +9,7 @@
 //! | tracking, at a crawl | [`CRAWL_TRACKING_M`] | m | the same of a vehicle that flies so slowly that it could as well hover |
 //! | estimate | [`ACCURACY_FACTOR`] × the reported accuracy, at least `FLK_EST_M` | m | how far the estimate is from the truth |
 //! | accuracy's age | [`MAX_ACCURACY_AGE`] | s | three reports of a stream at 1 Hz |
-//! | gust | scenario | m | the desk adds what a gust is announced to push ([`estimate_margin_m`]'s caller); on board it is part of the margin |
+//! | gust | scenario | m | the host adds what a gust is announced to push ([`estimate_margin_m`]'s caller); on board it is part of the margin |
 //!
 //! What is left for the estimate is compared with its bound. A bound worse than what is left at
 //! cruise refuses the start and slows the vehicle in flight; one worse than what is left at a crawl

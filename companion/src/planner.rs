@@ -1,5 +1,5 @@
-//! Computes the plan that a mission file describes, by the same code on the desk and on a board;
-//! the desk lends it more memory.
+//! Computes the plan that a mission file describes, by the same code on the host and on a board;
+//! the host lends it more memory.
 //!
 //! Every companion plans the whole swarm from the same file, so all get the same plan; they compare
 //! its CRC to be sure.
@@ -27,7 +27,7 @@ pub enum PlanStep {
 }
 
 /// Plans a mission with goals on its roadmap; no vehicle's plan has more than `gates_most` gates.
-/// `done` is called after each step, so that the desk can time it.
+/// `done` is called after each step, so that the host can time it.
 ///
 /// # Errors
 /// Reason why there is no plan; [`PlanError::SwarmFull`] for a mission with more than `V` vehicles

@@ -1,4 +1,4 @@
-//! Capacities of companions and planner on the desk, with the memory each entry costs; capacities
+//! Capacities of companions and planner on the host, with the memory each entry costs; capacities
 //! of each board.
 
 use companion::storage::mission_file::MissionView;
@@ -21,15 +21,15 @@ pub const GATES: usize = 2048;
 /// Most timed segments of all flights, among which the search for a side-step plans: 44 bytes each.
 pub const TIMED_SEGMENTS: usize = 32_768;
 
-/// A companion with the desk's capacities.
-pub type DeskCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
+/// A companion with the host's capacities.
+pub type HostCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
 
 /// A companion on the heap: it is too large for a thread's stack.
 ///
 /// # Errors
 /// The companion refuses the configuration; the error names what is wrong.
-pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompanion>> {
-    let companion = DeskCompanion::new(config)
+pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<HostCompanion>> {
+    let companion = HostCompanion::new(config)
         .map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
     Ok(Box::new(companion))
 }

@@ -1,4 +1,4 @@
-//! The flash bank of a board, simulated on the desk: bytes in memory, also written to a file if one
+//! The flash bank of a board, simulated on the host: bytes in memory, also written to a file if one
 //! is given.
 
 use std::fs::File;
@@ -11,23 +11,23 @@ use companion::storage::store::{FlashFault, FlashLayout, FlashRequest, MAX_READ,
 use crate::files;
 use crate::quote::quoted_path;
 
-/// Flash layout of a companion on the desk: that of the STM32H743 board.
-pub const DESK_FLASH_LAYOUT: FlashLayout = FlashLayout::H743;
+/// Flash layout of a companion on the host: that of the STM32H743 board.
+pub const HOST_FLASH_LAYOUT: FlashLayout = FlashLayout::H743;
 
 /// A simulated flash bank.
-pub struct DeskFlash {
+pub struct HostFlash {
     bytes: Vec<u8>,
     file: Option<File>,
 }
 
-impl DeskFlash {
+impl HostFlash {
     /// Opens the bank that `path` holds from an earlier run. A new or empty file, or no path, gives
     /// an erased bank (all 0xFF). Every change is written to the file at once.
     ///
     /// # Errors
     /// The file cannot be read or created, or its length is not that of the bank.
     pub fn open(path: Option<&Path>) -> anyhow::Result<Self> {
-        let mut bytes = vec![0xFF; DESK_FLASH_LAYOUT.len() as usize];
+        let mut bytes = vec![0xFF; HOST_FLASH_LAYOUT.len() as usize];
         let Some(path) = path else { return Ok(Self { bytes, file: None }) };
         let failed = || format!("cannot keep a flash: {}", quoted_path(path));
         if path.exists() {
@@ -37,14 +37,14 @@ impl DeskFlash {
         let mut file = opened.with_context(failed)?;
         match file.metadata().with_context(failed)?.len() {
             0 => file.write_all(&bytes).with_context(failed)?,
-            length if length == u64::from(DESK_FLASH_LAYOUT.len()) => {
+            length if length == u64::from(HOST_FLASH_LAYOUT.len()) => {
                 file.read_exact(&mut bytes).with_context(failed)?;
             }
             length => {
                 bail!(
                     "no flash image: {}: it has {length} bytes, not {}",
                     quoted_path(path),
-                    DESK_FLASH_LAYOUT.len()
+                    HOST_FLASH_LAYOUT.len()
                 )
             }
         }
@@ -65,7 +65,7 @@ impl DeskFlash {
                 return Ok(out);
             }
             FlashRequest::Erase { at } => {
-                self.modify_range(at, DESK_FLASH_LAYOUT.sector_len as usize, |part| {
+                self.modify_range(at, HOST_FLASH_LAYOUT.sector_len as usize, |part| {
                     part.fill(0xFF);
                 })?;
             }
@@ -100,7 +100,7 @@ impl DeskFlash {
     }
 }
 
-impl ReadFlash for DeskFlash {
+impl ReadFlash for HostFlash {
     fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
         let start = at as usize;
         out.copy_from_slice(self.bytes.get(start..start + out.len()).ok_or(FlashFault)?);

@@ -8,7 +8,7 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
 use host_sim::{commands, map, progress, quote, say};
 
-/// Plans and flies drone swarms on the desk, with the code that flies on the board.
+/// Plans and flies drone swarms on a computer, with the code that flies on the board.
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {

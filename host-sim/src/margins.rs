@@ -1,4 +1,4 @@
-//! The margins that the desk plans with, and their sums. The companion's own margins are in
+//! The margins that the host plans with, and their sums. The companion's own margins are in
 //! [`companion::margins`].
 //!
 //! | what | value |

@@ -1,5 +1,5 @@
 //! From a scenario to what is flown: the map on the planning grid, the roadmap, the mission file,
-//! and the plan that the desk and every companion compute from them.
+//! and the plan that the host and every companion compute from them.
 
 mod coverage;
 mod on_board;
@@ -23,7 +23,7 @@ use planner_core::search::SearchWorkspace;
 use self::ready::schedule_config;
 pub use self::ready::{Mission, OwnPlan, PLANNED_ACCEL_MPS2, SwarmPlan, VERTICAL_MPS};
 use crate::capacity::{
-    BoardCapacity, DeskCompanion, GATES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
+    BoardCapacity, GATES, HostCompanion, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
     on_heap,
 };
 use crate::coverage::check_starts_on_ground;
@@ -174,7 +174,7 @@ impl Mission {
         Ok(plan)
     }
 
-    /// Most gates of one vehicle: the board's capacity, or the desk's where no board is given.
+    /// Most gates of one vehicle: the board's capacity, or the host's where no board is given.
     fn max_gates(&self) -> usize {
         self.board.map_or(GATES, |board| board.gates)
     }
@@ -259,7 +259,7 @@ impl Mission {
         plan: &SwarmPlan,
         index: usize,
         wanted: PlanKind,
-        companion: &mut DeskCompanion,
+        companion: &mut HostCompanion,
     ) -> Result<Box<OwnPlan>, PlanFailure> {
         let own = |plan: &SwarmPlan| self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity);
         match wanted {

@@ -1,4 +1,4 @@
-//! Building a roadmap on the desk: planner-core's PRM on all cores, every edge with its clearance,
+//! Building a roadmap on the host: planner-core's PRM on all cores, every edge with its clearance,
 //! encoded as the file that goes on the board.
 //!
 //! Edges come in the same order on any number of threads: the results of the parallel jobs are

@@ -7,7 +7,7 @@
 //! during which QEMU executes no instruction, and its timers and watchdog count instructions.
 //!
 //! ```text
-//! desk    Bytes(port, due) …, Bytes(port, due) …, Run(until)
+//! host    Bytes(port, due) …, Bytes(port, due) …, Run(until)
 //! board   Sent(port, at) …, Sent(port, at) …, Waits(now)
 //! ```
 //!

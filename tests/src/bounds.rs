@@ -184,7 +184,7 @@ pub struct CallCost {
     pub bytes: u64,
 }
 
-/// Makes the calls on the desk without counting their instructions.
+/// Makes the calls on the host without counting their instructions.
 struct Uncounted;
 
 impl Meter for Uncounted {
@@ -198,7 +198,7 @@ impl Meter for Uncounted {
 ///
 /// # Errors
 /// The demo cannot be prepared, the program prints something else, or its coverage plans differ in
-/// any bit from those computed on the desk.
+/// any bit from those computed on the host.
 pub fn counted(program: &Path) -> Result<HashMap<String, CallCost>> {
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
@@ -212,10 +212,10 @@ pub fn counted(program: &Path) -> Result<HashMap<String, CallCost>> {
         &mut scratch,
         &mut Box::default(),
     );
-    let desk = format!("coverage {calls:08x} {flights:08x}");
+    let host = format!("coverage {calls:08x} {flights:08x}");
     ensure!(
-        lines.contains(&desk),
-        "the desk's coverage plans have {desk:?}, the board's\n{}",
+        lines.contains(&host),
+        "the host's coverage plans have {host:?}, the board's\n{}",
         lines.join("\n")
     );
     lines.iter().filter_map(|line| line.strip_prefix("call ")).map(parse_call_line).collect()

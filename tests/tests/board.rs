@@ -1,4 +1,4 @@
-//! The board computes what the desk computes, bit by bit, and in how many instructions: `measure`
+//! The board computes what the host computes, bit by bit, and in how many instructions: `measure`
 //! in QEMU. So it does at the limits of every public call of planner-core, and beyond, without a
 //! panic: `limits`.
 //!
@@ -27,7 +27,7 @@ const LIMITS: [(&str, u64); 4] = [
 ];
 
 #[test]
-fn the_board_computes_what_the_desk_computes() {
+fn the_board_computes_what_the_host_computes() {
     let Some(program) = board::program("measure") else { return };
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))
         .expect("the demo is good");
@@ -46,13 +46,13 @@ fn the_board_computes_what_the_desk_computes() {
         let [costs, assignment, paths, scales] =
             [case.costs, case.assignment, case.paths, case.scales];
         let line = format!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
-        assert!(lines.contains(&line), "the desk has {line:?}, the board\n{}", lines.join("\n"));
+        assert!(lines.contains(&line), "the host has {line:?}, the board\n{}", lines.join("\n"));
     }
     assert!(lines.contains(&format!("plan {:08x}", swarm_crc(&mission))), "{}", lines.join("\n"));
     for (name, clearance_m) in [("build", 0.0), ("build-with-clearance", cases::CLEARANCE_M)] {
         let config = Config { clearance_m, ..cases::ROADMAP_CONFIG };
         let line = format!("{name} {}", built(&map.grid(), &config));
-        assert!(lines.contains(&line), "the desk has {line:?}, the board\n{}", lines.join("\n"));
+        assert!(lines.contains(&line), "the host has {line:?}, the board\n{}", lines.join("\n"));
     }
 
     let mut counts: HashMap<&str, u64> = lines
@@ -79,7 +79,7 @@ impl Listener for Calls {
 }
 
 #[test]
-fn at_its_limits_the_board_answers_as_the_desk_does() {
+fn at_its_limits_the_board_answers_as_the_host_does() {
     let Some(program) = board::program("limits") else { return };
     let mut calls = Calls(0);
     let mut answers = Results::new(&mut calls);

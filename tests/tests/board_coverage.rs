@@ -92,7 +92,7 @@ kind = "kill"
 vehicle = 3
 "#;
 
-/// Each vehicle that is left flies one division: what the desk plans from the same inputs, bit by
+/// Each vehicle that is left flies one division: what the host plans from the same inputs, bit by
 /// bit.
 fn divides_as_planned(mission: &Mission, flight: &Flight, left: [u8; 2]) {
     for vehicle in left {
@@ -101,7 +101,7 @@ fn divides_as_planned(mission: &Mission, flight: &Flight, left: [u8; 2]) {
         let inputs = &reported[0].inputs;
         let plan = mission
             .plan_remaining(&[], std::iter::once(&inputs[..]))
-            .expect("the desk divides it too");
+            .expect("the host divides it too");
         println!("{:?}", reported[0]);
         assert_eq!(inputs.iter().map(|input| input.alive).collect::<Vec<_>>(), [true, true, false]);
         assert_eq!(reported[0].plan_crc, plan.crc, "vehicle {vehicle}: {inputs:?}");
@@ -113,10 +113,10 @@ fn two_boards_photograph_what_a_third_leaves_that_is_switched_off() {
     let Some(program) = board::program("flockmate") else { return };
     let folder = tempfile::tempdir().expect("a temporary directory");
     let mut mission = mission(LOSS);
-    let desk = covered::flight(&mut mission, &mut Vec::new()).expect("the desk flies it");
+    let host = covered::flight(&mut mission, &mut Vec::new()).expect("the host flies it");
     board::put_on_boards(&mut mission, &program, folder.path());
     let boards = covered::flight(&mut mission, &mut Vec::new()).expect("the boards fly it");
-    for flight in [&desk, &boards] {
+    for flight in [&host, &boards] {
         let said = || flight.log.iter().map(|e| (e.t_s, e.vehicle, &e.text)).collect::<Vec<_>>();
         assert_eq!(covered::faults(&flight.result), None, "{:?}", said());
         println!(

@@ -15,7 +15,7 @@ use companion::storage::store::{ErasePermission, MAX_READ, Store};
 use flockmate_tests::areas::{self, SMALL_FIELD};
 use flockmate_tests::{Profile, covered, host_sim, number};
 use host_sim::coverage::check::Picture;
-use host_sim::flash::{DESK_FLASH_LAYOUT, DeskFlash};
+use host_sim::flash::{HOST_FLASH_LAYOUT, HostFlash};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
@@ -154,8 +154,8 @@ fn what_an_interrupted_mission_left_is_photographed_after_the_next_start() {
 /// Sets a parameter in the flash of each companion, as a ground station does between flights.
 fn set_parameter(dir: &Path, name: &str, value: f32) {
     for entry in fs::read_dir(dir).expect("a directory") {
-        let mut flash = DeskFlash::open(Some(&entry.expect("a file").path())).expect("a flash");
-        let mut store = Store::mount(DESK_FLASH_LAYOUT, &mut flash);
+        let mut flash = HostFlash::open(Some(&entry.expect("a file").path())).expect("a flash");
+        let mut store = Store::mount(HOST_FLASH_LAYOUT, &mut flash);
         let index = Parameters::index_of(name.as_bytes()).expect("a parameter");
         store.set_parameter(index, value).expect("in range");
         let mut read = [0; MAX_READ];

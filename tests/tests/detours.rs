@@ -1,4 +1,4 @@
-//! Detours with the floor that the roadmap file knows, as desk and board plan them, beside those of
+//! Detours with the floor that the roadmap file knows, as host and board plan them, beside those of
 //! a planner that has the map.
 //!
 //! A vehicle flies from node to node; another one fell silent above its path and lies on the ground
@@ -31,9 +31,9 @@ const SAME_PERCENT: usize = 85;
 /// Where the ground is deeper than the file says, what lies there is not kept off: at most this
 /// share of the places.
 const DEEPER_PERCENT: f64 = 0.25;
-/// Capacity of a board and of the desk.
+/// Capacity of a board and of the host.
 const BOARD: usize = 4096;
-const DESK: usize = 16_384;
+const HOST: usize = 16_384;
 
 /// A map's roadmap with the ground, as files of both versions.
 struct Files {
@@ -55,7 +55,7 @@ fn files(map: &VoxelMap, clearance_m: f32) -> Files {
     let header = roadmap::header(&config, Geodetic::default(), 0, GOALS);
     let Roadmap { nodes, edges, .. } = &roadmap;
     let mut old = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).expect("it is small")];
-    let mut ws = Box::new(SearchWorkspace::<DESK>::new());
+    let mut ws = Box::new(SearchWorkspace::<HOST>::new());
     write_with_landmarks(&header, nodes, edges, &[], &mut ws, &mut old).expect("it is a roadmap");
     Files { new: roadmap::encode(&roadmap, &header).expect("it is a roadmap"), old }
 }
@@ -121,7 +121,7 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
     let dice = &mut Dice::new(7);
     grounds(name, map, &new, dice);
     let mut board = Box::new(SearchWorkspace::<BOARD>::new());
-    let mut desk = Box::new(SearchWorkspace::<DESK>::new());
+    let mut host = Box::new(SearchWorkspace::<HOST>::new());
     let [mut cases, mut same, mut found, mut found_by_old] = [0; 4];
     let mut nearest_m = f32::INFINITY;
     while cases < CASES {
@@ -129,7 +129,7 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
         let goal = dice.below(usize::from(GOALS)) as u16;
         let mut nodes = Few::<u16, 64>::new();
         let any = |_: u16, _: &planner_core::roadmap::HalfEdge| true;
-        if astar(&new, start, goal, any, &mut desk, &mut nodes).is_err() || nodes.len() < 4 {
+        if astar(&new, start, goal, any, &mut host, &mut nodes).is_err() || nodes.len() < 4 {
             continue;
         }
         let here = new.node(start);
@@ -158,10 +158,10 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
         let column =
             KeepOutZone { from: silent, to: deep, radius_m: KEPT_M, kind: ZoneKind::Grounded };
         let exact = KeepOutZone { from: lies, to: lies, ..column };
-        let by_desk = planned(&new, &request, column, &mut desk);
+        let by_host = planned(&new, &request, column, &mut host);
         let by_board = planned(&new, &request, column, &mut board);
-        assert_eq!(by_desk, by_board, "desk and board fly other ways");
-        let by_map = planned(&new, &request, exact, &mut desk);
+        assert_eq!(by_host, by_board, "host and board fly other ways");
+        let by_map = planned(&new, &request, exact, &mut host);
         let by_old = planned(&old, &request, column, &mut board);
         let is_found = |planned: &Planned| usize::from(planned.is_ok());
         found += is_found(&by_map);
@@ -188,7 +188,7 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
 }
 
 #[test]
-fn desk_and_board_find_the_detours_that_the_map_gives() {
+fn host_and_board_find_the_detours_that_the_map_gives() {
     let map = building::building_map(building::DEFAULT_SEED, 0.25).expect("the building");
     detours("building", &map.voxel_map(Unknown::Blocked), 0.8);
     for (name, resolution_m, clearance_m) in

@@ -23,7 +23,7 @@ use crate::scratch::CoverageBenchWorkspace;
 pub const MAX_ORDER_CHANGES: u32 = companion::planner::coverage::MAX_ORDER_CHANGES;
 /// Vehicles in the plans for which the bench sets a limit of instructions.
 const LIMITED_VEHICLES: usize = 3;
-/// Settings of the POWELL search, as on the desk.
+/// Settings of the POWELL search, as on the host.
 const POWELL_SEARCH: powell::PowellConfig = powell::PowellConfig::USUAL;
 const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
 
@@ -370,9 +370,9 @@ mod tests {
 
     use super::*;
 
-    struct Desk;
+    struct Uncounted;
 
-    impl Meter for Desk {
+    impl Meter for Uncounted {
         fn call<T>(&mut self, _: &'static str, _: usize, work: impl FnOnce() -> T) -> T {
             work()
         }
@@ -381,8 +381,8 @@ mod tests {
     #[test]
     fn all_calls_are_made_and_the_sum_is_the_same_again() {
         let mut lent = Box::<CoverageBenchWorkspace>::default();
-        let first = measure_coverage_calls(&mut Desk, &mut lent);
-        assert_eq!(measure_coverage_calls(&mut Desk, &mut lent), first);
+        let first = measure_coverage_calls(&mut Uncounted, &mut lent);
+        assert_eq!(measure_coverage_calls(&mut Uncounted, &mut lent), first);
         std::println!("lent {} bytes", size_of::<CoverageBenchWorkspace>());
     }
 }

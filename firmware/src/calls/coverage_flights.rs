@@ -369,9 +369,9 @@ mod tests {
 
     use super::*;
 
-    struct Desk;
+    struct Uncounted;
 
-    impl Meter for Desk {
+    impl Meter for Uncounted {
         fn call<T>(&mut self, name: &'static str, _: usize, work: impl FnOnce() -> T) -> T {
             let began = std::time::Instant::now();
             let result = work();
@@ -387,8 +387,8 @@ mod tests {
         let mut lent = Box::<scratch::CoverageBenchWorkspace>::default();
         let mut sums = || {
             [
-                measure_whole_plans(&mut Desk, &mut area, &mut out),
-                measure_plan_parts(&mut Desk, &mut lent, &mut out),
+                measure_whole_plans(&mut Uncounted, &mut area, &mut out),
+                measure_plan_parts(&mut Uncounted, &mut lent, &mut out),
             ]
         };
         let first = sums();

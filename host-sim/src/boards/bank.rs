@@ -7,7 +7,7 @@ use companion::storage::store::{ErasePermission, File, MAX_READ, Store, UploadSt
 
 use planner_core::field;
 
-use crate::flash::{DESK_FLASH_LAYOUT, DeskFlash};
+use crate::flash::{HOST_FLASH_LAYOUT, HostFlash};
 
 /// Address of flash bank 2 on the emulated board.
 pub const FLASH_BANK2_ADDRESS: u32 = 0x6000_0000;
@@ -27,8 +27,8 @@ pub const BANK_IMAGE_MARK: (u32, u32) = (0x6030_0000, 0x464c_4153);
 /// # Errors
 /// The store refuses a file.
 pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
-    let mut flash = DeskFlash::open(None)?;
-    let mut store = Store::mount(DESK_FLASH_LAYOUT, &mut flash);
+    let mut flash = HostFlash::open(None)?;
+    let mut store = Store::mount(HOST_FLASH_LAYOUT, &mut flash);
     let mut settle = |store: &mut Store| {
         let mut read = [0; MAX_READ];
         while let Some(request) = store.poll_request(ErasePermission::Allowed) {

@@ -1,7 +1,7 @@
 //! Boards in QEMU that run in lock step with the simulation's time.
 //!
 //! A board runs the firmware built for `qemu`, on an emulated Cortex-M7 on which an instruction
-//! takes 2 ns (`-icount shift=1,sleep=off`). It runs for the time that the desk grants it, and then
+//! takes 2 ns (`-icount shift=1,sleep=off`). It runs for the time that the host grants it, and then
 //! stands still until the next grant. So its behaviour depends on no clock and no load of the host
 //! ([`lock_step`] has the protocol).
 

@@ -10,7 +10,7 @@ use super::bank::{
     BANK_IMAGE_MARK, ERASED, FLASH_BANK2_ADDRESS, PROGRAMMED, TORN, WORD_MARKS_ADDRESS,
 };
 use super::{EmulatedBoard, GrantResult};
-use crate::flash::DESK_FLASH_LAYOUT;
+use crate::flash::HOST_FLASH_LAYOUT;
 use companion::storage::store::WORD;
 
 /// Most bytes of memory in one message.
@@ -55,7 +55,7 @@ impl EmulatedBoard {
     }
 
     /// Calls a function in the board, at the highest priority and at the board's current time.
-    /// Returns when the board waits for the desk again, or has reset.
+    /// Returns when the board waits for the host again, or has reset.
     ///
     /// # Errors
     /// The QEMU process has ended, or the board does not answer within `timeout` of wall-clock
@@ -76,9 +76,9 @@ impl EmulatedBoard {
     /// The QEMU process has ended, or the image has not the length of a bank.
     pub fn load_flash(&mut self, bank: &[u8]) -> anyhow::Result<()> {
         ensure!(
-            bank.len() == DESK_FLASH_LAYOUT.len() as usize,
+            bank.len() == HOST_FLASH_LAYOUT.len() as usize,
             "a bank has {} bytes",
-            DESK_FLASH_LAYOUT.len()
+            HOST_FLASH_LAYOUT.len()
         );
         let mark =
             |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { PROGRAMMED };
@@ -94,7 +94,7 @@ impl EmulatedBoard {
     /// The QEMU process has ended.
     pub fn torn_flash_words(&mut self) -> anyhow::Result<Vec<usize>> {
         let marks =
-            self.read_memory(WORD_MARKS_ADDRESS, DESK_FLASH_LAYOUT.len() as usize / WORD)?;
+            self.read_memory(WORD_MARKS_ADDRESS, HOST_FLASH_LAYOUT.len() as usize / WORD)?;
         Ok((0..marks.len()).filter(|word| marks[*word] == TORN).collect())
     }
 

@@ -12,8 +12,8 @@ use companion::{Config, Event, Instant, Link, State};
 use heapless::Vec as FixedVec;
 
 use super::load;
-use crate::capacity::{DeskCompanion, VEHICLES, new_companion};
-use crate::flash::{self, DeskFlash};
+use crate::capacity::{HostCompanion, VEHICLES, new_companion};
+use crate::flash::{self, HostFlash};
 use crate::link::{self, LinkUrl};
 use crate::mission::Mission;
 use crate::progress::Progress;
@@ -63,7 +63,7 @@ const MAX_AUTOPILOT_SILENCE: companion::Duration = companion::Duration::from_sec
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scenario = load(&args.scenario, None)?;
     // Opens the flash first, so that a bad file fails before the planning, which takes long.
-    let mut flash = DeskFlash::open(args.flash.as_deref())?;
+    let mut flash = HostFlash::open(args.flash.as_deref())?;
     let mut mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let index = mission.index_of(args.id)?;
     let plan = mission.plan()?;
@@ -181,8 +181,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// A new companion with the store in its flash, which holds parameters and uploaded files.
-fn start(config: &Config<VEHICLES>, flash: &mut DeskFlash) -> anyhow::Result<Box<DeskCompanion>> {
-    let store = Store::mount(flash::DESK_FLASH_LAYOUT, flash);
+fn start(config: &Config<VEHICLES>, flash: &mut HostFlash) -> anyhow::Result<Box<HostCompanion>> {
+    let store = Store::mount(flash::HOST_FLASH_LAYOUT, flash);
     let mut companion = new_companion(config.clone())?;
     companion.attach_store(store);
     Ok(companion)

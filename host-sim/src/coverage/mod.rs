@@ -1,4 +1,4 @@
-//! Coverage missions on the desk: from a scenario to each vehicle's flight.
+//! Coverage missions on the host: from a scenario to each vehicle's flight.
 //!
 //! `planner_core::coverage` plans in memory that this module provides. Its routes become flights
 //! ([`flight`]), which are exported for ground stations ([`export`]) and checked ([`check`]).
@@ -39,7 +39,7 @@ use crate::area::MAX_VERTICES;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method, ORIGIN_HINT};
 
-/// Most changes of the lanes' order that the desk tries while it shortens the path.
+/// Most changes of the lanes' order that the host tries while it shortens the path.
 pub const MAX_ORDER_CHANGES: u32 = 20_000_000;
 
 /// Greatest height of a start above or below the ground, metres.

@@ -11,9 +11,9 @@ use crate::scenario::coverage::{self, Method};
 
 /// Most vehicles of a coverage mission.
 pub const MAX_VEHICLES: usize = 32;
-/// Most lanes over an area that the desk plans.
+/// Most lanes over an area that the host plans.
 pub const MAX_LANES: usize = 8192;
-/// Most convex corners of no-fly zones that the desk plans around.
+/// Most convex corners of no-fly zones that the host plans around.
 pub const MAX_CORNERS: usize = 256;
 
 /// One flight of a vehicle on one battery.

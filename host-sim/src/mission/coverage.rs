@@ -38,7 +38,7 @@ const TAKEOFF_HEIGHT_M: f32 = 3.0;
 /// Distance by which the map extends beyond area and pads, and above the highest layer, metres.
 const MAP_MARGIN_M: f32 = 30.0;
 
-type DeskWorkspace = Workspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES>;
+type HostWorkspace = Workspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES>;
 
 /// Prepares a coverage mission: checks that companions can fly it, and encodes its files.
 pub(super) fn prepare(
@@ -94,7 +94,7 @@ pub(super) fn prepare(
         mission.roadmap_or_field_file = terrain.field.to_vec();
     }
     mission.encode_area(&climbs)?;
-    let mut ws = on_heap(DeskWorkspace::new);
+    let mut ws = on_heap(HostWorkspace::new);
     let plan = mission.plan_area(&[], iter::empty(), &mut ws)?;
     if ws.routes() != &routes {
         bail!(
@@ -247,7 +247,7 @@ impl Mission {
         &self,
         done: &[WaypointRange],
         losses: impl Iterator<Item = &'l [DivisionInput]>,
-        ws: &mut DeskWorkspace,
+        ws: &mut HostWorkspace,
     ) -> anyhow::Result<Box<SwarmPlan>> {
         let mission = self.mission_view();
         let MissionKind::Coverage(view) = mission.kind() else {
@@ -287,7 +287,7 @@ impl Mission {
 
     /// Plans the coverage mission from its start, with nothing photographed.
     pub(super) fn plan_coverage(&self) -> anyhow::Result<Box<SwarmPlan>> {
-        self.plan_area(&[], iter::empty(), &mut on_heap(DeskWorkspace::new))
+        self.plan_area(&[], iter::empty(), &mut on_heap(HostWorkspace::new))
     }
 
     /// Plans what is left: without the waypoints `done`, and after the divisions `losses`, each of
@@ -300,7 +300,7 @@ impl Mission {
         done: &[WaypointRange],
         losses: impl Iterator<Item = &'l [DivisionInput]>,
     ) -> anyhow::Result<Box<SwarmPlan>> {
-        self.plan_area(done, losses, &mut on_heap(DeskWorkspace::new))
+        self.plan_area(done, losses, &mut on_heap(HostWorkspace::new))
     }
 
     /// Plans one vehicle's path over the area to its pad or to a place aside, clear of the keep-out
@@ -312,7 +312,7 @@ impl Mission {
     ) -> Result<Box<OwnPlan>, PlanFailure> {
         let mission = self.mission_view();
         let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
-        let (mut ws, mut own) = (on_heap(DeskWorkspace::new), Box::new(OwnPlan::default()));
+        let (mut ws, mut own) = (on_heap(HostWorkspace::new), Box::new(OwnPlan::default()));
         coverage::plan_detour::<
             MAX_VERTICES,
             MAX_LANES,
@@ -341,7 +341,7 @@ impl Mission {
                 board.name
             ));
         }
-        let mut ws = on_heap(DeskWorkspace::new);
+        let mut ws = on_heap(HostWorkspace::new);
         match self.plan_area(&[], iter::empty(), &mut ws) {
             Ok(_) => board.area_excess(vertices.len(), ws.tracks().lanes().len()),
             Err(error) => Some(format!("{error:#}")),

@@ -1,4 +1,4 @@
-//! Checks whether a board computes the desk's plan from the same files. A board searches with less
+//! Checks whether a board computes the host's plan from the same files. A board searches with less
 //! memory, so it may find no plan, or one with another CRC: its vehicle would then not start with
 //! the others.
 

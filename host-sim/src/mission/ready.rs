@@ -21,7 +21,7 @@ use crate::result::{RoadmapSize, Timing};
 use crate::roadmap::Roadmap;
 use crate::scenario::{self, Scenario};
 
-/// The swarm's plan, with the desk's capacities.
+/// The swarm's plan, with the host's capacities.
 pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
 /// One vehicle's part of the swarm's plan, with its gates.
 pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
@@ -57,7 +57,7 @@ pub struct Mission {
     pub(super) schedule: ScheduleConfig,
     /// Computing times of the steps done so far.
     pub timing: Timing,
-    /// The board that the files have to fit; `None` if they are for the desk.
+    /// The board that the files have to fit; `None` if they are for the host.
     pub(super) board: Option<&'static BoardCapacity>,
     pub(super) clearance_field: OnceLock<ClearanceField>,
 }

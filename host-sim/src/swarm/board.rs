@@ -7,7 +7,7 @@
 //! TUNNEL.
 //!
 //! A board in QEMU is in lock step with the simulation ([`crate::boards`]): it runs through a step
-//! while the desk computes the other vehicles, and the simulation takes its bytes at the step's
+//! while the host computes the other vehicles, and the simulation takes its bytes at the step's
 //! end.
 
 use std::path::Path;

@@ -13,9 +13,9 @@ use super::radio::Radio;
 use super::serial::{SerialConfig, SerialLink};
 use super::step::{STEP_S, STEP_US};
 use crate::boards::STACK_LEN;
-use crate::capacity::{DeskCompanion, VEHICLES, new_companion};
+use crate::capacity::{HostCompanion, VEHICLES, new_companion};
 use crate::coverage::check::Picture;
-use crate::flash::{DESK_FLASH_LAYOUT, DeskFlash};
+use crate::flash::{HOST_FLASH_LAYOUT, HostFlash};
 use crate::mission::{Mission, OwnPlan};
 use crate::report::{self, Level};
 use crate::say;
@@ -40,11 +40,11 @@ pub struct SimulatedVehicle {
     /// Autopilot of the vehicle.
     pub autopilot: Autopilot,
     /// The vehicle's companion; idle if a board runs it.
-    pub companion: Box<DeskCompanion>,
+    pub companion: Box<HostCompanion>,
     /// The board or process whose companion flies the vehicle instead of `companion`.
     board: Option<Board>,
     /// Flash of the companion; `None`: it has no store.
-    flash: Option<DeskFlash>,
+    flash: Option<HostFlash>,
     /// The plans that the companion has requested and not got yet.
     plan_requests: PlanRequests,
     /// How a plan request is answered.
@@ -110,7 +110,7 @@ impl SimulatedVehicle {
     ///
     /// # Errors
     /// As [`Self::new`]; none if that succeeded with the same settings.
-    pub fn attach_flash(&mut self, flash: DeskFlash) -> anyhow::Result<()> {
+    pub fn attach_flash(&mut self, flash: HostFlash) -> anyhow::Result<()> {
         self.flash = Some(flash);
         self.start_companion()
     }
@@ -118,7 +118,7 @@ impl SimulatedVehicle {
     fn start_companion(&mut self) -> anyhow::Result<()> {
         self.companion = new_companion(self.config.clone())?;
         if let Some(flash) = &mut self.flash {
-            self.companion.attach_store(Store::mount(DESK_FLASH_LAYOUT, flash));
+            self.companion.attach_store(Store::mount(HOST_FLASH_LAYOUT, flash));
         }
         Ok(())
     }

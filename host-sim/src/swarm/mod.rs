@@ -1,4 +1,4 @@
-//! Simulates a whole swarm on the desk: companions and simulated autopilots, connected by emulated
+//! Simulates a whole swarm on the host: companions and simulated autopilots, connected by emulated
 //! serial links and a radio.
 //!
 //! Fixed steps of 4 ms, one thread, every random number from the scenario's seed: the same scenario

@@ -11,7 +11,7 @@ use super::board::Board;
 use super::member::SimulatedVehicle;
 use super::serial::SerialConfig;
 use crate::capacity::VEHICLES;
-use crate::flash::DeskFlash;
+use crate::flash::HostFlash;
 use crate::mission::{Mission, PLANNED_ACCEL_MPS2};
 use crate::scenario::{Companion, Vehicle};
 
@@ -45,7 +45,7 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
             match &vehicle.companion {
                 Companion::InProcess { flash: None } => {}
                 Companion::InProcess { flash: Some(file) } => {
-                    member.attach_flash(DeskFlash::open(Some(file))?)?;
+                    member.attach_flash(HostFlash::open(Some(file))?)?;
                 }
                 Companion::Url { autopilot, radio } => {
                     member.attach_board(Board::open(autopilot, radio.as_ref())?);

@@ -2,7 +2,7 @@
 //! (CPP §3); `companion/README.md` lists it byte by byte.
 //!
 //! Lanes, routes and flights are not in the file: each companion computes them from these numbers.
-//! The shares W of POWELL are computed on the desk.
+//! The shares W of POWELL are computed on the host.
 
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind};

@@ -89,7 +89,7 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     measure_segments(meter, &grid);
     measure_roadmap_builds(meter, &grid, scratch);
     let search = &mut scratch.planner().search;
-    measure_desk_calls(meter, &grid, search, beside);
+    measure_host_calls(meter, &grid, search, beside);
     let flights = coverage_flights::measure_coverage_flights(meter, scratch, &mut beside.plan);
     [coverage::measure_coverage_calls(meter, scratch.coverage_bench()), flights]
 }
@@ -448,7 +448,7 @@ fn measure_roadmap_builds(
 }
 
 /// Counts calls that are only made on the host in use, on a small roadmap.
-fn measure_desk_calls(
+fn measure_host_calls(
     meter: &mut impl Meter,
     grid: &VoxelGrid<'_>,
     search: &mut Search,

@@ -12,7 +12,7 @@
 //! host's serial line simulates the baud rate.
 #![expect(
     unsafe_code,
-    reason = "memory that the linker knows nothing of, and the desk's debug probe"
+    reason = "memory that the linker knows nothing of, and the host's debug probe"
 )]
 
 use core::cell::RefCell;
@@ -67,7 +67,7 @@ pub fn start(take: fn(u8, &[u8])) {
         let input = File::open(c"/dev/stdin").expect("QEMU has an input");
         // The log already uses the standard output.
         let output = File::create(c"/dev/fd/3").expect("QEMU has an output for answers");
-        let mut desk = SimulationLink {
+        let mut host = SimulationLink {
             input,
             output,
             length: 0,
@@ -76,13 +76,13 @@ pub fn start(take: fn(u8, &[u8])) {
             due: 0,
             receive_on_port: take,
         };
-        desk.queue_record(FromBoard::Started, &[]);
-        desk.flush();
-        desk.read_message();
+        host.queue_record(FromBoard::Started, &[]);
+        host.flush();
+        host.read_message();
         Register::new(TIMER, CONTROL).write(ONE_SHOT);
         interrupts::enable(Irq::DualTimer, interrupts::GRANTS);
         critical_section::with(|cs| {
-            SIMULATION_LINK.borrow_ref_mut(cs).insert(desk).run_due_work(cs)
+            SIMULATION_LINK.borrow_ref_mut(cs).insert(host).run_due_work(cs)
         });
     }
 }
@@ -95,15 +95,15 @@ pub fn is_lock_step() -> bool {
 /// Time at which the message's next record is due, counts since the start; `u64::MAX` outside lock
 /// step.
 pub fn next_due(cs: CriticalSection<'_>) -> u64 {
-    SIMULATION_LINK.borrow_ref(cs).as_ref().map_or(u64::MAX, |desk| desk.due)
+    SIMULATION_LINK.borrow_ref(cs).as_ref().map_or(u64::MAX, |host| host.due)
 }
 
 /// Interrupt handler of the dual timer: executes the records that are due.
 pub fn on_alarm() {
     Register::new(TIMER, INTCLR).write(1);
     critical_section::with(|cs| {
-        if let Some(desk) = &mut *SIMULATION_LINK.borrow_ref_mut(cs) {
-            desk.run_due_work(cs);
+        if let Some(host) = &mut *SIMULATION_LINK.borrow_ref_mut(cs) {
+            host.run_due_work(cs);
         }
     });
 }
@@ -111,10 +111,10 @@ pub fn on_alarm() {
 /// Queues bytes that UART `port` sends, for the host. Returns false outside lock step.
 pub fn send(port: u8, bytes: &[u8]) -> bool {
     critical_section::with(|cs| {
-        let mut desk = SIMULATION_LINK.borrow_ref_mut(cs);
-        let Some(desk) = &mut *desk else { return false };
+        let mut host = SIMULATION_LINK.borrow_ref_mut(cs);
+        let Some(host) = &mut *host else { return false };
         let at_us = CLOCK_NOW(cs) / COUNTS_PER_US;
-        desk.queue_record(FromBoard::Sent { port, len: bytes.len() as u16, at_us }, bytes);
+        host.queue_record(FromBoard::Sent { port, len: bytes.len() as u16, at_us }, bytes);
         true
     })
 }
@@ -148,7 +148,7 @@ impl SimulationLink {
     /// The next record of the message; `None` after the last.
     fn next_record(&self) -> Option<ToBoard> {
         let head = self.message_bytes()[self.done..].first_chunk::<HEAD>()?;
-        Some(ToBoard::from_bytes(head).expect("the desk sends records"))
+        Some(ToBoard::from_bytes(head).expect("the host sends records"))
     }
 
     fn message_bytes(&self) -> &'static [u8] {
@@ -211,7 +211,7 @@ impl SimulationLink {
     fn flush(&mut self) {
         // SAFETY: as in `queue_record`, which wrote it.
         let sent = unsafe { slice::from_raw_parts(SENT_ADDRESS as *const u8, self.queued_len) };
-        self.output.write_all(sent).expect("the desk listens");
+        self.output.write_all(sent).expect("the host listens");
         self.queued_len = 0;
     }
 
@@ -223,7 +223,7 @@ impl SimulationLink {
             semihosting::process::exit(0);
         }
         (self.length, self.done) = (u32::from_le_bytes(length) as usize, 0);
-        assert!(self.length <= LONGEST, "the desk sends no longer messages");
+        assert!(self.length <= LONGEST, "the host sends no longer messages");
         // SAFETY: memory of this board that no other code uses, and long enough.
         let message = unsafe { slice::from_raw_parts_mut(MESSAGE_ADDRESS as *mut u8, self.length) };
         self.input.read_exact(message).expect("a whole message");

@@ -164,7 +164,7 @@ fn theirs_us(program: &Path, vehicles: usize) -> Result<[f64; 2]> {
 }
 
 /// Input and workspaces of our plans of the area, and the flights as points.
-struct Desk {
+struct CoverageBench {
     vertices: Vec<Flat>,
     rings: [Ring; 1],
     vehicles: Vec<Vehicle>,
@@ -175,7 +175,7 @@ struct Desk {
     points: Vec<[f32; 3]>,
 }
 
-impl Desk {
+impl CoverageBench {
     fn new(vehicles: usize) -> Self {
         let vehicle = |i: usize| {
             let place = Flat::new(5.0 * i as f32, -10.0);
@@ -246,40 +246,40 @@ fn work<'a>(
 }
 
 fn ours_us(vehicles: usize) -> [f64; 2] {
-    let mut desk = Desk::new(vehicles);
-    let plan_us = median_us(|| desk.plan());
+    let mut bench = CoverageBench::new(vehicles);
+    let plan_us = median_us(|| bench.plan());
     let transit = Transit::<8>::empty();
     // Each vehicle has flown ten waypoints of its route and stands at the tenth.
     let mut done = Vec::new();
-    for route in &desk.plan.routes {
+    for route in &bench.plan.routes {
         let flown = WaypointRange { first: route.first, end: (route.first + 10).min(route.end) };
-        desk.vehicles[usize::from(route.vehicle)].place =
-            desk.tracks.waypoint(flown.end - 1).expect("a waypoint");
+        bench.vehicles[usize::from(route.vehicle)].place =
+            bench.tracks.waypoint(flown.end - 1).expect("a waypoint");
         done.push(flown);
     }
     let mut left: Box<Tracks<LANES>> = Box::default();
     let update_us = median_us(|| {
-        divide::remaining_lanes(&desk.tracks, black_box(&done), &transit, &mut left)
+        divide::remaining_lanes(&bench.tracks, black_box(&done), &transit, &mut left)
             .expect("something is left");
-        let rest = &desk.vehicles[1..];
+        let rest = &bench.vehicles[1..];
         let work = work(&left, &transit, rest);
-        binpat(&work, &mut desk.pack, &mut desk.plan).expect("routes");
-        write_out(&work, &desk.plan, &mut desk.points);
-        black_box(&desk.points);
+        binpat(&work, &mut bench.pack, &mut bench.plan).expect("routes");
+        write_out(&work, &bench.plan, &mut bench.points);
+        black_box(&bench.points);
     });
     let last = left.waypoint_count() - 1;
-    assert_eq!(divide::original_waypoint_number(&done, last), desk.tracks.waypoint_count() - 1);
+    assert_eq!(divide::original_waypoint_number(&done, last), bench.tracks.waypoint_count() - 1);
     [plan_us, update_us]
 }
 
 fn powell_us() -> f64 {
-    let mut desk = Desk::new(3);
-    desk.plan();
+    let mut bench = CoverageBench::new(3);
+    bench.plan();
     let transit = Transit::<8>::empty();
     let mut ws: Box<powell::Workspace<VEHICLES>> = Box::default();
-    let work = work(&desk.tracks, &transit, &desk.vehicles);
+    let work = work(&bench.tracks, &transit, &bench.vehicles);
     median_us(|| {
-        powell::powell(&work, &powell::PowellConfig::USUAL, &mut ws, &mut desk.plan)
+        powell::powell(&work, &powell::PowellConfig::USUAL, &mut ws, &mut bench.plan)
             .expect("routes");
     })
 }

@@ -8,7 +8,7 @@
 //! route planner on OR-tools is not built.
 //!
 //! Lengths are of all lanes and the connections between them. Ours twice: as boards plan, which
-//! look at few changes of the lanes' order, and `searched` as long as the desk does. `length with
+//! look at few changes of the lanes' order, and `searched` as long as the host does. `length with
 //! its lanes` is our order, as boards plan, of the very lanes of their best way ([`same_lanes`]).
 //! `length for what is swept` divides both lengths by the share of the field that lies beside a
 //! lane, no further than half its width.
