@@ -7,6 +7,7 @@ mod bench;
 mod build;
 mod emulate;
 mod flash;
+mod host_tests;
 mod install;
 mod shell;
 mod size;

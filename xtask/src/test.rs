@@ -1,10 +1,12 @@
 //! `cargo xtask test`: runs everything that CI runs.
 
+use std::ffi::OsString;
 use std::time::Instant;
 
 use anyhow::{Result, ensure};
 
 use crate::bare_metal::{self, Board, Built};
+use crate::host_tests::{self, Program};
 use crate::shell::{self, cargo};
 use crate::{emulate, install, size, structure};
 
@@ -20,9 +22,8 @@ pub struct Args {
     quick: bool,
 }
 
-/// Steps that check the sources only: format, lints, documentation, structure.
+/// Steps that check the sources only: lints, documentation, structure.
 fn sources() -> Result<()> {
-    step("format", || shell::run(cargo().args(["fmt", "--all", "--check"])))?;
     step("lints", || {
         shell::run(cargo().args([
             "clippy",
@@ -68,63 +69,59 @@ fn examples() -> Result<()> {
     Ok(())
 }
 
-/// Runs every step; stops at the first that fails.
-fn steps(args: &Args) -> Result<()> {
-    sources()?;
-    if args.quick {
-        return step("host tests", || {
-            shell::run(cargo().args(["test", "--workspace", "--no-fail-fast", "--locked"]))
-        });
-    }
-    let mut firmware = None;
+/// Builds the firmware for every board and installs what the tests run beside it. Returns the
+/// variables by which tests find these.
+fn boards_and_clients() -> Result<Vec<(&'static str, OsString)>> {
+    let mut found = Vec::new();
     step("boards", || {
         for board in Board::ALL {
             let Built { folder: programs, warnings } = bare_metal::build(board)?;
             ensure!(warnings == 0, "the firmware for {} has warnings", board.name());
-            firmware = firmware.take().or((board == Board::Qemu).then_some(programs));
+            if board == Board::Qemu {
+                found.push(("FLOCKMATE_FIRMWARE", programs.into_os_string()));
+            }
         }
         install::install_missing(install::EMULATOR)
     })?;
     step("browser", || install::install_missing(install::BROWSER))?;
-    let mut python = None;
     step("Python clients", || {
-        python = Some(install::python_clients()?);
+        found.push(("FLOCKMATE_PYTHON", install::python_clients()?.into_os_string()));
         Ok(())
     })?;
-    // The release build comes first, because tests compare it with the debug build.
+    Ok(found)
+}
+
+/// Checks the sources, then builds `host-sim` as its users run it, which tests compare with the
+/// debug build, then the tests.
+fn sources_and_host() -> Result<Vec<Program>> {
+    sources()?;
     step("release build", || {
         shell::run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))
     })?;
-    step("host tests", || {
-        let mut tests = cargo();
-        tests.args(["test", "--workspace", "--no-fail-fast", "--locked"]);
-        tests.env("RUST_TEST_THREADS", tests_at_once().to_string());
-        if let Some(python) = &python {
-            tests.env("FLOCKMATE_PYTHON", python);
-        }
-        if let Some(firmware) = &firmware {
-            tests.env("FLOCKMATE_FIRMWARE", firmware);
-        }
-        shell::run(&mut tests)
-    })?;
-    step("examples", examples)?;
-    let mut stack = 0;
-    step("emulated flight", || {
-        stack = emulate::run_emulate(&emulate::Args::default())?;
-        Ok(())
-    })?;
-    step("sizes", || {
-        for board in Board::ALL {
-            size::rows(board, stack)?;
-        }
-        Ok(())
-    })
+    step("host tests' build", host_tests::build)
 }
 
-/// Number of tests that run at once: at least four, since those with boards and clients mostly
-/// wait.
-fn tests_at_once() -> usize {
-    std::thread::available_parallelism().map_or(4, |cores| cores.get().max(4))
+/// Runs every step. Boards and host are built side by side, because each build waits for one
+/// crate at a time for minutes; then the steps follow one another, up to the first that fails.
+fn steps(args: &Args) -> Result<()> {
+    step("format", || shell::run(cargo().args(["fmt", "--all", "--check"])))?;
+    if args.quick {
+        sources()?;
+        let programs = step("host tests' build", host_tests::build)?;
+        return step("host tests", || host_tests::run(programs, &[]));
+    }
+    let (found, programs) = std::thread::scope(|scope| {
+        let boards = scope.spawn(boards_and_clients);
+        let programs = sources_and_host();
+        (boards.join().expect("builds without panic"), programs)
+    });
+    let (found, programs) = (found?, programs?);
+    step("host tests", || host_tests::run(programs, &found))?;
+    step("examples", examples)?;
+    let stack = step("emulated flight", || emulate::run_emulate(&emulate::Args::default()))?;
+    step("sizes", || {
+        Board::ALL.into_iter().try_for_each(|board| size::rows(board, stack).map(drop))
+    })
 }
 
 /// Runs the steps and prints the time each took.
@@ -135,10 +132,10 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-fn step(name: &str, work: impl FnOnce() -> Result<()>) -> Result<()> {
+fn step<T>(name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
     println!("== {name}");
     let begun = Instant::now();
-    work()?;
+    let done = work()?;
     println!("== {name}: passed in {:.0} s", begun.elapsed().as_secs_f32());
-    Ok(())
+    Ok(done)
 }
