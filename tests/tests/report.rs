@@ -164,17 +164,16 @@ struct Opened {
     pixels: Vec<[u8; 3]>,
 }
 
-/// Opens `page` once for its document and once for its picture, with `hash` after the address.
+/// Opens `page` once, with `hash` after the address.
 fn open(chromium: &Path, page: &Path, hash: &str) -> Opened {
-    let dom = browse(chromium, page, hash, "--dump-dom");
-    Opened { dom, pixels: picture(chromium, page, hash) }
+    let file = page.with_extension("png");
+    let dom = browse(chromium, page, hash, &file);
+    Opened { dom, pixels: pixels(&file) }
 }
 
-/// The window's pixels, row by row from the top.
-fn picture(chromium: &Path, page: &Path, hash: &str) -> Vec<[u8; 3]> {
-    let file = page.with_extension("png");
-    browse(chromium, page, hash, &format!("--screenshot={}", file.display()));
-    let decoder = png::Decoder::new(BufReader::new(File::open(&file).expect("a screenshot")));
+/// The pixels of a screenshot, row by row from the top.
+fn pixels(file: &Path) -> Vec<[u8; 3]> {
+    let decoder = png::Decoder::new(BufReader::new(File::open(file).expect("a screenshot")));
     let mut reader = decoder.read_info().expect("a PNG header");
     let mut bytes = vec![0; reader.output_buffer_size().expect("a size that fits memory")];
     let info = reader.next_frame(&mut bytes).expect("a PNG frame");
@@ -182,9 +181,9 @@ fn picture(chromium: &Path, page: &Path, hash: &str) -> Vec<[u8; 3]> {
     bytes.chunks_exact(info.color_type.samples()).map(|p| [p[0], p[1], p[2]]).collect()
 }
 
-/// Runs Chromium to its end, fails on anything the page wrote to the console, and returns its
-/// standard output.
-fn browse(chromium: &Path, page: &Path, hash: &str, action: &str) -> String {
+/// Runs Chromium to its end, fails on anything the page wrote to the console, writes a screenshot
+/// and returns the page's document.
+fn browse(chromium: &Path, page: &Path, hash: &str, screenshot: &Path) -> String {
     let profile = tempfile::tempdir().expect("a profile directory");
     let (out, err) = (profile.path().join("stdout"), profile.path().join("stderr"));
     let child = Command::new(chromium)
@@ -199,7 +198,8 @@ fn browse(chromium: &Path, page: &Path, hash: &str, action: &str) -> String {
         .args(["--virtual-time-budget=4000", "--force-device-scale-factor=1", "--hide-scrollbars"])
         .arg(format!("--user-data-dir={}", profile.path().join("profile").display()))
         .arg(format!("--window-size={},{}", WINDOW.0, WINDOW.1))
-        .arg(action)
+        .arg("--dump-dom")
+        .arg(format!("--screenshot={}", screenshot.display()))
         .arg(format!("file://{}{hash}", page.display()))
         .stdin(Stdio::null())
         .stdout(File::create(&out).expect("a file for stdout"))
@@ -304,7 +304,7 @@ fn page_of_the_demo_opens_clean_and_shows_every_vehicle_move() {
         (1.0, 10.0, 10.0)
     );
     assert!(opened.count("faces") > 1_000.0 && opened.count("roadmap-edges") > 10_000.0);
-    let later = picture(&chromium, &page, "#t=30&view=iso");
+    let later = open(&chromium, &page, "#t=30&view=iso").pixels;
     let moved = opened.pixels.iter().zip(&later).filter(|(a, b)| a != b).count();
     assert!(moved > 500, "{moved} pixels differ between two times");
     for index in 0..10 {
@@ -330,7 +330,8 @@ fn map_style_and_roadmap_change_the_picture() {
         (&whole, "#map=solid&cut=2.5"),
         (&bare, "#map=off"),
     ];
-    let [glass, none, solid, bare] = pictures.map(|(page, hash)| picture(&chromium, page, hash));
+    let [glass, none, solid, bare] =
+        pictures.map(|(page, hash)| open(&chromium, page, hash).pixels);
     let changed = |a: &[[u8; 3]], b: &[[u8; 3]]| a.iter().zip(b).filter(|(p, q)| p != q).count();
     assert!(changed(&glass, &none) > 20_000, "x-ray: {}", changed(&glass, &none));
     assert!(changed(&solid, &none) > 20_000, "solid: {}", changed(&solid, &none));
