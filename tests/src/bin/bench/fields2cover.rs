@@ -391,7 +391,7 @@ fn build(checkout: &Path, folder: &Path) -> Result<PathBuf> {
         .context("cannot run g++")?;
     ensure!(
         built.success(),
-        "Fields2Cover in {} does not build: it needs GDAL, GEOS and Eigen",
+        "Fields2Cover in {} does not build: apt-get install libgdal-dev libgeos-dev libeigen3-dev",
         checkout.display()
     );
     Ok(program)
