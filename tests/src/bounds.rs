@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use firmware::calls::{Meter, coverage, coverage_flights};
+use firmware::calls::{Meter, coverage, coverage_missions};
 use firmware::scratch::WorkspaceOverlay;
 use host_sim::map::{Unknown, building};
 use host_sim::mission::Mission;
@@ -112,14 +112,19 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("left and binpat, 32", "the same"),
     (
         "planner::coverage::plan_flights, 3",
-        "`set_area`, `build`, one `binpat`, `flights::plan_flights`",
+        "`set_area`, `build`, one `binpat`, `flights::plan_flights`, one `gates`",
     ),
     ("planner::coverage::plan_flights, 3, zones", "the same"),
+    ("planner::coverage::plan_flights, 32", "the same"),
+    ("a division, 3", "`set_area`, `losses::redivide_work` for the further loss, one `gates`"),
+    ("a division, 3, zones", "the same"),
     (
-        "planner::coverage::plan_flights, 3 after two losses",
-        "the same, and `losses::redivide_work` for each",
+        "a division, 3, nothing known",
+        "the plan, `losses::redivide_work` for each of two losses, one `gates`",
     ),
-    ("planner::coverage::plan_flights, 3 after two losses, zones", "the same"),
+    ("a division, 3, zones, nothing known", "the same"),
+    ("a division, 32", "as for 3"),
+    ("a division, 32, nothing known", "as for 3"),
     (
         "flights::plan_flights, 3",
         "at most v times v² / 2 pairs of flights, each w parts × 40 blocks of 8 timed segments; where gates are many 5 times v² pairs",
@@ -207,7 +212,7 @@ pub fn counted(program: &Path) -> Result<HashMap<String, CallCost>> {
         board::measure(program, &mission.roadmap_or_field_file, &board::map_image(&map.grid()));
     let calls = coverage::measure_coverage_calls(&mut Uncounted, &mut Box::default());
     let mut scratch = Box::new(WorkspaceOverlay::new());
-    let flights = coverage_flights::measure_coverage_flights(
+    let flights = coverage_missions::measure_coverage_flights(
         &mut Uncounted,
         &mut scratch,
         &mut Box::default(),

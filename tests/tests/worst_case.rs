@@ -19,12 +19,15 @@ const SLACK: f64 = 1.25;
 const STEP: u64 = 75_000;
 /// Instructions of the safety filter in the worst case seen.
 const FILTER: u64 = 12_000;
-/// Of a coverage mission: its whole plan, with and without zones, and the whole division of what is
-/// left after a loss, among 3 vehicles, with and without zones, and among 32 on 512 lanes.
-const COVERAGE: [(&str, u64); 5] = [
+/// Of a coverage mission: its whole plan, with and without zones, and the whole call of a board for
+/// a further division, among 3 vehicles, with and without zones, and among 32 on 512 lanes.
+const COVERAGE: [(&str, u64); 8] = [
     ("a coverage plan, 3", 20_000_000),
     ("planner::coverage::plan_flights, 3", 20_000_000),
     ("planner::coverage::plan_flights, 3, zones", 20_000_000),
+    ("a division, 3", 1_000_000),
+    ("a division, 3, zones", 1_000_000),
+    ("a division, 32", 10_000_000),
     ("losses::redivide_work, 3", 1_000_000),
     ("losses::redivide_work, 32", 10_000_000),
 ];

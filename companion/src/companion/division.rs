@@ -40,7 +40,7 @@ fn to_decimetres(along_m: f32) -> Option<u16> {
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// The input of the plan requested by [`PlanKind::Division`]: for each division so far, in
     /// order, the input of every vehicle by rank.
-    pub fn division_inputs(&self) -> impl Iterator<Item = &[DivisionInput]> {
+    pub fn division_inputs(&self) -> impl Iterator<Item = &[DivisionInput]> + Clone {
         self.neighbours.fleet().into_iter().flat_map(Fleet::inputs_of_divisions)
     }
 

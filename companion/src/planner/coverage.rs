@@ -14,6 +14,7 @@ use planner_core::coverage::{CoverageError, Flat, around};
 use planner_core::detour::{DetourRequest, KeepOutZone};
 use planner_core::field::FieldView;
 use planner_core::field::follow::TerrainFollowing;
+use planner_core::file::CRC32;
 use planner_core::flight::{HeadingMode, PicturePlan, VehiclePlan, WaypointRange};
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::ScheduleWorkspace;
@@ -41,6 +42,23 @@ pub struct Workspace<const X: usize, const L: usize, const K: usize> {
     pack: PackWorkspace<K>,
     routes: Plan<K>,
     losses: losses::Workspace<L, K>,
+    planned: Planned,
+}
+
+/// Which plan a workspace holds, together with the flights that were planned in it: a further
+/// division begins from there, not from the whole area again.
+#[derive(Clone, Copy, PartialEq, Eq)]
+struct Planned {
+    /// Number of plans that led to it, the one before take-off included; 0 if there is none.
+    plans: u32,
+    /// CRC of the inputs of all these plans.
+    inputs_crc: u32,
+    /// CRC of its flights.
+    plan_crc: u32,
+}
+
+impl Planned {
+    const NOTHING: Self = Self { plans: 0, inputs_crc: 0, plan_crc: 0 };
 }
 
 impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
@@ -54,6 +72,7 @@ impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
             pack: PackWorkspace::new(),
             routes: Plan::new(),
             losses: losses::Workspace::new(),
+            planned: Planned::NOTHING,
         }
     }
 
@@ -235,8 +254,55 @@ pub fn plan_detour<
         .map_err(|_| PlanFailure::Unreachable)
 }
 
+/// Vehicles and pads of a mission over this area.
+fn read_fleet<const K: usize>(
+    mission: &MissionView<'_>,
+    view: &CoverageView<'_>,
+    area: &Area<'_>,
+) -> Result<(Vec<Vehicle, K>, Vec<Pad, K>), CoverageError> {
+    let (mut vehicles, mut pads) = (Vec::new(), Vec::new());
+    for (i, own) in mission.vehicles().enumerate() {
+        let (id, start, climb_m) = (own.task.id, own.start, own.task.climb_m);
+        let pad = Pad { id, start, climb_m, end_z_m: start.z, descent_m: climb_m, airborne: false };
+        vehicles
+            .push(packing_vehicle(mission, &own, view, i))
+            .map_err(|_| CoverageError::Vehicles)?;
+        pads.push(pad).map_err(|_| CoverageError::Vehicles)?;
+        if area.is_in_no_fly_zone(&own.start.xy()) {
+            return Err(CoverageError::InsideNoFly(i as u8));
+        }
+    }
+    Ok((vehicles, pads))
+}
+
+/// CRC of the inputs of a plan before take-off.
+fn start_inputs_crc(request: &Request<'_, '_>) -> u32 {
+    let mut digest = CRC32.digest();
+    digest.update(&request.mission.crc().to_le_bytes());
+    digest.update(&(request.max_gates as u32).to_le_bytes());
+    for range in request.photographed {
+        digest.update(&range.first.to_le_bytes());
+        digest.update(&range.end.to_le_bytes());
+    }
+    digest.finalize()
+}
+
+/// CRC of the inputs of a division, and of all plans before it, whose inputs have the CRC `before`.
+fn division_inputs_crc(before: u32, inputs: &[DivisionInput]) -> u32 {
+    let mut digest = CRC32.digest();
+    digest.update(&before.to_le_bytes());
+    for input in inputs {
+        digest.update(&[u8::from(input.alive)]);
+        digest.update(&input.along_dm.to_le_bytes());
+    }
+    digest.finalize()
+}
+
 /// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` has for each
 /// division so far the inputs of all vehicles, by the rank of their system ids.
+///
+/// Where `ws` and `out` still hold the plan of the first of these divisions, only the later ones
+/// are computed; the result is the same.
 ///
 /// # Errors
 /// The error says why there is no plan.
@@ -250,51 +316,41 @@ pub fn plan_flights<
     const W: usize,
 >(
     request: &Request<'_, '_>,
-    losses: impl Iterator<Item = &'l [DivisionInput]>,
+    losses: impl Iterator<Item = &'l [DivisionInput]> + Clone,
     ws: &mut Workspace<X, L, K>,
     schedule: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), Error> {
-    let Request { mission, view, max_gates: gates_most, photographed: done, .. } = *request;
+    let Request { mission, view, max_gates: gates_most, .. } = *request;
     let header = view.header();
     let area = read_area(view, &mut ws.vertices, &mut ws.rings)?;
     let mut transit = Transit::<C>::empty();
     transit.set_area(area)?;
-    let pattern = LanePattern {
-        spacing: header.spacing,
-        angle_deg: header.angle_deg,
-        margin_m: header.margin_m,
-        search_steps: header.search_steps,
-    };
-    tracks::build_lanes(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
-    if ws.tracks.waypoint_count() > PicturePlan::MAX_AREA_WAYPOINTS {
-        return Err(CoverageError::LanesFull.into());
+    let (vehicles, pads) = read_fleet::<K>(mission, view, &area)?;
+    // A failure leaves neither plan.
+    let planned = core::mem::replace(&mut ws.planned, Planned::NOTHING);
+    let mut wanted = Planned { plans: 1, inputs_crc: start_inputs_crc(request), plan_crc: out.crc };
+    let mut known = u32::from(planned == wanted);
+    for inputs in losses.clone() {
+        wanted.inputs_crc = division_inputs_crc(wanted.inputs_crc, inputs);
+        wanted.plans += 1;
+        known = if planned == wanted { wanted.plans } else { known };
     }
-    let (mut vehicles, mut pads) = (Vec::<_, K>::new(), Vec::<_, K>::new());
-    for (i, own) in mission.vehicles().enumerate() {
-        let (id, start, climb_m) = (own.task.id, own.start, own.task.climb_m);
-        let pad = Pad { id, start, climb_m, end_z_m: start.z, descent_m: climb_m, airborne: false };
-        vehicles
-            .push(packing_vehicle(mission, &own, view, i))
-            .map_err(|_| CoverageError::Vehicles)?;
-        pads.push(pad).map_err(|_| CoverageError::Vehicles)?;
-        if area.is_in_no_fly_zone(&own.start.xy()) {
-            return Err(CoverageError::InsideNoFly(i as u8).into());
+    if known == 0 {
+        let pattern = LanePattern {
+            spacing: header.spacing,
+            angle_deg: header.angle_deg,
+            margin_m: header.margin_m,
+            search_steps: header.search_steps,
+        };
+        tracks::build_lanes(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
+        if ws.tracks.waypoint_count() > PicturePlan::MAX_AREA_WAYPOINTS {
+            return Err(CoverageError::LanesFull.into());
         }
     }
     let (tracks, transit) = (&ws.tracks, &transit);
-    let (left, done) = ws.losses.start_plan(tracks, transit, done)?;
     let whole =
         Work { tracks, transit, vehicles: &vehicles, heights: header.heights, unit: header.unit };
-    let work = Work { tracks: left, ..whole };
-    match header.parts {
-        PartEligibility::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
-        PartEligibility::Anyone => {
-            let shares: Vec<f32, K> = view.shares().map(|share| share.weight).collect();
-            // Here weights are sizes of parts, which any vehicle may get.
-            pack::binpat_by_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
-        }
-    }
     let along = tracks.lane_direction();
     let look = match header.heading {
         HeadingRule::Sweep => HeadingMode::Fixed(libm::atan2f(along.y, along.x)),
@@ -314,14 +370,22 @@ pub fn plan_flights<
         held_layers: 0,
         following: request.terrain_following(&vehicles)?,
     };
-    flights::plan_flights(
-        &work,
-        &ws.routes,
-        &FlightInputs { photographed: done, ..flight_inputs },
-        schedule,
-        out,
-    )?;
-    for inputs in losses {
+    if known == 0 {
+        let (left, done) = ws.losses.start_plan(tracks, transit, request.photographed)?;
+        let work = Work { tracks: left, ..whole };
+        match header.parts {
+            PartEligibility::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
+            PartEligibility::Anyone => {
+                let shares: Vec<f32, K> = view.shares().map(|share| share.weight).collect();
+                // Here weights are sizes of parts, which any vehicle may get.
+                pack::binpat_by_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
+            }
+        }
+        let inputs = FlightInputs { photographed: done, ..flight_inputs };
+        flights::plan_flights(&work, &ws.routes, &inputs, schedule, out)?;
+        known = 1;
+    }
+    for inputs in losses.skip(known as usize - 1) {
         let mut fates: Vec<VehicleStatus, K> = Vec::new();
         for pad in &pads {
             let rank = pads.iter().filter(|other| other.id < pad.id).count();
@@ -332,5 +396,6 @@ pub fn plan_flights<
         let loss = Loss { work: &whole, flight_inputs: &flight_inputs, fates: &fates };
         losses::redivide_work(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
     }
+    ws.planned = Planned { plan_crc: out.crc, ..wanted };
     Ok(())
 }

@@ -358,7 +358,7 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// The inputs of every binding division, and of the one under way where that is to be computed.
-    pub fn inputs_of_divisions(&self) -> impl Iterator<Item = &[DivisionInput]> {
+    pub fn inputs_of_divisions(&self) -> impl Iterator<Item = &[DivisionInput]> + Clone {
         let under_way = self.needs_division().then_some(&self.division_inputs);
         self.divisions.iter().chain(under_way).map(|inputs| &inputs[..])
     }

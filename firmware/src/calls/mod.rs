@@ -7,6 +7,7 @@
 
 pub mod coverage;
 pub mod coverage_flights;
+pub mod coverage_missions;
 pub mod flight;
 pub mod limits;
 mod limits_area_flights;

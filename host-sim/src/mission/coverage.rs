@@ -246,7 +246,7 @@ impl Mission {
     fn plan_area<'l>(
         &self,
         done: &[WaypointRange],
-        losses: impl Iterator<Item = &'l [DivisionInput]>,
+        losses: impl Iterator<Item = &'l [DivisionInput]> + Clone,
         ws: &mut HostWorkspace,
     ) -> anyhow::Result<Box<SwarmPlan>> {
         let mission = self.mission_view();
@@ -298,7 +298,7 @@ impl Mission {
     pub fn plan_remaining<'l>(
         &self,
         done: &[WaypointRange],
-        losses: impl Iterator<Item = &'l [DivisionInput]>,
+        losses: impl Iterator<Item = &'l [DivisionInput]> + Clone,
     ) -> anyhow::Result<Box<SwarmPlan>> {
         self.plan_area(done, losses, &mut on_heap(HostWorkspace::new))
     }

@@ -1,7 +1,7 @@
 //! Counts the public calls of planner-core.
 
 use firmware::boards::chosen::memory;
-use firmware::calls::{Meter, coverage, coverage_flights, flight};
+use firmware::calls::{Meter, coverage, coverage_missions, flight};
 use firmware::capacity::{
     GATES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
 };
@@ -90,7 +90,7 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     measure_roadmap_builds(meter, &grid, scratch);
     let search = &mut scratch.planner().search;
     measure_host_calls(meter, &grid, search, beside);
-    let flights = coverage_flights::measure_coverage_flights(meter, scratch, &mut beside.plan);
+    let flights = coverage_missions::measure_coverage_flights(meter, scratch, &mut beside.plan);
     [coverage::measure_coverage_calls(meter, scratch.coverage_bench()), flights]
 }
 

@@ -9,6 +9,7 @@ use std::vec::Vec as List;
 use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::field::{self, FieldShape, FieldView};
+use planner_core::flight::WaypointRange;
 use planner_core::frames::Geodetic;
 use planner_core::plan::{GoalMode, SwarmPlan, VehicleTask};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
@@ -19,6 +20,7 @@ use crate::planner::coverage::{self, Workspace};
 use crate::storage::mission_file::{
     self, MissionBlock, MissionHeader, MissionKind, MissionVehicle, MissionView,
 };
+use crate::swarm::fleet::DivisionInput;
 
 /// Bytes before the block of two vehicles.
 const BEFORE: usize = mission_file::HEADER_LEN + 2 * mission_file::VEHICLE_LEN;
@@ -298,4 +300,74 @@ proptest! {
             }
         }
     }
+}
+
+/// A step of a fleet: a further division, another one in place of the last, none, or a new start.
+#[derive(Clone, Copy)]
+enum Step {
+    Further,
+    Other,
+    Withdrawn,
+    Restarted,
+    OtherFile,
+}
+
+/// A workspace that holds an earlier plan gives the plan that an empty one gives, whatever
+/// divisions are added, withdrawn or changed, and whatever was planned in between.
+#[test]
+fn a_kept_workspace_plans_what_an_empty_one_plans() {
+    use Step::*;
+    let steps = [Further, Further, Further, Other, Withdrawn, Restarted, OtherFile];
+    let files = [file(), forged(60, &0.5f32.to_le_bytes())];
+    let mut random = rand_pcg::Pcg32::new(7, 9);
+    let mut draw = |below: u32| rand_core::Rng::next_u32(&mut random) % below;
+    let mut kept = Box::<Memory>::default();
+    let (mut which, mut done) = (0, List::new());
+    let mut losses: List<[DivisionInput; 2]> = List::new();
+    let (mut plans, mut failures) = (0, 0);
+    for _ in 0..400 {
+        let input = |draw: &mut dyn FnMut(u32) -> u32| DivisionInput {
+            alive: draw(4) > 0,
+            along_dm: draw(3000) as u16,
+        };
+        let step = steps[draw(7) as usize];
+        match step {
+            Further if losses.len() < 5 => losses.push([input(&mut draw), input(&mut draw)]),
+            Further => losses.truncate(1),
+            Other => {
+                losses.pop();
+                losses.push([input(&mut draw), input(&mut draw)]);
+            }
+            Withdrawn => _ = losses.pop(),
+            Restarted => {
+                losses.clear();
+                done = vec![WaypointRange { first: draw(9), end: 9 + draw(9) }];
+            }
+            OtherFile => which = 1 - which,
+        }
+        let plan = |memory: &mut Memory| {
+            let view = MissionView::parse(&files[which]).unwrap();
+            let MissionKind::Coverage(area) = view.kind() else { panic!("a coverage mission") };
+            let request = coverage::Request {
+                mission: &view,
+                view: area,
+                max_gates: 128,
+                field: None,
+                photographed: &done,
+            };
+            let (ws, schedule, plan) = memory;
+            let losses = losses.iter().map(|inputs| &inputs[..]);
+            coverage::plan_flights::<64, 128, 8, 16, 4, 64>(&request, losses, ws, schedule, plan)
+        };
+        let mut fresh = Box::<Memory>::default();
+        let (outcome, expected) = (plan(&mut kept), plan(&mut fresh));
+        assert_eq!(outcome, expected);
+        failures += usize::from(outcome.is_err());
+        if outcome.is_ok() {
+            plans += 1;
+            assert!(kept.2 == fresh.2);
+            assert_eq!(kept.0.routes().routes, fresh.0.routes().routes);
+        }
+    }
+    assert!(plans > 200 && failures > 0, "{plans} plans, {failures} failures");
 }

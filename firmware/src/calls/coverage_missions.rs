@@ -1,0 +1,270 @@
+//! Plans and divisions of coverage missions, each the whole call of a board: from the mission file
+//! to one vehicle's plan with its gates.
+
+use companion::planner::coverage::{self, Request};
+use companion::storage::mission_file::coverage::{
+    CoverageHeader, CoverageParts, HeadingRule, PartEligibility, VehicleShare,
+};
+use companion::storage::mission_file::{
+    self, MAX_BYTES, MissionBlock, MissionHeader, MissionKind, MissionVehicle, MissionView,
+};
+use companion::swarm::fleet::{DivisionInput, DivisionInputs};
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::coverage::Flat;
+use planner_core::coverage::pack::TrackUnit;
+use planner_core::deconflict::Method;
+use planner_core::flight::{Trigger, VehiclePlan};
+use planner_core::plan::{self, VehicleTask};
+use planner_core::schedule::ScheduleConfig;
+
+use super::coverage_flights::{
+    CLIMB_M, CLIMB_MPS, CRUISE_MPS, DESCEND_MPS, FIVE_VERTICES, Flights, HEIGHTS, LIMITED_VEHICLES,
+    NO_FLY_ZONES, PAD_SPACING_M, SCHEDULE, WIDE_VERTICES, add_to_checksum, rings, spacing,
+};
+use super::{Meter, coverage_flights, flight};
+use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
+use crate::scratch;
+
+/// Most divisions of a mission that are measured.
+const DIVISIONS: usize = 3;
+
+/// A coverage mission, and the rows of its calls.
+struct Mission<'a> {
+    outline: &'a [[f32; 2]],
+    zones: &'a [[[f32; 2]; 4]],
+    angle_deg: Option<f32>,
+    lane_m: f32,
+    separation_m: f32,
+    count: usize,
+    /// Row of the plan before take-off.
+    plan: &'static str,
+    /// Row of a division of which the board has planned all before: one further loss.
+    further: &'static str,
+    /// Row of a division of which the board has planned nothing: it was restarted, or the division
+    /// before it was withdrawn.
+    whole: &'static str,
+}
+
+const PLAIN: Mission<'static> = Mission {
+    outline: &FIVE_VERTICES,
+    zones: &[],
+    angle_deg: None,
+    lane_m: 10.0,
+    separation_m: SCHEDULE.separation_m,
+    count: LIMITED_VEHICLES,
+    plan: "planner::coverage::plan_flights, 3",
+    further: "a division, 3",
+    whole: "a division, 3, nothing known",
+};
+
+/// Measures all coverage plans and divisions; returns a checksum of the results.
+#[inline(never)]
+pub fn measure_coverage_flights(
+    meter: &mut impl Meter,
+    lent: &mut scratch::WorkspaceOverlay,
+    out: &mut Flights,
+) -> u32 {
+    measure_missions(meter, lent.coverage_plan(), out)
+        ^ coverage_flights::measure_plan_parts(meter, lent.coverage_bench(), out)
+}
+
+/// Measures plans and divisions of all missions; returns a checksum of the results.
+#[inline(never)]
+fn measure_missions(
+    meter: &mut impl Meter,
+    lent: &mut scratch::CoveragePlanWorkspace,
+    out: &mut Flights,
+) -> u32 {
+    let zones = Mission {
+        zones: &NO_FLY_ZONES,
+        plan: "planner::coverage::plan_flights, 3, zones",
+        further: "a division, 3, zones",
+        whole: "a division, 3, zones, nothing known",
+        ..PLAIN
+    };
+    let wide = Mission {
+        outline: &WIDE_VERTICES,
+        angle_deg: Some(90.0),
+        lane_m: 5.0,
+        count: VEHICLES,
+        plan: "planner::coverage::plan_flights, 32",
+        further: "a division, 32",
+        whole: "a division, 32, nothing known",
+        ..PLAIN
+    };
+    let mut sum = 1;
+    for mission in [PLAIN, zones, wide] {
+        let mut bytes = [0; MAX_BYTES];
+        let len = write_mission(&mission, &mut bytes);
+        let view = MissionView::parse(&bytes[..len]).expect("it was written");
+        let mut board = Board { mission: &mission, view, lent, out, sum: &mut sum };
+        measure_losses(meter, &mut board);
+    }
+    sum
+}
+
+/// Writes the mission file and returns its length.
+#[inline(never)]
+fn write_mission(mission: &Mission<'_>, out: &mut [u8]) -> usize {
+    let header = MissionHeader {
+        roadmap_crc: 0,
+        mode: crate::cases::ASSIGNMENT_MODE,
+        method: Method::Priority,
+        origin: flight::ORIGIN,
+        cruise_mps: CRUISE_MPS,
+        schedule: ScheduleConfig { separation_m: mission.separation_m, ..SCHEDULE },
+        safety_distance_m: 1.5,
+        geofence: None,
+        ground_stations: companion::config::USUAL_GROUND_STATIONS,
+    };
+    let vehicle = |k: usize| MissionVehicle {
+        task: VehicleTask {
+            id: 1 + k as u8,
+            required_clearance_m: 1.5,
+            climb_m: CLIMB_M,
+            goal: None,
+        },
+        start: Point::new(PAD_SPACING_M * k as f32, -10.0, CLIMB_M),
+        radius_m: 0.3,
+        speed_max_mps: 8.0,
+    };
+    let vehicles: Vec<_, VEHICLES> = (0..mission.count).map(vehicle).collect();
+    let area = CoverageHeader {
+        unit: TrackUnit::Waypoint,
+        parts: PartEligibility::Anyone,
+        heading: HeadingRule::Sweep,
+        trigger: Trigger::Distance,
+        search_steps: super::coverage::MAX_ORDER_CHANGES,
+        heights: HEIGHTS,
+        spacing: spacing(mission.lane_m),
+        angle_deg: mission.angle_deg,
+        margin_m: 0.0,
+        ground: None,
+    };
+    let share = VehicleShare { weight: 1.0, climb_mps: CLIMB_MPS, descend_mps: DESCEND_MPS };
+    let shares: Vec<_, VEHICLES> = core::iter::repeat_n(share, mission.count).collect();
+    let corners = mission.outline.iter().chain(mission.zones.iter().flatten());
+    let vertices: Vec<Flat, 16> = corners.map(|[x, y]| Flat::new(*x, *y)).collect();
+    let parts = CoverageParts {
+        header: area,
+        shares: &shares,
+        rings: &rings(mission.outline.len(), mission.zones.len()),
+        vertices: &vertices,
+    };
+    mission_file::write_mission(&header, &vehicles, &MissionBlock::Coverage(parts), out)
+        .expect("a good mission")
+}
+
+/// A board that has a mission, and its memory.
+struct Board<'a> {
+    mission: &'a Mission<'a>,
+    view: MissionView<'a>,
+    lent: &'a mut scratch::CoveragePlanWorkspace,
+    out: &'a mut Flights,
+    sum: &'a mut u32,
+}
+
+/// The inputs of all divisions of a mission.
+type Divisions = Vec<DivisionInputs<VEHICLES>, DIVISIONS>;
+
+impl Board<'_> {
+    /// Measures the whole call: the swarm's flights, and the plan of the last vehicle.
+    fn measure(&mut self, meter: &mut impl Meter, name: &'static str, losses: &Divisions) {
+        let MissionKind::Coverage(area) = self.view.kind() else { return };
+        let mission = &self.view;
+        let request =
+            Request { mission, view: area, field: None, max_gates: GATES, photographed: &[] };
+        let mut own = VehiclePlan::<WAYPOINTS, GATES>::new();
+        let (out, lent) = (&mut *self.out, &mut *self.lent);
+        let schedule = &mission.header().schedule;
+        meter
+            .call(name, size_of::<scratch::CoveragePlanWorkspace>(), || {
+                coverage::plan_flights::<
+                    AREA_VERTICES,
+                    LANES,
+                    VEHICLES,
+                    AREA_CORNERS,
+                    VEHICLES,
+                    WAYPOINTS,
+                >(
+                    &request,
+                    losses.iter().map(|inputs| &inputs[..]),
+                    &mut lent.area,
+                    &mut lent.schedule,
+                    out,
+                )
+                .expect("a plan");
+                let last = out.flights.len() - 1;
+                plan::vehicle_plan(out, last, schedule, &mut lent.schedule, &mut own)
+            })
+            .expect("its gates");
+        add_to_checksum(self.sum, self.out);
+    }
+
+    /// Inputs of a division: the first `lost` vehicles are lost, and all others hold at `share` of
+    /// their paths.
+    fn inputs(&self, lost: usize, share: f32) -> DivisionInputs<VEHICLES> {
+        let input = |k: usize| {
+            let flight = &self.out.flights[k];
+            let along_m =
+                if flight.task.leaves_pad() { flight.path.length_m() * share } else { 0.0 };
+            DivisionInput { alive: k >= lost, along_dm: (along_m * 10.0) as u16 }
+        };
+        (0..self.mission.count).map(input).collect()
+    }
+}
+
+/// Measures the plan before take-off; two losses, one after the other; the second one again with
+/// other inputs, since the first ones were withdrawn; and both at once.
+fn measure_losses(meter: &mut impl Meter, board: &mut Board<'_>) {
+    let Mission { plan, further, whole, .. } = *board.mission;
+    let mut losses = Divisions::new();
+    board.measure(meter, plan, &losses);
+    let both = board.inputs(2, 0.5);
+    losses.push(board.inputs(1, 0.5)).expect("there is room");
+    board.measure(meter, further, &losses);
+    let (second, other) = (board.inputs(2, 0.5), board.inputs(2, 0.4));
+    losses.push(second).expect("there is room");
+    board.measure(meter, further, &losses);
+    losses[1] = other;
+    board.measure(meter, whole, &losses);
+    losses.truncate(1);
+    losses[0] = both;
+    board.measure(meter, whole, &losses);
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::boxed::Box;
+
+    use super::*;
+
+    struct Uncounted;
+
+    impl Meter for Uncounted {
+        fn call<T>(&mut self, name: &'static str, _: usize, work: impl FnOnce() -> T) -> T {
+            let began = std::time::Instant::now();
+            let result = work();
+            std::println!("{name}: {:?}", began.elapsed());
+            result
+        }
+    }
+
+    #[test]
+    fn all_flights_are_planned_and_the_sum_is_the_same_again() {
+        let mut out = Box::new(Flights::new());
+        let mut area = Box::<scratch::CoveragePlanWorkspace>::default();
+        let mut lent = Box::<scratch::CoverageBenchWorkspace>::default();
+        let mut sums = || {
+            [
+                measure_missions(&mut Uncounted, &mut area, &mut out),
+                coverage_flights::measure_plan_parts(&mut Uncounted, &mut lent, &mut out),
+            ]
+        };
+        let first = sums();
+        assert_eq!(sums(), first);
+    }
+}
