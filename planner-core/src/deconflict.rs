@@ -4,7 +4,8 @@
 //! order of the swarm's schedule: the vehicle stops at each gate ([`crate::schedule`]) until the
 //! other vehicle has left the stretch that conflicts with the one behind the gate. A vehicle that
 //! is out of the plan opens all gates that wait for it, and is flown around ([`crate::detour`]).
-//! Before a neighbour that does not fly the shared plan the vehicle stops.
+//! Before a neighbour that does not fly the shared plan the vehicle stops; past one that hovers
+//! beside its path it flies slowly, where a stop from the lower speed still ends far enough away.
 
 use fpu::sqrtf;
 use heapless::Vec;
@@ -121,6 +122,17 @@ const GATE_OVERSHOOT_M: f32 = 0.1;
 const BRAKING_OVERSHOOT_S: f32 = 0.2;
 /// Cruise speed up to which a braking vehicle does not overshoot its reference, m/s.
 const BRAKING_OVERSHOOT_ABOVE_MPS: f32 = 3.0;
+/// Greatest speed past a neighbour that hovers nearer than a stop from cruise speed requires, m/s:
+/// a stop from it overshoots by 0.4 m, and detours keep 0.5 m beyond the safety distance.
+const PASSING_MPS: f32 = 5.0;
+/// Greatest speed of a neighbour that hovers, m/s.
+const HOVERING_MPS: f32 = 1.0;
+
+/// Distance that is kept so that a stop from this speed ends outside the safety distance, metres.
+fn stopping_distance_apart_m(cfg: &DeconflictConfig, speed_mps: f32) -> f32 {
+    cfg.safety_distance_m
+        + BRAKING_OVERSHOOT_S * fmaxf(speed_mps - BRAKING_OVERSHOOT_ABOVE_MPS, 0.0)
+}
 
 /// Advice to the vehicle `own`; `gates` must be sorted along its path. Work: the gates, a search
 /// among the neighbours for each gate within reach, and for each neighbour that does not fly the
@@ -189,12 +201,22 @@ fn advise_by_priority<const W: usize>(
     }
     let unplanned = |n: &&Neighbour| n.progress_m.is_none() || n.detours || own.detours;
     let ahead = PathSamples::new(cfg, own);
+    let mut slow_within_m = f32::INFINITY;
     for n in neighbours.iter().filter(|n| !n.grounded).filter(unplanned) {
-        if let Some(distance) = ahead.distance_to_conflict_m(cfg, own, n) {
-            stop(distance, n.id);
+        let conflict_m = |speed_mps: f32| {
+            ahead.distance_to_conflict_m(stopping_distance_apart_m(cfg, speed_mps), own, n)
+        };
+        let Some(distance_m) = conflict_m(cfg.cruise_mps) else { continue };
+        let hovers = n.velocity.norm_squared() <= HOVERING_MPS * HOVERING_MPS;
+        if hovers && cfg.cruise_mps > PASSING_MPS && conflict_m(PASSING_MPS).is_none() {
+            slow_within_m = fminf(slow_within_m, distance_m);
+        } else {
+            stop(distance_m, n.id);
         }
     }
-    let allowed_mps = sqrtf(2.0 * cfg.accel_mps2 * fmaxf(advice.stop_within_m, 0.0));
+    let braking = |within_m: f32| 2.0 * cfg.accel_mps2 * fmaxf(within_m, 0.0);
+    let slow_mps_sq = PASSING_MPS * PASSING_MPS + braking(slow_within_m);
+    let allowed_mps = sqrtf(fminf(braking(advice.stop_within_m), slow_mps_sq));
     advice.speed_scale = fminf(allowed_mps / cfg.cruise_mps, 1.0);
     advice
 }
@@ -219,13 +241,13 @@ impl PathSamples {
         Self { points: points.collect(), step_m }
     }
 
-    /// Distance along the own path at which the vehicle first comes within the safety distance of
+    /// Distance along the own path at which the vehicle first comes within `apart_m` metres of
     /// neighbour `n`, if `n` flies on straight as last heard. `None` if that is not within the
     /// samples, or if both only move apart. Squares are compared: square roots are slow on a board.
     /// Samples at which both cannot meet yet are skipped.
     fn distance_to_conflict_m<const W: usize>(
         &self,
-        cfg: &DeconflictConfig,
+        apart_m: f32,
         own: &OwnVehicle<'_, W>,
         n: &Neighbour,
     ) -> Option<f32> {
@@ -233,8 +255,6 @@ impl PathSamples {
             n.position + n.velocity * (n.age_s + looks as f32 * PATH_SAMPLE_S) - own
         };
         let now = away(0, &own.position);
-        let apart_m = cfg.safety_distance_m
-            + BRAKING_OVERSHOOT_S * fmaxf(cfg.cruise_mps - BRAKING_OVERSHOOT_ABOVE_MPS, 0.0);
         let near = fminf(apart_m * apart_m, now.norm_squared());
         // Upper bound of how far both fly between two samples.
         let fastest_mps = n.velocity.x.abs() + n.velocity.y.abs() + n.velocity.z.abs();
@@ -308,7 +328,8 @@ mod tests {
             };
             prop_assume!(distance(0) > cfg.safety_distance_m);
             let contact = (0..4000).find(|&ms| distance(ms) < cfg.safety_distance_m - 0.01);
-            let found = PathSamples::new(&cfg, &own).distance_to_conflict_m(&cfg, &own, &n);
+            let apart_m = stopping_distance_apart_m(&cfg, cruise_mps);
+            let found = PathSamples::new(&cfg, &own).distance_to_conflict_m(apart_m, &own, &n);
             if let Some(ms) = contact {
                 let within_m = found.expect("a contact is found");
                 prop_assert!(within_m <= cruise_mps * ms as f32 * 1e-3 + 1e-3);
@@ -358,6 +379,42 @@ mod tests {
         assert_eq!((advice.speed_scale, advice.waiting_for), (1.0 / 6.0, 4));
         let advice = advise(&cfg(Method::Algorithm2), &own(&path), &[], &near[..1]);
         assert_eq!(advice, Advice::FREE, "a lower id has no priority");
+    }
+
+    /// Past one that hovers beside the path, where a stop from cruise speed would come too near, at
+    /// most [`PASSING_MPS`]; before one on the path, or one that moves, a stop.
+    #[test]
+    fn priority_passes_one_that_hovers_slowly_and_stops_before_others() {
+        let mut path = Path::<4>::new();
+        path.push(Point::zeros(), 1.0).unwrap();
+        path.push(Point::new(200.0, 0.0, 0.0), 1.0).unwrap();
+        let cfg = DeconflictConfig { cruise_mps: 13.0, ..cfg(Method::Priority) };
+        let at = |along_m: f32, beside_m: f32, velocity_mps: f32| {
+            let own = OwnVehicle {
+                along_m,
+                position: Point::new(along_m, 0.0, 0.0),
+                detours: true,
+                ..own(&path)
+            };
+            let other = Neighbour {
+                velocity: Point::new(0.0, velocity_mps, 0.0),
+                ..neighbour(2, 0, Point::new(40.0, beside_m, 0.0))
+            };
+            let advice = advise(&cfg, &own, &[], &[other]);
+            (advice.waiting_for, advice.speed_scale * cfg.cruise_mps)
+        };
+        // Room for a stop from cruise speed, from the passing speed, and for neither.
+        for along_m in [0.0, 20.0, 35.0, 40.0] {
+            assert_eq!(at(along_m, 3.6, 0.0), (0, 13.0));
+            assert_eq!(at(along_m, 2.0, 0.0).0, 0);
+            assert_eq!(at(along_m.min(35.0), 1.8, 0.0).0, 2);
+            assert_eq!(at(along_m.min(35.0), 2.0, -1.5).0, 2);
+        }
+        let near = |mps: f32| (PASSING_MPS..PASSING_MPS + 0.01).contains(&mps);
+        assert!(near(at(38.0, 2.0, 0.0).1), "{:?}", at(38.0, 2.0, 0.0));
+        let before = at(20.0, 2.0, 0.0).1;
+        assert!(before > PASSING_MPS && before < 13.0, "{before}");
+        assert_eq!(at(45.0, 2.0, 0.0), (0, 13.0), "it is behind");
     }
 
     #[test]
