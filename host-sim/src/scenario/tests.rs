@@ -313,10 +313,10 @@ fn faults_of_an_area_are_named_where_they_stand() {
             polygon,
             crossing,
             metres,
-            "x.toml:4:11: area: the edges from vertex 0 of no-fly zone 0 and from vertex 2 of \
+            "x.toml:4:11: area.no_fly: the edges from vertex 0 of no-fly zone 0 and from vertex 2 of \
              no-fly zone 0 cross",
         ),
-        (polygon, outside, metres, "x.toml:4:42: area: hole 1"),
+        (polygon, outside, metres, "x.toml:4:42: area.holes: hole 1"),
         (polygon, "", &place(41.0, -3.0), "is 111 km from the origin at 40.0000, -3.0000"),
         (polygon, "", &place(-3.0, 40.0), "order of latitude and longitude"),
         (&degrees, "", metres, "area.polygon is in degrees"),
@@ -358,6 +358,46 @@ fn paths_are_relative_to_the_scenario() {
         error.why.ends_with("goals.txt:2: expected `x y z` in metres, found `1 x 3`"),
         "{error}"
     );
+}
+
+#[test]
+fn wrong_files_of_an_area_are_named_with_key_place_and_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let ring = |ring: &str| format!(r#"{{"type":"Polygon","coordinates":[[{ring}]]}}"#);
+    let line = ring("[8.0,47.0],[8.001,47.0]");
+    let crossing = ring("[8.0,47.0],[8.001,47.001],[8.001,47.0],[8.0,47.001],[8.0,47.0]");
+    let far = "ncols 2\nnrows 2\nxllcorner 5e5\nyllcorner 5e6\ncellsize 10\n1 2\n3 4\n";
+    let point = "<kml><Placemark><Point><coordinates>1,2</coordinates></Point></Placemark></kml>";
+    let missing = "FILE cannot be read: No such file";
+    for (key, name, text, wanted, hint) in [
+        ("file", "none.wkt", "", "is no area: FILE: cannot be read: No such file", "relative to"),
+        ("file", "a.gpx", "<gpx/>", "is no area: FILE: is in no known format", "as GeoJSON"),
+        ("file", "a.json", "", "is no area: FILE: is not GeoJSON: ", "export it again"),
+        ("file", "a.kml", point, "is no area: FILE: holds no polygon", "a closed polygon"),
+        ("file", "b.json", &line, ": polygon 0 has fewer than three", "three corners or more"),
+        ("file", "c.json", &crossing, ": the edges from vertex 0 of polygon 0", "in their order"),
+        ("terrain", "none.asc", "", missing, "relative to"),
+        ("terrain", "a.asc", far, "FILE has no height here", "all pads"),
+        ("terrain", "b.asc", "1 2 3\n", "FILE is not an ESRI grid", "export it again"),
+    ] {
+        let path = folder.path().join(name);
+        if !name.starts_with("none") {
+            std::fs::write(&path, text).unwrap();
+        }
+        let border = if key == "file" { "" } else { "polygon = [[0, 0], [90, 0], [90, 60]]\n" };
+        let scenario = format!(
+            "[area]\nheight_m = 35.0\ncamera = {{ fov_deg = 73.7, aspect = 1.5 }}\n\
+             {key} = \"{name}\"\n{border}[[vehicles]]\nid = 1\nstart = [0, -20, 0]\n"
+        );
+        std::fs::write(folder.path().join("s.toml"), scenario).unwrap();
+        let error = load(&folder.path().join("s.toml")).unwrap_err();
+        let wanted = wanted.replace("FILE", &path.display().to_string());
+        let place = error.place.as_ref().map(|place| place.line);
+        assert_eq!(place, Some(4), "{error}");
+        assert!(error.why.starts_with(&format!("area.{key}")), "{error}");
+        assert!(error.why.contains(&wanted), "{wanted}: {error}");
+        assert!(error.hint.as_ref().is_some_and(|said| said.contains(hint)), "{hint}: {error}");
+    }
 }
 
 /// Starts and goals clear of everything by more than the required clearance, on a map that can be

@@ -10,7 +10,7 @@ use planner_core::coverage::pack::Heights;
 use planner_core::coverage::{Flat, area as core_area};
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 
-use self::errors::{describe_area_error, faulty_ring, overlap_error};
+use self::errors::{area_hint, describe_area_error, faulty_ring, file_hint, overlap_error};
 use self::spacing::{read_camera, read_spacing};
 use super::checks::{VehicleSpans, check_margins};
 use super::obstacles::{Flown, MapBesideArea};
@@ -273,8 +273,9 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
         }
         (Some(file), None) => {
             let path = folder.join(file.str()?);
-            let polygons = area::read(&path).map_err(|error| {
-                file.error(&format!("is no area: {}: {error}", quoted_path(&path)))
+            let polygons = area::read(&path).map_err(|error| ScenarioError {
+                hint: Some(file_hint(&error).to_owned()),
+                ..file.error(&format!("is no area: {}: {error}", quoted_path(&path)))
             })?;
             let metres = AreaFormat::from_path(&path) == Some(AreaFormat::Wkt);
             let usual = if metres { Coordinates::Metres } else { Coordinates::Wgs84 };
@@ -355,10 +356,8 @@ fn rings_in_mission_frame(
     coordinates: Coordinates,
     origin: &Geodetic,
 ) -> Result<(Vec<Flat>, Vec<Ring>)> {
-    let bad = |why: String, hint: &str| match hint {
-        "" => Err(table.text.error(source, why)),
-        hint => Err(table.text.with_hint(source, why, hint)),
-    };
+    let bad = |why: String, hint: &str| Err(table.text.with_hint(source, why, hint));
+    let border = if table.get("file").is_some() { "area.file" } else { "area.polygon" };
     let (mut vertices, mut rings) = (Vec::new(), Vec::new());
     let kinds = [
         (RingKind::Outer, &polygons.outers),
@@ -371,7 +370,7 @@ fn rings_in_mission_frame(
         let begin = vertices.len();
         for &[x, y] in ring {
             let Some(place) = place_in_mission_frame([x, y], coordinates, origin) else {
-                let why = format!("area: longitude {x}, latitude {y} is no place on earth");
+                let why = format!("{border}: longitude {x}, latitude {y} is no place on earth");
                 return bad(why, "metres need `coordinates = \"metres\"`");
             };
             // Vertices that are equal up to rounding, or were given twice, become one.
@@ -399,26 +398,21 @@ fn rings_in_mission_frame(
     }
     match core_area::Area::new(&vertices, &rings).map(|area| overlap_error(&area)) {
         Ok(None) => Ok((vertices, rings)),
-        Ok(Some((why, hint))) => bad(format!("area: {why}"), hint),
+        Ok(Some((why, hint))) => bad(format!("{border}: {why}"), hint),
         Err(error) => {
-            let far = matches!(error, core_area::AreaError::TooFar { .. });
-            let hint = if far {
-                "metres are about area.origin, and origin must be near the area"
-            } else {
-                ""
-            };
-            let why = format!("area: {}", describe_area_error(error, &rings));
-            let own = faulty_ring(error, &rings).and_then(|ring| ring_span(table, &rings, ring));
-            match (own, hint) {
-                (Some(span), "") => Err(table.text.error(&span, why)),
-                _ => bad(why, hint),
+            let (why, hint) = (describe_area_error(error, &rings), area_hint(error));
+            match faulty_ring(error, &rings).and_then(|ring| ring_span(table, &rings, ring)) {
+                Some((key, span)) => {
+                    Err(table.text.with_hint(&span, format!("area.{key}: {why}"), hint))
+                }
+                None => bad(format!("{border}: {why}"), hint),
             }
         }
     }
 }
 
-/// Where a ring stands in the scenario; `None` if a file holds it.
-fn ring_span(table: &Table<'_>, rings: &[Ring], ring: usize) -> Option<Span> {
+/// Key and place of a ring that stands in the scenario beside the border; `None` for others.
+fn ring_span(table: &Table<'_>, rings: &[Ring], ring: usize) -> Option<(&'static str, Span)> {
     let kind = rings[ring].kind;
     let key = match kind {
         RingKind::Outer => return None,
@@ -429,7 +423,7 @@ fn ring_span(table: &Table<'_>, rings: &[Ring], ring: usize) -> Option<Span> {
     // Those of the file come before those of the key.
     let all = rings.iter().filter(|other| other.kind == kind).count();
     let nth = rings[..ring].iter().filter(|other| other.kind == kind).count();
-    items.get((nth + items.len()).checked_sub(all)?).map(|item| item.span.clone())
+    items.get((nth + items.len()).checked_sub(all)?).map(|item| (key, item.span.clone()))
 }
 
 /// A place in the mission frame; `None` for one that is not on earth.

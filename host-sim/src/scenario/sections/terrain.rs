@@ -71,7 +71,19 @@ impl TerrainFile {
                 format!("area.terrain: {path} does not say where it is"),
                 *hint,
             ),
-            other => text.error(&self.span, format!("area.terrain: {path} {other}")),
+            other => {
+                let hint = match other {
+                    TerrainError::Read(_) => "paths are relative to the scenario's folder",
+                    TerrainError::TooLong(_) | TerrainError::TooManyCells(_) => {
+                        "cut it to the area, or make its cells larger: gdalwarp -te … -tr …"
+                    }
+                    TerrainError::Elsewhere(_) => {
+                        "the file must hold the area and all pads; area.origin says where they are"
+                    }
+                    _ => "export it again as ESRI ASCII grid, GeoTIFF, LAS or LAZ",
+                };
+                text.with_hint(&self.span, format!("area.terrain: {path} {other}"), hint)
+            }
         }
     }
 

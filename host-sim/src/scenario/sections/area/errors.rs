@@ -2,6 +2,7 @@
 
 use planner_core::coverage::area::{self as core_area, MAX_VERTEX_M, Ring, RingKind};
 
+use crate::area::AreaFileError;
 use crate::area::overlap::{self, Overlap};
 
 /// Reason why rings that do not cross still form no area, and a remedy; `None` if they do.
@@ -15,8 +16,12 @@ pub(super) fn overlap_error(area: &core_area::Area<'_>) -> Option<(String, &'sta
             (format!("polygon {i} and polygon {j} overlap"), "draw them as one")
         }
         Overlap::Holes(i, j) => (format!("hole {i} and hole {j} overlap"), "draw them as one"),
-        Overlap::HoleOut(i) => (format!("hole {i} reaches out of its polygon"), ""),
-        Overlap::NothingLeft(i) => (format!("holes leave nothing of polygon {i}"), ""),
+        Overlap::HoleOut(i) => {
+            (format!("hole {i} reaches out of its polygon"), "draw it inside the border")
+        }
+        Overlap::NothingLeft(i) => {
+            (format!("holes leave nothing of polygon {i}"), "leave a hole out, or the polygon")
+        }
     })
 }
 
@@ -59,6 +64,39 @@ pub(super) fn describe_area_error(error: core_area::AreaError, rings: &[Ring]) -
         E::HoleOutside { ring: r } => format!("{} lies outside every polygon", ring(r)),
         E::OuterInside { ring: r } => format!("{} lies inside another polygon", ring(r)),
         E::AreaFull => "it has too many vertices".to_owned(),
+    }
+}
+
+/// Remedy for an area's fault.
+pub(super) fn area_hint(error: core_area::AreaError) -> &'static str {
+    use core_area::AreaError as E;
+    match error {
+        E::TooFewVertices { .. } | E::NoArea { .. } => {
+            "a polygon has three corners or more that are not on one line"
+        }
+        E::TooFar { .. } => "metres are about area.origin, and origin must be near the area",
+        E::SelfCrossing { .. } => "give the corners in their order around the polygon",
+        E::RingsCross { .. } => "draw one inside or outside the other",
+        E::HoleOutside { .. } => "draw it inside the border, or leave it out",
+        E::OuterInside { .. } => "draw the two as one, or give the inner one as a hole",
+        E::Duplicate { .. } => "leave one of the two out",
+        E::NotFinite { .. } => "give numbers",
+        E::NoOuter | E::Shape | E::AreaFull => "draw a border of fewer and simpler polygons",
+    }
+}
+
+/// Remedy for a file that is no area.
+pub(super) fn file_hint(error: &AreaFileError) -> &'static str {
+    match error {
+        AreaFileError::Read(_) => "paths are relative to the scenario's folder",
+        AreaFileError::Format => "export the area as GeoJSON, WKT, KML or a QGroundControl plan",
+        AreaFileError::Malformed { .. } => {
+            "export it again; the ending of its name has to be that of its format"
+        }
+        AreaFileError::NoPolygon(_) => {
+            "draw the area as a closed polygon: points and lines are none"
+        }
+        AreaFileError::TooManyVertices(_) => "simplify the border, or photograph it in parts",
     }
 }
 
