@@ -171,6 +171,14 @@ pub fn print_summary(result: &MissionResult, dir: &Path) {
         safety.deadlocks
     );
     match &result.coverage {
+        Some(coverage) if coverage.trigger == "none" => say!(
+            "area       {:.2} % flown over, {} waypoints ({} flown twice, {} left); \
+             area.trigger = \"none\": no pictures were asked for",
+            100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
+            coverage.waypoints,
+            coverage.twice,
+            coverage.left
+        ),
         Some(coverage) => say!(
             "area       {:.2} % photographed by {} pictures of {} waypoints ({} flown twice, {} left)",
             100.0 * (coverage.covered_share * 1e4).floor() / 1e4,

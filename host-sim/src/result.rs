@@ -38,7 +38,8 @@ pub struct MissionResult {
 /// Coverage of an area.
 #[derive(Clone, Debug, Serialize)]
 pub struct CoverageResult {
-    /// Share of the area that pictures show, 0 to 1.
+    /// Share of the area that pictures show, 0 to 1; with `trigger` `none` those that a camera
+    /// would take all along the lanes that were flown.
     pub covered_share: f64,
     /// Waypoints of all routes.
     pub waypoints: u32,
@@ -62,11 +63,13 @@ pub struct CoverageResult {
     pub lower_bound_s: f64,
     /// `max_cost_s / lower_bound_s - 1`.
     pub gap: f64,
-    /// Pictures.
+    /// What triggers the camera: `distance`, `waypoint` or `none`.
+    pub trigger: &'static str,
+    /// Pictures that companions asked for.
     pub photos: u64,
-    /// Number of waypoints photographed more than once.
+    /// Number of waypoints photographed (with `trigger` `none`: flown) more than once.
     pub twice: u64,
-    /// Number of waypoints that no vehicle photographed.
+    /// Number of waypoints that no vehicle photographed (with `trigger` `none`: flew over).
     pub left: u64,
     /// Heights above the ground; `None` over level ground.
     #[serde(flatten)]

@@ -145,6 +145,24 @@ fn the_papers_tracks_are_photographed_whole() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n").chars().take(4000).collect::<String>());
 }
 
+/// With `trigger = "none"` nobody asks for pictures: the mission is complete once all of the area
+/// is flown over, and not where a vehicle fell before that.
+#[test]
+fn without_a_trigger_a_mission_is_complete_once_it_is_flown() {
+    let field = "[area]\npolygon = [[0, 0], [80, 0], [80, 60], [0, 60]]\ntrigger = \"none\"\n\
+                 camera = { fov_deg = 73.7, aspect = 1.5 }\nheight_m = 35.0\n[mission]\n\
+                 cruise_mps = 5.0\n[[vehicles]]\nid = 1\nstart = [0, -20, 0]\nspeed_max_mps = 8.0\n";
+    let fly = |more: &str| covered::fly_text(&format!("{field}{more}")).expect("it is flown").0;
+    let whole = fly("");
+    let coverage = whole.coverage.as_ref().expect("it has an area");
+    let found = (coverage.trigger, coverage.photos, coverage.covered_share, coverage.left);
+    assert_eq!((whole.complete, found), (true, ("none", 0, 1.0, 0)));
+    let cut = fly("[[faults]]\nkind = \"kill\"\nat_s = 70.0\nvehicle = 1\n");
+    let coverage = cut.coverage.as_ref().expect("it has an area");
+    assert!(!cut.complete && coverage.photos == 0, "{coverage:?}");
+    assert!((0.1..0.9).contains(&coverage.covered_share) && coverage.left > 5, "{coverage:?}");
+}
+
 /// On the pad, while it starts, or in the air: a vehicle that is paused and resumed photographs its
 /// part.
 #[test]

@@ -205,8 +205,9 @@ fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
 /// The line about the area: what is photographed of it, and how.
 fn area_line(coverage: &CoverageResult, findings: &CoverageFindings) -> String {
     format!(
-        "area       {:.2} % photographed ({} of {:.2} m), {} on {} at {:.1}°",
+        "area       {:.2} % {} ({} of {:.2} m), {} on {} at {:.1}°",
         100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
+        if coverage.trigger == "none" { "flown over" } else { "photographed" },
         counted(findings.cells as usize, "cell"),
         findings.cell_m,
         counted(coverage.waypoints as usize, "waypoint"),

@@ -226,6 +226,9 @@ fn plan_and_fly(
         }
         None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
+    if let Some(places) = flown::places_in_place_of_pictures(&mission.scenario, &flight.tracks)? {
+        flight.pictures = places;
+    }
     if let Some(kept) = &kept {
         add_earlier_pictures(kept, &mission, &mut flight)?;
     }

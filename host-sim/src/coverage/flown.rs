@@ -1,5 +1,8 @@
-//! Checks the pictures of a coverage mission that was flown.
+//! Checks the pictures of a coverage mission that was flown; where the mission asks for none, the
+//! places where a camera that is triggered by other means could take them.
 
+use planner_core::Point;
+use planner_core::flight::Trigger;
 use planner_core::plan::SwarmPlan;
 
 use super::check::{self, CoverageFindings, Picture};
@@ -18,6 +21,35 @@ pub struct FlightFindings {
     pub plot: Plot,
     /// Whether every cell of the area that counts is photographed.
     pub complete: bool,
+}
+
+/// The places of a flight at the heights of its lanes, each as a picture in the lanes' direction;
+/// `None` where the companions trigger the camera, so that there are pictures to judge.
+///
+/// # Errors
+/// As [`CoveragePlan::new`].
+pub fn places_in_place_of_pictures(
+    scenario: &Scenario,
+    tracks: &[Vec<(f32, Point)>],
+) -> anyhow::Result<Option<Vec<Picture>>> {
+    let area = scenario.area.as_ref().filter(|area| area.trigger == Trigger::None);
+    let Some(area) = area else { return Ok(None) };
+    let along = CoveragePlan::plan_as_companions(scenario)?.tracks.lane_direction();
+    let heading = along.y.atan2(along.x);
+    let below_m = area.heights.layer_m / 2.0;
+    let above_m = below_m + area.terrain.as_ref().map_or(0.0, |terrain| terrain.tolerance_m);
+    let heights_m = area.height_m - below_m..=area.height_m + above_m;
+    let is_on_lanes = |place: &Point| heights_m.contains(&(place.z - area.ground_m(&place.xy())));
+    let places = scenario.vehicles.iter().zip(tracks).flat_map(|(vehicle, track)| {
+        let on_lanes = track.iter().filter(|(_, place)| is_on_lanes(place));
+        on_lanes.map(|&(t_s, position)| Picture {
+            vehicle: Some(vehicle.id),
+            t_s,
+            position,
+            heading,
+        })
+    });
+    Ok(Some(places.collect()))
 }
 
 /// Checks the pictures that were taken in a flight of this scenario. Departures in the result are

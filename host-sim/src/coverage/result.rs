@@ -1,6 +1,7 @@
 //! The coverage section of `result.json`.
 
 use planner_core::coverage::pack::Route;
+use planner_core::flight::Trigger;
 
 use super::CoveragePlan;
 use super::check::CoverageFindings;
@@ -14,6 +15,7 @@ pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) 
     let costs: Vec<f64> = routes.iter().map(|route| f64::from(planned.cost_s(route))).collect();
     let (mean, sd) = mean_and_sd(&costs);
     let along = planned.tracks.lane_direction();
+    let trigger = planned.area_settings.trigger;
     CoverageResult {
         covered_share: findings.covered_share,
         waypoints: planned.tracks.waypoint_count(),
@@ -27,7 +29,12 @@ pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) 
         max_cost_m: rounded(routes.iter().map(|route| planned.cost_m(route)).fold(0.0, f32::max)),
         lower_bound_s: rounded(planned.lower_bound_s),
         gap: rounded(max_cost_s / planned.lower_bound_s - 1.0),
-        photos: findings.photos,
+        trigger: match trigger {
+            Trigger::Distance => "distance",
+            Trigger::Waypoint => "waypoint",
+            Trigger::None => "none",
+        },
+        photos: if trigger == Trigger::None { 0 } else { findings.photos },
         twice: findings.repeated_waypoints,
         left: findings.missed_waypoints,
         terrain: findings.heights.as_ref().map(|heights| TerrainResult {
