@@ -130,3 +130,58 @@ fn who_flies_fast_stops_before_one_that_hovers() {
     let wrong: Vec<String> = (102..126).into_par_iter().step_by(6).filter_map(one).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
+
+/// Log texts of a vehicle that gave up its part before one that hovers on its path.
+const GIVES_UP: [&str; 3] = [
+    "Vehicle on the path: planning the way home",
+    "Path blocked for 2 min: planning the way home",
+    "Yielded for 60 s: planning the way home",
+];
+
+/// How the meetings of a mission at 8 to 15 m/s with one that hovers ended, unless something was
+/// wrong: how many vehicles flew around it, and how many gave up.
+fn met_fast(seed: u64) -> Result<[usize; 2], String> {
+    let mut random = Pcg32::seed_from_u64(seed);
+    let count = [3, 5][(seed % 2) as usize];
+    let loss = [0.0, 0.1, 0.3][(seed % 3) as usize];
+    let text = areas::lossy_radio_scenario(&mut random, count, loss);
+    let cruise = areas::between(&mut random, 8.0, 15.0);
+    let drawn = |line: &str| match line.starts_with("cruise_mps") {
+        true => format!("cruise_mps = {cruise:.1}\n"),
+        false => format!("{line}\n"),
+    };
+    let mut text: String = text.lines().map(drawn).collect();
+    let hovers = 1 + (random.next_u32() % count as u32) as u8;
+    let at_s = 30.0 + (random.next_u32() % 90) as f32;
+    text += &fault(HOVERS[(seed / 4 % 2) as usize], at_s, hovers);
+    let Ok((result, log)) = covered::fly_text(&text) else { return Ok([0; 2]) };
+    let safety = &result.safety;
+    if (safety.wall_contacts, safety.violations, safety.deadlocks) != (0, 0, 0) {
+        return Err(format!("seed {seed}: {safety:?}\n{log}{text}"));
+    }
+    let own = |vehicle: u8, end: &dyn Fn(&str) -> bool| {
+        let own = format!(" Some({vehicle}) ");
+        log.lines().any(|line| line.contains(&own) && end(line))
+    };
+    let others = || (1..=count as u8).filter(|vehicle| *vehicle != hovers);
+    let gives_up = |line: &str| GIVES_UP.iter().any(|text| line.contains(text));
+    let left = |vehicle: &u8| own(*vehicle, &gives_up);
+    let around = |vehicle: &u8| own(*vehicle, &|line| line.contains("Flying around"));
+    Ok([
+        others().filter(|vehicle| around(vehicle) && !left(vehicle)).count(),
+        others().filter(left).count(),
+    ])
+}
+
+/// At 8 to 15 m/s, too, most that meet a vehicle that hovers fly around it, and do not go home.
+/// `FLOCKMATE_FAST=N` flies more, `FLOCKMATE_FAST_FROM` others.
+#[test]
+fn who_flies_fast_flies_around_one_that_hovers() {
+    let (from, count) = (number("FLOCKMATE_FAST_FROM", 82), number("FLOCKMATE_FAST", 1));
+    let all: Vec<_> = (from..from + count).into_par_iter().map(met_fast).collect();
+    let wrong: Vec<_> = all.iter().filter_map(|met| met.as_ref().err()).collect();
+    let sum = |k: usize| all.iter().flatten().map(|met| met[k]).sum::<usize>();
+    println!("{count} missions: {} flew around, {} gave up, {} wrong", sum(0), sum(1), wrong.len());
+    wrong.iter().for_each(|wrong| println!("{wrong}"));
+    assert!(wrong.is_empty() && sum(0) >= 2 * sum(1) && sum(0) > 0);
+}
