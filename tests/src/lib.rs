@@ -12,6 +12,7 @@ pub mod hills;
 pub mod hostile;
 pub mod logs;
 pub mod meeting;
+pub mod owners;
 pub mod parts;
 pub mod roadmaps;
 pub mod setpoints;

@@ -4,9 +4,13 @@
 //! `FLOCKMATE_LOSSES=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_LOSSES_FROM` others.
 
 use flockmate_tests::areas::Shape;
+use flockmate_tests::owners::Owners;
 use flockmate_tests::{areas, covered, number};
+use host_sim::coverage::CoveragePlan;
+use host_sim::coverage::check::Picture;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
+use host_sim::report::Event;
 use host_sim::result::{MissionResult, VehicleResult};
 use host_sim::scenario;
 use planner_core::Point;
@@ -23,7 +27,13 @@ struct Outcome {
     kind: &'static str,
     covered: f64,
     left: u64,
+    /// Waypoints that vehicles reported to have flown around.
+    reported: u64,
+    /// Whether waypoints are left although a majority lived.
+    left_out: bool,
     twice: u64,
+    /// Waypoints that two vehicles owned.
+    owned: Vec<String>,
     /// Vehicles that landed short of their part, beside those that were struck.
     landed_short: usize,
     /// Contacts with walls, distances below the safety distance, deadlocks.
@@ -132,12 +142,60 @@ const NO_FLIGHT: [&str; 7] = [
     "no-fly zone",
 ];
 
-fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
-    let (text, kind, struck, at_s) = drawn(draw, seed);
+/// A mission that was flown: its result, its log, and waypoints that two vehicles owned.
+struct Flown {
+    result: MissionResult,
+    log: String,
+    owned: Vec<String>,
+}
+
+/// Whether a picture was taken by a vehicle that flew around something, by its log.
+fn is_beside_path(log: &[Event], picture: &Picture) -> bool {
+    let own = |event: &&Event| {
+        event.vehicle.is_some() && event.vehicle == picture.vehicle && event.t_s <= picture.t_s
+    };
+    let around = log.iter().filter(own).filter_map(|event| {
+        let begins = event.text.contains("→ Follow: Flying around");
+        (begins || event.text.contains("Flown around: on its path again")).then_some(begins)
+    });
+    around.last().unwrap_or(false)
+}
+
+fn flown(text: &str, struck: &[u8]) -> Result<Flown, String> {
     if std::env::var("FLOCKMATE_LOSSES").is_ok_and(|n| n == "1") {
         println!("{text}");
     }
-    let (result, log) = match covered::fly_text(&text) {
+    let said = |error: anyhow::Error| format!("{error:#}");
+    let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
+    let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
+    let mut pictures = Vec::new();
+    let flight = covered::flight(&mut mission, &mut pictures).map_err(said)?;
+    let plan = mission.plan().map_err(said)?;
+    let owners = Owners::of(&mission, &plan, &flight).map_err(said)?;
+    // On a way around what bars a lane pictures are taken beside it, of others' waypoints too.
+    pictures.retain(|picture| !is_beside_path(&flight.log, picture));
+    let planned = CoveragePlan::plan_as_companions(&mission.scenario).map_err(said)?;
+    let owned = owners.faults(&planned, &pictures, struck);
+    Ok(Flown { result: flight.result, log: covered::log_lines(&flight.log), owned })
+}
+
+/// Number of waypoints that vehicles report that they flew around: the next start flies them.
+fn flown_around(log: &str) -> u64 {
+    let around =
+        |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<u64>().ok();
+    log.lines().filter_map(around).sum()
+}
+
+/// Number of waypoints that the mission leaves with nobody struck: those that a late trigger leaves.
+fn left_unstruck(text: &str) -> u64 {
+    let sound = text.split("[[faults]]").next().unwrap_or(text);
+    let (result, _) = covered::fly_text(sound).expect("it was flown before");
+    result.coverage.expect("it has an area").left
+}
+
+fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
+    let (text, kind, struck, at_s) = drawn(draw, seed);
+    let Flown { result, log, owned } = match flown(&text, &struck) {
         Ok(flown) => flown,
         Err(error) => {
             assert!(NO_FLIGHT.iter().any(|why| error.contains(why)), "seed {seed}: {error}");
@@ -147,17 +205,14 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     let MissionResult { vehicles, safety, coverage, .. } = result;
     let coverage = coverage.expect("it has an area");
     // By a wrong estimate it lands beside its pad, all of its part flown.
-    let whole = ["Done", "no goal", "Aborted: Landed beside its goal"];
-    let short = |end: &str| !whole.iter().any(|whole| end.starts_with(whole));
-    // What a vehicle reports that it flew around, the next start flies.
-    let around =
-        |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<u64>().ok();
-    let reported: u64 = log.lines().filter_map(around).sum();
+    let ends = ["Done", "no goal", "Aborted: Landed beside its goal"];
+    let short = |end: &str| !ends.iter().any(|whole| end.starts_with(whole));
+    let reported = flown_around(&log);
     // Of the area no more than those waypoints' share.
     let missing = (1.0 - coverage.covered_share) * coverage.photos as f64;
     let fell_short = |v: &&VehicleResult| !struck.contains(&v.id) && short(&v.end);
-    let landed_short = vehicles.iter().filter(fell_short).count();
-    let whole = coverage.covered_share >= 1.0;
+    let (landed_short, whole) =
+        (vehicles.iter().filter(fell_short).count(), coverage.covered_share >= 1.0);
     let rough = (draw.radio == Radio::Rough).then_some(GIVEN_AWAY);
     // With nothing left to photograph it may land where there is room.
     let aside = whole.then_some(covered::LANDS_ASIDE);
@@ -174,8 +229,15 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
         seed,
         kind,
         covered: coverage.covered_share,
+        // Where nobody landed short of a whole area a majority lived to the end.
+        left_out: landed_short == 0
+            && whole
+            && coverage.left > reported
+            && coverage.left > reported + left_unstruck(&text),
         left: coverage.left,
+        reported,
         twice: coverage.twice,
+        owned,
         landed_short,
         broken: [safety.wall_contacts, safety.violations, safety.deadlocks]
             .map(|count| count as u64),
@@ -344,15 +406,20 @@ fn are_whole(draw: Draw) {
     let one = |k| outcome(draw, from + k + skip(k));
     let all: Vec<Outcome> = (0..count).into_par_iter().filter_map(one).collect();
     let short = |o: &&Outcome| o.covered < 1.0 || o.landed_short > 0;
-    let wrong = |o: &&Outcome| o.broken != [0; 3] || (short(o) && !o.explained);
+    let wrong = |o: &&Outcome| {
+        o.broken != [0; 3] || (short(o) && !o.explained) || !o.owned.is_empty() || o.left_out
+    };
     for o in all.iter().filter(|o| wrong(o) || short(o)) {
         println!(
-            "seed {} {}: {:.2} %, left {}, twice {}, {} landed short, broken {:?}\n{}",
+            "seed {} {}: {:.2} %, left {} of which {} reported, twice {}, owned twice {:?}, \
+             {} landed short, broken {:?}\n{}",
             o.seed,
             o.kind,
             100.0 * o.covered,
             o.left,
+            o.reported,
             o.twice,
+            o.owned,
             o.landed_short,
             o.broken,
             o.text
