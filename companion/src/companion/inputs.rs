@@ -227,7 +227,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether this vehicle has no part of the area, but may get one if another one is lost.
     fn is_in_reserve(&self) -> bool {
         let needed = |fleet: &Fleet<V>| {
-            fleet.is_reserve_needed() && fleet.lease_age(self.now) < RESERVE_UNHEARD_MOST
+            // The plan of a division that counts already may give it a part.
+            let behind = fleet.division_count() > self.mission.division_count();
+            (behind || fleet.is_reserve_needed())
+                && fleet.lease_age(self.now) < RESERVE_UNHEARD_MOST
         };
         !self.has_goal() && self.neighbours.fleet().is_some_and(needed)
     }

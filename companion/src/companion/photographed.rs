@@ -9,6 +9,7 @@ use crate::events::Link;
 use crate::link::OnDemandMessage;
 use crate::link::done::{self, PhotographedReport};
 use crate::mission::State;
+use crate::swarm::fleet::Fleet;
 use crate::time::Duration;
 use crate::timers::Timer;
 
@@ -89,8 +90,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ours = report.mission_crc == self.config.mission_crc
             && self.config.roster.iter().any(|entry| entry.system_id == report.system_id);
         if ours && self.is_area_mission() && self.config.skips_photographed {
+            // Once started, it keeps its part of a flight in which others fly or have flown.
+            let plans = self.plans_with_others()
+                && !(self.mission.state() == State::Scheduled
+                    && self.neighbours.fleet().is_some_and(Fleet::is_flight_under_way));
             let waits = self.plans_with_others();
-            self.mission.photographed_mut().handle_report(report, waits, self.now);
+            let photographed = self.mission.photographed_mut();
+            photographed.handle_report(report, waits, plans, self.now);
         }
     }
 

@@ -152,8 +152,14 @@ impl PhotographedWaypoints {
     }
 
     /// Handles another vehicle's report of photographed waypoints. `waits`: this vehicle stands on
-    /// the ground and must plan as others do.
-    pub(crate) fn handle_report(&mut self, report: &PhotographedReport, waits: bool, now: Instant) {
+    /// the ground and must plan as those in flight do; `plans`: and as those on the ground do.
+    pub(crate) fn handle_report(
+        &mut self,
+        report: &PhotographedReport,
+        waits: bool,
+        plans: bool,
+        now: Instant,
+    ) {
         if report.is_left_out_by_plan {
             if waits {
                 self.adopt_plan_of(report, now);
@@ -165,7 +171,7 @@ impl PhotographedWaypoints {
             return;
         }
         let follows = self.followed_at.is_some_and(|at| now - at <= FLIGHT_REPORT_LIFETIME);
-        let plans = waits && !report.flies && !follows;
+        let plans = plans && !report.flies && !follows;
         if newer > 0 {
             self.round = report.round;
             self.known.clear();

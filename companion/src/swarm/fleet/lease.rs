@@ -58,6 +58,13 @@ impl<const V: usize> Fleet<V> {
         self.is_dividing() || others.any(|rank| self.is_alive(rank))
     }
 
+    /// Whether another vehicle flies, or has flown and finished, left or was lost since it was
+    /// started.
+    pub(crate) fn is_flight_under_way(&self) -> bool {
+        let ended = |member: &FleetMember| member.entry.status != MemberStatus::Alive;
+        self.knows_flight() || self.members.iter().any(ended)
+    }
+
     /// When the last of the vehicles that may be lost is down: of those that have been silent for
     /// `MISSED_AFTER`. `None` if there is none.
     pub(crate) fn last_down_at(&self) -> Option<Instant> {

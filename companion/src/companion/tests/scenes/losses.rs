@@ -5,6 +5,7 @@ use super::*;
 use crate::Link;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
+use crate::swarm::fleet::Fleet;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 
@@ -41,7 +42,7 @@ fn three() -> Config<4> {
 }
 
 /// The other vehicle reports what it knows of this one and of itself.
-fn tells(b: &mut Bench, own: MemberStatus, other: MemberStatus) {
+pub(super) fn tells(b: &mut Bench, own: MemberStatus, other: MemberStatus) {
     let entry = |standing| RosterReportEntry { status: standing, ..RosterReportEntry::default() };
     let entries = [entry(own), entry(other)].into_iter().collect();
     let plan = super::super::divisions::own_roster(b).plan;
@@ -202,4 +203,28 @@ fn a_vehicle_that_was_restarted_comes_back_as_a_new_one() {
     bench.start();
     bench.run_until(Follow, 30.0);
     bench.run_until(Done, 120.0);
+}
+
+/// The last that takes part, in reserve until then: what the others left may be its own by the
+/// division that counts, so it waits for its plan of that.
+#[test]
+fn a_vehicle_in_reserve_waits_for_its_plan_of_a_division_that_counts() {
+    let without_part = Plan { task: Task::Stay, ..field_plan() };
+    let mut b = over_a_field_with(without_part, Ready);
+    b.run(6.0);
+    b.start();
+    b.run_until(Scheduled, 10.0);
+    tells(&mut b, MemberStatus::Alive, MemberStatus::Left);
+    for _ in 0..400 {
+        // It has computed the division: from now on its shell is late.
+        if b.answer_division {
+            b.tick();
+            b.answer_division = super::super::divisions::own_roster(&b).hash == 0;
+        }
+    }
+    b.run(3.0);
+    let counted = b.companion.neighbours.fleet().map(Fleet::division_count);
+    assert_eq!((b.state(), counted), (Scheduled, Some(1)), "{:?}", b.texts);
+    b.answer_division = true;
+    b.run_until(Done, 60.0);
 }

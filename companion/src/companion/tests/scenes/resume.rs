@@ -3,9 +3,10 @@
 use planner_core::flight::WaypointRange;
 
 use super::State::*;
-use super::losses::{over_a_field, tunnels};
+use super::losses::{over_a_field, tells, tunnels};
 use super::*;
 use crate::link::done::{self, PhotographedReport};
+use crate::link::roster::MemberStatus;
 
 /// The other vehicle reports what it knows to be photographed.
 fn knows(b: &mut Bench, first: u32, round: u8, flies: bool) {
@@ -88,4 +89,18 @@ fn only_what_others_on_the_ground_know_changes_the_plan() {
     knows(&mut bench, 80, 4, false);
     bench.run(2.0);
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
+}
+
+/// What vehicles know that landed with their parts done takes no part from one that is yet to
+/// start: it would plan another flight than the one under way.
+#[test]
+fn whoever_was_started_keeps_its_plan_when_others_have_landed() {
+    for status in [MemberStatus::Finished, MemberStatus::Left] {
+        let mut bench = over_a_field(Scheduled);
+        tells(&mut bench, MemberStatus::Alive, status);
+        knows(&mut bench, 20, 0, false);
+        bench.run(1.0);
+        assert_eq!(bench.companion.excluded_waypoints(), [], "{:?}", bench.texts);
+        bench.run_until(Follow, 30.0);
+    }
 }
