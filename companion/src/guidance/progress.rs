@@ -12,6 +12,13 @@ use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
+/// Speed up to which a vehicle's place is sought within three times the largest lead behind the
+/// reference, m/s.
+const LAG_WINDOW_ABOVE_MPS: f32 = 2.0;
+/// Half of the additional distance behind the reference for each m/s above that, seconds: the
+/// setpoint's curve follows the reference by up to 1.2 s, and the vehicle that curve by 0.4 s.
+const LAG_WINDOW_S: f32 = 1.0;
+
 impl Guidance {
     /// Place along the plan's path up to which this vehicle flies while unheard, through gates that
     /// are open or open after a short wait, metres; and the seconds by which those gates delay it
@@ -81,11 +88,13 @@ impl Guidance {
                 length_m + clamp_to(end_z - z, 0.0, plan.descent_m)
             }
             _ if self.on_path => {
-                let behind = self.track.lead_max_m * 2.0;
+                let lead_m = self.track.lead_max_m;
+                let faster_mps = libm::fmaxf(self.track.cruise_mps - LAG_WINDOW_ABOVE_MPS, 0.0);
+                let window_m = 2.0 * lead_m + LAG_WINDOW_S * faster_mps;
                 let seen = path.project(
                     &scene.telemetry.position,
-                    self.tracker.along_m - behind * 0.5,
-                    behind,
+                    self.tracker.along_m + lead_m - window_m,
+                    window_m,
                 );
                 // Within `ARRIVED_M` of its reference the vehicle reports at least the progress
                 // that gates ask of a vehicle that waits there.

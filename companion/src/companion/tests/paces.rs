@@ -82,6 +82,35 @@ proptest::proptest! {
     }
 }
 
+/// Gates of others open by the progress that it reports, and by it others count pictures as taken.
+#[test]
+fn no_place_counts_as_reached_before_the_vehicle_is_there_at_any_speed() {
+    for cruise_mps in [2.0, 5.0, 8.0, 12.0, 15.0] {
+        let mut config = config();
+        config.cruise_mps = cruise_mps;
+        let mut bench = Bench::new(config);
+        let plan = lanes(150.0, 30.0);
+        let path = plan.path.clone();
+        bench.answer_plan = Some(Ok(plan));
+        bench.step_m = cruise_mps * 0.06;
+        bench.run_until(State::Ready, 6.0);
+        bench.start();
+        bench.run_until(State::Follow, 20.0);
+        let (mut early_m, mut along_m) = (0f32, 0f32);
+        for _ in 0..2000 {
+            bench.tick();
+            if bench.state() != State::Follow || along_m > 0.9 * path.length_m() {
+                break;
+            }
+            let guidance = &bench.companion.guidance;
+            along_m = guidance.progress_m(bench.state(), &bench.companion.guidance_inputs());
+            early_m = early_m.max(along_m - path.project(&bench.enu, along_m, 40.0));
+        }
+        assert!(along_m > 50.0, "{along_m} m flown at {cruise_mps} m/s");
+        assert!(early_m < 0.3, "{early_m} m early at {cruise_mps} m/s");
+    }
+}
+
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 30 } else { 300 }))]
     /// A PX4 that lands by itself holds where it was when it was ordered to: the wind has carried
