@@ -154,11 +154,11 @@ fn is_beside_path(log: &[Event], picture: &Picture) -> bool {
     let own = |event: &&Event| {
         event.vehicle.is_some() && event.vehicle == picture.vehicle && event.t_s <= picture.t_s
     };
-    let around = log.iter().filter(own).filter_map(|event| {
+    let mut around = log.iter().filter(own).filter_map(|event| {
         let begins = event.text.contains("→ Follow: Flying around");
         (begins || event.text.contains("Flown around: on its path again")).then_some(begins)
     });
-    around.last().unwrap_or(false)
+    around.next_back().unwrap_or(false)
 }
 
 fn flown(text: &str, struck: &[u8]) -> Result<Flown, String> {
@@ -186,7 +186,7 @@ fn flown_around(log: &str) -> u64 {
     log.lines().filter_map(around).sum()
 }
 
-/// Number of waypoints that the mission leaves with nobody struck: those that a late trigger leaves.
+/// Number of waypoints that the mission leaves with nobody struck: a late trigger leaves those.
 fn left_unstruck(text: &str) -> u64 {
     let sound = text.split("[[faults]]").next().unwrap_or(text);
     let (result, _) = covered::fly_text(sound).expect("it was flown before");

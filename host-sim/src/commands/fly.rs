@@ -188,6 +188,24 @@ fn check_emulated_boards(mission: &Mission, plan: &SwarmPlan) -> anyhow::Result<
     Ok(())
 }
 
+/// Prints that the flight was given up, its errors, and how fast it was simulated.
+fn print_course(flight: &Flight, limit_s: f32) {
+    let aloft = flight.result.vehicles.iter().filter(|vehicle| !vehicle.landed).count();
+    if aloft > 0 && flight.simulated_s >= f64::from(limit_s) {
+        say!("given up   at simulation.time_limit_s = {limit_s} s, {aloft} not landed");
+    }
+    for incident in flight.log.iter().filter(|event| event.level == Level::Error) {
+        let id = incident.vehicle.map_or(String::new(), |id| format!(" vehicle {id}"));
+        say!("           {:.2} s{id}: {}", incident.t_s, incident.text);
+    }
+    say!(
+        "           {:.0} s simulated in {:.1} s, {:.0} × real time",
+        flight.simulated_s,
+        flight.took_s,
+        flight.simulated_s / flight.took_s
+    );
+}
+
 /// Adds the pictures of earlier flights if this flight continued them: companions that know of no
 /// photographed waypoint, or of nothing else, begin the area again.
 fn add_earlier_pictures(
@@ -256,20 +274,6 @@ fn plan_and_fly(
     output::add(&mut results, &flight.result, &mission.timing, page)?;
     results.commit()?;
     output::print_summary(&flight.result, out);
-    let aloft = flight.result.vehicles.iter().filter(|vehicle| !vehicle.landed).count();
-    let limit_s = mission.scenario.simulation.time_limit_s;
-    if aloft > 0 && flight.simulated_s >= f64::from(limit_s) {
-        say!("given up   at simulation.time_limit_s = {limit_s} s, {aloft} not landed");
-    }
-    for incident in flight.log.iter().filter(|event| event.level == Level::Error) {
-        let id = incident.vehicle.map_or(String::new(), |id| format!(" vehicle {id}"));
-        say!("           {:.2} s{id}: {}", incident.t_s, incident.text);
-    }
-    say!(
-        "           {:.0} s simulated in {:.1} s, {:.0} × real time",
-        flight.simulated_s,
-        flight.took_s,
-        flight.simulated_s / flight.took_s
-    );
+    print_course(&flight, mission.scenario.simulation.time_limit_s);
     Ok(if flight.result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
