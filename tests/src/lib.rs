@@ -45,15 +45,6 @@ pub fn workspace() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Cargo profile in which a program is built.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Profile {
-    /// `cargo build`
-    Debug,
-    /// `cargo build --release`
-    Release,
-}
-
 /// The Python with pymavlink and mavsdk that `FLOCKMATE_PYTHON` names; `None`, with a printed line
 /// that says what is skipped, if the variable is not set.
 pub fn python() -> Option<String> {
@@ -66,26 +57,22 @@ pub fn python() -> Option<String> {
     python
 }
 
-/// Builds `host-sim` and returns its path: cargo gives tests no path to another package's binaries.
-pub fn host_sim(profile: Profile) -> PathBuf {
-    let mut build = Command::new(env!("CARGO"));
-    build.current_dir(workspace()).args([
-        "build",
-        "--quiet",
-        "--package",
-        "host-sim",
-        "--bin",
-        "host-sim",
-    ]);
-    if profile == Profile::Release {
-        build.arg("--release");
-    }
-    assert!(build.status().expect("cargo runs").success(), "host-sim does not build");
+/// Path of `host-sim`, in the profile of the test that asks. It is built first, because cargo gives
+/// tests no path to another package's binaries, unless `FLOCKMATE_BUILT` says that it was built with
+/// the tests.
+pub fn host_sim() -> PathBuf {
     let test = std::env::current_exe().expect("a test knows its own path");
     // TARGET/PROFILE/deps/TEST-HASH
-    let target =
-        test.ancestors().nth(3).expect("tests lie three levels deep in the target directory");
-    target.join(if profile == Profile::Release { "release" } else { "debug" }).join("host-sim")
+    let built = test.ancestors().nth(2).expect("tests lie two levels deep in their profile");
+    if std::env::var_os("FLOCKMATE_BUILT").is_none() {
+        let mut build = Command::new(env!("CARGO"));
+        build.current_dir(workspace()).args(["build", "--quiet", "-p", "host-sim"]);
+        if built.ends_with("release") {
+            build.arg("--release");
+        }
+        assert!(build.status().expect("cargo runs").success(), "host-sim does not build");
+    }
+    built.join("host-sim")
 }
 
 /// A child process that is killed when this is dropped, also by a test that panics.
@@ -137,7 +124,7 @@ pub fn listening(mut command: Command, links: usize) -> (Guard, Vec<String>) {
 /// # Panics
 /// The program does not start.
 pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
-    let mut command = Command::new(host_sim(Profile::Debug));
+    let mut command = Command::new(host_sim());
     command.arg("autopilot").args(options);
     for url in listen {
         command.args(["--listen", url]);

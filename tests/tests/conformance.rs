@@ -11,9 +11,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use companion::services::parameters;
-use flockmate_tests::{
-    Guard, Profile, autopilot, free_port, host_sim, python, shared_data, workspace,
-};
+use flockmate_tests::{Guard, autopilot, free_port, host_sim, python, shared_data, workspace};
 
 const TIME_LIMIT: Duration = Duration::from_secs(160);
 /// ArduCopter, whose estimator is ready sooner than the real one's.
@@ -111,12 +109,7 @@ fn survey(personality: &str, vehicles: usize, camera: &str, out: &Path) -> Optio
     }
     let file = out.join("survey.toml");
     std::fs::write(&file, scenario).expect("a scenario");
-    let cover = Command::new(host_sim(Profile::Debug))
-        .arg("cover")
-        .arg(file)
-        .arg("--out")
-        .arg(out)
-        .status();
+    let cover = Command::new(host_sim()).arg("cover").arg(file).arg("--out").arg(out).status();
     assert!(cover.expect("host-sim starts").success(), "it is planned and covers everything");
     Some(())
 }
@@ -186,7 +179,7 @@ impl Onboard {
         assert!(text.contains("245"));
         let lobby = files.path().join("lobby.toml");
         std::fs::write(&lobby, text).expect("a scenario");
-        let program = host_sim(Profile::Debug);
+        let program = host_sim();
         let plan =
             Command::new(&program).arg("plan").arg(&lobby).arg("--out").arg(files.path()).status();
         assert!(plan.expect("host-sim starts").success());
@@ -251,7 +244,7 @@ fn pymavlink_watches_the_swarm_and_talks_to_each_vehicle() {
     let Some(python) = python() else { return };
     let out = tempfile::tempdir().expect("a directory");
     let address = format!("udp:127.0.0.1:{}", free_port());
-    let fly = Command::new(host_sim(Profile::Debug))
+    let fly = Command::new(host_sim())
         .arg("fly")
         .arg(workspace().join("host-sim/scenarios/demo.toml"))
         .args(["--qgc", &address, "--out"])

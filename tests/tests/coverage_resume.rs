@@ -13,7 +13,7 @@ use std::process::Command;
 use companion::services::parameters::Parameters;
 use companion::storage::store::{ErasePermission, MAX_READ, Store};
 use flockmate_tests::areas::{self, SMALL_FIELD};
-use flockmate_tests::{Profile, covered, host_sim, number};
+use flockmate_tests::{covered, host_sim, number};
 use host_sim::coverage::check::Picture;
 use host_sim::flash::{HOST_FLASH_LAYOUT, HostFlash};
 use host_sim::mission::Mission;
@@ -249,7 +249,7 @@ fn what_was_flown_around_is_photographed_after_the_next_start() {
 /// was whole before is still judged whole.
 #[test]
 fn an_area_that_was_whole_is_judged_whole_at_the_next_start() {
-    let program = host_sim(Profile::Release);
+    let program = host_sim();
     let flown = |at_s: u64| -> Result<usize, String> {
         let dir = tempfile::tempdir().expect("a directory");
         let at = |name: &str| dir.path().join(name);

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant as Clock};
 
 use companion::Instant;
 use companion::link::frame::{self, Framer, Header};
-use flockmate_tests::{Guard, Profile, autopilot, free_port, host_sim, listening, workspace};
+use flockmate_tests::{Guard, autopilot, free_port, host_sim, listening, workspace};
 use host_sim::link::{Link, LinkUrl};
 use serialport::TTYPort;
 
@@ -31,7 +31,7 @@ struct Flight {
 
 impl Flight {
     fn begin(autopilot: &str) -> Self {
-        let mut child = Command::new(host_sim(Profile::Debug))
+        let mut child = Command::new(host_sim())
             .args(["companion", "--id", "1", "--start", "--autopilot", autopilot])
             .arg(workspace().join("host-sim/scenarios/lobby.toml"))
             .stdout(Stdio::piped())
@@ -146,7 +146,7 @@ fn assert_done((code, lines): (Option<i32>, Vec<String>)) {
 
 /// A radio with this share of losses, and the addresses of its links.
 fn radio(links: usize, loss: &str) -> (Guard, Vec<String>) {
-    let mut command = Command::new(host_sim(Profile::Debug));
+    let mut command = Command::new(host_sim());
     command.args(["radio", "--delay", "0.02", "--loss", loss]);
     (0..links).for_each(|_| {
         command.args(["--listen", "udp-listen:127.0.0.1:0"]);
@@ -156,8 +156,7 @@ fn radio(links: usize, loss: &str) -> (Guard, Vec<String>) {
 
 /// Uploads a file; what is printed.
 fn upload(link: &str, file: &std::path::Path) -> String {
-    let done =
-        Command::new(host_sim(Profile::Debug)).args(["upload", "--link", link]).arg(file).output();
+    let done = Command::new(host_sim()).args(["upload", "--link", link]).arg(file).output();
     let done = done.expect("the upload starts");
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     String::from_utf8_lossy(&done.stdout).into_owned()
@@ -263,14 +262,14 @@ fn an_arducopter_that_reboots_in_flight_ends_the_mission_on_the_ground() {
 fn files_go_up_through_the_autopilot_and_over_a_radio_that_loses() {
     let files = tempfile::tempdir().expect("a directory");
     let lobby = workspace().join("host-sim/scenarios/lobby.toml");
-    let mut plan = Command::new(host_sim(Profile::Debug));
+    let mut plan = Command::new(host_sim());
     plan.arg("plan").arg(&lobby).arg("--out").arg(files.path()).stdout(Stdio::null());
     assert!(plan.status().expect("host-sim starts").success());
     let port = free_port();
     let (_autopilot, at) =
         autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let (_radio, ends) = radio(2, "0.1");
-    let companion = Command::new(host_sim(Profile::Debug))
+    let companion = Command::new(host_sim())
         .args(["companion", "--id", "1", "--autopilot", &format!("udp-listen:127.0.0.1:{port}")])
         .args(["--swarm", &format!("udp:{}", ends[0])])
         .arg(&lobby)

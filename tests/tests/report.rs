@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use flockmate_tests::areas::SMALL_FIELD;
-use flockmate_tests::{Guard, Profile, chromium, host_sim};
+use flockmate_tests::{Guard, chromium, host_sim};
 use host_sim::report::{
     Curve, Event, Level, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint,
     VehicleTrack, page as page_of, vehicle_color,
@@ -293,8 +293,7 @@ fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
 fn page_of_the_demo_opens_clean_and_shows_every_vehicle_move() {
     let Some(chromium) = chromium() else { return };
     let dir = tempfile::tempdir().expect("a directory");
-    let demo =
-        Command::new(host_sim(Profile::Release)).args(["demo", "--out"]).arg(dir.path()).output();
+    let demo = Command::new(host_sim()).args(["demo", "--out"]).arg(dir.path()).output();
     assert!(demo.expect("the demo runs").status.success());
     let page = dir.path().join("report.html");
     assert!(fs::metadata(&page).expect("the page is there").len() < 6_000_000);
@@ -347,7 +346,7 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     // One of three loses all power over the area.
     let fault = "[[faults]]\nat_s = 90.0\nkind = \"kill\"\nvehicle = 2\n";
     fs::write(&scenario, format!("seed = 7\n{SMALL_FIELD}{fault}")).expect("it is written");
-    let mut fly = Command::new(host_sim(Profile::Release));
+    let mut fly = Command::new(host_sim());
     let flown =
         fly.arg("fly").arg(&scenario).arg("--out").arg(dir.path()).output().expect("it flies");
     assert!(flown.status.success(), "{}", String::from_utf8_lossy(&flown.stdout));
@@ -419,7 +418,7 @@ fn page_of_a_plan_offers_no_flown_tracks() {
     let dir = tempfile::tempdir().expect("a directory");
     let scenario = dir.path().join("field.toml");
     fs::write(&scenario, SMALL_FIELD).expect("it is written");
-    let mut cover = Command::new(host_sim(Profile::Release));
+    let mut cover = Command::new(host_sim());
     let planned = cover.arg("cover").arg(&scenario).arg("--out").arg(dir.path()).output();
     assert!(planned.expect("it plans").status.success());
     let opened = open(&chromium, &dir.path().join("report.html"), "#t=60&view=top");

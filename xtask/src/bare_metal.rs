@@ -1,15 +1,12 @@
 //! Builds programs for boards: by rustup's compiler if it has the target, else by Debian's, which
 //! also builds `core`.
 
-use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, ensure};
-use serde_json::Value;
+use anyhow::{Context, Result};
 
 use crate::install;
-use crate::shell::{cargo, command, target_dir};
+use crate::shell::{cargo, command, compile, target_dir};
 
 /// A board that the firmware is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -173,7 +170,8 @@ pub fn build(board: Board) -> Result<Built> {
     building.args(["--config", "profile.release.codegen-units=1"]);
     // The chip's drivers only set registers: optimized for size they are as fast.
     building.args(["--config", "profile.release.package.embassy-stm32.opt-level='s'"]);
-    let warnings = compile(&mut building)?;
+    building.arg("--timings");
+    let warnings = compile(&mut building)?.warnings;
     // The programs of two boards have the same names, and cargo shares their directory: so they are
     // copied.
     let aside = products.join(board.name());
@@ -182,26 +180,6 @@ pub fn build(board: Board) -> Result<Built> {
         std::fs::copy(products.join(target).join("release").join(program), aside.join(program))?;
     }
     Ok(Built { folder: aside, warnings })
-}
-
-/// Runs a `cargo build`, prints the compiler's messages and returns the number of warnings.
-fn compile(building: &mut Command) -> Result<usize> {
-    let mut child = building
-        .arg("--message-format=json")
-        .stdout(Stdio::piped())
-        .spawn()
-        .with_context(|| format!("cannot start {building:?}"))?;
-    let mut warnings = 0;
-    for line in BufReader::new(child.stdout.take().context("its output is piped")?).lines() {
-        // A line that is no JSON message of cargo is ignored.
-        let line: Value = serde_json::from_str(&line?).unwrap_or_default();
-        let message = &line["message"];
-        eprint!("{}", message["rendered"].as_str().unwrap_or_default());
-        warnings += usize::from(message["level"] == "warning");
-    }
-    let status = child.wait()?;
-    ensure!(status.success(), "{building:?} failed: {status}");
-    Ok(warnings)
 }
 
 /// Name of cargo's environment variable for a setting of a target.

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 use crate::bare_metal::{self, Board};
 use crate::install;
@@ -20,7 +20,7 @@ pub struct Args {
     out: Option<PathBuf>,
     /// Run only the groups whose name contains this: roadmap, assignment, coverage, fields2cover,
     /// swarm, steps, worst-case, boards; or one of the suites: deconfliction, meetings, hostile,
-    /// range.
+    /// range; or profiles, which flies the demo by a debug and a release build and compares.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
     /// A checkout of cvar-upm/multi_uav_planning_binpat, with which the coverage rows are compared.
@@ -41,6 +41,9 @@ pub struct Args {
 /// Runs the chosen bench, or all. Where the C++ baseline cannot be built, its rows are skipped and
 /// a line gives the reason.
 pub fn run_bench(args: &Args) -> Result<()> {
+    if args.only.as_deref() == Some("profiles") {
+        return compare_profiles();
+    }
     let run_release = ["run", "--release", "--quiet", "--package", "flockmate-tests", "--bin"];
     let mut bench = cargo();
     bench.args(run_release);
@@ -87,6 +90,22 @@ pub fn run_bench(args: &Args) -> Result<()> {
         bench.arg("--only").arg(only);
     }
     run(&mut bench)
+}
+
+/// Flies the demo by a debug and a release build: both write the same `result.json`.
+fn compare_profiles() -> Result<()> {
+    let mut results = Vec::new();
+    for (profile, option) in [("debug", None), ("release", Some("--release"))] {
+        run(cargo().args(["build", "--locked", "-p", "host-sim"]).args(option))?;
+        let out = target_dir().join("profiles").join(profile);
+        run(command(target_dir().join(profile).join("host-sim"))
+            .args(["demo", "--out"])
+            .arg(&out))?;
+        results.push(std::fs::read(out.join("result.json"))?);
+    }
+    ensure!(results[0] == results[1], "result.json differs in {}", target_dir().display());
+    println!("the demo's result.json is the same in debug and release");
+    Ok(())
 }
 
 /// Builds the C++ baseline with the options that its file's header gives, if its source is newer

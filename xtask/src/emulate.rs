@@ -32,12 +32,17 @@ pub struct Args {
     /// Directory for the files of `host-sim fly` and each board's log
     #[arg(long, value_name = "DIR", default_value = "out/emulate")]
     out: PathBuf,
+    /// A `host-sim` that is built already
+    #[arg(skip)]
+    host_sim: Option<PathBuf>,
 }
 
 impl Default for Args {
-    /// The flight that CI runs.
+    /// The flight that CI runs, by the `host-sim` that its tests were built with.
     fn default() -> Self {
-        Self { vehicles: 3, out: target_dir().join("emulate") }
+        let target = target_dir();
+        let host_sim = Some(target.join("debug/host-sim"));
+        Self { vehicles: 3, out: target.join("emulate"), host_sim }
     }
 }
 
@@ -46,12 +51,18 @@ impl Default for Args {
 pub fn run_emulate(args: &Args) -> Result<usize> {
     install::install_missing(install::EMULATOR)?;
     let firmware = bare_metal::build(Board::Qemu)?.folder.join("flockmate");
-    run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))?;
+    let host_sim = match &args.host_sim {
+        Some(built) => built.clone(),
+        None => {
+            run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))?;
+            target_dir().join("release/host-sim")
+        }
+    };
     let out = std::path::absolute(&args.out)?;
     std::fs::create_dir_all(&out).with_context(|| format!("cannot write: {}", out.display()))?;
     let (scenario, boards) = (out.join("scenario.toml"), usize::from(args.vehicles));
     std::fs::write(&scenario, cut_demo(boards)?)?;
-    let Reported { gaps_ms, stacks } = fly(&firmware, &scenario, &out)?;
+    let Reported { gaps_ms, stacks } = fly(&host_sim, &firmware, &scenario, &out)?;
     ensure!(
         gaps_ms.len() == boards,
         "{} of {boards} boards reported their setpoints",
@@ -74,8 +85,8 @@ struct Reported {
 }
 
 /// Runs `host-sim fly`, prints its output and collects the boards' reports from it.
-fn fly(firmware: &Path, scenario: &Path, out: &Path) -> Result<Reported> {
-    let mut fly = command(target_dir().join("release/host-sim"));
+fn fly(host_sim: &Path, firmware: &Path, scenario: &Path, out: &Path) -> Result<Reported> {
+    let mut fly = command(host_sim);
     fly.arg("fly").arg(scenario).arg("--out").arg(out).arg("--emulate").arg(firmware);
     let mut fly = fly.stdout(Stdio::piped()).spawn()?;
     let mut reported = Reported::default();

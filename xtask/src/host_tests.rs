@@ -1,35 +1,53 @@
-//! The host's tests: built by cargo, then run several programs at once. cargo itself runs one after
-//! the other, and most of them have one long test, beside which the other cores would be idle.
+//! The host's tests and examples: built by cargo, then run several programs at once. cargo itself
+//! runs one after the other, and most of them have one long test, beside which the other cores would
+//! be idle.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::process::Stdio;
 use std::sync::Mutex;
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use serde_json::Value;
 
-use crate::shell::{self, cargo, command};
+use crate::shell::{self, cargo, command, compile};
 
 /// Programs in the order in which they start before all others: those that take longest.
-const FIRST: [&str; 8] = [
-    "closed_loop",
-    "report",
+const FIRST: [&str; 9] = [
     "coverage_losses",
-    "companion",
-    "schedule_model",
     "schedules",
+    "closed_loop",
     "coverage_flights",
+    "schedule_model",
+    "fleet_model",
+    "worst_case",
     "conformance",
+    "report",
 ];
+/// Programs that need boards, a browser or Python clients. The others run while these are built.
+const NEED_OTHERS: [&str; 9] = [
+    "board",
+    "board_coverage",
+    "board_cuts",
+    "board_flights",
+    "board_lock_step",
+    "conformance",
+    "logs",
+    "report",
+    "worst_case",
+];
+/// Variables by which tests find boards, browser and Python clients.
+const OTHERS: [&str; 3] = ["FLOCKMATE_FIRMWARE", "FLOCKMATE_CHROMIUM", "FLOCKMATE_PYTHON"];
 /// Programs that hold the companion to the wall clock: nothing runs beside them.
 const ALONE: [&str; 1] = ["rehearsal"];
 /// Tests of one program that run at once, on a core each. Those with boards and clients mostly
 /// wait, so there is more than one.
 const TESTS_AT_ONCE: &str = "2";
 
-/// A program of tests, as cargo built it.
+/// Variables with which programs run.
+pub type Environment = Vec<(&'static str, OsString)>;
+
+/// A program of tests, or an example, which fails if its own checks fail.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Program {
     name: String,
@@ -38,29 +56,25 @@ pub struct Program {
     package: PathBuf,
 }
 
-/// The program of tests that a line of cargo's messages names; `None` if it names none.
-fn program(line: &str) -> Option<Program> {
-    let message: Value = serde_json::from_str(line).ok()?;
-    if message["reason"] != "compiler-artifact" || message["profile"]["test"] != true {
+/// The program of tests or example that cargo built; `None` for any other artifact.
+fn program(artifact: &Value) -> Option<Program> {
+    let target = &artifact["target"];
+    if artifact["profile"]["test"] != true && target["kind"][0] != "example" {
         return None;
     }
-    let manifest = PathBuf::from(message["manifest_path"].as_str()?);
+    let manifest = PathBuf::from(artifact["manifest_path"].as_str()?);
     Some(Program {
-        name: message["target"]["name"].as_str()?.to_owned(),
-        path: message["executable"].as_str()?.into(),
+        name: target["name"].as_str()?.to_owned(),
+        path: artifact["executable"].as_str()?.into(),
         package: manifest.parent()?.to_owned(),
     })
 }
 
-/// Builds the tests of the workspace and names their programs.
+/// Builds programs, tests and examples of the workspace without a warning and names the latter two.
 pub fn build() -> Result<Vec<Program>> {
-    let mut build = cargo();
-    build.args(["test", "--workspace", "--no-run", "--locked"]);
-    build.args(["--message-format", "json-render-diagnostics"]);
-    let built = build.stderr(Stdio::inherit()).output().context("cannot start cargo")?;
-    ensure!(built.status.success(), "the tests do not build");
-    let programs: Vec<_> =
-        String::from_utf8_lossy(&built.stdout).lines().filter_map(program).collect();
+    let built = compile(cargo().args(["test", "--workspace", "--no-run", "--locked"]))?;
+    ensure!(built.warnings == 0, "{} warnings", built.warnings);
+    let programs: Vec<_> = built.artifacts.iter().filter_map(program).collect();
     ensure!(!programs.is_empty(), "cargo names no program of tests");
     Ok(programs)
 }
@@ -71,11 +85,13 @@ fn turn(program: &Program) -> usize {
 }
 
 /// Runs one program and prints all that it printed. True if it passed.
-fn passes(program: &Program, environment: &[(&str, OsString)]) -> Result<bool> {
+fn passes(program: &Program, environment: &Environment) -> Result<bool> {
     let begun = Instant::now();
     let mut tests = command(&program.path);
     tests.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
     tests.env("RUST_TEST_THREADS", TESTS_AT_ONCE).envs(environment.iter().cloned());
+    // The programs that tests run are built with them.
+    tests.env("FLOCKMATE_BUILT", "1");
     let output = tests.output().with_context(|| format!("cannot start {tests:?}"))?;
     let printed = [output.stdout, output.stderr].concat();
     let (name, seconds) = (&program.name, begun.elapsed().as_secs_f32());
@@ -87,7 +103,7 @@ fn passes(program: &Program, environment: &[(&str, OsString)]) -> Result<bool> {
 fn failures(
     programs: Vec<Program>,
     at_once: usize,
-    environment: &[(&str, OsString)],
+    environment: &Environment,
 ) -> Result<Vec<String>> {
     let waiting = Mutex::new(programs.into_iter());
     let next = || waiting.lock().expect("no holder panics").next();
@@ -107,19 +123,27 @@ fn failures(
     Ok(failed.into_iter().collect::<Result<Vec<_>>>()?.concat())
 }
 
-/// Runs the programs of tests and the examples in documentation, all of them although some fail.
-/// By the variables in `environment` tests find clients and boards.
+/// Runs tests and examples, those in documentation too, all of them although some fail. Those that
+/// need what `others` brings, and names by variables, wait for it; `None`: they run without it.
 ///
 /// # Errors
 ///
 /// The names of the programs that failed.
-pub fn run(programs: Vec<Program>, environment: &[(&str, OsString)]) -> Result<()> {
-    let (alone, mut beside): (Vec<_>, Vec<_>) =
-        programs.into_iter().partition(|program| ALONE.contains(&program.name.as_str()));
-    beside.sort_by_key(turn);
+pub fn run(
+    programs: Vec<Program>,
+    others: Option<impl FnOnce() -> Result<Environment>>,
+) -> Result<()> {
+    let belongs = |list: &'static [&str]| move |program: &Program| list.contains(&&*program.name);
+    let (alone, mut programs): (Vec<_>, Vec<_>) = programs.into_iter().partition(belongs(&ALONE));
+    programs.sort_by_key(turn);
+    let (waiting, free): (Vec<_>, Vec<_>) = programs.into_iter().partition(belongs(&NEED_OTHERS));
     let cores = std::thread::available_parallelism().map_or(2, usize::from);
-    let mut failed = failures(beside, cores, environment)?;
-    failed.extend(failures(alone, 1, environment)?);
+    // With these a test that asks for the others fails, where it would be skipped without.
+    let absent = || OTHERS.map(|name| (name, "/not/built/yet".into())).into();
+    let mut failed = failures(free, cores, &others.as_ref().map_or_else(Vec::new, |_| absent()))?;
+    let found = others.map_or_else(|| Ok(Vec::new()), |bring| bring())?;
+    failed.extend(failures(waiting, cores, &found)?);
+    failed.extend(failures(alone, 1, &found)?);
     let documentation = shell::run(cargo().args(["test", "--workspace", "--doc", "--locked"]));
     ensure!(failed.is_empty(), "failed: {}", failed.join(", "));
     documentation

@@ -1,10 +1,12 @@
 //! Child processes, and paths of the checkout.
 
 use std::ffi::OsStr;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
+use serde_json::Value;
 
 /// Root directory of the checkout.
 pub fn root() -> &'static Path {
@@ -36,6 +38,37 @@ pub fn run(command: &mut Command) -> Result<()> {
         bail!("{command:?} failed: {status}");
     }
     Ok(())
+}
+
+/// What a build by cargo reported.
+pub struct Compiled {
+    /// Number of the compiler's warnings, repeated ones of earlier builds included.
+    pub warnings: usize,
+    /// What it built, as cargo's messages give it.
+    pub artifacts: Vec<Value>,
+}
+
+/// Runs a build by cargo and prints the compiler's messages.
+pub fn compile(building: &mut Command) -> Result<Compiled> {
+    let mut child = building
+        .arg("--message-format=json")
+        .stdout(Stdio::piped())
+        .spawn()
+        .with_context(|| format!("cannot start {building:?}"))?;
+    let mut compiled = Compiled { warnings: 0, artifacts: Vec::new() };
+    for line in BufReader::new(child.stdout.take().context("its output is piped")?).lines() {
+        // A line that is no JSON message of cargo is ignored.
+        let line: Value = serde_json::from_str(&line?).unwrap_or_default();
+        let message = &line["message"];
+        eprint!("{}", message["rendered"].as_str().unwrap_or_default());
+        compiled.warnings += usize::from(message["level"] == "warning");
+        if line["reason"] == "compiler-artifact" {
+            compiled.artifacts.push(line);
+        }
+    }
+    let status = child.wait()?;
+    ensure!(status.success(), "{building:?} failed: {status}");
+    Ok(compiled)
 }
 
 /// Path of a program in the first directory of `PATH` that has it; `None` if none has.
