@@ -184,14 +184,22 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Forgets what is known of the fleet, and takes part again under this incarnation number.
+    /// Forgets what is known of the fleet, and takes part again under this incarnation number, by
+    /// the plan that this vehicle holds. When each other one was heard last stays known: otherwise
+    /// all would count as lost.
     fn rejoin(&mut self, incarnation: u8) {
+        let fresh = FleetMember { in_roster: true, ..FleetMember::default() };
+        for member in &mut self.members {
+            *member = FleetMember { heard_at: member.heard_at, ..fresh };
+        }
         *self = Self {
+            members: core::mem::take(&mut self.members),
             lease_at: self.lease_at,
             in_flight: self.in_flight,
             hear_flight: self.hear_flight,
             airborne: self.airborne,
-            ..Self::new(usize::from(self.own), self.members.len(), self.limits)
+            plan: self.plan,
+            ..Self::new(usize::from(self.own), 0, self.limits)
         };
         self.members[usize::from(self.own)].entry.incarnation = incarnation;
     }

@@ -246,6 +246,28 @@ fn some_of(count: usize, bits: u32) -> Vec<usize> {
     if some.is_empty() { std::vec![bits as usize % count] } else { some }
 }
 
+/// One that no majority heard before the start leaves, and is a new vehicle once it is heard: by the
+/// plan that it holds, and without counting as lost whom it had heard all the time.
+#[test]
+fn one_that_left_before_the_start_takes_part_again_by_its_plan() {
+    let mut swarm = Swarm::new(3, 0.0, 1);
+    (0..3).for_each(|own| swarm.plan(own, PLANS[0]));
+    swarm.run_s(60);
+    (swarm.links[2], swarm.vehicles[2].status) = (0, MemberStatus::Left);
+    swarm.run_s(30);
+    (swarm.links[2], swarm.vehicles[2].status) = (u32::MAX, MemberStatus::Alive);
+    swarm.run_s(READY_S);
+    for vehicle in &swarm.vehicles {
+        assert!((0..3).all(|rank| vehicle.fleet.is_alive(rank)), "{:?}", vehicle.fleet);
+    }
+    (0..3).for_each(|own| swarm.start(own));
+    swarm.vehicles.iter_mut().for_each(|vehicle| vehicle.on_pad = false);
+    swarm.run_s(20);
+    swarm.end(0, MemberStatus::Left);
+    swarm.run_s(20);
+    assert_eq!([1, 2].map(|own| swarm.inputs(own).len()), [1, 1], "they divide");
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 300 } else { 600 }))]
 
