@@ -70,6 +70,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.is_on_detour();
         let along = PathProgress {
             progress_m: self.guidance.progress_m(state, &self.guidance_inputs()),
+            reference_m: self.guidance.along_m(),
             // A vehicle that brakes along its path still takes the pictures that it passes.
             place: match state.is_on_path() {
                 true if self.detours.is_beside_plan() && !self.guidance.returning => {

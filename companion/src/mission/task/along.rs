@@ -17,6 +17,8 @@ pub(crate) enum PathRelation {
 pub(crate) struct PathProgress {
     /// Distance flown along that path, metres.
     pub(crate) progress_m: f32,
+    /// Distance of the reference along that path, metres: where a vehicle that holds comes to rest.
+    pub(crate) reference_m: f32,
     /// Which path that is.
     pub(crate) place: PathRelation,
 }

@@ -27,7 +27,8 @@ const MAX_COMMANDS: usize = 4;
 const REPEAT_EVERY: Duration = Duration::from_millis(300);
 /// Number of times that a command is sent before it is dropped and reported.
 const MAX_TRIES: u8 = 5;
-/// Distance before a picture's place within which a vehicle that holds counts as there, metres.
+/// Distance before a picture's place within which the reference of a vehicle that holds counts as
+/// there, metres.
 const HELD_WITHIN_M: f32 = 0.3;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;
@@ -114,7 +115,7 @@ impl CameraControl {
             match photographs.stretches(path).nth(self.stretch) {
                 _ if beside => self.photograph_whole_detour(photographs, along.progress_m),
                 Some(shots) if along.place == PathRelation::OnPath => {
-                    self.update_trigger(photographs.trigger, &shots, along.progress_m);
+                    self.update_trigger(photographs.trigger, &shots, along);
                 }
                 _ => self.end_early(),
             }
@@ -172,12 +173,19 @@ impl CameraControl {
         }
     }
 
-    fn update_trigger(&mut self, trigger: Trigger, shots: &PictureStretch<'_>, progress_m: f32) {
+    fn update_trigger(
+        &mut self,
+        trigger: Trigger,
+        shots: &PictureStretch<'_>,
+        along: PathProgress,
+    ) {
+        let progress_m = along.progress_m;
         let next_m = match trigger {
             Trigger::Distance => shots.from_m,
             _ => shots.picture_at_m(self.picture),
         };
-        self.due = Some(trigger).filter(|_| progress_m >= next_m - HELD_WITHIN_M);
+        // A vehicle holds once its setpoint stands, up to a metre before it is there itself.
+        self.due = Some(trigger).filter(|_| along.reference_m >= next_m - HELD_WITHIN_M);
         if progress_m < shots.from_m {
             self.switch_off();
             return;

@@ -122,6 +122,7 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32
         settle += i32::from(at_m > path.length_m());
         let along = PathProgress {
             progress_m: at_m.min(path.length_m()),
+            reference_m: at_m.min(path.length_m()),
             place: if held == 0 { PathRelation::OnPath } else { PathRelation::Elsewhere },
         };
         camera.step(photographs, &path, along, now, &mut links);
@@ -192,13 +193,15 @@ proptest! {
 }
 
 proptest! {
-    /// A vehicle that holds at a picture's place, or a little before it, has that picture when its
-    /// path is replaced, however late the autopilot looks; and no trigger is left on.
+    /// A vehicle whose reference holds at a picture's place, or a little before it, has that
+    /// picture when its path is replaced, however late the autopilot looks and however far the
+    /// vehicle lags; and no trigger is left on.
     #[test]
     fn where_a_vehicle_holds_for_another_path_the_last_picture_is_taken(
         distance in any::<bool>(),
         number in 0_u32..9,
         before_m in 0.0_f32..0.2,
+        lag_m in 0.0_f32..1.2,
         looks_every in 1_u32..8,
     ) {
         let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
@@ -210,19 +213,22 @@ proptest! {
         let bare = PicturePlan::new(8.0, HeadingMode::Ahead, photographs.trigger);
         for step in 0..800_u32 {
             now = now + Duration::from_millis(50);
-            at_m = (at_m + MPS * STEP_S).min(hold_m - before_m);
+            let reference_m = (MPS * STEP_S * step as f32).min(hold_m - before_m);
+            at_m = (reference_m - lag_m).max(at_m);
             if step == 600 {
                 camera.begin_path();
             }
             let flown = if step < 600 { &photographs } else { &bare };
-            let along = PathProgress { progress_m: at_m, place: PathRelation::OnPath };
+            let place = PathRelation::OnPath;
+            let along = PathProgress { progress_m: at_m, reference_m, place };
             camera.step(flown, &path, along, now, &mut links);
             if step % looks_every == 0 {
                 fake.fly(at_m);
             }
             deliver(&mut camera, &mut fake, &mut links, &mut framer, now, at_m);
         }
-        let near = fake.pictures_m.iter().any(|m| (m - hold_m).abs() <= HELD_WITHIN_M);
+        let near = |m: &f32| (m - hold_m).abs() <= lag_m + HELD_WITHIN_M;
+        let near = fake.pictures_m.iter().any(near);
         prop_assert!(near, "held at {} m: {:?}", hold_m, fake.pictures_m);
         prop_assert_eq!(fake.step_m, 0.0);
     }
@@ -250,7 +256,7 @@ proptest! {
             taken_before = if on_path { fake.pictures_m.len() } else { taken_before };
             at_m += MPS * STEP_S;
             let place = if on_path { PathRelation::OnPath } else { PathRelation::Elsewhere };
-            let along = PathProgress { progress_m: at_m, place };
+            let along = PathProgress { progress_m: at_m, reference_m: at_m, place };
             camera.step(&photographs, &path, along, now, &mut links);
             fake.fly(at_m);
             deliver(&mut camera, &mut fake, &mut links, &mut framer, now, at_m);
@@ -274,7 +280,8 @@ fn a_silent_autopilot_is_reported_at_any_speed() {
         for step in 0..2000_u16 {
             now = now + Duration::from_millis(50);
             let progress_m = (mps * STEP_S * f32::from(step)).min(path.length_m());
-            let along = PathProgress { progress_m, place: PathRelation::OnPath };
+            let place = PathRelation::OnPath;
+            let along = PathProgress { progress_m, reference_m: progress_m, place };
             camera.step(&photographs, &path, along, now, &mut links);
             for frame in sent_frames(&mut links, &mut framer, now) {
                 texts += usize::from(frame.decode::<STATUSTEXT_DATA>().is_some());
