@@ -195,6 +195,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 hears_us: bits[rank] >> own & 1 != 0,
                 heard_by_others: (0..count)
                     .any(|j| j != rank && fresh(heard_at[j]) && bits[j] >> rank & 1 != 0),
+                hears: bits[rank],
             };
             let at = usize::from(vehicle.along_dm / WAYPOINT_DM);
             let (path, goes_on) = vehicle.path();
@@ -425,7 +426,12 @@ fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
     let own = OwnReport { commitment_dm: Some(WAYPOINT_DM), ..OwnReport::default() };
     let step = |fleet: &mut Whole, at_s: u64, heard: usize| {
         let now = Instant::from_millis(1000 * at_s);
-        let hears = MemberReception { heard_at: Some(now), hears_us: true, heard_by_others: false };
+        let hears = MemberReception {
+            heard_at: Some(now),
+            hears_us: true,
+            hears: u32::MAX,
+            ..MemberReception::default()
+        };
         fleet.step(
             now,
             &own,

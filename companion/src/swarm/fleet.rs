@@ -71,6 +71,8 @@ pub struct MemberReception {
     pub hears_us: bool,
     /// Whether a vehicle heard by this one lately reported that it hears the other one.
     pub heard_by_others: bool,
+    /// Ranks of the vehicles that the other one reported to hear, as bits.
+    pub hears: u32,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -84,6 +86,12 @@ struct FleetMember {
     heard_itself: bool,
     /// Hash of the division under way that the member has computed; 0 for none.
     hash: u32,
+}
+
+impl FleetMember {
+    fn takes_part(&self) -> bool {
+        self.in_roster && self.entry.status == MemberStatus::Alive
+    }
 }
 
 /// What this vehicle knows of all vehicles of the roster, itself included, and of their divisions.
@@ -118,7 +126,8 @@ pub struct Fleet<const V: usize> {
     airborne: bool,
     /// When the last of the vehicles that may be lost is down; 0 if there is none.
     down_at: Instant,
-    /// Whether a vehicle that takes part has not been heard for [`MISSED_AFTER`].
+    /// Whether a vehicle that takes part has not been heard for [`MISSED_AFTER`], or hears no
+    /// majority.
     any_missing: bool,
     limits: FleetTimeouts,
 }
@@ -224,6 +233,7 @@ impl<const V: usize> Fleet<V> {
         let takes_off = !own.waits && entry.status == MemberStatus::Alive;
         self.note_flight(usize::from(self.own), takes_off, false);
         let mut linked = self.own_bit();
+        let counted = self.counted_ranks();
         for (rank, member) in self.members.iter_mut().enumerate() {
             let heard = hearing(rank);
             let lately = heard.heard_at.is_some_and(|at| now - at <= self.limits.heard);
@@ -236,8 +246,10 @@ impl<const V: usize> Fleet<V> {
                 let falls = member.entry.status <= MemberStatus::Lost;
                 let down_at = member.heard_at + self.limits.down;
                 self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
-                self.any_missing |= member.entry.status == MemberStatus::Alive;
             }
+            // One that hears no majority is to land, and leaves its part, as its lease ends.
+            let cut_off = lately && !lease::is_majority_of(heard.hears | bit, counted);
+            self.any_missing |= (silence >= MISSED_AFTER || cut_off) && member.takes_part();
             if silence >= self.limits.silent {
                 self.hear_flight &= !bit;
                 // A majority has counted it as lost, so it has landed; or its battery is empty.
@@ -325,8 +337,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether the vehicle of this rank takes part in the mission.
     pub(crate) fn is_alive(&self, rank: usize) -> bool {
-        let member = &self.members[rank];
-        member.in_roster && member.entry.status == MemberStatus::Alive
+        self.members[rank].takes_part()
     }
 
     /// Computes the inputs of the division, once all vehicles that live have promised, and this

@@ -121,6 +121,8 @@ pub struct Bench {
     pub neighbour_clock: Option<Instant>,
     /// Place along the neighbour's path up to which its gates are open, metres.
     pub neighbour_clear_m: f32,
+    /// Ranks of the vehicles that the neighbour reports to hear, as bits.
+    pub neighbour_hears: u32,
     neighbour_sequence: u8,
 }
 
@@ -182,6 +184,7 @@ impl Bench {
             neighbour: None,
             neighbour_clock: None,
             neighbour_clear_m: -1e6,
+            neighbour_hears: u32::MAX,
             neighbour_sequence: 0,
         }
     }

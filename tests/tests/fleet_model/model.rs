@@ -228,6 +228,7 @@ impl FleetModel {
             heard_at: bit(vehicle.hears, rank).then_some(now),
             hears_us: heard.iter().any(|(from, m)| *from == rank && bit(m.hears, vehicle.rank)),
             heard_by_others: heard.iter().any(|(from, m)| *from != rank && bit(m.hears, rank)),
+            hears: heard.iter().find(|(from, _)| *from == rank).map_or(0, |(_, m)| m.hears),
         };
         let (path, goes_on) = self.path(&vehicle);
         let done = usize::from(vehicle.along) >= path.len();

@@ -300,23 +300,25 @@ fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
 }
 
 /// Its part may yet be another's: above its pad a vehicle waits while one that takes part is
-/// silent.
+/// silent, or hears nobody and is to land.
 #[test]
-fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
-    let mut b = over_a_field(true);
-    b.start();
-    b.run_until(Follow, 30.0);
-    b.neighbour = None;
-    b.run(15.0);
-    let along_m = b.companion.guidance.along_m();
-    assert!(
-        b.state() == Follow && (17.5..18.3).contains(&along_m),
-        "{:?} {along_m} {:?}",
-        b.state(),
-        b.texts
-    );
-    b.neighbour = FAR_AWAY;
-    b.run_until(Done, 60.0);
+fn a_vehicle_waits_above_its_pad_while_another_is_silent_or_hears_nobody() {
+    for sends in [false, true] {
+        let mut b = over_a_field(true);
+        b.start();
+        b.run_until(Follow, 30.0);
+        (b.neighbour, b.neighbour_hears) = (FAR_AWAY.filter(|_| sends), 0);
+        b.run(15.0);
+        let along_m = b.companion.guidance.along_m();
+        assert!(
+            b.state() == Follow && (17.5..18.3).contains(&along_m),
+            "{sends}: {:?} {along_m} {:?}",
+            b.state(),
+            b.texts
+        );
+        (b.neighbour, b.neighbour_hears) = (FAR_AWAY, u32::MAX);
+        b.run_until(Done, 60.0);
+    }
 }
 
 /// Beside its path it waits for none: what it comes to is not its pad. Vehicle 77 lies there.

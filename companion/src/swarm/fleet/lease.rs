@@ -4,7 +4,23 @@ use super::{Fleet, FleetMember, INCARNATIONS};
 use crate::link::roster::{MemberStatus, RosterReportEntry};
 use crate::time::{Duration, Instant};
 
+/// Whether these ranks, as bits, hold a majority of those that count, by the rule of
+/// [`Fleet::is_majority`].
+pub(super) fn is_majority_of(ranks: u32, counted: u32) -> bool {
+    let among = ranks & counted;
+    let lowest = among & counted.wrapping_neg() != 0;
+    // All of them, as a rule: boards count bits in steps.
+    among == counted || 2 * among.count_ones() + u32::from(lowest) > counted.count_ones()
+}
+
 impl<const V: usize> Fleet<V> {
+    /// Ranks of the vehicles that take part, or were lost, as bits.
+    pub(super) fn counted_ranks(&self) -> u32 {
+        let counts = |m: &FleetMember| m.in_roster && m.entry.status <= MemberStatus::Lost;
+        let ranks = self.members.iter().enumerate();
+        ranks.filter(|(_, m)| counts(m)).fold(0, |bits, (rank, _)| bits | 1 << rank.min(31))
+    }
+
     /// Whether the vehicles `among` are a majority of those that take part, or were lost; of two
     /// halves, the one with the lowest rank is.
     pub(super) fn is_majority(&self, among: impl Fn(usize, &FleetMember) -> bool) -> bool {
@@ -71,7 +87,8 @@ impl<const V: usize> Fleet<V> {
         Some(self.down_at).filter(|at| *at > Instant::ZERO)
     }
 
-    /// Whether a vehicle that takes part had not been heard for 3 s at the last step.
+    /// Whether a vehicle that takes part had not been heard for 3 s at the last step, or hears no
+    /// majority: it may leave a part.
     pub fn is_any_missing(&self) -> bool {
         self.any_missing
     }

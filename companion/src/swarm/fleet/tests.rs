@@ -151,6 +151,7 @@ impl Swarm {
             heard_at: heard_at[rank],
             hears_us: hears(rank, own),
             heard_by_others: (0..count).any(|other| other != rank && hears(other, rank)),
+            hears: bits[rank],
         };
         let holds_dm = v.fleet.commitment_dm();
         let report = OwnReport {
@@ -266,6 +267,26 @@ fn one_that_left_before_the_start_takes_part_again_by_its_plan() {
     swarm.end(0, MemberStatus::Left);
     swarm.run_s(20);
     assert_eq!([1, 2].map(|own| swarm.inputs(own).len()), [1, 1], "they divide");
+}
+
+/// One that sends and hears nobody is to leave its part: it is missed, so nobody comes down that
+/// could take the part over. Of two halves the one with the lowest id goes on, and is not missed.
+#[test]
+fn a_vehicle_that_hears_no_majority_is_missed_until_it_leaves() {
+    for (deaf, heard_by) in [(2, 0b111), (0, 0b111), (1, 0b11), (0, 0b11)] {
+        let count = if heard_by == 0b111 { 3 } else { 2 };
+        let mut swarm = Swarm::flying(count, 0.0, 1, PLANS[0]);
+        let other = (deaf + 1) % count;
+        let missed = |swarm: &Swarm| swarm.vehicles[other].fleet.is_any_missing();
+        swarm.run_s(5);
+        assert!(!missed(&swarm));
+        swarm.links[deaf] = 0;
+        swarm.run_s(3);
+        assert_eq!(missed(&swarm), (deaf, count) != (0, 2), "{deaf} of {count}");
+        swarm.end(deaf, MemberStatus::Left);
+        swarm.run_s(2);
+        assert!(!missed(&swarm) && swarm.vehicles[other].fleet.is_dividing(), "{deaf} of {count}");
+    }
 }
 
 proptest! {

@@ -51,6 +51,7 @@ impl<const V: usize> Neighbours<V> {
                     heard_at: contact.intent_at,
                     hears_us: contact.hears_us_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN),
                     heard_by_others: by_others & bit != 0,
+                    hears: contact.heard_bits,
                 }
             })
         });

@@ -26,7 +26,7 @@ impl Bench {
             plan_crc,
             progress_m,
             gates_open_up_to_m: self.neighbour_clear_m,
-            heard_bits: u32::MAX,
+            heard_bits: self.neighbour_hears,
             ..Intent::default()
         };
         let mut payload = [0; 133];

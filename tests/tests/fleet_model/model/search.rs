@@ -19,8 +19,12 @@ impl Model for FleetModel {
                 let mut vehicle = Vehicle { flight: Flight::Flies, stands, ..self.dead(rank, 0) };
                 vehicle.fleet.begin_flight(NOW);
                 // All heard each other when they took off.
-                let heard =
-                    MemberReception { heard_at: Some(NOW), hears_us: true, heard_by_others: true };
+                let heard = MemberReception {
+                    heard_at: Some(NOW),
+                    hears_us: true,
+                    heard_by_others: true,
+                    hears: u32::MAX,
+                };
                 vehicle.fleet.step(
                     NOW,
                     &OwnReport { airborne: true, ..OwnReport::default() },
