@@ -62,9 +62,10 @@ struct Draw {
     most_in_three: usize,
 }
 
-/// The row of a vehicle that no other vehicle heard for so long that its part was divided among the
-/// others.
-const GIVEN_AWAY: &str = "Its part was given away: landing";
+/// The rows of a vehicle that no other vehicle heard for so long that its part was divided among
+/// the others: in flight, and on its pad.
+const GIVEN_AWAY: [&str; 2] =
+    ["Its part was given away: landing", "Its part was given away: start cancelled"];
 
 /// After the stroke of another: its pilot keeps that for good, and the row of the vehicle that it
 /// keeps on its pad.
@@ -213,7 +214,7 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     let fell_short = |v: &&VehicleResult| !struck.contains(&v.id) && short(&v.end);
     let (landed_short, whole) =
         (vehicles.iter().filter(fell_short).count(), coverage.covered_share >= 1.0);
-    let rough = (draw.radio == Radio::Rough).then_some(GIVEN_AWAY);
+    let rough = (draw.radio == Radio::Rough).then_some(GIVEN_AWAY).into_iter().flatten();
     // With nothing left to photograph it may land where there is room.
     let aside = whole.then_some(covered::LANDS_ASIDE);
     let reasons: Vec<&str> =
