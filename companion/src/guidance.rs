@@ -36,7 +36,6 @@ use planner_core::{Length, Point};
 use self::filter::SafetyFilter;
 use self::hold::Hold;
 use self::limits::{MotionLimits, Settings};
-use self::nearest::nearest_arc_length_m;
 use self::phase::Phase;
 use self::setpoint::position_correction;
 use self::smoother::{ClockPace, SetpointSmoother, TICK_S};
@@ -83,8 +82,8 @@ pub const REJOIN_WINDOW_M: f32 = 5.0;
 /// lost, metres: it stopped within its braking distance of the reference, so a position further
 /// along the path is not believed.
 pub const LOST_WINDOW_M: f32 = 2.5;
-/// Length of path searched, to either side, for the point nearest to a standing setpoint, metres:
-/// the raw point may be a second of flight ahead of it.
+/// Length of path searched ahead of a reference that stepped back for the point nearest to the
+/// setpoint, metres: at the 1.5 m/s of a step back the setpoint stands up to 2 m ahead of it.
 const SETTLE_WINDOW_M: f32 = 3.0;
 /// A nearest point this close to an end of the searched path counts as not found, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
@@ -257,7 +256,7 @@ impl Guidance {
 
     /// Forgets the flight before: phase, leg, path progress, advice and filter. The setpoint stays.
     pub fn reset(&mut self) {
-        self.tracker = ReferenceState::default();
+        (self.tracker, self.setpoint_m) = (ReferenceState::default(), 0.0);
         self.phase = Phase::Hold;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
@@ -310,10 +309,8 @@ impl Guidance {
             if next.is_some_and(|gate| neighbours.has_passed(gate, now)) {
                 self.gates_open += 1;
             }
-            let place = self.smoother.position();
-            let along_m = self.tracker.along_m;
-            self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
-            let along_m = if self.on_path { along_m } else { -plan.climb_m };
+            self.follow_setpoint(&plan.path, dt_s);
+            let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
                 // Also while stopped: the filter checks up to the stop, also if advised too late.
                 State::Follow | State::Blocked | State::Replanning => {
@@ -387,9 +384,7 @@ impl Guidance {
         let moves = wanted && !self.hold.is_binding(now);
         if !moves && self.smoother.is_standing() && !self.raw_point_at_rest {
             if let (Some(path), Phase::Path) = (path, self.phase) {
-                let near_m = self.tracker.along_m;
-                self.tracker.along_m =
-                    nearest_arc_length_m(path, &self.smoother.position(), near_m, SETTLE_WINDOW_M);
+                self.settle_reference(path);
             }
             self.smoother.forget_curve();
             self.forget_leg();

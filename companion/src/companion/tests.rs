@@ -23,6 +23,7 @@ mod hostile;
 mod interruptions;
 mod paces;
 mod scenes;
+mod setpoint_place;
 mod unheard;
 
 use std::vec::Vec;

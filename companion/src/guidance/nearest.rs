@@ -1,8 +1,16 @@
-//! The point of a path that is nearest to a place, within a window.
+//! The point of a path that is nearest to a place, within a window; and where the setpoint is along
+//! the path.
 
 use planner_core::Point;
 use planner_core::flight::Path;
 
+use super::{Guidance, SETTLE_WINDOW_M};
+
+/// Distance along the path by which the place nearest to the setpoint may move at once, metres: from
+/// one leg to the next where the setpoint rounds a corner, by 0.25 m at most.
+const CORNER_REACH_M: f32 = 0.5;
+/// Rounding of an arc length, metres: where the setpoint stands, its place must not creep.
+const ROUNDING_M: f32 = 1e-3;
 /// A nearest point this close to the end of the path counts as its end, metres.
 const AT_PATH_END_M: f32 = 0.02;
 
@@ -16,4 +24,27 @@ pub(super) fn nearest_arc_length_m<const W: usize>(
 ) -> f32 {
     let (along_m, length_m) = (path.project(place, near_m, window_m), path.length_m());
     if length_m - along_m < AT_PATH_END_M { length_m } else { along_m.max(0.0) }
+}
+
+impl Guidance {
+    /// Follows the setpoint forward along the path: it has moved by at most a step of `dt_s` at
+    /// cruise speed since its place was last sought, and never beyond the reference. The setpoint is
+    /// up to 1.2 s of flight behind the reference, 18 m at 15 m/s. In a window of that length a leg
+    /// that is flown back over the one before would be found too early.
+    pub(super) fn follow_setpoint<const W: usize>(&mut self, path: &Path<W>, dt_s: f32) {
+        let (from_m, along_m) = (self.setpoint_m, self.tracker.along_m);
+        let reach_m = 0.5 * (CORNER_REACH_M + self.track.cruise_mps * dt_s);
+        let place = self.smoother.position();
+        let seen_m = path.project(&place, from_m + reach_m, reach_m + ROUNDING_M);
+        self.setpoint_m = seen_m.max(from_m).min(along_m);
+    }
+
+    /// Sets the reference back to the setpoint, which stands.
+    pub(super) fn settle_reference<const W: usize>(&mut self, path: &Path<W>) {
+        let from_m = self.setpoint_m;
+        let stepped_back = self.tracker.along_m <= from_m;
+        let reach_m = if stepped_back { 0.5 * SETTLE_WINDOW_M } else { 0.0 };
+        self.tracker.along_m =
+            nearest_arc_length_m(path, &self.smoother.position(), from_m + reach_m, reach_m);
+    }
 }

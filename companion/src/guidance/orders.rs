@@ -52,7 +52,7 @@ impl Guidance {
 
     /// Begins another path at its start; the setpoint stands there, or near it.
     pub fn begin_path(&mut self, now: Instant) {
-        self.tracker = ReferenceState::default();
+        (self.tracker, self.setpoint_m) = (ReferenceState::default(), 0.0);
         self.phase = Phase::Path;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
@@ -69,7 +69,7 @@ impl Guidance {
     /// Begins another path, at the place `along_m` metres along it; the setpoint stands there.
     pub(crate) fn begin_path_at(&mut self, along_m: f32, now: Instant) {
         self.begin_path(now);
-        self.tracker.along_m = along_m;
+        (self.tracker.along_m, self.setpoint_m) = (along_m, along_m);
         self.progress_m = along_m;
     }
 
@@ -148,6 +148,7 @@ impl Guidance {
             self.phase = Phase::Path;
             self.tracker.along_m =
                 nearest_arc_length_m(path, &place, self.tracker.along_m, REJOIN_WINDOW_M);
+            self.setpoint_m = self.tracker.along_m;
         }
         self.start_following(now);
     }
@@ -178,7 +179,7 @@ impl Guidance {
         let (phase, leg) = (self.phase, self.leg.take());
         *path = back;
         self.begin_path(now);
-        self.tracker = tracker;
+        (self.tracker, self.setpoint_m) = (tracker, tracker.along_m);
         self.returning = true;
         match phase {
             Phase::Climb | Phase::Join => (self.phase, self.leg) = (phase, leg),
