@@ -170,7 +170,6 @@ pub fn build(board: Board) -> Result<Built> {
     building.args(["--config", "profile.release.codegen-units=1"]);
     // The chip's drivers only set registers: optimized for size they are as fast.
     building.args(["--config", "profile.release.package.embassy-stm32.opt-level='s'"]);
-    building.arg("--timings");
     let warnings = compile(&mut building)?.warnings;
     // The programs of two boards have the same names, and cargo shares their directory: so they are
     // copied.

@@ -184,6 +184,7 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
                 heard_at: speaks.then_some(now),
                 hears_us: speaks,
                 heard_by_others: speaks,
+                hears: u32::MAX >> (round / 10),
             }
         };
         let promise_dm = Some(100 + round);
