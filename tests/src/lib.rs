@@ -57,9 +57,9 @@ pub fn python() -> Option<String> {
     python
 }
 
-/// Path of `host-sim`, in the profile of the test that asks. It is built first, because cargo gives
-/// tests no path to another package's binaries, unless `FLOCKMATE_BUILT` says that it was built with
-/// the tests.
+/// Path of `host-sim`, in the profile of the test that asks. It is built first, because cargo
+/// gives tests no path to another package's binaries, unless `FLOCKMATE_BUILT` says that it was
+/// built with the tests.
 pub fn host_sim() -> PathBuf {
     let test = std::env::current_exe().expect("a test knows its own path");
     // TARGET/PROFILE/deps/TEST-HASH

@@ -1,6 +1,6 @@
 //! The host's tests and examples: built by cargo, then run several programs at once. cargo itself
-//! runs one after the other, and most of them have one long test, beside which the other cores would
-//! be idle.
+//! runs one after the other, and most of them have one long test, beside which the other cores
+//! would be idle.
 
 use std::ffi::OsString;
 use std::path::PathBuf;

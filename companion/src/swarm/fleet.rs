@@ -248,7 +248,7 @@ impl<const V: usize> Fleet<V> {
                 self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
             }
             // One that hears no majority is to land, and leaves its part, as its lease ends.
-            let cut_off = lately && !lease::is_majority_of(heard.hears | bit, counted);
+            let cut_off = lately && !Self::is_majority_of(heard.hears | bit, counted);
             self.any_missing |= (silence >= MISSED_AFTER || cut_off) && member.takes_part();
             if silence >= self.limits.silent {
                 self.hear_flight &= !bit;
@@ -271,18 +271,8 @@ impl<const V: usize> Fleet<V> {
         if self.has_lease(now) {
             self.count_silent_as_lost(now);
         }
-        let asks =
-            own.wants_division && self.is_alive(usize::from(self.own)) && !self.divisions.is_full();
-        if (self.is_dividing() || asks) && caught_up {
-            // This vehicle's promise, in its next report, also requests the division from the
-            // others.
-            let entry = &mut self.members[usize::from(self.own)].entry;
-            entry.commitment_dm = entry.commitment_dm.or(own.commitment_dm);
-            entry.holds |= own.holds && entry.commitment_dm.is_some();
-            self.prepare_division_inputs(now);
-            if self.is_division_agreed(now) {
-                self.commit_division();
-            }
+        if caught_up {
+            self.step_division(now, own);
         }
     }
 

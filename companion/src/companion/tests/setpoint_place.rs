@@ -94,7 +94,7 @@ impl Reference {
         let least_m = (0..=steps).map(|i| apart(i).1).fold(f32::INFINITY, f32::min);
         let mut near = (0..=steps).map(apart).filter(|at| at.1 < least_m + 0.06).map(|at| at.0);
         let first_m = near.next()?;
-        Some((first_m, near.last().unwrap_or(first_m), least_m))
+        Some((first_m, near.next_back().unwrap_or(first_m), least_m))
     }
 }
 

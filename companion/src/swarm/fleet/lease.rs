@@ -1,19 +1,19 @@
 //! The lease of a vehicle, and what silence of the others means.
 
-use super::{Fleet, FleetMember, INCARNATIONS};
+use super::{Fleet, FleetMember, INCARNATIONS, OwnReport};
 use crate::link::roster::{MemberStatus, RosterReportEntry};
 use crate::time::{Duration, Instant};
 
-/// Whether these ranks, as bits, hold a majority of those that count, by the rule of
-/// [`Fleet::is_majority`].
-pub(super) fn is_majority_of(ranks: u32, counted: u32) -> bool {
-    let among = ranks & counted;
-    let lowest = among & counted.wrapping_neg() != 0;
-    // All of them, as a rule: boards count bits in steps.
-    among == counted || 2 * among.count_ones() + u32::from(lowest) > counted.count_ones()
-}
-
 impl<const V: usize> Fleet<V> {
+    /// Whether these ranks, as bits, hold a majority of those that count, by the rule of
+    /// [`Self::is_majority`].
+    pub(super) fn is_majority_of(ranks: u32, counted: u32) -> bool {
+        let among = ranks & counted;
+        let lowest = among & counted.wrapping_neg() != 0;
+        // All of them, as a rule: boards count bits in steps.
+        among == counted || 2 * among.count_ones() + u32::from(lowest) > counted.count_ones()
+    }
+
     /// Ranks of the vehicles that take part, or were lost, as bits.
     pub(super) fn counted_ranks(&self) -> u32 {
         let counts = |m: &FleetMember| m.in_roster && m.entry.status <= MemberStatus::Lost;
@@ -113,6 +113,24 @@ impl<const V: usize> Fleet<V> {
             && self.has_lease(now)
         {
             self.rejoin((incarnation + 1) % INCARNATIONS);
+        }
+    }
+
+    /// Promises and holds where a division is under way or asked for, and commits to it once it is
+    /// agreed. This vehicle has the path of the last one.
+    pub(super) fn step_division(&mut self, now: Instant, own: &OwnReport) {
+        let is_alive = self.is_alive(usize::from(self.own));
+        let asks = own.wants_division && is_alive && !self.divisions.is_full();
+        if !self.is_dividing() && !asks {
+            return;
+        }
+        // This vehicle's promise, in its next report, also requests the division from the others.
+        let entry = &mut self.members[usize::from(self.own)].entry;
+        entry.commitment_dm = entry.commitment_dm.or(own.commitment_dm);
+        entry.holds |= own.holds && entry.commitment_dm.is_some();
+        self.prepare_division_inputs(now);
+        if self.is_division_agreed(now) {
+            self.commit_division();
         }
     }
 }

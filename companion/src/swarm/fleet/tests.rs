@@ -247,8 +247,8 @@ fn some_of(count: usize, bits: u32) -> Vec<usize> {
     if some.is_empty() { std::vec![bits as usize % count] } else { some }
 }
 
-/// One that no majority heard before the start leaves, and is a new vehicle once it is heard: by the
-/// plan that it holds, and without counting as lost whom it had heard all the time.
+/// One that no majority heard before the start leaves, and is a new vehicle once it is heard: by
+/// the plan that it holds, and without counting as lost those that it had heard all the time.
 #[test]
 fn one_that_left_before_the_start_takes_part_again_by_its_plan() {
     let mut swarm = Swarm::new(3, 0.0, 1);
