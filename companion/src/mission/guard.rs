@@ -75,6 +75,10 @@ pub enum Guard {
     /// The autopilot's mode is not one that the companion set, and HEARTBEAT reports
     /// `MAV_STATE_CRITICAL` or worse.
     FailsafeActs,
+    /// As [`Guard::ModeTaken`], with the motors armed.
+    ModeTakenArmed,
+    /// As [`Guard::FailsafeActs`], with the motors armed.
+    FailsafeActsArmed,
     /// The motors are armed.
     Armed,
     /// The motors are disarmed.
@@ -248,7 +252,8 @@ pub enum Guard {
     /// The division has not become binding within the limit, nor within a minute from when a lost
     /// vehicle is down.
     NotDivided,
-    /// A pause is commanded in a climb that has not left the ground.
+    /// A pause is commanded in a climb that has not left the ground: the landing detector has not
+    /// reported flight. Once it has, its report of ground may be false, and disarming a fall.
     PausedBeforeLiftOff,
     /// A vehicle that follows another plan of this mission has been heard, and the state has lasted
     /// for the limit.
@@ -302,6 +307,8 @@ impl Guard {
             Self::Offboard => i.offboard,
             Self::ModeTaken => i.mode_foreign && !i.critical,
             Self::FailsafeActs => i.mode_foreign && i.critical,
+            Self::ModeTakenArmed => i.armed && i.mode_foreign && !i.critical,
+            Self::FailsafeActsArmed => i.armed && i.mode_foreign && i.critical,
             Self::Armed => i.armed,
             Self::Disarmed => !i.armed,
             Self::DisarmedAtGoal => !i.armed && i.at_goal,
@@ -370,7 +377,7 @@ impl Guard {
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::LeaseLost => i.area && i.neighbour_age > limit,
             Self::NotDivided => i.in_state >= limit && i.division_overdue,
-            Self::PausedBeforeLiftOff => i.pause && i.on_ground && !i.vertical,
+            Self::PausedBeforeLiftOff => i.pause && i.on_ground && !i.vertical && !i.has_flown,
             Self::WayFree => i.way_free,
             Self::OutOfRange => i.out_of_range && i.in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,

@@ -186,11 +186,11 @@ impl InterruptedStates {
     pub(crate) fn record_interruption(&mut self, from: State, to: State, lands: bool) {
         use State::*;
         // These states cannot be resumed half-way: a search begins again in the state before it, a
-        // disarming in the landing.
+        // disarming in the landing, and so does a start that ended with the motors armed.
         let kept = match from {
             Replanning if lands => Land,
             Replanning => Blocked,
-            Disarm | LandingHeld => Land,
+            Arming | CancelStart | Disarm | LandingHeld => Land,
             other => other,
         };
         if Self::is_loss(to) && !Self::is_loss(from) {

@@ -146,6 +146,9 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(FLYING,              G::ModeTaken,       AT_ONCE,    PilotControl, A::None,             "Pilot has control: mission stopped"),
     warning_row(&[Land, Disarm],     G::FailsafeActs,    AT_ONCE,    Failsafe,    A::None,              "Autopilot failsafe while landing"),
     warning_row(&[Land, Disarm],     G::ModeTaken,       AT_ONCE,    PilotControl, A::None,             "Pilot has control: landing stopped"),
+    // Once armed it may be in the air, or be flown from there: it is given back as from a flight.
+    warning_row(&[Arming, CancelStart], G::FailsafeActsArmed, AT_ONCE, Failsafe,  A::None,              "Autopilot failsafe: setpoints stopped"),
+    warning_row(&[Arming, CancelStart], G::ModeTakenArmed, AT_ONCE,  PilotControl, A::None,             "Pilot has control: mission stopped"),
     warning_row(ON_PAD,              G::FailsafeActs,    AT_ONCE,    Aborted,     A::ForgetStart,       "Failsafe before take-off: start cancelled"),
     warning_row(ON_PAD,              G::ModeTaken,       AT_ONCE,    Aborted,     A::ForgetStart,       "Mode changed by pilot: start cancelled"),
     // The companion was restarted in the air: it sends no setpoints, and pilot or autopilot go on
@@ -157,7 +160,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Arming],           G::NoHeartbeat,     secs(3),    CancelStart, A::CancelStart,       "Autopilot silent: start cancelled"),
     warning_row(&[CancelStart],      G::NoHeartbeat,     secs(60),   Aborted,     A::ForgetStart,       "Autopilot lost"),
     warning_row(FLYING_LINKED,       G::NoHeartbeat,     secs(3),    AutopilotSilent, A::BrakeOnPath,   "Autopilot silent: stopping"),
-    warning_row(&[Disarm, PilotControl, Failsafe], G::NoHeartbeat, secs(60), Aborted, A::ForgetStart,   "Autopilot lost"),
+    warning_row(&[Disarm, Failsafe], G::NoHeartbeat,     secs(60),   Aborted,     A::ForgetStart,       "Autopilot lost"),
     warning_row(&[Land],             G::NoHeartbeat,     secs(120),  Aborted,     A::ForgetStart,       "Autopilot lost"),
     warning_row(&[PilotReturned],    G::NoHeartbeat,     secs(60),   Land,        A::RequestLandMode,   "Autopilot still silent: landing"),
     warning_row(&[Planning, Ready, Scheduled, PadReplanning], G::NoPosition, secs(2), WaitPosition, A::ForgetStart, "Position lost: start cancelled"),

@@ -229,6 +229,8 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::Offboard => i.offboard = true,
         G::ModeTaken => i.mode_foreign = true,
         G::FailsafeActs => (i.mode_foreign, i.critical) = (true, true),
+        G::ModeTakenArmed => i.mode_foreign = true,
+        G::FailsafeActsArmed => (i.mode_foreign, i.critical) = (true, true),
         G::Armed => i.armed = true,
         G::Disarmed => i.armed = false,
         G::LiftedOff => i.lifted_off = true,
@@ -311,6 +313,8 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
                 (WaitPosition, G::PositionKnown) | (WaitAutopilot, G::AutopilotHeard) => {}
                 (PositionLost | WaitPosition, _) => inputs.position_age = MAX_POSITION_AGE,
                 (AutopilotSilent, _) => inputs.heartbeat_age = MAX_HEARTBEAT_AGE,
+                (Arming | CancelStart, G::ModeTaken | G::FailsafeActs) => inputs.armed = false,
+                (Arming, G::ModeTakenArmed | G::FailsafeActsArmed) => {}
                 (Arming, _) => inputs.armed = false,
                 (Scheduled | PadReplanning | Streaming | Engaging, guard) => {
                     inputs.armed = guard == G::Armed;

@@ -56,6 +56,13 @@ impl Watch {
                 "{command} under the pilot in {state:?}: {:#?}",
                 self.log
             );
+            let flown = b.companion.requests.handshake().has_flown();
+            assert!(
+                (command, param1) != (ARM, 0.0) || state != State::CancelStart || !flown,
+                "disarmed after it has flown: {:#?} {:?}",
+                self.log,
+                b.texts
+            );
             assert!(
                 (command, param1) != (ARM, 1.0) || !self.armed_once,
                 "armed again in {state:?}: {:#?} {:?}",
