@@ -36,11 +36,13 @@ pub(crate) enum Timer {
     DivisionDue,
     /// From then on a vehicle on the ground that can promise nothing leaves its share to others.
     LeaveUnstarted,
+    /// From then on the vehicle waits above its pad for no missing one.
+    ComeDown,
     /// From then on "EKF origin # km away" may be sent again.
     OriginReport,
 }
 
-const TIMER_COUNT: usize = 14;
+const TIMER_COUNT: usize = 15;
 /// Timers that wake the shell.
 const WAKING_TIMERS: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 

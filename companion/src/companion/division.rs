@@ -25,6 +25,9 @@ const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 /// Time for which a vehicle on the ground that can promise nothing keeps its share while another
 /// one flies.
 pub(super) const CANNOT_START_MOST: Duration = Duration::from_secs(60);
+/// Time for which a vehicle waits above its pad for missing ones. Twice what one needs to be
+/// counted as lost, or to leave without a lease: a false report keeps nobody in the air for longer.
+const WAIT_FOR_MISSING_MOST: Duration = Duration::from_secs(180);
 /// Time after a lost vehicle is down within which a division becomes binding.
 const DIVIDES_WITHIN: Duration = Duration::from_secs(60);
 /// Stands for the plan's CRC where the planner cannot divide the rest of the area.
@@ -63,8 +66,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.neighbours.step_fleet(&own, now);
         let Some(fleet) = self.neighbours.fleet() else { return };
         let (home_m, around) = (self.last_descent_start_m(), self.detours.is_beside_plan());
+        if !fleet.is_any_missing() {
+            self.timers.set(Timer::ComeDown, now + WAIT_FOR_MISSING_MOST);
+        }
+        let misses = fleet.is_any_missing() && !self.timers.is_due(Timer::ComeDown, now);
         // Only a vehicle that still takes part waits above its pad.
-        let waits = fleet.takes_part() && (fleet.is_dividing() || fleet.is_any_missing());
+        let waits = fleet.takes_part() && (fleet.is_dividing() || misses);
         let halt_m = match self.division_hold_m() {
             Some(holds_at_m) => holds_at_m,
             // On a detour the end of the path is not above the pad.

@@ -38,9 +38,9 @@ pub(super) fn over_a_field(px4: bool) -> Bench {
 /// The same with other settings.
 pub(super) fn over_a_field_with(px4: bool, set: impl Fn(&mut Config<4>)) -> Bench {
     let mut config = two_vehicles();
-    set(&mut config);
     config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
     config.lost_vehicle_down_s = Some(60.0);
+    set(&mut config);
     let mut bench = if px4 { Bench::new(config) } else { Bench::ardupilot(config) };
     bench.answer_plan = Some(Ok(field_plan()));
     bench.neighbour = FAR_AWAY;
@@ -300,25 +300,36 @@ fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
 }
 
 /// Its part may yet be another's: above its pad a vehicle waits while one that takes part is
-/// silent, or hears nobody and is to land.
+/// silent.
 #[test]
-fn a_vehicle_waits_above_its_pad_while_another_is_silent_or_hears_nobody() {
-    for sends in [false, true] {
-        let mut b = over_a_field(true);
-        b.start();
-        b.run_until(Follow, 30.0);
-        (b.neighbour, b.neighbour_hears) = (FAR_AWAY.filter(|_| sends), 0);
-        b.run(15.0);
-        let along_m = b.companion.guidance.along_m();
-        assert!(
-            b.state() == Follow && (17.5..18.3).contains(&along_m),
-            "{sends}: {:?} {along_m} {:?}",
-            b.state(),
-            b.texts
-        );
-        (b.neighbour, b.neighbour_hears) = (FAR_AWAY, u32::MAX);
-        b.run_until(Done, 60.0);
-    }
+fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
+    let mut b = over_a_field(true);
+    b.start();
+    b.run_until(Follow, 30.0);
+    b.neighbour = None;
+    b.run(15.0);
+    let along_m = b.companion.guidance.along_m();
+    assert!(
+        b.state() == Follow && (17.5..18.3).contains(&along_m),
+        "{:?} {along_m} {:?}",
+        b.state(),
+        b.texts
+    );
+    b.neighbour = FAR_AWAY;
+    b.run_until(Done, 60.0);
+}
+
+/// It waits too for one that reports that it hears nobody, since that one is to land; but if it
+/// says so for ever and flies on, for three minutes only.
+#[test]
+fn above_its_pad_a_vehicle_waits_for_one_that_hears_nobody_for_a_limited_time() {
+    let mut b = over_a_field_with(true, |config| _ = config.roster.pop());
+    b.start();
+    b.run_until(Follow, 30.0);
+    b.neighbour_hears = 0;
+    b.run(120.0);
+    assert_eq!(b.state(), Follow, "{:?}", b.texts);
+    b.run_until(Done, 150.0);
 }
 
 /// Beside its path it waits for none: what it comes to is not its pad. Vehicle 77 lies there.
