@@ -18,12 +18,13 @@
 //! computing a distance.
 
 mod own;
+mod place;
 
 use fpu::sqrtf;
 use heapless::Vec;
 
 pub use self::own::{Legs, OwnSet};
-use crate::geometry::clamp_share;
+pub use self::place::{OFF_REPORTED_PATH_M, OFF_REPORTED_PATH_S, PlaceOnPoints, PointsReach};
 use crate::{ConfigError, Point, all_positive};
 
 /// Time from a decision of the filter to the first motion that follows it, seconds: two setpoints.
@@ -34,9 +35,6 @@ pub const MAX_LAG_S: f32 = 0.25;
 /// Age up to which the last report of a neighbour is fresh, seconds; after that the neighbour is
 /// stale.
 pub const FRESH_S: f32 = 1.0;
-/// Distance of a vehicle from the path points that it reports beyond which it does not count as
-/// flying along them, metres: real vehicles lag by up to 0.5 m and deviate by 0.4 m.
-pub const OFF_REPORTED_PATH_M: f32 = 0.9;
 /// Most points of a reachable set: the vehicle's position and the eight path points that it
 /// reports.
 const MAX_SET_POINTS: usize = 9;
@@ -186,8 +184,8 @@ pub struct NeighbourMotion<'a> {
     pub points: &'a [Point],
     /// Where the neighbour is on its reported points.
     pub place_on_points: PlaceOnPoints,
-    /// Greatest distance of one of the points from the first of them, metres.
-    pub extent_m: f32,
+    /// How far its points lead it.
+    pub points_reach: PointsReach,
     /// Distance along its points within which a neighbour that has been silent for long may have
     /// stopped, metres; 0 for one that is heard.
     pub rests_within_m: f32,
@@ -196,95 +194,6 @@ pub struct NeighbourMotion<'a> {
     /// Height down to which the column below the neighbour belongs to its set, metres up in the
     /// mission frame; `None` while it flies along its points.
     pub column_to_m: Option<f32>,
-}
-
-/// Place of a vehicle on the polyline of points that it reports. Valid until position or points are
-/// heard again.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum PlaceOnPoints {
-    /// Not computed yet.
-    #[default]
-    Unknown,
-    /// The vehicle is further than [`OFF_REPORTED_PATH_M`] from its points.
-    Beside,
-    /// The vehicle is on its points.
-    On {
-        /// Index of the point that ends the first leg on which the vehicle may be.
-        leg: u8,
-        /// Further distance along the points that it may have flown already, where they turn back
-        /// and lead past it again: from that first place to the last one, decimetres, rounded up.
-        /// Two bytes, since one is stored for each neighbour.
-        more_dm: u16,
-    },
-}
-
-/// Points that come nearer to the vehicle again by less than this do not count as leading past it
-/// again, metres.
-const RETURN_TOLERANCE_M: f32 = 0.05;
-
-impl PlaceOnPoints {
-    /// Finds the first place on the points at which the vehicle may be, and how far along the
-    /// points after it the last such place is.
-    #[inline(never)]
-    pub fn find(position: &Point, points: &[Point]) -> Self {
-        let (mut found, mut more_m): (Option<u8>, f32) = (None, 0.0);
-        let Some(mut from) = points.first() else { return Self::Beside };
-        let away_m = |place: &Point| sqrtf((position - place).norm_squared());
-        // Distance of the vehicle from the first place; arc length from there to the current leg;
-        // whether the points have led away from the vehicle since.
-        let (mut least_m, mut along_m, mut left) = (OFF_REPORTED_PATH_M, 0.0, false);
-        let mut start_m = away_m(from);
-        for (i, to) in points.iter().enumerate() {
-            let place = nearest_point_on_leg(position, from, to);
-            let (apart_m, upto_m) = (away_m(&place), sqrtf((place - from).norm_squared()));
-            if !left && apart_m < least_m {
-                (found, least_m, along_m) = (Some(i as u8), apart_m, -upto_m);
-            } else if left
-                && apart_m < OFF_REPORTED_PATH_M
-                && apart_m + RETURN_TOLERANCE_M < start_m
-            {
-                more_m = along_m + upto_m;
-            }
-            along_m += sqrtf((to - from).norm_squared());
-            start_m = away_m(to);
-            left |= found.is_some() && start_m > least_m + RETURN_TOLERANCE_M;
-            from = to;
-        }
-        // The cast to `u16` saturates.
-        found.map_or(Self::Beside, |leg| Self::On {
-            leg,
-            more_dm: libm::ceilf(10.0 * more_m) as u16,
-        })
-    }
-
-    /// The first place on the points, and the points after it; `None` where the vehicle is beside
-    /// its points.
-    fn ahead<'a>(&self, position: &Point, points: &'a [Point]) -> Option<(Point, &'a [Point])> {
-        let Self::On { leg, .. } = *self else { return None };
-        let leg = usize::from(leg);
-        let to = points.get(leg)?;
-        // No leg ends at the first point: it is the place itself, and would take up the room of
-        // another point.
-        let ahead = &points[leg.max(1).min(points.len())..];
-        Some((nearest_point_on_leg(position, &points[leg.saturating_sub(1)], to), ahead))
-    }
-
-    /// Distance along the points beyond the first place that the vehicle may have flown already,
-    /// metres.
-    #[inline]
-    pub fn flown_beyond_m(&self) -> f32 {
-        if let Self::On { more_dm, .. } = *self { 0.1 * f32::from(more_dm) } else { 0.0 }
-    }
-}
-
-/// The point of the leg from `from` to `to` that is nearest to `position`. Not inlined: a board has
-/// little flash.
-#[inline(never)]
-fn nearest_point_on_leg(position: &Point, from: &Point, to: &Point) -> Point {
-    let leg = to - from;
-    let length_sq = leg.norm_squared();
-    let share = if length_sq > 0.0 { (position - from).dot(&leg) / length_sq } else { 0.0 };
-    from + leg * clamp_share(share)
 }
 
 /// Bounds of a neighbour's motion, from which its reachable set is computed.
@@ -328,24 +237,9 @@ impl NeighbourMotion<'_> {
         if self.age_s > FRESH_S {
             return self.reach_any_direction_m(bounds);
         }
-        let along_m = self.distance_until_stop_m(bounds, ahead_s);
-        let Some(first) = self.points.first() else {
-            return along_m + self.lateral_reach_m(bounds);
-        };
-        let away = (first - self.position).abs();
-        // At least the distance, without a square root.
-        let first_m = away.x + away.y + away.z;
-        // While the place on the points is unknown, only the points' extent bounds it.
-        let more_m = if self.place_on_points == PlaceOnPoints::Unknown {
-            2.0 * self.extent_m
-        } else {
-            self.place_on_points.flown_beyond_m()
-        };
-        if first_m < OFF_REPORTED_PATH_M {
-            // On its points, and no further than those lead.
-            return less(along_m + more_m + OFF_REPORTED_PATH_M, first_m + self.extent_m);
-        }
-        along_m + more_m + self.lateral_reach_m(bounds) + OFF_REPORTED_PATH_M
+        let until_stop_m = self.distance_until_stop_m(bounds, ahead_s);
+        let PointsReach { beyond_m, most_m } = self.points_reach;
+        less(until_stop_m + beyond_m + self.lateral_reach_m(bounds), most_m)
     }
 
     /// Age of the neighbour's position and velocity, the radio's delay included, seconds.
@@ -423,7 +317,7 @@ impl NeighbourMotion<'_> {
     #[inline]
     fn place_on_points(&self) -> PlaceOnPoints {
         if self.place_on_points == PlaceOnPoints::Unknown {
-            PlaceOnPoints::find(&self.position, self.points)
+            PlaceOnPoints::find(&self.position, self.points, &self.velocity)
         } else {
             self.place_on_points
         }

@@ -113,9 +113,9 @@ pub struct Reference {
 const MIN_LEAD_M: f32 = 0.4;
 /// Additional lead in the open per m/s above [`WALKING_SPEED_MPS`], seconds: twice the delay of
 /// setpoint, response and report together, since the reference slows from half the lead.
-const LEAD_PER_SPEED_S: f32 = 0.8;
+pub(crate) const LEAD_PER_SPEED_S: f32 = 0.8;
 /// Walking speed, m/s: at this speed [`MIN_LEAD_M`] covers an autopilot's lag.
-const WALKING_SPEED_MPS: f32 = 2.0;
+pub(crate) const WALKING_SPEED_MPS: f32 = 2.0;
 /// Distance from the end of the path at which the path counts as flown, metres.
 const PATH_END_M: f32 = 0.01;
 

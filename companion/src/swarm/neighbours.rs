@@ -21,7 +21,7 @@ use nalgebra::Vector3;
 use planner_core::deconflict::Neighbour;
 use planner_core::flight::Gate;
 use planner_core::frames::{self, Geodetic};
-use planner_core::safety::PlaceOnPoints;
+use planner_core::safety::{PlaceOnPoints, PointsReach};
 use planner_core::{Length, Point};
 
 pub(crate) use self::bounds::MAX_HOVER_MPS;
@@ -171,6 +171,7 @@ impl<const V: usize> Neighbours<V> {
             unheard_point_count: 0,
             place_on_points: PlaceOnPoints::Unknown,
             extent_m: 0.0,
+            points_reach: PointsReach::OPEN,
             unheard_way_m: -1.0,
             may_come_down: false,
             gates_open_up_to_m: f32::NEG_INFINITY,
@@ -275,11 +276,11 @@ impl<const V: usize> Neighbours<V> {
         contact.heard_at = Some(now);
         contact.position_at = Some(now);
         contact.state.position = frames::geodetic_to_enu(origin, &place);
-        contact.update_place_on_points();
         contact.at_range_edge = (contact.state.position - own).norm_squared() >= edge_m * edge_m;
         let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
         contact.speed_mps = contact.state.velocity.length();
+        contact.update_place_on_points();
         if contact.speed_mps >= MAX_HOVER_MPS {
             contact.moved_at = now;
         }

@@ -11,7 +11,7 @@ use planner_core::flight::{HeadingMode, Path, PicturePlan, Task, Trigger, Waypoi
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::prm::{self, Config, PrmError, Sampling};
 use planner_core::safety::{
-    Braking, Legs, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, ReachableSet,
+    Braking, Legs, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, PointsReach, ReachableSet,
 };
 use planner_core::segment::{self, MAX_SNAPPED};
 use planner_core::track::{self, ReferenceState, TrackConfig};
@@ -461,17 +461,19 @@ fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
             further.extend_along(ahead.iter().copied(), hard);
         });
         for bounds in [bounds, sane] {
+            let points = &ahead[..i % 3];
+            let place_on_points =
+                to.call("place::PlaceOnPoints::find", || PlaceOnPoints::find(&p, points, &p));
+            let along = || PointsReach::new(&p, points, &place_on_points, hard);
             let heard = NeighbourMotion {
                 position: p,
                 velocity: p,
                 speed_mps: hard,
                 age_s: p.x,
                 delay_s: 0.3,
-                points: &ahead[..i % 3],
-                place_on_points: to.call("safety::PlaceOnPoints::find", || {
-                    PlaceOnPoints::find(&p, &ahead[..i % 3])
-                }),
-                extent_m: hard,
+                points,
+                place_on_points,
+                points_reach: to.call("place::PointsReach::new", along),
                 rests_within_m: 0.0,
                 grounded: i % 5 == 0,
                 column_to_m: (i % 2 == 0).then_some(hard),
@@ -479,9 +481,8 @@ fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
             let reach_m =
                 to.call("safety::NeighbourMotion::reach_m", || heard.reach_m(&bounds, hard));
             to.add(reach_m);
-            let more_m = to.call("safety::PlaceOnPoints::flown_beyond_m", || {
-                heard.place_on_points.flown_beyond_m()
-            });
+            let beyond = || place_on_points.flown_beyond_m();
+            let more_m = to.call("place::PlaceOnPoints::flown_beyond_m", beyond);
             to.add(more_m);
             let other = to.call("safety::NeighbourMotion::reachable_set", || {
                 heard.reachable_set(&bounds, hard)

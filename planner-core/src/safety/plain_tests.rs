@@ -78,6 +78,16 @@ fn way(rng: &mut Pcg32, from: Point, most: u32) -> StdVec<Point> {
     points
 }
 
+/// How far `points` lead a vehicle at `position`.
+pub(super) fn points_reach(
+    position: &Point,
+    points: &[Point],
+    place: PlaceOnPoints,
+) -> PointsReach {
+    let extent_m = points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f32::max);
+    PointsReach::new(position, points, &place, extent_m)
+}
+
 fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> NeighbourMotion<'a> {
     let velocity = near(rng, 2.0);
     NeighbourMotion {
@@ -88,7 +98,7 @@ fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> Neighbour
         delay_s: uniform(rng, 0.0, 0.5),
         points,
         place_on_points: PlaceOnPoints::Unknown,
-        extent_m: points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f32::max),
+        points_reach: points_reach(&position, points, PlaceOnPoints::Unknown),
         rests_within_m: one_of(rng, &[0.0, 0.0, 6.0]),
         grounded: rng.next_u32().is_multiple_of(16),
         column_to_m: rng
@@ -122,13 +132,16 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
         let heard = heard(rng, position, &points);
         let ahead_s = one_of(rng, &[0.0, 3.0]);
         let other = heard.reachable_set(&bounds, ahead_s);
-        let joint = PlaceOnPoints::find(&position, &points);
+        let joint = PlaceOnPoints::find(&position, &points, &heard.velocity);
         assert_eq!(
             NeighbourMotion { place_on_points: joint, ..heard }.reachable_set(&bounds, ahead_s),
             other,
             "{seed}: what is remembered is the same"
         );
         assert!(other.reach_m() <= heard.reach_m(&bounds, ahead_s) + 0.01, "{seed}");
+        let points_reach = points_reach(&position, &points, joint);
+        let remembered = NeighbourMotion { points_reach, ..heard };
+        assert!(other.reach_m() <= remembered.reach_m(&bounds, ahead_s) + 0.01, "{seed}");
         let from_line_m = least_sq(&ReachableSet::at(position), &set, f32::INFINITY).sqrt();
         assert!(
             own.distance_from_box(&position).norm() <= 1.0001 * from_line_m + 0.001,
@@ -176,7 +189,7 @@ fn the_nearest_place_is_among_the_remembered_ones() {
         let position = near(rng, 100.0);
         let from = position + near(rng, 1.0);
         let points = way(rng, from, 8);
-        let joint = PlaceOnPoints::find(&position, &points);
+        let joint = PlaceOnPoints::find(&position, &points, &Point::zeros());
         let places = places(&points);
         let away_m = |p: &Point| (position - p).norm();
         let least_m = places.iter().map(|(_, p)| away_m(p)).fold(f32::INFINITY, f32::min);
@@ -240,7 +253,8 @@ fn a_vehicle_stays_in_its_set_where_points_lead_back() {
             let away_m = least_sq(&ReachableSet::at(*place), &set, f32::INFINITY).sqrt();
             assert!(away_m < 2.0 * stray_m + 0.1, "{seed}: {away_m} m from its set, {stray_m}");
         }
-        back += u32::from(PlaceOnPoints::find(&position, &points).flown_beyond_m() > 0.0);
+        let joint = PlaceOnPoints::find(&position, &points, &heard.velocity);
+        back += u32::from(joint.flown_beyond_m() > 0.0);
     }
     std::println!("{back} of points that come back");
     assert!(back > 100, "{back}");

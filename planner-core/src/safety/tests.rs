@@ -4,6 +4,7 @@ use proptest::prelude::*;
 use std::vec;
 use std::vec::Vec as StdVec;
 
+use super::plain_tests::points_reach;
 use super::*;
 
 const BRAKING: Braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
@@ -85,7 +86,7 @@ proptest! {
             delay_s: 0.0,
             points: &path,
             place_on_points: PlaceOnPoints::Unknown,
-            extent_m: extent_m(&path),
+            points_reach: points_reach(&path[0], &path, PlaceOnPoints::Unknown),
             rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
@@ -106,8 +107,8 @@ proptest! {
         path in points(8),
         east in -1.0_f32..1.0,
         north in -1.0_f32..1.0,
-        by_m in 0.0_f32..2.0,
-        speed_mps in 0.0_f32..2.0,
+        by_m in 0.0_f32..14.0,
+        speed_mps in 0.0_f32..15.0,
         age_s in 0.0_f32..2.0,
         ahead_s in 0.0_f32..4.0,
     ) {
@@ -121,19 +122,61 @@ proptest! {
             delay_s: 0.2,
             points: &path,
             place_on_points: PlaceOnPoints::Unknown,
-            extent_m: extent_m(&path),
+            points_reach: points_reach(&position, &path, PlaceOnPoints::Unknown),
             rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
         };
         let set = heard.reachable_set(&BOUNDS, ahead_s);
         prop_assert!(set.reach_m() <= heard.reach_m(&BOUNDS, ahead_s) + 0.01);
+        let joint = PlaceOnPoints::find(&position, &path, &heard.velocity);
+        let points_reach = points_reach(&position, &path, joint);
+        let heard = NeighbourMotion { place_on_points: joint, points_reach, ..heard };
+        prop_assert!(set.reach_m() <= heard.reach_m(&BOUNDS, ahead_s) + 0.01);
     }
 }
 
-/// How far from the first of them points lead.
-fn extent_m(points: &[Point]) -> f32 {
-    points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f32::max)
+/// Its points begin at its setpoint, which leads it by up to 11 m at 15 m/s. They may turn by any
+/// angle, back past the vehicle too.
+#[test]
+fn a_fast_vehicle_behind_its_setpoint_stays_inside_its_set_around_a_corner() {
+    let bounds = MotionBounds { speed_max_mps: 15.0, ..BOUNDS };
+    for case in 0..15 * 40 * 7 {
+        let speed_mps = 1.0 + (case % 15) as f32;
+        let leads_m = 0.6 + 0.8 * (speed_mps - 2.0).max(0.0);
+        let corner_m = leads_m + 0.1 + (case / 15 % 40) as f32;
+        let (north, east) = (0.5 * (case / 600) as f32).sin_cos();
+        let place = |along_m: f32| {
+            let beyond_m = (along_m - corner_m).max(0.0);
+            Point::new(along_m.min(corner_m) + east * beyond_m, north * beyond_m, 0.0)
+        };
+        let points = [leads_m, corner_m, 300.0].map(place);
+        let heard = NeighbourMotion {
+            position: Point::zeros(),
+            velocity: Point::new(speed_mps, 0.0, 0.0),
+            speed_mps,
+            age_s: 0.1,
+            delay_s: 0.0,
+            points: &points,
+            place_on_points: PlaceOnPoints::Unknown,
+            points_reach: points_reach(&Point::zeros(), &points, PlaceOnPoints::Unknown),
+            rests_within_m: 0.0,
+            grounded: false,
+            column_to_m: None,
+        };
+        let set = heard.reachable_set(&bounds, 0.0);
+        let flown_m = 0.1 * speed_mps + BRAKING.stop_m(speed_mps);
+        let away_m = least(&[place(flown_m)], &places(&set));
+        assert!(away_m < 0.1, "{away_m} m outside at {speed_mps} m/s, corner at {corner_m} m");
+        let joint = PlaceOnPoints::find(&heard.position, &points, &heard.velocity);
+        let points_reach = points_reach(&heard.position, &points, joint);
+        let reach_m = NeighbourMotion { points_reach, ..heard }.reach_m(&bounds, 0.0);
+        assert!(set.reach_m() <= reach_m + 0.01, "{} of {reach_m} m", set.reach_m());
+        // Beyond the last point that was heard it flies on.
+        let beyond = NeighbourMotion { points: &[place(-1.5)], ..heard };
+        let there = places(&beyond.reachable_set(&bounds, 0.0));
+        assert!(least(&[Point::new(flown_m, 0.0, 0.0)], &there) < 0.1);
+    }
 }
 
 /// A vehicle that flies along a polyline and stops where its set conflicts.
@@ -228,7 +271,7 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
                     delay_s: 0.0,
                     points: &other.path[from..],
                     place_on_points: PlaceOnPoints::Unknown,
-                    extent_m: extent_m(&other.path[from..]),
+                    points_reach: PointsReach::OPEN,
                     rests_within_m: 0.0,
                     grounded: false,
                     column_to_m: None,

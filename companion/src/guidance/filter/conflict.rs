@@ -2,7 +2,7 @@
 //! first.
 
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{self, MotionBounds, OwnSet, REACTION_S, ReachableSet};
+use planner_core::safety::{self, MotionBounds, OwnSet, PointsReach, REACTION_S, ReachableSet};
 use planner_core::{Length, Point};
 
 use super::super::{Guidance, GuidanceInputs, Phase};
@@ -129,6 +129,7 @@ impl Guidance {
                 // A landing does not wait for where a silent vehicle may fly, only for where it may
                 // have stopped.
                 (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
+                met.motion.points_reach = PointsReach::OPEN;
                 met.motion.rests_within_m = 0.0;
             }
             if follows && contact.is_leased() && !(by_gates || met.lost) {

@@ -4,7 +4,7 @@ use heapless::Vec;
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::flight::PROGRESS_ERROR_M;
-use planner_core::safety::PlaceOnPoints;
+use planner_core::safety::{PlaceOnPoints, PointsReach};
 use planner_core::{Length, Point};
 
 use super::bounds::*;
@@ -53,6 +53,8 @@ pub(crate) struct NeighbourEntry {
     pub(super) unheard_point_count: u8,
     /// Where the neighbour's position is on its reported points.
     pub(super) place_on_points: PlaceOnPoints,
+    /// How far its points, up to its stop for now, lead it.
+    pub(super) points_reach: PointsReach,
     /// Greatest distance of the points, up to its stop for now, from the first of them, metres.
     pub(super) extent_m: f32,
     /// Length of all its points from its position on, metres, if it flies to the last of them
@@ -89,16 +91,6 @@ pub(crate) struct NeighbourEntry {
 }
 
 impl NeighbourEntry {
-    /// Finds where the neighbour's position is on its points, once, when either was heard.
-    pub(super) fn update_place_on_points(&mut self) {
-        self.place_on_points = PlaceOnPoints::find(&self.state.position, self.points_for_now());
-        if self.is_leased() {
-            let mut at = self.state.position;
-            let legs = self.points.iter().map(|next| next - core::mem::replace(&mut at, *next));
-            self.unheard_way_m = legs.map(|leg| fpu::sqrtf(leg.norm_squared())).sum();
-        }
-    }
-
     /// Whether the neighbour flies to the last of its points even unheard: in a coverage mission.
     pub(crate) fn is_leased(&self) -> bool {
         self.unheard_way_m >= 0.0

@@ -3,7 +3,7 @@
 
 use planner_core::Point;
 use planner_core::safety::{
-    MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, OwnSet, PlaceOnPoints,
+    MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, OwnSet, PlaceOnPoints, PointsReach,
 };
 
 use super::*;
@@ -59,6 +59,19 @@ pub(crate) struct ReachQuery<'a> {
 }
 
 impl NeighbourEntry {
+    /// Finds where the neighbour's position is on its points, once, when either was heard.
+    pub(super) fn update_place_on_points(&mut self) {
+        let (at, points) = (&self.state, self.points_for_now());
+        let place = PlaceOnPoints::find(&at.position, points, &at.velocity);
+        self.points_reach = PointsReach::new(&at.position, points, &place, self.extent_m);
+        self.place_on_points = place;
+        if self.is_leased() {
+            let mut at = self.state.position;
+            let legs = self.points.iter().map(|next| next - core::mem::replace(&mut at, *next));
+            self.unheard_way_m = legs.map(|leg| fpu::sqrtf(leg.norm_squared())).sum();
+        }
+    }
+
     /// Whether the neighbour counts as dead, if it may come within reach; `None` if it stays out of
     /// reach wherever it can be, or has no position. Most are far away: this test needs no
     /// reachable set. Never `None` for a neighbour that is within reach after
@@ -88,10 +101,10 @@ impl NeighbourEntry {
             speed_mps: self.speed_mps,
             age_s: age.as_secs_f32(),
             delay_s: if reach.on_plan && self.on_plan() { 0.0 } else { self.message_delay.delay_s },
-            // Only the first point is read.
-            points: &self.points,
-            place_on_points: self.place_on_points,
-            extent_m: self.extent_m,
+            // Not read.
+            points: &[],
+            place_on_points: PlaceOnPoints::Unknown,
+            points_reach: self.points_reach,
             rests_within_m: 0.0,
             grounded: self.reports(GROUNDED | LANDED),
             column_to_m: None,
@@ -143,11 +156,8 @@ impl NeighbourEntry {
             reaches(FALL_CARRY_S * self.speed_mps + self.fall_aside_m());
         }
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
-            reaches(
-                self.unheard_distance_m()
-                    + self.place_on_points.flown_beyond_m()
-                    + OFF_REPORTED_PATH_M,
-            );
+            let beyond_m = self.points_reach.beyond_m + OFF_REPORTED_PATH_M;
+            reaches(self.unheard_distance_m() + beyond_m);
         }
         if reach.lands || self.climb_top_m().is_some() {
             reaches(self.rest_radius_m(reach));
@@ -204,7 +214,7 @@ impl NeighbourEntry {
                 delay_s: self.message_delay.delay_s,
                 points: self.points_for_now(),
                 place_on_points: self.place_on_points,
-                extent_m: self.extent_m,
+                points_reach: self.points_reach,
                 rests_within_m: 0.0,
                 grounded,
                 column_to_m: comes_down.then(|| self.floor_m(self.state.position.z)),
@@ -230,8 +240,8 @@ impl NeighbourEntry {
         let flown_m =
             fastest_mps * (heard.age_s + heard.delay_s) + bounds.braking.stop_m(fastest_mps);
         (heard.age_s, heard.delay_s, heard.speed_mps) = (0.0, 0.0, 0.0);
-        (heard.points, heard.place_on_points, heard.extent_m) =
-            (&self.points, self.place_on_points, f32::INFINITY);
+        (heard.points, heard.place_on_points) = (&self.points, self.place_on_points);
+        heard.points_reach.most_m = f32::INFINITY;
         heard.rests_within_m = libm::fminf(flown_m, self.unheard_distance_m());
     }
 
@@ -246,7 +256,7 @@ impl NeighbourEntry {
             delay_s: self.message_delay.delay_s.max(UNHEARD_BEYOND_TOP_S),
             points: &[],
             place_on_points: PlaceOnPoints::Beside,
-            extent_m: 0.0,
+            points_reach: PointsReach::OPEN,
             rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
@@ -379,9 +389,7 @@ impl<const V: usize> Neighbours<V> {
         }
         if dead {
             motion.points = &contact.points;
-            if contact.is_leased() {
-                motion.extent_m = contact.unheard_distance_m();
-            }
+            motion.points_reach.most_m = f32::INFINITY;
             if top.is_none() {
                 motion.rests_within_m = contact.unheard_distance_m();
             }
@@ -390,7 +398,10 @@ impl<const V: usize> Neighbours<V> {
             motion.points = &[];
         }
         if by_intent || lies || top.is_some() {
-            motion.place_on_points = PlaceOnPoints::Unknown;
+            let (place, extent_m) = (PlaceOnPoints::Unknown, contact.extent_m);
+            motion.place_on_points = place;
+            motion.points_reach =
+                PointsReach::new(&motion.position, motion.points, &place, extent_m);
         }
         let column =
             (dead || contact.has_column()) && (!motion.grounded || (lies && highest_m > floor_m));

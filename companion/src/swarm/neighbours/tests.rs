@@ -340,7 +340,8 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let mut table = joined(0);
         let contact = &mut table.contacts[1];
         contact.state.position = near(rng, 10.0);
-        contact.state.velocity = near(rng, 2.0);
+        let fastest_mps = [2.0, 15.0][rng.next_u32() as usize % 2];
+        contact.state.velocity = near(rng, fastest_mps);
         contact.speed_mps = contact.state.velocity.norm();
         contact.flags = rng.next_u32() as u8;
         contact.may_come_down = rng.next_u32().is_multiple_of(2);
@@ -356,9 +357,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let first = contact.points.first().copied().unwrap_or_default();
         let extent_m = |p: &Point| (p - first).norm();
         contact.extent_m = contact.points_for_now().iter().map(extent_m).fold(0.0, f32::max);
-        if contact.is_leased() {
-            contact.update_place_on_points();
-        }
+        contact.update_place_on_points();
         let now = Instant::from_millis(200_000);
         let ages_ms = [100, 900, 1500, 5000, 46_000, 80_000];
         let age = |rng: &mut Pcg32| {
@@ -400,10 +399,12 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let silent = met.lost || met.motion.age_s > MAX_HEIGHT_AGE_S;
         if lands && silent {
             (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
+            met.motion.points_reach = PointsReach::OPEN;
             met.motion.rests_within_m = 0.0;
         }
         let by_gates = met.on_plan && reach.on_plan;
-        if !(lands || by_gates || met.lost || reach.hears_nobody) {
+        let leased = table.contacts[1].is_leased();
+        if leased && !(lands || by_gates || met.lost || reach.hears_nobody) {
             table.contacts[1].follow_unheard(&mut met.motion, &bounds);
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
