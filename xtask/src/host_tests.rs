@@ -20,8 +20,8 @@ const FIRST: [&str; 9] = [
     "coverage_flights",
     "schedule_model",
     "fleet_model",
-    "worst_case",
     "conformance",
+    "worst_case",
     "report",
 ];
 /// Programs that need boards, a browser or Python clients. The others run while these are built.
@@ -40,9 +40,11 @@ const NEED_OTHERS: [&str; 9] = [
 const OTHERS: [&str; 3] = ["FLOCKMATE_FIRMWARE", "FLOCKMATE_CHROMIUM", "FLOCKMATE_PYTHON"];
 /// Programs that hold the companion to the wall clock: nothing runs beside them.
 const ALONE: [&str; 1] = ["rehearsal"];
-/// Tests of one program that run at once, on a core each. Those with boards and clients mostly
-/// wait, so there is more than one.
+/// Tests of one program that run at once, on a core each. Those with boards mostly wait, so there
+/// is more than one.
 const TESTS_AT_ONCE: &str = "2";
+/// The same of a program whose tests wait for Python clients, which wait for real time.
+const CLIENTS_AT_ONCE: (&str, &str) = ("conformance", "4");
 
 /// Variables with which programs run.
 pub type Environment = Vec<(&'static str, OsString)>;
@@ -89,7 +91,9 @@ fn passes(program: &Program, environment: &Environment) -> Result<bool> {
     let begun = Instant::now();
     let mut tests = command(&program.path);
     tests.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
-    tests.env("RUST_TEST_THREADS", TESTS_AT_ONCE).envs(environment.iter().cloned());
+    let (clients, clients_at_once) = CLIENTS_AT_ONCE;
+    let at_once = if program.name == clients { clients_at_once } else { TESTS_AT_ONCE };
+    tests.env("RUST_TEST_THREADS", at_once).envs(environment.iter().cloned());
     // The programs that tests run are built with them.
     tests.env("FLOCKMATE_BUILT", "1");
     let output = tests.output().with_context(|| format!("cannot start {tests:?}"))?;
