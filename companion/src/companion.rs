@@ -51,7 +51,7 @@ pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 const GUID_TIMEOUT_RANGE_S: (f32, f32) = (0.2, 0.5);
 /// Maximum number of transitions of the mission table that one step makes. More would mean that the
 /// table has a cycle.
-const MAX_ROWS_PER_STEP: usize = 4;
+const MAX_TRANSITIONS_PER_STEP: usize = 4;
 /// Maximum number of events that wait for the shell; when they are full a further event is dropped.
 const MAX_EVENTS: usize = 16;
 

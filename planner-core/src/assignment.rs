@@ -80,7 +80,7 @@ impl<const N: usize> AssignmentWorkspace<N> {
             row_of_col: &mut self.row_of_col[..cols],
             col_of_row: &mut self.col_of_row[..rows],
             row: &mut self.row[..cols],
-            free: &mut self.free[..rows],
+            free_rows: &mut self.free[..rows],
         };
         let paths = AugmentingPaths {
             distance: &mut self.distance[..cols],

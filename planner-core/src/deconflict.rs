@@ -299,7 +299,7 @@ mod tests {
     use proptest::prelude::*;
 
     proptest! {
-        /// Against looks a millisecond apart, at closing speeds up to 40 m/s.
+        /// Compared with the distances at each millisecond, at closing speeds up to 40 m/s.
         #[test]
         fn no_contact_on_a_straight_course_is_missed(
             cruise_mps in 0.5f32..15.0,

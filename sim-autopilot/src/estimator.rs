@@ -141,15 +141,15 @@ impl EstimateErrors {
 mod tests {
     use super::*;
 
-    /// RMS and greatest of the error over a flight of a minute and its drift in 10 s, across and
-    /// up, and RMS of velocity.
-    struct Flight {
+    /// RMS and maximum of the position error in a flight of a minute, and its drift in 10 s,
+    /// horizontal and vertical, and RMS and maximum of the velocity error.
+    struct FlightErrors {
         across: [f32; 4],
         up: [f32; 4],
         velocity: [f32; 2],
     }
 
-    fn flight(estimator: EstimatorErrors, autopilot: AutopilotKind, seed: u64) -> Flight {
+    fn flight(estimator: EstimatorErrors, autopilot: AutopilotKind, seed: u64) -> FlightErrors {
         let mut errors = EstimateErrors::new(estimator, autopilot, seed);
         let (mut positions, mut across_v, mut up_v) = (Vec::new(), 0.0, 0.0);
         for _ in 0..3000 {
@@ -169,7 +169,7 @@ mod tests {
             let ([a, b], [c, d]) = (stats(e), stats(d));
             [a, b, c, d]
         };
-        Flight {
+        FlightErrors {
             across: both(&|p| p.xy().norm()),
             up: both(&|p| p.z.abs()),
             velocity: [(across_v / 3000.0).sqrt(), (up_v / 3000.0).sqrt()],
@@ -202,7 +202,7 @@ mod tests {
             ),
         ];
         for (autopilot, across, up, velocity) in ranges {
-            let flights: Vec<Flight> =
+            let flights: Vec<FlightErrors> =
                 (0..100).map(|seed| flight(EstimatorErrors::Recorded, autopilot, seed)).collect();
             for k in 0..4 {
                 let what = ["RMS", "greatest", "RMS of drift", "greatest drift"][k];

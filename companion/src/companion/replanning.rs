@@ -74,10 +74,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.request_detour(DetourPurpose::Aside(self.rejoin_after_aside(from)));
     }
 
-    /// Over an area, the places where a vehicle that goes aside comes back to its path: where it
-    /// left that before, or holds for a division, or stands; and, unless it promised to hold
-    /// before, the first free place beyond what blocks the path. `None` for a vehicle that does not
-    /// come back.
+    /// Over an area, two places on its path to which a vehicle that goes aside may come back. The
+    /// first is where it left its path on an earlier detour, holds for a division or stands now.
+    /// The second is the first free place beyond what blocks the path; there is none if the
+    /// vehicle promised to hold short of it. `None` for a vehicle that does not come back.
     fn rejoin_after_aside(&self, from: State) -> Option<RejoinPlaces> {
         if !self.detours.keeps_to_plan_over_area(&self.detour_view()) {
             return None;

@@ -1,7 +1,7 @@
 //! The control step, and the actions of the mission table's rows.
 
 use super::division::CANNOT_START_MOST;
-use super::{Companion, IDLE_STEP_EVERY, MAX_ROWS_PER_STEP, REPORT_EVERY, SETPOINT_EVERY};
+use super::{Companion, IDLE_STEP_EVERY, MAX_TRANSITIONS_PER_STEP, REPORT_EVERY, SETPOINT_EVERY};
 use crate::autopilot::requests::DISARM_EVERY;
 use crate::config::PlanFailure;
 use crate::events::{Event, Link, PlanKind};
@@ -152,7 +152,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     pub(super) fn run_mission_table(&mut self) {
-        for _ in 0..MAX_ROWS_PER_STEP {
+        for _ in 0..MAX_TRANSITIONS_PER_STEP {
             let inputs = self.guard_inputs();
             let Some(row) = mission::first_applicable_row(self.mission.state(), &inputs) else {
                 return;

@@ -102,7 +102,7 @@ pub struct GuardInputs {
     pub own_plan_ready: bool,
     /// Whether the rest of its own plan could not be planned for this vehicle, back on its path.
     pub own_plan_lost: bool,
-    /// Whether this vehicle flies its path home over the field, or seeks one.
+    /// Whether this vehicle seeks a path home, over the heights of the ground, or flies one.
     pub homeward: bool,
     /// Time for which this vehicle has sought its path home; `None` if it seeks none.
     pub seeking_home_for: Option<Duration>,

@@ -27,8 +27,8 @@ pub(crate) mod asking;
 mod beside;
 mod homeward;
 pub(crate) mod path_kind;
+mod rejoining;
 mod reported;
-mod returning;
 
 use planner_core::detour;
 use planner_core::frames::Geodetic;
@@ -437,7 +437,7 @@ impl Detours {
         let [beside_m, beyond_m] = beside::blocking_distances_m(waits);
         let apart_m = view.config.safety_distance_m + beside_m;
         let (now, neighbours) = (view.now, view.neighbours);
-        let new = self.obstacles.new_ones();
+        let new = self.obstacles.unavoided();
         self.scan.continue_scan(
             new.len() + neighbours.len(),
             &mut (cost.max(MAX_STRETCHES_PER_STEP) as u16),

@@ -37,7 +37,7 @@ pub const MAX_DIVISIONS: usize = 12;
 /// before it comes down.
 pub(crate) const MISSED_AFTER: Duration = Duration::from_secs(3);
 /// Silence of a vehicle that was in flight after which it has landed, whatever it flew on.
-const MAX_FLIGHT: Duration = Duration::from_secs(1800);
+const LANDED_AFTER_SILENCE: Duration = Duration::from_secs(1800);
 /// Number of distinct incarnations, the counts of a vehicle's flights: 3 bits.
 const INCARNATIONS: u8 = 8;
 
@@ -254,7 +254,7 @@ impl<const V: usize> Fleet<V> {
                 self.hear_flight &= !bit;
                 // A majority has counted it as lost, so it has landed; or its battery is empty.
                 let lost = member.entry.status == MemberStatus::Lost;
-                if (lost && silence >= self.limits.down) || silence >= MAX_FLIGHT {
+                if (lost && silence >= self.limits.down) || silence >= LANDED_AFTER_SILENCE {
                     self.in_flight &= !bit;
                 }
             }

@@ -86,7 +86,7 @@ impl Obstacles {
     }
 
     /// Obstacles that the detour flown now does not avoid: these may block the path.
-    pub(crate) fn new_ones(&self) -> &[KeepOutZone] {
+    pub(crate) fn unavoided(&self) -> &[KeepOutZone] {
         &self.known[self.avoided..]
     }
 

@@ -21,6 +21,8 @@ use crate::progress::check_printed;
 use crate::say;
 
 const PHYSICS_STEP: Duration = Duration::from_millis(4);
+/// Time by which the simulation may be behind the wall clock; what is lost beyond it is not caught
+/// up with.
 const MAX_CLOCK_LAG: Duration = Duration::from_secs(1);
 /// Longest datagram that is sent, bytes: fits the MTU of any network.
 const MAX_DATAGRAM: usize = 1400;

@@ -45,7 +45,7 @@ struct Reported {
 pub struct DivisionLog {
     vehicles: HashMap<u8, Reported>,
     /// Inputs of each division, by the hash that the vehicles reported for it.
-    inputs: HashMap<u32, Vec<DivisionInput>>,
+    inputs_by_hash: HashMap<u32, Vec<DivisionInput>>,
     reported: Vec<Division>,
 }
 
@@ -78,8 +78,8 @@ impl DivisionLog {
             return;
         }
         // A vehicle that took no part in the division before takes none in this one.
-        let before = self.inputs.get(&roster.committed_hash).cloned().unwrap_or_default();
-        let inputs = self.inputs.entry(roster.hash).or_default();
+        let before = self.inputs_by_hash.get(&roster.committed_hash).cloned().unwrap_or_default();
+        let inputs = self.inputs_by_hash.entry(roster.hash).or_default();
         for (i, entry) in roster.entries.iter().enumerate() {
             let rank = i + usize::from(roster.first);
             inputs.resize(inputs.len().max(rank + 1), DivisionInput::default());
@@ -101,7 +101,7 @@ impl DivisionLog {
         if reported.number > reported.flown_number && reported.plan_crc != reported.flown_crc {
             (reported.flown_number, reported.flown_crc) = (reported.number, reported.plan_crc);
             let Reported { number, counted, plan_crc, .. } = *reported;
-            let inputs = self.inputs.get(&counted).cloned().unwrap_or_default();
+            let inputs = self.inputs_by_hash.get(&counted).cloned().unwrap_or_default();
             self.reported.push(Division { t_s, vehicle, number, inputs, plan_crc });
         }
     }

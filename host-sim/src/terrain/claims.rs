@@ -43,8 +43,8 @@ impl<R: Read + Seek> NumberReader<'_, R> {
         Ok(u64::from_le_bytes(number))
     }
 
-    /// Length of a chunk's first point record, which is stored uncompressed, bytes, and number of
-    /// layers of a chunk, from the compressor's record; `None` if its chunks have no layers.
+    /// Length in bytes of a chunk's first point record, which is stored uncompressed, and number of
+    /// layers of a chunk, by the file's LASzip record. `None` if its chunks have no layers.
     fn read_chunk_layout(&mut self) -> io::Result<Option<(u64, u64)>> {
         let (mut at, count) = (self.read_number(94, 2)?, self.read_number(100, 4)?);
         for _ in 0..count.min(self.length / 54) {

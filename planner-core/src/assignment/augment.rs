@@ -16,7 +16,7 @@ pub(super) fn augment_from_row(
     paths: &mut AugmentingPaths<'_>,
     k: usize,
 ) -> bool {
-    let row = state.free[k];
+    let row = state.free_rows[k];
     paths.distance.fill(f64::INFINITY);
     let least = relax_columns(costs.row_costs(row, state.row), state.price, 0.0, row, paths);
     augment_shortest_path(costs, state, paths, least)

@@ -9,7 +9,7 @@ const BLOCK_COLUMNS: usize = 64;
 
 /// Column reduction, then two rounds of augmenting row reduction. Column reduction is for square
 /// matrices only: it changes the price of every column, and a column that stays free must keep
-/// price 0. Returns the number of rows left in `state.free`, or `None` if a row or, in a square
+/// price 0. Returns the number of rows left in `state.free_rows`. `None` if a row or, in a square
 /// matrix, a column has no finite cost, so that not every row can be matched.
 pub(super) fn reduce_to_free_rows(
     costs: &CostMatrix<'_>,
@@ -19,7 +19,7 @@ pub(super) fn reduce_to_free_rows(
     let mut left = if costs.rows == costs.cols {
         reduce_columns(costs, state, paths)?
     } else {
-        for (row, free) in state.free.iter_mut().enumerate() {
+        for (row, free) in state.free_rows.iter_mut().enumerate() {
             *free = row as u16;
         }
         costs.rows
@@ -65,7 +65,7 @@ fn reduce_columns(
     for row in 0..costs.rows as u16 {
         match paths.settled[usize::from(row)] {
             0 => {
-                state.free[left] = row;
+                state.free_rows[left] = row;
                 left += 1;
             }
             1 => {
@@ -143,7 +143,7 @@ fn reduce_rows(
     // Rows take columns from one another as long as prices fall; the budget bounds the work.
     let mut budget = rows_in * costs.cols;
     while at < rows_in {
-        let row = state.free[at];
+        let row = state.free_rows[at];
         at += 1;
         let two = TwoCheapestColumns::of_row(costs.row_costs(row, state.row), state.price);
         if two.least == f64::INFINITY {
@@ -152,7 +152,7 @@ fn reduce_rows(
         if two.second == f64::INFINITY {
             // The row has one possible column: no second price bounds the fall, so the row is left
             // for an augmenting path.
-            state.free[left] = row;
+            state.free_rows[left] = row;
             left += 1;
             continue;
         }
@@ -171,9 +171,9 @@ fn reduce_rows(
             if falls {
                 at -= 1;
                 budget -= 1;
-                state.free[at] = evicted;
+                state.free_rows[at] = evicted;
             } else {
-                state.free[left] = evicted;
+                state.free_rows[left] = evicted;
                 left += 1;
             }
         }

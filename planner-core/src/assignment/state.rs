@@ -15,7 +15,7 @@ pub(super) struct MatchingState<'w> {
     /// Buffer for a copy of one row of costs.
     pub(super) row: &'w mut [f32],
     /// Rows without a column, in the order in which they are matched.
-    pub(super) free: &'w mut [u16],
+    pub(super) free_rows: &'w mut [u16],
 }
 
 impl MatchingState<'_> {

@@ -101,7 +101,7 @@ pub(super) fn improve_departure_order<
     let mut found_s: Vec<f32, V> = Vec::new();
     for (i, flight) in out.flights.iter().enumerate() {
         if flight.task.leaves_pad() {
-            // Cannot overflow: one entry per flight, as below.
+            // Cannot overflow, nor can those below: `V` flights at most, an entry for each.
             let _ = order.push(i as u16);
         }
         let _ = (lasts_s.push(flight.duration_s(cfg)), found_s.push(flight.depart_s));

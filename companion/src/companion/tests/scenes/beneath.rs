@@ -18,8 +18,9 @@ use crate::link::intent::{Intent, WAITING};
 
 /// Random falls over a vehicle in each of the states.
 const FALLS: u64 = if cfg!(debug_assertions) { 10 } else { 40 };
-/// Once that is on the ground, the flight is over by then, seconds.
-const OVER_S: f32 = 500.0;
+/// Time of the scene by which the flight is over, once the vehicle that fell is on the ground,
+/// seconds.
+const FLIGHT_OVER_BY_S: f32 = 500.0;
 
 /// The vehicle that comes down, heard five times a second, late and with losses.
 struct Faller {
@@ -252,7 +253,7 @@ fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
         Paused => resume(&mut b),
         _ => {}
     }
-    let ended = faller.until(&mut b, OVER_S, |b| matches!(b.state(), Done | Aborted));
+    let ended = faller.until(&mut b, FLIGHT_OVER_BY_S, |b| matches!(b.state(), Done | Aborted));
     if over_area && b.state() != Done {
         std::println!("{:?}", b.texts);
     }
@@ -331,7 +332,7 @@ fn whoever_is_interrupted_while_it_seeks_a_way_aside_flies_its_part() {
             resume(&mut b);
             faller.until(&mut b, 5.0, |_| false);
             assert!(!b.companion.detours.is_on_detour() || b.companion.detours.is_blocked());
-            faller.until(&mut b, OVER_S, |b| matches!(b.state(), Done | Aborted));
+            faller.until(&mut b, FLIGHT_OVER_BY_S, |b| matches!(b.state(), Done | Aborted));
             assert_eq!(b.state(), Done, "{seed} {state:?} {:?}", b.texts);
         }
     }
