@@ -7,16 +7,68 @@ use companion::swarm::fleet::DivisionInput;
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::Picture;
 use host_sim::mission::{Mission, SwarmPlan};
+use host_sim::progress::Progress;
+use host_sim::report::Event;
+use host_sim::result::MissionResult;
+use host_sim::scenario;
 use host_sim::swarm::Flight;
 use planner_core::flight::{Task, WaypointRange};
+
+use crate::covered;
 
 /// Waypoints by the id of their owner.
 type Owned = BTreeMap<u8, BTreeSet<u32>>;
 
+/// A mission that was flown.
+pub struct Flown {
+    /// Its result.
+    pub result: MissionResult,
+    /// Its log, by [`covered::log_lines`].
+    pub log: String,
+    /// What is wrong with who owned what ([`Owners::faults`]).
+    pub owned: Vec<String>,
+}
+
+/// Flies a scenario in which the vehicles `struck` are lost.
+///
+/// # Errors
+/// Reason why it cannot be planned, flown or judged.
+pub fn fly(text: &str, struck: &[u8]) -> Result<Flown, String> {
+    let said = |error: anyhow::Error| format!("{error:#}");
+    let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
+    let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
+    let mut pictures = Vec::new();
+    let flight = covered::flight(&mut mission, &mut pictures).map_err(said)?;
+    let plan = mission.plan().map_err(said)?;
+    let owners = Owners::of(&mission, &plan, &flight).map_err(said)?;
+    // On a way around what bars a lane pictures are taken beside it, of others' waypoints too.
+    pictures.retain(|picture| !is_beside_path(&flight.log, picture));
+    let planned = CoveragePlan::plan_as_companions(&mission.scenario).map_err(said)?;
+    let owned = owners.faults(&planned, &pictures, struck);
+    Ok(Flown { result: flight.result, log: covered::log_lines(&flight.log), owned })
+}
+
+/// Whether a picture was taken by a vehicle that flew around something, by its log.
+fn is_beside_path(log: &[Event], picture: &Picture) -> bool {
+    let own = |event: &&Event| {
+        event.vehicle.is_some() && event.vehicle == picture.vehicle && event.t_s <= picture.t_s
+    };
+    let mut around = log.iter().filter(own).filter_map(|event| {
+        let begins = event.text.contains("→ Follow: Flying around");
+        (begins || event.text.contains("Flown around: on its path again")).then_some(begins)
+    });
+    around.next_back().unwrap_or(false)
+}
+
+/// Inputs of divisions in a row, from the first on.
+type Chain<'a> = Vec<&'a [DivisionInput]>;
+
 /// Who owns what in a mission that was flown, by its division records.
 pub struct Owners {
-    /// After the plan, and after each division.
+    /// After the plan, and after each chain of divisions that a vehicle reported.
     plans: Vec<Owned>,
+    /// Plans that each vehicle reported to fly, by index, besides the first.
+    flown: BTreeMap<u8, BTreeSet<usize>>,
     /// Vehicles that a division counts as lost, or as gone before the end of their parts.
     gone: BTreeSet<u8>,
     /// Waypoints that a plan gives to two vehicles.
@@ -33,6 +85,7 @@ impl Owners {
     pub fn of(mission: &Mission, plan: &SwarmPlan, flight: &Flight) -> anyhow::Result<Self> {
         let mut owners = Self {
             plans: Vec::new(),
+            flown: BTreeMap::new(),
             gone: BTreeSet::new(),
             faults: Vec::new(),
             disagreed: Vec::new(),
@@ -46,29 +99,49 @@ impl Owners {
         }
         let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.id).collect();
         ids.sort_unstable();
-        let (mut losses, mut begun) = (Vec::<&[DivisionInput]>::new(), Vec::<u8>::new());
+        // The first report of each division; the divisions that each vehicle reported; those of
+        // which the plan is known.
+        let (mut first, mut begun) = (Chain::new(), Vec::<u8>::new());
+        let mut chains: BTreeMap<u8, Chain<'_>> = BTreeMap::new();
+        let mut planned = vec![Chain::new()];
         for division in flight.divisions.iter().filter(|division| !division.inputs.is_empty()) {
-            let number = usize::from(division.number);
+            let (number, vehicle) = (usize::from(division.number), division.vehicle);
             let inputs = &division.inputs[..];
-            if let Some(known) = number.checked_sub(1).and_then(|index| losses.get(index)) {
-                if *known != inputs {
+            let Some(before) = number.checked_sub(1).filter(|before| *before <= first.len()) else {
+                continue;
+            };
+            match first.get(before) {
+                Some(known) if *known != inputs => {
                     let said = format!("division {number}: {known:?} and {inputs:?}");
-                    owners.disagreed.push(([begun[number - 1], division.vehicle], said));
+                    owners.disagreed.push(([begun[before], vehicle], said));
                 }
-                continue;
+                Some(_) => {}
+                None => {
+                    first.push(inputs);
+                    begun.push(vehicle);
+                }
             }
-            if number != losses.len() + 1 {
-                continue;
+            owners.note_gone(&ids, inputs);
+            // A division that a vehicle did not report it knows from the others.
+            let chain = chains.entry(vehicle).or_default();
+            chain.truncate(before);
+            chain.extend(&first[chain.len()..before]);
+            chain.push(inputs);
+            let known = planned.iter().position(|known| known == chain);
+            let at = known.unwrap_or(planned.len());
+            if known.is_none() {
+                owners.add(&*mission.plan_remaining(&flight.done, chain.iter().copied())?);
+                planned.push(chain.clone());
             }
-            losses.push(inputs);
-            begun.push(division.vehicle);
-            let left =
-                |input: &DivisionInput| !input.alive && input.along_dm != DivisionInput::WHOLE_PATH;
-            let gone = ids.iter().zip(inputs).filter(|(_, input)| left(input)).map(|(id, _)| *id);
-            owners.gone.extend(gone);
-            owners.add(&*mission.plan_remaining(&flight.done, losses.iter().copied())?);
+            owners.flown.entry(vehicle).or_default().insert(at);
         }
         Ok(owners)
+    }
+
+    fn note_gone(&mut self, ids: &[u8], inputs: &[DivisionInput]) {
+        let left =
+            |input: &DivisionInput| !input.alive && input.along_dm != DivisionInput::WHOLE_PATH;
+        self.gone.extend(ids.iter().zip(inputs).filter(|(_, own)| left(own)).map(|(id, _)| *id));
     }
 
     fn add(&mut self, plan: &SwarmPlan) {
@@ -94,7 +167,8 @@ impl Owners {
     }
 
     fn has_owned(&self, vehicle: u8, number: u32) -> bool {
-        self.plans.iter().any(|owned| owned.get(&vehicle).is_some_and(|own| own.contains(&number)))
+        let owns = |at: &usize| self.plans[*at].get(&vehicle).is_some_and(|o| o.contains(&number));
+        owns(&0) || self.flown.get(&vehicle).is_some_and(|plans| plans.iter().any(owns))
     }
 
     /// Whether a waypoint is, or is next to, the first or last one of what a plan gives a vehicle

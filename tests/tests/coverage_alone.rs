@@ -3,6 +3,7 @@
 //!
 //! `FLOCKMATE_ALONE=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_ALONE_FROM` others.
 
+use flockmate_tests::owners::{self, Flown};
 use flockmate_tests::{areas, assert_no_seed_is_wrong, covered};
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
@@ -37,7 +38,8 @@ fn the_last_vehicle_photographs_all_that_is_left() {
         if std::env::var("FLOCKMATE_ALONE").is_ok_and(|n| n == "1") {
             println!("{text}");
         }
-        let (result, log) = covered::fly_text(&text).ok()?;
+        let lost: Vec<u8> = (2..=2 + (seed % 2) as u8).collect();
+        let Flown { result, log, owned } = owners::fly(&text, &lost).ok()?;
         let (safety, coverage) = (result.safety, result.coverage.expect("it has an area"));
         let last = result.vehicles.iter().find(|vehicle| vehicle.id == 1).expect("it has one");
         // Without a part, or kept on its pad by one that fell beside it, it takes over none; nor
@@ -46,10 +48,10 @@ fn the_last_vehicle_photographs_all_that_is_left() {
         let landed = last.end == "Done" && covered::others_until_s(&log, 0) < struck_s + NOTICED_S;
         let broken = safety.violations + safety.wall_contacts + safety.deadlocks > 0;
         let whole = coverage.covered_share >= 1.0;
-        let wrong = broken || (flies && !landed && !whole);
+        let wrong = broken || !owned.is_empty() || (flies && !landed && !whole);
         if wrong || !whole {
             println!(
-                "seed {seed}: {:.2} %, left {}, {safety:?}\n{log}",
+                "seed {seed}: {:.2} %, left {}, {safety:?}, {owned:?}\n{log}",
                 100.0 * coverage.covered_share,
                 coverage.left
             );

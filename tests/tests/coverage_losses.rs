@@ -4,13 +4,10 @@
 //! `FLOCKMATE_LOSSES=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_LOSSES_FROM` others.
 
 use flockmate_tests::areas::Shape;
-use flockmate_tests::owners::Owners;
+use flockmate_tests::owners::{self, Flown};
 use flockmate_tests::{areas, covered, number};
-use host_sim::coverage::CoveragePlan;
-use host_sim::coverage::check::Picture;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
-use host_sim::report::Event;
 use host_sim::result::{MissionResult, VehicleResult};
 use host_sim::scenario;
 use planner_core::Point;
@@ -143,41 +140,11 @@ const NO_FLIGHT: [&str; 7] = [
     "no-fly zone",
 ];
 
-/// A mission that was flown: its result, its log, and waypoints that two vehicles owned.
-struct Flown {
-    result: MissionResult,
-    log: String,
-    owned: Vec<String>,
-}
-
-/// Whether a picture was taken by a vehicle that flew around something, by its log.
-fn is_beside_path(log: &[Event], picture: &Picture) -> bool {
-    let own = |event: &&Event| {
-        event.vehicle.is_some() && event.vehicle == picture.vehicle && event.t_s <= picture.t_s
-    };
-    let mut around = log.iter().filter(own).filter_map(|event| {
-        let begins = event.text.contains("→ Follow: Flying around");
-        (begins || event.text.contains("Flown around: on its path again")).then_some(begins)
-    });
-    around.next_back().unwrap_or(false)
-}
-
 fn flown(text: &str, struck: &[u8]) -> Result<Flown, String> {
     if std::env::var("FLOCKMATE_LOSSES").is_ok_and(|n| n == "1") {
         println!("{text}");
     }
-    let said = |error: anyhow::Error| format!("{error:#}");
-    let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
-    let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
-    let mut pictures = Vec::new();
-    let flight = covered::flight(&mut mission, &mut pictures).map_err(said)?;
-    let plan = mission.plan().map_err(said)?;
-    let owners = Owners::of(&mission, &plan, &flight).map_err(said)?;
-    // On a way around what bars a lane pictures are taken beside it, of others' waypoints too.
-    pictures.retain(|picture| !is_beside_path(&flight.log, picture));
-    let planned = CoveragePlan::plan_as_companions(&mission.scenario).map_err(said)?;
-    let owned = owners.faults(&planned, &pictures, struck);
-    Ok(Flown { result: flight.result, log: covered::log_lines(&flight.log), owned })
+    owners::fly(text, struck)
 }
 
 /// Number of waypoints that vehicles report that they flew around: the next start flies them.
