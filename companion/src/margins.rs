@@ -37,6 +37,11 @@ pub const ACCURACY_FACTOR: f32 = 3.0;
 /// Age from which a reported accuracy counts as unknown.
 pub const MAX_ACCURACY_AGE: Duration = Duration::from_secs(3);
 
+/// Greatest estimated height above the plan's ground at which a vehicle may be on the ground, and
+/// from the pad's height at which it takes off, metres: real estimates there were up to 1.1 m off.
+/// Above it a report of the ground is not believed.
+pub(crate) const MAX_GROUND_HEIGHT_ERROR_M: f32 = 1.5;
+
 /// Distance by which two vehicles in a coverage mission may be nearer than their estimates say,
 /// metres: for each of the two, the part of the clearance that is left for its estimate. Where no
 /// gates separate them, this is added to the safety distance.

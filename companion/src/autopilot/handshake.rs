@@ -13,6 +13,9 @@ const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
 const MAX_ARMING_TRIES: u8 = 2;
 /// Most different refusals (command and result) that are reported in one mission state.
 const MAX_REFUSALS: usize = 4;
+/// Estimated height above the pad from which the vehicle counts as risen, whatever the landing
+/// detector reports, metres; the estimate's error is the same before.
+const RISEN_M: f32 = 0.25;
 
 const NAV_TAKEOFF: u16 = 22;
 const DO_SET_MODE: u16 = 176;
@@ -36,14 +39,14 @@ pub(crate) struct Handshake {
     /// Whether HEARTBEAT was missing since arming was last requested: meanwhile the vehicle may
     /// have been armed, and disarmed again by its pilot. Then arming is not requested again.
     heartbeat_gap: bool,
-    /// Whether the autopilot refused to disarm in this state.
-    disarm_refused: bool,
     /// Whether the autopilot was switched to Offboard or Guided for this mission, and its HEARTBEAT
     /// has shown no mode but that and the landing mode since.
     in_own_mode: bool,
-    /// Whether the landing detector has reported flight while armed since the state `Arming` was
-    /// entered.
+    /// Whether the landing detector has reported flight while armed, or the vehicle has risen,
+    /// since the state `Arming` was entered.
     flown: bool,
+    /// Estimated height with which the vehicle was last disarmed, metres.
+    disarmed_z_m: f32,
     /// Refusals reported in this state: `MAV_CMD` and `MAV_RESULT`.
     reported: [Option<(u16, u8)>; MAX_REFUSALS],
 }
@@ -52,9 +55,9 @@ impl Handshake {
     /// Clears what belongs to the state `from`; entering `Arming` clears everything.
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
         self.reported = [None; MAX_REFUSALS];
-        self.disarm_refused = false;
         if to == State::Arming {
-            *self = Self { in_own_mode: true, ..Self::default() };
+            let disarmed_z_m = self.disarmed_z_m;
+            *self = Self { in_own_mode: true, disarmed_z_m, ..Self::default() };
         }
         if from == State::PilotReturned {
             self.in_own_mode = true;
@@ -68,7 +71,9 @@ impl Handshake {
         let on_ground = t.on_ground != Some(false);
         self.in_own_mode &=
             t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
-        if !on_ground && t.armed {
+        if !t.armed {
+            self.disarmed_z_m = t.position.z;
+        } else if !on_ground || t.position.z > self.disarmed_z_m + RISEN_M {
             self.flown = true;
         }
         if matches!(state, State::Aborted | State::Done) && on_ground && !t.armed {
@@ -115,19 +120,14 @@ impl Handshake {
         asks
     }
 
-    /// Whether the autopilot refused to disarm in this state.
-    pub(crate) fn is_disarm_refused(&self) -> bool {
-        self.disarm_refused
-    }
-
     /// Whether the autopilot is still in the mode that the companion set: Offboard or Guided, or
     /// the landing mode after it.
     pub(crate) fn is_in_own_mode(&self) -> bool {
         self.in_own_mode
     }
 
-    /// Whether the landing detector has reported flight while armed since the state `Arming` was
-    /// entered.
+    /// Whether the landing detector has reported flight while armed, or the vehicle has risen,
+    /// since the state `Arming` was entered.
     pub(crate) fn has_flown(&self) -> bool {
         self.flown
     }
@@ -151,7 +151,6 @@ impl Handshake {
                 self.accepted_at.get_or_insert(now);
             }
             (State::Arming, ARM_DISARM) if refused => (self.denied, self.unanswered) = (true, 0),
-            (State::Disarm, ARM_DISARM) if refused => self.disarm_refused = true,
             _ => {}
         }
         let refusal = Some((ack.command, ack.result));

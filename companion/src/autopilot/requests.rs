@@ -20,8 +20,10 @@ use crate::timers::{Timer, Timers};
 /// flight.
 pub(crate) const ORIGIN_RETRY_EVERY: Duration = Duration::from_millis(200);
 /// Time from entering the state `Disarm` to the first request to disarm, and between two such
-/// requests.
-pub(crate) const DISARM_EVERY: Duration = Duration::from_millis(4000);
+/// requests. Autopilots disarm by themselves within 3 s. The report of the ground may be false up
+/// to 2.6 m above it ([`MAX_GROUND_HEIGHT_ERROR_M`](crate::margins::MAX_GROUND_HEIGHT_ERROR_M) and
+/// the estimate's error); at 0.3 m/s, the slowest landing, the vehicle is down before the request.
+pub(crate) const DISARM_EVERY: Duration = Duration::from_millis(9000);
 /// Least time in the state `Land` before the landing mode is requested: the safety filter checks
 /// the column below the vehicle for two steps first.
 const LAND_REQUEST_AFTER: Duration = Duration::from_millis(100);
@@ -200,6 +202,10 @@ impl Requests {
         let (now, kind) = (s.now, telemetry.kind());
         let heard = telemetry.heartbeat_at.is_some();
         let silent = telemetry.heartbeat_age(now) > MAX_HEARTBEAT_AGE;
+        if silent && s.state == State::Disarm {
+            // What was reported before the silence says nothing of now.
+            timers.set(Timer::Request, now + DISARM_EVERY);
+        }
         if heard {
             self.request_next_limit(kind, now, timers, links);
         }
@@ -264,7 +270,7 @@ impl Requests {
             {
                 push(change_to(kind.setpoint_mode()));
             }
-            State::CancelStart => push(Outgoing::Arm(false)),
+            State::CancelStart if !self.handshake.has_flown() => push(Outgoing::Arm(false)),
             State::TakeOff => {
                 timers.set(Timer::Request, s.now + TAKE_OFF_RETRY_EVERY);
                 push(Outgoing::TakeOff(telemetry.above_home_m + s.climb_m));
@@ -273,9 +279,6 @@ impl Requests {
             State::Disarm => {
                 timers.set(Timer::Request, s.now + DISARM_EVERY);
                 push(Outgoing::Arm(false));
-                if mode != kind.land_mode() {
-                    push(change_to(kind.land_mode()));
-                }
             }
             _ => {}
         }

@@ -6,6 +6,7 @@ use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::requests::is_battery_known;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
+use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
 use crate::mission::{GuardInputs, MAX_POSITION_AGE, State, UNFOLLOWED_MOST};
 use crate::swarm::fleet::{Fleet, MISSED_AFTER};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
@@ -18,9 +19,6 @@ const LANDING_DRIFT_M: f32 = 1.0;
 /// Greatest horizontal distance from the place where landing was commanded to the touchdown, for a
 /// vehicle that stood still then, metres.
 const STANDING_DRIFT_M: f32 = 0.3;
-/// Greatest difference between the estimated height on the pad and the pad's height in the plan
-/// with which a vehicle takes off, metres: real estimates on the ground were up to 1.1 m off.
-const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
 /// Time without its lease renewed, after which silence counts in a coverage mission: 1 s before the
 /// lease ends. The row `NeighboursSilent` stops the vehicle 1 s later.
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
@@ -151,13 +149,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             armed_unseen: handshake.is_armed_bit_overdue(now),
             arming_unrequested: handshake.is_arming_unrequested(),
             arming_unanswered: handshake.is_arming_unanswered(now),
-            disarm_refused: handshake.is_disarm_refused(),
             own_mode: handshake.is_in_own_mode(),
             landing: t.custom_mode == kind.land_mode(),
             offboard,
             mode_foreign,
             critical: t.is_critical(),
             on_ground,
+            height_m: view.height_m(),
             has_flown: handshake.has_flown(),
             vertical: t.position_age(now) < MAX_POSITION_AGE
                 && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,
@@ -243,7 +241,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn is_at_start(&self) -> bool {
         let pad = self.mission.path_start() - Point::new(0.0, 0.0, self.mission.climb_m());
         let away = self.telemetry.position - pad;
-        let height_tolerance_m = self.config.start_tolerance_m.min(MAX_START_HEIGHT_ERROR_M);
+        let height_tolerance_m = self.config.start_tolerance_m.min(MAX_GROUND_HEIGHT_ERROR_M);
         away.xy().length() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m
     }
 

@@ -236,7 +236,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         let grounded = match self.mission.state() {
             Done | Disarm => true,
-            _ => !self.telemetry.armed || self.telemetry.on_ground == Some(true),
+            // On its path it flies, whatever the landing detector reports.
+            state => {
+                !self.telemetry.armed || (!state.is_on_path() && self.detour_view().is_on_ground())
+            }
         };
         let on_plan = !self.guidance.returning
             && matches!(

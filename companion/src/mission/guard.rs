@@ -1,6 +1,7 @@
 //! The guards: conditions of the rows of the mission table.
 
 use super::inputs::GuardInputs;
+use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
 use crate::time::Duration;
 
 /// Age up to which a position is known.
@@ -99,13 +100,14 @@ pub enum Guard {
     ArmingHeld,
     /// Arming was requested as often as allowed, and the autopilot did not answer.
     ArmingUnanswered,
-    /// The motors are armed, and the vehicle is in flight or moves up or down.
+    /// The motors are armed, and the vehicle is in flight, moves up or down, or is by its estimate
+    /// more than 2 m above the plan's ground.
     InAir,
-    /// The vehicle is in flight, in the Offboard or Guided that the companion entered, in a state
+    /// As [`Guard::InAir`], in the Offboard or Guided that the companion entered, in a state
     /// that sends no setpoints.
     Unattended,
-    /// The autopilot refused to disarm, and is not in its landing mode.
-    DisarmRefused,
+    /// The autopilot is not in its landing mode.
+    LandingModeLeft,
     /// The landing detector reports flight; always met for an autopilot that takes off without a
     /// command.
     LiftedOff,
@@ -219,8 +221,8 @@ pub enum Guard {
     OutOfRange,
     /// In the last second a neighbour was heard, and one reported that it hears this vehicle.
     NeighbourHeard,
-    /// The landing detector reports ground after a flight or in the landing mode, and the vehicle
-    /// does not move up or down.
+    /// The landing detector reports ground in the landing mode, the estimated height is within 1.5
+    /// m of the plan's ground, and the vehicle does not move up or down.
     OnGround,
     /// An obstacle, or a vehicle that left the plan, is on the path ahead, or this vehicle seeks a
     /// path home.
@@ -253,7 +255,8 @@ pub enum Guard {
     /// vehicle is down.
     NotDivided,
     /// A pause is commanded in a climb that has not left the ground: the landing detector has not
-    /// reported flight. Once it has, its report of ground may be false, and disarming a fall.
+    /// reported flight, and the vehicle has not risen. Otherwise a report of ground may be false,
+    /// and disarming a fall.
     PausedBeforeLiftOff,
     /// A vehicle that follows another plan of this mission has been heard, and the state has lasted
     /// for the limit.
@@ -328,11 +331,11 @@ impl Guard {
                 i.arming_unrequested && i.column_blocked_for.min(i.in_state) >= limit
             }
             Self::ArmingUnanswered => i.arming_unanswered,
-            Self::InAir => i.armed && (i.airborne || i.vertical),
+            Self::InAir => i.is_in_air(),
             Self::Unattended => {
-                i.airborne && i.offboard && i.own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE
+                i.is_in_air() && i.offboard && i.own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE
             }
-            Self::DisarmRefused => i.armed && i.disarm_refused && !i.landing,
+            Self::LandingModeLeft => !i.landing,
             Self::LiftedOff => i.lifted_off,
             Self::ClimbDone => i.climb_done,
             Self::PathDone => i.path_done,
@@ -381,7 +384,9 @@ impl Guard {
             Self::WayFree => i.way_free,
             Self::OutOfRange => i.out_of_range && i.in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,
-            Self::OnGround => i.on_ground && !i.vertical && (i.has_flown || i.landing),
+            Self::OnGround => {
+                i.on_ground && !i.vertical && i.landing && i.height_m < MAX_GROUND_HEIGHT_ERROR_M
+            }
             Self::PathBlocked => i.blocked,
             Self::PathClear => !i.blocked,
             Self::OurTurn => i.our_turn,

@@ -1,5 +1,6 @@
 //! The inputs of the guards of the mission table.
 
+use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
 use crate::time::Duration;
 
 /// Snapshot of the vehicle, of pending commands, of neighbours and of the plan, by which the guards
@@ -118,8 +119,6 @@ pub struct GuardInputs {
     pub arming_unrequested: bool,
     /// Whether arming has failed for want of an answer from the autopilot.
     pub arming_unanswered: bool,
-    /// Whether the autopilot refused to disarm in this state.
-    pub disarm_refused: bool,
     /// Whether the autopilot is still in Offboard or Guided as entered for this mission, or in the
     /// landing mode after it.
     pub own_mode: bool,
@@ -134,7 +133,10 @@ pub struct GuardInputs {
     pub critical: bool,
     /// Whether the landing detector reports the vehicle on the ground.
     pub on_ground: bool,
-    /// Whether the landing detector has reported flight since arming was requested.
+    /// Estimated height above the ground as far as the plan says, metres; NaN while unknown.
+    pub height_m: f32,
+    /// Whether the landing detector has reported flight, or the vehicle has risen, since arming was
+    /// requested.
     pub has_flown: bool,
     /// Whether the vehicle moves up or down by more than 0.5 m/s.
     pub vertical: bool,
@@ -220,10 +222,19 @@ pub struct GuardInputs {
 /// Longest time that a vehicle waits above one that rests for good, which will not leave.
 const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 
+/// Estimated height from which a vehicle is in the air, metres: above
+/// [`MAX_GROUND_HEIGHT_ERROR_M`], so that an estimate at that bound does not alternate.
+const SURELY_IN_AIR_M: f32 = MAX_GROUND_HEIGHT_ERROR_M + 0.5;
+
 impl GuardInputs {
     /// Whether the vehicle can request a path home over the field, and does not seek one yet.
     pub(super) fn may_turn_home(&self) -> bool {
         self.can_fly_home && self.seeking_home_for.is_none()
+    }
+
+    /// Whether the vehicle is in the air, whatever the landing detector reports.
+    pub(super) fn is_in_air(&self) -> bool {
+        self.armed && (self.airborne || self.vertical || self.height_m > SURELY_IN_AIR_M)
     }
 
     /// Whether the column below has not been free for `limit`, or a vehicle that rests for good has

@@ -60,7 +60,7 @@ pub enum Action {
     /// after a detour.
     FlyDivision,
     /// Request disarming from the autopilot: at once before take-off; after landing only if the
-    /// autopilot has not disarmed by itself in four seconds.
+    /// autopilot has not disarmed by itself in nine seconds.
     RequestDisarming,
     /// Clear all pending commands, and request disarming from the autopilot, every second.
     CancelStart,

@@ -310,7 +310,7 @@ pub static TABLE: &[TransitionRow] = &[
     info_row(&[Land],                G::OnGround,        AT_ONCE,    Disarm,      A::RequestDisarming,  ""),
     warning_row(&[Land],             G::Elapsed,         secs(120),  Land,        A::RequestLandMode,   "Landing takes long"),
     warning_row(&[Disarm],           G::InAir,           AT_ONCE,    Land,        A::RequestLandMode,   "Still in the air: landing"),
-    warning_row(&[Disarm],           G::DisarmRefused,   AT_ONCE,    Land,        A::RequestLandMode,   "Disarming refused: landing"),
+    info_row(&[Disarm],              G::LandingModeLeft, AT_ONCE,    Land,        A::RequestLandMode,   ""),
     warning_row(&[Disarm],           G::Elapsed,         secs(30),   Aborted,     A::ForgetStart,       "On the ground, still armed"),
     // A pilot or a failsafe flies the vehicle, or has given it back; a mission that is over.
     warning_row(&[PilotControl, PilotReturned], G::Disarmed, AT_ONCE, Aborted,    A::ForgetStart,       "Pilot landed: mission over"),

@@ -84,7 +84,7 @@ pub(crate) fn quiet(state: State) -> GuardInputs {
         Blocked => i.blocked = true,
         AutopilotSilent => i.heartbeat_age = Duration::from_secs(5),
         PositionLost => i.position_age = Duration::from_secs(2),
-        Disarm => i.airborne = false,
+        Disarm => (i.airborne, i.landing) = (false, true),
         PilotControl | Failsafe => i.mode_foreign = true,
         _ => {}
     }
@@ -168,7 +168,7 @@ fn every_state_is_reached_and_every_wait_ends() {
 /// Inputs under which a guard holds for ever, everything else quiet.
 fn inputs_for(guard: Guard) -> GuardInputs {
     let long = Duration::from_secs(3600);
-    let mut i = GuardInputs { armed: true, ..GuardInputs::default() };
+    let mut i = GuardInputs { armed: true, landing: true, ..GuardInputs::default() };
     match guard {
         G::AutopilotHeard | G::PositionKnown => {}
         G::NoHeartbeat => i.heartbeat_age = long,
@@ -221,7 +221,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::ArmingUnanswered => i.arming_unanswered = true,
         G::InAir => i.airborne = true,
         G::Unattended => (i.airborne, i.offboard, i.own_mode) = (true, true, true),
-        G::DisarmRefused => i.disarm_refused = true,
+        G::LandingModeLeft => i.landing = false,
         G::PausedOnPad => (i.pause, i.in_state) = (true, long),
         G::LandUnattended => (i.land, i.airborne, i.offboard) = (true, true, true),
         G::ReturnInClimb => (i.turn_back, i.in_climb) = (true, true),
@@ -281,7 +281,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::NotDivided => (i.in_state, i.division_overdue) = (long, true),
         G::PausedBeforeLiftOff => (i.pause, i.on_ground) = (true, true),
         G::NeighbourHeard => i.neighbour_heard = true,
-        G::OnGround => (i.on_ground, i.has_flown) = (true, true),
+        G::OnGround => i.on_ground = true,
         G::PathBlocked => i.blocked = true,
         G::PathClear => {}
         G::OurTurn => i.our_turn = true,

@@ -269,7 +269,7 @@ impl Detours {
         let lasted = view.mission.time_in_state(view.now);
         match view.mission.state() {
             State::Done => !view.guidance.is_at_goal(&view.scene) || self.left_plan,
-            State::Aborted => view.telemetry.on_ground == Some(true) || lasted >= ABORT_OVER_AFTER,
+            State::Aborted => view.is_on_ground() || lasted >= ABORT_OVER_AFTER,
             State::PilotControl | State::PilotReturned => {
                 view.mission.time_with_pilot(view.now) >= PILOT_KEEPS_AFTER
             }

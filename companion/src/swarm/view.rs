@@ -5,6 +5,8 @@ use planner_core::Point;
 use crate::autopilot::telemetry::Telemetry;
 use crate::config::Config;
 use crate::guidance::{Guidance, GuidanceInputs};
+use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
+use crate::mission::MAX_POSITION_AGE;
 use crate::mission::course::Mission;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
@@ -18,6 +20,25 @@ pub(crate) struct DetourView<'a, const V: usize, const W: usize, const G: usize>
     pub(crate) telemetry: &'a Telemetry,
     pub(crate) neighbours: &'a Neighbours<V>,
     pub(crate) scene: GuidanceInputs<'a, W, G>,
+}
+
+impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
+    /// Estimated height above the ground as far as the plan says, metres; NaN while unknown.
+    pub(crate) fn height_m(&self) -> f32 {
+        let known = self.telemetry.position_age(self.now) < MAX_POSITION_AGE
+            && !self.telemetry.origin_moved;
+        match self.mission.plan().filter(|_| known) {
+            Some(plan) => self.telemetry.position.z - self.guidance.ground_m(plan),
+            None => f32::NAN,
+        }
+    }
+
+    /// Whether the landing detector reports the ground, and the motors are off or the estimated
+    /// height agrees.
+    pub(crate) fn is_on_ground(&self) -> bool {
+        self.telemetry.on_ground == Some(true)
+            && (!self.telemetry.armed || self.height_m() < MAX_GROUND_HEIGHT_ERROR_M)
+    }
 }
 
 /// Position and velocity that this vehicle reports to the others.

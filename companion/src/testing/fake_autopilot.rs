@@ -63,6 +63,8 @@ pub struct Bench {
     pub no_battery: bool,
     /// Whether the landing detector reports ground at any height.
     pub false_ground: bool,
+    /// Estimated height minus the true one, metres.
+    pub height_error_m: f32,
     /// Vertical speed that the autopilot reports, m/s upwards.
     pub climbs_mps: f32,
     pub silent: bool,
@@ -147,6 +149,7 @@ impl Bench {
             mute: false,
             no_battery: false,
             false_ground: false,
+            height_error_m: 0.0,
             climbs_mps: 0.0,
             silent: false,
             no_position: false,
@@ -194,7 +197,7 @@ impl Bench {
     }
 
     pub fn ned(&self) -> Vector3<f64> {
-        let place = frames::enu_to_geodetic(&ORIGIN, &self.enu);
+        let place = frames::enu_to_geodetic(&ORIGIN, &(self.enu + self.height_error()));
         frames::geodetic_to_ned(self.kind.projection(), &self.origin, &place)
     }
 

@@ -17,10 +17,13 @@ use planner_core::Point;
 
 mod false_ground;
 mod random;
+mod reported_ground;
 
 const ARM: u16 = 400;
 const SET_MODE: u16 = 176;
 const TAKE_OFF: u16 = 22;
+/// True height above the ground up to which a disarmed vehicle does not fall far, metres.
+const HARMLESS_M: f32 = 0.35;
 
 fn pilot_mode(kind: AutopilotKind) -> u32 {
     match kind {

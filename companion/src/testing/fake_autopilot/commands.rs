@@ -46,7 +46,7 @@ impl Bench {
         assert_eq!(s.coordinate_frame, MavFrame::MAV_FRAME_LOCAL_NED);
         let ned = Vector3::new(f64::from(s.x), f64::from(s.y), f64::from(s.z));
         let place = frames::ned_to_geodetic(self.kind.projection(), &self.origin, &ned);
-        let enu = frames::geodetic_to_enu(&ORIGIN, &place);
+        let enu = frames::geodetic_to_enu(&ORIGIN, &place) - self.height_error();
         // ArduCopter cancels a take-off at a setpoint that arrives before the lift-off.
         self.took_off &= !self.on_ground();
         assert!(enu.iter().all(|c| c.is_finite()));
@@ -63,9 +63,9 @@ impl Bench {
         if self.silent {
             return;
         }
-        // Neither autopilot kind accepts disarming in the air while its landing detector reports
-        // flight.
-        let disarms_in_air = number == 400 && c.param1 == 0.0 && !self.on_ground() && self.armed;
+        // Both autopilot kinds go by their landing detector: a false report lets the vehicle fall.
+        let disarms_in_air =
+            number == 400 && c.param1 == 0.0 && !self.reports_ground() && self.armed;
         let takes_off_disarmed = number == 22 && !self.armed;
         let refused = self.refused.contains(&number) || disarms_in_air || takes_off_disarmed;
         if !self.mute {

@@ -12,6 +12,16 @@ impl Bench {
         self.enu.z < 0.05
     }
 
+    /// Whether the landing detector reports the ground.
+    pub(super) fn reports_ground(&self) -> bool {
+        self.on_ground() || self.false_ground
+    }
+
+    /// Error of the estimated position.
+    pub(super) fn height_error(&self) -> Point {
+        Point::new(0.0, 0.0, self.height_error_m)
+    }
+
     /// Whether the vehicle can leave the ground: an ArduCopter only once its motors have spun up
     /// after NAV_TAKEOFF.
     fn lifts(&self) -> bool {
@@ -31,6 +41,7 @@ impl Bench {
         if let Some(target) = target.filter(|_| self.armed && !self.stuck) {
             let way = target - self.enu;
             self.enu += way * (step / way.norm().max(step));
+            self.enu.z = self.enu.z.max(0.0);
         }
         let landing = self.mode == self.kind.land_mode() && self.on_ground() && self.armed;
         self.landed_at = if landing { self.landed_at.or(Some(self.now)) } else { None };

@@ -77,7 +77,7 @@ impl Bench {
             }
         }
         if count.is_multiple_of(4) && self.sends(245) {
-            let landed_state = if self.on_ground() || self.false_ground {
+            let landed_state = if self.reports_ground() {
                 MavLandedState::MAV_LANDED_STATE_ON_GROUND
             } else {
                 MavLandedState::MAV_LANDED_STATE_IN_AIR

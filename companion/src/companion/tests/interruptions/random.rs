@@ -27,7 +27,7 @@ struct Watch {
 
 impl Watch {
     fn tick(&mut self, b: &mut Bench) {
-        let before = b.setpoints.len();
+        let (before, armed) = (b.setpoints.len(), b.armed);
         b.tick();
         let sent = b.setpoints.len() > before;
         let state = b.state();
@@ -54,6 +54,12 @@ impl Watch {
             assert!(
                 self.piloted < 30 || !acts,
                 "{command} under the pilot in {state:?}: {:#?}",
+                self.log
+            );
+            assert!(
+                (command, param1) != (ARM, 0.0) || !armed || b.enu.z <= HARMLESS_M,
+                "falls from {} m in {state:?}: {:#?}",
+                b.enu.z,
                 self.log
             );
             let flown = b.companion.requests.handshake().has_flown();
@@ -180,7 +186,7 @@ proptest::proptest! {
             }
             (0..20).for_each(|_| watch.tick(&mut b));
         }
-        let down = b.on_ground() && !b.armed;
+        let down = b.enu.z <= HARMLESS_M && !b.armed;
         proptest::prop_assert!(
             down,
             "{:?} {} {:?} {:#?} {:?}",
