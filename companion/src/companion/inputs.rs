@@ -155,7 +155,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             mode_foreign,
             critical: t.is_critical(),
             on_ground,
-            height_m: view.height_m(),
+            height_m: if on_ground { view.height_m() } else { f32::NAN },
             has_flown: handshake.has_flown(),
             vertical: t.position_age(now) < MAX_POSITION_AGE
                 && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,

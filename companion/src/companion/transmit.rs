@@ -234,12 +234,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Flags of this vehicle's intent: whether it flies, follows the plan, waits or is blocked.
     fn intent_flags(&self) -> u8 {
         use State::*;
+        let view = self.detour_view();
         let grounded = match self.mission.state() {
             Done | Disarm => true,
             // On its path it flies, whatever the landing detector reports.
-            state => {
-                !self.telemetry.armed || (!state.is_on_path() && self.detour_view().is_on_ground())
-            }
+            state => !self.telemetry.armed || (!state.is_on_path() && view.is_on_ground()),
         };
         let on_plan = !self.guidance.returning
             && matches!(
@@ -264,13 +263,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || matches!(self.mission.state(), Land | LandingHeld | Disarm | Done)
                 && self.guidance.is_at_goal(&self.guidance_inputs());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
-        let out = self.detours.is_out_of_plan(&self.detour_view());
+        let out = self.detours.is_out_of_plan(&view);
         let flies = if grounded { intent::GROUNDED } else { intent::FLYING };
         flies
             | flag(intent::LANDED, self.mission.state() == Done)
             | flag(intent::ON_PLAN, on_plan && self.mission.plan().is_some())
             | flag(intent::OUT_OF_PLAN, out)
-            | flag(intent::WAITING, self.detours.is_waiting(&self.detour_view()))
+            | flag(intent::WAITING, self.detours.is_waiting(&view))
             | flag(intent::BLOCKED, self.detours.is_blocked())
             | flag(
                 intent::ON_DETOUR,

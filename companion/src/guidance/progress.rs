@@ -136,6 +136,8 @@ impl Guidance {
 
     /// Height of the ground below the vehicle as far as the plan says, ENU up, metres: that of the
     /// pad before the path, that of the goal at its end, and between them the lowest that is known.
+    // Not inlined: it has many callers, and in each it would take a board's flash.
+    #[inline(never)]
     pub(crate) fn ground_m<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>) -> f32 {
         let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
         let end_m =

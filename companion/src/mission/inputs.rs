@@ -133,7 +133,8 @@ pub struct GuardInputs {
     pub critical: bool,
     /// Whether the landing detector reports the vehicle on the ground.
     pub on_ground: bool,
-    /// Estimated height above the ground as far as the plan says, metres; NaN while unknown.
+    /// Estimated height above the ground as far as the plan says, metres; NaN while unknown, and
+    /// where the landing detector does not report the ground.
     pub height_m: f32,
     /// Whether the landing detector has reported flight, or the vehicle has risen, since arming was
     /// requested.

@@ -24,6 +24,8 @@ pub(crate) struct DetourView<'a, const V: usize, const W: usize, const G: usize>
 
 impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
     /// Estimated height above the ground as far as the plan says, metres; NaN while unknown.
+    // Not inlined: in each caller it would take a board's flash.
+    #[inline(never)]
     pub(crate) fn height_m(&self) -> f32 {
         let known = self.telemetry.position_age(self.now) < MAX_POSITION_AGE
             && !self.telemetry.origin_moved;
