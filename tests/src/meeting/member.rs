@@ -121,8 +121,10 @@ impl Member {
 
     pub(super) fn seen(&self, now_s: f32) -> VehicleState {
         let lately = |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s < DEAF_S);
-        let lands = self.autopilot.flown() == Flown::Commanded
-            && self.autopilot.mode == self.autopilot.kind.land_mode();
+        // In the landing mode, or led down by setpoints.
+        let lands = (self.autopilot.flown() == Flown::Commanded
+            && self.autopilot.mode == self.autopilot.kind.land_mode())
+            || self.companion.state() == State::Land;
         VehicleState {
             position: self.autopilot.position,
             velocity: self.autopilot.velocity,
