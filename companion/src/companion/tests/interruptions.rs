@@ -439,17 +439,10 @@ fn the_same_number_with_other_parameters_is_another_command_and_a_repeat_is_answ
     );
 }
 
-#[test]
-fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
+/// The ground station reports an obstacle of 0.5 m at `place`.
+fn obstacle(b: &mut Bench, place: Point) {
     use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavFrame};
-    use planner_core::frames::enu_to_geodetic;
-    let mut b = Bench::started_with_neighbour(two_vehicles());
-    b.run_until(State::Follow, 20.0);
-    b.answer_detour = None;
-    b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
-    b.run_until(State::Replanning, 10.0);
-    // Upon the detour that comes a second later.
-    let place = enu_to_geodetic(&ORIGIN, &Point::new(13.0, 16.0, 2.0));
+    let place = planner_core::frames::enu_to_geodetic(&ORIGIN, &place);
     let data = COMMAND_INT_DATA {
         command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
         param1: 0.5,
@@ -466,6 +459,17 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     let len = crate::link::frame::encode(header, &data, &mut out);
     b.companion.handle_bytes(Link::Swarm, b.now, &out[..len]);
     b.drain();
+}
+
+#[test]
+fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
+    let mut b = Bench::started_with_neighbour(two_vehicles());
+    b.run_until(State::Follow, 20.0);
+    b.answer_detour = None;
+    b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
+    b.run_until(State::Replanning, 10.0);
+    // Upon the detour that comes a second later.
+    obstacle(&mut b, Point::new(13.0, 16.0, 2.0));
     let request = b.companion.detour_request(|_| {}).expect("planning");
     let mut path = planner_core::flight::Path::new();
     for point in [request.here, Point::new(13.0, 16.0, 2.0), GOAL] {
