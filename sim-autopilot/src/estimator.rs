@@ -141,8 +141,8 @@ impl EstimateErrors {
 mod tests {
     use super::*;
 
-    /// RMS and maximum of the position error in a flight of a minute, and its drift in 10 s,
-    /// horizontal and vertical, and RMS and maximum of the velocity error.
+    /// Horizontally and in height: RMS and maximum of the position error in a flight of a minute,
+    /// the same of its drift in 10 s, and RMS of the velocity error, horizontal first.
     struct FlightErrors {
         across: [f32; 4],
         up: [f32; 4],
