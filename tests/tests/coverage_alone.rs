@@ -8,7 +8,7 @@ use flockmate_tests::{areas, assert_no_seed_is_wrong, covered};
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 
-const MISSIONS: u64 = 16;
+const MISSIONS: u64 = 10;
 
 /// Time in which a lost vehicle is noticed, and the others have not yet landed, seconds.
 const NOTICED_S: f64 = 45.0 + 15.0;

@@ -9,7 +9,7 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-const MISSIONS: u64 = 12;
+const MISSIONS: u64 = 8;
 
 /// What leaves a vehicle that hovers.
 const HOVERS: [&str; 2] = ["pilot-takeover", "companion-reset"];

@@ -15,7 +15,7 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-const MISSIONS: u64 = 10;
+const MISSIONS: u64 = 6;
 
 /// What became of a mission.
 #[derive(Debug)]

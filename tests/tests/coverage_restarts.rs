@@ -17,7 +17,7 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-const MISSIONS: u64 = 12;
+const MISSIONS: u64 = 8;
 const START_CANCELLED: &str = "Its part was given away: start cancelled";
 
 fn fly(text: &str) -> (MissionResult, String) {

@@ -24,7 +24,7 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-const MISSIONS: u64 = 8;
+const MISSIONS: u64 = 6;
 /// Starts until the area is whole.
 const STARTS: usize = 4;
 /// When three vehicles have photographed 40 % of the small field, seconds.

@@ -9,7 +9,7 @@ use host_sim::result::MissionResult;
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 
-const MISSIONS: u64 = 8;
+const MISSIONS: u64 = 6;
 
 fn fault(at_s: f64, kind: &str, vehicle: usize, rest: &str) -> String {
     format!("[[faults]]\nat_s = {at_s:.1}\nkind = \"{kind}\"\nvehicle = {vehicle}\n{rest}")

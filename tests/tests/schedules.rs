@@ -17,7 +17,7 @@ use planner_core::schedule::ScheduleError;
 use rayon::prelude::*;
 
 /// Swarms flown where nothing else is asked for.
-const SWARMS: u64 = 600;
+const SWARMS: u64 = 300;
 /// The fastest vehicle flies so far in one step, metres.
 const STEP_M: f32 = 0.3;
 
