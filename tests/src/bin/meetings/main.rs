@@ -27,6 +27,10 @@ struct Args {
     /// be stopped.
     #[arg(long)]
     passing: bool,
+    /// Time limit of a meeting, seconds after its start, in place of that of its scene: vehicles
+    /// that are still up after a long time wait without a bound.
+    #[arg(long, value_name = "SECONDS")]
+    limit: Option<f32>,
     /// Only meetings of this geometry.
     #[arg(long, value_name = "KIND")]
     kind: Option<String>,
@@ -57,7 +61,10 @@ fn trace(scene: &scene::Scene) {
 
 fn main() {
     let args = Args::parse();
-    let draw = if args.passing { scene::passing } else { scene::scene };
+    let draw = |seed| {
+        let scene = if args.passing { scene::passing(seed) } else { scene::scene(seed) };
+        scene::Scene { limit_s: args.limit.unwrap_or(scene.limit_s), ..scene }
+    };
     if args.trace {
         trace(&draw(args.seed));
         return;
