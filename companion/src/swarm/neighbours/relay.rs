@@ -47,7 +47,8 @@ const OUT_OF_RANGE_AFTER: Duration = Duration::from_secs(3);
 /// Time for which a relayed report that a vehicle follows the plan counts: three hops, and the loss
 /// of a message.
 const RELAYED_LIFETIME: Duration = Duration::from_secs(6);
-/// Age that each relay adds to a report, microseconds: longer than most messages take.
+/// Least age that each relay adds to a report, microseconds: longer than most messages take. A
+/// message that takes longer adds that: else a report that is relayed in a circle stays young.
 const HOP_AGE_US: u64 = 500_000;
 /// Delay that each relay adds to the delay of a vehicle's flight, seconds: its progress is not as
 /// old as the added age says.
@@ -200,9 +201,8 @@ impl<const V: usize> Neighbours<V> {
 
     /// Handles a relay, for our plan, from the vehicle `from` of the roster.
     pub(crate) fn handle_relay(&mut self, now: Instant, from: u8, relay: &Relay) {
-        if self.active_roster_index(from, now).is_none() {
-            return;
-        }
+        let Some(by) = self.active_roster_index(from, now) else { return };
+        let hop_us = (self.contacts[by].message_delay.delay_s * 1e6) as u64;
         for item in &relay.items {
             let Some(at) = self.in_ranks(item.rank) else { continue };
             let (fastest_mps, contact) = (self.fastest_mps, &mut self.contacts[at]);
@@ -221,7 +221,7 @@ impl<const V: usize> Neighbours<V> {
                 contact.gates_open_up_to_m = item.gates_open_up_to_m;
                 contact.unheard_delay_s = item.unheard_delay_s.saturating_add(HOP_DELAY_S);
             }
-            let age_us = u64::from(item.age) * AGE_TICK_US + HOP_AGE_US;
+            let age_us = u64::from(item.age) * AGE_TICK_US + HOP_AGE_US.max(hop_us);
             let then = Instant::from_micros(now.as_micros().saturating_sub(age_us));
             contact.relayed_at = contact.relayed_at.max(Some(then).filter(|_| item.age < u8::MAX));
         }

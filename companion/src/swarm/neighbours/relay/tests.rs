@@ -7,6 +7,7 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
+use super::super::LOST_AFTER;
 use super::*;
 use crate::config::RosterEntry;
 use crate::link::intent::{Intent, ON_PLAN};
@@ -235,4 +236,64 @@ fn the_delay_of_a_flight_goes_with_its_progress() {
     };
     assert_eq!(believed_m(12, &mut table), 7.0);
     assert!(believed_m(16, &mut table) > 8.0);
+}
+
+/// Whatever messages take: what two vehicles relay to each other of a third one, which failed, does
+/// not keep that one young.
+#[test]
+fn a_vehicle_that_fails_is_lost_in_time_though_messages_are_late() {
+    let mut rng = Pcg32::seed_from_u64(13);
+    for case in 0..100 {
+        let mut swarm = Swarm::new(3);
+        (0..10).for_each(|_| swarm.step(&[true; 3], &[true, false, false], true));
+        let delay_ms = 50 + u64::from(rng.next_u32() % 950);
+        let failed_at = swarm.now;
+        let mut late = List::new();
+        // Vehicle 1 hears neither of them, which is why they relay what they know of each other and
+        // of it; it was heard up to now by both.
+        for of in [1, 2] {
+            let delays = &mut swarm.tables[of];
+            let heard = Intent {
+                system_id: 1,
+                flags: ON_PLAN,
+                mission_crc: MISSION,
+                plan_crc: PLAN,
+                progress_m: 5.0,
+                ..Intent::default()
+            };
+            delays.handle_intent(failed_at, 9, &heard, MISSION, Some(PLAN));
+        }
+        while swarm.now < failed_at + LOST_AFTER + Duration::from_secs(3) {
+            swarm.now = swarm.now + Duration::from_millis(50);
+            let now = swarm.now;
+            if now.as_micros() % 1_000_000 < 50_000 {
+                for from in [1, 2] {
+                    let intent = Intent {
+                        system_id: from as u8 + 1,
+                        flags: ON_PLAN,
+                        mission_crc: MISSION,
+                        plan_crc: PLAN,
+                        heard_bits: swarm.tables[from].heard_bits(now),
+                        ..Intent::default()
+                    };
+                    let relay = swarm.tables[from].next_relay(now, MISSION, PLAN);
+                    late.push((now + Duration::from_millis(delay_ms), 3 - from, intent, relay));
+                }
+            }
+            late.retain(|(due, to, intent, relay)| {
+                if *due <= now {
+                    let sequence = (now.as_micros() / 50_000) as u16;
+                    let table = &mut swarm.tables[*to];
+                    table.handle_intent(now, sequence, intent, MISSION, Some(PLAN));
+                    let by = table.roster_index(intent.system_id).expect("of the roster");
+                    table.contacts[by].message_delay.delay_s = delay_ms as f32 * 1e-3;
+                    table.handle_relay(now, intent.system_id, relay);
+                }
+                *due > now
+            });
+        }
+        for of in [1, 2] {
+            assert!(swarm.tables[of].contacts[0].is_dead(swarm.now), "{case}: {delay_ms} ms");
+        }
+    }
 }
