@@ -84,7 +84,8 @@ impl Guidance {
         let place = scene.telemetry.position;
         let lands = matches!(state, State::Land | State::LandingHeld);
         let hears_nobody = neighbours.hears_nobody(now);
-        let deaf = lands && hears_nobody;
+        // Hearing nobody, the vehicle flies on only to a landing place aside.
+        let deaf = hears_nobody && (lands || (self.on_path && self.ends_away_from_goal));
         // Like a landing, a guided descent in a coverage mission checks for unheard vehicles on the
         // ground.
         let comes_down = lands || (self.is_descending() && neighbours.fleet().is_some());
@@ -119,15 +120,15 @@ impl Guidance {
                 // Gates keep two vehicles on the plan apart, whatever the delay of their messages.
                 met.motion.delay_s = 0.0;
             }
-            if met.lost && !lands && neighbours.may_fly_on_unheard(contact, now, &reach) {
+            if met.lost && !(lands || deaf) && neighbours.may_fly_on_unheard(contact, now, &reach) {
                 // Where no neighbour is heard this vehicle's receiver may have failed: the others
                 // are not lost, they fly on.
                 (met.motion.age_s, met.motion.grounded) = (bounds.silent_s, false);
             }
             let silent = met.lost || met.motion.age_s > safety::FRESH_S;
-            if lands && silent {
-                // A landing does not wait for where a silent vehicle may fly, only for where it may
-                // have stopped.
+            if (lands || deaf) && silent {
+                // A landing, and the flight aside before it, does not wait for where a silent
+                // vehicle may fly, only for where it may have stopped.
                 (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
                 met.motion.points_reach = PointsReach::OPEN;
                 met.motion.rests_within_m = 0.0;

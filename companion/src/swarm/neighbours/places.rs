@@ -5,7 +5,8 @@ use planner_core::{Length, Point};
 
 use super::contact::{AreaGround, NeighbourEntry};
 use super::{
-    MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, ON_PLAN, UNHEARD_LANDING_AFTER, VAGUE_POSITION_M,
+    GROUNDED, LANDED, MAX_HEIGHT_AGE, MAX_HEIGHT_AGE_S, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE,
+    Neighbours, ON_PLAN, OUT_OF_PLAN, UNHEARD_LANDING_AFTER, VAGUE_POSITION_M,
 };
 use crate::time::Instant;
 
@@ -94,6 +95,43 @@ impl<const V: usize> Neighbours<V> {
             let far_m = if contact.is_on_ground(now, self.down_after) { lying_m } else { apart_m };
             let reach = [far_m, self.unheard_progress_m(contact, now)];
             contact.keep_out_zones(now, reach, self.area_ground(), visit);
+            if self.fleet.is_none() && !contact.heard_within(now, MAX_HEIGHT_AGE) {
+                self.silent_zones(contact, now, reach, visit);
+            }
+        }
+    }
+
+    /// Calls `visit` with the zones in which the safety filter lets no vehicle come nearer to a
+    /// silent contact in the air than it is: its path once it counts as dead, before that a ball,
+    /// less wide than the filter has it.
+    /// A detour that the filter does not let the vehicle fly would be sought again and again.
+    // Not inlined, as other calls that a board seldom makes.
+    #[inline(never)]
+    fn silent_zones(
+        &self,
+        contact: &NeighbourEntry,
+        now: Instant,
+        [apart_m, upto_m]: [f32; 2],
+        visit: &mut dyn FnMut(KeepOutZone),
+    ) {
+        let kind = ZoneKind::Static;
+        if contact.reports(GROUNDED | LANDED | OUT_OF_PLAN)
+            || contact.is_on_ground(now, self.down_after)
+            || contact.flies_plan_unheard()
+        {
+            return;
+        }
+        if contact.is_dead(now) {
+            contact.for_each_leg(upto_m, &mut |[from, next], [leg_m, flown_m]| {
+                let share = if flown_m < leg_m { flown_m / leg_m } else { 1.0 };
+                let to = from + (next - from) * share;
+                visit(KeepOutZone { from, to, radius_m: apart_m, kind });
+            });
+        } else if !self.hears_nobody(now) {
+            let from = contact.state.position;
+            let far_s = MAX_HEIGHT_AGE_S + 2.0 * contact.message_delay.delay_s;
+            let radius_m = apart_m + self.fastest_mps * far_s;
+            visit(KeepOutZone { from, to: from, radius_m, kind });
         }
     }
 
