@@ -135,8 +135,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Switches to the detour that the shell has planned, or refuses it where it starts or ends
     /// elsewhere.
     pub(super) fn begin_detour(&mut self, detour: &VehiclePlan<W, G>) {
-        let along_m = self.guidance.along_m();
-        let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
+        let here = self.detours.start_of_detour(&self.detour_view());
         let begins = here.is_some_and(|here| self.mission.starts_at(detour, &here));
         let purpose = self.detours.sought().filter(|_| begins);
         let ends = detour.path.waypoints().last().map(|last| last.position);

@@ -221,7 +221,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.hold_at(position);
             }
             Action::HoldHere if to == State::PilotReturned => {
-                self.guidance.hold_after_pilot(position);
+                self.guidance.hold_after_pilot(position, self.mission.plan());
             }
             Action::HoldHere => self.guidance.hold_at(position),
             Action::HoldOver => self.timers.set(Timer::Request, now),

@@ -25,10 +25,21 @@ impl Guidance {
     }
 
     /// Holds where the pilot left the vehicle, until the mission resumes; the place along the path
-    /// where the flight was interrupted is kept.
-    pub fn hold_after_pilot(&mut self, point: Point) {
+    /// where the flight was interrupted is kept. Carried away from the end of its path, the vehicle
+    /// is no longer there: the ground below it is not that of the goal.
+    pub fn hold_after_pilot<const W: usize, const G: usize>(
+        &mut self,
+        point: Point,
+        plan: Option<&VehiclePlan<W, G>>,
+    ) {
         self.hold_at(point);
         self.forget_leg();
+        let Some(path) = plan.map(|plan| &plan.path) else { return };
+        let away = |end: Point| (end - point).xy().norm_squared() > ARRIVED_M * ARRIVED_M;
+        if self.has_reached_end(path) && path.point_at(path.length_m()).is_some_and(away) {
+            self.tracker.along_m = path.length_m() - ARRIVED_M;
+            self.setpoint_m = self.tracker.along_m;
+        }
     }
 
     /// Begins the climb, straight up from the setpoint, or from `position` where there is no
@@ -82,6 +93,11 @@ impl Guidance {
     /// begin, even one that starts a little away from it.
     pub(crate) fn is_at_rest_on_raw_point(&self) -> bool {
         self.raw_point_at_rest
+    }
+
+    /// Position of the setpoint, ENU metres.
+    pub(crate) fn setpoint_position(&self) -> Point {
+        self.smoother.position()
     }
 
     /// Whether the setpoint stands, in a descent too.

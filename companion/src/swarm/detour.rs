@@ -19,9 +19,7 @@
 //! with many vehicles takes several steps.
 //!
 //! Over an area there is no roadmap and no turn: a stopped vehicle flies around the obstacle and
-//! back to its path ([`beside`]), or home ([`homeward`]).
-//!
-//! ENU metres.
+//! back to its path ([`beside`]), or home ([`homeward`]). ENU metres.
 
 pub(crate) mod asking;
 mod beside;
@@ -60,10 +58,10 @@ const TURN_CLAIM: Duration = Duration::from_secs(1);
 /// Time by which each blocked vehicle with a lower system id delays this one's claim, seconds.
 const TURN_DELAY_S: u64 = 2;
 /// Further delay of the next claim after each search that found no detour, seconds.
-const DETOUR_RETRY_S: u64 = 10;
+const DETOUR_RETRY_S: u64 = 5;
 /// Time for which a vehicle waits while all others stand, after which it counts as blocked: the
 /// vehicle that it waits for has found no detour.
-const DEAD_END_AFTER: Duration = Duration::from_secs(30);
+const DEAD_END_AFTER: Duration = Duration::from_secs(15);
 /// Number of failed searches, and detours without progress, after which a vehicle seeks no further
 /// detour; one search fewer is enough if they failed in one place over [`GIVE_UP_AFTER_S`].
 const MAX_DETOUR_SEARCHES: u8 = 4;
@@ -115,10 +113,11 @@ pub(crate) struct Detours {
     /// this place have failed for [`GIVE_UP_AFTER_S`].
     no_retry: bool,
     /// Number of failed searches from about this place, the place along the path, metres, and the
-    /// time of the first.
+    /// times of the first and of the last anywhere.
     failures_here: u8,
     failed_at_m: f32,
     failed_since: Instant,
+    failed_at: Instant,
     /// Number of detours in a row on which the vehicle made no progress.
     detours_without_progress: u8,
     /// When a search for a path aside last failed.
@@ -308,6 +307,8 @@ impl Detours {
             }
             // `stands` is false in a descent, where a blocked vehicle hovers too.
             State::Blocked => view.guidance.is_setpoint_still() && rests,
+            // After a detour the vehicle only waits to be disarmed.
+            State::Land | State::Disarm => self.is_on_detour() && view.is_on_ground(),
             // A held landing goes on by itself once its column is free.
             State::LandingHeld => view.telemetry.velocity.length() < MAX_HOVER_MPS,
             _ => false,
@@ -476,6 +477,7 @@ impl Detours {
             + DETOUR_RETRY_S * u64::from(self.failures);
         // Over an area vehicles take no turns.
         self.blocked
+            && self.may_search_again(view.now)
             && view.config.lost_vehicle_down_s.is_none()
             && view.neighbours.are_all_standing(view.now)
             && self

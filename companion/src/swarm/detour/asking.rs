@@ -3,6 +3,7 @@
 //!
 //! Cost: a request lists every known keep-out zone.
 
+use planner_core::Point;
 use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
 use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_MARGIN_M};
@@ -99,6 +100,24 @@ impl Detours {
         self.request_read
     }
 
+    /// Whether the last failed search is long enough ago for the next. The number of failures alone
+    /// makes no pause: while a silent vehicle comes down it does not grow.
+    pub(super) fn may_search_again(&self, now: Instant) -> bool {
+        now - self.failed_at >= Duration::from_secs(DETOUR_RETRY_S)
+    }
+
+    /// Where the path that is requested begins: on the path, or for a landing aside where the
+    /// setpoint stands. Held far from its path, the vehicle may not be able to fly to that first.
+    pub(crate) fn start_of_detour<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &DetourView<'_, V, W, G>,
+    ) -> Option<Point> {
+        match self.seeks_landing() && view.guidance.is_setpoint_still() {
+            true => Some(view.guidance.setpoint_position()),
+            false => view.mission.plan()?.path.point_at(view.guidance.along_m()),
+        }
+    }
+
     /// The request for the shell's planner; `None` without a plan or a request. `visit` is called
     /// with each keep-out zone.
     pub(crate) fn detour_request<const V: usize, const W: usize, const G: usize>(
@@ -158,7 +177,7 @@ impl Detours {
         };
         Some(DetourRequest {
             aside: sought.is_aside(),
-            here: plan.path.point_at(along_m)?,
+            here: self.start_of_detour(view)?,
             leg: [ahead.position, behind.position],
             leg_clearance_m: ahead.clearance_m,
             goal,
@@ -218,6 +237,7 @@ impl Detours {
             Some(DetourPurpose::Rejoin(_)) => return self.area_searches.note_failure(now),
             Some(DetourPurpose::Goal) | None => {}
         }
+        self.failed_at = now;
         if outlook == RetryOutlook::Settles {
             // Each failure delays the next request, but alone never ends the search: once the
             // silent vehicle is on the ground, a detour may be found.
