@@ -87,6 +87,9 @@ pub const LOST_WINDOW_M: f32 = 2.5;
 const SETTLE_WINDOW_M: f32 = 3.0;
 /// A nearest point this close to an end of the searched path counts as not found, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
+/// Distance along the path between setpoint and reference up to which the setpoint has come to it,
+/// metres: the averages of a setpoint that stands leave millimetres.
+const SETTLED_M: f32 = 0.05;
 /// Advance of the reference along the path that counts as progress, metres.
 const MIN_PROGRESS_M: f32 = 0.25;
 /// Distance before the geofence at which the raw point stops, metres: the setpoint may deviate by

@@ -29,6 +29,10 @@ const HOVER_SWAY_M: f32 = 0.05;
 /// safety filter allows no more.
 const PATH_APPROACH_ROUNDING_M: f32 = 0.002;
 
+/// Distance of centres at which two vehicles of 0.3 m radius touch, metres: a vehicle as near to the
+/// axis of a zone has nothing to keep there, and only has to leave.
+const TOUCHING_M: f32 = 0.6;
+
 /// A capsule, or the column below a vehicle, that a detour keeps out of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeepOutZone {
@@ -389,6 +393,10 @@ fn nearest_place_aside<const N: usize>(
 pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.kind != ZoneKind::Descending) {
         *obstacle = obstacle.shrunk_to(here, PATH_APPROACH_ROUNDING_M);
+        if obstacle.kind == ZoneKind::Static && obstacle.radius_m < TOUCHING_M {
+            // Below one that comes down: every way out may lead nearer to the vertical first.
+            obstacle.radius_m = 0.0;
+        }
     }
 }
 

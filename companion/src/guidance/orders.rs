@@ -6,7 +6,7 @@ use super::nearest::nearest_arc_length_m;
 use super::phase::Phase;
 use super::smoother::TICK_S;
 use super::waypoints::Algorithm2Waypoints;
-use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, STANDING_SETPOINT_MPS};
+use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, SETTLED_M, STANDING_SETPOINT_MPS};
 use crate::time::Instant;
 use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};
@@ -98,6 +98,12 @@ impl Guidance {
     /// Position of the setpoint, ENU metres.
     pub(crate) fn setpoint_position(&self) -> Point {
         self.smoother.position()
+    }
+
+    /// Whether the setpoint has come to the reference, at which a path aside begins: one that was
+    /// stopped short of it would first have to fly on.
+    pub(crate) fn is_setpoint_at_reference(&self) -> bool {
+        libm::fabsf(self.tracker.along_m - self.setpoint_m) < SETTLED_M
     }
 
     /// Whether the setpoint stands, in a descent too.

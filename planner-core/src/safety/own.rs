@@ -66,6 +66,9 @@ pub struct OwnSet<'a> {
     /// Centre of the bounding box, and half of its size.
     middle: Point,
     half: Point,
+    /// Distance of centres at which the two hulls touch, metres: a vehicle that is already as near
+    /// to where another one may come has nothing to keep there, and only has to leave.
+    pub touching_m: f32,
 }
 
 impl<'a> OwnSet<'a> {
@@ -84,7 +87,8 @@ impl<'a> OwnSet<'a> {
             low = select_per_axis(&low, to, |a, b| a < b);
             high = select_per_axis(&high, to, |a, b| a > b);
         }
-        Self { set, legs, middle: (low + high) * 0.5, half: (high - low) * 0.5 }
+        let (middle, half) = ((low + high) * 0.5, (high - low) * 0.5);
+        Self { set, legs, middle, half, touching_m: 0.0 }
     }
 
     /// Distances from the set's bounding box to a point along each axis, metres; 0 on an axis along
@@ -159,8 +163,8 @@ impl<'a> OwnSet<'a> {
         }
         let here = &self.set.points[0];
         // The motion comes no nearer if the vehicle is already as near to a leg of the neighbour's
-        // set.
-        let here_m = sqrtf(motion_sq) + APPROACH_ROUNDING_M;
+        // set, or would be hit by a neighbour on that leg.
+        let here_m = greater(sqrtf(motion_sq) + APPROACH_ROUNDING_M, self.touching_m);
         let is_here = |leg| point_distance_sq(leg, here) <= here_m * here_m;
         // Most often that is the leg that the motion comes nearest to.
         if here_m < most_m && !is_here(nearest) && !other.segments().any(is_here) {
@@ -176,6 +180,12 @@ impl<'a> OwnSet<'a> {
         };
         nearer_m > 0.0 && self.legs.iter().any(is_nearer)
     }
+}
+
+/// The greater of two. A board takes three times as long for `max`, which asks for NaN too.
+#[inline]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 /// For each coordinate that of `b` if it is `more` than that of `a`, else that of `a`. Not `min`:

@@ -114,7 +114,8 @@ impl Guidance {
             FlightDirection::Stands => return,
         }
         let mut legs = Legs::new();
-        let own = OwnSet::new(&set, &mut legs);
+        let mut own = OwnSet::new(&set, &mut legs);
+        own.touching_m = 2.0 * self.track.radius_m;
         let mut found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
         if found.is_none() && on_pad {
             // PX4 disarms within seconds on the ground. So it does not arm beside a vehicle that

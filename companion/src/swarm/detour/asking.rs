@@ -74,8 +74,10 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> Duration {
         let retries = |at: Instant| view.now - at >= Duration::from_secs(DETOUR_RETRY_S);
-        let trapped =
-            view.guidance.trapped_since().filter(|_| self.no_way_aside_at.is_none_or(retries));
+        let may_seek = |_: &Instant| {
+            view.guidance.is_setpoint_at_reference() && self.no_way_aside_at.is_none_or(retries)
+        };
+        let trapped = view.guidance.trapped_since().filter(may_seek);
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 
