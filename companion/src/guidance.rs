@@ -95,6 +95,8 @@ const MIN_PROGRESS_M: f32 = 0.25;
 /// Distance before the geofence at which the raw point stops, metres: the setpoint may deviate by
 /// this much from the path.
 const FENCE_MARGIN_M: f32 = 0.05;
+/// Bisection steps that find where the path leaves the geofence: to 1 cm in the 3 m of a stop.
+const FENCE_HALVINGS: usize = 8;
 /// Greatest height above the ground at which a guided descent becomes slow, or an autopilot that is
 /// not led to the ground begins to land, metres; less where the margin to walls is.
 const MAX_LAND_HANDOVER_M: f32 = 1.2;

@@ -8,8 +8,8 @@ use planner_core::{Length, Point};
 use super::limits::JOIN_MPS;
 use super::smoother::TICK_S;
 use super::{
-    DESCENDED_M, FENCE_MARGIN_M, GUIDED_LANDING_STALL_TIMEOUT, Guidance, GuidanceInputs,
-    LEG_LEAD_M, MIN_LEG_M, Phase, SETTLE_WINDOW_M, TOUCHDOWN_MPS,
+    DESCENDED_M, FENCE_HALVINGS, FENCE_MARGIN_M, GUIDED_LANDING_STALL_TIMEOUT, Guidance,
+    GuidanceInputs, LEG_LEAD_M, MIN_LEG_M, Phase, SETTLE_WINDOW_M, TOUCHDOWN_MPS,
 };
 use crate::autopilot::AutopilotKind;
 use crate::guidance::evade;
@@ -140,11 +140,17 @@ impl Guidance {
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
         let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + FENCE_MARGIN_M;
-        if path
-            .point_at(self.tracker.along_m + braking_m)
-            .is_some_and(|ahead| !self.smoother.is_place_allowed(&ahead))
-        {
-            advice.stop_within_m = advice.stop_within_m.min(braking_m);
+        let allowed = |by_m: f32| {
+            let ahead = path.point_at(self.tracker.along_m + by_m);
+            ahead.is_none_or(|ahead| self.smoother.is_place_allowed(&ahead))
+        };
+        let (mut inside_m, mut outside_m) = (0.0, braking_m + FENCE_MARGIN_M);
+        if !allowed(outside_m) {
+            for _ in 0..FENCE_HALVINGS {
+                let middle_m = 0.5 * (inside_m + outside_m);
+                *if allowed(middle_m) { &mut inside_m } else { &mut outside_m } = middle_m;
+            }
+            advice.stop_within_m = advice.stop_within_m.min(inside_m - FENCE_MARGIN_M);
             self.stopped_at_fence = true;
         }
         let Reference { position, lead_m, .. } =

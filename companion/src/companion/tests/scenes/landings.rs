@@ -1,5 +1,9 @@
 //! Reason why the vehicle lands, and where there is room for it.
 
+use planner_core::flight::{Path, VehiclePlan};
+use rand_core::Rng;
+use rand_pcg::Pcg32;
+
 use super::State::*;
 use super::*;
 
@@ -52,6 +56,35 @@ pub(super) fn at_a_limit(scenes: &mut Scenes) {
         b.run_until(Land, 5.0);
     };
     scenes.play(Bench::started_with_neighbour(narrow), waits_inside, Aborted, 60.0);
+}
+
+/// Wherever and at whatever angle the path leaves the geofence, and where on the path the vehicle
+/// begins: it stops there, and does not fly on along the fence. The estimate is exact, and so no
+/// error of it ends the flight.
+#[test]
+fn who_comes_to_the_fence_lands_where_its_path_leaves_it() {
+    let mut rng = Pcg32::new(1, 1);
+    let mut draw =
+        |low: f32, high: f32| low + (high - low) * (rng.next_u32() >> 8) as f32 / 16_777_216.0;
+    for case in 0..60 {
+        let angle = draw(-1.3, 1.3);
+        let way = Point::new(12.0 * libm::cosf(angle), 12.0 * libm::sinf(angle), draw(0.0, 7.0));
+        let mut path = Path::new();
+        for point in [START, START + way, START + way + Point::new(0.0, 12.0, 0.0)] {
+            path.push(point, 1.2).unwrap();
+        }
+        let leaves = START + way * draw(0.1, 0.8);
+        let most = Point::new(leaves.x, 90.0, 90.0);
+        let mut config = fenced(config(), Point::new(0.0, -90.0, -1.0), most);
+        config.cruise_mps = draw(0.5, 3.0);
+        let mut b = Bench::new(config);
+        b.answer_plan = Some(Ok(VehiclePlan { path, ..plan() }));
+        b.run_until(Ready, 6.0);
+        b.start();
+        b.run_until(Land, 60.0);
+        let away_m = (b.enu - leaves).norm();
+        assert!(away_m < 0.4, "case {case}: {away_m} m from {leaves:?}: {:?}", b.texts);
+    }
 }
 
 /// Another is below where it lands.
