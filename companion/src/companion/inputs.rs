@@ -269,13 +269,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// The part of the time for which the safety filter has kept this vehicle from moving on that
-    /// counts against it. Over an area it begins once a vehicle that came down unheard must lie on
-    /// the ground: that one takes longer than this one yields, and then leaves room.
+    /// counts against it. It begins once a vehicle that came down unheard must lie on the ground:
+    /// that one takes longer than this one yields, and then leaves room.
     fn counted_hindrance(&self, hindered_for: Duration) -> Duration {
-        match self.config.lost_vehicle_down_s {
-            Some(_) => hindered_for.min(self.guidance.filter.time_since_fall(self.now)),
-            None => hindered_for,
-        }
+        hindered_for.min(self.guidance.filter.time_since_fall(self.now))
     }
 
     /// Time for which other vehicles have barred the descent to its pad, or the path there.

@@ -378,7 +378,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 add(setpoint);
                 first.into_iter().for_each(add);
             }
-            Land | LandingHeld => {
+            // A mission that is over in the air ends in a landing too.
+            Land | LandingHeld | Aborted => {
                 add(here);
                 add(Point::new(here.x, here.y, self.guidance.ground_m(plan)));
             }
