@@ -6,6 +6,9 @@ use crate::time::Duration;
 
 /// Age up to which a position is known.
 pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500);
+/// Time without progress after which a vehicle at the geofence no longer waits for room below: its
+/// landing is held then, and it flies back.
+const MAX_WAIT_AT_FENCE: Duration = Duration::from_secs(30);
 
 /// Condition of a row: a field of [`GuardInputs`], or a comparison of fields. "Limit" is the row's
 /// minimum duration. "MISSION_START" and other commands mean that the command is pending.
@@ -91,9 +94,9 @@ pub enum Guard {
     /// The motors are disarmed, HEARTBEAT is younger than 1.5 s, and the state has lasted for the
     /// limit.
     StaysDisarmed,
-    /// As [`Guard::StaysDisarmed`], while MISSION_START and DO_PAUSE_CONTINUE 0 are pending: the
-    /// start is paused, not cancelled.
-    StaysDisarmedPaused,
+    /// As [`Guard::StaysDisarmed`], while MISSION_START is pending: the start waits, it is not
+    /// cancelled.
+    StaysDisarmedStarted,
     /// The autopilot accepted arming, but HEARTBEAT has not shown the armed bit for 2.5 s.
     ArmedUnseen,
     /// As [`Guard::ColumnBlocked`], and arming was not requested yet.
@@ -209,7 +212,8 @@ pub enum Guard {
     /// The battery's charge is below the configured limit, no neighbour is below, and the vehicle
     /// neither seeks nor flies to a place aside to land at.
     BatteryLow,
-    /// The vehicle is outside the geofence or stands at it, and no neighbour is below.
+    /// The vehicle is outside the geofence or stands at it, and no neighbour is below, or it has
+    /// made no progress for 30 s (`MAX_WAIT_AT_FENCE`).
     OutsideGeofence,
     /// For longer than the limit no neighbour that flies was heard, or none reported that it hears
     /// this vehicle.
@@ -258,6 +262,9 @@ pub enum Guard {
     /// reported flight, and the vehicle has not risen. Otherwise a report of ground may be false,
     /// and disarming a fall.
     PausedBeforeLiftOff,
+    /// The safety filter has barred for the limit a climb that has not left the ground, as in
+    /// [`Guard::PausedBeforeLiftOff`].
+    BarredBeforeLiftOff,
     /// A vehicle that follows another plan of this mission has been heard, and the state has lasted
     /// for the limit.
     PlansDiffer,
@@ -319,12 +326,8 @@ impl Guard {
             Self::StaysDisarmed => {
                 !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE
             }
-            Self::StaysDisarmedPaused => {
-                !i.armed
-                    && i.in_state >= limit
-                    && i.heartbeat_age < MAX_HEARTBEAT_AGE
-                    && i.start
-                    && i.pause
+            Self::StaysDisarmedStarted => {
+                !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE && i.start
             }
             Self::ArmedUnseen => i.armed_unseen,
             Self::ArmingHeld => {
@@ -376,11 +379,14 @@ impl Guard {
             Self::Hindered => i.hindered_for >= limit && i.seeking_home_for.is_none(),
             Self::BatteryCritical => i.battery_critical,
             Self::BatteryLow => i.battery_low && i.room_below && !i.lands_aside,
-            Self::OutsideGeofence => i.outside && i.room_below,
+            Self::OutsideGeofence => {
+                i.outside && (i.room_below || i.stalled_for > MAX_WAIT_AT_FENCE)
+            }
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::LeaseLost => i.area && i.neighbour_age > limit,
             Self::NotDivided => i.in_state >= limit && i.division_overdue,
-            Self::PausedBeforeLiftOff => i.pause && i.on_ground && !i.vertical && !i.has_flown,
+            Self::PausedBeforeLiftOff => i.pause && i.is_before_lift_off(),
+            Self::BarredBeforeLiftOff => i.hindered_for >= limit && i.is_before_lift_off(),
             Self::WayFree => i.way_free,
             Self::OutOfRange => i.out_of_range && i.in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,

@@ -233,6 +233,12 @@ impl GuardInputs {
         self.can_fly_home && self.seeking_home_for.is_none()
     }
 
+    /// Whether the vehicle surely has not left the ground: the landing detector has not reported
+    /// flight, and the vehicle does not rise.
+    pub(super) fn is_before_lift_off(&self) -> bool {
+        self.on_ground && !self.vertical && !self.has_flown
+    }
+
     /// Whether the vehicle is in the air, whatever the landing detector reports.
     pub(super) fn is_in_air(&self) -> bool {
         self.armed && (self.airborne || self.vertical || self.height_m > SURELY_IN_AIR_M)

@@ -242,7 +242,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Arming],           G::ArmingUnanswered, AT_ONCE,   CancelStart, A::CancelStart,       "Arming not answered: start cancelled"),
     warning_row(&[Arming],           G::Elapsed,         secs(20),   CancelStart, A::CancelStart,       "Arming refused: mission aborted"),
     warning_row(&[CancelStart],      G::InAir,           AT_ONCE,    Land,        A::RequestLandMode,   "Lifted off all the same: landing"),
-    info_row(&[CancelStart],         G::StaysDisarmedPaused, ARMED_BIT_TIMEOUT, Scheduled, A::None,     ""),
+    info_row(&[CancelStart],         G::StaysDisarmedStarted, ARMED_BIT_TIMEOUT, Scheduled, A::None,    ""),
     info_row(&[CancelStart],         G::StaysDisarmed,   ARMED_BIT_TIMEOUT, Aborted, A::ForgetStart,    "Start is cancelled"),
     warning_row(&[CancelStart],      G::StaysArmed,      secs(5),    Land,        A::RequestLandMode,   "Still armed on the pad: landing"),
     info_row(&[TakeOff],             G::LiftedOff,       AT_ONCE,    Climb,       A::BeginClimb,        ""),
@@ -262,6 +262,8 @@ pub static TABLE: &[TransitionRow] = &[
     info_row(&[Dividing],            G::NothingToDivide, AT_ONCE,    Follow,      A::FollowPath,        "Nothing to divide: flying on"),
     warning_row(&[Dividing],         G::NotDivided,      secs(300),  Stopping,    A::BrakeOnPath,       "No division for 5 min: landing"),
     info_row(&[Climb],               G::PausedBeforeLiftOff, AT_ONCE, CancelStart, A::RequestDisarming, "Paused on the pad"),
+    // PX4 disarms after 10 s on the ground.
+    warning_row(&[Climb],            G::BarredBeforeLiftOff, secs(4), CancelStart, A::RequestDisarming, "Vehicle above the pad: start waits"),
     info_row(&[Climb, Follow, Alone, Blocked, Replanning, Dividing], G::PauseCommanded, AT_ONCE, Paused, A::BrakeOnPath, "Paused"),
     warning_row(&[Follow, Blocked, Dividing], G::NeighboursSilent, secs(1), Alone, A::BrakeOnPath,      "Neighbours silent: stopping"),
     // Others take what they do not hear to be down after a while: no state keeps it up longer.

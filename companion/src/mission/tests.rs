@@ -211,9 +211,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::DisarmedAtGoal => (i.armed, i.at_goal) = (false, true),
         G::StaysArmed => i.in_state = long,
         G::StaysDisarmed => (i.armed, i.in_state) = (false, long),
-        G::StaysDisarmedPaused => {
-            (i.armed, i.in_state, i.start, i.pause) = (false, long, true, true);
-        }
+        G::StaysDisarmedStarted => (i.armed, i.in_state, i.start) = (false, long, true),
         G::ArmedUnseen => i.armed_unseen = true,
         G::ArmingHeld => {
             (i.arming_unrequested, i.column_blocked_for, i.in_state) = (true, long, long);
@@ -280,6 +278,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::LeaseLost => (i.area, i.neighbour_age) = (true, long),
         G::NotDivided => (i.in_state, i.division_overdue) = (long, true),
         G::PausedBeforeLiftOff => (i.pause, i.on_ground) = (true, true),
+        G::BarredBeforeLiftOff => (i.hindered_for, i.on_ground) = (long, true),
         G::NeighbourHeard => i.neighbour_heard = true,
         G::OnGround => i.on_ground = true,
         G::PathBlocked => i.blocked = true,

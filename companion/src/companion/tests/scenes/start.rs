@@ -150,11 +150,30 @@ pub(super) fn arming(scenes: &mut Scenes) {
     scenes.play(arming_after(|b| b.never_arms = true), nothing, Aborted, 9.0);
     scenes.play(denied(), armed_late, Disarm, 6.0);
     arming_held(scenes);
+    scenes.play(Bench::new(two_vehicles()), climb_barred, Done, 60.0);
     let lifted_off = |b: &mut Bench| {
         armed_late(b);
         b.enu.z = 1.0;
     };
     scenes.play(denied(), lifted_off, Land, 2.0);
+}
+
+/// Another vehicle comes over the pad of one that is armed and has not left the ground: it disarms
+/// before its autopilot does, waits, and starts once the column is free.
+fn climb_barred(b: &mut Bench) {
+    b.neighbour = on_pad(ON_PLAN);
+    b.run_until(Ready, 6.0);
+    b.start();
+    b.run_until(Arming, 15.0);
+    while b.commands.iter().all(|c| c.0 != 400) {
+        b.run(0.05);
+    }
+    b.neighbour = flies(Point::new(8.0, 12.0, 3.0), ON_PLAN);
+    b.run_until(CancelStart, 9.0);
+    b.run(4.0);
+    assert!(b.state() == Scheduled && !b.armed, "{:?}", b.texts);
+    b.neighbour = on_pad(ON_PLAN);
+    b.run_until(Follow, 20.0);
 }
 
 /// Another vehicle comes over the pad so late that the mode is entered first: arming is not
