@@ -168,7 +168,7 @@ fn climb_barred(b: &mut Bench) {
     while b.commands.iter().all(|c| c.0 != 400) {
         b.run(0.05);
     }
-    b.neighbour = flies(Point::new(8.0, 12.0, 3.0), ON_PLAN);
+    b.neighbour = flies(Point::new(8.0, 12.0, 1.5), ON_PLAN);
     b.run_until(CancelStart, 9.0);
     b.run(4.0);
     assert!(b.state() == Scheduled && !b.armed, "{:?}", b.texts);
