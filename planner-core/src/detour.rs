@@ -29,8 +29,8 @@ const HOVER_SWAY_M: f32 = 0.05;
 /// safety filter allows no more.
 const PATH_APPROACH_ROUNDING_M: f32 = 0.002;
 
-/// Distance of centres at which two vehicles of 0.3 m radius touch, metres: a vehicle as near to the
-/// axis of a zone has nothing to keep there, and only has to leave.
+/// Distance of centres at which two vehicles of 0.3 m radius touch, metres: a vehicle as near to
+/// the axis of a zone has nothing to keep there, and only has to leave.
 const TOUCHING_M: f32 = 0.6;
 
 /// A capsule, or the column below a vehicle, that a detour keeps out of.

@@ -228,7 +228,7 @@ fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
     faller.until(&mut b, wait_s, |_| false);
     (faller.loss, faller.delay_s) = (faller.real(0.0, 0.3), faller.real(0.0, 0.8));
     // One in three right above: every way out leads nearer to the vertical first.
-    let off_most_m = if seed % 3 == 0 { 0.1 } else { 1.2 };
+    let off_most_m = if seed.is_multiple_of(3) { 0.1 } else { 1.2 };
     let (angle, off_m) = (faller.real(-3.2, 3.2), faller.real(0.0, off_most_m));
     let mut beside = Point::new(libm::cosf(angle), libm::sinf(angle), 0.0) * off_m;
     if state == Paused {
