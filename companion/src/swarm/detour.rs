@@ -58,7 +58,7 @@ const TURN_CLAIM: Duration = Duration::from_secs(1);
 /// Time by which each blocked vehicle with a lower system id delays this one's claim, seconds.
 const TURN_DELAY_S: u64 = 2;
 /// Further delay of the next claim after each search that found no detour, seconds.
-const DETOUR_RETRY_S: u64 = 5;
+const DETOUR_RETRY_S: u64 = 10;
 /// Time for which a vehicle waits while all others stand, after which it counts as blocked: the
 /// vehicle that it waits for has found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(15);
