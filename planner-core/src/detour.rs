@@ -255,12 +255,18 @@ pub struct DetourRequest {
     pub descent_m: f32,
     /// Vehicle radius + safety margin, metres: edges must have more clearance.
     pub required_clearance_m: f32,
-    /// Lowest and highest corner of the volume in which all legs over a height field have to be,
-    /// ENU metres; `None` if there is none.
+    /// Lowest and highest corner of the volume that no leg may leave, ENU metres; `None` if there is
+    /// none.
     pub fence: Option<(Point, Point)>,
 }
 
 impl DetourRequest {
+    /// Whether a place is inside the fence or on one of its faces.
+    pub(crate) fn is_inside_fence(&self, place: &Point) -> bool {
+        self.fence
+            .is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
+    }
+
     /// Checks that all positions are finite, and that height and clearances are finite and not
     /// negative; the error names the first that is not.
     pub fn check(&self) -> Result<(), ConfigError> {
@@ -327,6 +333,9 @@ pub fn plan_detour<const N: usize, const W: usize>(
     let clear = |a: &Point, b: &Point| {
         !obstacles.iter().any(|obstacle| obstacle.impassable_part(&here).intersects(a, b))
     };
+    // The fence is a box, so only the ends of legs are checked. The first leg may begin outside,
+    // where the vehicle has strayed.
+    let free = |a: &Point, b: &Point| request.is_inside_fence(b) && clear(a, b);
     let Goal::Node(number) = request.goal else {
         return Err(DetourError::Search(SearchError::NoPath));
     };
@@ -342,7 +351,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
         let to = view.node(edge.target);
         let near = !request.aside || (to - here).length() < MAX_SIDESTEP_M;
         near && view.has_clearance(edge, request.required_clearance_m)
-            && clear(&view.node(from), &to)
+            && free(&view.node(from), &to)
     };
     let mut search = |entry: u16, nodes: &mut Vec<u16, W>| {
         if !request.aside {
@@ -355,7 +364,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
     };
     let mut best = f32::INFINITY;
     let mut failed = Err(DetourError::Search(SearchError::NoPath));
-    for end in request.leg.iter().filter(|end| clear(&here, end)) {
+    for end in request.leg.iter().filter(|end| free(&here, end)) {
         let Some(entry) = (0..view.node_count() as u16).find(|&node| view.node(node) == *end)
         else {
             continue;
@@ -392,8 +401,10 @@ fn nearest_place_aside<const N: usize>(
 /// descending vehicles are not changed.
 pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.kind != ZoneKind::Descending) {
-        *obstacle = obstacle.shrunk_to(here, PATH_APPROACH_ROUNDING_M);
-        if obstacle.kind == ZoneKind::Static && obstacle.radius_m < TOUCHING_M {
+        let shrunk = obstacle.shrunk_to(here, PATH_APPROACH_ROUNDING_M);
+        let is_inside = shrunk.radius_m < obstacle.radius_m;
+        *obstacle = shrunk;
+        if is_inside && obstacle.kind == ZoneKind::Static && obstacle.radius_m < TOUCHING_M {
             // Below one that comes down: every way out may lead nearer to the vertical first.
             obstacle.radius_m = 0.0;
         }

@@ -159,7 +159,6 @@ fn a_fine_hall_of_a_million_edges_fits() {
         all.edges.len(),
         bytes.len()
     );
-    assert!(cfg!(debug_assertions) || took.as_secs_f64() < 8.0);
     assert_eq!(BOARDS[0].roadmap_excess(&RoadmapView::parse(&bytes).unwrap()), None);
 }
 

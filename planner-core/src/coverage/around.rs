@@ -47,25 +47,19 @@ struct LegConstraints<'a, 't, const N: usize> {
     transit: &'a Transit<'t, N>,
     field: Option<FieldView<'a>>,
     obstacles: &'a [KeepOutZone],
-    here: Point,
-    fence: Option<(Point, Point)>,
+    request: &'a DetourRequest,
 }
 
 impl<const N: usize> LegConstraints<'_, '_, N> {
     fn is_leg_free(&self, a: &Point, b: &Point) -> bool {
         let touches =
-            |obstacle: &KeepOutZone| obstacle.impassable_part(&self.here).intersects(a, b);
+            |obstacle: &KeepOutZone| obstacle.impassable_part(&self.request.here).intersects(a, b);
         // The fence is a box, so a leg between two points inside is inside. Only its end is
         // checked: the vehicle, where the first leg begins, may have strayed outside.
-        self.is_inside(b)
+        self.request.is_inside_fence(b)
             && self.transit.is_line_clear(&a.xy(), &b.xy())
             && self.is_above_field(a, b)
             && !self.obstacles.iter().any(touches)
-    }
-
-    fn is_inside(&self, place: &Point) -> bool {
-        self.fence
-            .is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
     }
 
     /// Whether a leg keeps [`MIN_HEIGHT_OVER_FIELD_M`] above the height field, at samples half a
@@ -103,8 +97,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
         return Err(DetourError::Search(SearchError::NoPath));
     };
     detour::shrink_zones(obstacles, &request.here);
-    let clear =
-        LegConstraints { transit, field, obstacles, here: request.here, fence: request.fence };
+    let clear = LegConstraints { transit, field, obstacles, request };
     let from = |points: &[Point], out: &mut Path<W>| {
         write_path(request, points, out).map_err(DetourError::Path)
     };
@@ -154,7 +147,7 @@ pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
 
 /// The nearest point on the rings that is outside all zones and reached by a free straight leg.
 fn nearest_reachable_place<const N: usize>(clear: &LegConstraints<'_, '_, N>) -> Option<Point> {
-    let here = clear.here;
+    let here = clear.request.here;
     let step = core::f32::consts::TAU / SIDESTEP_DIRECTIONS as f32;
     let place = |i: usize| {
         let (far_m, angle) =

@@ -91,6 +91,29 @@ fn who_is_too_near_already_may_leave_but_come_no_nearer() {
     assert_eq!(planned(&request(), &[ahead]).unwrap()[1], NODES[0]);
 }
 
+/// Small vehicles have small zones: only one that the vehicle is in is left out, whatever its size.
+#[test]
+fn zones_of_any_size_ahead_are_kept_out_of() {
+    for radius_m in [0.1, 0.3, 0.5, 0.7] {
+        let ahead = at(Point::new(6.0, 0.0, 5.0), radius_m);
+        assert_eq!(planned(&request(), &[ahead]).unwrap()[1], NODES[0], "{radius_m}");
+    }
+}
+
+#[test]
+fn no_way_leaves_the_fence() {
+    let here = request().here;
+    let fenced = |most: Point| {
+        let fence = Some((Point::new(-1.0, -1.0, 0.0), most));
+        planned(&DetourRequest { fence, ..request() }, &[at(Point::new(5.0, 0.0, 5.0), 1.0)])
+    };
+    let around = Ok(StdVec::from([here, NODES[0], NODES[3], NODES[1]]));
+    assert_eq!(fenced(Point::new(9.0, 5.0, 6.0)), around);
+    let none = Err(DetourError::Search(SearchError::NoPath));
+    assert_eq!(fenced(Point::new(9.0, 3.0, 6.0)), none);
+    assert_eq!(fenced(Point::new(7.0, 5.0, 6.0)), none, "the goal lies outside");
+}
+
 #[test]
 fn aside_is_the_nearest_node_that_nobody_lands_on() {
     let aside = DetourRequest { aside: true, ..request() };
