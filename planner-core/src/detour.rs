@@ -255,8 +255,8 @@ pub struct DetourRequest {
     pub descent_m: f32,
     /// Vehicle radius + safety margin, metres: edges must have more clearance.
     pub required_clearance_m: f32,
-    /// Lowest and highest corner of the volume that no leg may leave, ENU metres; `None` if there is
-    /// none.
+    /// Lowest and highest corner of the volume that no leg may leave, ENU metres; `None` without a
+    /// fence.
     pub fence: Option<(Point, Point)>,
 }
 
