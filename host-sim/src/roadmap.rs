@@ -286,7 +286,9 @@ fn describe(error: &PrmError) -> anyhow::Error {
             anyhow!("terminal {i} lies in an obstacle, in unknown space or outside the map")
         }
         PrmError::NoFreeSpace(found) => {
-            anyhow!("only {found} nodes found: too little of the map is free")
+            anyhow!(
+                "only {found} nodes found: too little of the map, or of mission.geofence, is free"
+            )
         }
         other => anyhow!("{other:?}"),
     }

@@ -52,6 +52,10 @@ struct Case {
 const STOPPED: &str = "Autopilot failsafe: setpoints stopped";
 const FOUND: &str = "Found in flight: no mission";
 const AT_GOAL: &str = "At the goal: landing";
+/// Room between starts and goals and a geofence around them, metres: that of the roadmap and some
+/// more, so that passages are found.
+const ROOM_AT_FENCE_M: f32 = 1.5;
+const AT_FENCE: &str = "Geofence reached: landing";
 /// No fault of the script: a fence that the paths of some vehicles leave.
 const GEOFENCE: &str = "geofence";
 const RETURNED: &str =
@@ -81,7 +85,8 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'companion-reset'", then: Out, says: &[FOUND] },
     Case { script: "kind = 'late-plan'\nduration_s = 40", then: GoesOn, says: &["Plan is late: asked again"] },
     Case { script: "kind = 'obstacle'\nradius_m = 0.4\nposition = AHEAD", then: GoesOn, says: &["Flying around", AT_GOAL] },
-    Case { script: GEOFENCE, then: Out, says: &["Geofence reached: landing"] },
+    // Detours stay inside the fence too: behind one that has landed at it there may be no way.
+    Case { script: GEOFENCE, then: Out, says: &[AT_FENCE, "No way around: landing"] },
     Case { script: "kind = 'pause-order'\nduration_s = 8", then: GoesOn, says: &["Resumed"] },
     Case { script: "kind = 'return-order'", then: Out, says: &["Flying back to the start", "Landing on the pad", CANCELLED] },
     Case { script: "kind = 'land-order'", then: Out, says: &["Landing as commanded", CANCELLED] },
@@ -117,9 +122,15 @@ impl Case {
 
 /// The demo's mission by a seed, and its plan.
 fn prepare(seed: u64) -> (Mission, Box<SwarmPlan>) {
+    prepare_inside(None, seed)
+}
+
+/// The same, planned inside a geofence.
+fn prepare_inside(geofence: Option<Geofence>, seed: u64) -> (Mission, Box<SwarmPlan>) {
     let mut scenario = scenario::parse(DEMO, "demo.toml").expect("the demo is good");
     scenario.seed = seed;
     scenario.simulation.time_limit_s = TIME_LIMIT_S;
+    scenario.mission.geofence = geofence;
     let mut mission =
         Mission::prepare(scenario, &Progress::on_terminal()).expect("the demo has room");
     let plan = mission.plan().expect("the demo has a plan");
@@ -197,6 +208,9 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
         if goes_on || !(struck.contains(&v.id) || others_short) || !rests {
             wrong.push(format!("vehicle {} ends in {}", v.id, v.end));
         }
+    }
+    if case.script == GEOFENCE && !said(AT_FENCE) {
+        wrong.push(format!("none of {struck:?} said {AT_FENCE:?}"));
     }
     for vehicle in struck {
         let log: Vec<&Event> = flight.log.iter().filter(|e| e.vehicle == Some(*vehicle)).collect();
@@ -349,6 +363,35 @@ fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
     let wrong: Vec<&str> =
         flown.iter().flatten().flat_map(|o| &o.wrong).map(String::as_str).collect();
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+/// Number of paths that leave a box.
+fn count_outside(plan: &SwarmPlan, fence: &Geofence) -> usize {
+    let paths = plan.flights.iter().map(|flight| flight.path.waypoints());
+    paths.filter(|points| points.iter().any(|w| !fence.contains(&w.position))).count()
+}
+
+#[test]
+fn plans_stay_inside_the_geofence_and_no_flight_meets_it() {
+    let mut left = 0;
+    for seed in 1..=SEEDS {
+        let (mission, plan) = prepare(seed);
+        let starts = mission.scenario.vehicles.iter().map(|v| v.start);
+        let ends: Vec<Point> = starts.chain(mission.scenario.mission.goals.clone()).collect();
+        let room = Point::repeat(ROOM_AT_FENCE_M);
+        let fence = Geofence {
+            min: ends.iter().copied().reduce(|a, b| a.inf(&b)).expect("there are starts") - room,
+            max: ends.iter().copied().reduce(|a, b| a.sup(&b)).expect("there are starts") + room,
+        };
+        left += count_outside(&plan, &fence);
+        let (mission, plan) = prepare_inside(Some(fence.clone()), seed);
+        assert_eq!(count_outside(&plan, &fence), 0, "seed {seed}");
+        let flight = fly(&mission, &plan);
+        assert!(flight.result.complete, "seed {seed}");
+        let met = flight.log.iter().find(|e| e.text.contains("eofence"));
+        assert!(met.is_none(), "seed {seed}: {met:?}");
+    }
+    assert!(left > 0, "no path of the missions without a fence would leave it");
 }
 
 #[test]

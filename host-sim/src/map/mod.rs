@@ -12,6 +12,7 @@ pub mod occupancy;
 pub mod octree;
 #[cfg(test)]
 mod reference_test;
+mod voxel_map;
 
 use std::path::Path;
 
@@ -19,8 +20,9 @@ pub use boxes::BoxTree;
 pub use edt::ClearanceField;
 pub use error::MapError;
 pub use ground::level_ground_map;
-pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
+pub use occupancy::{OccupancyMap, Unknown};
 pub use octree::{Occupancy, Octree};
+pub use voxel_map::VoxelMap;
 
 /// The names of maps that are accepted, for messages.
 pub const ACCEPTED_MAPS: &str =

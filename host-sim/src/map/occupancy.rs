@@ -1,4 +1,4 @@
-//! Occupancy of all cells of a planning grid, and the bit grids that planner-core queries.
+//! Occupancy of all cells of a planning grid.
 //!
 //! The leaves of an octree are resampled conservatively: a planning cell is occupied if any
 //! occupied leaf reaches into it, else unknown if any part of it is unknown, else free. Occupied
@@ -7,10 +7,11 @@
 //! begin at cell boundaries of the octree; with its own resolution every cell keeps its state.
 
 use planner_core::Point;
-use planner_core::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
+use planner_core::voxel::{GridShape, MAX_DIM, Outside};
 
 use super::error::MapError;
 use super::octree::{KEY_ORIGIN, KEYS_PER_AXIS, Occupancy, Octree};
+use super::voxel_map::VoxelMap;
 
 /// Share of a planning cell's edge that is neglected: more than the rounding error of f32 over
 /// [`MAX_DIM`] cells.
@@ -273,7 +274,7 @@ impl OccupancyMap {
 }
 
 /// Bricks along one axis that the cells `from..to` reach into: index, and mask of those cells.
-fn brick_masks(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
+pub(super) fn brick_masks(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
     let lane = |c: u32| match axis {
         0 => 0x1111_1111_1111_1111 << c,
         1 => 0x000f_000f_000f_000f << (4 * c),
@@ -287,70 +288,11 @@ fn brick_masks(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
         .collect()
 }
 
-/// The bit grids of a map that planner-core plans on.
-#[derive(Clone, Debug)]
-pub struct VoxelMap {
-    /// Dimensions, corner and resolution of the grid.
-    pub shape: GridShape,
-    /// One bit per cell: set if the cell is an obstacle.
-    pub obstacle_words: Vec<u64>,
-    /// Bits of the occupied cells alone, if unknown cells are obstacles too; `None` if
-    /// `obstacle_words` holds no unknown cells.
-    pub seen_obstacle_words: Option<Vec<u64>>,
-    /// Bits of the cells in which no roadmap node may lie, if these are more than the obstacles.
-    pub never_sample_words: Option<Vec<u64>>,
-    /// Whether the space beyond the map's faces is an obstacle.
-    pub outside: Outside,
-}
-
-impl VoxelMap {
-    /// The bit grid of obstacles that planner-core queries.
-    pub fn grid(&self) -> VoxelGrid<'_> {
-        VoxelGrid::new(self.shape, self.outside, &self.obstacle_words)
-            .expect("the words were made for the shape")
-    }
-
-    /// The bit grid of cells in which no roadmap node may lie; space beyond the map counts as such.
-    pub fn never_sample_grid(&self) -> VoxelGrid<'_> {
-        let words = self.never_sample_words.as_deref().unwrap_or(&self.obstacle_words);
-        VoxelGrid::new(self.shape, Outside::Blocked, words)
-            .expect("the words were made for the shape")
-    }
-
-    /// Whether a cell is an obstacle only because it is unknown. Panics for a cell outside the
-    /// grid.
-    pub fn is_unknown(&self, cell: [u32; 3]) -> bool {
-        let (word, mask) = self.shape.word_and_mask(cell);
-        self.seen_obstacle_words
-            .as_ref()
-            .is_some_and(|seen| self.obstacle_words[word] & !seen[word] & mask != 0)
-    }
-
-    /// Height on which a vehicle that sinks vertically from `point` comes to stand, metres: the top
-    /// of the first obstacle below it, or `point` itself inside an obstacle. Without an obstacle it
-    /// is the map's bottom if the outside is blocked, else `None`. Also `None` for a point beside
-    /// or below the map.
-    pub fn ground_below(&self, point: &Point) -> Option<f32> {
-        let mut inside = *point;
-        inside.z =
-            inside.z.clamp(self.shape.min.z, self.shape.max().z - self.shape.resolution_m / 2.0);
-        let [i, j, top] = self.shape.cell_of(&inside)?;
-        if point.z < self.shape.min.z {
-            return None;
-        }
-        let grid = self.grid();
-        let cell = (0..=top).rev().find(|&k| grid.is_occupied([i, j, k]));
-        let height = |k: u32| self.shape.min.z + k as f32 * self.shape.resolution_m;
-        match cell {
-            Some(k) => Some(height(k + 1).min(point.z)),
-            None => (self.outside == Outside::Blocked).then_some(self.shape.min.z),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use planner_core::voxel::VoxelGrid;
+
     use crate::map::octree::Leaf;
 
     /// A few leaves of each kind at odd places: 0.3 m cells, keys about the origin.

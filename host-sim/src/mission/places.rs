@@ -197,6 +197,12 @@ pub(super) fn build_roadmap(
     // edges whose stored clearance is too small for it.
     let smallest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(f32::INFINITY, f32::min);
     let (edge_min_m, edge_max_m) = edge_lengths(scenario, map)?;
+    // As far from the geofence as hulls are from walls: a vehicle beyond it lands. The fence is a
+    // box, so an edge between two nodes inside is inside.
+    let room = Point::repeat(settings.safety_margin_m);
+    let fence = scenario.mission.geofence.as_ref();
+    let fenced = fence.map(|f| map.with_nodes_inside(&(f.min + room), &(f.max - room)));
+    let map = fenced.as_ref().unwrap_or(map);
     let config = Config {
         nodes: settings.nodes as usize,
         edge_min_m,

@@ -1,0 +1,141 @@
+//! The bit grids of a map that planner-core queries.
+
+use planner_core::Point;
+use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+
+use super::occupancy::brick_masks;
+
+/// The bit grids of a map that planner-core plans on.
+#[derive(Clone, Debug)]
+pub struct VoxelMap {
+    /// Dimensions, corner and resolution of the grid.
+    pub shape: GridShape,
+    /// One bit per cell: set if the cell is an obstacle.
+    pub obstacle_words: Vec<u64>,
+    /// Bits of the occupied cells alone, if unknown cells are obstacles too; `None` if
+    /// `obstacle_words` holds no unknown cells.
+    pub seen_obstacle_words: Option<Vec<u64>>,
+    /// Bits of the cells in which no roadmap node may lie, if these are more than the obstacles.
+    pub never_sample_words: Option<Vec<u64>>,
+    /// Whether the space beyond the map's faces is an obstacle.
+    pub outside: Outside,
+}
+
+impl VoxelMap {
+    /// The bit grid of obstacles that planner-core queries.
+    pub fn grid(&self) -> VoxelGrid<'_> {
+        VoxelGrid::new(self.shape, self.outside, &self.obstacle_words)
+            .expect("the words were made for the shape")
+    }
+
+    /// The bit grid of cells in which no roadmap node may lie; space beyond the map counts as such.
+    pub fn never_sample_grid(&self) -> VoxelGrid<'_> {
+        let words = self.never_sample_words.as_deref().unwrap_or(&self.obstacle_words);
+        VoxelGrid::new(self.shape, Outside::Blocked, words)
+            .expect("the words were made for the shape")
+    }
+
+    /// This map, with no roadmap node in a cell that is not entirely inside the box between two
+    /// corners, ENU metres.
+    pub fn with_nodes_inside(&self, low: &Point, high: &Point) -> Self {
+        let masks = [0, 1, 2].map(|axis| {
+            let cells = |at_m: f32| (at_m - self.shape.min[axis]) / self.shape.resolution_m;
+            // `as` saturates, and a range that ends before it begins is empty.
+            let dim = self.shape.dims[axis];
+            let inside = brick_masks(
+                axis,
+                (cells(low[axis]).ceil() as u32).min(dim),
+                (cells(high[axis]).floor() as u32).min(dim),
+            );
+            let mut masks = vec![0; dim.div_ceil(4) as usize];
+            inside.into_iter().for_each(|(brick, mask)| masks[brick as usize] = mask);
+            masks
+        });
+        let all = [0, 1, 2].map(|axis| brick_masks(axis, 0, self.shape.dims[axis]));
+        let mut words = self.never_sample_grid().words().to_vec();
+        let mut word = words.iter_mut();
+        for (k, z) in &all[2] {
+            for (j, y) in &all[1] {
+                for (i, x) in &all[0] {
+                    let [i, j, k] = [i, j, k].map(|brick| *brick as usize);
+                    let inside = masks[0][i] & masks[1][j] & masks[2][k];
+                    *word.next().expect("a word for each brick") |= x & y & z & !inside;
+                }
+            }
+        }
+        Self { never_sample_words: Some(words), ..self.clone() }
+    }
+
+    /// Whether a cell is an obstacle only because it is unknown. Panics for a cell outside the
+    /// grid.
+    pub fn is_unknown(&self, cell: [u32; 3]) -> bool {
+        let (word, mask) = self.shape.word_and_mask(cell);
+        self.seen_obstacle_words
+            .as_ref()
+            .is_some_and(|seen| self.obstacle_words[word] & !seen[word] & mask != 0)
+    }
+
+    /// Height on which a vehicle that sinks vertically from `point` comes to stand, metres: the top
+    /// of the first obstacle below it, or `point` itself inside an obstacle. Without an obstacle it
+    /// is the map's bottom if the outside is blocked, else `None`. Also `None` for a point beside
+    /// or below the map.
+    pub fn ground_below(&self, point: &Point) -> Option<f32> {
+        let mut inside = *point;
+        inside.z =
+            inside.z.clamp(self.shape.min.z, self.shape.max().z - self.shape.resolution_m / 2.0);
+        let [i, j, top] = self.shape.cell_of(&inside)?;
+        if point.z < self.shape.min.z {
+            return None;
+        }
+        let grid = self.grid();
+        let cell = (0..=top).rev().find(|&k| grid.is_occupied([i, j, k]));
+        let height = |k: u32| self.shape.min.z + k as f32 * self.shape.resolution_m;
+        match cell {
+            Some(k) => Some(height(k + 1).min(point.z)),
+            None => (self.outside == Outside::Blocked).then_some(self.shape.min.z),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::{Occupancy, OccupancyMap, Unknown};
+
+    #[test]
+    fn nodes_lie_in_cells_that_are_entirely_inside_the_box() {
+        let shape =
+            GridShape { dims: [13, 9, 7], min: Point::new(-3.0, 2.0, 0.5), resolution_m: 0.3 };
+        let mut map = OccupancyMap::all_unknown(shape, "sample").unwrap();
+        map.fill([1, 0, 0], shape.dims, Occupancy::Free);
+        map.set([7, 4, 3], Occupancy::Occupied);
+        for unknown in [Unknown::Blocked, Unknown::Free] {
+            let map = map.voxel_map(unknown);
+            let (min, max) = (map.shape.min, map.shape.max());
+            let boxes = [
+                (Point::repeat(-1e9), Point::repeat(1e9)),
+                (min + Point::repeat(0.4), max - Point::repeat(0.5)),
+                (min + Point::new(2.0, -5.0, 0.1), Point::new(max.x + 1.0, max.y - 0.7, 1e9)),
+                (max + Point::repeat(1.0), max + Point::repeat(2.0)),
+                (min - Point::repeat(2.0), min - Point::repeat(1.0)),
+            ];
+            for (low, high) in boxes {
+                let fenced = map.with_nodes_inside(&low, &high);
+                assert_eq!(fenced.grid().words(), map.grid().words());
+                let (never, before) = (fenced.never_sample_grid(), map.never_sample_grid());
+                let [nx, ny, nz] = map.shape.dims;
+                for (i, j, k) in
+                    (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| (i, j, k))))
+                {
+                    let half = Point::repeat(0.5 * map.shape.resolution_m);
+                    let centre = map.shape.center([i, j, k]);
+                    let (from, to) = (centre - half, centre + half);
+                    let inside =
+                        (0..3).all(|a| from[a] >= low[a] - 1e-4 && to[a] <= high[a] + 1e-4);
+                    let want = before.is_occupied([i, j, k]) || !inside;
+                    assert_eq!(never.is_occupied([i, j, k]), want, "{low} {high} {i} {j} {k}");
+                }
+            }
+        }
+    }
+}
