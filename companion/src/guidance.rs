@@ -330,6 +330,7 @@ impl Guidance {
         let known = scene.telemetry.position_at.is_some();
         if !state.streams_setpoints() {
             self.smoother.end_stream();
+            self.forget_waiting();
             return true;
         }
         let kind = scene.telemetry.kind();
@@ -356,6 +357,7 @@ impl Guidance {
         if !self.smoother.has_setpoint() || taken {
             self.guides_landing = false;
             self.sent_acceleration = Point::zeros();
+            self.forget_waiting();
             self.finish_step(sends);
             return true;
         }
@@ -481,16 +483,6 @@ impl Guidance {
     /// Whether the vehicle is in the descent from the end of its path, or of a guided landing.
     pub(crate) fn is_descending(&self) -> bool {
         self.phase == Phase::Descent
-    }
-
-    /// Since when the vehicle has been below one that descends, unable to leave along its path.
-    pub(crate) fn trapped_since(&self) -> Option<Instant> {
-        self.trapped_since
-    }
-
-    /// Restarts the time for which the vehicle counts as trapped below one that descends.
-    pub(crate) fn reset_trap_timer(&mut self) {
-        self.trapped_since = None;
     }
 
     /// When the reference last advanced along the path by 0.25 m.

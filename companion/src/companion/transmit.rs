@@ -271,15 +271,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | flag(intent::OUT_OF_PLAN, out)
             | flag(intent::WAITING, self.detours.is_waiting(&view))
             | flag(intent::BLOCKED, self.detours.is_blocked())
-            | flag(
-                intent::ON_DETOUR,
-                self.detours.is_on_detour()
-                    || self.detours.has_left_plan()
-                    || self.guidance.evading,
-            )
+            | flag(intent::ON_DETOUR, self.is_detouring())
     }
 
-    fn own_intent(&self) -> Intent {
+    /// Whether this companion leads the vehicle beside its plan, or will. Where somebody else flies
+    /// it, nothing keeps it from coming down on others.
+    fn is_detouring(&self) -> bool {
+        use State::*;
+        !matches!(self.mission.state(), Failsafe | PilotControl | PilotReturned | Aborted)
+            && (self.detours.is_on_detour()
+                || self.detours.has_left_plan()
+                || self.guidance.evading)
+    }
+
+    pub(super) fn own_intent(&self) -> Intent {
         let plan = self.mission.plan();
         let along_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
         let (mut points, column) = self.points_ahead();
@@ -383,7 +388,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 add(here);
                 add(Point::new(here.x, here.y, self.guidance.ground_m(plan)));
             }
-            _ if self.guidance.hold.is_reported() => {
+            state if state.is_on_path() && self.guidance.hold.is_reported() => {
                 column = false;
                 add(setpoint);
             }

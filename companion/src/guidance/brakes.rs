@@ -101,6 +101,24 @@ impl Guidance {
         if expected { self.known_way.from_m.max(self.known_way.to_m) } else { f32::INFINITY }
     }
 
+    /// Since when the vehicle has been below one that descends, unable to leave along its path.
+    pub(crate) fn trapped_since(&self) -> Option<Instant> {
+        self.trapped_since
+    }
+
+    /// Restarts the time for which the vehicle counts as trapped below one that descends.
+    pub(crate) fn reset_trap_timer(&mut self) {
+        self.trapped_since = None;
+    }
+
+    /// Forgets where the vehicle waits, and what it reports of that: somebody else flies it now.
+    pub(super) fn forget_waiting(&mut self) {
+        self.cancel_evasion();
+        self.hold_changed |= self.hold.end();
+        (self.evading, self.back_to_m, self.no_better_place) = (false, None, false);
+        self.trapped_since = None;
+    }
+
     /// Notes whether the vehicle is trapped below one that descends: no place is better, or the way
     /// back is barred. `blocked`: a raw point of this step could not go back.
     pub(super) fn mark_trapped(&mut self, blocked: bool, now: Instant) {

@@ -42,6 +42,12 @@ impl Hold {
         core::mem::replace(&mut self.on, on) != on
     }
 
+    /// Ends the hold: the vehicle is led by somebody else. Returns whether it was on.
+    pub(super) fn end(&mut self) -> bool {
+        self.since = None;
+        core::mem::take(&mut self.on)
+    }
+
     /// Whether the vehicle's intents report the hold.
     pub(crate) fn is_reported(&self) -> bool {
         self.on

@@ -18,6 +18,7 @@ use planner_core::Point;
 mod false_ground;
 mod random;
 mod reported_ground;
+mod reports;
 
 const ARM: u16 = 400;
 const SET_MODE: u16 = 176;

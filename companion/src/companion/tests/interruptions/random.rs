@@ -47,6 +47,13 @@ impl Watch {
             self.log,
             b.texts
         );
+        let intent = b.companion.own_intent();
+        let leads_along = state.is_on_path() || state == State::Stopping;
+        assert!(
+            leads_along || intent.may_come_down,
+            "may come down unsaid in {state:?}: {intent:?} {:#?}",
+            self.log
+        );
         let foreign = !ours && b.mode != b.kind.land_mode() && b.armed && !b.silent;
         self.piloted = if foreign { self.piloted + 1 } else { 0 };
         for &(command, param1, ..) in &b.commands[self.commands..] {

@@ -1,0 +1,62 @@
+//! What a vehicle that somebody else flies reports to the others: not what it reported before.
+
+use super::*;
+use crate::link::intent::ON_DETOUR;
+
+/// Takes the vehicle, or comes to, one of these modes.
+const OTHERS_FLY: [State; 2] = [State::Failsafe, State::PilotControl];
+
+/// Somebody else flies the vehicle from now on.
+fn take(b: &mut Bench, by: State) {
+    (b.mode, b.status) = match (by, b.kind) {
+        (State::Failsafe, AutopilotKind::Px4) => (px4::RTL, 5),
+        (State::Failsafe, AutopilotKind::ArduPilot) => (ardupilot::RTL, 5),
+        _ => (pilot_mode(b.kind), 3),
+    };
+    b.run_until(by, 2.0);
+    b.run(0.5);
+}
+
+/// It may come down anywhere and flies along no points.
+fn check(b: &Bench, case: &str) {
+    let intent = b.companion.own_intent();
+    assert!(intent.may_come_down, "{case}: {intent:?}");
+    assert!(intent.points.is_empty(), "{case}: {intent:?}");
+    assert_eq!(intent.flags & (ON_DETOUR | ON_PLAN), 0, "{case}: {intent:?}");
+}
+
+/// A vehicle that stood said that it stays: until the autopilot or the pilot took it.
+#[test]
+fn who_is_taken_where_it_stood_no_longer_reports_that_it_stays() {
+    let mut held = 0;
+    for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
+        for (&(state, paused_in), by) in
+            CASES.iter().flat_map(|case| OTHERS_FLY.map(|by| (case, by)))
+        {
+            let Some(mut b) = reach(kind, state, paused_in) else { continue };
+            b.run(5.0);
+            if b.state() != state {
+                continue;
+            }
+            held += usize::from(b.companion.guidance.hold.is_reported());
+            take(&mut b, by);
+            check(&b, &format!("{kind:?} {state:?} {paused_in:?} {by:?}"));
+        }
+    }
+    assert!(held >= 4, "{held} of these reported that they stay");
+}
+
+/// Nor that it flies a detour, on which it would look for others before it lands.
+#[test]
+fn who_is_taken_on_a_detour_no_longer_reports_it() {
+    for by in OTHERS_FLY {
+        let mut b = reach(AutopilotKind::Px4, State::Blocked, None).expect("it can be blocked");
+        b.stuck = false;
+        b.answer_detour = Some(Ok(()));
+        b.run_until(State::Follow, 60.0);
+        assert_ne!(b.companion.own_intent().flags & ON_DETOUR, 0);
+        b.run(1.0);
+        take(&mut b, by);
+        check(&b, &format!("{by:?}"));
+    }
+}
