@@ -179,6 +179,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             path_done: follow
                 && (self.guidance.is_path_done(scene, now)
                     || (self.guidance.is_descending() && on_ground)),
+            flies_back: self.guidance.returning || self.detours.is_homeward(),
             at_goal: self.guidance.is_at_goal(scene) && !self.detours.is_homeward(),
             near_path: match (beneath, self.mission.state()) {
                 // Resuming a take-off or a landing does not depend on a place along the path.

@@ -116,6 +116,8 @@ pub enum Guard {
     LiftedOff,
     /// The vehicle has climbed to the start of its path.
     ClimbDone,
+    /// The vehicle has flown back to its start, and may land there.
+    BackAtStart,
     /// The vehicle is at the end of its path and may land there.
     PathDone,
     /// The vehicle has made no progress along its path for the limit.
@@ -341,6 +343,7 @@ impl Guard {
             Self::LandingModeLeft => !i.landing,
             Self::LiftedOff => i.lifted_off,
             Self::ClimbDone => i.climb_done,
+            Self::BackAtStart => i.path_done && i.flies_back,
             Self::PathDone => i.path_done,
             Self::Stalled => i.stalled_for >= limit,
             Self::Unfollowed => i.unfollowed_for >= limit,

@@ -155,6 +155,8 @@ pub struct GuardInputs {
     /// Whether the vehicle is at the end of its path and may land there, or is on the ground in its
     /// last descent.
     pub path_done: bool,
+    /// Whether the vehicle flies back to its start, along its path or straight home.
+    pub flies_back: bool,
     /// Whether the vehicle is at the goal of its plan.
     pub at_goal: bool,
     /// Whether the vehicle is near enough to its path to fly back to it, in the states that wait

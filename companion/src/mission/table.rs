@@ -253,6 +253,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Follow, Blocked],  G::HinderedOverField, secs(90), Blocked,     A::TurnHome,          "Vehicle on the path: planning the way home"),
     warning_row(&[Follow, Blocked],  G::Yielded,         secs(60),   Stopping,    A::BrakeOnPath,       "Yielded for 60 s: landing"),
     warning_row(&[Follow, Blocked],  G::Hindered,        secs(90),   Stopping,    A::BrakeOnPath,       "Vehicle on the path for 90 s: landing"),
+    info_row(&[Follow],              G::BackAtStart,     AT_ONCE,    Land,        A::RequestLandMode,   "Back at the start: landing"),
     info_row(&[Follow],              G::PathDone,        AT_ONCE,    Land,        A::RequestLandMode,   "At the goal: landing"),
     info_row(&[Follow, Blocked],     G::HoldsToDivide,   AT_ONCE,    Dividing,    A::BrakeOnPath,       "Area is divided again: waits"),
     info_row(&[Follow],              G::AroundFlown,     AT_ONCE,    Dividing,    A::BrakeOnPath,       ""),

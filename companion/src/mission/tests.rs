@@ -233,6 +233,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::Disarmed => i.armed = false,
         G::LiftedOff => i.lifted_off = true,
         G::ClimbDone => i.climb_done = true,
+        G::BackAtStart => (i.path_done, i.flies_back) = (true, true),
         G::PathDone => i.path_done = true,
         G::Unfollowed => i.unfollowed_for = long,
         G::Stalled => i.stalled_for = long,
