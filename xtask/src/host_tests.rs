@@ -43,8 +43,9 @@ const ALONE: [&str; 1] = ["rehearsal"];
 /// Tests of one program that run at once, on a core each. Those with boards mostly wait, so there
 /// is more than one.
 const TESTS_AT_ONCE: &str = "2";
-/// The same of a program whose tests wait for Python clients, which wait for real time.
-const CLIENTS_AT_ONCE: (&str, &str) = ("conformance", "4");
+/// The same of programs whose tests wait for Python clients, or for processes that keep real time.
+const WAITING_AT_ONCE: [(&str, &str); 3] =
+    [("closed_loop", "4"), ("conformance", "4"), ("rehearsal", "6")];
 
 /// Variables with which programs run.
 pub type Environment = Vec<(&'static str, OsString)>;
@@ -91,8 +92,8 @@ fn passes(program: &Program, environment: &Environment) -> Result<bool> {
     let begun = Instant::now();
     let mut tests = command(&program.path);
     tests.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
-    let (clients, clients_at_once) = CLIENTS_AT_ONCE;
-    let at_once = if program.name == clients { clients_at_once } else { TESTS_AT_ONCE };
+    let waiting = WAITING_AT_ONCE.iter().find(|(name, _)| *name == program.name);
+    let at_once = waiting.map_or(TESTS_AT_ONCE, |(_, at_once)| *at_once);
     tests.env("RUST_TEST_THREADS", at_once).envs(environment.iter().cloned());
     // The programs that tests run are built with them.
     tests.env("FLOCKMATE_BUILT", "1");
