@@ -11,7 +11,7 @@ use planner_core::voxel::{GridShape, MAX_DIM, Outside};
 
 use super::error::MapError;
 use super::octree::{KEY_ORIGIN, KEYS_PER_AXIS, Occupancy, Octree};
-use super::voxel_map::VoxelMap;
+use super::voxel_map::{VoxelMap, brick_masks};
 
 /// Share of a planning cell's edge that is neglected: more than the rounding error of f32 over
 /// [`MAX_DIM`] cells.
@@ -271,21 +271,6 @@ impl OccupancyMap {
         }
         words
     }
-}
-
-/// Bricks along one axis that the cells `from..to` reach into: index, and mask of those cells.
-pub(super) fn brick_masks(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
-    let lane = |c: u32| match axis {
-        0 => 0x1111_1111_1111_1111 << c,
-        1 => 0x000f_000f_000f_000f << (4 * c),
-        _ => 0xffff << (16 * c),
-    };
-    (from / 4..to.div_ceil(4))
-        .map(|brick| {
-            let cells = (0..4).filter(|c| (from..to).contains(&(brick * 4 + c)));
-            (brick, cells.fold(0, |bits, c| bits | lane(c)))
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -3,8 +3,6 @@
 use planner_core::Point;
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
 
-use super::occupancy::brick_masks;
-
 /// The bit grids of a map that planner-core plans on.
 #[derive(Clone, Debug)]
 pub struct VoxelMap {
@@ -95,6 +93,21 @@ impl VoxelMap {
             None => (self.outside == Outside::Blocked).then_some(self.shape.min.z),
         }
     }
+}
+
+/// Bricks along one axis that the cells `from..to` reach into: index, and mask of those cells.
+pub(super) fn brick_masks(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
+    let lane = |c: u32| match axis {
+        0 => 0x1111_1111_1111_1111 << c,
+        1 => 0x000f_000f_000f_000f << (4 * c),
+        _ => 0xffff << (16 * c),
+    };
+    (from / 4..to.div_ceil(4))
+        .map(|brick| {
+            let cells = (0..4).filter(|c| (from..to).contains(&(brick * 4 + c)));
+            (brick, cells.fold(0, |bits, c| bits | lane(c)))
+        })
+        .collect()
 }
 
 #[cfg(test)]
