@@ -15,8 +15,11 @@ impl<const V: usize> Fleet<V> {
         // The sender may fly, or have flown, by another plan: before a restart, or without what was
         // photographed meanwhile. Its divisions and places are none of this vehicle's plan.
         let same_plan = roster.plan == self.plan;
-        if same_plan && roster.divisions > here && !self.adopt_division(roster) {
-            self.excluded = !waits;
+        if same_plan && roster.divisions > here {
+            let left = self.has_left(sender, roster);
+            if !self.adopt_division(roster, left) && !left {
+                self.excluded = !waits;
+            }
         }
         let same = same_plan && usize::from(roster.divisions) == self.divisions.len();
         if same || !same_plan {
@@ -48,14 +51,24 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
+    /// Whether the sender of a report has left, as it says there or said before. A division that
+    /// only it had agreed to before it was cut off excludes nobody: it flew by that until its lease
+    /// ended, and the others divide what they had heard of it.
+    fn has_left(&self, sender: usize, roster: &RosterReport) -> bool {
+        let own = sender.checked_sub(usize::from(roster.first)).and_then(|i| roster.entries.get(i));
+        let known = &self.members[sender].entry;
+        own.unwrap_or(known).status == MemberStatus::Left
+    }
+
     /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
     /// then the others counted on that. Returns whether it did.
-    fn adopt_division(&mut self, roster: &RosterReport) -> bool {
+    /// Where the sender has `left`, the others may meanwhile have counted on a later hash instead.
+    fn adopt_division(&mut self, roster: &RosterReport, left: bool) -> bool {
         let here = self.divisions.len() as u8;
         if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
             return false;
         }
-        if roster.committed_hash == self.previous_hash {
+        if roster.committed_hash == self.previous_hash && (self.hash == 0 || !left) {
             (self.division_inputs, self.hash) = (self.previous_inputs.clone(), self.previous_hash);
         }
         let reported = roster.committed_hash == self.hash;

@@ -292,6 +292,36 @@ fn a_vehicle_that_hears_no_majority_is_missed_until_it_leaves() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 300 } else { 600 }))]
 
+    /// One that nobody hears any more may be the only one that knows that all have agreed on a
+    /// division. Heard again, it goes on with the others. Once it has landed, they have divided
+    /// without it, or are about to: they fly on.
+    #[test]
+    fn a_division_that_only_one_cut_off_agreed_to_excludes_nobody(
+        count in 4usize..=MOST, cut_after in 0usize..100, silent_s in 1u32..75,
+        seed in any::<u64>(), loss in proptest::sample::select(&[0.0f32, 0.1, 0.5][..]),
+    ) {
+        let mut swarm = Swarm::flying(count, loss, seed, PLANS[0]);
+        swarm.run_s(20);
+        swarm.end(count - 1, MemberStatus::Left);
+        (0..cut_after).for_each(|_| swarm.step());
+        (1..count).for_each(|to| swarm.links[to] &= !1);
+        // Its lease ends after 20 s, then it waits for 20 s, and lands.
+        swarm.run_s(silent_s.min(42));
+        if let Some(landed_for_s) = silent_s.checked_sub(42) {
+            swarm.end(0, MemberStatus::Left);
+            swarm.run_s(landed_for_s);
+        }
+        swarm.links = [u32::MAX; MOST];
+        swarm.run_s(90);
+        for own in usize::from(silent_s >= 42)..count - 1 {
+            let vehicle = &swarm.vehicles[own];
+            let fleet = &vehicle.fleet;
+            prop_assert!(vehicle.status == MemberStatus::Alive, "{own} landed: {fleet:?}");
+            prop_assert!(!fleet.is_dividing(), "{own} divides: {fleet:?}");
+            prop_assert_eq!(swarm.inputs(own), swarm.inputs(1));
+        }
+    }
+
     /// What landed vehicles report of an earlier flight, places and divisions, is of its plan.
     #[test]
     fn of_an_earlier_flight_nothing_counts(
