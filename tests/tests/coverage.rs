@@ -342,7 +342,7 @@ fn what_cannot_be_flown_is_refused_by_name() {
         ),
         (
             "start = [6, -10, -20]",
-            "flown: bad vehicle: asked:10: vehicle 7 starts -20.0 m above the ground",
+            "bad vehicle: asked:10: vehicle 7 starts 20.0 m below the ground",
         ),
         ("start = [0, -10, 20]", "vehicles 7 and 9 start 0.00 m apart"),
         ("start = [6, -10, 0]\nweight = 0", "weight must be a number from"),

@@ -36,8 +36,8 @@ use planner_core::frames::{Geodetic, enu_to_geodetic};
 pub use self::planned::{CoveragePlan, MAX_CORNERS, MAX_LANES, MAX_VEHICLES};
 use self::sorties::{BATTERY_SWAP_S, LaneTooLong, Sortie, USABLE_CHARGE};
 use crate::area::MAX_VERTICES;
-use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method, ORIGIN_HINT};
+use crate::scenario::{self, Scenario};
 
 /// Most changes of the lanes' order that the host tries while it shortens the path.
 pub const MAX_ORDER_CHANGES: u32 = 20_000_000;
@@ -56,9 +56,8 @@ impl<'a> CoveragePlan<'a> {
     /// No plan was found; the error says why, and names the place in the scenario.
     pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
         // A pad may be a roof, but not where altitude 0 only stands for one that is not given.
-        if scenario.area.as_ref().is_some_and(|area| area.origin.alt_m == 0.0) {
-            check_starts_on_ground(scenario)?;
-        }
+        let given = scenario.area.as_ref().is_some_and(|area| area.origin.alt_m != 0.0);
+        check_starts(scenario, if given { f32::INFINITY } else { MAX_OFF_GROUND_M })?;
         Self::plan_with_search(scenario, method, MAX_ORDER_CHANGES)
     }
 
@@ -322,17 +321,22 @@ fn build_tracks(
 /// # Errors
 /// A vehicle starts too far above or below the ground; the error names it.
 pub fn check_starts_on_ground(scenario: &Scenario) -> anyhow::Result<()> {
+    check_starts(scenario, MAX_OFF_GROUND_M)
+}
+
+/// Refuses a start below the ground, or more than `most_m` above it.
+fn check_starts(scenario: &Scenario, most_m: f32) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
-    let above_m =
-        |vehicle: &crate::scenario::Vehicle| vehicle.start.z - area.ground_m(&vehicle.start.xy());
-    let stray = |vehicle: &crate::scenario::Vehicle| above_m(vehicle).abs() > MAX_OFF_GROUND_M;
+    let above_m = |v: &scenario::Vehicle| v.start.z - area.ground_m(&v.start.xy());
+    let stray = |v: &scenario::Vehicle| !(-MAX_OFF_GROUND_M..=most_m).contains(&above_m(v));
     if let Some(index) = scenario.vehicles.iter().position(stray) {
         let vehicle = &scenario.vehicles[index];
         bail!(
-            "bad vehicle: {}: vehicle {} starts {:.1} m above the ground\nhint: {ORIGIN_HINT}",
+            "bad vehicle: {}: vehicle {} starts {:.1} m {} the ground\nhint: {ORIGIN_HINT}",
             scenario.vehicle_places[index],
             vehicle.id,
-            above_m(vehicle)
+            above_m(vehicle).abs(),
+            if above_m(vehicle) < 0.0 { "below" } else { "above" }
         );
     }
     Ok(())
@@ -374,7 +378,7 @@ fn zone_at(area: &Area<'_>, place: &Flat) -> Option<usize> {
 }
 
 /// The planner's description of a vehicle: pad, speeds and weight.
-fn planner_vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
+fn planner_vehicle(vehicle: &scenario::Vehicle, scenario: &Scenario) -> Vehicle {
     let place = vehicle.start.xy();
     let [climb_mps, descend_mps] = vehicle.climb_and_descent_mps();
     Vehicle {

@@ -16,8 +16,8 @@ use crate::coverage::obstacles::Obstacles;
 use crate::terrain::HeightGrid;
 
 /// Hint of an error about a vehicle whose start is not on the ground.
-pub const ORIGIN_HINT: &str =
-    "area.origin = { lat_deg = …, lon_deg = …, alt_m = … } says how high the ground is";
+pub const ORIGIN_HINT: &str = "area.origin = { lat_deg = …, lon_deg = …, alt_m = … } says how high the ground is; a start's alt_m counts from \
+     sea level too";
 
 /// `[area]`: the area of a coverage mission, and how it is photographed.
 #[derive(Clone, Debug)]
