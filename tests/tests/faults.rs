@@ -55,6 +55,7 @@ const AT_GOAL: &str = "At the goal: landing";
 /// Room between starts and goals and a geofence around them, metres: that of the roadmap and some
 /// more, so that passages are found.
 const ROOM_AT_FENCE_M: f32 = 1.5;
+const FLIES_BACK: &str = "No way around, no room below: flying back";
 const AT_FENCE: &str = "Geofence reached: landing";
 /// No fault of the script: a fence that the paths of some vehicles leave.
 const GEOFENCE: &str = "geofence";
@@ -86,7 +87,7 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'late-plan'\nduration_s = 40", then: GoesOn, says: &["Plan is late: asked again"] },
     Case { script: "kind = 'obstacle'\nradius_m = 0.4\nposition = AHEAD", then: GoesOn, says: &["Flying around", AT_GOAL] },
     // Detours stay inside the fence too: behind one that has landed at it there may be no way.
-    Case { script: GEOFENCE, then: Out, says: &[AT_FENCE, "No way around: landing"] },
+    Case { script: GEOFENCE, then: Out, says: &[AT_FENCE, "No way around: landing", FLIES_BACK] },
     Case { script: "kind = 'pause-order'\nduration_s = 8", then: GoesOn, says: &["Resumed"] },
     Case { script: "kind = 'return-order'", then: Out, says: &["Flying back to the start", "Landing on the pad", CANCELLED] },
     Case { script: "kind = 'land-order'", then: Out, says: &["Landing as commanded", CANCELLED] },
