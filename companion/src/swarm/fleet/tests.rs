@@ -298,27 +298,31 @@ proptest! {
     #[test]
     fn a_division_that_only_one_cut_off_agreed_to_excludes_nobody(
         count in 4usize..=MOST, cut_after in 0usize..100, silent_s in 1u32..75,
+        rank in 0usize..MOST - 1, deaf in any::<bool>(),
         seed in any::<u64>(), loss in proptest::sample::select(&[0.0f32, 0.1, 0.5][..]),
     ) {
+        let cut = rank % (count - 1);
         let mut swarm = Swarm::flying(count, loss, seed, PLANS[0]);
         swarm.run_s(20);
         swarm.end(count - 1, MemberStatus::Left);
         (0..cut_after).for_each(|_| swarm.step());
-        (1..count).for_each(|to| swarm.links[to] &= !1);
+        swarm.links.iter_mut().for_each(|from| *from &= !(1 << cut));
+        swarm.links[cut] = if deaf { 0 } else { u32::MAX };
         // Its lease ends after 20 s, then it waits for 20 s, and lands.
         swarm.run_s(silent_s.min(42));
         if let Some(landed_for_s) = silent_s.checked_sub(42) {
-            swarm.end(0, MemberStatus::Left);
+            swarm.end(cut, MemberStatus::Left);
             swarm.run_s(landed_for_s);
         }
         swarm.links = [u32::MAX; MOST];
         swarm.run_s(90);
-        for own in usize::from(silent_s >= 42)..count - 1 {
+        let flies_on = |own: &usize| *own != cut || silent_s < 42;
+        for own in (0..count - 1).filter(flies_on) {
             let vehicle = &swarm.vehicles[own];
             let fleet = &vehicle.fleet;
             prop_assert!(vehicle.status == MemberStatus::Alive, "{own} landed: {fleet:?}");
             prop_assert!(!fleet.is_dividing(), "{own} divides: {fleet:?}");
-            prop_assert_eq!(swarm.inputs(own), swarm.inputs(1));
+            prop_assert_eq!(swarm.inputs(own), swarm.inputs(usize::from(cut == 0)));
         }
     }
 
