@@ -11,7 +11,7 @@ const LINKER_CHECKS: &str = r#"
 ASSERT(__e_shell <= _stack_end - 4K, "the companion reaches into the stack's guard");
 ASSERT(SIZEOF(.data) <= 16K, "what is large has a first value that is not all zeros");
 "#;
-/// Linker sections of the firmware for the chip, which is one program.
+/// Sections that must not be empty in the H743's firmware; there no other program is built.
 const CHIP_SECTIONS: &str = r#"
 ASSERT(SIZEOF(.shell) > 0 && SIZEOF(.swarm_plan) > 0 && SIZEOF(.own_plan) > 0 && SIZEOF(.mission) > 0 && SIZEOF(.dma) > 0,
   "a part has lost its name, or its first value is not all zeros");
@@ -26,7 +26,8 @@ fn main() {
     let boards = manifest.join("src/boards");
     if chosen("QEMU") {
         link(&boards.join("qemu/memory.x"), &[LINKER_CHECKS]);
-        // Its interrupts are all in its own table; the chips' crates bring theirs.
+        // `boards/qemu/vectors.rs` holds all interrupts of this board; the chips' crates bring
+        // theirs.
         write("device.x", b"");
     } else if chosen("NUCLEO_H743") {
         link(&manifest.join("../memory.x"), &[LINKER_CHECKS, CHIP_SECTIONS]);
@@ -44,9 +45,9 @@ fn write(name: &str, bytes: &[u8]) {
     println!("cargo:rustc-link-search={}", out().display());
 }
 
-/// Cortex-m-rt's script includes `memory.x`, and a linker looks for that where it was started
-/// first: at the top of the checkout, which is right for the default board alone. So the script is
-/// copied to include the chosen board's map instead, and the checks behind it.
+/// Cortex-m-rt's linker script includes `memory.x`. The linker first searches the directory in
+/// which it was started, the top of the checkout, whose `memory.x` is the default board's. So the
+/// script is copied, with the chosen board's map included instead and the checks appended.
 fn link(memory: &Path, checks: &[&str]) {
     println!("cargo:rerun-if-changed={}", memory.display());
     write("board-memory.x", &fs::read(memory).expect("the board has a memory map"));

@@ -1,7 +1,7 @@
 //! The drain contract as a run loop: bytes and time in, bytes and events out.
 //!
-//! The clock counts steps of 10 ms, and of the autopilot there is a HEARTBEAT each second. A shell
-//! in its place reads a clock, reads and writes two ports, and plans elsewhere
+//! Here the clock counts steps of 10 ms, and the autopilot sends only a HEARTBEAT each second. A
+//! real shell reads a clock, reads and writes two ports, and plans elsewhere
 //! (`planner_core::plan`).
 //!
 //! `cargo run -p companion --example run_loop`
@@ -38,8 +38,8 @@ fn main() {
     println!("{sent} bytes sent");
 }
 
-/// 3. All that the companion has to say: events until `None`, frames for both links until 0. The
-///    bytes sent.
+/// 3. All that the companion has to say: events until `None`, frames for both links until 0.
+///    Returns the number of bytes sent.
 ///
 /// A shell with a flash also drains `poll_flash`, and answers by `handle_flash`.
 fn drain(companion: &mut Small, now: Instant) -> usize {

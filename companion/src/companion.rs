@@ -44,15 +44,16 @@ const ROSTER_EVERY: Duration = Duration::from_millis(500);
 const ROSTER_EVERY_DIVIDING: Duration = Duration::from_millis(200);
 /// Period of HEARTBEAT.
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
-/// Range of ArduCopter's `GUID_TIMEOUT`, the time without setpoints after which Guided mode stops
-/// the vehicle, seconds. Within the range it is the time in which cruise speed covers the safety
-/// margin to walls. ArduCopter's own 3 s would fly the last velocity on through walls while a link
-/// stalls; the shortest is four setpoints.
+/// Limits of the value that the companion sets for ArduCopter's `GUID_TIMEOUT`, the time without
+/// setpoints after which Guided mode stops the vehicle, seconds. Within the limits it is the time
+/// in which a vehicle at cruise speed covers the safety margin to walls. With the default of 3 s it
+/// would fly on into walls while a link stalls. The lower limit is four setpoint periods.
 const GUID_TIMEOUT_RANGE_S: (f32, f32) = (0.2, 0.5);
 /// Maximum number of transitions of the mission table that one step makes. More would mean that the
 /// table has a cycle.
 const MAX_TRANSITIONS_PER_STEP: usize = 4;
-/// Maximum number of events that wait for the shell; when they are full a further event is dropped.
+/// Maximum number of events that wait for the shell; when the queue is full a further event is
+/// dropped.
 const MAX_EVENTS: usize = 16;
 
 /// The companion of one UAV: at most `V` vehicles in the swarm, and at most `W` waypoints and `G`
@@ -155,8 +156,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// System id of the neighbour that the safety filter stops for at `now`, computed as in each
-    /// step; 0 for none. The call leaves the state as it was: benches count the filter's
-    /// instructions by it.
+    /// step; 0 for none. The call changes no state: benches call it to count the filter's
+    /// instructions.
     pub fn query_filter(&mut self, now: Instant) -> u8 {
         let scene = GuidanceInputs::new(
             self.mission.plan(),
@@ -235,7 +236,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             );
             self.links.set_due(Link::Swarm, OnDemandMessage::Intent, true);
         }
-        // Its period is its own: neither a multiple of the intent's nor of the step's.
+        // The roster message has a period of its own, no multiple of the intent's or of the step's.
         if let Some(fleet) = self.neighbours.fleet()
             && self.timers.is_due(Timer::Roster, now)
         {
@@ -313,7 +314,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Starts requesting the telemetry streams; on the ground, disarmed, also the autopilot's
-    /// limits, and returns to their defaults until these are read.
+    /// limits; guidance uses the default limits until these are read.
     fn request_streams(&mut self) {
         let situation = self.request_context();
         if self.requests.begin_requesting_streams(

@@ -42,9 +42,11 @@ pub struct Config<const V: usize> {
     pub mission_crc: u32,
     /// Nominal speed of this vehicle along its path, m/s.
     pub cruise_mps: f32,
-    /// Cruise of the slowest vehicle of the mission, m/s: what an unheard one surely flies at.
+    /// Cruise speed of the slowest vehicle of the mission, m/s: an unheard vehicle is assumed to
+    /// fly at least at a share of it.
     pub slowest_mps: f32,
-    /// Cruise of the fastest vehicle of the mission, m/s: how far an unheard one may have come.
+    /// Cruise speed of the fastest vehicle of the mission, m/s: it bounds how far an unheard
+    /// vehicle may have flown.
     pub fastest_mps: f32,
     /// Speed of this vehicle's climb from its pad, m/s.
     pub climb_mps: f32,
@@ -59,13 +61,14 @@ pub struct Config<const V: usize> {
     pub required_clearance_m: f32,
     /// Smallest distance between two vehicles' centres, metres.
     pub safety_distance_m: f32,
-    /// Method by which advice keeps vehicles apart.
+    /// Method by which the advice on speed and stops (`planner_core::deconflict`) keeps vehicles
+    /// apart.
     pub method: Method,
     /// Least error of the position estimate that is assumed, whatever accuracy the autopilot
     /// reports, metres (`FLK_EST_M`): the operator vouches by it for the receiver.
     pub estimate_m: f32,
     /// Range within which the swarm's radio surely works, metres (`FLK_RADIO_M`). A neighbour that
-    /// falls silent beyond 0.7 of that is taken to be out of range, not failed. With
+    /// falls silent beyond 0.7 of this range is taken to be out of range, not failed. With
     /// [`REACHES_ALL_M`] the radio reaches every vehicle, so any silence is a failure.
     pub radio_range_m: f32,
     /// Greatest horizontal distance between this vehicle and its pad with which it takes off,
@@ -78,8 +81,8 @@ pub struct Config<const V: usize> {
     pub swarm_hz: u8,
     /// Geofence: minimum and maximum corner of the box that this vehicle may be in, ENU metres.
     pub geofence: Option<(Point, Point)>,
-    /// `Some` for a coverage mission, whose area is divided again after the loss of a vehicle: the
-    /// longest time that a lost vehicle takes to come down, seconds.
+    /// In a coverage mission, whose area is divided again after the loss of a vehicle: the longest
+    /// time that a lost vehicle takes to come down, seconds. `None` in a mission with goals.
     pub lost_vehicle_down_s: Option<f32>,
     /// Height range of the ground below a coverage mission whose ground is not level.
     pub ground: Option<Ground>,
@@ -106,7 +109,7 @@ pub struct CheckedConfig<const V: usize> {
 pub enum ConfigError {
     /// The vehicle's own system id is not in the roster, or 0.
     NotInRoster,
-    /// The roster is not sorted by system id, or names one twice.
+    /// The roster is not sorted by system id, or names an id twice.
     RosterOrder,
     /// A number is NaN or infinite, or a speed, acceleration or distance is not positive.
     NotPositive,
@@ -116,7 +119,7 @@ pub enum ConfigError {
     Geofence,
     /// The vehicle with this system id starts outside the geofence.
     StartOutside(u8),
-    /// A setting of the planner that is derived from these numbers is out of its range; its name.
+    /// The setting of this name, which the planner derives from these numbers, is out of its range.
     Setting(&'static str),
 }
 
@@ -254,8 +257,7 @@ mod tests {
     }
 
     proptest! {
-        /// A vehicle that starts outside the geofence is named, whatever the box, the first of the
-        /// roster.
+        /// The first vehicle of the roster that starts outside the geofence is named in the error.
         #[test]
         fn who_starts_outside_the_geofence_is_named(
             low in proptest::array::uniform3(-2.0f32..12.0),

@@ -1,4 +1,4 @@
-//! Events from the companion to its shell: everything that passes between the two beside bytes.
+//! Events from the companion to its shell: everything that it passes to the shell other than bytes.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -18,17 +18,17 @@ pub enum Link {
 pub enum PlanKind {
     /// The plan of the whole mission, for the flight from the pad.
     Mission,
-    /// A detour around an obstacle, or a path aside: [`crate::Companion::detour_request`] has its
-    /// start, its end and its keep-out zones.
+    /// A detour around an obstacle, or a path home or aside: [`crate::Companion::detour_request`]
+    /// has its start, its end and its keep-out zones.
     Detour,
     /// The plan that divides the rest of an area after losses:
-    /// [`crate::Companion::division_inputs`] has the vehicles and waypoints.
+    /// [`crate::Companion::division_inputs`] has the state of all vehicles at each division so far.
     Division,
 }
 
 impl PlanKind {
-    /// A detour first: the vehicle that needs it may be below one that descends. The mission's plan
-    /// last: a vehicle without one is on its pad.
+    /// The kinds, most urgent first. A detour comes first: the vehicle that needs it may be below
+    /// one that descends. The mission's plan comes last: a vehicle without one is on its pad.
     const BY_URGENCY: [Self; 3] = [Self::Detour, Self::Division, Self::Mission];
 
     const fn bit(self) -> u8 {
@@ -49,7 +49,7 @@ impl PlanRequests {
         Self { waiting: AtomicU8::new(0) }
     }
 
-    /// Adds a request; one of that kind that waits already stays the only one.
+    /// Adds a request; nothing changes if one of this kind waits already.
     pub fn add(&self, wanted: PlanKind) {
         self.waiting.fetch_or(wanted.bit(), Ordering::Relaxed);
     }
@@ -87,8 +87,8 @@ pub enum Event {
         /// Number of waypoints that are left.
         left: u32,
     },
-    /// This vehicle has waited for long for a vehicle that was not started; repeated while it
-    /// waits.
+    /// This vehicle has waited for 30 s for a vehicle that was not started; repeated every 30 s
+    /// while it waits.
     WaitsForStart {
         /// MAVLink system id of the vehicle that was not started.
         id: u8,

@@ -1,11 +1,11 @@
-//! Guidance makes the setpoints: from path, neighbours and the autopilot's position it moves a raw
-//! point, by the state, and its smoother turns the raw point into a setpoint that can be flown.
+//! Guidance makes the setpoints. From mission state, path, neighbours and the autopilot's position
+//! it moves a raw point; its smoother turns the raw point into a setpoint that can be flown.
 //!
 //! A flight has phases: the climb straight up from where the vehicle stands, the join to the path's
 //! start, the path, the descent. The phase is guidance's own state. A pause, a lost position or a
-//! pilot interrupts it; afterwards it continues where it was. A stop slows the smoother's clock, so
-//! the raw point stays where it is. Once the setpoint stands, the raw point is set back to it, and
-//! the flight continues by a straight leg to where the phase was left.
+//! pilot interrupts the flight; afterwards it continues in the same phase. A stop slows the
+//! smoother's clock, so the raw point stays where it is. Once the setpoint stands, the raw point is
+//! set back to it, and the flight continues by a straight leg to where the phase was left.
 
 mod brakes;
 pub(crate) mod evade;
@@ -51,7 +51,8 @@ pub use self::scene::GuidanceInputs;
 pub use self::setpoint::Setpoint;
 pub use self::smoother::SetpointStats;
 
-/// Distance from the end of a climb or a path within which it counts as reached, metres.
+/// A vehicle this near to its reference, or to the end of a climb or a path, counts as there,
+/// metres.
 const ARRIVED_M: f32 = 0.35;
 /// A vehicle within [`ARRIVED_M`] of its reference reports its progress at most this far short of
 /// the reference, metres: 0.05 m less than gates allow (`PROGRESS_ERROR_M`), since a vehicle stops
@@ -63,20 +64,20 @@ const AT_REST_MPS: f32 = 0.5;
 const STANDING_SETPOINT_MPS: f32 = 0.05;
 /// A climb is done within this vertical distance of its top, metres.
 const CLIMBED_M: f32 = 0.12;
-/// A guided descent is done less than this high above its lower end, metres.
+/// A guided descent is done within this height above its lower end, metres.
 const DESCENDED_M: f32 = 0.2;
 /// Time for which the setpoint rests at the end of a guided descent before the autopilot's landing
 /// mode takes over, even if the vehicle has not reached that point.
 const LAND_AFTER: Duration = Duration::from_secs(2);
-/// Time without progress of a landing that setpoints lead down, after which the autopilot's own
-/// landing takes over.
+/// Time without progress of a guided landing after which the autopilot's own landing takes over.
 const GUIDED_LANDING_STALL_TIMEOUT: Duration = Duration::from_secs(4);
 /// Greatest distance of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
 const LEG_LEAD_M: f32 = 1.5;
 /// Greatest speed with which the setpoint of a vehicle on its pad follows the position estimate
 /// before the take-off, m/s.
 const MAX_PAD_DRIFT_MPS: f32 = 0.2;
-/// Length of path searched, to either side, for the point nearest to a vehicle after its pilot, m.
+/// Length of path searched, to either side, for the point nearest to a vehicle after a pilot has
+/// flown it, metres.
 pub const REJOIN_WINDOW_M: f32 = 5.0;
 /// Length of path searched, to either side, for the point nearest to a vehicle whose position was
 /// lost, metres: it stopped within its braking distance of the reference, so a position further
@@ -87,8 +88,8 @@ pub const LOST_WINDOW_M: f32 = 2.5;
 const SETTLE_WINDOW_M: f32 = 3.0;
 /// A nearest point this close to an end of the searched path counts as not found, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
-/// Distance along the path between setpoint and reference up to which the setpoint has come to it,
-/// metres: the averages of a setpoint that stands leave millimetres.
+/// A setpoint within this distance of the reference along the path has reached it, metres: after
+/// the averages a setpoint that stands is still millimetres off.
 const SETTLED_M: f32 = 0.05;
 /// Advance of the reference along the path that counts as progress, metres.
 const MIN_PROGRESS_M: f32 = 0.25;
@@ -97,15 +98,16 @@ const MIN_PROGRESS_M: f32 = 0.25;
 const FENCE_MARGIN_M: f32 = 0.05;
 /// Bisection steps that find where the path leaves the geofence: to 1 cm in the 3 m of a stop.
 const FENCE_HALVINGS: usize = 8;
-/// Greatest height above the ground at which a guided descent becomes slow, or an autopilot that is
-/// not led to the ground begins to land, metres; less where the margin to walls is.
+/// Upper bound of `low_height_m`, the height above the ground from which a guided descent is slow,
+/// or an autopilot that is not led to the ground lands by itself, metres; the margin to walls is
+/// another upper bound.
 const MAX_LAND_HANDOVER_M: f32 = 1.2;
 /// Greatest speed of a guided descent near the ground, m/s: that of ArduCopter's landing.
 const TOUCHDOWN_MPS: f32 = 0.5;
 /// A leg shorter than this counts as flown, metres.
 const MIN_LEG_M: f32 = 1e-3;
 
-/// Advice until the neighbours were evaluated: stand.
+/// Advice before the neighbours are first evaluated: stand.
 const NO_ADVICE_YET: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
 
 /// State of guidance: flight phase, raw point, smoother and safety filter.
@@ -117,7 +119,7 @@ pub struct Guidance {
     deconflict: DeconflictConfig,
     /// Speed of the mission's fastest vehicle, m/s.
     fastest_mps: f32,
-    /// Share of the speed that the error bound of the position estimate allows; 0 stops.
+    /// Share of the nominal speed that the error bound of the position estimate allows; 0 stops.
     pub estimate_speed_share: f32,
     /// The smoother, which makes setpoints of raw points.
     pub smoother: SetpointSmoother,
@@ -162,7 +164,8 @@ pub struct Guidance {
     stopped_at_fence: bool,
     progress_m: f32,
     progress_at: Instant,
-    /// When the vehicle was last at its setpoint or that advanced, and the setpoint's place then.
+    /// When the vehicle was last at its setpoint, or the setpoint last advanced; and where the
+    /// setpoint was then.
     followed_at: Instant,
     followed_place: Point,
     reported_m: f32,
@@ -177,18 +180,20 @@ pub struct Guidance {
     wait_distance_m: f32,
     /// Place along the path where the vehicle holds for a division, metres; ∞ for none.
     halt_m: f32,
-    /// Place along the path to which the vehicle steps back from below one that descends, metres.
+    /// Place along the path to which the vehicle steps back from below one that descends, metres;
+    /// `None` if it does not step back.
     back_to_m: Option<f32>,
     /// Whether no place back along the path is outside the columns of vehicles that descend.
     no_better_place: bool,
     /// Since when the vehicle has been below one that descends, unable to leave along its path.
     trapped_since: Option<Instant>,
-    /// Whether the path ends aside or back on the plan's path, where the vehicle does not land.
+    /// Whether the path ends aside or back on the plan's path: then no descent begins at its end.
     pub ends_away_from_goal: bool,
     /// Height above the ground from which a guided descent is slow, or an autopilot that is not led
     /// to the ground lands by itself, metres.
     low_height_m: f32,
-    /// Height of the lowest ground between pads, ENU up, metres; ∞ where only the pads' are known.
+    /// Height of the lowest ground between pads, ENU up, metres; ∞ where only the pads' heights are
+    /// known.
     lowest_ground_m: f32,
     /// Acceleration sent last: the setpoint's plus the correction towards it, with limited jerk.
     sent_acceleration: Point,
@@ -317,7 +322,8 @@ impl Guidance {
             self.follow_setpoint(&plan.path, dt_s);
             let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
-                // Also while stopped: the filter checks up to the stop, also if advised too late.
+                // Also while the vehicle is stopped: the filter checks up to the stop even if that
+                // was advised too late.
                 State::Follow | State::Blocked | State::Replanning => {
                     let least_m = track::braking_distance_m(&self.track, &plan.path, &self.tracker);
                     along_m + self.advice.stop_within_m.max(least_m)

@@ -1,9 +1,10 @@
 //! The companion of one UAV, sans-IO: bytes and time in, bytes and events out.
 //!
-//! **Contract.** The shell owns links, clock and planner. It calls [`Companion::handle_bytes`] with
-//! the bytes that a link received, [`Companion::handle_timeout`] when [`Companion::poll_timeout`]
-//! is due, and [`Companion::handle_plan`] with the answer to [`Event::PlanRequested`]. After *each*
-//! `handle_*` call it calls [`Companion::poll_transmit`] for both links until it returns 0, and
+//! **Contract.** The shell, the program around the companion, owns links, clock and planner. It
+//! calls [`Companion::handle_bytes`] with the bytes that a link received,
+//! [`Companion::handle_timeout`] when [`Companion::poll_timeout`] is due, and
+//! [`Companion::handle_plan`] with the answer to [`Event::PlanRequested`]. After *each* `handle_*`
+//! call it calls [`Companion::poll_transmit`] for both links until it returns 0, and
 //! [`Companion::poll_event`] until it returns `None`. With a flash ([`Companion::attach_store`]) it
 //! also calls [`Companion::poll_flash`] and passes the outcome of each operation to
 //! [`Companion::handle_flash`], whenever the operation is done. Times never go back. Every call

@@ -224,7 +224,7 @@ impl Links {
         self.outboxes[link as usize].next_header(system)
     }
 
-    /// The header of an intent whose points lead to `ends_m` along this vehicle's path. Its
+    /// The header of an intent whose points end `ends_m` metres along this vehicle's path. Its
     /// sequence number and `ends_m` are remembered: an echo of it by a neighbour gives the message
     /// delay, and the part of the path that the neighbour knows.
     pub(crate) fn intent_header(&mut self, system: u8, ends_m: f32, now: Instant) -> Header {
@@ -238,13 +238,13 @@ impl Links {
         self.sent.count()
     }
 
-    /// One-way delay of messages, seconds, measured by a neighbour's echo of an own intent; `None`
-    /// where that intent is no longer remembered.
+    /// One-way delay of messages, seconds, measured by a neighbour's echo of an intent of this
+    /// vehicle; `None` where that intent is no longer remembered.
     pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
         self.sent.message_delay_s(echo, now)
     }
 
-    /// The own intents sent last, and which of them are known to have arrived.
+    /// This vehicle's intents sent last, and which of them are known to have arrived.
     pub(crate) fn sent_intents(&mut self) -> &mut SentIntents {
         &mut self.sent
     }

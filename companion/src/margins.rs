@@ -6,15 +6,16 @@
 //! | hull | mission file | m | radius of the vehicle |
 //! | clearance | mission file | m | radius and safety margin: what every edge of the roadmap was tested at |
 //! | tracking, at cruise | [`TRACKING_M`] | m | how far beside its path the vehicle flies, by its own estimate |
-//! | tracking, at a crawl | [`CRAWL_TRACKING_M`] | m | the same of a vehicle that flies so slowly that it could as well hover |
+//! | tracking, at a crawl | [`CRAWL_TRACKING_M`] | m | the same, at a speed at which the vehicle could as well hover |
 //! | estimate | [`ACCURACY_FACTOR`] × the reported accuracy, at least `FLK_EST_M` | m | how far the estimate is from the truth |
 //! | accuracy's age | [`MAX_ACCURACY_AGE`] | s | three reports of a stream at 1 Hz |
-//! | gust | scenario | m | the host adds what a gust is announced to push ([`estimate_margin_m`]'s caller); on board it is part of the margin |
+//! | gust | scenario | m | the host adds the distance by which an announced gust pushes the vehicle (in the caller of [`estimate_margin_m`]); on board it is part of the margin |
 //!
-//! What is left for the estimate is compared with its bound. A bound worse than what is left at
-//! cruise refuses the start and slows the vehicle in flight; one worse than what is left at a crawl
-//! stops it. A bound of at most [`MIN_ESTIMATE_ERROR_M`] refuses nothing: no receiver does better,
-//! and the operator chose the margin. A margin below that flies at the operator's risk.
+//! The part of the clearance that is left for the estimate is compared with the bound of the
+//! estimate's error. A bound above the part left at cruise refuses the start and slows the vehicle
+//! in flight; one above the part left at a crawl stops it. A bound of at most
+//! [`MIN_ESTIMATE_ERROR_M`] refuses nothing: no receiver does better, and the operator chose the
+//! margin. A margin below that flies at the operator's risk.
 //!
 //! **What this cannot see.** The bound is only as honest as the estimator. In the recorded flights
 //! PX4's SIH reported 0.25 m while the estimate was 0.7 m off: a receiver's bias and a barometer's
@@ -32,14 +33,15 @@ pub const CRAWL_TRACKING_M: f32 = 0.1;
 /// Least bound of the position estimate's error, unless `FLK_EST_M` says otherwise: a receiver with
 /// fixed RTK, metres.
 pub const MIN_ESTIMATE_ERROR_M: f32 = 0.1;
-/// Bound of the estimate's error over the reported accuracy, which is one standard deviation.
+/// Ratio of the estimate's error bound to the accuracy that the autopilot reports, which is one
+/// standard deviation.
 pub const ACCURACY_FACTOR: f32 = 3.0;
 /// Age from which a reported accuracy counts as unknown.
 pub const MAX_ACCURACY_AGE: Duration = Duration::from_secs(3);
 
-/// Greatest estimated height above the plan's ground at which a vehicle may be on the ground, and
-/// from the pad's height at which it takes off, metres: real estimates there were up to 1.1 m off.
-/// Above it a report of the ground is not believed.
+/// Greatest estimated height above the plan's ground at which a landing detector's report of the
+/// ground is believed, and greatest distance in height from the pad at which a vehicle takes off,
+/// metres. On the ground real estimates were up to 1.1 m off.
 pub(crate) const MAX_GROUND_HEIGHT_ERROR_M: f32 = 1.5;
 
 /// Distance by which two vehicles in a coverage mission may be nearer than their estimates say,
@@ -77,7 +79,7 @@ pub fn speed_share_for_bound(bound_m: f32, clearance_m: f32, radius_m: f32) -> f
         return 0.0;
     }
     // With a bound just within the crawl margin the vehicle still flies, at `MIN_SPEED_SHARE`, so
-    // that it may come to where the estimate is better.
+    // that it may reach a place where the estimate is better.
     ((crawl_m - bound_m) / (crawl_m - cruise_m)).clamp(MIN_SPEED_SHARE, 1.0)
 }
 

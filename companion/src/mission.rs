@@ -1,8 +1,9 @@
 //! The mission as an ordered transition table and a pure update function.
 //!
 //! [`first_applicable_row`] goes through [`TABLE`] from the top and takes the first row whose
-//! `from` holds the state and whose guard has held for the row's limit. Order is rank: the pilot
-//! and the failsafe come first. `docs/table.md` prints the same table, and a test compares the two.
+//! `from` holds the state and whose guard has held for the row's limit. Earlier rows have priority:
+//! those of the pilot and the failsafe come first. `docs/table.md` prints the same table, and a
+//! test compares the two.
 
 pub(crate) mod course;
 mod guard;

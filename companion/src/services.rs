@@ -1,8 +1,8 @@
 //! The MAVLink services for ground tools, beside commands: FTP, parameters, TIMESYNC,
-//! AUTOPILOT_VERSION. They answer on both links frames addressed to this system and component: a
-//! ground station may come by the radio or through the autopilot's routing. Only a ground station
-//! of the mission sets parameters and transfers files; what other senders may request is in
-//! `answer_limits`.
+//! AUTOPILOT_VERSION. On both links they answer frames addressed to this system and component:
+//! those of a ground station may come by the radio or through the autopilot's routing. Only a
+//! ground station of the mission sets parameters and transfers files; what other senders may
+//! request is in `answer_limits`.
 
 pub mod ftp;
 pub mod parameters;

@@ -6,7 +6,8 @@ use core::ops::{Add, Sub};
 /// A point in time, microseconds since the shell's start. It never goes back; 2⁶⁴ µs are 584 000
 /// years.
 ///
-/// Kept is the number of microseconds plus 1, so that an `Option` of it takes 8 bytes, not 16.
+/// The value stored is the number of microseconds plus 1, so that an `Option` of it takes 8 bytes,
+/// not 16.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Instant(NonZero<u64>);
 

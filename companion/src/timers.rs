@@ -1,8 +1,8 @@
 //! The table of all timers: for each action the time at which it is due.
 //!
 //! Three timers wake the shell ([`Timers::next_due`]): the control step, the heartbeats, and the
-//! position and intent to the swarm. The others wake nobody: their action runs in the first step at
-//! or after its time.
+//! position and intent to the swarm. The others do not: their action runs in a later call, at or
+//! after its time.
 
 use crate::time::{Duration, Instant};
 
@@ -34,9 +34,10 @@ pub(crate) enum Timer {
     HeldReport,
     /// From then on a division under way is overdue.
     DivisionDue,
-    /// From then on a vehicle on the ground that can promise nothing leaves its share to others.
+    /// From then on a vehicle on the ground that cannot make a commitment leaves its share to
+    /// others.
     LeaveUnstarted,
-    /// From then on the vehicle waits above its pad for no missing one.
+    /// From then on the vehicle no longer waits above its pad for missing vehicles.
     ComeDown,
     /// From then on "EKF origin # km away" may be sent again.
     OriginReport,

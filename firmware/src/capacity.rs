@@ -1,5 +1,5 @@
 //! Capacities of a board, and the RAM (or flash) that each item takes. The RP2350 has 520 kB of
-//! RAM, so it has half the capacities.
+//! RAM, so most capacities are halved there.
 
 use companion::Companion;
 

@@ -280,7 +280,7 @@ pub fn random_point(rng: &mut Pcg32, reach_m: f32) -> Point {
     Point::from_fn(|_, _| random_between(rng, -reach_m, reach_m))
 }
 
-/// Settings of the roadmap that is built on board: 2300 nodes in P3D's building.
+/// Settings of the roadmap that is built on board: 2300 nodes in paper P3D's building.
 pub const ROADMAP_CONFIG: Config = Config {
     nodes: 2300,
     edge_min_m: 0.5,

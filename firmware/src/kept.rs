@@ -67,13 +67,13 @@ type Task = (FileWork, u32);
 pub struct CrashRecord {
     end: RunEnd,
     text: String<MAX_TEXT_LEN>,
-    /// File work that runs now; `FileWork::None` between.
+    /// File work that runs now; `FileWork::None` while none runs.
     task: Task,
     /// For each kind of work: checksum of the files on which it crashed last, and number of starts
     /// in a row that it crashed.
     failed_work: [(u32, u32); WORK_KINDS],
-    /// Bit of each kind of work that ended without a crash in this run, on the files in
-    /// `failed_work`.
+    /// Bit mask of the kinds of work that ended without a crash in this run, on the files in
+    /// `failed_work`; bit 0 is [`FileWork::CheckRoadmap`].
     completed_work: u32,
 }
 
@@ -217,7 +217,7 @@ const _: () = assert!(HEADER_WORDS + TEXT_WORDS + 1 == RECORD_WORDS, "the text h
 mod tests {
     use super::*;
 
-    /// A start from what the one before left.
+    /// The start that follows a run that left `kept`, encoded as words.
     fn start(kept: &CrashRecord, cause: ResetCause) -> (CrashRecord, Option<String<MAX_TEXT_LEN>>) {
         let words = kept.to_words();
         let read = CrashRecord::from_words(&words);
@@ -270,7 +270,7 @@ mod tests {
         assert_eq!(says(&crashed, ResetCause::Power), None, "memory of another day");
     }
 
-    /// A start that ends amid a plan with these files; false if they are set aside.
+    /// A start that ends while it plans on these files; false if they are set aside.
     fn fails(kept: &mut CrashRecord, files: u32, cause: ResetCause, panics: bool) -> bool {
         let begun = kept.begin_work(FileWork::Plan, files);
         if panics {
@@ -323,17 +323,18 @@ mod tests {
         let fail = |kept: &mut CrashRecord| assert!(fails(kept, 7, ResetCause::Request, true));
         let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
         (0..2).for_each(|_| fail(&mut kept));
-        // A start in which nothing is planned changes nothing, nor one that somebody else ended.
+        // A start without a plan leaves the count, and so does one ended by key, brown-out or
+        // debugger.
         kept = start(&kept, ResetCause::Watchdog).0;
         for cause in [ResetCause::Key, ResetCause::BrownOut, ResetCause::Request] {
             assert!(fails(&mut kept, 7, cause, false));
         }
-        // A plan that came to its end, after which another brought the start down, does not help.
+        // A plan that completes does not reset the count if another one then crashes the start.
         assert!(kept.begin_work(FileWork::Plan, 7));
         kept.finish_work();
         fail(&mut kept);
         assert!(!kept.clone().begin_work(FileWork::Plan, 7));
-        // A start whose plans all came to their ends begins the count again.
+        // A start whose plans all complete resets the count.
         let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
         (0..2).for_each(|_| fail(&mut kept));
         assert!(kept.begin_work(FileWork::Plan, 7));

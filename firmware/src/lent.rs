@@ -16,7 +16,7 @@ impl Deref for LentFlash {
     }
 }
 
-/// Keeps which range of a flash is lent; one range at a time.
+/// Keeps track of the lent range of a flash; at most one range is lent at a time.
 #[derive(Debug, Default)]
 pub struct FlashLender {
     lent: Option<Range<u32>>,

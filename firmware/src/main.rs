@@ -92,7 +92,7 @@ fn main() -> ! {
 /// Both halves of a UART.
 type UartEnds = (Receiver, Transmitter);
 
-/// Messages of the start for the operator, sent by STATUSTEXT.
+/// Messages about the start, sent to the operator by STATUSTEXT.
 struct StartReport {
     crashed: Option<String<50>>,
     warnings: Vec<&'static str, MAX_WARNINGS>,
@@ -137,9 +137,9 @@ async fn planner_and_flash_task(
     let config = own
         .and_then(Result::ok)
         .unwrap_or_else(|| Config::new(system_id, Point::zeros(), UNKNOWN_PLACE));
-    // Neither the stack nor the task's own memory has room for a second companion, so it is made in
-    // its static. `expect` would format the error, which takes 3 kB of flash because of a name in
-    // it.
+    // Neither the stack nor the task's own memory has room for a companion that is then moved, so
+    // it is built in its static. `expect` would format the error with the name in it, which takes 3
+    // kB of flash.
     let Ok(settings) = config.checked() else { panic!("every setting was checked") };
     let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
     companion.attach_store(store);

@@ -21,8 +21,8 @@ use crate::kept::FileWork;
 use crate::scratch::WorkspaceOverlay;
 
 /// Most keep-out zones of a detour. A vehicle that fell silent may make a dozen zones, any other
-/// one or two. With more zones than these the request fails ([`PlanFailure::Capacity`]): a detour
-/// that ignored some zones would not be safe.
+/// vehicle makes one or two. With more zones than these the request fails
+/// ([`PlanFailure::Capacity`]): a detour that ignored some zones would not be safe.
 const MAX_ZONES: usize = 4 * VEHICLES;
 
 /// Memory that the planner works in; the three parts lie in different RAMs of the chip.
@@ -113,8 +113,7 @@ impl Planner<'_> {
         companion.detour_request(|obstacle| *crowded |= obstacles.push(obstacle).is_err())
     }
 
-    /// Makes the requested plan. Files whose planning crashed three starts in a row are not planned
-    /// on.
+    /// Makes the requested plan; refuses files whose planning crashed three starts in a row.
     ///
     /// # Errors
     /// [`PlanFailure`]: the reason why there is no plan.

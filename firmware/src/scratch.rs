@@ -191,7 +191,7 @@ pub struct RoadmapBuilder {
 }
 
 impl RoadmapBuilder {
-    /// Samples nodes and connects them by edges: Algorithm 1 of P3D. Every edge stores the
+    /// Samples nodes and connects them by edges: paper P3D, Algorithm 1. Every edge stores the
     /// clearance with which it was tested.
     ///
     /// # Errors

@@ -38,7 +38,8 @@ const UART_REPORT_EVERY: Duration = Duration::from_secs(10);
 const UART_ERROR_TEXTS: [&str; 2] =
     ["Autopilot line: # errors, # damaged frames", "Radio line: # errors, # damaged frames"];
 
-/// Time from the request of a restart to the restart, milliseconds: queued messages are sent.
+/// Time from the request of a restart to the restart, milliseconds, in which queued messages are
+/// sent.
 const FLUSH_BEFORE_RESTART_MS: u32 = 200;
 
 type TaskSignal<T> = Signal<CriticalSectionRawMutex, T>;
@@ -75,9 +76,9 @@ enum FlashOperation {
     Read(u32, usize),
 }
 
-/// Waits for HEARTBEATs on `uart` and returns the autopilot's system id: of the senders heard
-/// within 1.1 s after the first HEARTBEAT the one with most frames, since an autopilot may forward
-/// others' messages. `None` if no HEARTBEAT comes within 3 s.
+/// Waits for HEARTBEATs on `uart` and returns the autopilot's system id. An autopilot may forward
+/// other autopilots' messages: of those heard until 1.1 s after the first HEARTBEAT, the id of the
+/// one that sent most frames is returned. `None` if no HEARTBEAT comes within 3 s.
 pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
     let mut listener = AutopilotListener::new();
     let mut until = Instant::now() + FIRST_AUTOPILOT_WITHIN;
@@ -95,8 +96,8 @@ pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
     listener.most_heard()
 }
 
-/// System id of a board that has heard no autopilot and has none set: files can be uploaded to it.
-/// When it hears an autopilot, it restarts and takes that one's id.
+/// System id of a board that has heard no autopilot and has no id stored: files can be uploaded to
+/// it. When the board hears an autopilot, it restarts and takes the autopilot's id.
 pub const SYSTEM_ID_WITHOUT_AUTOPILOT: u8 = 250;
 /// Time to wait for the first HEARTBEAT; an autopilot sends one each second.
 const FIRST_AUTOPILOT_WITHIN: Duration = Duration::from_secs(3);
@@ -174,7 +175,7 @@ impl Shell {
     }
 
     /// Stores the companion; to be called before any task of the links or timers is spawned. Before
-    /// this call [`Self::is_alive`] holds for [`START_TIMEOUT_MS`] only.
+    /// this call [`Self::is_alive`] is true for the first [`START_TIMEOUT_MS`] only.
     pub fn start(&self, companion: &'static mut BoardCompanion) {
         self.companion.lock(|held| *held.borrow_mut() = Some(companion));
         (0..TASK_COUNT).for_each(|task| self.check_in(task));
@@ -374,7 +375,7 @@ impl Shell {
             })
         });
         let Some(request) = request else {
-            // `poll_flash` may have finished a request without flash, whose answer is to be sent.
+            // `poll_flash` may have queued an FTP reply or text that needs no flash operation.
             self.send_due.iter().for_each(|sends| sends.signal(()));
             return false;
         };
@@ -400,7 +401,7 @@ impl Shell {
     }
 
     /// Whether the watchdog may be fed: all tasks checked in within 0.4 s, and while setpoints are
-    /// streamed the last was sent within 0.4 s; during the start, for its first 20 s.
+    /// streamed the last was sent within 0.4 s; before [`Self::start`], for the first 20 s.
     pub fn is_alive(&self) -> bool {
         self.is_alive_at(now_ms())
     }

@@ -1,5 +1,5 @@
-//! A line that fails under the shell: overruns and framing errors at the driver's boundary are
-//! counted, reported and survived. The clock is the test's.
+//! A faulty serial line: the shell counts, reports and survives overruns and framing errors that
+//! the UART driver returns. The test drives the clock.
 
 use std::collections::VecDeque;
 use std::pin::pin;
@@ -18,7 +18,7 @@ use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, STATUSTEXT_
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
-/// The test's clock: it polls its tasks at every step, so nobody has to be woken.
+/// The test's clock. The test polls all tasks at every step, so no task has to be woken.
 struct TestClock(AtomicU64);
 
 impl Driver for TestClock {
@@ -31,7 +31,7 @@ impl Driver for TestClock {
 
 embassy_time_driver::time_driver_impl!(static CLOCK: TestClock = TestClock(AtomicU64::new(0)));
 
-/// A line whose far end is the test: what it receives next, and what was sent.
+/// A serial line whose far end is the test: what the shell receives next, and what it sent.
 #[derive(Default)]
 struct Line {
     received: Mutex<VecDeque<Result<Vec<u8>, ErrorKind>>>,
@@ -101,7 +101,7 @@ fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
         let mut cx = Context::from_waker(Waker::noop());
         for _ in 0..ms {
             CLOCK.0.fetch_add(1000, Ordering::Relaxed);
-            // None of them ends.
+            // None of the tasks ends.
             assert!(receives.as_mut().poll(&mut cx).is_pending());
             assert!(transmits.as_mut().poll(&mut cx).is_pending());
             assert!(tells.as_mut().poll(&mut cx).is_pending());
@@ -123,8 +123,7 @@ fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
     };
     assert_eq!(shell.line_errors[0].load(Ordering::Relaxed), 2);
     assert!(reported(0).contains(&"Autopilot found".to_owned()), "{:?}", reported(0));
-    // The first is reported at once, on both links, the others ten seconds later with all that came
-    // meanwhile.
+    // The first error is reported at once, on both links; those of the next ten seconds together.
     assert_eq!(errors(0), ["Autopilot line: 1 errors, 0 damaged frames"]);
     assert_eq!(errors(1), errors(0));
     (0..500).for_each(|_| receive(Err(ErrorKind::Other)));

@@ -12,13 +12,14 @@ pub const ROADMAP_NODES: usize = 16_384;
 /// Most cubes of the grid into which nodes are sorted while a roadmap is built: 2 bytes each.
 /// Enough for 250 × 250 × 100 m with edges of at most 8 m.
 pub const ROADMAP_CUBES: usize = 1 << 17;
-/// Most vehicles, and most goals: 4 bytes for each pair of them, 1.6 kB for each path.
+/// Most vehicles, and most goals: 4 bytes for each pair of vehicle and goal, 1.6 kB for each path.
 pub const VEHICLES: usize = 256;
 /// Most waypoints of a path: 24 bytes each.
 pub const WAYPOINTS: usize = 64;
 /// Most gates of one vehicle: 12 bytes each.
 pub const GATES: usize = 2048;
-/// Most timed segments of all flights, among which the search for a side-step plans: 44 bytes each.
+/// Most timed segments of all scheduled flights; the search for a side-step (SIPP) plans around
+/// them: 44 bytes each.
 pub const TIMED_SEGMENTS: usize = 32_768;
 
 /// A companion with the host's capacities.
@@ -139,8 +140,8 @@ impl BoardCapacity {
     }
 }
 
-/// Makes a large value on the heap. Debug builds first place it on the stack, so it is made on a
-/// thread whose stack is large enough.
+/// Makes a large value on the heap. Debug builds first place the value on the stack, so a thread
+/// with a large enough stack makes it.
 pub fn on_heap<T: Send + 'static>(make: fn() -> T) -> Box<T> {
     std::thread::Builder::new()
         .stack_size(4 * size_of::<T>() + (1 << 20))

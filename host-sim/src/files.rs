@@ -247,8 +247,8 @@ mod tests {
         let names: Vec<_> = fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!((names.len(), fs::read(out.join("two")).unwrap()), (2, b"2".to_vec()));
 
-        // A file that cannot have its name, here since a folder has it by now, leaves all that was
-        // there before.
+        // If one file cannot be renamed to its target (here a folder has taken the name), all
+        // earlier files stay as they were.
         let mut results = ResultFiles::open(&out, &["one", "three", "last"]).unwrap();
         for name in ["one", "three", "last"] {
             results.add(name, b"new").unwrap();

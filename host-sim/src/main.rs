@@ -108,7 +108,7 @@ fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     bail!("{}{tips}\nhint: `{help}` says more", what.strip_prefix("error: ").unwrap_or(&what))
 }
 
-/// The `--help` command line of the subcommand that the arguments name, as deep as they are known.
+/// The `--help` command line of the innermost subcommand that the arguments name.
 fn help_of(arguments: &[String]) -> String {
     let mut command = &Cli::command();
     let mut line = command.get_name().to_owned();

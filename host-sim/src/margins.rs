@@ -5,25 +5,28 @@
 //! |---|---|
 //! | margin to walls, beyond the hull | tracking + estimate + gust |
 //! | separation of two paths | safety distance + 2 (tracking + estimate) |
-//! | separation from a parked vehicle | safety distance + [`STRAY_BESIDE_PARKED_M`] + estimate + gust |
+//! | separation to parked vehicle | safety distance + [`STRAY_BESIDE_PARKED_M`] + estimate + gust |
 //! | tracking | [`companion::margins::TRACKING_M`] |
 //! | estimate, `rtk` | part of the tracking: at most 0.1 m |
 //! | estimate, `recorded`, PX4 | 0.65 m |
 //! | estimate, `recorded`, ArduPilot | 0.12 m: the greatest recorded error |
-//! | height, `recorded` | PX4 1.1 m, ArduPilot 0.3 m: a camera that is too low shows less |
+//! | height | `rtk` 0.15 m; `recorded` PX4 1.1 m, ArduPilot 0.3 m: a lower camera shows less |
 //! | gust | [`STRAY_PER_GUST_S`] × `gust_mps`: how far gusts push a vehicle off its path |
 //! | touchdown, PX4 | 0.5 m + [`STRAY_PER_GUST_S`] × `gust_mps` |
-//! | usable part of a picture | footprint less twice the margin, and less the delay along the lanes |
+//! | usable footprint | from the lowest height, less 2 × margin, along lanes also less 2 × delay |
 //!
-//! - Tracking is the deviation from the path by the vehicle's own estimate; estimate is the error
-//!   of that. Two vehicles in the air may deviate towards each other. A parked vehicle does not
-//!   move any more, but it stands where its estimate was wrong.
+//! - Tracking is the deviation of a vehicle's estimated position from its path; estimate is the
+//!   error of the estimated position. Two vehicles in the air may deviate towards each other. A
+//!   parked vehicle does not move, but it stands off its pad by the error of its estimate at
+//!   touchdown.
 //! - The default margin and [`PAIR_STRAY_M`] were measured with the estimator `rtk`.
-//! - A PX4 reports 0.2 m with `recorded`: 0.65 m is three times that and a reserve. Its errors were
-//!   up to 0.75 m across and 1.1 m in height, rarely, and not together with a tracking error.
-//! - PX4 touched down up to 0.7 m off its pad without wind, and up to 1.1 m in gusts of 3 m/s,
-//!   rarely two vehicles towards each other.
-//! - Pictures are taken off their waypoints, and [`TRIGGER_DELAY_S`] after passing them.
+//! - With `recorded` a PX4 reports an accuracy of 0.2 m: 0.65 m is three times that and a reserve.
+//!   Its errors were up to 0.75 m horizontally and 1.1 m in height, rarely, and not together with a
+//!   tracking error.
+//! - PX4 touched down up to 0.7 m off its pad without wind, and up to 1.1 m in gusts of 3 m/s; two
+//!   vehicles rarely touched down towards each other.
+//! - Pictures are taken up to the margin beside their waypoints, and [`TRIGGER_DELAY_S`] after
+//!   passing them: the delay is the distance flown meanwhile.
 
 use companion::margins::TRACKING_M;
 use planner_core::coverage::footprint::{Footprint, Spacing};
@@ -34,8 +37,8 @@ use crate::scenario::{Simulation, Vehicle};
 /// Sum of the deviations of two vehicles from their paths, which the default separation adds to the
 /// safety distance, metres.
 pub const PAIR_STRAY_M: f32 = 0.5;
-/// As [`PAIR_STRAY_M`], over fields, metres: wider, since there is room, and for receivers without
-/// RTK.
+/// As [`PAIR_STRAY_M`], for coverage missions, metres: greater, since there is room, and for
+/// receivers without RTK.
 pub const PAIR_STRAY_OVER_FIELDS_M: f32 = 2.4;
 /// Deviation of a flying vehicle from its path that is added to the separation from a parked
 /// vehicle, metres.
@@ -102,9 +105,9 @@ pub fn min_pad_distance_m(
         + vehicles.iter().map(own).fold(0.0, f32::max)
 }
 
-/// Distance by which touchdowns are further off the pad than flight is off the path, metres. A PX4
-/// that arrives over its pad fast, or in wind, has wound up the integrator of its controller, which
-/// carries it on once the companion stops holding it.
+/// Distance by which a touchdown may be further off the pad than a flying vehicle off its path,
+/// metres. A PX4 that arrives over its pad fast, or in wind, has wound up the integrator of its
+/// controller, which carries it on once the companion stops holding it.
 fn touchdown_extra_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
     match autopilot {
         AutopilotKind::Px4 => 0.5 + STRAY_PER_GUST_S * gust_mps,
@@ -122,8 +125,9 @@ pub fn max_height_error_m(estimator: EstimatorErrors, autopilot: AutopilotKind) 
 }
 
 /// The spacing with its footprint reduced to the part that the plan counts on, for pictures from
-/// `height_m` above ground: they are taken off their waypoints, lower and late. The footprint stays
-/// at least as large as the spacings, since a plan without overlap has nothing to lose.
+/// `height_m` above ground: they may be taken beside their waypoints, from lower, and late. The
+/// footprint stays at least as large as the spacings: a smaller one would be refused as leaving
+/// gaps.
 pub fn usable_footprint(
     spacing: &Spacing,
     height_m: f32,

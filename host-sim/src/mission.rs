@@ -35,8 +35,8 @@ use crate::scenario::Scenario;
 
 type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
-/// For each goal: its height above the hull centre of a vehicle of the largest radius that stands
-/// on the ground below it, metres; the length of the landing.
+/// Length of the landing at each goal, metres: from the goal down to the hull centre of a vehicle
+/// that stands on the ground below it, computed for the largest radius of all vehicles.
 fn descents_m(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result<Vec<f32>> {
     let largest_m = scenario.largest_radius_m();
     goals
@@ -251,9 +251,10 @@ impl Mission {
         }
     }
 
-    /// Answers the plan request of the companion of vehicle `index`: its part of the swarm's plan;
-    /// its part of a new plan of an area, without waypoints that are already photographed and, for
-    /// a division, after losses of vehicles; or a detour.
+    /// Answers a plan request of the companion of vehicle `index`. Depending on `wanted`, the
+    /// answer is the vehicle's part of the swarm's plan, its part of a new plan of an area (without
+    /// the waypoints already photographed and, for a division, after losses of vehicles), or a
+    /// detour.
     pub fn answer_plan_request(
         &self,
         plan: &SwarmPlan,

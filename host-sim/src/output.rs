@@ -55,7 +55,7 @@ pub fn planned_page(
     })
 }
 
-/// Report page of a flown mission: that of its plan, with tracks, event log and plots of the
+/// Report page of a flown mission: the page of its plan, with tracks, event log and plots of the
 /// smallest distances.
 pub fn flown_page(
     mission: &Mission,
@@ -101,7 +101,7 @@ pub const RESULT_FILES: [&str; 3] = ["result.json", "timing.json", "report.html"
 /// Adds the three files of [`RESULT_FILES`] to `results`.
 ///
 /// # Errors
-/// One cannot be written.
+/// A file cannot be written.
 pub fn add(
     results: &mut ResultFiles,
     result: &MissionResult,
@@ -114,7 +114,8 @@ pub fn add(
     results.add(RESULT_FILES[2], report::page(&page)?.as_bytes())
 }
 
-/// The points as text, one `x y z` a line in metres: other programs read the same problem from it.
+/// The points as text, one `x y z` a line in metres, from which other programs can plan the same
+/// problem.
 pub fn points_to_text(points: impl Iterator<Item = Point>) -> String {
     points.map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect()
 }

@@ -19,7 +19,7 @@ impl Progress {
         Self { shown: std::io::stderr().is_terminal() }
     }
 
-    /// Never shown.
+    /// No bars are drawn.
     pub const fn hidden() -> Self {
         Self { shown: false }
     }

@@ -17,8 +17,8 @@ pub struct MissionResult {
     pub scenario: String,
     /// The seed used.
     pub seed: u64,
-    /// Whether nothing touched or came too near, every goal (or vehicle) was served, and every
-    /// vehicle did its task and landed, except those that a fault disabled.
+    /// Whether there was no contact, violation or deadlock, as many goals were served as vehicles
+    /// and goals allow, and every vehicle that no fault disabled did its task and landed.
     pub complete: bool,
     /// One entry per vehicle.
     pub vehicles: Vec<VehicleResult>,
@@ -38,12 +38,12 @@ pub struct MissionResult {
 /// Coverage of an area.
 #[derive(Clone, Debug, Serialize)]
 pub struct CoverageResult {
-    /// Share of the area that pictures show, 0 to 1; with `trigger` `none` those that a camera
-    /// would take all along the lanes that were flown.
+    /// Share of the area that pictures show, 0 to 1; with `trigger` `none` the pictures are those
+    /// that a camera would take all along the lanes that were flown.
     pub covered_share: f64,
-    /// Waypoints of all routes.
+    /// Number of waypoints on all lanes.
     pub waypoints: u32,
-    /// Lanes.
+    /// Number of lanes.
     pub lanes: usize,
     /// Greatest distance from one lane to the next, metres.
     pub lane_m: f64,
@@ -65,7 +65,7 @@ pub struct CoverageResult {
     pub gap: f64,
     /// What triggers the camera: `distance`, `waypoint` or `none`.
     pub trigger: &'static str,
-    /// Pictures that companions asked for.
+    /// Number of pictures that companions requested.
     pub photos: u64,
     /// Number of waypoints photographed (with `trigger` `none`: flown) more than once.
     pub twice: u64,
@@ -83,9 +83,9 @@ pub struct CoverageResult {
 pub struct TerrainResult {
     /// Least height above the ground of any lane or leg between lanes, metres.
     pub ground_least_m: f64,
-    /// Greatest height above the ground of any of them, metres.
+    /// Greatest height above the ground of any lane or leg between lanes, metres.
     pub ground_most_m: f64,
-    /// Greatest slope of any of them: rise divided by horizontal distance.
+    /// Greatest slope of any lane or leg between lanes: rise divided by horizontal distance.
     pub steepest: f64,
     /// Number of legs that come too near to the ground.
     pub too_low: u64,
@@ -106,7 +106,7 @@ pub struct RouteResult {
     pub backward: bool,
     /// Height of the vehicle's transit layer, metres.
     pub layer_m: f64,
-    /// When the vehicle leaves its pad, seconds.
+    /// Time at which the vehicle first leaves its pad, seconds after the mission's start.
     pub depart_s: f64,
     /// Cost C_k of the route, seconds: all sorties and the battery swaps between them.
     pub cost_s: f64,
@@ -123,9 +123,9 @@ pub struct SortieResult {
     pub first: u32,
     /// Highest number of the sortie's waypoints.
     pub last: u32,
-    /// When the fleet's round of sorties begins to which this one belongs, seconds.
+    /// Time at which the round of this sortie begins, seconds after the mission's start.
     pub begin_s: f64,
-    /// When the vehicle leaves its pad, seconds after `begin_s`.
+    /// Time at which the vehicle leaves its pad, seconds after `begin_s`.
     pub depart_s: f64,
     /// Cost C_k of the sortie, seconds.
     pub cost_s: f64,
@@ -154,7 +154,7 @@ pub struct VehicleResult {
     pub id: u8,
     /// Index of the vehicle's goal; `None` if it has none.
     pub goal: Option<u16>,
-    /// Whether the vehicle came to its goal, by its true position.
+    /// Whether the vehicle reached its goal, by its true position; false if nothing was flown.
     pub reached: bool,
     /// Whether the vehicle stood on the ground again, disarmed, after it had left it; false if
     /// nothing was flown.
@@ -204,7 +204,7 @@ pub struct Safety {
 pub struct RoadmapSize {
     /// Number of nodes, starts and goals included.
     pub nodes: usize,
-    /// Edges, each counted once.
+    /// Number of edges, each counted once.
     pub edges: usize,
     /// Length of the roadmap file, bytes.
     pub bytes: usize,

@@ -32,7 +32,7 @@ const NODES_PER_JOB: usize = 32;
 /// Numbers that a roadmap file stores for each node beside its position: its distance to each
 /// landmark, and its height above the ground.
 const NODE_COLUMNS: usize = LANDMARKS + 1;
-/// Clearances that differ by less than this count as equal, metres: the file keeps millimetres.
+/// Clearances that differ by less than this count as equal, metres: the file stores millimetres.
 const SAME_CLEARANCE_M: f32 = 2e-4;
 
 /// Nodes and edges, not yet encoded.
@@ -42,7 +42,7 @@ pub struct Roadmap {
     pub nodes: Vec<Point>,
     /// Edges with their clearances.
     pub edges: Vec<Edge>,
-    /// Height of each node above the ground below it, metres; infinite over no ground.
+    /// Height of each node above the ground below it, metres; infinite where there is no ground.
     pub heights_m: Vec<f32>,
 }
 
@@ -63,8 +63,8 @@ pub struct BuildTimes {
     pub file_s: f64,
 }
 
-/// Samples nodes and joins them: Algorithm 1 of P3D, with the clearance of every edge. The result
-/// does not depend on the number of threads.
+/// Samples nodes and joins them: Algorithm 1 of paper P3D, with the clearance of every edge. The
+/// result does not depend on the number of threads.
 pub fn build(
     map: &VoxelMap,
     terminals: &[Point],
@@ -118,7 +118,7 @@ pub fn add_passages(
     Ok(added.len())
 }
 
-/// Height of a node above the ground below it, metres; infinite over no ground.
+/// Height of a node above the ground below it, metres; infinite where there is no ground.
 fn height_m(map: &VoxelMap, node: &Point) -> f32 {
     map.ground_below(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m)
 }

@@ -52,7 +52,8 @@ pub fn shortage_lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
 struct ShortageFindings<'a> {
     mission: &'a Mission,
     reach: Reachability,
-    /// For each vehicle asked about, [`widest_path_clearances_m`] to all goals.
+    /// By vehicle index: [`widest_path_clearances_m`] from its start to all goals, computed on
+    /// demand.
     widths: BTreeMap<usize, Option<Vec<f32>>>,
 }
 
@@ -115,7 +116,7 @@ fn smallest_vehicle(mission: &Mission) -> usize {
     (0..mission.tasks.len()).min_by(|a, b| radius(a).total_cmp(&radius(b))).unwrap_or_default()
 }
 
-/// Text: what would give this vehicle a path to this goal, or that nothing would.
+/// Text that says what would give this vehicle a path to this goal, or that nothing would.
 fn remedy_text(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usize) -> String {
     let mission = asked.mission;
     let settings = &mission.scenario.vehicles[vehicle];
@@ -274,7 +275,7 @@ mod tests {
     use crate::map::occupancy::{OccupancyMap, Unknown};
     use planner_core::voxel::GridShape;
 
-    /// Two rooms behind a wall with a door of `door` cells of 0.1 m.
+    /// Two rooms on either side of a wall with a door that is `door` cells of 0.1 m wide.
     fn rooms(door: u32) -> VoxelMap {
         let shape = GridShape { dims: [60, 40, 20], min: Point::zeros(), resolution_m: 0.1 };
         let mut map = OccupancyMap::all_unknown(shape, "rooms").unwrap();
@@ -288,8 +289,7 @@ mod tests {
         map.voxel_map(Unknown::Free)
     }
 
-    /// A start or goal near the floor of its cell is as near to the floor as it is, not as the
-    /// centre of its cell.
+    /// The clearance of a start or goal is that of the point itself, not that of its cell's centre.
     #[test]
     fn a_way_is_no_wider_than_its_ends() {
         let (from, to) = (Point::new(1.0, 1.0, 1.0), Point::new(5.0, 3.0, 1.0));

@@ -1,8 +1,8 @@
 //! A MAVLink FTP client: uploads a file to a companion and compares the CRC-32 of both sides.
 //!
 //! Source: MAVLink guide, "File Transfer Protocol". Several WRITE requests are under way at once. A
-//! request without an answer is sent again with the same sequence number, after a timeout and in a
-//! number that fit the link ([`retransmission`]).
+//! request without an answer is sent again with the same sequence number. The timeout and the
+//! number of requests under way follow the link ([`retransmission`]).
 
 mod retransmission;
 
@@ -69,8 +69,8 @@ impl FtpClient {
     /// A client for the companion of the vehicle `system`; with `None` of the first one heard.
     pub fn new(link: Box<dyn Link>, system: Option<u8>) -> Self {
         let now = link.now();
-        // Sequence numbers begin at the time of day, to differ from those of a client before: a
-        // server takes an equal number for a repeated request.
+        // Sequence numbers begin at the clock's milliseconds, to differ from those of an earlier
+        // client: a server takes an equal number for a repeated request.
         let sequence = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
             .map_or(0, |since| (since.as_millis() % 65_536) as u16);
@@ -103,8 +103,8 @@ impl FtpClient {
         Header { system: self.own_system, component: COMPONENT_ID, sequence: self.frames }
     }
 
-    /// The frames that have arrived from the companion; rests a moment if there were no bytes. Also
-    /// sends a HEARTBEAT each second, so that autopilots forward messages to this client.
+    /// The frames that have arrived from the companion; waits a moment if no bytes have arrived.
+    /// Also sends a HEARTBEAT each second, so that autopilots forward messages to this client.
     fn receive_frames(&mut self) -> anyhow::Result<Vec<Frame>> {
         if self.link.now() >= self.beat_at {
             self.beat_at += HEARTBEAT_EVERY;
@@ -216,7 +216,7 @@ impl FtpClient {
     /// Uploads a file; calls `progress` with the number of bytes that were acknowledged so far.
     ///
     /// # Errors
-    /// The companion refuses the file, does not answer, or has other bytes in the end.
+    /// The companion refuses the file, does not answer, or has stored a file with another CRC-32.
     pub fn upload(
         &mut self,
         file: File,
@@ -296,7 +296,8 @@ impl FtpClient {
     }
 }
 
-/// The CRC-32 of MAVLink FTP: the polynomial of zip, but begun at 0 and not inverted.
+/// The CRC-32 of MAVLink FTP: the polynomial of zip's CRC-32, but with initial value 0 and without
+/// the final inversion.
 pub fn crc32(bytes: &[u8]) -> u32 {
     const FTP: crc::Algorithm<u32> = crc::Algorithm {
         init: 0,

@@ -3,15 +3,15 @@
 //!
 //! Source: R. Jonker, A. Volgenant, "A shortest augmenting path algorithm for dense and sparse
 //! linear assignment problems", Computing 38 (1987): column reduction with reduction transfer,
-//! augmenting row reduction, then one shortest augmenting path for each row still free. P3D §3.3
-//! names it the unlabelled allocation. O(n³) at worst.
+//! augmenting row reduction, then one shortest augmenting path for each row still free. Paper P3D
+//! §3.3 calls this assignment the unlabelled allocation. O(n³) at worst.
 //!
 //! Beyond the paper: matrices that are not square, and pairs that are impossible (`f32::INFINITY`).
 //! The result has the largest possible number of pairs and, among those, the least total cost. No
-//! large number stands in for infinity. Jonker–Volgenant solves it if every row of the shorter side
-//! can be matched. If one cannot, the matching starts again, with shortest augmenting paths from
-//! all free rows at once. After each of those the matching is the cheapest of its size, so when no
-//! path is left it is the largest and the cheapest of that size.
+//! large number stands in for infinity. Jonker–Volgenant suffices if every row of the shorter side
+//! can be matched. If a row cannot, the matching starts again, with shortest augmenting paths from
+//! all free rows at once. After each path the matching is the cheapest of its size, so when no path
+//! is left it is the largest, and the cheapest of that size.
 //!
 //! Costs are f32 in any unit (metres, seconds), sums and dual prices f64.
 
@@ -37,7 +37,7 @@ pub struct Assignment {
     pub largest: f32,
 }
 
-/// Memory for matrices of up to `N` rows and `N` columns: 46 bytes for each. All-zero when new.
+/// Memory for matrices of up to `N` rows and `N` columns: 46 · `N` bytes. All-zero when new.
 pub struct AssignmentWorkspace<const N: usize> {
     /// Dual price of each column. A free column's stays 0 unless the matrix is square.
     price: [f64; N],
@@ -103,7 +103,7 @@ impl<const N: usize> Default for AssignmentWorkspace<N> {
 /// "total").
 ///
 /// `costs` is row-major, `rows` × `cols`; infinity marks an impossible pair. Writes the column of
-/// each row to `out[row]`, or `None`.
+/// each row to `out[row]`, or `None` for a row without a pair.
 pub fn assign<const N: usize>(
     costs: &[f32],
     rows: usize,

@@ -1,7 +1,7 @@
 //! Coverage: a fleet photographs an area in the least time; each vehicle flies one continuous
 //! route.
 //!
-//! Source: CPP (Luna 2022). One algorithm a file:
+//! Source: paper CPP (Luna 2022). One algorithm per file:
 //!
 //! | file | is |
 //! |---|---|
@@ -13,6 +13,7 @@
 //! | `patches.rs` | extra lanes for ground that a no-fly zone keeps the lanes from photographing |
 //! | `cells.rs` | lanes grouped into cells that are flown back and forth: an initial order |
 //! | `order.rs` | the order and the directions in which lanes are flown |
+//! | `given.rs` | lanes that another tool has laid, ordered by the same search |
 //! | `transit.rs` | shortest paths around no-fly zones |
 //! | `around.rs` | the path of a vehicle that leaves its route: home, or around an obstacle |
 //! | `pack.rs` | CBinPack, SIMPLE-BINPAT and BINPAT: routes, vehicles, layers, costs |
@@ -57,12 +58,12 @@ pub enum CoverageError {
     Area(area::AreaError),
     /// The setting with this name is outside its range.
     SettingOutOfRange(&'static str),
-    /// Lanes are further apart than an image is wide, or waypoints further than it is long, so that
-    /// ground between images is missed.
+    /// Lanes are further apart than an image is wide, or waypoints further than an image is long,
+    /// so that ground between images is missed.
     Gaps,
     /// The path has more lanes, or one lane is cut into more parts, than the memory holds.
     LanesFull,
-    /// The no-fly zones have more corners, transits included, than the memory holds.
+    /// The no-fly zones have more convex corners than the memory holds.
     NoFlyFull,
     /// No lane is left: the no-fly zones cover the whole area.
     NothingToCover,

@@ -1,11 +1,12 @@
 //! Deconfliction in flight: how fast and how far the own vehicle may fly, given its neighbours.
 //!
-//! [`Method::Algorithm2`] is P3D §3.4 as printed, for comparison. [`Method::Priority`] keeps the
-//! order of the swarm's schedule: the vehicle stops at each gate ([`crate::schedule`]) until the
-//! other vehicle has left the stretch that conflicts with the one behind the gate. A vehicle that
-//! is out of the plan opens all gates that wait for it, and is flown around ([`crate::detour`]).
-//! Before a neighbour that does not fly the shared plan the vehicle stops; past one that hovers
-//! beside its path it flies slowly, where a stop from the lower speed still ends far enough away.
+//! [`Method::Algorithm2`] is paper P3D §3.4 as printed, for comparison. [`Method::Priority`] keeps
+//! the order of the swarm's schedule: the vehicle stops at each gate ([`crate::schedule`]) until
+//! the other vehicle has left the stretch that conflicts with the one behind the gate. A vehicle
+//! that is out of the plan opens all gates that wait for it, and others fly around it
+//! ([`crate::detour`]). The own vehicle stops before a neighbour that does not fly the shared plan.
+//! If that neighbour hovers beside the own path, the own vehicle flies past slowly, where a stop
+//! from the lower speed still ends far enough away.
 
 use fpu::sqrtf;
 use heapless::Vec;
@@ -19,7 +20,7 @@ use crate::{ConfigError, Length, Point, all_positive};
 pub enum Method {
     /// No rule: neighbours are ignored.
     Off,
-    /// P3D Algorithm 2.
+    /// Algorithm 2 of paper P3D.
     Algorithm2,
     /// Right of way in the order of the schedule, by gates.
     Priority,
@@ -54,7 +55,7 @@ impl DeconflictConfig {
 pub struct Neighbour {
     /// Id of the vehicle, unique in the swarm.
     pub id: u8,
-    /// Index of the neighbour in the roster sorted by id, from 0: the `h` of Algorithm 2.
+    /// Index of the neighbour in the roster sorted by id, from 0: the `h` of paper P3D Algorithm 2.
     pub rank: u16,
     /// Position of the neighbour when it was last heard, ENU metres in the mission frame.
     pub position: Point,
@@ -81,7 +82,8 @@ pub struct OwnVehicle<'a, const W: usize> {
     pub rank: u16,
     /// Position of the own vehicle, ENU metres in the mission frame.
     pub position: Point,
-    /// Arc length of the reference on `path`, metres; before take-off minus the climb.
+    /// Arc length of the reference on `path`, metres; before take-off the negative of the climb's
+    /// height.
     pub along_m: f32,
     /// The path that the vehicle flies.
     pub path: &'a Path<W>,
@@ -97,7 +99,8 @@ pub struct Advice {
     /// Distance along the path within which the vehicle has to stop, metres; infinite if it need
     /// not.
     pub stop_within_m: f32,
-    /// System id of the neighbour that the own vehicle stops for; 0 if it need not stop.
+    /// System id of the neighbour that the own vehicle stops for, or by [`Method::Algorithm2`]
+    /// slows for; 0 for none.
     pub waiting_for: u8,
 }
 
@@ -118,12 +121,13 @@ const DISTANCE_ROUNDING_M: f32 = 0.05;
 /// overshoot of the stop must not carry the vehicle through.
 const GATE_OVERSHOOT_M: f32 = 0.1;
 /// Overshoot of a braking vehicle over its reference, as seconds of flight at the part of the
-/// cruise speed above [`BRAKING_OVERSHOOT_ABOVE_MPS`]: from 5.8 m/s 0.5 m were seen.
+/// cruise speed above [`BRAKING_OVERSHOOT_ABOVE_MPS`]: from 5.8 m/s an overshoot of 0.5 m was
+/// measured.
 const BRAKING_OVERSHOOT_S: f32 = 0.2;
 /// Cruise speed up to which a braking vehicle does not overshoot its reference, m/s.
 const BRAKING_OVERSHOOT_ABOVE_MPS: f32 = 3.0;
 /// Greatest speed past a neighbour that hovers nearer than a stop from cruise speed requires, m/s:
-/// a stop from it overshoots by 0.4 m, and detours keep 0.5 m beyond the safety distance.
+/// a stop from this speed overshoots by 0.4 m, and detours keep 0.5 m beyond the safety distance.
 const PASSING_MPS: f32 = 5.0;
 /// Greatest speed of a neighbour that hovers, m/s.
 const HOVERING_MPS: f32 = 1.0;
@@ -150,10 +154,10 @@ pub fn advise<const W: usize>(
     }
 }
 
-/// P3D Algorithm 2, lines 12–17: within the safety distance of a vehicle of higher rank `h` the
-/// speed is the nominal one divided by `(h + 1) · 1.5`. Of several such vehicles the one with the
-/// highest rank counts, since the paper's loop overwrites. The speed is the nominal one again when
-/// no such vehicle is near.
+/// Paper P3D Algorithm 2, lines 12–17: within the safety distance of a vehicle of higher rank `h`
+/// the speed is the nominal one divided by `(h + 1) · 1.5`. Of several such vehicles the one with
+/// the highest rank counts, since the paper's loop overwrites. The speed is the nominal one again
+/// when no such vehicle is near.
 fn advise_by_algorithm2(
     cfg: &DeconflictConfig,
     rank: u16,
@@ -185,7 +189,7 @@ fn advise_by_priority<const W: usize>(
             advice.waiting_for = id;
         }
     };
-    // Gates further ahead than twice the braking distance, and one sample, are not looked at yet.
+    // Gates further ahead than twice the braking distance plus one sample step are ignored for now.
     let horizon_m = own.along_m
         + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2
         + cfg.cruise_mps * PATH_SAMPLE_S;
@@ -244,7 +248,7 @@ impl PathSamples {
     /// Distance along the own path at which the vehicle first comes within `apart_m` metres of
     /// neighbour `n`, if `n` flies on straight as last heard. `None` if that is not within the
     /// samples, or if both only move apart. Squares are compared: square roots are slow on a board.
-    /// Samples at which both cannot meet yet are skipped.
+    /// Samples that come too early for both to meet are skipped.
     fn distance_to_conflict_m<const W: usize>(
         &self,
         apart_m: f32,
@@ -281,7 +285,7 @@ impl PathSamples {
 }
 
 /// Square of the least distance from the origin to the segment between two points, if that is
-/// inside the segment; `None` if it is at one of its ends.
+/// inside the segment; `None` if the least distance is at one of the segment's ends.
 fn min_squared_distance(from: &Point, to: &Point) -> Option<f32> {
     let step = to - from;
     let ahead = to.dot(&step);
@@ -381,8 +385,9 @@ mod tests {
         assert_eq!(advice, Advice::FREE, "a lower id has no priority");
     }
 
-    /// Past one that hovers beside the path, where a stop from cruise speed would come too near, at
-    /// most [`PASSING_MPS`]; before one on the path, or one that moves, a stop.
+    /// Past a vehicle that hovers beside the path, where a stop from cruise speed would end too
+    /// near, the speed is at most [`PASSING_MPS`]; before a vehicle on the path, or one that moves,
+    /// the own vehicle stops.
     #[test]
     fn priority_passes_one_that_hovers_slowly_and_stops_before_others() {
         let mut path = Path::<4>::new();

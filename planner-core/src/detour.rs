@@ -1,12 +1,13 @@
-//! One vehicle's detour around a vehicle that is out of the plan and lies, stands or hovers on its
-//! path. Over a height field, where there is no roadmap, [`crate::coverage::around`] plans it.
+//! One vehicle's detour around another vehicle that is out of the plan and lies, stands or hovers
+//! on the first one's path. Over a height field, where there is no roadmap,
+//! [`crate::coverage::around`] plans the detour.
 //!
 //! A detour is flown while all other vehicles stand (`companion/src/swarm/detour.rs` waits for
 //! that), so times do not matter. It is the shortest roadmap path from where the vehicle hovers to
 //! its goal that keeps out of every [`KeepOutZone`]. It begins with the rest of the current leg,
 //! forward or back, which is known to be clear of walls. A vehicle that is inside a zone already
-//! only must not fly deeper into it. A column ends at the ground, as far as the roadmap has its
-//! height.
+//! only must not fly deeper into it. The column below a vehicle ends at the ground if the roadmap
+//! has the ground's height there.
 //!
 //! ENU metres. Cost: two A*, with each edge checked against every [`KeepOutZone`], and each zone
 //! checked against every node.
@@ -29,8 +30,8 @@ const HOVER_SWAY_M: f32 = 0.05;
 /// safety filter allows no more.
 const PATH_APPROACH_ROUNDING_M: f32 = 0.002;
 
-/// Distance of centres at which two vehicles of 0.3 m radius touch, metres: a vehicle as near to
-/// the axis of a zone has nothing to keep there, and only has to leave.
+/// Distance of centres at which two vehicles of 0.3 m radius touch, metres: a vehicle this near to
+/// the axis of a zone has no distance left to keep, and only has to leave.
 const TOUCHING_M: f32 = 0.6;
 
 /// A capsule, or the column below a vehicle, that a detour keeps out of.
@@ -51,8 +52,8 @@ pub struct KeepOutZone {
 pub enum ZoneKind {
     /// Another vehicle may be anywhere along the axis: all of the zone is kept clear.
     Static,
-    /// A vehicle at `from` that descends to `to`: a detour may cross below it, but neither rest
-    /// there nor climb to it.
+    /// A vehicle at `from` that descends to `to`: a detour may cross below that vehicle, but
+    /// neither rest there nor climb towards it.
     Descending,
     /// A vehicle on the ground below `from`: where the roadmap has the ground's height, only a
     /// column at the ground is kept clear.
@@ -68,8 +69,8 @@ impl KeepOutZone {
         check_not_negative("radius_m", self.radius_m)
     }
 
-    /// The zone with its radius reduced to the distance of `here` less `nearer_m`, if `here` is
-    /// nearer than the radius: a vehicle that is too near already may still fly away.
+    /// The zone with its radius reduced to the distance of `here` from the axis less `nearer_m`, if
+    /// `here` is inside the zone: a vehicle that is too near already may still fly away.
     fn shrunk_to(&self, here: &Point, nearer_m: f32) -> Self {
         let now_sq = segments_distance_sq((here, here), (&self.from, &self.to));
         let far_m = self.radius_m + nearer_m;
@@ -80,9 +81,9 @@ impl KeepOutZone {
         Self { radius_m: fminf(self.radius_m, fmaxf(now_m - nearer_m, 0.0)), ..*self }
     }
 
-    /// The zone, ended at the ground below it as far as the roadmap has its height: a vehicle does
-    /// not fall through a floor. For [`ZoneKind::Grounded`] its top is moved down to the ground,
-    /// too.
+    /// The zone, ended at the ground below it if the roadmap has the ground's height: a vehicle
+    /// does not fall through a floor. For [`ZoneKind::Grounded`] its top is moved down to the
+    /// ground, too.
     fn clipped_to_ground(&self, view: &RoadmapView<'_>) -> Self {
         let falls = self.to.z < self.from.z;
         let Some((low_m, high_m)) = view.ground_range_near(&self.from).filter(|_| falls) else {
@@ -96,9 +97,10 @@ impl KeepOutZone {
         Self { from, to, ..*self }
     }
 
-    /// The part of the zone that may not be flown through. A descending vehicle may meet one that
-    /// climbs as fast half way: so of the space between `here` and the vehicle above, the lower
-    /// third may be crossed. If the vehicle above is within the radius already, no part is left.
+    /// The part of the zone that may not be flown through. A descending vehicle and one that climbs
+    /// as fast may meet half way, so only the lower third of the space between `here` and the
+    /// vehicle above may be crossed. If that vehicle is within the radius already, the part is
+    /// empty.
     pub(crate) fn impassable_part(&self, here: &Point) -> Self {
         if self.kind != ZoneKind::Descending {
             return *self;
@@ -118,7 +120,7 @@ impl KeepOutZone {
     }
 
     pub(crate) fn intersects(&self, a: &Point, b: &Point) -> bool {
-        // Most legs are apart from the zone along one axis alone, which is cheaper to see than a
+        // Most legs are apart from the zone along one axis alone, which is cheaper to check than a
         // distance.
         let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
         let beside = |axis: usize| {
@@ -160,9 +162,9 @@ impl BoundingBox {
     }
 }
 
-/// Whether a path enters the zone between the two arc lengths of `ahead`: the climb included if
-/// that begins below 0, the descent if it ends beyond the path. A vehicle at `here` that is inside
-/// the zone already is blocked only where the path leads deeper into it.
+/// Whether a path enters the zone between the two arc lengths of `ahead`: including the climb if
+/// `ahead` begins below 0, and the descent if it ends beyond the path's length. A vehicle at `here`
+/// that is inside the zone already is blocked only where the path leads deeper into it.
 pub fn is_path_blocked<const W: usize>(
     path: &Path<W>,
     ahead: Range<f32>,
@@ -239,15 +241,15 @@ pub enum Goal {
 /// Request for a detour: where the vehicle hovers, where it has to go, and its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetourRequest {
-    /// Whether the target is not `goal` but the nearest roadmap node outside all zones, to land
-    /// below it.
+    /// Whether the target is not `goal` but the nearest roadmap node (without a roadmap: free
+    /// point) outside all zones, to land below it.
     pub aside: bool,
     /// Position where the vehicle hovers, on the leg `leg`.
     pub here: Point,
-    /// Ends of that leg. They are nodes of the roadmap, except that one may be where an earlier
-    /// detour began.
+    /// Ends of the leg on which the vehicle hovers: roadmap nodes, except that one end may be where
+    /// an earlier detour began.
     pub leg: [Point; 2],
-    /// Distance from that leg to the nearest obstacle, metres.
+    /// Distance from `leg` to the nearest obstacle, metres.
     pub leg_clearance_m: f32,
     /// Target of the detour.
     pub goal: Goal,
@@ -313,8 +315,8 @@ pub enum DetourError {
 const MAX_SIDESTEP_M: f32 = 20.0;
 
 /// Writes the shortest path to the goal, or to a node aside, that keeps out of all `obstacles` to
-/// `out`. Changes the zones: they end at the ground, and one that contains the vehicle is shrunk.
-/// `nodes` is scratch memory.
+/// `out`. Changes `obstacles`: zones end at the ground, and a zone that contains the vehicle is
+/// shrunk. `nodes` is scratch memory.
 pub fn plan_detour<const N: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
@@ -385,7 +387,8 @@ pub fn plan_detour<const N: usize, const W: usize>(
     failed
 }
 
-/// The nearest node that was reached and that no obstacle takes.
+/// Of the nodes outside all `obstacles` that the search reached within [`MAX_SIDESTEP_M`], the one
+/// with the shortest path.
 fn nearest_place_aside<const N: usize>(
     view: &RoadmapView<'_>,
     obstacles: &[KeepOutZone],
@@ -397,22 +400,23 @@ fn nearest_place_aside<const N: usize>(
     reached.filter(rest).min_by(|&a, &b| ws.distance_m(a).total_cmp(&ws.distance_m(b)))
 }
 
-/// Shrinks each zone that contains the vehicle, so that the vehicle is on its border; zones of
-/// descending vehicles are not changed.
+/// Shrinks each zone that contains the vehicle, so that the vehicle is on the zone's border; zones
+/// of descending vehicles are not changed.
 pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.kind != ZoneKind::Descending) {
         let shrunk = obstacle.shrunk_to(here, PATH_APPROACH_ROUNDING_M);
         let is_inside = shrunk.radius_m < obstacle.radius_m;
         *obstacle = shrunk;
         if is_inside && obstacle.kind == ZoneKind::Static && obstacle.radius_m < TOUCHING_M {
-            // Below one that comes down: every way out may lead nearer to the vertical first.
+            // The vehicle is almost on the axis, as below a vehicle that comes down: every path out
+            // may first lead nearer to the axis.
             obstacle.radius_m = 0.0;
         }
     }
 }
 
-/// As [`plan_detour`], written as a vehicle's plan: without gates, since all others stand while it
-/// is flown.
+/// As [`plan_detour`], written as a vehicle's plan: without gates, since all other vehicles stand
+/// while the detour is flown.
 pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,

@@ -4,10 +4,10 @@
 //! Little endian: magic `FLKFIELD`, version u16, columns u16, rows u16, 0 u16, east and north of
 //! the first node f32, metres between nodes f32, then one i16 per node (decimetres up in the
 //! mission frame, rows from south to north), and a CRC-32 of all before it. Heights between nodes
-//! are bilinear; beyond the border they are those of the border. The desktop raises each node to
-//! the highest ground within a vehicle's position error and half a sample step of [`follow`], and
-//! flattens slopes that are too steep. So a path that is above the field at samples half a node
-//! spacing apart is above the ground everywhere.
+//! are interpolated bilinearly; beyond the border the height is that of the nearest point of the
+//! border. The desktop raises each node to the highest ground within a vehicle's position error and
+//! half a sample step of [`follow`], and flattens slopes that are too steep. So a path that is
+//! above the field at samples half a node spacing apart is above the ground everywhere.
 
 pub mod follow;
 
@@ -78,7 +78,7 @@ impl<'a> FieldView<'a> {
     /// it.
     ///
     /// # Errors
-    /// The reason why it is not a valid height field.
+    /// The reason why the bytes are not a valid height field.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, FileError> {
         let Some((header, rest)) = bytes.split_first_chunk::<HEADER_LEN>() else {
             return Err(FileError::Truncated);
@@ -119,7 +119,7 @@ impl<'a> FieldView<'a> {
     }
 
     /// Height of the field at `place`, metres up in the mission frame; beyond the border that of
-    /// the border.
+    /// its nearest point.
     pub fn height_at(&self, place: &Flat) -> f32 {
         let axis = |at: f32, low: f32, count: u16| {
             let most = f32::from(count - 1);

@@ -6,7 +6,7 @@ use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final
-/// xor 0xFFFFFFFF. All files and records use this one instance, so its tables exist once.
+/// xor 0xFFFFFFFF. All users of a CRC-32 share this one instance, so its tables exist once.
 pub static CRC32: Crc<u32, CrcTable> = Crc::<u32, CrcTable>::new(&CRC_32_ISO_HDLC);
 
 /// Lookup tables of [`CRC32`]: one table (1 kB) on a board, sixteen (16 kB) on a desktop, with
@@ -16,7 +16,8 @@ type CrcTable = crc::Table<1>;
 #[cfg(not(target_os = "none"))]
 type CrcTable = crc::Table<16>;
 
-/// Reason why bytes are not a valid file. Its text has at most 41 characters.
+/// Reason why bytes are not a valid file. Its `Display` text has at most 41 characters, so that it
+/// fits into a STATUSTEXT.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileError {
     /// The bytes end before the end of the header, or before the length that the header states.
@@ -25,7 +26,8 @@ pub enum FileError {
     Magic,
     /// The format version is not one that this code reads.
     Version(u16),
-    /// The lengths and counts in the header contradict one another, or the length of the bytes.
+    /// The lengths and counts in the header contradict one another, or do not fit the number of
+    /// bytes.
     Length,
     /// The CRC-32 at the end is not that of the bytes before it.
     Crc,

@@ -1,8 +1,8 @@
 //! Plan types: a path, the gates along it, a vehicle's flight, and the part of the swarm's plan
 //! that its companion needs.
 //!
-//! They hold data and compute geometry only. Metres, seconds, ENU in the mission frame; arc length
-//! is measured along the path from its first waypoint.
+//! These types hold data and compute geometry only. Metres, seconds, ENU in the mission frame; arc
+//! length is measured along the path from its first waypoint.
 
 mod done;
 mod photographs;
@@ -28,7 +28,7 @@ pub struct Waypoint {
     /// these times matters.
     pub arrive_s: f32,
     /// Scheduled departure, seconds after take-off: later than `arrive_s` where the vehicle hovers
-    /// here to let another one pass.
+    /// here to let another vehicle pass.
     pub leave_s: f32,
 }
 
@@ -62,8 +62,8 @@ impl<const W: usize> Path<W> {
         self.waypoints.len().checked_sub(1)
     }
 
-    /// Sets the times of all waypoints for a flight without stops: `first_s` at the first one, and
-    /// `seconds` of each leg later at the one that ends it.
+    /// Sets the times of all waypoints for a flight without stops: `first_s` at the first one; each
+    /// other one is later than the one before by `seconds` of the leg between the two.
     pub fn set_times_by_leg(&mut self, first_s: f32, seconds: impl Fn(&Point, &Point) -> f32) {
         let mut before: Option<(Point, f32)> = None;
         for waypoint in &mut self.waypoints {
@@ -126,7 +126,8 @@ impl<const W: usize> Path<W> {
     }
 
     /// The point at an arc length, which is clamped to the path; `None` if the path is empty.
-    // Not inlined: it has many callers, and the search in each would take a board's flash.
+    // Not inlined: it has many callers, and a copy of the search in each would take flash on a
+    // board.
     #[inline(never)]
     pub fn point_at(&self, along_m: f32) -> Option<Point> {
         self.point_on(self.leg_at(along_m), along_m)
@@ -197,8 +198,8 @@ pub const PROGRESS_ERROR_M: f32 = 0.25;
 
 /// Task of a vehicle on its flight: to stay, to fly to a goal, or to photograph.
 ///
-/// Whatever the task, the flight is one path. A task that acts along the path says where by arc
-/// length.
+/// Whatever the task, the flight is one path. A task that acts along the path gives the places of
+/// its actions as arc lengths.
 // `repr(u8)`, so that `Stay` is all zeros and a static of plans takes .bss only.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -295,7 +296,7 @@ pub struct VehiclePlan<const W: usize, const G: usize> {
     pub depart_s: f32,
     /// The vehicle's gates: arc lengths at which it waits, and for which vehicle.
     pub gates: Vec<Gate, G>,
-    /// CRC-32 over the plan of the whole swarm. Vehicles with the same one agree on the order at
+    /// CRC-32 over the plan of the whole swarm. Vehicles with the same CRC agree on the order at
     /// every gate.
     pub plan_crc: u32,
 }

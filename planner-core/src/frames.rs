@@ -112,9 +112,9 @@ fn ecef_to_geodetic(x: f64, y: f64, z: f64) -> Geodetic {
     Geodetic { lat_deg: lat.to_degrees(), lon_deg: atan2(y, x).to_degrees(), alt_m: alt }
 }
 
-/// Great-circle distance between two positions in metres by the haversine formula (CPP eq. 9), on a
-/// sphere of 6 371 000 m; altitudes are ignored. Compared with WGS84 it is up to 0.56 % too long
-/// (along a meridian at the equator) and up to 0.45 % too short (near the poles).
+/// Great-circle distance between two positions in metres by the haversine formula (paper CPP eq.
+/// 9), on a sphere of 6 371 000 m; altitudes are ignored. Compared with WGS84 it is up to 0.56 %
+/// too long (along a meridian at the equator) and up to 0.45 % too short (near the poles).
 pub fn haversine_m(a: &Geodetic, b: &Geodetic) -> f64 {
     let (lat_a, lat_b) = (a.lat_deg.to_radians(), b.lat_deg.to_radians());
     let half_dlat = sin((lat_b - lat_a) / 2.0);

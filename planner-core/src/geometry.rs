@@ -1,4 +1,4 @@
-//! Lengths of vectors, and squared distances between segments and points, metres.
+//! Lengths of vectors (metres), squared distances between segments and points (m²), and clamping.
 
 use nalgebra::{Vector2, Vector3};
 
@@ -32,15 +32,15 @@ pub(crate) fn clamp_to(value: f32, low: f32, high: f32) -> f32 {
     if value > high { high } else { value }
 }
 
-/// The value clamped to 0 and 1, 0 for no number: two instructions of a board, where
-/// `f32::clamp`, which hands on what is no number, takes seven.
+/// `value` limited to 0..=1; 0 if it is NaN. Takes two instructions on a board; `f32::clamp`, which
+/// returns NaN for NaN, takes seven.
 #[inline]
 pub(crate) fn clamp_share(value: f32) -> f32 {
     let value = if value > 0.0 { value } else { 0.0 };
     if value < 1.0 { value } else { 1.0 }
 }
 
-/// Squared distance between two segments (Ericson, Real-Time Collision Detection, 5.1.9).
+/// Squared distance between two segments, m² (Ericson, Real-Time Collision Detection, 5.1.9).
 pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> f32 {
     let (d1, d2, r) = (p.1 - p.0, q.1 - q.0, p.0 - q.0);
     let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
@@ -48,7 +48,7 @@ pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> 
     let (b, c) = (d1.dot(&d2), d1.dot(&r));
     let s = share(b * f - c * e, a * e - b * b);
     let t = share(b * s + f, e);
-    // With t clamped, s is computed from it again.
+    // `t` may have been clamped, so `s` is computed again from it, then `t` from `s`.
     let s = share(b * t - c, a);
     let t = share(b * s + f, e);
     (r + d1 * s - d2 * t).norm_squared()

@@ -1,15 +1,15 @@
 //! The plan of a whole swarm: which vehicle flies to which goal, on which path, and in which order
 //! at shared places.
 //!
-//! Every companion computes it for the whole swarm, from the mission's starts and goals and never
-//! from live positions, so all get the same plan; they compare its CRC. As in P3D §3.3 there is one
+//! Every companion computes this plan, from the mission's starts and goals and never from live
+//! positions, so all get the same plan; they compare its CRC. As in paper P3D §3.3 there is one
 //! roadmap, and either a shortest path per vehicle (labelled) or the assignment of least total
 //! length over all pairs (unlabelled). The paper leaves out the order at shared stretches, which
 //! [`crate::schedule`] decides.
 //!
-//! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds. In a round
-//! each vehicle takes one to three A*, up to a dozen searches of the schedule (one per departure
-//! tried) and one pass over all scheduled timed segments. Twice that for more than
+//! Cost: one search per vehicle, one assignment, then at most 2 · (min(vehicles, 64) + 9) rounds.
+//! In a round each vehicle takes one to three A*, up to a dozen searches of the schedule (one per
+//! departure tried) and one pass over all scheduled timed segments. Twice that for more than
 //! `MAX_VEHICLES_WITHOUT_HANDOVER` vehicles that cannot be planned with a handover.
 
 mod departures;
@@ -96,7 +96,7 @@ pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
 }
 
 /// Second step: assigns goals to vehicles by the costs that [`compute_costs`] left in the
-/// workspace. A vehicle without one gets `None`.
+/// workspace. A vehicle that gets no goal has `None`.
 pub fn assign_goals<const N: usize, const V: usize, const P: usize>(
     request: &PlanRequest<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
@@ -170,7 +170,7 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
         if request.vehicles.len() > MAX_VEHICLES_WITHOUT_HANDOVER { HANDOVER_S } else { 0.0 };
     let mut planned = schedule_in_order(view, request, handover_s, ws, out);
     if handover_s > 0.0 && planned.is_err() {
-        // A plan that makes vehicles late is better than none.
+        // A plan without handover, which makes vehicles late, is better than none.
         planned = schedule_in_order(view, request, 0.0, ws, out);
     }
     planned?;
@@ -179,14 +179,14 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
 }
 
 /// Time from when a vehicle has left a place until the schedule lets another one be there, seconds:
-/// what a vehicle that waits for it takes until it flies in at full speed. The waiting vehicle is
-/// up to a second behind the reference that stops it at gates, progress is reported five times a
-/// second, and a vehicle that has to stop brakes before. Without this time each vehicle is later
-/// than the one before it, and vehicles that leave their pads on time wait in the air. Gates do not
-/// depend on it.
+/// the time that a vehicle waiting for the place takes until it flies in at full speed. The waiting
+/// vehicle is up to a second behind the reference that stops it at gates, progress is reported five
+/// times a second, and a vehicle that has to stop brakes before. Without this time each vehicle is
+/// later than the one before it, and vehicles that leave their pads on time wait in the air. Gates
+/// do not depend on this time.
 const HANDOVER_S: f32 = 2.0;
 /// Swarms of up to this many vehicles are planned without [`HANDOVER_S`]: in them no vehicle waits
-/// for many that wait themselves, and without it all land earlier.
+/// for many that wait themselves, and without the handover all land earlier.
 const MAX_VEHICLES_WITHOUT_HANDOVER: usize = 12;
 
 /// Plans paths and their order, then checks that the gates of each vehicle fit. The schedule lets a

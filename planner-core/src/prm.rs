@@ -1,15 +1,16 @@
-//! The probabilistic roadmap of P3D §3.2, Algorithm 1: terminals (starts and goals) and random free
-//! nodes, joined where a straight flight between two keeps the clearance.
+//! The probabilistic roadmap (PRM) of paper P3D §3.2, Algorithm 1: terminals (starts and goals) and
+//! random free nodes, joined where a straight flight between two keeps the clearance.
 //!
 //! Starts and goals are nodes; `nodes` random points of free space follow (the paper's count
 //! excludes the terminals as well). Two nodes are joined iff `edge_min_m ≤ length ≤ edge_max_m` and
-//! the segment between them keeps `clearance_m` ([`segment_is_clear`]). The set of edges is the one
-//! of a loop over all pairs ([`connect_all_pairs`]); only the work is less:
+//! the segment between them keeps `clearance_m` ([`segment_is_clear`]). The edges are exactly those
+//! that a loop over all pairs finds ([`connect_all_pairs`]), with less work:
 //!
 //! 1. nodes are sorted into cubes ([`NodeIndex`]), so that only near pairs are measured;
 //! 2. around a node the largest empty box in a fixed order of growth is taken (`prm/free_box.rs`):
-//!    a neighbour inside it is clear, and a ray that leaves it mostly does so into a wall;
-//! 3. the segments that are left go to the exact check, without their part inside the box.
+//!    the segment to a neighbour inside the box is clear, and one that leaves the box mostly meets
+//!    a wall;
+//! 3. the remaining segments go to the exact check, without their part inside the box.
 //!
 //! Cost: O(nodes · neighbours); 2300 nodes have some 80 000 pairs within the length range. Memory:
 //! 14 bytes per node, 2 per cube. Metres, mission frame, f32.

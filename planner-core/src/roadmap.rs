@@ -5,8 +5,8 @@
 //! in compressed sparse rows, targets in ascending order. A half-edge takes four bytes: its length
 //! is computed from the nodes, its clearance is stored in whole millimetres, rounded down. So 4096
 //! nodes and 65536 half-edges take 320 kB, 32 kB more with landmarks. Because each edge carries its
-//! own clearance, one roadmap built for a small required clearance serves vehicles of any size (P3D
-//! Table 1 from a single build).
+//! own clearance, one roadmap built for a small required clearance serves vehicles of any size
+//! (paper P3D Table 1 from a single build).
 //!
 //! A roadmap may store the length of the shortest path from each node to two landmarks (nodes),
 //! eight bytes per node. By the triangle inequality, the difference of two nodes' distances to a
@@ -14,12 +14,13 @@
 //! line (ALT: Goldberg and Harrelson 2005, "Computing the Shortest Path: A* Search Meets Graph
 //! Theory").
 //!
-//! It may also store each node's height above the ground, four bytes per node, so that a board
-//! without a map knows the ground height below a vehicle ([`RoadmapView::ground_range_near`]).
+//! A roadmap may also store each node's height above the ground, four bytes per node, so that a
+//! board without a map knows the ground height below a vehicle
+//! ([`RoadmapView::ground_range_near`]).
 //!
 //! [`RoadmapView::parse`] checks the file once, in O(nodes + half-edges · log degree). After that
 //! no accessor can meet an offset or a target out of range, and A* finds shortest paths, whatever
-//! the bytes were. It cannot check clearances: that takes the map.
+//! the bytes were. Parsing cannot check clearances: that takes the map.
 
 use crate::Point;
 use crate::file::{CRC32, FileError};
@@ -36,7 +37,7 @@ pub use write::{Edge, encoded_len, write, write_with_landmarks};
 pub const MAGIC: [u8; 8] = *b"FLKROAD\n";
 /// File version with a height above the ground for each node.
 pub const VERSION: u16 = 2;
-/// File version without heights; it is written where there are none, and both versions are read.
+/// File version without heights, written if the caller has none; both versions are read.
 const VERSION_WITHOUT_HEIGHTS: u16 = 1;
 /// Length of the header, the bytes before the first node.
 pub const HEADER_LEN: usize = 72;
@@ -45,7 +46,7 @@ pub const MAX_NODES: usize = u16::MAX as usize;
 /// Largest magnitude of a coordinate, metres: up to here f32 resolves a millimetre.
 pub const MAX_COORDINATE_M: f32 = 16_384.0;
 /// Longest edge that a roadmap may have, metres. The scheduler checks every metre of an edge, so
-/// this bounds its work.
+/// this limit bounds the scheduler's work.
 pub const MAX_EDGE_M: f32 = 100.0;
 /// Longest path from a node to a landmark that the file may store, metres: up to this length the
 /// f32 sum of edge lengths errs by at most 4 mm per edge.
@@ -120,9 +121,9 @@ impl From<FileError> for RoadmapError {
 pub struct RoadmapHeader {
     /// The mission origin: the WGS84 position of the point (0, 0, 0) of the nodes' ENU frame.
     pub origin: Geodetic,
-    /// Shortest edge that the builder was allowed to make (P3D `Dmin`), metres.
+    /// Shortest edge that the builder was allowed to make (`Dmin` of paper P3D), metres.
     pub edge_min_m: f32,
-    /// Longest edge that the builder was allowed to make (P3D `Dmax`), metres.
+    /// Longest edge that the builder was allowed to make (`Dmax` of paper P3D), metres.
     pub edge_max_m: f32,
     /// Clearance that every edge was tested to exceed, metres. A vehicle that needs more must check
     /// [`HalfEdge::clearance_m`] of each edge.
@@ -188,7 +189,7 @@ fn millimetres_down(metres: f32) -> u16 {
 /// One of the two directions of an edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HalfEdge {
-    /// Index of the node to which it leads.
+    /// Index of the node to which the half-edge leads.
     pub target: u16,
     /// Distance from the edge to the nearest obstacle, metres, rounded down to a millimetre. If it
     /// equals [`RoadmapHeader::max_clearance_m`], the distance may be larger.
@@ -288,7 +289,7 @@ impl<'a> RoadmapView<'a> {
         }
     }
 
-    /// Number of nodes; valid indices are below it.
+    /// Number of nodes; valid indices are below this number.
     pub fn node_count(&self) -> usize {
         self.nodes.len()
     }
@@ -372,9 +373,9 @@ impl<'a> RoadmapView<'a> {
         fpu::sqrtf((self.node(b) - self.node(a)).norm_squared())
     }
 
-    /// Whether a vehicle that needs `required_m` (radius + safety margin) may fly `edge`. Its
-    /// clearance must be greater than that; equal is blocked. A requirement up to the header's
-    /// tested clearance is met by every edge.
+    /// Whether a vehicle that needs `required_m` (radius + safety margin) may fly `edge`. The
+    /// edge's clearance must be greater than `required_m`; equal is blocked. A requirement up to
+    /// the header's tested clearance is met by every edge.
     #[inline]
     pub fn has_clearance(&self, edge: &HalfEdge, required_m: f32) -> bool {
         edge.clearance_m > required_m || required_m <= self.header.tested_clearance_m

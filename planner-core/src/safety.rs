@@ -3,13 +3,13 @@
 //!
 //! The own vehicle's set ([`ReachableSet::along`], [`ReachableSet::vertical`]) is the motion that
 //! it can no longer avoid: [`REACTION_S`] at its present speed, then a stop at its limits along its
-//! reference. A neighbour's set ([`NeighbourMotion::reachable_set`]) depends only on its last
-//! reports: on no gate, no progress, no advice.
+//! reference. A neighbour's set ([`NeighbourMotion::reachable_set`]) depends only on the
+//! neighbour's last reports: on no gate, no progress, no advice.
 //!
 //! Two sets conflict ([`OwnSet::conflicts`]) where they come nearer than the safety distance. A
 //! motion that does not reduce a distance that is already too small never conflicts. A vehicle that
-//! stops as soon as its set conflicts stays inside its set of the step before, which did not: that
-//! is the safety argument (`docs/safety.md`).
+//! stops as soon as its set conflicts stays inside its set of the step before, which did not
+//! conflict: that is the safety argument (`docs/safety.md`).
 //!
 //! ENU metres. Sets have no times, so two vehicles that pass a place one after the other still
 //! conflict there. Cost: the segments of one set times those of the other;
@@ -27,7 +27,8 @@ pub use self::own::{Legs, OwnSet};
 pub use self::place::{OFF_REPORTED_PATH_M, OFF_REPORTED_PATH_S, PlaceOnPoints, PointsReach};
 use crate::{ConfigError, Point, all_positive};
 
-/// Time from a decision of the filter to the first motion that follows it, seconds: two setpoints.
+/// Time from a decision of the filter to the first motion that follows it, seconds: two setpoint
+/// periods.
 pub const REACTION_S: f32 = 0.1;
 /// Greatest lag of a vehicle behind its reference, seconds: in a stop the vehicle flies on for this
 /// time.
@@ -92,8 +93,8 @@ impl ReachableSet {
         set
     }
 
-    /// Adds to a set of one place what [`Self::along`] leads it along: a board takes long to copy
-    /// what that returns.
+    /// Extends a set of one point in place as [`Self::along`] does: copying a set that
+    /// [`Self::along`] returns takes long on a board.
     #[inline]
     pub fn extend_along(&mut self, ahead: impl Iterator<Item = Point>, length_m: f32) {
         let (mut left_m, mut last) = (length_m, None);
@@ -126,8 +127,8 @@ impl ReachableSet {
         set
     }
 
-    /// Adds the column below the first point down to the height `to_m`; none for `None`, or if that
-    /// is above the point.
+    /// Adds the column below the first point down to the height `to_m`; no column if `to_m` is
+    /// `None` or not below the point.
     fn add_column(&mut self, to_m: Option<f32>) {
         let first = self.points[0];
         self.foot = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
@@ -146,7 +147,7 @@ impl ReachableSet {
     }
 }
 
-/// What [`ReachableSet::segments`] gives: from point to point, and the column at last.
+/// Iterator of [`ReachableSet::segments`]: the legs from point to point, then the column.
 struct Segments<'a> {
     from: &'a Point,
     next: core::slice::Iter<'a, Point>,
@@ -165,7 +166,7 @@ impl<'a> Iterator for Segments<'a> {
     }
 }
 
-/// Last reports of a neighbour, and what follows from them, from which its reachable set is
+/// Last reports of a neighbour and values derived from them, from which its reachable set is
 /// computed.
 #[derive(Clone, Copy, Debug)]
 pub struct NeighbourMotion<'a> {
@@ -184,10 +185,10 @@ pub struct NeighbourMotion<'a> {
     pub points: &'a [Point],
     /// Where the neighbour is on its reported points.
     pub place_on_points: PlaceOnPoints,
-    /// How far its points lead it.
+    /// Bounds of how far its reported points lead the neighbour.
     pub points_reach: PointsReach,
     /// Distance along its points within which a neighbour that has been silent for long may have
-    /// stopped, metres; 0 for one that is heard.
+    /// stopped, metres; 0 for a neighbour that is heard.
     pub rests_within_m: f32,
     /// Whether the neighbour stands on the ground.
     pub grounded: bool,
@@ -219,8 +220,8 @@ impl MotionBounds {
     }
 }
 
-/// The lesser of two, `b` where `a` is no number. A board takes three times as long for `min`,
-/// which asks the same of `b`.
+/// The lesser of two numbers; `b` if `a` is NaN. `f32::min`, which also checks `b` for NaN, takes
+/// three times as long on a board.
 #[inline]
 fn less(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -250,7 +251,8 @@ impl NeighbourMotion<'_> {
 
     #[inline]
     fn reach_any_direction_m(&self, bounds: &MotionBounds) -> f32 {
-        // The neighbour learns that no vehicle hears it by messages that are as late as its own.
+        // The neighbour learns that no vehicle hears it from messages that are delayed as much as
+        // its own.
         bounds.speed_max_mps * less(self.data_age_s(), bounds.silent_s + 2.0 * self.delay_s)
     }
 

@@ -8,9 +8,9 @@
 //! landing places of the others (a "well-formed" problem, Čáp et al. 2015).
 //!
 //! In flight only the *order* of the schedule counts. For each pair of conflicting segments the
-//! later vehicle gets a [`Gate`]: it enters its segment only when the earlier one has left its own.
-//! Claim by claim, `docs/schedule.md` proves that this keeps vehicles apart and lets all of them
-//! arrive.
+//! later vehicle gets a [`Gate`]: it enters its segment only when the earlier vehicle has left its
+//! own. Claim by claim, `docs/schedule.md` proves that this keeps vehicles apart and lets all of
+//! them arrive.
 //!
 //! Where no wait on the pad helps, as for two vehicles head-on in a corridor, [`sipp`] lets the
 //! vehicle wait or step aside on its way.
@@ -38,8 +38,8 @@ use self::pieces::{TimedSegment, cut_into_segments, is_conflict};
 use crate::flight::{Flight, Gate, PROGRESS_ERROR_M};
 use crate::sort;
 
-/// Most forbidden intervals that are kept apart during the search for a take-off time. More are
-/// merged with the nearest, which only forbids more.
+/// Most forbidden intervals that are kept apart during the search for a take-off time. Any further
+/// interval is merged with the nearest one, which only forbids more.
 const MAX_INTERVALS: usize = 128;
 /// Height above its pad from which a vehicle counts as having left the pad, metres.
 const OFF_PAD_HEIGHT_M: f32 = 0.02;
@@ -65,7 +65,8 @@ impl ScheduleWorkspace {
 type ForbiddenIntervals = Vec<(f32, f32), MAX_INTERVALS>;
 
 fn add_forbidden_interval(forbidden: &mut ForbiddenIntervals, mut low: f32, mut high: f32) {
-    // Merged with all that overlap; if there is no room, with the nearest as well.
+    // The new interval is merged with all that overlap it; if there is no room, with the nearest as
+    // well.
     while let Some(i) = forbidden.iter().position(|&(l, h)| l <= high && low <= h) {
         let (l, h) = forbidden.swap_remove(i);
         (low, high) = (fminf(low, l), fmaxf(high, h));
@@ -163,8 +164,8 @@ pub(crate) fn departure_with_conflict_counts<const W: usize>(
 }
 
 /// The interval of differences in take-off time, `a` minus `b`, outside which the two flights have
-/// no conflict, seconds. Its first end is the greater one if they never have. A place counts as
-/// free `handover_s` after its vehicle has left it.
+/// no conflict, seconds. If they never conflict, the first end is greater than the second. A place
+/// counts as free `handover_s` after its vehicle has left it.
 pub(crate) fn forbidden_differences<const W: usize>(
     cfg: &ScheduleConfig,
     a: &Flight<W>,
@@ -215,11 +216,12 @@ fn last_allowed(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
 
 /// The reported progress from which a vehicle counts as having left timed segment `q`, metres.
 ///
-/// Where the segment ends the vehicle may have to wait at a gate, for a vehicle that waits until
-/// this segment is left. So what a standing vehicle may report too little is subtracted. The next
-/// segment begins at that place: it is in conflict too and counts by itself, or it is clear, and
-/// then so is the place. A vehicle has left its pad when it is above it by [`OFF_PAD_HEIGHT_M`],
-/// however low its climb ends, and its descent when it stands on the ground.
+/// At the segment's end the vehicle may have to wait at a gate for another one, which itself waits
+/// until this segment is left. So [`PROGRESS_ERROR_M`], by which a standing vehicle may report too
+/// little, is subtracted. The next segment begins at that end: either it is in conflict too and
+/// counts by itself, or it is clear, and then so is the end. A vehicle has left its pad when it is
+/// [`OFF_PAD_HEIGHT_M`] above the pad, however low its climb ends, and its descent when it stands
+/// on the ground.
 fn progress_when_left_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
     if q.to_m < flight.path.length_m() + flight.descent_m {
         fmaxf(q.to_m - PROGRESS_ERROR_M, OFF_PAD_HEIGHT_M - flight.climb_m)
@@ -250,7 +252,7 @@ pub fn gates<const W: usize, const G: usize>(
     if full { Err(ScheduleError::GatesFull) } else { Ok(()) }
 }
 
-/// The distance along its path within which the gates of flight `index` have to be merged so that
+/// The distance along the path within which the gates of flight `index` have to be merged so that
 /// at most `most` remain, metres: the first of `GATE_MERGE_M` that suffices.
 pub(crate) fn gate_merge_distance_m<const W: usize>(
     cfg: &ScheduleConfig,
@@ -300,8 +302,7 @@ fn for_each_gate<const W: usize>(
     ws: &mut ScheduleWorkspace,
     mut found: impl FnMut(Gate),
 ) -> Result<(), ScheduleError> {
-    // Hovers are left out: the segment that ends at a hover and the one that begins there conflict
-    // wherever the hover does.
+    // Hovers are left out: wherever a hover conflicts, so do the segments that end and begin there.
     let moves = |piece: &&TimedSegment| piece.parked || piece.to_m > piece.from_m;
     let flight = &flights[index];
     for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {

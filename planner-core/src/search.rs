@@ -1,12 +1,12 @@
 //! Shortest paths on a roadmap: A* from one node to another, and the path lengths from one node to
 //! many goals (a row of the cost matrix).
 //!
-//! Source: P3D §3.3 (A* per pair, cost matrix for the assignment). The heuristic is the greater of
-//! the straight-line distance and the bound from the roadmap's landmarks. Both are admissible and
-//! consistent: an edge is as long as the straight line between its nodes, and the distances of its
-//! two nodes to a landmark differ by no more than its length. Blocked edges only make paths longer.
-//! Metres, f32. Cost O(half-edges + nodes · log nodes), each node settled once; memory is the
-//! caller's [`SearchWorkspace`].
+//! Source: paper P3D §3.3 (A* per pair, cost matrix for the assignment). The heuristic is the
+//! greater of the straight-line distance and the bound from the roadmap's landmarks. Both are
+//! admissible and consistent: an edge is as long as the straight line between its nodes, and the
+//! distances of its two nodes to a landmark differ by no more than its length. Blocked edges only
+//! make paths longer, so both bounds still hold. Metres, f32. Cost O(half-edges + nodes · log
+//! nodes), each node settled once; memory is the caller's [`SearchWorkspace`].
 //!
 //! Edge lengths are not stored but computed from the nodes. Most half-edges need no length: the
 //! target is settled, or its distance is already too small for the squared length of this edge to
@@ -117,8 +117,8 @@ pub trait Graph {
     /// their number. `first` is the index of `half_edges[0]` in the file. May include some that do
     /// not shorten a path, never leaves out one that does.
     ///
-    /// Most do not: the target is settled, or has a shorter path. Written without branches, which
-    /// could not be predicted.
+    /// Most half-edges shorten no path: the target is settled, or has a shorter path. Written
+    /// without branches, which could not be predicted.
     fn find_improvements<const N: usize>(
         &self,
         first: usize,
@@ -152,7 +152,7 @@ impl Graph for RoadmapView<'_> {
     ) -> usize {
         // The bound is raised a little, so that rounding hides no improvement; the exact comparison
         // follows in [`relax_edges`]. 1e-6 is eight times the rounding of the three products.
-        /// Factor on the squared length up to which an edge counts as an improvement.
+        /// Factor by which the bound on an edge's squared length is raised.
         const BOUND_ROUNDING: f32 = 1.0 + 1e-6;
         let mut count = 0_u8;
         for (place, half_edge) in half_edges.iter().enumerate() {
@@ -261,7 +261,7 @@ pub fn dijkstra_all<const N: usize>(
 ///
 /// For up to 32 targets it is an A* to each target in turn: nodes settled for one target stay
 /// settled, since their distances are final, and only the heap is reordered by the heuristic of the
-/// next. For more it is Dijkstra's algorithm.
+/// next target. For more targets it is Dijkstra's algorithm.
 pub fn dijkstra_row<const N: usize>(
     graph: &impl Graph,
     from: u16,

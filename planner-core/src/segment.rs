@@ -1,8 +1,8 @@
 //! Distance from a straight segment to the obstacles of a voxel map, and whether it is enough.
 //!
-//! It decides on every roadmap edge (P3D §3.2, Algorithm 1): may a vehicle that needs `clearance_m`
-//! fly straight from `a` to `b`? A segment is clear iff its Euclidean distance to every occupied
-//! closed cell, and to the outside where that is
+//! This check decides on every roadmap edge (paper P3D §3.2, Algorithm 1): may a vehicle that needs
+//! `clearance_m` fly straight from `a` to `b`? A segment is clear iff its Euclidean distance to
+//! every occupied closed cell, and to the outside where that is
 //! [`Outside::Blocked`](crate::voxel::Outside::Blocked), is strictly greater than the clearance:
 //! touching a face, an edge or a corner is blocked.
 //!
@@ -16,7 +16,7 @@
 //!
 //! So for ends on the lattice (multiples of resolution / 16384; also a corner and a resolution for
 //! which `(p − min) / resolution` is exact, such as powers of two) the answer is right, touching
-//! included. For any other end it is right for a segment of which each end is moved by at most
+//! included. For any other ends the answer is that for a segment whose ends are moved by at most
 //! [`snap_error_cells`]: 2⁻¹⁵ cell of snapping and two f32 roundings, 0.000 06 cell in a grid of
 //! 256 cells a side, 15 µm at 0.25 m.
 //!

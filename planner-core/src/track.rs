@@ -3,10 +3,11 @@
 //! Setpoints for the autopilot are made from the reference. It moves along the path no faster than
 //! corners, walls and other vehicles allow, and waits for a vehicle that lags. A corner of angle θ
 //! at speed v asks the vehicle for a sudden change of velocity Δv = 2·v·sin(θ/2). A velocity loop
-//! with response time τ lets it stray Δv·τ from the path until it has caught up. So v = e /
-//! (τ·2·sin(θ/2)) keeps the vehicle within the deviation e that the clearance of the two legs
+//! with response time τ lets the vehicle stray Δv·τ from the path until it has caught up. So v = e
+//! / (τ·2·sin(θ/2)) keeps the vehicle within the deviation e that the clearance of the two legs
 //! allows. Between corners the acceleration is sent as feed-forward, so that the vehicle brakes
-//! without lag. (P2D §4 reports collisions where a waypoint counted as reached from a metre away.)
+//! without lag. (Paper P2D §4 reports collisions where a waypoint counted as reached from a metre
+//! away.)
 
 use fpu::sqrtf;
 use libm::{fabsf, fmaxf, fminf};
@@ -41,8 +42,9 @@ pub struct TrackConfig {
     /// more.
     pub deviation_max_m: f32,
     /// Largest distance of the reference ahead of the vehicle, metres: the reference slows from
-    /// half of it and stops at it. Between walls it is four times the deviation allowed there, so
-    /// that a vehicle that lags does not cut the corner. In the open it grows with the speed.
+    /// half of it and stops at it. Between walls the lead is limited to four times the deviation
+    /// allowed there, so that a vehicle that lags does not cut the corner. In the open the limit
+    /// grows with the speed.
     pub lead_max_m: f32,
 }
 

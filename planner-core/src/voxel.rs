@@ -2,8 +2,8 @@
 //! each.
 //!
 //! One load shows whether a brick holds any obstacle, so a query over empty space advances four
-//! cells at a time. The building at 0.5 m (82 × 48 × 98 cells) takes 50.4 kB. Cell `(i, j, k)`
-//! covers the closed cube from `min + (i, j, k) · resolution` to
+//! cells at a time. The built-in building map at 0.5 m (82 × 48 × 98 cells) takes 50.4 kB. Cell
+//! `(i, j, k)` covers the closed cube from `min + (i, j, k) · resolution` to
 //! `min + (i + 1, j + 1, k + 1) · resolution`.
 
 use crate::Point;
@@ -90,8 +90,8 @@ impl GridShape {
         (word, 1 << ((k % 4) * 16 + (j % 4) * 4 + i % 4))
     }
 
-    /// Whether all padding bits (bits of cells beyond the last of an axis) are clear. A set one
-    /// would be an obstacle in a cell that does not exist.
+    /// Whether all padding bits (bits of cells beyond the last of an axis) are clear. A set padding
+    /// bit would be an obstacle in a cell that does not exist.
     fn padding_is_clear(&self, words: &[u64]) -> bool {
         /// Masks, for each axis, of a brick's first layer of cells, its first two and its first
         /// three.
@@ -174,7 +174,8 @@ impl<'a> VoxelGrid<'a> {
         self.words
     }
 
-    /// Whether a cell is an obstacle. A cell outside the grid is one with [`Outside::Blocked`].
+    /// Whether a cell is an obstacle. A cell outside the grid is an obstacle if the grid has
+    /// [`Outside::Blocked`].
     #[inline]
     pub fn is_occupied(&self, cell: [u32; 3]) -> bool {
         if (0..3).any(|axis| cell[axis] >= self.shape.dims[axis]) {
@@ -184,8 +185,8 @@ impl<'a> VoxelGrid<'a> {
         self.words[word] & mask != 0
     }
 
-    /// Whether the cell that contains `p` is an obstacle. A point outside the grid is in one with
-    /// [`Outside::Blocked`].
+    /// Whether the cell that contains `p` is an obstacle. A point outside the grid is in an
+    /// obstacle if the grid has [`Outside::Blocked`].
     pub fn is_blocked_at(&self, p: &Point) -> bool {
         match self.shape.cell_of(p) {
             Some(cell) => self.is_occupied(cell),

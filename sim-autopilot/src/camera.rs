@@ -2,14 +2,14 @@
 //! once (DO_DIGICAM_CONTROL, 203).
 //!
 //! Each autopilot checks in its own way. PX4's `camera_trigger` (TRIG_MODE 4) runs every 50 ms:
-//! then it executes a command, takes a picture where triggering is switched on, and one whenever
-//! the distance from the last is reached. ArduPilot's `AP_Camera` runs every 20 ms: it measures
-//! from where triggering is switched on or from the last picture, and takes a requested picture
-//! immediately. Both measure horizontally, on the estimated position. So pictures are farther apart
-//! than the distance, by what is flown between two checks. Each picture is announced on every port,
-//! with the estimated position, by CAMERA_IMAGE_CAPTURED (263, PX4, counted from 0) or
-//! CAMERA_FEEDBACK (180, ArduPilot, counted from 1). Source: `camera_trigger.cpp`,
-//! `AP_Camera_Backend.cpp`.
+//! then it executes a command, takes a picture where triggering by distance is switched on, and
+//! another whenever the distance from the last picture is reached. ArduPilot's `AP_Camera` runs
+//! every 20 ms: it measures from where triggering is switched on or from the last picture, and
+//! takes a requested picture immediately. Both measure horizontally, on the estimated position. So
+//! pictures are farther apart than the distance, by what is flown between two checks. Each picture
+//! is announced on every port, with the estimated position, by CAMERA_IMAGE_CAPTURED (263, PX4,
+//! counted from 0) or CAMERA_FEEDBACK (180, ArduPilot, counted from 1). Source:
+//! `camera_trigger.cpp`, `AP_Camera_Backend.cpp`.
 //!
 //! The true position of each picture is kept for a referee ([`super::Autopilot::take_photos`]).
 

@@ -30,7 +30,7 @@ pub struct Command {
     pub place: [f64; 2],
     /// Parameter 7, for most commands an altitude, metres.
     pub z: f32,
-    /// Whether `z` counts from home; false: from sea level.
+    /// Whether altitude `z` counts from home; false: from sea level.
     pub relative: bool,
 }
 

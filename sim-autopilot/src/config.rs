@@ -8,8 +8,8 @@ use super::vehicle::VehicleLimits;
 use crate::{AutopilotKind, EstimatorErrors};
 
 impl AutopilotKind {
-    /// Factor on the airframe's drag. ArduCopter's follows from recorded flights of its simulated
-    /// quadrotor.
+    /// Factor on the airframe's drag. ArduCopter's factor is fitted to recorded flights of its
+    /// simulated quadrotor.
     pub(super) fn drag_share(self) -> f32 {
         match self {
             Self::Px4 => 1.0,

@@ -5,16 +5,16 @@
 //! is a first-order Gauss–Markov process with standard deviation σ and time constant τ, so e has
 //! the standard deviation σ T √(τ / (τ + T)). A constant error of the height over the whole flight
 //! is added, like that of the EKF origin's altitude of a recorded PX4. The parameters are fitted to
-//! the recorded flights (`data/flights` of the shared data). Their errors, from arming to
+//! the recorded flights (`data/flights` of the shared data). The recorded errors, from arming to
 //! disarming, metres and m/s:
 //!
 //! | | PX4 | ArduCopter |
 //! |---|---|---|
-//! | across: RMS; greatest | 0.13–0.27; 0.26–0.72 | 0.02–0.04; 0.03–0.11 |
-//! | drift in 10 s, across: RMS; greatest | 0.20–0.41; 0.38–1.03 | 0.01–0.04; 0.03–0.11 |
+//! | horizontal: RMS; greatest | 0.13–0.27; 0.26–0.72 | 0.02–0.04; 0.03–0.11 |
+//! | drift in 10 s, horizontal: RMS; greatest | 0.20–0.41; 0.38–1.03 | 0.01–0.04; 0.03–0.11 |
 //! | height: RMS; greatest | 0.11–0.51; 0.27–1.09 | 0.01–0.03; 0.02–0.08 |
 //! | drift in 10 s, height: RMS; greatest | 0.11–0.57; 0.21–1.42 | 0.01–0.04; 0.02–0.08 |
-//! | velocity: RMS each way across; up | 0.14–0.26; 0.10–0.20 | 0.02; 0.00 |
+//! | velocity: RMS on each horizontal axis; up | 0.14–0.26; 0.10–0.20 | 0.02; 0.00 |
 
 use planner_core::Point;
 
@@ -92,8 +92,8 @@ impl EstimateErrors {
     pub fn new(estimator: EstimatorErrors, autopilot: AutopilotKind, seed: u64) -> Self {
         let mut random = Gaussian::new(seed ^ 0x0E57_1A7E);
         let (across, up, height_m) = error_models(estimator, autopilot);
-        // A number within ±1.75 becomes a share of the range from 0 to 1; the generator's others,
-        // up to ±3.46, are clamped to its ends.
+        // A random number within ±1.75 becomes a place in the range (0 to 1); larger ones, up to
+        // ±3.46, are clamped to the ends.
         let share = (0.5 + random.sample() / 3.5).clamp(0.0, 1.0);
         let mut errors = Self {
             random,
@@ -176,7 +176,8 @@ mod tests {
         }
     }
 
-    /// The median over seeds lies in the recorded range, and nine of ten do within a fifth of it.
+    /// The median over seeds lies in the recorded range, and nine of ten values lie between half of
+    /// its lower end and 1.25 times its upper end.
     fn holds(name: &str, mut values: Vec<f32>, range: [f32; 2]) {
         values.sort_by(f32::total_cmp);
         let at = |share: f32| values[(share * (values.len() - 1) as f32) as usize];

@@ -1,4 +1,4 @@
-//! The kind of autopilot that runs: dispatches every call that depends on it.
+//! Dispatches every call that depends on the kind of autopilot.
 
 use super::ardupilot::{self, Copter};
 use super::command::Command;
@@ -161,8 +161,7 @@ impl Firmware {
         }
     }
 
-    /// Handles PARAM_SET: changes the parameter if the value is valid, and looks up the values in
-    /// use.
+    /// Handles PARAM_SET: changes the parameter if the value is valid, and updates the tuning.
     pub(super) fn set_param(&mut self, name: &str, wire: f32, wire_type: u8) {
         match self {
             Self::Px4(px4) => {
@@ -208,7 +207,8 @@ impl Firmware {
         }
     }
 
-    /// Sets the mode of this `custom_mode` as the pilot's switch does; false if there is none.
+    /// Sets the mode of this `custom_mode` as the pilot's switch does; false if there is no such
+    /// mode.
     pub(super) fn force_mode(&mut self, custom_mode: u32, sensors: &SensorReadings) -> bool {
         match self {
             Self::Px4(px4) => px4::Mode::from_custom_mode(custom_mode)

@@ -1,11 +1,11 @@
 //! MAVLink framing of the simulated autopilots. It shares no code with the companion's, so that a
 //! bug in one is not hidden by the same bug in the other.
 //!
-//! Source: MAVLink guide, "Packet Serialization". The `mavlink` crate provides message types, CRC
-//! seeds and the checksum; its reader is not used, because it blocks on a stream, and bytes here
-//! arrive whenever the simulation has some.
+//! Source: MAVLink guide, "Packet Serialization". The `mavlink` crate provides message types,
+//! CRC_EXTRA and the checksum; its reader is not used, because it blocks on a stream, and bytes
+//! here arrive whenever the simulation has some.
 //!
-//! Of overlapping candidates the first with a correct checksum is the frame; after a wrong checksum
+//! Of overlapping candidate frames the first with a correct checksum counts; after a wrong checksum
 //! the search continues behind the candidate's start byte. An incomplete frame is dropped
 //! [`PARTIAL_LIFETIME_US`] after its first byte.
 
@@ -24,8 +24,8 @@ const V2_HEADER: usize = 10;
 /// Incompatibility flag of a MAVLink 2 frame: a signature follows. A frame with any other flag is
 /// not read.
 const FLAG_SIGNED: u8 = 1;
-/// COMPONENT_INFORMATION, the only message whose CRC seed is 0; for unknown ids the crate returns 0
-/// too.
+/// COMPONENT_INFORMATION, the only message whose CRC_EXTRA is 0; the crate returns 0 for unknown
+/// ids too.
 const SEED_ZERO: u32 = 395;
 
 /// A received frame whose checksum is correct.
@@ -77,7 +77,7 @@ impl Frame {
     }
 }
 
-/// CRC seed (CRC_EXTRA) of a message id; `None` if the dialect does not know the id.
+/// CRC_EXTRA of a message id; `None` if the dialect does not know the id.
 pub fn crc_seed(message_id: u32) -> Option<u8> {
     let seed = MavMessage::extra_crc(message_id);
     (seed != 0 || message_id == SEED_ZERO).then_some(seed)

@@ -39,7 +39,8 @@ impl Autopilot {
             20 if for_us(2, 3) => self.handle_param_read(port, &fields),
             21 if for_us(0, 1) => platform.ports[port].param_cursor = Some(0),
             23 if for_us(4, 5) => self.handle_param_set(port, &fields),
-            // Messages of the mission protocol, by where their target system and component stand.
+            // Messages of the mission protocol, by the offsets of their target system and
+            // component.
             43 | 45 if for_us(0, 1) => platform.handle_mission(from, frame.message_id, &fields),
             40 | 41 | 44 | 47 | 51 if for_us(2, 3) => {
                 platform.handle_mission(from, frame.message_id, &fields);
@@ -83,8 +84,8 @@ impl Autopilot {
         self.send_named_param(port, name);
     }
 
-    /// Sends a parameter by its name; an unknown name gets no answer. ArduPilot reports no index
-    /// then.
+    /// Sends a parameter by its name; an unknown name gets no answer. ArduPilot answers a request
+    /// by name with 65535 instead of the index.
     fn send_named_param(&mut self, port: usize, name: Option<&str>) {
         let params = self.firmware.params();
         if let Some(index) = name.and_then(|name| params.index(name)) {

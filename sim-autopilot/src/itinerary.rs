@@ -5,7 +5,7 @@
 //! DO_DIGICAM_CONTROL (203) and DO_SET_CAM_TRIGG_DIST (206) are executed as soon as the item before
 //! them is completed. All other items are skipped. ArduPilot's item 0 is home and not flown.
 //!
-//! Items have their numbers of the upload; positions are ENU metres in the mission frame; times are
+//! Items keep their numbers of the upload; positions are ENU metres in the mission frame; times are
 //! microseconds since boot.
 
 use planner_core::Point;

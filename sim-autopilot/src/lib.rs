@@ -378,8 +378,8 @@ impl Autopilot {
     }
 
     /// Sets the errors of the estimate (estimated minus true): position (ENU metres), velocity (ENU
-    /// m/s) and rate of change of the height's error (m/s). A replay imposes recorded errors by
-    /// this.
+    /// m/s) and rate of change of the height's error (m/s). A replay uses this to impose recorded
+    /// errors.
     pub fn set_estimate_error(&mut self, position: &Point, velocity: &Point, height_rate: f32) {
         (self.platform.position_offset, self.platform.velocity_bias) = (*position, *velocity);
         self.platform.height_error_rate = height_rate;

@@ -24,7 +24,7 @@ const PREARM: u32 = 0x1000_0000;
 /// Bit MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL of SYS_STATUS.
 const XY_POSITION_CONTROL: u32 = 0x4000;
 
-/// Messages that many dialects do not have: id, CRC seed and payload as recorded from PX4 1.17.
+/// Messages that many dialects do not have: id, CRC_EXTRA and payload as recorded from PX4 1.17.
 /// Their contents do not matter; they test that receivers skip unknown messages.
 const RECORDED: [(u32, u8, &[u8]); 5] = [
     (8, 117, &[0xA0, 0x6F, 0x6D, 0, 0, 0, 0, 0, 0x29, 0x60, 0, 0, 0, 0, 0, 0, 0xAB, 9]),

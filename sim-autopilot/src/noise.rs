@@ -1,8 +1,8 @@
 //! Seeded random disturbances: gusts of wind and a random error of the estimator.
 //!
-//! All are Ornstein–Uhlenbeck processes (first-order Gauss–Markov; a Dryden gust is one on each
-//! axis with τ = L / V). They are updated every 20 ms and constant in between, since nothing they
-//! model changes faster.
+//! All disturbances are Ornstein–Uhlenbeck processes (first-order Gauss–Markov; a Dryden gust is
+//! one process on each axis with τ = L / V). They are updated every 20 ms and constant in between,
+//! since nothing they model changes faster.
 //!
 //! A gust is specified by its peak beyond the mean wind, as in weather reports and MIL-F-8785C's
 //! discrete gust, not by a standard deviation: the peak is [`PEAK_FACTOR`] deviations, and gusts
@@ -95,8 +95,8 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
-    /// Mean wind (ENU m/s), largest gust beyond it (m/s) and standard deviation of the position
-    /// estimate (m). 0 switches gusts or errors off.
+    /// Disturbances with this mean wind (ENU m/s), largest gust beyond it (m/s) and standard
+    /// deviation of the position estimate (m). 0 switches gusts or errors off.
     pub fn new(mean_wind: Point, gust_peak_mps: f32, position_noise_m: f32, seed: u64) -> Self {
         let mut random = Gaussian::new(seed);
         let sigma = gust_peak_mps / PEAK_FACTOR;

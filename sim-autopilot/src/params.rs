@@ -75,7 +75,7 @@ pub struct Params {
 }
 
 impl Params {
-    /// The defaults in `table`, sorted by name, with the values in `own` instead for some.
+    /// The defaults in `table` (sorted by name), replaced by the values in `own` where given.
     ///
     /// # Panics
     /// A name in `own` is not in the table.

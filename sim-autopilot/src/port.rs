@@ -11,7 +11,7 @@ pub const AUTOPILOT_COMPONENT: u8 = 1;
 /// telemetry is dropped, as PX4 drops it when its buffer is full.
 const MAX_QUEUED_TELEMETRY: usize = 4096;
 /// Stream rates of the ground station's port: message id and interval in µs. A real ground station
-/// requests about these.
+/// requests about these rates.
 pub const GROUND_STREAMS: [(u32, u32); 11] = [
     (0, 1_000_000),   // HEARTBEAT
     (1, 1_000_000),   // SYS_STATUS
@@ -67,7 +67,7 @@ impl Sender {
     }
 }
 
-/// A MAVLink port: bytes in, frames out, and back. It does not depend on the transport.
+/// A MAVLink port: decodes received bytes and encodes messages to send, whatever the transport.
 #[derive(Clone, Debug)]
 pub struct Port {
     framer: Framer,
@@ -192,7 +192,7 @@ impl Port {
         }
     }
 
-    /// Queues a message that the dialect does not know, with its CRC seed.
+    /// Queues a message that the dialect does not know; `seed` is its CRC_EXTRA.
     pub fn send_seeded(&mut self, id: u32, seed: u8, payload: &[u8]) {
         if self.reserve_frame() {
             let sender = self.next_sender();

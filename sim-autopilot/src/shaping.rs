@@ -24,7 +24,7 @@ pub struct JerkLimitedRate {
 }
 
 impl JerkLimitedRate {
-    /// Advances `dt` seconds towards `rate`, with at most `derivative` m/s² and `jerk` m/s³.
+    /// Advances `dt` seconds towards `rate`, with at most `change` m/s² and `jerk` m/s³.
     pub fn advance(&mut self, rate: f32, change: f32, jerk: f32, dt: f32) {
         let wanted =
             approach_rate(rate - self.rate, RAMP_END_RATE_PER_S, jerk).clamp(-change, change);

@@ -1,5 +1,5 @@
-//! One test for each thing PX4 was seen to do, in memory: here how it flies, in `protocol` what it
-//! says; in `ardupilot` what ArduCopter was seen to do.
+//! One test for each observed behaviour of PX4: its flight here, its messages in `protocol`;
+//! ArduCopter's in `ardupilot`.
 
 mod ardupilot;
 mod camera;
@@ -21,15 +21,15 @@ const OFFBOARD: u32 = 0x0006_0000;
 const POSITION: u16 = 0xDF8;
 const VELOCITY: u16 = 0xDC7;
 
-/// A ground station on a bench: sends by field, keeps every frame that comes back with the time it
-/// came.
+/// A test bench: sends messages to the autopilot and keeps every frame that it answers, with the
+/// time of its reception.
 struct Bench {
     autopilot: Autopilot,
     framer: Framer,
     sequence: u8,
     received: Vec<(f64, Frame)>,
     ground: f32,
-    /// A setpoint repeated at this period in steps: mask, frame, position, velocity.
+    /// Period in steps, and payload, of the setpoint message that is sent repeatedly.
     stream: Option<(usize, Vec<u8>)>,
     steps: usize,
 }
@@ -92,7 +92,8 @@ impl Bench {
         }
     }
 
-    /// Runs until the condition holds; the time it took. Fails after `limit` seconds.
+    /// Runs until the condition holds; returns the time it took, seconds. Fails after `limit`
+    /// seconds.
     fn until(&mut self, limit: f64, mut done: impl FnMut(&Autopilot) -> bool) -> f64 {
         let start = self.now();
         while !done(&self.autopilot) {
@@ -159,7 +160,7 @@ impl Bench {
         self.of(245).last().unwrap().1.padded_payload()[1]
     }
 
-    /// Armed in Offboard, hovering over the start at `up` metres.
+    /// A bench whose vehicle is armed in Offboard and hovers `up` metres over the start.
     fn hovering(up: f32) -> Self {
         let mut bench = Self::new();
         bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -up], [0.0; 3], 0.0));
@@ -191,8 +192,8 @@ fn it_arms_goes_offboard_follows_setpoints_and_lands() {
     bench.stream(20.0, setpoint(POSITION, 1, [10.0, 4.0, -5.0], [0.0; 3], 0.0));
     bench.run(12.0);
     let at = bench.autopilot.true_state().position;
-    // 10 m north and 4 m east of the EKF origin, which is the mission origin here; ground is 0 and
-    // rest 0.3.
+    // 10 m north and 4 m east of the EKF origin, which is the mission's origin here. The ground is
+    // at 0; at rest the body's centre is 0.3 m above it.
     assert!((at - Point::new(4.0, 10.0, 5.0)).norm() < 0.2, "at {at}");
     assert_eq!(bench.set_mode(4.0, 6.0), [0, 0]);
     bench.run(1.5);
@@ -236,7 +237,7 @@ fn position_setpoints_alone_lift_it_off_in_px4s_time() {
     bench.run(1.0);
     bench.set_mode(6.0, 0.0);
     bench.arm();
-    // 6.3 s to within 5 %.
+    // PX4 took 6.3 s to come within 5 % of the height.
     let took = bench.until(10.0, |a| a.true_state().position.z - 0.3 > 4.6);
     assert!((5.0..7.5).contains(&took), "{took} s");
 }
@@ -257,7 +258,7 @@ fn velocity_position_with_feed_forward_and_yaw_masks_fly() {
     bench.stream(20.0, setpoint(0x9F8, 1, [3.0, 1.0, -6.0], [0.0; 3], 1.57));
     bench.run(5.0);
     assert!((bench.autopilot.true_state().heading_rad - 1.57).abs() < 0.02);
-    // Velocity ahead of the body, mask 0x5C7 with a yaw rate of zero: ahead is east now.
+    // Velocity forward in the body frame, mask 0x5C7 with a yaw rate of zero: forward is east now.
     bench.stream(20.0, setpoint(0x5C7, 8, [0.0; 3], [1.5, 0.0, 0.0], 0.0));
     bench.run(4.0);
     let v = bench.autopilot.true_state().velocity;

@@ -2,9 +2,10 @@
 //!
 //! The controller is the cascade of PX4's `mc_pos_control`: P on position, PID on velocity
 //! (integral with anti-windup, derivative of the measured acceleration); tilt and thrust limit the
-//! acceleration that it commands. The airframe responds to that with a jerk limit and a first-order
-//! lag (attitude and motors together); drag acts on it. Drag is not fed forward, so a commanded
-//! velocity is flown 10–20 % too slow until the integral has compensated, as in recordings of PX4.
+//! acceleration that it commands. The airframe responds to the commanded acceleration with a jerk
+//! limit and a first-order lag (attitude and motors together); drag acts on it. Drag is not fed
+//! forward, so a commanded velocity is flown 10–20 % too slow until the integral has compensated,
+//! as in recordings of PX4.
 //!
 //! ENU, metres, seconds. One step takes about a hundred floating-point operations, none of them
 //! trigonometric.

@@ -30,8 +30,8 @@ pub const EARLY_LANDING_TEXTS: [&str; 11] = [
 /// Log text of a vehicle that lands beside its pad, since another one may lie or come down there.
 pub const LANDS_ASIDE: &str = "No room to land: seeking a place aside";
 
-/// When the last of the other vehicles began to land or to fly home, seconds, by [`log_lines`]:
-/// nobody is left to take over what `vehicle` leaves after that.
+/// When the last of the other vehicles began to land or to fly home, seconds, by [`log_lines`]: no
+/// vehicle is left to take over what `vehicle` leaves after that.
 pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
     let mut ended: Vec<(&str, f64)> = Vec::new();
     for line in log.lines().filter(|line| line.contains("landing") || line.contains("the way home"))

@@ -1,5 +1,5 @@
-//! Makes a board fail from inside: its debug probe changes memory and calls code while it stands
-//! still.
+//! Makes a board fail from inside: a debug probe changes memory and calls code while the board is
+//! halted.
 
 use std::path::Path;
 use std::time::Duration;
@@ -68,7 +68,7 @@ impl Downfall {
         }
     }
 
-    /// How long the board stands in this failure before it restarts.
+    /// How long the board hangs in this failure before it restarts.
     pub fn lasts(self) -> Duration {
         Duration::from_secs(u64::from(self == Self::Hang))
     }
@@ -156,7 +156,8 @@ fn put(board: &mut EmulatedBoard, code: &[u16]) -> u32 {
     SPARE
 }
 
-/// Writes a `core::panic::Location` (file, its length, line, column) there; returns its address.
+/// Writes a `core::panic::Location` (file, its length, line, column) to memory that nothing uses;
+/// returns its address.
 fn location(board: &mut EmulatedBoard) -> u32 {
     let words = [SPARE + 16, PLACE.len() as u32, LINE, 1];
     let bytes: Vec<u8> =

@@ -3,7 +3,7 @@
 //! A flight of the demo with a random short radio range is flown once without a fault. Each moment
 //! of it at which a vehicle on its path leaves the range of all others is a candidate. Near one of
 //! these, from 3 s before to 12 s after, a random fault strikes that vehicle, and the flight is
-//! flown again. The referee, who sees the true motion, judges it.
+//! flown again. The referee, which sees the true motion, judges this second flight.
 
 use host_sim::mission::{Mission, SwarmPlan};
 use host_sim::progress::Progress;
@@ -16,7 +16,7 @@ use crate::vehicle::ahead;
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
 /// Time limit of a flight, seconds: every flight has ended by then.
 const TIME_LIMIT_S: f32 = 600.0;
-/// TOML lines of each fault beside `at_s` and `vehicle`; AHEAD becomes a point on the vehicle's
+/// TOML lines of each fault besides `at_s` and `vehicle`; AHEAD becomes a point on the vehicle's
 /// path.
 pub const SCRIPTS: [&str; 9] = [
     "kind = 'pilot-takeover'",
@@ -79,7 +79,7 @@ impl Edge {
         Ok(Self { range_m, mission, plan, leaves, rng })
     }
 
-    /// From now on every vehicle hears every other one: only the faults are left to matter.
+    /// Lets every vehicle hear every other one from now on, so that only the faults have an effect.
     pub fn hear_all(&mut self) {
         self.mission.scenario.simulation.radio_range_m = 500.0;
     }

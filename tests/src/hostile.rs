@@ -176,7 +176,7 @@ impl Flight {
     }
 
     /// A flight brought to this phase without an attack; phases from [`PHASES`] on are the same
-    /// ones over an area.
+    /// phases in a coverage mission.
     pub fn at_phase(phase: usize) -> Self {
         let kind =
             if phase.is_multiple_of(2) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
@@ -351,7 +351,8 @@ impl Flight {
             }
         }
         if let Some(mut data) = frame.decode::<SET_POSITION_TARGET_LOCAL_NED_DATA>() {
-            // The origin that the companion believes counts: a forged one is not the autopilot's.
+            // Checked by the EKF origin that the companion believes: a forged one is not the
+            // autopilot's.
             self.check.rounded_m = rounding_m(&data);
             if let Some(origin) = self.companion.telemetry().ekf_origin {
                 let ned = nalgebra::Vector3::new(data.x, data.y, data.z).cast::<f64>();
@@ -374,9 +375,9 @@ impl Flight {
         }
     }
 
-    /// Gives forged frames until the entropy or the number is spent. Each attack has a theme: some
-    /// of the links, some of the messages, few or many frames a step. One that forges everything at
-    /// once soon ends every mission.
+    /// Gives forged frames until `entropy` is spent or `frames` are given. Each attack has a theme:
+    /// some of the links, some of the messages, few or many frames a step. An attack that forged
+    /// everything at once would soon end every mission.
     pub fn attacked(mut self, entropy: &mut impl Entropy, frames: usize) -> Report {
         let mut left = frames;
         let bits = entropy.bits();

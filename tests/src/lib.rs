@@ -133,7 +133,7 @@ pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
 }
 
 /// A port that is free now for TCP and UDP, and that no other test of this process gets. It is
-/// outside the system's range of ephemeral ports: from that, another process might get it before it
+/// outside the system's range of ephemeral ports, in which another process might get it before it
 /// is used.
 ///
 /// # Panics
@@ -167,9 +167,9 @@ pub fn chromium() -> Option<PathBuf> {
     found
 }
 
-/// Flies the seeds 0 to `usual` - 1 in parallel, or as many from as many on as the environment
-/// variables `name` and `name`_FROM say, and fails if one is wrong. `one` is `None` for a mission
-/// that cannot be planned, which less than half may be.
+/// Calls `one` for the seeds 0 to `usual` - 1 in parallel; the environment variables `name` and
+/// `name`_FROM set another number of seeds and another first seed. Fails if `one` returns
+/// `Some(true)` (wrong) for any seed, or `None` (not planned) for half of them or more.
 pub fn assert_no_seed_is_wrong(name: &str, usual: u64, one: impl Fn(u64) -> Option<bool> + Sync) {
     let (from, count) = (number(&format!("{name}_FROM"), 0), number(name, usual));
     let flown: Vec<(u64, bool)> =

@@ -1,5 +1,5 @@
 //! Which vehicle owns which waypoint of an area, after the plan and after each division in flight,
-//! and which waypoints two vehicles photographed that should not have.
+//! and which waypoints two vehicles photographed although only one should have.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,7 +25,7 @@ pub struct Flown {
     pub result: MissionResult,
     /// Its log, by [`covered::log_lines`].
     pub log: String,
-    /// What is wrong with who owned what ([`Owners::faults`]).
+    /// What is wrong with the ownership of waypoints ([`Owners::faults`]).
     pub owned: Vec<String>,
 }
 
@@ -41,14 +41,15 @@ pub fn fly(text: &str, struck: &[u8]) -> Result<Flown, String> {
     let flight = covered::flight(&mut mission, &mut pictures).map_err(said)?;
     let plan = mission.plan().map_err(said)?;
     let owners = Owners::of(&mission, &plan, &flight).map_err(said)?;
-    // On a way around what bars a lane pictures are taken beside it, of others' waypoints too.
+    // On a detour around an obstacle pictures are taken beside the lane, also of waypoints that
+    // other vehicles own.
     pictures.retain(|picture| !is_beside_path(&flight.log, picture));
     let planned = CoveragePlan::plan_as_companions(&mission.scenario).map_err(said)?;
     let owned = owners.faults(&planned, &pictures, struck);
     Ok(Flown { result: flight.result, log: covered::log_lines(&flight.log), owned })
 }
 
-/// Whether a picture was taken by a vehicle that flew around something, by its log.
+/// Whether a picture was taken while its vehicle flew around an obstacle, by the vehicle's log.
 fn is_beside_path(log: &[Event], picture: &Picture) -> bool {
     let own = |event: &&Event| {
         event.vehicle.is_some() && event.vehicle == picture.vehicle && event.t_s <= picture.t_s
@@ -60,14 +61,14 @@ fn is_beside_path(log: &[Event], picture: &Picture) -> bool {
     around.next_back().unwrap_or(false)
 }
 
-/// Inputs of divisions in a row, from the first on.
+/// Inputs of successive divisions, from the first one on.
 type Chain<'a> = Vec<&'a [DivisionInput]>;
 
-/// Who owns what in a mission that was flown, by its division records.
+/// Which vehicle owns which waypoint in a mission that was flown, by its division records.
 pub struct Owners {
     /// After the plan, and after each chain of divisions that a vehicle reported.
     plans: Vec<Owned>,
-    /// Plans that each vehicle reported to fly, by index, besides the first.
+    /// Indices in `plans` of the plans that each vehicle reported to fly, besides the first plan.
     flown: BTreeMap<u8, BTreeSet<usize>>,
     /// Vehicles that a division counts as lost, or as gone before the end of their parts.
     gone: BTreeSet<u8>,
@@ -99,8 +100,8 @@ impl Owners {
         }
         let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.id).collect();
         ids.sort_unstable();
-        // The first report of each division; the divisions that each vehicle reported; those of
-        // which the plan is known.
+        // The first report of each division, and its reporter; the divisions that each vehicle
+        // reported; the chains of divisions whose plan is known.
         let (mut first, mut begun) = (Chain::new(), Vec::<u8>::new());
         let mut chains: BTreeMap<u8, Chain<'_>> = BTreeMap::new();
         let mut planned = vec![Chain::new()];
@@ -122,7 +123,8 @@ impl Owners {
                 }
             }
             owners.note_gone(&ids, inputs);
-            // A division that a vehicle did not report it knows from the others.
+            // A division that a vehicle did not report itself is taken from another vehicle's
+            // report.
             let chain = chains.entry(vehicle).or_default();
             chain.truncate(before);
             chain.extend(&first[chain.len()..before]);
@@ -171,8 +173,8 @@ impl Owners {
         owns(&0) || self.flown.get(&vehicle).is_some_and(|plans| plans.iter().any(owns))
     }
 
-    /// Whether a waypoint is, or is next to, the first or last one of what a plan gives a vehicle
-    /// without a break: where a part begins a picture may be taken once more.
+    /// Whether a waypoint is the first or last one of an unbroken range that a plan gives to a
+    /// vehicle, or is next to such a waypoint: there a picture may be taken twice.
     fn is_at_seam(&self, number: u32) -> bool {
         let near = number.saturating_sub(1)..=number + 1;
         let ends = |own: &BTreeSet<u32>, k: u32| {
@@ -183,8 +185,8 @@ impl Owners {
     }
 
     /// What is wrong: a waypoint with two owners at once, a division that vehicles disagree on, and
-    /// a waypoint that two of its owners photographed, unless one of them is a vehicle that was
-    /// lost, by its stroke (`struck`) or for the others, or it is where a part begins.
+    /// a waypoint that two of its owners photographed. A vehicle that was lost (struck by a fault,
+    /// `struck`, or given up by the others) and a waypoint at a seam do not count for the last.
     pub fn faults(
         &self,
         planned: &CoveragePlan<'_>,
@@ -205,7 +207,8 @@ impl Owners {
                 && !self.is_at_seam(**number)
         });
         let said = wrong.map(|(number, vehicles)| format!("{number} by {vehicles:?}"));
-        // What one that was then lost flew by itself is over before others take its part.
+        // A disagreement with a vehicle that was lost does not count: its own flight is over before
+        // others take its part.
         let split = self.disagreed.iter().filter(|(who, _)| !who.iter().any(lost));
         let split = split.map(|(_, said)| said.clone());
         self.faults.iter().cloned().chain(split).chain(said).collect()

@@ -2,7 +2,7 @@
 
 use companion::swarm::fleet::{DivisionInput, Fleet};
 
-/// Length of path for each waypoint, decimetres.
+/// Length of path per waypoint, decimetres.
 pub const WAYPOINT_DM: u16 = 100;
 
 /// The waypoints of each of `count` vehicles, in the order of their flight, after the divisions

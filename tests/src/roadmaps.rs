@@ -158,7 +158,7 @@ impl Forger {
     }
 }
 
-/// Asserts that a length is what it should be but for rounding, metres.
+/// Asserts that the length `found` equals the expected length `way` up to rounding, metres.
 #[track_caller]
 fn near(found: f64, way: f64) {
     assert!(found == way || (found - way).abs() <= 1e-5 * (1.0 + way), "{found} in place of {way}");
@@ -206,8 +206,8 @@ fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
     let sizes = sizes(bytes);
     for _ in 0..1 + entropy.bits() % 3 {
         let (choice, value) = (entropy.bits(), entropy.bits());
-        // Half of the changes go to the distances to the landmarks, which no other part of the file
-        // implies.
+        // Four of nine changes go to the distances to the landmarks, which no other part of the
+        // file implies.
         let part = [0, 1, 2, 3, 4, 4, 4, 4, 5][(choice % 9) as usize];
         let begin: usize = sizes[..part].iter().sum();
         // Without heights this word is the CRC, which is corrected afterwards.

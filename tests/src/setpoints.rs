@@ -21,7 +21,7 @@ const FOLLOWS_MPS: f32 = 15.2;
 /// Greatest jerk, m/s³: in general, then in a stop by the safety filter.
 const JERK_MPS3: f32 = 4.0;
 const URGENT_JERK_MPS3: f32 = 8.0;
-/// Rounding error of a position of three f32 coordinates, metres for each metre.
+/// Rounding error of a position of three f32 coordinates, as a fraction of the largest coordinate.
 const ROUNDING: f32 = 1.04e-7;
 /// Bits of `type_mask` by which the position is ignored.
 const NO_POSITION: u16 = 0b111;
@@ -51,7 +51,7 @@ pub struct SetpointStats {
     pub outside: u64,
     /// Number of setpoints with more jerk than allowed.
     pub jerky: u64,
-    /// Number of setpoints further from the one before than [`Limits::speed_mps`] leads.
+    /// Number of setpoints further from the one before than [`Limits::speed_mps`] allows.
     pub jumps: u64,
 }
 

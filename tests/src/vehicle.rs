@@ -28,7 +28,7 @@ const STEP: Duration = Duration::from_millis(4);
 const PATIENCE: Duration = Duration::from_secs(400);
 /// Time between two commands to start the mission.
 const AGAIN: Duration = Duration::from_secs(1);
-/// States of a mission that has not left its pad.
+/// States of a companion whose vehicle has not left its pad.
 const ON_PAD: [State; 6] = [
     State::WaitAutopilot,
     State::WaitPosition,
@@ -67,7 +67,7 @@ pub struct Vehicle {
     pub autopilot: Autopilot,
     /// Messages received from the board since the caller last emptied this.
     pub heard: Heard,
-    /// Bytes received from the board's radio, for others to read.
+    /// Bytes received from the board's radio, for an upload client to read.
     pub radio: Vec<u8>,
     /// Simulated time so far.
     pub time: Duration,
@@ -265,8 +265,8 @@ impl Vehicle {
         self.until(text, |vehicle| vehicle.heard.texts.iter().any(|said| said.starts_with(text)));
     }
 
-    /// Commands the start whenever the mission is ready, and steps until it has left its states on
-    /// the pad. A reported state is up to a second old, and a board that has just lost its
+    /// Commands the start whenever the companion is ready, and steps until its state is none of
+    /// `ON_PAD`. A reported state is up to a second old, and a board that has just lost its
     /// autopilot may still seem ready.
     pub fn start(&mut self) {
         let mut last = None;

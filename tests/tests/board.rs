@@ -1,9 +1,9 @@
-//! The board computes what the host computes, bit by bit, and in how many instructions: `measure`
-//! in QEMU. So it does at the limits of every public call of planner-core, and beyond, without a
-//! panic: `limits`.
+//! An emulated board computes the same bits as the host, within a limit of instructions (program
+//! `measure`). It also does so, without a panic, for every public call of planner-core with extreme
+//! and invalid arguments (program `limits`).
 //!
-//! QEMU counts: with `-icount shift=0` an instruction takes a nanosecond of the board's time. They
-//! are its instructions, not cycles of the chip.
+//! QEMU counts: with `-icount shift=0` an instruction takes a nanosecond of the board's time.
+//! Counted are the board's instructions, not cycles of the chip.
 
 use std::collections::HashMap;
 
@@ -18,7 +18,7 @@ use host_sim::scenario;
 use planner_core::plan::{self, PlanWorkspace, SwarmPlan};
 use planner_core::prm::{self, Config};
 
-/// Most instructions, by the name of what is counted.
+/// Most instructions permitted, by the name that `measure` prints.
 const LIMITS: [(&str, u64); 4] = [
     ("replan", 40_000_000),
     ("build", 100_000_000),
@@ -104,7 +104,7 @@ fn swarm_crc(mission: &Mission) -> u32 {
     plan.crc
 }
 
-/// What `measure` says of a roadmap that is built.
+/// The values that `measure` prints for a roadmap built on board, computed on the host.
 fn built(grid: &planner_core::voxel::VoxelGrid<'_>, config: &Config) -> String {
     let mut nodes = vec![planner_core::Point::zeros(); config.nodes];
     prm::sample_nodes(grid, None, &[], config, &mut nodes).expect("free space");

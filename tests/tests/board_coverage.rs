@@ -1,6 +1,6 @@
 //! Three boards plan an area above a hill from mission file and field in their flash, divide it
-//! alike and photograph it. The pictures are judged by where they were truly taken. Where one of
-//! them is switched off in flight, the other two divide what it left.
+//! alike and photograph it. The pictures are judged by where they were truly taken. If one vehicle
+//! loses all power in flight, the other two divide what it left.
 
 use flockmate_tests::hills::Hills;
 use flockmate_tests::vehicle::mission;
@@ -10,8 +10,7 @@ use host_sim::swarm::Flight;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 
-/// An area with a zone that no vehicle may enter, small: boards in QEMU are no faster than a few
-/// times the clock.
+/// A small area with a no-fly zone: boards in QEMU run only a few times faster than real time.
 const FIELD: &str = r#"
 [area]
 polygon = [[0, 0], [70, 0], [80, 45], [10, 50]]
@@ -92,8 +91,8 @@ kind = "kill"
 vehicle = 3
 "#;
 
-/// Each vehicle that is left flies one division: what the host plans from the same inputs, bit by
-/// bit.
+/// Asserts that each vehicle of `left` flies one division, the same bits as the host plans from its
+/// inputs.
 fn divides_as_planned(mission: &Mission, flight: &Flight, left: [u8; 2]) {
     for vehicle in left {
         let reported: Vec<_> = flight.divisions.iter().filter(|d| d.vehicle == vehicle).collect();

@@ -1,12 +1,12 @@
-//! A roadmap on its way into an emulated board, cut anywhere: afterwards the board holds the old
-//! one or the new one, whole. An armed board erases nothing, nor one that does not know yet whether
-//! it is.
+//! The upload of a roadmap to an emulated board is cut anywhere: afterwards the board holds the old
+//! roadmap or the new one, whole. A board erases nothing while its vehicle is armed, or while it
+//! does not know yet whether it is armed.
 //!
 //! The board is the firmware as it is flashed, in QEMU and in lock step with its client; its
-//! emulated flash keeps over a reset what was in it, torn words too. Each cut is a reset: while a
-//! slot is erased, after a random byte of the upload, or a random moment after the last one, while
-//! it is checked and sealed. Every second cut is moved on, by instants, to one that leaves a torn
-//! word: of the data, or the seal. What the board holds then is asked of it by FTP.
+//! emulated flash keeps its content over a reset, torn words too. Each cut is a reset: while a slot
+//! is erased, after a random byte of the upload, or at a random moment after the last byte, while
+//! the file is checked and sealed. Every second cut is delayed by microseconds until it leaves a
+//! torn word, in the data or the seal. The test then reads by FTP what the board holds.
 //!
 //! `FLOCKMATE_FIRMWARE=… FLOCKMATE_CUTS=200 cargo test --workspace --test board_cuts -- --nocapture`
 //! makes two hundred.
@@ -35,39 +35,39 @@ use planner_core::roadmap::{self, Edge, RoadmapHeader};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-/// Between two looks at the board.
+/// Board time between two exchanges with the board, microseconds.
 const STEP_US: u64 = 4000;
-/// Between two heartbeats of the autopilot.
+/// Time between two heartbeats of the autopilot, microseconds.
 const BEAT_US: u64 = 250_000;
-/// Cuts of a run that does not say how many.
+/// Number of cuts unless `FLOCKMATE_CUTS` sets another.
 const CUTS: usize = 16;
-/// Boards at once.
+/// Number of boards that run at once.
 const BOARDS: usize = 4;
-/// Erasing a slot takes a board three times 1.1 s.
+/// Time in which a board erases a slot (three sectors of 1.1 s), and a little more, milliseconds.
 const ERASE_MS: u32 = 3400;
-/// Writing the last words, reading all back and sealing takes it less, microseconds.
+/// More than a board needs to write the last words, read all back and seal, microseconds.
 const SEAL_US: u32 = 6000;
-/// A file of this length takes a board less than half a second.
+/// Nodes of the longest uploaded files; the upload takes a board less than half a second.
 const NODES: u32 = 300;
-/// Uploads that are not cut by us are tried so often.
+/// Number of attempts at an upload that the test does not cut.
 const TRIES: usize = 5;
-/// Words in a slot, and which of its first ones is the seal.
+/// Words of 32 bytes in a slot, and the number of the word that is the seal.
 const SLOT: usize = (384 << 10) / 32;
 const SEAL: usize = 2;
-/// Where a slot's data begins, words.
+/// Number of the slot's word at which the data begins.
 const DATA: usize = 8;
-/// A board runs on for less than this between two looks, microseconds.
+/// Most board time between two looks for a torn word, microseconds.
 const MOVE_US: u32 = 150;
-/// As `NO_AUTOPILOT_AFTER` of the companion's services.
+/// As the companion's `NO_AUTOPILOT_AFTER`, microseconds.
 const ALONE_AFTER_US: u64 = 10_000_000;
-/// Erasing begins within this time after it.
+/// Erasing begins within this time after `ALONE_AFTER_US`, microseconds.
 const ERASES_WITHIN_US: u64 = 5_000_000;
-/// More torn words than a block has are a sector that is erased.
+/// Words in a block: if more words are torn, a sector was being erased.
 const BLOCK: usize = 8;
-/// Looks for a torn word before a cut is made all the same.
+/// Most looks for a torn word before the cut is made without one.
 const LOOKS: usize = 80;
 
-/// When a line is cut.
+/// When the connection to a board is cut.
 #[derive(Clone, Copy)]
 enum Cut {
     Never,
@@ -79,14 +79,13 @@ enum Cut {
 /// A board that its clients share, one after the other.
 type Shared = Arc<Mutex<EmulatedBoard>>;
 
-/// What a client sees of its vehicle: the companion, and an autopilot that reports that it is
-/// there.
+/// A client's link to a board's companion. It also plays an autopilot that sends heartbeats.
 struct Line {
     board: Shared,
     began: Instant,
     received: Vec<u8>,
     sent: Vec<PortBytes>,
-    /// Whether the autopilot is armed; none is there if there is nothing in it.
+    /// Whether the autopilot is armed; `None`: there is no autopilot.
     armed: Option<bool>,
     beat_at_us: u64,
     cut: Arc<Mutex<Cut>>,
@@ -187,7 +186,7 @@ impl Link for Line {
     }
 }
 
-/// A roadmap of that many nodes in a row.
+/// A roadmap file of `nodes` nodes in a row.
 fn roadmap(nodes: u32, shift_m: f32) -> Vec<u8> {
     let points: Vec<Point> = (0..nodes).map(|i| Point::new(i as f32, shift_m, 2.0)).collect();
     let edge = |i: u32| Edge { a: i as u16 - 1, b: i as u16, clearance_m: 1.0 };
@@ -208,12 +207,12 @@ fn roadmap(nodes: u32, shift_m: f32) -> Vec<u8> {
     bytes
 }
 
-/// What a client sees of a board until a cut.
+/// A client of a board, whose connection is cut as `cut` says.
 fn client(board: &Shared, armed: Option<bool>, cut: &Arc<Mutex<Cut>>) -> FtpClient {
     FtpClient::new(Line::new(board, armed, cut), None)
 }
 
-/// One that found it, and is never cut.
+/// A client that has found the companion, and is never cut.
 fn uncut(board: &Shared, armed: Option<bool>) -> FtpClient {
     let mut client = client(board, armed, &Arc::new(Mutex::new(Cut::Never)));
     client.wait_for_companion().expect("the board is there");
@@ -252,7 +251,7 @@ impl Tally {
     }
 }
 
-/// What is being done to the flash when a cut comes.
+/// What the board does with its flash when the cut comes.
 #[derive(Clone, Copy, PartialEq)]
 enum Part {
     Erasing,
@@ -260,12 +259,13 @@ enum Part {
     Sealing,
 }
 
-/// Begins an upload and cuts it at a random moment of a part; whether it was over before.
+/// Begins an upload and cuts it at a random moment of `part`. Returns whether it completed before
+/// the cut.
 fn cut_upload(board: &Shared, file: &[u8], part: Part, rng: &mut Pcg32) -> bool {
     let after_us = 1000 * u64::from(rng.next_u32() % ERASE_MS);
     let seal_in_us = u64::from(rng.next_u32() % SEAL_US);
     let now_us = || board.lock().unwrap().now_us();
-    // Beside every piece of 239 bytes travel 24 or so.
+    // Each piece of 239 bytes travels with about 24 bytes of framing.
     let bytes = rng.next_u32() as usize % (file.len() * 11 / 10);
     let cut = Arc::new(Mutex::new(match part {
         Part::Erasing => Cut::At(now_us() + after_us),
@@ -282,8 +282,8 @@ fn cut_upload(board: &Shared, file: &[u8], part: Part, rng: &mut Pcg32) -> bool 
     client.wait_for_companion().and_then(|_| client.upload(File::Roadmap, file, sealing)).is_ok()
 }
 
-/// Stops a board; every second time, if it may, where a word of the kind that the part has is torn.
-/// The torn words.
+/// Stops a board; with `moves_on` it first runs the board until a word is torn (while sealing: the
+/// seal). Returns the torn words.
 fn stop(board: &Shared, part: Part, moves_on: bool, rng: &mut Pcg32) -> Vec<usize> {
     let mut board = board.lock().unwrap();
     for _ in 0..LOOKS {
@@ -298,7 +298,7 @@ fn stop(board: &Shared, part: Part, moves_on: bool, rng: &mut Pcg32) -> Vec<usiz
     board.torn_flash_words().expect("a board")
 }
 
-/// A board, its flash empty.
+/// Starts a board with an empty flash.
 fn start(program: &Path, folder: &Path) -> Shared {
     Arc::new(Mutex::new(EmulatedBoard::start(program, &folder.join("log")).expect("a board")))
 }
@@ -371,7 +371,7 @@ fn an_armed_board_erases_nothing() {
         assert!(torn().is_empty());
     }
     drop(client);
-    // Without an autopilot it is known after ten seconds of the board's time that none is armed.
+    // A board without an autopilot assumes after ten seconds of its time that none is armed.
     reset(&mut board.lock().unwrap());
     while torn().is_empty() {
         let now_us = board.lock().unwrap().now_us();

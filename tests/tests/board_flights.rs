@@ -1,6 +1,6 @@
 //! An emulated board in flight, treated badly: reset at any moment, cables pulled, garbage on both
-//! lines. The board is the firmware as it is flashed, the autopilot beside it the simulated one,
-//! both in lock step: what is tested here happens the same every time.
+//! lines. The board runs the firmware as it is flashed, in lock step with a simulated autopilot, so
+//! every run of a test is the same.
 //!
 //! `FLOCKMATE_FIRMWARE=… FLOCKMATE_RESETS=50 cargo test --workspace --test board_flights -- --nocapture`
 //! resets fifty times, and `FLOCKMATE_GARBAGE=1000000` puts a megabyte on each line.
@@ -40,45 +40,45 @@ goals = [[28.0, 3.0, 3.5]]
 id = 1
 start = [10.0, 3.0, 3.5]
 "#;
-/// Its start's height, metres.
+/// Height of the start of its path, metres.
 const CLIMBS_TO_M: f32 = 3.5;
-/// The same flown by ArduCopter.
+/// Line that makes ArduCopter fly it.
 const ARDUPILOT: &str = "personality = \"ardupilot\"\n";
-/// Resets of a run that does not say how many.
+/// Number of resets unless `FLOCKMATE_RESETS` sets another.
 const RESETS: usize = 4;
-/// Boards at once.
+/// Number of boards that run at once.
 const BOARDS: usize = 4;
-/// From the start command to the landing, milliseconds.
+/// Time from the start command to the landing, milliseconds.
 const FLIGHT_MS: u32 = 22_000;
-/// Commands to an autopilot that would have it fly: NAV_TAKEOFF, DO_SET_MODE, COMPONENT_ARM_DISARM.
+/// Commands that make an autopilot fly: NAV_TAKEOFF, DO_SET_MODE, COMPONENT_ARM_DISARM.
 const FLIES: [u32; 3] = [22, 176, 400];
-/// A vehicle that flies at 2 m/s stops within that way, metres.
+/// Distance within which a vehicle that flies at 2 m/s stops, metres.
 const STOPS_M: f32 = 4.0;
-/// What a companion says of its autopilot.
+/// STATUSTEXTs of a companion about its autopilot.
 const FOUND: &str = "Autopilot found";
 const SILENT: &str = "Autopilot silent: start cancelled";
-/// Streams and the first heartbeats take a companion less.
+/// More time than a companion needs to find its autopilot and get its streams.
 const FINDS: Duration = Duration::from_millis(4500);
 
 /// The demo, whose first vehicle flies alone.
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
-/// Where the tables of its vehicles begin.
+/// Line with which each vehicle's table begins.
 const VEHICLE: &str = "[[vehicles]]";
-/// Garbage on each line of a run that does not say how much, bytes.
+/// Garbage on each line unless `FLOCKMATE_GARBAGE` sets another amount, bytes.
 const GARBAGE: usize = 200_000;
-/// So much of it in a millisecond, beside the autopilot's 4 kB/s.
+/// Garbage per millisecond, bytes, in addition to the autopilot's 4 kB/s.
 const PER_MS: usize = 10;
-/// What a plan takes longer that is slowed on purpose.
+/// Time by which a plan is slowed on purpose.
 const BURST: Duration = Duration::from_millis(38);
-/// For how long setpoints are held up on purpose.
+/// Times for which setpoints are held up on purpose.
 const HELD_UP: [Duration; 2] = [Duration::from_millis(83), Duration::from_millis(217)];
-/// Between two setpoints, microseconds of the board's time, and how late one may be: the longest
-/// that other interrupts and calls of the companion hold it up.
+/// Period of setpoints, microseconds of the board's time, and how late a setpoint may be: as long
+/// as other interrupts and calls of the companion hold it up.
 const PERIOD_US: u64 = 50_000;
 const LATE_US: u64 = 100;
 
-/// Brings the companion down at a random moment of a flight, and sees the flight to its end; what
-/// came of it.
+/// Brings the companion down at a random moment of a flight, and checks the flight until its end.
+/// Returns a line about it; `None` if the mission was over before.
 fn reset_in_flight(
     vehicle: &mut Vehicle,
     how: Downfall,
@@ -91,10 +91,10 @@ fn reset_in_flight(
         return None;
     }
     let (state, place) = (vehicle.heard.state, vehicle.autopilot.true_state().position);
-    // A take-off by command is flown to its end.
+    // The autopilot flies a commanded take-off to its end.
     let top_m = place.z.max(CLIMBS_TO_M);
     vehicle.bring_down(how);
-    // From here on nobody but the autopilot flies it.
+    // From here on only the autopilot flies the vehicle.
     let began = vehicle.autopilot.time_us();
     let mut highest_m = 0_f32;
     let mut farthest_m = 0_f32;
@@ -142,7 +142,7 @@ fn reset_in_flight(
     ))
 }
 
-/// Resets one board in flight again and again.
+/// Brings a board down in `resets` flights. Returns a line about each.
 fn reset_again_and_again(
     program: &Path,
     missions: [&Mission; 2],
@@ -156,7 +156,7 @@ fn reset_again_and_again(
         let brakes = (flights + seed).is_multiple_of(2);
         let mission = missions[usize::from(brakes)];
         let mut vehicle = Vehicle::new(program, mission, mission, rng.next_u64());
-        // Every other flight is by the other autopilot: each meets every downfall.
+        // The autopilots alternate, so each meets every downfall.
         let how = Downfall::ALL[(lines.len() / 2 + seed as usize) % Downfall::ALL.len()];
         let outcome = reset_in_flight(&mut vehicle, how, brakes, &mut rng);
         lines.extend(outcome.map(|line| {
@@ -188,7 +188,7 @@ fn a_companion_reset_in_flight_leaves_it_to_the_autopilot_and_says_so() {
     assert_eq!(lines.len(), resets);
 }
 
-/// Whether the mission was flown to its end.
+/// Asserts that the mission was flown to its end.
 fn done(vehicle: &Vehicle) {
     assert_eq!(vehicle.heard.state, State::Done, "{:?}", vehicle.heard.texts);
 }
@@ -204,8 +204,8 @@ fn cables_are_pulled_and_put_back_without_a_restart() {
     let mission = mission(LOBBY);
     let mut vehicle = Vehicle::new(&program, &mission, &mission, 1);
     vehicle.until("ready", |vehicle| vehicle.heard.state == State::Ready);
-    // On the pad: said when it is silent, said when it is back, and ready again. What counts is
-    // what was said last.
+    // On the pad the companion reports that the autopilot is silent, and that it is back; then it
+    // is ready again. The last report counts.
     let last = |vehicle: &Vehicle, text| vehicle.heard.texts.iter().rposition(|said| said == text);
     let heard = |vehicle: &Vehicle| last(vehicle, FOUND) > last(vehicle, SILENT);
     vehicle.plug(Port::Autopilot, false);
@@ -215,7 +215,7 @@ fn cables_are_pulled_and_put_back_without_a_restart() {
     vehicle.start();
     vehicle.until("on its way", |vehicle| vehicle.heard.state == State::Follow || is_over(vehicle));
     vehicle.run(Duration::from_secs(1));
-    // In flight: shorter than the autopilot's patience, and the radio for as long as one likes.
+    // In flight: the autopilot's cable for less than its timeout, the radio's for any time.
     vehicle.plug(Port::Autopilot, false);
     vehicle.run(Duration::from_millis(500));
     vehicle.plug(Port::Autopilot, true);
@@ -239,7 +239,7 @@ fn a_board_beside_an_autopilot_that_the_mission_does_not_name_says_so() {
     vehicle.until_said("This system id is not in the mission: no plan");
 }
 
-/// What a board says of a mission that it does not plan any more.
+/// STATUSTEXT about a mission that the board no longer plans.
 const ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
 
 #[test]
@@ -258,8 +258,8 @@ fn a_mission_that_brings_the_planner_down_in_three_starts_is_set_aside() {
         let aside = texts.iter().any(|text| text == ASIDE);
         assert!(in_a_row == 3 || !aside, "after {in_a_row} in a row: {texts:?}");
     }
-    // The mission is left alone from that start on, whose planner is broken again: the board stays
-    // up.
+    // From that start on the mission is not planned: the planner is broken again, but the board
+    // stays up.
     vehicle.until_said(ASIDE);
     vehicle.run(FINDS);
     vehicle.break_planner();
@@ -270,8 +270,8 @@ fn a_mission_that_brings_the_planner_down_in_three_starts_is_set_aside() {
     assert_eq!(heard.state, State::Aborted, "there is no plan");
 }
 
-/// A client's end of a radio that the vehicle's thread serves: each has its turn, and time passes
-/// between the client's.
+/// A client's end of a radio that the vehicle's thread serves. Client and vehicle take turns; time
+/// passes between two turns of the client.
 struct Radio {
     turns: Receiver<(Instant, Vec<u8>)>,
     sends: SyncSender<Vec<u8>>,
@@ -302,7 +302,7 @@ impl Link for Radio {
     }
 
     fn rest(&mut self) {
-        // Nobody is there any more when the vehicle has landed.
+        // The vehicle's thread has ended once the vehicle has landed.
         let _ = self.sends.send(core::mem::take(&mut self.sent));
         if let Ok((now, heard)) = self.turns.recv() {
             (self.now, self.heard) = (now, heard);
@@ -316,7 +316,7 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
     let length =
         std::env::var("FLOCKMATE_GARBAGE").map_or(GARBAGE, |n| n.parse().expect("a number"));
     let (mut vehicle, place) = demo_on_its_way(&program);
-    // An upload by the radio, another roadmap than the one that is flown on.
+    // An upload by radio of another roadmap than the one in use.
     let ((turn, turns), (sends, sent)) = (sync_channel(1), sync_channel(1));
     let other = mission(LOBBY).roadmap_or_field_file;
     let began = Instant::now();
@@ -339,7 +339,7 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
         left -= handful;
         let heard = core::mem::take(&mut vehicle.radio);
         if uploads {
-            // It ends amid its turn.
+            // The client may end in its turn.
             match sent.recv() {
                 Ok(bytes) => vehicle.send(Port::Swarm, &bytes),
                 Err(_) => uploads = false,
@@ -348,7 +348,7 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
         }
         let around = vehicle.heard.texts.iter().any(|text| text == "Flying around");
         if around && left > 0 && vehicle.heard.state == State::Follow && steps % 250 == 0 {
-            // It hovers, rather than to land before all has come.
+            // The vehicle is paused, so that it does not land before all garbage has arrived.
             vehicle.send_command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0);
         } else if left == 0 && vehicle.heard.state == State::Paused && steps % 250 == 0 {
             vehicle.send_command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0);
@@ -375,7 +375,7 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
     assert!(stack <= 64 << 10, "{stack} bytes of stack");
 }
 
-/// The demo's first vehicle alone, on its way, and a place ahead of it.
+/// The demo's first vehicle alone, in flight on its path, and a place ahead of it.
 fn demo_on_its_way(program: &Path) -> (Vehicle, Geodetic) {
     let demo = DEMO.match_indices(VEHICLE).nth(1).map_or(DEMO, |(second, _)| &DEMO[..second]);
     let mut demo = mission(demo);
@@ -387,7 +387,7 @@ fn demo_on_its_way(program: &Path) -> (Vehicle, Geodetic) {
     (vehicle, place)
 }
 
-/// Something lies on the path: it has to be planned around, in the air.
+/// Reports an obstacle on the path, so that a detour is planned in flight.
 fn block(vehicle: &mut Vehicle, place: &Geodetic) {
     vehicle.send_message(&COMMAND_INT_DATA {
         command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
@@ -401,7 +401,7 @@ fn block(vehicle: &mut Vehicle, place: &Geodetic) {
     });
 }
 
-/// How many setpoints a board reports, and how far apart at most, milliseconds.
+/// Number of setpoints that a board reports, and the longest time between two, milliseconds.
 fn reported(vehicle: &mut Vehicle) -> (usize, u64) {
     vehicle.until_said("Setpoints: ");
     let mut texts = vehicle.heard.texts.iter();
@@ -410,8 +410,8 @@ fn reported(vehicle: &mut Vehicle) -> (usize, u64) {
     (count.parse().expect("a number"), gap.parse().expect("a number"))
 }
 
-/// How late a setpoint was at most, microseconds of the board's time. One that a change of state
-/// brings comes early.
+/// How late a setpoint was at most, microseconds of the board's time. A setpoint due to a change of
+/// state comes early.
 fn late_us(heard: &Heard) -> u64 {
     let gaps = heard.setpoints_us.windows(2).map(|pair| pair[1] - pair[0]);
     gaps.max().expect("many").saturating_sub(PERIOD_US)

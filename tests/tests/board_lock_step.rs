@@ -1,5 +1,5 @@
-//! Boards in lock step with the simulation: a flight is the same twice, whatever else this machine
-//! does. By the wall clock, for foreign ground tools, a board has ports.
+//! Boards in lock step with the simulation: a flight repeats exactly, whatever else this machine
+//! does. For other programs a board can run by the wall clock, with TCP ports.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{available_parallelism, scope};

@@ -17,7 +17,7 @@ use planner_core::voxel::GridShape;
 const CLEARANCES_M: [f32; 3] = [0.3, 0.8, 1.2];
 /// Nodes from which all others are searched.
 const SOURCES: u16 = 40;
-/// What a path may lengthen by: in the median, and at the 95th percentile.
+/// Greatest ratio of a path's length after to before: of the median, and of the 95th percentile.
 const MEDIAN: f32 = 1.03;
 const MOST: f32 = 1.15;
 
@@ -37,7 +37,7 @@ fn file(roadmap: &Roadmap, config: &Config) -> Vec<u8> {
         .expect("it is a roadmap")
 }
 
-/// Lengths of the shortest ways from a node to all others.
+/// Lengths of the shortest paths from a node to all others, metres.
 fn ways(
     view: &RoadmapView<'_>,
     from: u16,
@@ -49,13 +49,14 @@ fn ways(
     (0..view.node_count() as u16).map(|node| workspace.distance_m(node)).collect()
 }
 
-/// The same nodes reach one another, and how much longer their ways are is within the limits.
+/// Asserts that the same nodes reach one another, and that paths lengthen no more than the limits
+/// allow.
 fn paths_stay_short(name: &str, all: &RoadmapView<'_>, kept: &RoadmapView<'_>) {
     let mut workspace = Box::new(SearchWorkspace::<4096>::new());
     for required_m in CLEARANCES_M {
         let mut ratios = Vec::new();
         for i in 0..SOURCES {
-            // Not those whose paths decide which edges are kept.
+            // None of the nodes whose paths decide which edges are kept.
             let from =
                 (u32::from(2 * i + 1) * all.node_count() as u32 / u32::from(2 * SOURCES)) as u16;
             let before = ways(all, from, required_m, &mut workspace);
@@ -89,7 +90,7 @@ fn paths_stay_short(name: &str, all: &RoadmapView<'_>, kept: &RoadmapView<'_>) {
     }
 }
 
-/// Builds a roadmap and cuts it down for a board.
+/// Builds a roadmap, cuts it down for a board and checks that its paths stay short.
 fn holds(name: &str, map: &VoxelMap, config: Config, board: &BoardCapacity) {
     let began = Instant::now();
     let (all, parts) = roadmap::build(map, &[], &config).expect("there is free space");
@@ -110,7 +111,7 @@ fn holds(name: &str, map: &VoxelMap, config: Config, board: &BoardCapacity) {
     paths_stay_short(name, &all, &kept);
 }
 
-/// `FLOCKMATE_CAPS` sets the roadmaps a map.
+/// `FLOCKMATE_CAPS` sets the number of roadmaps per map.
 #[test]
 fn scanned_maps_fit_and_paths_stay_short() {
     let seeds: u64 =
@@ -121,7 +122,7 @@ fn scanned_maps_fit_and_paths_stay_short() {
         let Some(path) = shared_data(&format!("maps3d/{name}.bt")) else { return };
         let map =
             map::load(path.to_str().unwrap(), resolution_m).unwrap().voxel_map(Unknown::Blocked);
-        // What cuts down was chosen by the first seed.
+        // The method of cutting down was chosen with the first seed.
         for seed in 1..=seeds {
             holds(name, &map, Config { seed, ..config(2300) }, &BOARDS[0]);
         }
@@ -143,7 +144,7 @@ fn hall() -> VoxelMap {
     map.voxel_map(Unknown::Blocked)
 }
 
-/// In seconds: eight in a release build.
+/// Takes eight seconds in a release build.
 #[test]
 fn a_fine_hall_of_a_million_edges_fits() {
     let map = hall();
@@ -162,7 +163,7 @@ fn a_fine_hall_of_a_million_edges_fits() {
     assert_eq!(BOARDS[0].roadmap_excess(&RoadmapView::parse(&bytes).unwrap()), None);
 }
 
-/// What is said of the board that this build is for is what its firmware has.
+/// The capacities that host-sim lists for the default board are those of its firmware.
 #[test]
 fn boards_are_what_their_firmware_is() {
     use firmware::capacity::{GATES, HALF_EDGES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES};

@@ -1,4 +1,4 @@
-//! What of an area a board does not hold is said when it is planned, before anything is uploaded.
+//! If a board cannot hold an area's mission, planning reports it, before anything is uploaded.
 
 use host_sim::capacity::{BOARD_CORNERS, BOARDS};
 use host_sim::coverage::CoveragePlan;
@@ -31,7 +31,7 @@ fn field(area: &str, height_m: f64, vehicles: usize, south_m: f64) -> String {
     )
 }
 
-/// What each board does not hold of it, and how many lanes it has.
+/// For each board what it cannot hold of the area (`None`: it holds all), and the number of lanes.
 fn excess(text: &str) -> ([Option<String>; 3], usize) {
     let scenario = || scenario::parse(text, "area").expect("a good scenario");
     let lanes = CoveragePlan::plan_as_companions(&scenario()).expect("lanes").tracks.lanes().len();

@@ -13,7 +13,7 @@ use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
 use host_sim::{scenario, swarm};
 
-/// The checker of flown missions.
+/// Asserts that each vehicle reached its goal and that the flight was clean.
 fn assert_complete_and_clean(result: &MissionResult) {
     for vehicle in &result.vehicles {
         assert!(vehicle.reached && vehicle.landed && vehicle.end == "Done", "{vehicle:?}");
@@ -60,8 +60,8 @@ fn ten_vehicles_fly_the_building_clean_with_other_seeds() {
     for seed in 1..=8 {
         let result = fly(&scenario_path("host-sim/scenarios/demo.toml"), Some(seed));
         let served = result.vehicles.iter().filter(|v| v.goal.is_some()).count();
-        // A roadmap of 2300 nodes may leave a goal out of reach (P3D Fig. 10); every vehicle that
-        // flies, flies clean.
+        // A roadmap of 2300 nodes may leave a goal out of reach (paper P3D Fig. 10); every vehicle
+        // that flies touches nothing.
         assert!(served >= 8, "seed {seed}: only {served} goals in reach");
         let safety = &result.safety;
         assert_eq!(
@@ -119,7 +119,7 @@ fn companion_and_autopilot_fly_in_two_processes() {
     assert!(ended.is_some_and(|status| status.success()), "the companion ended with {ended:?}");
 }
 
-/// The demo's first vehicles, in a file.
+/// Writes the demo's scenario with its first vehicles to a file.
 fn first_of_the_demo(vehicles: usize, path: &Path) {
     let demo = std::fs::read_to_string(scenario_path("host-sim/scenarios/demo.toml"))
         .expect("it is there");
@@ -127,8 +127,8 @@ fn first_of_the_demo(vehicles: usize, path: &Path) {
     std::fs::write(path, parts.join("[[vehicles]]")).expect("a writable folder");
 }
 
-/// The companion of vehicle 1 in a process that listens for its autopilot and, if it shall, for its
-/// radio; then `fly` with the options that name these, in the order of its ports.
+/// Runs the companion of vehicle 1 in a process that listens for its autopilot and, if `options`
+/// has a second one, for its radio; then `fly` with these options, each with the address of a port.
 fn fly_beside_a_process(vehicles: usize, options: &[&str]) {
     let dir = tempfile::tempdir().expect("a directory");
     let scenario = dir.path().join("scenario.toml");

@@ -1,8 +1,8 @@
-//! Random missions on scanned maps: a start or goal whose column is clear by brute force over all
-//! cells is planned, any other is refused by a message that names a place nearby, and nothing is
-//! touched in flight.
+//! Random missions on scanned maps. A start or goal whose column to the ground is clear, by brute
+//! force over all cells, is accepted; any other is refused by a message that names a place nearby;
+//! no vehicle touches anything in flight.
 //!
-//! `FLOCKMATE_COLUMNS=100` sets the missions a map.
+//! `FLOCKMATE_COLUMNS=100` sets the number of missions per map.
 
 use flockmate_tests::shared_data;
 use host_sim::map::{self, Occupancy, OccupancyMap};
@@ -14,11 +14,10 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use sim_autopilot::EstimatorErrors;
 
-/// How far `estimator = "rtk"` errs across, metres.
+/// Horizontal error of `estimator = "rtk"`, metres.
 const RTK_ERROR_M: f32 = 0.1;
 
-/// A map, the resolution it is planned at, and a vehicle that fits it: its radius and its margin,
-/// metres.
+/// A map, the resolution for planning on it, and a vehicle that fits: radius and margin, metres.
 struct Case {
     file: &'static str,
     resolution_m: f32,
@@ -45,13 +44,13 @@ const CASES: [Case; 4] = [
         edge_max_m: 0.5,
     },
 ];
-/// Nodes of a roadmap, and more where these find no way, with `roadmap.passages` then.
+/// Nodes of a roadmap and whether `roadmap.passages` is set; the second is used if the first finds
+/// no path.
 const NODES: [(usize, bool); 2] = [(1500, false), (6000, true)];
-/// Missions a map, where nothing else is asked for.
+/// Number of missions per map unless `FLOCKMATE_COLUMNS` sets another.
 const MISSIONS: usize = 3;
 
-/// Height of the ground and whether the column from there to the point is clear, over all cells of
-/// the map.
+/// Whether the column from the ground to the point is clear, over all cells of the map.
 fn is_clear(map: &OccupancyMap, p: &Point, radius_m: f32, required_m: f32) -> bool {
     let shape = map.shape();
     let cell_m = f64::from(shape.resolution_m);
@@ -104,7 +103,7 @@ fn is_low(map: &OccupancyMap, p: &Point, required_m: f32) -> bool {
     })
 }
 
-/// A random free place over something that was seen.
+/// A random place in a free cell.
 fn place(map: &OccupancyMap, rng: &mut Pcg32) -> Point {
     let (min, size) = (map.shape().min, map.shape().max() - map.shape().min);
     loop {
@@ -123,8 +122,8 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
         let Some(file) = shared_data(&format!("maps3d/{}", case.file)) else { return };
         let map = map::load(file.to_str().unwrap(), case.resolution_m).unwrap();
         let required_m = case.radius_m + case.margin_m;
-        // A margin below what a receiver errs by keeps no vehicle off a wall: there it is the
-        // columns alone that are tried.
+        // A margin below the RTK error keeps no vehicle off a wall: such a case tests the columns
+        // only, with perfect estimates.
         let fits = case.margin_m >= RTK_ERROR_M;
         let (estimator, cruise_mps) =
             if fits { (EstimatorErrors::Rtk, 1.0) } else { (EstimatorErrors::Perfect, 0.3) };
@@ -139,8 +138,8 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 }
                 let p = place(&map, &mut rng);
                 match is_clear(&map, &p, case.radius_m, required_m) {
-                    // The program reports what such a place is short of; the unit tests of
-                    // `shortage` have it.
+                    // The program reports what such a place lacks; the unit tests of `shortage`
+                    // check that.
                     true if is_low(&map, &p, required_m) => {}
                     true if clear.len() < 2 => clear.push(p),
                     false => other = Some(p),
@@ -186,8 +185,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 let lines = shortage::shortage_lines(&mission, &plan);
                 Some((lines.iter().any(|line| line.contains("the map has one")), mission, plan))
             };
-            // More nodes where the map itself has a way that the roadmap has not: as the program
-            // suggests.
+            // More nodes if the map has a path that the roadmap has not, as the program suggests.
             let plan =
                 plan(NODES[0]).and_then(|first| if first.0 { plan(NODES[1]) } else { Some(first) });
             let Some((false, mission, plan)) = plan else {
@@ -214,7 +212,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
     }
 }
 
-/// The fifth scan is of a few rays: all beside them is unknown, so nothing stands anywhere.
+/// The fifth scan is of a few rays: all else is unknown, so no vehicle can stand anywhere.
 #[test]
 fn a_map_of_a_few_rays_has_no_clear_column() {
     let Some(file) = shared_data("maps3d/wkentaro_test.bt") else { return };

@@ -1,9 +1,9 @@
-//! Ground tools that others wrote must be able to fly `host-sim autopilot`: pymavlink and MAVSDK;
-//! and with MAVProxy use a companion's services.
+//! Other projects' ground tools work with us: pymavlink and MAVSDK fly `host-sim autopilot`, and
+//! with MAVProxy they use a companion's services.
 //!
 //! The scripts in `tests/conformance` run with the Python of the virtual environment that
-//! `cargo xtask test` makes (`FLOCKMATE_PYTHON`); without it each test says so and passes. Flights
-//! are in real time: half a minute each.
+//! `cargo xtask test` makes (`FLOCKMATE_PYTHON`); without it each test prints a line and passes.
+//! Flights are in real time: half a minute each.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -89,7 +89,7 @@ fn mavsdk_uses_the_simulated_ardupilots_parameters_and_missions() {
     mavsdk("mavsdk_services.py", &["FS_GCS_TIMEOUT", "FS_GCS_ENABLE"], ARDUPILOT);
 }
 
-/// Where vehicles of a survey stand, degrees.
+/// Pads of a survey's vehicles: latitude and longitude, degrees.
 const PADS: [&str; 2] = ["47.3977,8.5463", "47.3981,8.5463"];
 
 /// Plans the polygon of QGroundControl's sample survey for some vehicles, as `cover` does; `None`
@@ -114,8 +114,8 @@ fn survey(personality: &str, vehicles: usize, camera: &str, out: &Path) -> Optio
     Some(())
 }
 
-/// MAVSDK and pymavlink read what `cover` wrote; MAVSDK has it flown, and pymavlink counts the
-/// pictures on a second link.
+/// MAVSDK and pymavlink read the plan that `cover` wrote; MAVSDK starts its flight, and pymavlink
+/// counts the pictures on a second link.
 fn vehicle_flies(python: &str, out: &Path, vehicle: usize, personality: &str, trigger: &str) {
     let address = format!("127.0.0.1:{}", free_port());
     let (id, home) = (vehicle.to_string(), format!("{},488", PADS[vehicle - 1]));
@@ -130,7 +130,7 @@ fn vehicle_flies(python: &str, out: &Path, vehicle: usize, personality: &str, tr
     run(python, "plan_flight.py", &[&urls[0], &urls[1], &folder, &id, personality, trigger]);
 }
 
-/// One vehicle with a picture at each waypoint; and, while it flies, both of a fleet that trigger
+/// Flies one vehicle that takes a picture at each waypoint and, at the same time, two that trigger
 /// by distance.
 fn plans_fly(personality: &str) {
     let Some(python) = python() else { return };
@@ -138,7 +138,7 @@ fn plans_fly(personality: &str) {
         (tempfile::tempdir().expect("a directory"), tempfile::tempdir().expect("a directory"));
     let by_waypoint = "lane_m = 25.0\nwaypoint_m = 20.0\ntrigger = \"waypoint\"";
     let Some(()) = survey(personality, 1, by_waypoint, alone.path()) else { return };
-    // By distance, where a survey says nothing.
+    // Without a trigger in the scenario pictures are triggered by distance.
     let Some(()) = survey(personality, 2, "lane_m = 13.0\nwaypoint_m = 9.0", fleet.path()) else {
         return;
     };
@@ -161,8 +161,8 @@ fn mavsdk_has_the_simulated_ardupilot_fly_survey_plans() {
     plans_fly("ardupilot");
 }
 
-/// A companion of the lobby's first vehicle beside the autopilot that sends to this port, and the
-/// two files it may be given.
+/// A companion of the lobby's first vehicle, for the autopilot that sends to a port, and the two
+/// files that may be uploaded to it.
 struct Onboard {
     _companion: Guard,
     files: tempfile::TempDir,
@@ -204,7 +204,7 @@ impl Onboard {
     }
 }
 
-/// Runs a script on a link of the autopilot that the companion is not on.
+/// Runs a script on another link of the autopilot than the companion's.
 fn onboard(script: &str, listen: &str, options: &[&str], address: impl Fn(&str) -> String) {
     let Some(python) = python() else { return };
     let port = free_port();

@@ -1,5 +1,5 @@
-//! Coverage plans, judged by the one checker: everything photographed, every waypoint once, no leg
-//! in a no-fly zone.
+//! Coverage plans, judged by host-sim's checker of plans: everything photographed, every waypoint
+//! once, no leg in a no-fly zone.
 
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::costs::Costs;
@@ -14,7 +14,7 @@ use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// How many random areas: more with `FLOCKMATE_AREAS=N`.
+/// Number of random areas: 1000, or `FLOCKMATE_AREAS`.
 fn areas() -> u64 {
     std::env::var("FLOCKMATE_AREAS").ok().and_then(|n| n.parse().ok()).unwrap_or(1000)
 }
@@ -48,7 +48,7 @@ fn random_areas_are_covered() {
             ))
         }
     };
-    // Areas that are none, or that zones close, are followed by others.
+    // Twice as many are drawn, since some are no valid areas, or zones close them.
     let all: Vec<_> = (0..areas() * 2).into_par_iter().map(outcome).collect();
     let wrong: Vec<_> = all.iter().filter_map(|outcome| outcome.as_ref().err()).collect();
     for wrong in wrong.iter().take(60) {
@@ -59,15 +59,15 @@ fn random_areas_are_covered() {
     assert!(wrong.is_empty() && planned >= areas(), "{planned} planned, {} wrong", wrong.len());
 }
 
-/// A field is a whole number of lanes wide and a little more, whose pictures do not overlap; with
-/// and without a zone in it.
+/// Fields a little wider than a whole number of lanes, with pictures that do not overlap; with and
+/// without a zone in them.
 #[test]
 fn fields_a_little_wider_than_their_lanes_are_covered() {
     let mut random = Pcg32::seed_from_u64(0x51DE);
     let mut wrong = Vec::new();
     for case in 0..600 {
         let (lane_m, lanes) = (areas::between(&mut random, 2.0, 20.0), 1 + case % 4);
-        // From less than a rounding to a twentieth of a lane.
+        // From less than a rounding error to a twentieth of a lane.
         let more_m = lane_m * 10f64.powf(areas::between(&mut random, -7.0, -1.3));
         let (width_m, long_m) = (lane_m * f64::from(lanes) + more_m, lane_m * 12.0);
         let [east_m, north_m] = [0, 1].map(|_| areas::between(&mut random, -200.0, 200.0));
@@ -97,7 +97,7 @@ fn fields_a_little_wider_than_their_lanes_are_covered() {
     assert!(wrong.is_empty(), "{} of 600: {:?}", wrong.len(), &wrong[..wrong.len().min(8)]);
 }
 
-/// `FLOCKMATE_AREAS=1000` takes minutes in a debug build: `exact` looks at 2²⁰ states for ten
+/// `FLOCKMATE_AREAS=1000` takes minutes in a debug build: `exact` visits 2²⁰ states for ten
 /// vehicles.
 #[test]
 fn powell_is_no_worse_than_binpat_and_exact_is_the_best() {
@@ -177,7 +177,7 @@ fn files_without_an_area_are_refused_by_name() {
     }
 }
 
-/// What is no area, or hardly one: the error says why, or the plan is right.
+/// Invalid and extreme areas: the error says why one is refused, or the plan is right.
 #[test]
 fn bad_areas_are_refused_by_name_or_covered() {
     let many: Vec<String> = (0..10_000)
@@ -288,7 +288,7 @@ fn bad_areas_are_refused_by_name_or_covered() {
     }
 }
 
-/// What is asked of the vehicles and cannot be flown: the error says why, for `cover` and `fly`.
+/// Scenarios that the vehicles cannot fly: the error says why, for `cover` and `fly`.
 #[test]
 fn what_cannot_be_flown_is_refused_by_name() {
     let start = "start = [6, -10, 0]";
@@ -309,7 +309,7 @@ fn what_cannot_be_flown_is_refused_by_name() {
         Ok::<_, String>((longest_s, costs_s))
     };
     let (longest_s, costs_s) = plan("", start, "").expect("nothing is wrong");
-    // Enough for the costs, which leave out turns, and not for the flight.
+    // The endurance is enough for the costs, which leave out turns, but not for the flight.
     assert!(costs_s < longest_s);
     let endurance = |seconds: f32| {
         let endurance = format!("endurance_s = {seconds:.2}");
@@ -318,8 +318,8 @@ fn what_cannot_be_flown_is_refused_by_name() {
     let error =
         endurance(0.5 * (costs_s + longest_s) / 0.85).expect_err("the battery is too small");
     assert!(error.contains("of that are for the landing"), "{error}");
-    // Whoever flies at speed needs more than a hover of that time: `fly` says how much, and takes
-    // no less.
+    // A flight at speed needs more charge than a hover of that time: `fly` says how much, and
+    // accepts no less.
     let error = endurance(longest_s / 0.84).expect_err("the battery is too small at speed");
     let (_, needed) = error.split_once("would need the charge of ").expect(&error);
     let needed_s: f32 = needed.split_once(" s").expect(&error).0.parse().expect(&error);

@@ -1,7 +1,8 @@
-//! Coverage missions in which all vehicles but one are lost: the one that may go on photographs
-//! what they leave.
+//! Coverage missions in which all vehicles but one are lost: the last one photographs what they
+//! leave.
 //!
-//! `FLOCKMATE_ALONE=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_ALONE_FROM` others.
+//! `FLOCKMATE_ALONE=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_ALONE_FROM=SEED` from
+//! another seed on.
 
 use flockmate_tests::owners::{self, Flown};
 use flockmate_tests::{areas, assert_no_seed_is_wrong, covered};
@@ -10,22 +11,25 @@ use rand_pcg::Pcg32;
 
 const MISSIONS: u64 = 10;
 
-/// Time in which a lost vehicle is noticed, and the others have not yet landed, seconds.
+/// Time after a loss within which the last vehicle may land without taking over, seconds: the loss
+/// is noticed after 45 s.
 const NOTICED_S: f64 = 45.0 + 15.0;
 
-/// The scenario, and when the last vehicle is struck: two vehicles, of which the higher is lost; or
-/// three, of which two are, one long after the other. The lower of two goes on (docs/coverage.md).
+/// The scenario, and when the last fault strikes. Of two vehicles the one with the higher id is
+/// lost; of three two are lost, one long after the other. Of two the lower id continues
+/// (docs/coverage.md).
 fn drawn(seed: u64) -> (String, f64) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = 2 + (seed % 2) as usize;
     let loss = [0.0, 0.1, 0.3][(seed / 2 % 3) as usize];
-    // One that is left with an area for three may take hours.
+    // One vehicle alone may take hours for the area of three.
     let text = areas::lossy_radio_scenario(&mut random, count, loss);
     let mut text = text.replace("time_limit_s = 3600.0", "time_limit_s = 14400.0");
     let (mut at_s, mut last_s) = (20 + random.next_u32() % 150, 0);
     for vehicle in (2..=count).rev() {
         text += &format!("[[faults]]\nat_s = {at_s}.0\nkind = \"kill\"\nvehicle = {vehicle}\n");
-        // The first loss counts from the start on, and the others hold until that one is down.
+        // Silence counts from the start on; after it the others hold until the lost vehicle is
+        // down.
         (last_s, at_s) = (at_s, (at_s + 180).max(300) + random.next_u32() % 60);
     }
     (text, f64::from(last_s))
@@ -42,8 +46,8 @@ fn the_last_vehicle_photographs_all_that_is_left() {
         let Flown { result, log, owned } = owners::fly(&text, &lost).ok()?;
         let (safety, coverage) = (result.safety, result.coverage.expect("it has an area"));
         let last = result.vehicles.iter().find(|vehicle| vehicle.id == 1).expect("it has one");
-        // Without a part, or kept on its pad by one that fell beside it, it takes over none; nor
-        // does it once it has landed with all of its own part flown.
+        // A vehicle without a part, or kept on its pad by one that fell beside it, takes over no
+        // part; nor does one that has landed with all of its own part flown.
         let flies = last.flown_m > 20.0;
         let landed = last.end == "Done" && covered::others_until_s(&log, 0) < struck_s + NOTICED_S;
         let broken = safety.violations + safety.wall_contacts + safety.deadlocks > 0;
@@ -61,8 +65,8 @@ fn the_last_vehicle_photographs_all_that_is_left() {
     assert_no_seed_is_wrong("FLOCKMATE_ALONE", MISSIONS, one);
 }
 
-/// The other has left, and its pilot keeps it in the air, unheard after a while: no lease lands it,
-/// so the last one keeps clear of where it was last heard for as long as it flies.
+/// A pilot takes one of two vehicles, which is unheard after a while. No lease lands it, so the
+/// other one keeps clear of where it was last heard for as long as it flies.
 #[test]
 fn an_unheard_vehicle_that_its_pilot_keeps_in_the_air_is_kept_clear_of() {
     let one = |seed: u64| -> Option<bool> {

@@ -1,8 +1,8 @@
-//! A vehicle that flies around what hovers on its lane is struck itself: nothing touches, and all
-//! come down.
+//! A vehicle that flies around one that hovers on its lane is struck by a fault itself: none
+//! touches anything, and all come down.
 //!
 //! `FLOCKMATE_BESIDE=N` looks for such vehicles in N missions in place of [`MISSIONS`],
-//! `FLOCKMATE_BESIDE_FROM` in others.
+//! `FLOCKMATE_BESIDE_FROM=SEED` from another seed on.
 
 use flockmate_tests::{areas, covered, number};
 use rand_core::{Rng as _, SeedableRng as _};
@@ -11,10 +11,10 @@ use rayon::prelude::*;
 
 const MISSIONS: u64 = 8;
 
-/// What leaves a vehicle that hovers.
+/// Faults that leave a vehicle hovering.
 const HOVERS: [&str; 2] = ["pilot-takeover", "companion-reset"];
 
-/// What strikes the one that flies around it, with further keys.
+/// Faults that strike the vehicle that flies around it, with further keys.
 const STRIKES: [&str; 14] = [
     "kill",
     "radio-cut",
@@ -43,7 +43,7 @@ fn fault(kind: &str, at_s: f32, vehicle: u8) -> String {
     format!("{keys}at_s = {at_s:.2}\nvehicle = {vehicle}\n")
 }
 
-/// When a vehicle flies around an obstacle, and its index.
+/// When the first vehicle begins to fly around an obstacle, seconds, and its id.
 fn flies_around(log: &str) -> Option<(f32, u8)> {
     let line = log.lines().find(|line| line.ends_with("Replanning → Follow: Flying around"))?;
     let mut words = line.split_whitespace();
@@ -52,7 +52,8 @@ fn flies_around(log: &str) -> Option<(f32, u8)> {
     Some((at_s, vehicle))
 }
 
-/// Whether somebody flew around, and what was wrong with the mission in which that one was struck.
+/// Whether a vehicle flew around the hovering one, and what was wrong with the mission in which it
+/// was struck then.
 fn struck(seed: u64) -> (bool, Option<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [3, 5][(seed % 2) as usize];
@@ -71,7 +72,7 @@ fn struck(seed: u64) -> (bool, Option<String>) {
     let (result, log) = covered::fly_text(&text).expect("it was flown before");
     let safety = &result.safety;
     let touches = (safety.wall_contacts, safety.violations, safety.deadlocks) != (0, 0, 0);
-    // Who was struck may hover with its pilot, or be gone.
+    // A vehicle that was struck may hover under its pilot, or be lost.
     let ends = |end: &str| ["Done", "Aborted", "no goal"].iter().any(|all| end.starts_with(all));
     let others = result.vehicles.iter().filter(|v| v.id != hovers && v.id != vehicle);
     let stays = others.filter(|v| !ends(&v.end)).count();
@@ -131,15 +132,15 @@ fn who_flies_fast_stops_before_one_that_hovers() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Log texts of a vehicle that gave up its part before one that hovers on its path.
+/// Log texts of a vehicle that gave up its part because another one hovers on its path.
 const GIVES_UP: [&str; 3] = [
     "Vehicle on the path: planning the way home",
     "Path blocked for 2 min: planning the way home",
     "Yielded for 60 s: planning the way home",
 ];
 
-/// How the meetings of a mission at 8 to 15 m/s with one that hovers ended, unless something was
-/// wrong: how many vehicles flew around it, and how many gave up.
+/// Flies a mission at 8 to 15 m/s with one vehicle that hovers. Returns how many vehicles flew
+/// around it, and how many gave up; the error says what was wrong.
 fn met_fast(seed: u64) -> Result<[usize; 2], String> {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [3, 5][(seed % 2) as usize];
@@ -173,8 +174,8 @@ fn met_fast(seed: u64) -> Result<[usize; 2], String> {
     ])
 }
 
-/// At 8 to 15 m/s, too, most that meet a vehicle that hovers fly around it, and do not go home.
-/// `FLOCKMATE_FAST=N` flies more, `FLOCKMATE_FAST_FROM` others.
+/// At 8 to 15 m/s, too, most vehicles that meet a hovering one fly around it and do not go home.
+/// `FLOCKMATE_FAST=N` flies N missions, `FLOCKMATE_FAST_FROM=SEED` from another seed on.
 #[test]
 fn who_flies_fast_flies_around_one_that_hovers() {
     let (from, count) = (number("FLOCKMATE_FAST_FROM", 82), number("FLOCKMATE_FAST", 1));

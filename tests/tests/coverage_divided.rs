@@ -1,7 +1,7 @@
-//! Divisions of an area alone, without flights: whatever is lost, they leave nothing out and give
-//! nothing twice.
+//! Divisions of an area, computed without flights: whichever vehicles are lost, they leave no
+//! waypoint out and give none twice.
 //!
-//! `FLOCKMATE_DIVIDED=N` divides N areas of each test.
+//! With `FLOCKMATE_DIVIDED=N` each test divides N areas.
 
 use companion::swarm::fleet::DivisionInput;
 use flockmate_tests::areas::Shape;
@@ -23,7 +23,7 @@ fn is_first_part(flight: &Flight<WAYPOINTS>) -> bool {
     matches!(&flight.task, Task::Photograph(photographs) if photographs.is_first_part)
 }
 
-/// Places of the pictures that a flight takes up to a place of its path.
+/// Places of the pictures that a flight takes up to `along_m` of its path, metres ENU.
 fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
     let Task::Photograph(photographs) = &flight.task else { return Vec::new() };
     let places = photographs.stretches(&flight.path);
@@ -34,8 +34,8 @@ fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
         .collect()
 }
 
-/// Whatever is lost, and wherever the others hold, each waypoint is photographed once: by the
-/// vehicle that kept it, or by the one that has it now.
+/// Whichever vehicles are lost, and wherever the others hold, each waypoint is photographed once:
+/// by the vehicle that kept it, or by the one that has it now.
 #[test]
 fn divisions_leave_nothing_out_and_give_nothing_twice() {
     let one = |seed: u64| -> [usize; 2] {
@@ -71,8 +71,8 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
             let inputs: Vec<DivisionInput> = (0..vehicles).map(|i| input(i, &mut random)).collect();
             let before = plan;
             losses.push(inputs.clone());
-            // Where vehicles hold nearer to each other than any order of departures allows there is
-            // none, nor where a path would need more corners than it may have.
+            // There is no plan if vehicles hold so near to each other that no order of departures
+            // is possible, or if a path would need more corners than it may have.
             match mission.plan_remaining(&[], losses.iter().map(|inputs| &inputs[..])) {
                 Ok(divided) => plan = divided,
                 Err(error) => {
@@ -121,7 +121,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
     assert!(divided as u64 > count && 500 * blocked <= divided);
 }
 
-/// Routes that take more than one path each: nobody is lost, and all hold again and again.
+/// Routes that take more than one path each: no vehicle is lost, and all hold again and again.
 #[test]
 fn stretches_leave_nothing_out_and_give_nothing_twice() {
     let one = |seed: u64| -> usize {

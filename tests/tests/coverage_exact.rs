@@ -1,5 +1,5 @@
-//! `exact` beside trying everything: all cuts, vehicles, layers and directions, with ways around
-//! no-fly zones that are searched here.
+//! Compares `exact` with brute force: all cuts, vehicles, layers and directions, with paths around
+//! no-fly zones by a search of its own.
 
 use flockmate_tests::areas::{self, Shape};
 use host_sim::coverage::{CoveragePlan, divide_by_method};
@@ -13,10 +13,10 @@ use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// Most waypoints of an area that is divided in all ways.
+/// Most waypoints of an area that is divided by brute force.
 const MOST_WAYPOINTS: u32 = 12;
 
-/// Lengths of the shortest ways of a plan, metres.
+/// Lengths of the shortest paths among a plan's no-fly zones, metres.
 struct Ways<'p, 'a> {
     planned: &'p CoveragePlan<'a>,
     /// Between each two corners of zones.
@@ -59,19 +59,19 @@ impl<'p, 'a> Ways<'p, 'a> {
     }
 }
 
-/// Length of the straight way, infinite where a zone bars it.
+/// Length of the straight line between two places, metres; infinite if it crosses a zone.
 fn direct_m(planned: &CoveragePlan<'_>, a: &Flat, b: &Flat) -> f64 {
     if planned.transit.is_line_clear(a, b) { straight_m(a, b) } else { f64::INFINITY }
 }
 
 /// All that costs depend on: lengths in metres, by vehicle and waypoint.
 struct Lengths {
-    /// From the vehicle's place to the waypoint, and from there home.
+    /// From the vehicle's place to each waypoint, and (`home_m`) from each waypoint home.
     out_m: Vec<Vec<f64>>,
     home_m: Vec<Vec<f64>>,
     /// From each waypoint to the next.
     steps_m: Vec<f64>,
-    /// Whether a zone bends a way to a vehicle's first waypoint, or home.
+    /// Whether a zone lengthens a path between a waypoint and a vehicle's place or home.
     bent: bool,
 }
 
@@ -97,8 +97,8 @@ impl Lengths {
     }
 }
 
-/// The least largest cost of waypoints `from` on for these vehicles and layers, by trying
-/// everything.
+/// The smallest possible largest cost (s) of the waypoints from `from` on, divided among these
+/// vehicles and layers, by brute force.
 fn brute_force(
     lengths: &Lengths,
     work: &Work<'_, { host_sim::coverage::MAX_LANES }, { host_sim::coverage::MAX_CORNERS }>,
@@ -138,15 +138,15 @@ fn brute_force(
     best
 }
 
-/// An area that few pictures show.
+/// A random area of few waypoints.
 fn drawn(seed: u64, shape: Shape) -> String {
     let mut random = Pcg32::seed_from_u64(seed);
     let text = areas::scenario(&mut random, shape, 1 + (seed % 3) as usize);
     text.replace("height_m = ", "height_m = 1")
 }
 
-/// The plan's vehicles at speeds that differ; but for every third area they end elsewhere than they
-/// begin.
+/// The plan's vehicles with different speeds; except for every third area they end elsewhere than
+/// they begin.
 fn vehicles(seed: u64, planned: &CoveragePlan<'_>) -> Vec<Vehicle> {
     let mut random = Pcg32::seed_from_u64(seed ^ 0xE4AC7);
     let one = |vehicle: &Vehicle| {
@@ -161,7 +161,7 @@ fn vehicles(seed: u64, planned: &CoveragePlan<'_>) -> Vec<Vehicle> {
     planned.vehicles.iter().map(one).collect()
 }
 
-/// What an area was tried for.
+/// Counts of what was tested.
 #[derive(Default)]
 struct Tried {
     areas: usize,
@@ -224,8 +224,8 @@ fn exact_is_what_trying_everything_finds() {
     assert!(areas >= 50 && three >= 15 && backward >= 10 && bent >= 20);
 }
 
-/// Companions plan by shares alone: an exact division is one that they find too, as good, or it is
-/// refused.
+/// Companions plan from the vehicles' shares alone: they find an equally good division for an exact
+/// one, or it is refused.
 #[test]
 fn exact_divisions_are_planned_by_companions_or_refused_by_name() {
     let one = |seed: u64| -> Option<bool> {

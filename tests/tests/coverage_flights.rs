@@ -13,7 +13,7 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// Reason why a random area is not flown.
+/// Reasons for which a random area may be refused.
 const NO_FLIGHT: [&str; 6] = [
     "too many corners",
     "area too large",
@@ -23,7 +23,7 @@ const NO_FLIGHT: [&str; 6] = [
     "cannot keep vehicles apart",
 ];
 
-/// `FLOCKMATE_FLOWN=N` flies more, `FLOCKMATE_FLOWN_FROM` others.
+/// `FLOCKMATE_FLOWN=N` flies N areas, `FLOCKMATE_FLOWN_FROM=SEED` from another seed on.
 #[test]
 fn random_areas_are_photographed_whole() {
     are_photographed_whole(areas::flyable_scenario, 0);
@@ -39,7 +39,7 @@ fn large_random_areas_are_photographed_whole_in_stretches() {
     are_photographed_whole(areas::many_lanes_scenario, 1);
 }
 
-/// At least `stretched` of them are flown in stretches.
+/// Flies random areas of `draw`; at least `stretched` of them must be flown in stretches.
 fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String, stretched: usize) {
     let (from, count) = (number("FLOCKMATE_FLOWN_FROM", 0), number("FLOCKMATE_FLOWN", 16));
     let in_stretches = AtomicUsize::new(0);
@@ -86,11 +86,12 @@ fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String, stretche
     assert!(wrong.is_empty() && flown >= count / 4, "{flown} flown, {} wrong", wrong.len());
 }
 
-/// The tracks of CPP's Tables A1 to A12, as docs/coverage.md derives them from its times: east and
-/// north, metres.
+/// The tracks of paper CPP, Tables A1 to A12, as docs/coverage.md derives them from the paper's
+/// times: east and north, metres.
 const TRACKS: [(&str, [u32; 2]); 2] = [("short", [150, 180]), ("long", [320, 420])];
 
-/// One of them: lanes of 10 m from 35 m at 5 m/s, as the paper flies it, in gusts of 3 m/s.
+/// Scenario of one of these tracks: lanes 10 m apart, flown at 35 m height and 5 m/s as in the
+/// paper, in gusts of 3 m/s.
 fn track([east_m, north_m]: [u32; 2], vehicles: usize, autopilot: &str, estimator: &str) -> String {
     let separation_m = if estimator == "recorded" { 3.6 } else { 2.0 };
     let pads = (0..vehicles).map(|k| {
@@ -145,8 +146,8 @@ fn the_papers_tracks_are_photographed_whole() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n").chars().take(4000).collect::<String>());
 }
 
-/// With `trigger = "none"` nobody asks for pictures: the mission is complete once all of the area
-/// is flown over, and not where a vehicle fell before that.
+/// With `trigger = "none"` no pictures are requested: the mission is complete once all of the area
+/// is flown over, and not if a vehicle fell before that.
 #[test]
 fn without_a_trigger_a_mission_is_complete_once_it_is_flown() {
     let field = "[area]\npolygon = [[0, 0], [80, 0], [80, 60], [0, 60]]\ntrigger = \"none\"\n\
@@ -163,13 +164,13 @@ fn without_a_trigger_a_mission_is_complete_once_it_is_flown() {
     assert!((0.1..0.9).contains(&coverage.covered_share) && coverage.left > 5, "{coverage:?}");
 }
 
-/// On the pad, while it starts, or in the air: a vehicle that is paused and resumed photographs its
-/// part.
+/// A vehicle that is paused and resumed photographs its part, whether on the pad, during its start
+/// or in the air.
 #[test]
 fn a_vehicle_paused_at_any_time_goes_on_when_it_is_resumed() {
     let one = |seed: u64| {
         let mut random = Pcg32::seed_from_u64(seed);
-        // Most on their pads: their times there are short.
+        // Two of three are paused near the start, since the times on the pad are short.
         let at_s = 0.5 + (random.next_u32() % [600, 6000][(seed % 3 / 2) as usize]) as f32 / 100.0;
         let (duration_s, vehicle) =
             ((1 + random.next_u32() % 40) as f32 / 10.0, 1 + random.next_u32() % 2);
@@ -194,8 +195,8 @@ fn a_vehicle_paused_at_any_time_goes_on_when_it_is_resumed() {
     );
 }
 
-/// Two vehicles that each err by as much as stops none of them stay apart by the safety distance,
-/// whatever the separation.
+/// Two vehicles whose estimates each err as much as is possible without a stop keep the safety
+/// distance, whatever the separation.
 #[test]
 fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
     let mut random = Pcg32::seed_from_u64(7);
@@ -221,7 +222,7 @@ fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
     }
 }
 
-/// By the autopilot's true heading at each picture.
+/// Judged by the autopilot's true heading at each picture.
 #[test]
 fn pictures_look_along_all_lanes_alike_or_the_way_that_is_flown() {
     for (autopilot, heading) in
@@ -238,7 +239,7 @@ fn pictures_look_along_all_lanes_alike_or_the_way_that_is_flown() {
         let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("a mission");
         let mut pictures = Vec::new();
         covered::fly_on(&mut mission, &mut pictures).expect("a flight");
-        // Pictures in the middle of lanes, and by how much the nose is off the way that is flown.
+        // Pictures in the middle of lanes: the angle between the nose and the direction of flight.
         let off_deg = pictures.windows(3).filter_map(|three| {
             let way = three[2].position - three[0].position;
             let along_lane = way.y.abs() < 1.0 && (20.0..130.0).contains(&three[1].position.x);
@@ -262,8 +263,8 @@ fn pictures_look_along_all_lanes_alike_or_the_way_that_is_flown() {
     }
 }
 
-/// Pads as near as a scenario may have them, low and fast flights, gusts: a vehicle comes over its
-/// pad with what it flew, and down beside one that stands there.
+/// Pads as near to each other as a scenario may have them, low and fast flights, gusts: vehicles
+/// come back over their pads and descend beside vehicles that stand there.
 #[test]
 fn vehicles_land_on_pads_as_near_as_they_may_be() {
     let outcome = |seed: u64| -> Result<(), String> {

@@ -1,7 +1,8 @@
 //! A vehicle lost in a coverage mission: the others divide what it leaves, and photograph all of
 //! it.
 //!
-//! `FLOCKMATE_LOSSES=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_LOSSES_FROM` others.
+//! `FLOCKMATE_LOSSES=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_LOSSES_FROM=SEED`
+//! from another seed on.
 
 use flockmate_tests::areas::Shape;
 use flockmate_tests::owners::{self, Flown};
@@ -17,25 +18,26 @@ use rayon::prelude::*;
 
 const MISSIONS: u64 = 6;
 
-/// What became of a mission.
+/// How a mission ended.
 #[derive(Debug)]
 struct Outcome {
     seed: u64,
     kind: &'static str,
     covered: f64,
     left: u64,
-    /// Waypoints that vehicles reported to have flown around.
+    /// Number of waypoints that vehicles reported to have left out on detours.
     reported: u64,
-    /// Whether waypoints are left although a majority lived.
+    /// Whether more waypoints are left than explained, although a majority lived to the end.
     left_out: bool,
     twice: u64,
-    /// Waypoints that two vehicles owned.
+    /// Faults of ownership, as a waypoint with two owners.
     owned: Vec<String>,
-    /// Vehicles that landed short of their part, beside those that were struck.
+    /// Number of vehicles that landed before the end of their part, without those that were struck.
     landed_short: usize,
-    /// Contacts with walls, distances below the safety distance, deadlocks.
+    /// Numbers of wall contacts, approaches below the safety distance, and deadlocks.
     broken: [u64; 3],
-    /// Each other vehicle that landed short said why itself, and what is missing has a reason too.
+    /// Whether each vehicle counted in `landed_short` logged a reason, and what is missing has one
+    /// too.
     explained: bool,
     text: String,
 }
@@ -46,29 +48,29 @@ const KINDS: [&str; 6] =
 /// What a mission is drawn from.
 #[derive(Clone, Copy)]
 struct Draw {
-    /// An area of this shape for so many vehicles, with this share of messages lost.
+    /// Draws the scenario: shape of the area, number of vehicles, share of messages that are lost.
     area: fn(&mut Pcg32, Shape, usize, f32) -> String,
-    /// The ways in which vehicles are struck, seed by seed.
+    /// Kinds of fault, by seed modulo 6.
     kinds: [&'static str; 6],
-    /// Until when vehicles are struck, seconds.
+    /// Faults strike within this time after 20 s, seconds.
     until_s: u32,
-    /// How many are struck at once.
+    /// Number of vehicles struck at once.
     struck: usize,
     radio: Radio,
-    /// Of three missions so many may not be whole.
+    /// Number of missions of three that may be not whole.
     most_in_three: usize,
 }
 
-/// The rows of a vehicle that no other vehicle heard for so long that its part was divided among
-/// the others: in flight, and on its pad.
+/// Log texts of a vehicle whose part was divided among the others, since none heard it for so long:
+/// in flight, and on its pad.
 const GIVEN_AWAY: [&str; 2] =
     ["Its part was given away: landing", "Its part was given away: start cancelled"];
 
-/// After the stroke of another: its pilot keeps that for good, and the row of the vehicle that it
-/// keeps on its pad.
+/// Time after the fault until a vehicle that is kept on its pad (by one that a pilot holds above)
+/// cancels its start, seconds.
 const START_BARRED_S: f64 = 20.0 + 180.0 + 20.0;
 
-/// What the radio does beside losing messages one by one.
+/// What the radio does besides losing single messages.
 #[derive(Clone, Copy, PartialEq)]
 enum Radio {
     Even,
@@ -77,15 +79,15 @@ enum Radio {
     Rough,
 }
 
-/// One with so many lanes that it is flown in stretches.
+/// A scenario with so many lanes that vehicles fly their parts in stretches.
 fn large(random: &mut Pcg32, shape: Shape, vehicles: usize, loss: f32) -> String {
     let text = areas::many_lanes_scenario(random, shape, vehicles);
     let kept = text.lines().filter(|line| !line.starts_with("radio_loss"));
     kept.map(|line| format!("{line}\n")).collect::<String>() + &format!("radio_loss = {loss}\n")
 }
 
-/// Bursts in which a vehicle neither hears nor sends, and spells in which it does one of both: half
-/// of them are over before anybody is given up.
+/// Faults of the radio: bursts in which a vehicle neither hears nor sends, and longer times in
+/// which it only hears or only sends. Half of these faults end before a vehicle is given up.
 fn rough(random: &mut Pcg32, vehicles: usize, until_s: u32) -> String {
     let one = |k: u32| {
         let vehicle = 1 + random.next_u32() % vehicles as u32;
@@ -103,18 +105,19 @@ fn rough(random: &mut Pcg32, vehicles: usize, until_s: u32) -> String {
     (0..6).map(one).collect()
 }
 
-/// The scenario, what strikes first, and whom.
+/// The scenario, the first kind of fault, the ids of the struck vehicles, and when they are struck,
+/// seconds.
 fn drawn(draw: Draw, seed: u64) -> (String, &'static str, Vec<u8>, f32) {
     let mut random = Pcg32::seed_from_u64(seed);
-    // Six seeds strike in every way, each half with 50 % loss and the next six with the other loss.
+    // Six seeds have all kinds of fault, half of them with 50 % loss; the next six swap the losses.
     let kind = draw.kinds[(seed % 6) as usize];
     let count = [3, 5][(seed / 12 % 2) as usize];
     let loss = if (seed + seed / 6).is_multiple_of(2) { 0.5 } else { 0.1 };
-    // In every way of striking half of the areas are concave, or have holes and no-fly zones.
+    // For each kind of fault half of the areas are concave, or have holes and no-fly zones.
     let shape = [Shape::Convex, Shape::Any][((seed / 2 + seed / 24) % 2) as usize];
     let mut text = (draw.area)(&mut random, shape, count, loss);
     let first = (random.next_u32() % count as u32) as u8;
-    // Beside others, of which some are in the air and some on their pads yet.
+    // At this time some of the others are in the air, and some still on their pads.
     let at_s = 20.0 + (random.next_u32() % draw.until_s) as f32;
     let mut struck = Vec::new();
     for k in 0..draw.struck {
@@ -129,7 +132,7 @@ fn drawn(draw: Draw, seed: u64) -> (String, &'static str, Vec<u8>, f32) {
     (text, kind, struck, at_s)
 }
 
-/// Reason why a random area is not flown.
+/// Reasons for which a random area may be refused.
 const NO_FLIGHT: [&str; 7] = [
     "too many corners",
     "area too large",
@@ -147,14 +150,14 @@ fn flown(text: &str, struck: &[u8]) -> Result<Flown, String> {
     owners::fly(text, struck)
 }
 
-/// Number of waypoints that vehicles report that they flew around: the next start flies them.
+/// Number of waypoints that vehicles report to have left out on detours; the next start flies them.
 fn flown_around(log: &str) -> u64 {
     let around =
         |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<u64>().ok();
     log.lines().filter_map(around).sum()
 }
 
-/// Number of waypoints that the mission leaves with nobody struck: a late trigger leaves those.
+/// Number of waypoints that the mission leaves if no vehicle is struck: those of late triggers.
 fn left_unstruck(text: &str) -> u64 {
     let sound = text.split("[[faults]]").next().unwrap_or(text);
     let (result, _) = covered::fly_text(sound).expect("it was flown before");
@@ -172,32 +175,32 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     };
     let MissionResult { vehicles, safety, coverage, .. } = result;
     let coverage = coverage.expect("it has an area");
-    // By a wrong estimate it lands beside its pad, all of its part flown.
+    // With a wrong estimate a vehicle may land beside its pad after all of its part is flown.
     let ends = ["Done", "no goal", "Aborted: Landed beside its goal"];
     let short = |end: &str| !ends.iter().any(|whole| end.starts_with(whole));
     let reported = flown_around(&log);
-    // Of the area no more than those waypoints' share.
+    // The part of the area that is not photographed, as a number of pictures.
     let missing = (1.0 - coverage.covered_share) * coverage.photos as f64;
     let fell_short = |v: &&VehicleResult| !struck.contains(&v.id) && short(&v.end);
     let (landed_short, whole) =
         (vehicles.iter().filter(fell_short).count(), coverage.covered_share >= 1.0);
     let rough = (draw.radio == Radio::Rough).then_some(GIVEN_AWAY).into_iter().flatten();
-    // With nothing left to photograph it may land where there is room.
+    // Once nothing is left to photograph, a vehicle may land where there is room.
     let aside = whole.then_some(covered::LANDS_ASIDE);
     let reasons: Vec<&str> =
         covered::EARLY_LANDING_TEXTS.into_iter().chain(rough).chain(aside).collect();
-    // On its pad it waits on where nobody flies any more who could take its part.
+    // A vehicle stays on its pad if no vehicle flies any more that could take its part.
     let waits = |v: &VehicleResult| {
         v.end.starts_with("Scheduled")
             && covered::others_until_s(&log, v.id) < f64::from(at_s) + START_BARRED_S
     };
-    // None of them waits to take over: a vehicle without a part takes none.
+    // All that were not struck have no part: such a vehicle does not take over.
     let had_none = |v: &VehicleResult| struck.contains(&v.id) || v.end.starts_with("no goal");
     Some(Outcome {
         seed,
         kind,
         covered: coverage.covered_share,
-        // Where nobody landed short of a whole area a majority lived to the end.
+        // If no vehicle landed short and the area is whole, a majority lived to the end.
         left_out: landed_short == 0
             && whole
             && coverage.left > reported
@@ -241,8 +244,8 @@ fn what_two_vehicles_leave_that_are_lost_at_once_over_a_rough_radio_is_photograp
     are_whole(Draw { radio: Radio::Rough, ..TWO });
 }
 
-/// A vehicle whose power is gone above its pad falls beside it: others that come down there later
-/// keep off all that its fall may have reached.
+/// A vehicle that loses power above its pad falls beside it: others that land there later keep
+/// clear of all places that its fall may have reached.
 #[test]
 fn who_lands_keeps_off_where_another_may_have_fallen() {
     let one = |seed: u64| -> Option<(u64, f32, bool)> {
@@ -250,7 +253,7 @@ fn who_lands_keeps_off_where_another_may_have_fallen() {
         let count = 3 + (seed % 3) as usize;
         let text = areas::lossy_radio_scenario(&mut random, count, [0.1, 0.5][(seed % 2) as usize]);
         let (_, log) = covered::fly_text(&text).ok()?;
-        // The first that lands, near the beginning of its descent at a metre a second.
+        // The first vehicle that lands, early in its descent at 1 m/s.
         let line = log.lines().find(|line| line.contains("At the goal: landing"))?;
         let mut words = line.split_whitespace();
         let ends_s: f64 = words.next()?.parse().ok()?;
@@ -295,8 +298,7 @@ fn who_lands_keeps_off_where_another_may_have_fallen() {
     assert!(2 * all.len() as u64 > count);
 }
 
-/// One vehicle is heard no more and flies on as long as its lease allows, while others come down
-/// beside it.
+/// One vehicle falls silent and flies on as long as its lease allows, while others land beside it.
 #[test]
 fn who_lands_keeps_off_all_that_an_unheard_vehicle_may_still_fly() {
     let one = |seed: u64| -> Option<(u64, bool)> {
@@ -342,14 +344,14 @@ fn what_a_lost_vehicle_leaves_of_a_large_area_is_photographed_too() {
     are_whole(Draw { area: large, until_s: 900, ..EVEN });
 }
 
-/// Some are struck before they know where they are, have a plan, or are started.
+/// Some vehicles are struck before they have a position or a plan, or are started.
 #[test]
 fn what_a_vehicle_leaves_that_is_lost_before_it_flies_is_photographed_by_the_others() {
     are_whole(Draw { until_s: 30, ..EVEN });
 }
 
-/// Above pads from which others are yet to start, or on their ways: whoever cannot start leaves its
-/// part to those that fly.
+/// A pilot holds a vehicle above pads from which others are still to start, or on their paths: a
+/// vehicle that cannot start leaves its part to those that fly.
 #[test]
 fn what_waits_below_a_vehicle_that_a_pilot_keeps_is_photographed_by_the_others() {
     are_whole(Draw { kinds: ["pilot-takeover"; 6], until_s: 40, ..EVEN });
@@ -364,12 +366,13 @@ const EVEN: Draw = Draw {
     radio: Radio::Even,
     most_in_three: 1,
 };
-/// Two of three or of five are lost at once. Of three the last one has no majority: it lands.
+/// Two of three or of five vehicles are lost at once. Of three the last one has no majority and
+/// lands.
 const TWO: Draw = Draw { struck: 2, most_in_three: 2, ..EVEN };
 
 fn are_whole(draw: Draw) {
     let (from, count) = (number("FLOCKMATE_LOSSES_FROM", 0), number("FLOCKMATE_LOSSES", MISSIONS));
-    // Twelve seeds have three vehicles, the next twelve five: of few missions half have each.
+    // Twelve seeds have three vehicles, the next twelve have five; of few missions half have three.
     let skip = |k| if count == MISSIONS && k >= count / 2 { 12 - count / 2 } else { 0 };
     let one = |k| outcome(draw, from + k + skip(k));
     let all: Vec<Outcome> = (0..count).into_par_iter().filter_map(one).collect();
@@ -401,12 +404,12 @@ fn are_whole(draw: Draw) {
     let [wrong, short] = [all.iter().filter(wrong).count(), all.iter().filter(short).count()];
     println!("{} flown, {short} landed short or not whole, {wrong} without a reason", all.len());
     assert_eq!(wrong, 0);
-    // Where the rule lands a vehicle that a rough radio cuts off, or one that is alone, the area
-    // may be whole all the same.
+    // A vehicle that a rough radio cuts off, or that is alone, must land; the area may be whole all
+    // the same.
     let incomplete = all.iter().filter(|o| o.covered < 1.0).count();
     let rare = if draw.radio == Radio::Rough || draw.struck > 1 { incomplete } else { short };
     println!("{incomplete} incomplete");
     assert!(draw.most_in_three * all.len() >= 3 * rare);
-    // Random concave areas may be none, or their zones may bar a pad.
+    // Random concave areas may be invalid, or their zones may cover a pad.
     assert!(2 * all.len() as u64 >= count, "{} of {count} flown", all.len());
 }

@@ -1,4 +1,4 @@
-//! A map beside an area: what it holds at the height of the flights is flown around.
+//! Coverage missions with a map of obstacles: flights lead around those that reach their height.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -62,7 +62,7 @@ fn random_boxes(random: &mut Pcg32, cell_m: f64, height_m: f64) -> Vec<Block> {
     let one = |_| {
         let low = [0, 1].map(|_| cells(areas::between(random, -150.0, 150.0)));
         let size = [0, 1].map(|_| cells(areas::between(random, 1.0, 25.0)));
-        // Some hang, some are as high as lanes or layers, many are lower.
+        // Some blocks hang in the air, some reach the lanes or layers, many are lower.
         let from_m = [0.0, 0.0, 0.0, areas::between(random, 0.0, 1.2)];
         let from_m = cells(height_m * from_m[(random.next_u32() % 4) as usize]);
         let tall_m = cells(height_m * areas::between(random, 0.1, 1.8)) + cell_m;
@@ -76,7 +76,7 @@ fn random_boxes(random: &mut Pcg32, cell_m: f64, height_m: f64) -> Vec<Block> {
 fn wrong(scenario: &Scenario, planned: &CoveragePlan<'_>, boxes: &[Block]) -> Option<String> {
     let area = scenario.area.as_ref().expect("an area");
     let obstacles = area.obstacles.as_ref().expect("a map");
-    // Default: 0.3 m and half of 2.4 m.
+    // Default clearance: 0.3 m and half of 2.4 m.
     if (obstacles.clearance_m - 1.5).abs() > 1e-5 {
         return Some(format!("the clearance is {} m", obstacles.clearance_m));
     }
@@ -100,7 +100,7 @@ fn wrong(scenario: &Scenario, planned: &CoveragePlan<'_>, boxes: &[Block]) -> Op
             findings.first_missing_cell, findings.legs_in_no_fly_zones
         ));
     }
-    // What is not photographed: little more than what nobody may fly over.
+    // What is not photographed must be little more than what no vehicle may fly over.
     let low_m = f64::from(area.heights.mission_m) - 1.5 - 0.02;
     let tall: Vec<_> = boxes.iter().filter(|block| block[1][2] > low_m).collect();
     let own = scenario.text.lines().find(|line| line.starts_with("no_fly"));
@@ -128,7 +128,7 @@ fn wrong(scenario: &Scenario, planned: &CoveragePlan<'_>, boxes: &[Block]) -> Op
     (free > 0.5 * all).then(|| format!("{free} of {all} m² of the zones are free"))
 }
 
-/// `FLOCKMATE_OBSTACLES=N` plans more.
+/// `FLOCKMATE_OBSTACLES=N` plans N areas.
 #[test]
 fn plans_keep_clear_of_all_that_a_map_holds_at_their_height() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -213,7 +213,8 @@ fn an_area_with_towers_is_photographed_without_contact() {
     let nearest_m = places.map(|place| far_m(place.into())).fold(f64::INFINITY, f64::min);
     println!("{nearest_m:.2} m from the nearest, {:.0} s", flight.result.totals.makespan_s);
     assert!(nearest_m > 1.0 && nearest_m < 4.0, "{nearest_m}");
-    // The same flight where a mast stands in its way that nobody planned for: the referee sees it.
+    // The same flight with a mast on its path that the plan does not know: the referee sees the
+    // contact.
     let mut mission = prepared();
     let mast = [[60.0, 0.0, 0.0], [61.0, 60.0, 45.0]];
     let map = map_of(&[&BLOCKS[..], &[mast]].concat(), 0.5);
@@ -252,7 +253,7 @@ fn what_a_map_leaves_no_room_for_is_refused_by_name() {
     assert!(error.contains("324 corners with those around the map's obstacles"), "{error}");
     assert_eq!(beside(&[column(40.0, 20.0, 22.0), column(60.0, 20.0, 0.5)]), Ok(1), "all is low");
     assert_eq!(beside(&[column(40.0, 20.0, 24.0), column(300.0, 20.0, 30.0)]), Ok(2));
-    // Lanes that lead further beyond the border meet what lies there.
+    // Lanes that reach further beyond the border meet an obstacle there.
     let longer = FIELD.replacen("[area]\n", "[area]\nangle_deg = 0.0\nmargin_m = 60.0\n", 1);
     write(&[column(134.0, 28.0, 60.0)], 0.5, &path);
     assert_eq!(plan(&with_map(&longer, &path, 0.5)), Ok(2));

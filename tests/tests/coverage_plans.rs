@@ -14,15 +14,16 @@ use host_sim::scenario::coverage::Method;
 use planner_core::Point;
 use sim_autopilot::{Autopilot, AutopilotKind, Config, Photo};
 
-/// A waypoint is passed within 2 m across, and by what is flown in a step.
+/// Greatest horizontal distance at which a waypoint is passed, metres: 2 m, and the flight of one
+/// step.
 const PASSED_M: f32 = 2.2;
-/// And 0.8 m in height, by a vehicle that comes down to the first picture a step later.
+/// Greatest vertical distance, metres: 0.8 m, and the descent of one step to the first picture.
 const PASSED_UP_M: f32 = 1.1;
 const CRUISE_MPS: f32 = 5.0;
-/// PX4's camera looks every 50 ms.
+/// Flight between two checks of PX4's camera trigger, every 50 ms, metres.
 const LATE_M: f32 = 0.05 * CRUISE_MPS;
-/// Between two pictures by distance: the look is in the first step of 4 ms after that, and gusts
-/// and estimates are none here.
+/// Most by which the gap of two pictures by distance exceeds the planned one, metres: the check
+/// comes up to one step of 4 ms later. There are no gusts or estimate errors here.
 const GAP_M: f32 = LATE_M + 0.05;
 
 fn scenario(personality: &str, trigger: &str) -> String {
@@ -141,7 +142,7 @@ fn fly(
         announced: 0,
     };
     client.run(3.0);
-    // The delay before it leaves is the swarm's; ArduPilot's item 0 is home.
+    // The delay item is left out, as it serves the swarm; ArduPilot's item 0 is home.
     let mut items: Vec<MissionItem> =
         items.iter().filter(|item| item.command != 93).cloned().collect();
     if personality == AutopilotKind::Ardupilot {
@@ -184,18 +185,19 @@ fn off_by(photo: &Photo, place: &Point) -> (f32, f32) {
     (off.xy().norm(), off.z.abs())
 }
 
-/// By distance: pictures of a lane are nowhere further apart than they are planned, but for the
-/// look that they wait for.
+/// Asserts for the trigger by distance that a lane's pictures are nowhere further apart than
+/// planned, apart from the wait for the camera's check.
 fn judge_gaps(photos: &[Photo], wanted: &[&FlightPoint], label: &str) {
     for lane in wanted.chunk_by(|a, b| a.lane == b.lane) {
         let [first, .., last] = lane else { continue };
         let (from, way) = (first.position.xy(), (last.position - first.position).xy());
         let step_m = (lane[1].position - first.position).xy().norm();
-        // Of neighbouring lanes none is so near.
+        // No neighbouring lane is so near.
         let beside = |at: &Point| ((at.xy() - from).perp(&way) / way.norm()).abs() < PASSED_M;
         let own = photos.iter().map(|photo| photo.position).filter(beside);
         let mut along: Vec<f32> = own.map(|at| (at.xy() - from).dot(&way) / way.norm()).collect();
-        // Lanes that a zone divides lie in one line.
+        // The two lanes left of one that a zone divides lie in one line: only this lane's pictures
+        // count.
         along.retain(|at| (-PASSED_M..way.norm() + PASSED_M).contains(at));
         along.sort_by(f32::total_cmp);
         assert!(
@@ -236,12 +238,12 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
                 }
             }
             "distance" => {
-                // The last before the end of a lane may be behind it, or one more.
+                // The last picture of a lane may come after its end, or one may be added.
                 let counts = wanted.len() - lanes..=wanted.len() + lanes;
                 assert!(counts.contains(&photos.len()), "{label}, {lanes} lanes");
                 judge_gaps(&photos, &wanted, &label);
-                // Both ends of a lane as they are passed; between them each is late by the looks
-                // before it.
+                // Both ends of a lane are photographed as they are passed; each picture between is
+                // late by the checks before it.
                 for (k, point) in wanted.iter().enumerate() {
                     let before =
                         wanted[..k].iter().rev().take_while(|s| s.lane == point.lane).count();
@@ -255,7 +257,8 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
             _ => assert_eq!(photos.len(), 0, "{label}"),
         }
         if personality == AutopilotKind::Px4 && trigger == "waypoint" {
-            // The heading of a sweep: one for all, within what PX4 waits for.
+            // With the heading of the sweep all pictures look the same way, within the error for
+            // which PX4 waits.
             let turned =
                 photos.iter().map(|photo| (photo.heading_rad - photos[0].heading_rad).abs());
             assert!(turned.fold(0.0, f32::max) < 0.43, "{label}");

@@ -1,9 +1,9 @@
 //! Coverage missions in which some vehicles land and stay powered while others are restarted and
-//! flown again, and in which vehicles come up one after the other: nothing is left out, and nobody
-//! is kept on its pad for what another vehicle reports of an earlier flight.
+//! flown again, and in which vehicles come up one after the other: nothing is left out, and no
+//! vehicle is kept on its pad because of another vehicle's report of an earlier flight.
 //!
 //! `FLOCKMATE_RESTARTED=N` flies N missions of each kind in place of [`MISSIONS`],
-//! `FLOCKMATE_RESTARTED_FROM` others.
+//! `FLOCKMATE_RESTARTED_FROM=SEED` from another seed on.
 
 use std::fmt::Write as _;
 
@@ -31,8 +31,8 @@ fn fault(lines: &mut String, kind: &str, vehicle: u32, at_s: u32) {
     let _ = write!(lines, "[[faults]]\nkind = \"{kind}\"\nvehicle = {vehicle}\nat_s = {at_s}.0\n");
 }
 
-/// All are ordered home, together or one after the other, so that those in the air divide what is
-/// left; once all are down, some are restarted together.
+/// All vehicles are commanded home, together or one after the other, so that those in the air
+/// divide what is left; once all are down, some are restarted together.
 fn restarted(seed: u64) -> String {
     let mut random = Pcg32::seed_from_u64(seed);
     let mut text = SMALL_FIELD.replace("id =", "endurance_s = 4000.0\nid =");
@@ -75,8 +75,8 @@ fn what_landed_vehicles_report_of_their_flight_does_not_count_in_the_next() {
     none_is_wrong(restarted);
 }
 
-/// One vehicle is heard, and knows its position, 72 to 82 s after the others, before which nobody
-/// is started. From this height a lost one would be down by then.
+/// One vehicle is heard, and knows its position, 72 to 82 s later than the others; none is started
+/// before that. From this height a lost vehicle would be down by then.
 #[test]
 fn a_vehicle_that_comes_up_late_flies_its_part() {
     none_is_wrong(|seed| {
@@ -92,8 +92,8 @@ fn a_vehicle_that_comes_up_late_flies_its_part() {
     });
 }
 
-/// A board that is restarted on the ground again and again counts an incarnation more each time.
-/// Whoever is restarted after that, and knows nothing, takes its count as it is.
+/// A board that is restarted on the ground increases its incarnation each time. A vehicle restarted
+/// after that, which remembers nothing, accepts that incarnation.
 #[test]
 fn any_number_of_restarts_on_the_ground_keeps_nobody_from_dividing() {
     none_is_wrong(|seed| {

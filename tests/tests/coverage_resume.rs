@@ -1,8 +1,9 @@
-//! Coverage missions that are interrupted, and started again: the rest is flown, and nothing is
-//! left out.
+//! Coverage missions that are interrupted and started again: the rest is flown, and nothing is left
+//! out.
 //!
-//! `FLOCKMATE_RESUMED=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_RESUMED_FROM`
-//! others; `FLOCKMATE_SEAMS` and `FLOCKMATE_SEAMS_FROM` those whose batteries are low.
+//! `FLOCKMATE_RESUMED=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_RESUMED_FROM=SEED`
+//! from another seed on; `FLOCKMATE_SEAMS` and `FLOCKMATE_SEAMS_FROM` do the same for low
+//! batteries.
 
 use std::ffi::OsStr;
 use std::fmt::Write as _;
@@ -25,15 +26,15 @@ use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
 const MISSIONS: u64 = 6;
-/// Starts until the area is whole.
+/// Most starts until the area is whole.
 const STARTS: usize = 4;
 /// When three vehicles have photographed 40 % of the small field, seconds.
 const FORTY_PERCENT_S: f64 = 112.0;
-/// What brings a vehicle down early; it is carried back to its pad, charged and switched on.
+/// Faults that bring a vehicle down early; then it is carried to its pad, charged and switched on.
 const KINDS: [&str; 5] =
     ["battery-low", "battery-low", "pilot-takeover", "companion-reset", "kill"];
 
-/// The scenario without faults, and what happens in the first flights.
+/// The scenario without faults, and the faults of the first flights.
 fn drawn(seed: u64) -> (String, Vec<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [1, 3, 5][(seed % 3) as usize];
@@ -43,7 +44,7 @@ fn drawn(seed: u64) -> (String, Vec<String>) {
     let mut faults = Vec::new();
     for _ in 0..flights {
         let mut lines = String::new();
-        // All of them, or some: then the others divide what they leave.
+        // All vehicles are struck, or some: then the others divide what these leave.
         let all = random.next_u32().is_multiple_of(2);
         let kind = KINDS[(random.next_u32() % 5) as usize];
         for vehicle in 1..=count {
@@ -77,10 +78,10 @@ fn fly(
     Ok((result, covered::log_lines(&log)))
 }
 
-/// What came of a mission.
+/// How a mission ended.
 struct Outcome {
     seed: u64,
-    /// Starts until the area was whole, if it came to be.
+    /// Number of starts until the area was whole; `None` if it never was.
     starts: Option<usize>,
     twice: u64,
     broken: bool,
@@ -110,7 +111,7 @@ fn outcome(seed: u64) -> Option<Outcome> {
         let coverage = result.coverage.expect("it has an area");
         let safety = &result.safety;
         outcome.broken |= (safety.wall_contacts, safety.violations) != (0, 0);
-        // With nobody struck all come home.
+        // In a start without faults all come home.
         let home = |end: &str| end == "Done" || end.starts_with("no goal");
         outcome.broken |= start >= faults.len() && !result.vehicles.iter().all(|v| home(&v.end));
         outcome.twice = coverage.twice;
@@ -190,12 +191,12 @@ fn flk_resume_0_photographs_the_whole_area_again() {
     assert!(rest.left > 20 && fewer + 20 < pictures, "{fewer} pictures: {rest:?}");
 }
 
-/// A pilot takes a vehicle, which hovers, and others fly around it: whether they left waypoints
-/// out, and what is wrong after the next start, which is to fly those and no more.
+/// A pilot takes a vehicle, which hovers, and others fly around it. Returns whether they left
+/// waypoints out, and what is wrong after the next start, which is to fly only those.
 fn around(seed: u64) -> (bool, Option<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [3, 5][(seed % 2) as usize];
-    // By a good estimate: what is left out is judged by true places.
+    // Estimates are good, because what is left out is judged by true places.
     let text =
         areas::lossy_radio_scenario(&mut random, count, 0.1).replace("\"recorded\"", "\"rtk\"");
     let (vehicle, at_s) = (1 + random.next_u32() % count as u32, 60 + random.next_u32() % 150);
@@ -245,8 +246,8 @@ fn what_was_flown_around_is_photographed_after_the_next_start() {
     assert!(wrong.is_empty() && left > 0, "{left} of {count}");
 }
 
-/// Some time after a takeover a journal is waypoints behind: the next start flies these, and what
-/// was whole before is still judged whole.
+/// After a low battery a journal may be some waypoints behind: the next start flies these, and an
+/// area that was whole before is still judged whole.
 #[test]
 fn an_area_that_was_whole_is_judged_whole_at_the_next_start() {
     let program = host_sim();
@@ -286,7 +287,7 @@ fn an_area_that_was_whole_is_judged_whole_at_the_next_start() {
     assert!(whole_at_once >= 3, "{whole_at_once} of 6 missions were whole after a takeover");
 }
 
-/// The battery-low fault of each of these vehicles, at its own time, seconds.
+/// A battery-low fault for each vehicle from 1 on, at its time in `at_s`, seconds.
 fn batteries_low(at_s: &[f64]) -> String {
     let low = |(vehicle, at_s): (usize, &f64)| {
         format!("[[faults]]\nkind = \"battery-low\"\nvehicle = {vehicle}\nat_s = {at_s:.1}\n")
@@ -294,8 +295,8 @@ fn batteries_low(at_s: &[f64]) -> String {
     (1..).zip(at_s).map(low).collect()
 }
 
-/// An even fleet, without gusts and with good estimates, of which one flight or two are cut short
-/// by low batteries. Seed 0 lands at about 40 % of the area, the others anywhere.
+/// A scenario without gusts, with good estimates, and the low batteries that cut its first flight
+/// or two short. Seed 0 lands at about 40 % of the area, the others anywhere.
 fn cut_short(seed: u64) -> (String, Vec<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let autopilot = ["px4", "ardupilot"][(seed % 2) as usize];
@@ -314,7 +315,7 @@ fn cut_short(seed: u64) -> (String, Vec<String>) {
     }
     let one = |random: &mut Pcg32| {
         let (low, at_s) = (40.0, areas::between(random, 40.0, 192.0));
-        // All at once, or each at its own time.
+        // The batteries of all are low at once, or each at its own time.
         let spread = [0.0, 30.0][(random.next_u32() % 2) as usize];
         let each = [0; 3].map(|_| (at_s + areas::between(random, -1.0, 1.0) * spread).max(low));
         batteries_low(&each)
@@ -323,22 +324,22 @@ fn cut_short(seed: u64) -> (String, Vec<String>) {
     (text, (0..flights).map(|_| one(&mut random)).collect())
 }
 
-/// Flies a mission of [`cut_short`] until it is whole: how many flights were cut short before that,
-/// or what is wrong.
+/// Flies a mission of [`cut_short`] until it is whole. Returns how many flights were cut short
+/// before, or what is wrong.
 fn seam(seed: u64) -> Result<usize, String> {
     let (text, faults) = cut_short(seed);
     let dir = tempfile::tempdir().expect("a directory");
     let (mut pictures, mut said) = (Vec::new(), String::new());
     let mut cut = 0;
-    // Low batteries may come after the last picture: then nothing is left to fly.
+    // Batteries may be low only after the last picture: then nothing is left to fly.
     for fault in faults.iter().map(String::as_str).chain([""]) {
         let (result, log) =
             fly(&format!("{text}{fault}"), dir.path(), &mut pictures).expect("it flies");
         let coverage = result.coverage.expect("it has an area");
         let _ = writeln!(said, "{fault}{coverage:?}\n{log}");
         let (left, waypoints) = (coverage.left, u64::from(coverage.waypoints));
-        // Of each flight that is cut short each of the three vehicles has a few waypoints flown
-        // again.
+        // For each flight that is cut short, a few waypoints of each of the three vehicles are
+        // flown again.
         let again = 3 * 4 * cut as u64;
         let right = coverage.twice <= again && pictures.len() as u64 <= waypoints + 2 * again;
         let forty =
@@ -352,8 +353,8 @@ fn seam(seed: u64) -> Result<usize, String> {
     Err(format!("seed {seed}, start {}:\n{text}{said}", cut + 1))
 }
 
-/// Landed at any moment by low batteries, and restarted from flash: after as many starts as flights
-/// were cut short, one more flies all of the rest.
+/// Low batteries land the vehicles at any moment, and they restart from flash. The start after the
+/// last flight that was cut short flies all of the rest.
 #[test]
 fn what_low_batteries_left_is_flown_by_the_next_start_and_nothing_is_left_at_the_seam() {
     let (from, count) = (number("FLOCKMATE_SEAMS_FROM", 0), number("FLOCKMATE_SEAMS", 12));

@@ -12,18 +12,18 @@ use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// Times are summed in another order here.
+/// Tolerance, as a factor: this test sums times in another order than the planner.
 const ROUNDING: f32 = 1.0002;
-/// Routes of more lanes are not cut in every way.
+/// Most lanes of a route for which every cut is tried.
 const MOST_LANES: usize = 10;
 
-/// The same scenario with batteries that last so long.
+/// The same scenario with batteries that last `endurance_s`.
 fn with_batteries(text: &str, endurance_s: f32) -> String {
     let text = text.replace("[area]\n", "[area]\nbatteries = true\n");
     text.replace("speed_max_mps", &format!("endurance_s = {endurance_s}\nspeed_max_mps"))
 }
 
-/// From pad to pad, with stops at both ends of each lane and over the pad.
+/// Time of a route from pad to pad, with stops at both ends of each lane and over the pad, seconds.
 fn flown_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let points = flight::route_points(planned, route);
     let steady_s = flight::passing_times_s(planned, route, &points)
@@ -31,7 +31,7 @@ fn flown_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
         .copied()
         .expect("a flight has points");
     let (speed, accel) = (planned.vehicles[usize::from(route.vehicle)].cruise_mps, 1.5f32);
-    // Over a leg from rest to rest.
+    // Time lost by stops at both ends of a leg, seconds.
     let lost_s = |leg_m: f32| match leg_m < speed * speed / accel {
         true => 2.0 * (leg_m / accel).sqrt() - leg_m / speed,
         false => speed / accel,
@@ -41,15 +41,15 @@ fn flown_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     steady_s + (count + 2) as f32 * lost_s(f32::INFINITY) + steps_s
 }
 
-/// The lanes of a route, each with what of it belongs to the route, in the order of the path.
+/// A route's lanes in path order, each cut to the waypoints that belong to the route.
 fn lanes(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Route> {
     let numbers: Vec<u32> = (route.first..route.end).collect();
     let lanes = numbers.chunk_by(|a, b| planned.tracks.lane_of(*a) == planned.tracks.lane_of(*b));
     lanes.map(|lane| Route { first: lane[0], end: lane[lane.len() - 1] + 1, ..*route }).collect()
 }
 
-/// The fewest sorties within this time, one lane after the other as long as it fits: no part takes
-/// longer than what it is a part of. None where a lane alone does not fit.
+/// The fewest sorties of at most `most_s` each: lanes are added to a sortie as long as they fit,
+/// since no part takes longer than the whole. `None` if a lane alone does not fit.
 fn fewest(planned: &CoveragePlan<'_>, route: &Route, most_s: f32) -> Option<usize> {
     let (mut count, mut first) = (1, route.first);
     for lane in lanes(planned, route) {
@@ -63,7 +63,7 @@ fn fewest(planned: &CoveragePlan<'_>, route: &Route, most_s: f32) -> Option<usiz
     Some(count)
 }
 
-/// The least time of so many sorties, by trying every cut.
+/// The least total time of `count` sorties, by trying every cut, seconds.
 fn least_s(planned: &CoveragePlan<'_>, route: &Route, count: usize, most_s: f32) -> f32 {
     let lanes = lanes(planned, route);
     let cuts = (0..1u32 << (lanes.len() - 1)).filter(|cut| cut.count_ones() as usize == count - 1);
@@ -81,7 +81,7 @@ fn least_s(planned: &CoveragePlan<'_>, route: &Route, count: usize, most_s: f32)
     cuts.map(total_s).fold(f32::INFINITY, f32::min)
 }
 
-/// What one area was good for.
+/// What was tested on one area.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
     planned: usize,
@@ -123,7 +123,8 @@ fn judge_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32, seen: &mu
     }
 }
 
-/// In each round all begin together, when the last one is back.
+/// Asserts that all sorties of a round begin together, when the last one of the round before is
+/// back.
 fn judge_rounds(planned: &CoveragePlan<'_>) {
     let rounds: Vec<_> = planned.sorties.chunk_by(|a, b| a.number == b.number).collect();
     let mut begin_s = 0.0;
@@ -150,7 +151,8 @@ fn judge(seed: u64) -> Option<Seen> {
     let method = methods[(seed % 3) as usize];
     let plain = scenario::parse(&text, "plain").ok()?;
     let whole = CoveragePlan::new(&plain, method).ok()?;
-    // From a little less than the longest lane takes alone to more than the longest route takes.
+    // Endurance from a little less than the longest lane takes alone to more than the longest route
+    // takes.
     let routes = &whole.plan.routes;
     let alone = routes.iter().flat_map(|route| lanes(&whole, route));
     let least_s = 0.95 * alone.map(|lane| flown_s(&whole, &lane)).fold(0.0, f32::max);
@@ -197,7 +199,7 @@ fn judge(seed: u64) -> Option<Seen> {
     Some(Seen { planned: 1, ..seen })
 }
 
-/// More with `FLOCKMATE_SORTIES=N`.
+/// `FLOCKMATE_SORTIES=N` judges N areas.
 #[test]
 fn each_sortie_comes_home_in_time_and_nothing_is_left_out() {
     let count = std::env::var("FLOCKMATE_SORTIES").ok().and_then(|n| n.parse().ok()).unwrap_or(300);

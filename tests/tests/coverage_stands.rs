@@ -1,8 +1,8 @@
-//! Coverage missions in which a vehicle stands, or cannot start: paused, in its climb, without a
-//! position. The others may neither fly into it nor wait for it to the end.
+//! Coverage missions in which a vehicle stands still or cannot start: paused, in its climb, without
+//! a position. The others may neither fly into it nor wait for it for ever.
 //!
-//! `FLOCKMATE_STANDS=N` flies N missions of each test, `FLOCKMATE_STANDS_FROM` others; with N = 1
-//! the scenario is printed.
+//! `FLOCKMATE_STANDS=N` flies N missions of each test, `FLOCKMATE_STANDS_FROM=SEED` from another
+//! seed on; with N = 1 the scenario is printed.
 
 use flockmate_tests::{areas, assert_no_seed_is_wrong, covered};
 use host_sim::result::MissionResult;
@@ -24,7 +24,7 @@ fn is_not_whole(result: &MissionResult) -> bool {
     result.coverage.as_ref().is_none_or(|coverage| coverage.covered_share < 1.0)
 }
 
-/// Flies what `draw` draws, and fails where `wrong` says so of the result and the log.
+/// Flies the scenarios that `draw` draws; fails if `wrong` is true for a result and its log.
 fn fly_all(draw: fn(&mut Pcg32) -> String, wrong: impl Fn(&MissionResult, &str) -> bool + Sync) {
     let one = |seed: u64| -> Option<bool> {
         let text = draw(&mut Pcg32::seed_from_u64(seed));
@@ -44,8 +44,8 @@ fn fly_all(draw: fn(&mut Pcg32) -> String, wrong: impl Fn(&MissionResult, &str) 
     assert_no_seed_is_wrong("FLOCKMATE_STANDS", MISSIONS, one);
 }
 
-/// Others take a silent vehicle to be down after a while, and fly where it was: so no state may
-/// keep it up for longer, a pause or a slow climb neither.
+/// After a while others assume that a silent vehicle is down, and fly where it was. So no state may
+/// keep it up for longer, not even a pause or a slow climb.
 #[test]
 fn a_vehicle_that_stands_unheard_is_down_before_others_fly_there() {
     let draw = |random: &mut Pcg32| {
@@ -70,9 +70,9 @@ fn a_vehicle_that_stands_unheard_is_down_before_others_fly_there() {
     fly_all(draw, |result, _| is_not_whole(result));
 }
 
-/// One without a position or plan on its pad, one that hears nobody, or one that a restart left
-/// without a position in the field is heard but promises nothing: the others divide its share all
-/// the same, after a loss and without one.
+/// A vehicle that has no position or plan on its pad, hears no other, or has no position after a
+/// restart in the field is heard but commits to nothing. The others divide its share all the same,
+/// after a loss and without one.
 #[test]
 fn what_cannot_start_leaves_its_share_to_the_others() {
     let draw = |random: &mut Pcg32| {
@@ -104,12 +104,12 @@ fn what_cannot_start_leaves_its_share_to_the_others() {
         }
         text
     };
-    // Without a majority those that are left land.
+    // Without a majority the remaining vehicles land.
     let lands = |log: &str| log.contains("Neighbours still silent: landing");
     fly_all(draw, |result, log| is_not_whole(result) && !lands(log));
 }
 
-/// A pause as vehicles take off delays the mission, and ends it for none.
+/// A pause during the take-offs delays the mission, but ends it for no vehicle.
 #[test]
 fn a_pause_in_the_start_ends_no_mission() {
     let draw = |random: &mut Pcg32| {
@@ -125,8 +125,8 @@ fn a_pause_in_the_start_ends_no_mission() {
     fly_all(draw, |result, _| !result.complete);
 }
 
-/// Another vehicle is lost while all wait until the first one is down, from high up or slowly: they
-/// wait for that one too, and then divide.
+/// A second vehicle is lost while the others wait until the first one, which is high or descends
+/// slowly, is down: they wait for the second one too, and then divide.
 #[test]
 fn a_loss_during_a_division_delays_it_and_lands_nobody() {
     let draw = |random: &mut Pcg32| {

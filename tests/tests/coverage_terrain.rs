@@ -1,6 +1,6 @@
-//! Coverage plans above terrain, random and real, judged by what is not the planner: never nearer
-//! to the ground than the height of the pictures, never higher than the tolerance above what must
-//! be flown over, no steeper than vehicles fly, all photographed.
+//! Coverage plans above random and real terrain, judged without the planner's code: never nearer to
+//! the ground than the pictures' height, no higher above what must be flown over than the
+//! tolerance, no steeper than vehicles fly, all photographed.
 
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::hills::Hills;
@@ -18,7 +18,7 @@ use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// How many random areas: more with `FLOCKMATE_TERRAINS=N`, from seed `FLOCKMATE_TERRAINS_FROM` on.
+/// Seeds of the random areas: `FLOCKMATE_TERRAINS=N` many, from `FLOCKMATE_TERRAINS_FROM` on.
 fn seeds() -> std::ops::Range<u64> {
     let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
     let from = number("FLOCKMATE_TERRAINS_FROM").unwrap_or(0);
@@ -41,13 +41,13 @@ fn drawn(seed: u64, folder: &std::path::Path) -> String {
     hills.under(&text, &folder.join(format!("hills-{seed}.asc")), tolerance_m)
 }
 
-/// The rule: no higher than the tolerance above the highest ground near, or what the slope from
-/// higher ground allows.
+/// The ceiling of a plan without the tolerance: the highest ground near, or higher ground far away,
+/// less the slope from it.
 struct Ceiling<'a> {
     grid: &'a HeightGrid,
     near_m: f32,
-    /// Along east or north; both add up. The field's steps of 0.1 m make it up to a fifth less
-    /// steep than vehicles fly.
+    /// Slope along east or north; both add up. The field's steps of 0.1 m make it up to a fifth
+    /// less than vehicles fly.
     slope: f32,
 }
 
@@ -85,8 +85,9 @@ impl<'a> Ceiling<'a> {
     }
 }
 
-/// Random places around pictures that no picture shows where the ground is as high as there, not as
-/// below the camera: the plan need not see them, but overlaps should.
+/// Number of random places near pictures that are shown if a camera's height counts from the ground
+/// below it, but not if it counts from the ground at the place. The plan need not show these, but
+/// overlaps should.
 fn hidden(planned: &CoveragePlan<'_>, points: &[&FlightPoint], places: usize) -> usize {
     let (area, along) = (planned.area_settings, planned.tracks.lane_direction());
     let pictures: Vec<Point> = points
@@ -115,7 +116,7 @@ fn hidden(planned: &CoveragePlan<'_>, points: &[&FlightPoint], places: usize) ->
     hidden.count()
 }
 
-/// What is wrong with a plan.
+/// Checks a plan; the error says what is wrong.
 fn judge(scenario: &Scenario, looks: usize) -> Result<CoverageFindings, String> {
     let method = scenario.area.as_ref().unwrap().method;
     let planned = CoveragePlan::new(scenario, method).map_err(|error| format!("{error:#}"))?;
@@ -201,7 +202,7 @@ fn plans_above_real_terrain_keep_their_heights() {
                 4 * id
             )
         };
-        // What the program says of the heights of the pads is what it takes then.
+        // The pad heights that the program's error states are accepted then.
         let mut heights_m = [0.0, 0.0];
         let mut altitude_m = 0.0;
         let mut scenario = None;
@@ -239,7 +240,7 @@ fn plans_above_real_terrain_keep_their_heights() {
 #[test]
 fn what_cannot_be_planned_or_flown_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();
-    // A tenth of the seeds are no areas: the first that is one.
+    // A tenth of the seeds give no valid area: the first one that does.
     let texts = (100..140).map(|seed| drawn(seed, folder.path()));
     let text =
         texts.into_iter().find(|text| scenario::parse(text, "random").is_ok()).expect("an area");

@@ -1,5 +1,6 @@
-//! Areas above random hills, flown by companions that follow the ground: all photographed, by where
-//! each picture was truly taken and how high the ground is there, and nobody touches a hill.
+//! Areas above random hills, flown by companions that follow the ground: all is photographed,
+//! judged by where each picture was truly taken and how high the ground is there, and no vehicle
+//! touches a hill.
 
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::hills::Hills;
@@ -9,11 +10,11 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// Reason why a random area is not flown.
+/// Reasons for which a random area may be refused.
 const NO_FLIGHT: [&str; 5] =
     ["too many corners", "area too large", "bad area", "bad scenario", "no-fly zone"];
 
-/// Hills under what `draw` draws.
+/// The scenario that `draw` draws, above random hills.
 fn drawn(seed: u64, folder: &std::path::Path, draw: impl Fn(&mut Pcg32) -> String) -> String {
     let mut random = Pcg32::seed_from_u64(seed);
     let hills = Hills::new(&mut random, 60.0);
@@ -28,7 +29,8 @@ fn drawn(seed: u64, folder: &std::path::Path, draw: impl Fn(&mut Pcg32) -> Strin
     )
 }
 
-/// Flies all; `Err` says what is wrong, `Ok` whether it was flown, and photographed whole.
+/// Flies `one` for all seeds. Its `Err` says what is wrong, its `Ok` whether the mission was flown,
+/// and photographed whole.
 fn all_flown(
     name: &str,
     from: u64,
@@ -49,7 +51,7 @@ fn all_flown(
     );
 }
 
-/// `FLOCKMATE_HILLS=N` flies more, `FLOCKMATE_HILLS_FROM` others.
+/// `FLOCKMATE_HILLS=N` flies N areas, `FLOCKMATE_HILLS_FROM=SEED` from another seed on.
 #[test]
 fn areas_above_random_hills_are_photographed_whole() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -72,8 +74,8 @@ fn areas_above_random_hills_are_photographed_whole() {
     all_flown("hills", number("FLOCKMATE_HILLS_FROM", 0), number("FLOCKMATE_HILLS", 12), one);
 }
 
-/// What a lost vehicle leaves is photographed by the others, which follow the ground too; or a row
-/// of the table says why not.
+/// The others, which follow the ground too, photograph what a lost vehicle leaves, or the log says
+/// why not.
 #[test]
 fn losses_above_random_hills_touch_nothing() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -96,7 +98,7 @@ fn losses_above_random_hills_touch_nothing() {
                 if number("FLOCKMATE_HILLS", 0) == 1 {
                     println!("{log}{text}");
                 }
-                // None of them waits to take over: a vehicle without a part takes none.
+                // All that were not struck have no part: such a vehicle does not take over.
                 let had_none =
                     |v: &VehicleResult| v.id == vehicle as u8 || v.end.starts_with("no goal");
                 let others = || result.vehicles.iter().filter(|v| v.id != vehicle as u8);

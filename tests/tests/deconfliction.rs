@@ -21,8 +21,8 @@ fn suite(args: &[&str]) -> Vec<Value> {
     serde_json::from_str(&std::fs::read_to_string(rows).unwrap()).unwrap()
 }
 
-/// Each vehicle flies as late as the schedule says, so nobody waits in the air for one that is
-/// later; and each lands near enough to its place for the others to pass.
+/// Each vehicle departs as late as the schedule says, so none waits in the air for a later one; and
+/// each lands near enough to its place for the others to pass.
 #[test]
 fn forty_swap_places_and_none_stands() {
     let rows = suite(&["--only", "circle, 40", "--method", "priority", "--seeds", "1"]);
@@ -39,12 +39,13 @@ fn hard_meetings_end_without_a_touch_or_a_standstill() {
     let ours: Vec<&Value> = rows.iter().filter(|row| row["method"] == "priority").collect();
     assert!(ours.len() >= 16, "{} cases", ours.len());
     for row in ours {
-        // Where one may lie anywhere on a stretch, another's goal may be out of reach.
+        // If a silent vehicle may lie anywhere on a stretch, another vehicle's goal may be out of
+        // reach.
         let lost = row["name"]
             .as_str()
             .is_some_and(|name| name.starts_with("radio") || name.starts_with("circle, 30 %"));
         assert!(lost || row["complete"] == SEEDS, "{row}");
-        // Most get there all the same: one of eight in every flight may land short.
+        // Most reach their goals all the same: one vehicle of eight in every flight may land short.
         assert!(
             row["held_up"].as_u64().is_some_and(|held_up| held_up <= if lost { SEEDS } else { 0 }),
             "{row}"
@@ -63,9 +64,9 @@ fn hard_meetings_end_without_a_touch_or_a_standstill() {
     }
 }
 
-/// Three meetings of the seeds 101 to 400 that came too near beside a silent vehicle on the ground:
-/// it lay at the end of the stretch that others keep off (123, 160), or where gates that opened had
-/// led it since it was heard last (360).
+/// Three of the seeds 101 to 400 in which a vehicle once came too near to a silent one on the
+/// ground. That lay at the end of the stretch that others keep clear of (123, 160), or where it had
+/// flown through gates that opened after it was last heard (360).
 #[test]
 fn a_vehicle_that_only_hears_lies_where_others_look_for_it() {
     for seed in ["123", "160", "360"] {

@@ -1,8 +1,9 @@
-//! Detours with the floor that the roadmap file knows, as host and board plan them, beside those of
-//! a planner that has the map.
+//! Compares detours by the ground heights of the roadmap file, as host and board plan them, with
+//! those of a planner that has the map.
 //!
 //! A vehicle flies from node to node; another one fell silent above its path and lies on the ground
-//! there. With a file of version 1 the whole column below is kept clear.
+//! there. With a file of version 1, which has no ground heights, detours keep clear of the whole
+//! column below.
 
 use flockmate_tests::meeting::dice::Dice;
 use flockmate_tests::shared_data;
@@ -18,24 +19,24 @@ use planner_core::prm::{Config, Sampling};
 use planner_core::roadmap::{LANDMARKS, RoadmapView, encoded_len, write_with_landmarks};
 use planner_core::search::{SearchWorkspace, astar};
 
-/// Terminals of the roadmap: random nodes as good as any.
+/// Number of terminals (goals) of the roadmap: random nodes.
 const GOALS: u16 = 40;
 const CASES: usize = 400;
 const PLACES: usize = 20_000;
-/// What a companion keeps from where a vehicle lies that it does not see, metres.
+/// Distance that a companion keeps from the place where an unheard vehicle may lie, metres.
 const KEPT_M: f32 = 2.5;
-/// Nobody comes nearer to it: two hulls, and twice as much again.
+/// Least distance permitted in this test, metres: two hulls' radii, and as much again.
 const NEAREST_M: f32 = 1.2;
-/// Share of the ways around that the ground of the roadmap leaves as they are.
+/// Least share of detours that are the same with the roadmap's ground as with the map, percent.
 const SAME_PERCENT: usize = 85;
-/// Where the ground is deeper than the file says, what lies there is not kept off: at most this
-/// share of the places.
+/// Greatest share of places, percent, where the ground is deeper than the file says, so that a
+/// vehicle on it is not kept clear of.
 const DEEPER_PERCENT: f64 = 0.25;
-/// Capacity of a board and of the host.
+/// Nodes of a search workspace: of a board and of the host.
 const BOARD: usize = 4096;
 const HOST: usize = 16_384;
 
-/// A map's roadmap with the ground, as files of both versions.
+/// A map's roadmap as files of both versions: `new` has ground heights, `old` has none.
 struct Files {
     new: Vec<u8>,
     old: Vec<u8>,
@@ -73,7 +74,7 @@ fn on_edge(view: &RoadmapView<'_>, dice: &mut Dice) -> Point {
     }
 }
 
-/// How the ground that nodes tell compares with the map's.
+/// Compares the ground heights known from nodes with the map's, at random places on edges.
 fn grounds(name: &str, map: &VoxelMap, view: &RoadmapView<'_>, dice: &mut Dice) {
     let [mut unknown, mut deeper, mut higher] = [0; 3];
     let mut wide_m = 0.0;

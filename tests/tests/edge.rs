@@ -1,15 +1,15 @@
-//! A vehicle fails where its radio no longer reaches the others: two that nothing struck come too
-//! near to nobody, and nobody touches another.
+//! A vehicle fails where its radio no longer reaches the others: no two vehicles without a fault
+//! come too near to each other, and none touches another.
 //!
 //! `FLOCKMATE_EDGES=60 FLOCKMATE_EDGES_FROM=1000 cargo test --release -p flockmate-tests --test edge`
-//! flies others, and `range --strikes 8` the same as a bench. A sweep still finds some:
+//! flies other seeds; the bench `range --strikes 8` does the same. A sweep still finds failures:
 //! docs/safety.md, "Figures".
 
 use flockmate_tests::edge::Edge;
 use flockmate_tests::swarms::number;
 use rayon::prelude::*;
 
-/// Failures of a seed.
+/// Number of flights with a fault per seed.
 const STRIKES: usize = 3;
 
 #[test]

@@ -1,4 +1,5 @@
-//! Estimates as wrong as the recorded ones: what they need, and that it is enough by the truth.
+//! Estimates with the recorded errors: the margin and separation that they require, and that these
+//! suffice by true motion.
 
 use host_sim::margins;
 use host_sim::mission::Mission;
@@ -7,7 +8,7 @@ use host_sim::scenario::{self, EstimatorErrors, Scenario, ScenarioError};
 use host_sim::swarm;
 
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
-/// Seeds of the demo; `FLOCKMATE_ESTIMATOR_SEEDS` flies more.
+/// Number of seeds of the demo unless `FLOCKMATE_ESTIMATOR_SEEDS` sets another.
 const SEEDS: u64 = 3;
 
 fn demo(seed: u64, margin_m: f32, separation_m: f32) -> Result<Scenario, ScenarioError> {
@@ -32,7 +33,7 @@ fn the_default_margin_and_separation_are_refused_with_the_metres_that_are_missin
         refused.contains("separation_m is 2.00 m, 1.30 m less than the 3.30 m it takes"),
         "{refused}"
     );
-    // Either alone is not enough.
+    // A larger margin or a larger separation alone is not enough.
     assert!(demo(1, 0.9, 3.2).is_err() && demo(1, 0.85, 3.3).is_err());
     let scenario = demo(1, 0.9, 3.3).unwrap();
     assert_eq!(scenario.simulation.estimator, EstimatorErrors::Recorded);

@@ -1,17 +1,17 @@
-//! Every kind of fault strikes a vehicle of the ten-UAV building mission, each seed another vehicle
-//! and another time.
+//! Every kind of fault strikes a vehicle of the ten-UAV building mission, with each seed another
+//! vehicle at another time.
 //!
-//! Whatever strikes, no other vehicle touches anything, none comes nearer than the safety distance
-//! to another that was not struck, and all others reach their goals. The vehicle struck ends in a
-//! row of the companion's table, and the log says so. A fault that passes leaves the mission
-//! complete. One thing nobody can help is let pass: to be hit by a vehicle that falls, where it is
-//! shown that there was no time to leave ([`is_unavoidable`]).
+//! Whatever strikes, no other vehicle touches anything, no two others come nearer to each other
+//! than the safety distance, and all others reach their goals. The struck vehicle ends in a row of
+//! the companion's table, and the log says so. A fault that passes leaves the mission complete. One
+//! exception is permitted: a vehicle may be hit by one that falls if there was provably no time to
+//! leave ([`is_unavoidable`]).
 //!
-//! What is counted and not asserted: vehicles nearer than the safety distance to the one struck,
-//! where that comes down without looking, or to one that it hit; touching it is asserted.
+//! Counted but not asserted: vehicles nearer than the safety distance to the struck one while it
+//! descends blindly, or to one that it hit. That none touches it is asserted.
 //! `FLOCKMATE_FAULT_SEEDS=20 cargo test --release --workspace --test faults -- --nocapture` sweeps
-//! twenty seeds and prints a line for each kind. `FLOCKMATE_FAULT_ONLY=kill` plays the kinds whose
-//! lines hold that, `FLOCKMATE_FAULT_SEED=17` one seed, and prints its logs.
+//! twenty seeds and prints a line for each kind. `FLOCKMATE_FAULT_ONLY=kill` flies only the kinds
+//! whose lines contain this text, `FLOCKMATE_FAULT_SEED=17` one seed, and prints its logs.
 
 use flockmate_tests::vehicle::ahead;
 use host_sim::mission::{Mission, SwarmPlan};
@@ -24,9 +24,9 @@ use planner_core::Point;
 use rayon::prelude::*;
 
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
-/// Seeds of a run that does not say how many.
+/// Number of seeds unless `FLOCKMATE_FAULT_SEEDS` sets another.
 const SEEDS: u64 = 2;
-/// Every vehicle that is not held up has landed by then, seconds.
+/// Time limit of a flight, seconds: every vehicle that is not held up has landed by then.
 const TIME_LIMIT_S: f32 = 500.0;
 
 /// What is expected of a kind of fault.
@@ -34,30 +34,30 @@ const TIME_LIMIT_S: f32 = 500.0;
 enum Then {
     /// It passes: the mission is flown to its end.
     GoesOn,
-    /// The vehicle is out.
+    /// The vehicle is out of the plan.
     Out,
 }
 use Then::{GoesOn, Out};
 
 /// One kind of fault.
 struct Case {
-    /// The lines of `[[faults]]` beside `at_s` and `vehicle`; ID and LATER stand for the vehicle
-    /// and 8 s later, AHEAD for a place on its path.
+    /// The TOML lines of `[[faults]]` besides `at_s` and `vehicle`. ID stands for the vehicle,
+    /// LATER for a time 8 s later, AHEAD for a place on its path.
     script: &'static str,
     then: Then,
-    /// One of these is in the log of a vehicle struck on its path.
+    /// A vehicle struck on its path must log one of these.
     says: &'static [&'static str],
 }
 
 const STOPPED: &str = "Autopilot failsafe: setpoints stopped";
 const FOUND: &str = "Found in flight: no mission";
 const AT_GOAL: &str = "At the goal: landing";
-/// Room between starts and goals and a geofence around them, metres: that of the roadmap and some
-/// more, so that passages are found.
+/// Distance from starts and goals to the geofence around them, metres: what the roadmap requires,
+/// and more so that passages are found.
 const ROOM_AT_FENCE_M: f32 = 1.5;
 const FLIES_BACK: &str = "No way around, no room below: flying back";
 const AT_FENCE: &str = "Geofence reached: landing";
-/// No fault of the script: a fence that the paths of some vehicles leave.
+/// Not a fault of the scenario: a geofence that the paths of some vehicles leave.
 const GEOFENCE: &str = "geofence";
 const RETURNED: &str =
     "kind = 'pilot-takeover'\n[[faults]]\nkind = 'pilot-return'\nat_s = LATER\nvehicle = ID";
@@ -86,7 +86,7 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'companion-reset'", then: Out, says: &[FOUND] },
     Case { script: "kind = 'late-plan'\nduration_s = 40", then: GoesOn, says: &["Plan is late: asked again"] },
     Case { script: "kind = 'obstacle'\nradius_m = 0.4\nposition = AHEAD", then: GoesOn, says: &["Flying around", AT_GOAL] },
-    // Detours stay inside the fence too: behind one that has landed at it there may be no way.
+    // Detours stay inside the fence too: past a vehicle that has landed at it there may be no path.
     Case { script: GEOFENCE, then: Out, says: &[AT_FENCE, "No way around: landing", FLIES_BACK] },
     Case { script: "kind = 'pause-order'\nduration_s = 8", then: GoesOn, says: &["Resumed"] },
     Case { script: "kind = 'return-order'", then: Out, says: &["Flying back to the start", "Landing on the pad", CANCELLED] },
@@ -96,10 +96,10 @@ const CASES: &[Case] = &[
 
 const CANCELLED: &str = "Start cancelled as commanded";
 const UNFOLLOWED: &str = "Setpoint not followed: landing";
-/// Not solved yet: beside a vehicle whose autopilot is silent for good others may land short of
-/// their goals.
+/// Not solved yet: if a vehicle's autopilot is silent for good, others may land short of their
+/// goals.
 const OTHERS_LAND_SHORT: &str = "duration_s = 600";
-/// States in which the mission of a vehicle struck may rest.
+/// States in which the mission of a struck vehicle may end.
 const RESTS: &[&str] = &["Done", "Aborted", "WaitAutopilot", "Killed", "PilotControl", "Scheduled"];
 
 impl Case {
@@ -126,7 +126,7 @@ fn prepare(seed: u64) -> (Mission, Box<SwarmPlan>) {
     prepare_inside(None, seed)
 }
 
-/// The same, planned inside a geofence.
+/// As [`prepare`], planned inside a geofence.
 fn prepare_inside(geofence: Option<Geofence>, seed: u64) -> (Mission, Box<SwarmPlan>) {
     let mut scenario = scenario::parse(DEMO, "demo.toml").expect("the demo is good");
     scenario.seed = seed;
@@ -143,7 +143,7 @@ fn fly(mission: &Mission, plan: &SwarmPlan) -> Flight {
         .expect("the script can be played")
 }
 
-/// What came of one flight; whatever must not be is a text in `wrong`.
+/// How one flight ended; `wrong` has a text for each broken rule.
 struct Outcome {
     complete: bool,
     /// Events in which a falling vehicle hits another.
@@ -159,17 +159,18 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
     let (mut wrong, mut notes) = (Vec::new(), Vec::new());
     let is_struck = |e: &Event| e.vehicle.is_some_and(|id| struck.contains(&id));
     let said = |text: &str| flight.log.iter().any(|e| is_struck(e) && e.text.contains(text));
-    // A vehicle that is out comes down where it is, whatever is there.
+    // A vehicle that is out of the plan descends where it is, whatever is there.
     let own_contacts_count = case.then == GoesOn;
-    // Before take-off a mode that the pilot changes cancels the start for good; armed and not yet
-    // up, the autopilot disarms; and a pilot who takes over at the end of a landing has landed.
+    // A fault that passes may still end the mission: before take-off a mode change by the pilot
+    // cancels the start for good; armed but not yet up, the autopilot disarms; and a pilot's
+    // takeover at the end of a landing ends it.
     let goes_on = case.then == GoesOn
         && !["start cancelled", "Disarmed in flight", "landing stopped"]
             .iter()
             .any(|text| said(text));
     let (mut too_near, mut hit) = (0, 0);
-    // A vehicle that could not help being hit is struck from then on; that it flies on at all is
-    // the simulation's.
+    // A vehicle that was unavoidably hit counts as struck from then on; the simulation lets it fly
+    // on.
     let is_hit =
         |e: &&Event| e.text.contains("is hit by falling") && is_unavoidable(flight, at_s, e);
     let hit_at: Vec<(u8, f32)> =
@@ -198,8 +199,8 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
         }
     }
     let did_its_task = |v: &&VehicleResult| v.reached && v.landed && v.end == "Done";
-    // It hangs on an obstacle over others: it can neither leave nor land before its battery is
-    // nearly empty.
+    // The struck vehicle hangs on an obstacle above others: it can neither leave nor land before
+    // its battery is nearly empty.
     let hangs = said(UNFOLLOWED) && said("Vehicle still below: landing waits");
     for v in result.vehicles.iter().filter(|v| !did_its_task(v)) {
         let state = v.end.split(':').next().unwrap_or_default();
@@ -226,11 +227,11 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
     Outcome { complete: result.complete, hit, too_near, notes, wrong }
 }
 
-/// Whether nobody could have got out of the way of a wreck. Nobody knows that a vehicle falls
-/// before there was a second without positions (a shorter gap is everyday: see the stall of 0.8
-/// s), 0.2 s to the next word, 0.05 s on the air and two steps of 0.05 s; the airframe answers 0.55
-/// s later, and then gains room at 1.5 m/s². What was missing is what the bodies (0.3 m each)
-/// overlap across the fall.
+/// Whether no vehicle could have evaded a wreck. Others notice a fall only after 1 s without
+/// positions (shorter gaps are common: see the stall of 0.8 s), 0.2 s until the next message, 0.05
+/// s of radio delay and two steps of 0.05 s. The airframe responds 0.55 s later, then gains
+/// distance at 1.5 m/s². The missing distance is the horizontal overlap of both hulls (radius 0.3 m
+/// each).
 fn is_unavoidable(flight: &Flight, at_s: f32, hit: &Event) -> bool {
     let wreck = hit.text.rsplit(' ').next().and_then(|n| n.parse::<usize>().ok());
     let (Some(wreck), Some(vehicle)) = (wreck, hit.vehicle) else { return false };
@@ -247,8 +248,8 @@ fn is_unavoidable(flight: &Flight, at_s: f32, hit: &Event) -> bool {
     missing_m > 0.5 * 1.5 * left_s * left_s
 }
 
-/// A box that the paths of one to three vehicles leave and those of the others keep off by most,
-/// and these vehicles.
+/// A geofence that the paths of one to three vehicles leave and from which all other paths keep the
+/// greatest distance, and the ids of these vehicles.
 fn fence_for_some(plan: &SwarmPlan) -> (Vec<u8>, Geofence) {
     let reach = |axis: usize, sign: f32, i: usize| {
         let points = plan.flights[i].path.waypoints().iter();
@@ -275,7 +276,7 @@ fn fence_for_some(plan: &SwarmPlan) -> (Vec<u8>, Geofence) {
     (outside, Geofence { min, max })
 }
 
-/// Which seeds are flown; whether their logs are printed.
+/// The seeds to fly, and whether their logs are printed.
 fn seeds() -> (std::ops::RangeInclusive<u64>, bool) {
     let asked = |name| std::env::var(name).ok().map(|n| n.parse().expect("a number"));
     match (asked("FLOCKMATE_FAULT_SEED"), asked("FLOCKMATE_FAULT_SEEDS")) {
@@ -315,7 +316,7 @@ fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
             let at_s = if case.on_ground() || case.script == GEOFENCE {
                 0.0
             } else if case.script.contains("AHEAD") {
-                // Before anyone can have come there.
+                // Before any vehicle can have reached the place.
                 5.0
             } else {
                 (6 + (seed * 13 + k * 5) % 26) as f32

@@ -4,7 +4,8 @@
 use flockmate_tests::fidelity::{Correction, Estimator, RUNS, Recording, allowed_m, recordings};
 use sim_autopilot::AutopilotKind;
 
-/// The recorded flights that nobody interrupted.
+/// The recorded flights that no pilot or failsafe interrupted, with their allowed difference,
+/// metres.
 fn plain() -> impl Iterator<Item = (Recording, f64)> {
     RUNS.iter()
         .flat_map(|run| recordings(run))
@@ -64,7 +65,8 @@ fn interrupted_px4s_stop_as_far_on_as_they_did() {
 
 #[test]
 fn errors_of_another_flight_with_the_same_noise_do_as_well() {
-    // Nothing of the flight itself but its setpoints, and yet far nearer than without errors.
+    // The replay has only the setpoints of its own flight, yet it is far nearer to the recording
+    // than without errors.
     let pairs = [
         ("a_demo", "px4_d4_lobby"),
         ("a_lobby", "px4_d4_lobby"),

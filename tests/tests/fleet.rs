@@ -1,14 +1,16 @@
-//! The agreement on what lost vehicles left, among whole fleets with bad radios: random losses,
-//! leavings, partitions, one-way links, bursts, delays. Vehicles are points on numbered waypoints;
-//! what they agree by is the code that flies.
+//! How whole fleets with bad radios agree on the work that lost vehicles left: random losses,
+//! departures, partitions, one-way links, bursts, delays. Vehicles are points on numbered
+//! waypoints; they agree by the code that flies.
 //!
 //! - No waypoint has two owners at a time, whatever happens.
-//! - What does not fit into a path is asked for, and photographed in the end as well.
-//! - Nothing is left out while a majority lives and hears each other in the end.
+//! - Waypoints that do not fit into a path are requested by a division, and photographed in the end
+//!   as well.
+//! - Nothing is left out if a majority lives and its vehicles hear each other in the end.
 //! - Without loss of messages an agreement takes seconds, and no vehicle's part is given away while
 //!   it is heard.
 //!
-//! `FLOCKMATE_FLEETS=N` draws N fleets in place of [`FLEETS`], `FLOCKMATE_FLEETS_FROM` others.
+//! `FLOCKMATE_FLEETS=N` draws N fleets in place of [`FLEETS`], `FLOCKMATE_FLEETS_FROM=SEED` from
+//! another seed on.
 
 use std::collections::VecDeque;
 
@@ -21,22 +23,23 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// Fleets drawn.
+/// Number of fleets drawn.
 const FLEETS: u64 = 400;
 /// Shares of messages that are lost.
 const LOSSES: [f32; 3] = [0.0, 0.1, 0.5];
-/// Vehicles that hear each other agree so soon after a loss is known, in 99 of 100 fleets, seconds.
+/// Time after a loss is known within which vehicles that hear each other agree, in 99 of 100
+/// fleets, for each of [`LOSSES`], seconds.
 const AGREED_WITHIN_S: [f32; 3] = [3.0, 3.0, 5.0];
 const STEP_S: f32 = 0.25;
-/// Waypoints a second.
+/// Waypoints per second.
 const PER_S: f32 = 0.5;
-/// What a stop takes, seconds.
+/// Duration of a stop, seconds.
 const STOP_S: f32 = 3.0;
-/// After the lease has run out a vehicle hovers so long before it lands, seconds.
+/// Time for which a vehicle hovers after its lease has run out, before it lands, seconds.
 const HOVERS_S: f32 = 20.0;
 const ENDS_S: f32 = 900.0;
-/// Whoever has photographed its part flies home for so long, then says that it has finished, and
-/// takes so long to come down.
+/// Time for which a vehicle that has photographed its part flies home before it reports that it has
+/// finished, and duration of its descent after that, seconds.
 const HOME_S: f32 = 10.0;
 const DESCENT_S: f32 = 15.0;
 
@@ -45,14 +48,14 @@ type Whole = Fleet<8>;
 struct Vehicle {
     fleet: Whole,
     part: Vec<u32>,
-    /// So many waypoints of its part are its path: of a longer one that is the first stretch.
+    /// Most waypoints of its path, which is the first stretch of a longer part.
     most: usize,
-    /// Divisions whose part it flies.
+    /// Number of divisions that its present part counts.
     division: usize,
     along_dm: u16,
-    /// When the lease ran out, and it has hovered since.
+    /// For how long it has hovered since its lease ran out, seconds.
     unheld_s: f32,
-    /// For how long it has flown home.
+    /// For how long it has flown home, seconds.
     home_s: f32,
     /// Stopped for good: on the ground, or without power.
     down: bool,
@@ -69,7 +72,7 @@ impl Vehicle {
         (&self.part[..self.part.len().min(self.most)], self.part.len() > self.most)
     }
 
-    /// Once it has photographed its part it flies home along its path, and down.
+    /// Flies a vehicle that has photographed its part (`done`) home along its path, and down.
     fn fly_home(&mut self, done: bool) {
         if self.home_s > 0.0
             || (done && !self.fleet.is_dividing() && self.fleet.division_count() == self.division)
@@ -85,14 +88,14 @@ impl Vehicle {
 
 struct Outcome {
     wrong: Option<String>,
-    /// From when the first vehicle knew of the loss until each knew that all have the same
-    /// division, seconds; where one is lost and links fail by chance alone.
+    /// Time from when the first vehicle knew of the loss until each knew that all have the same
+    /// division, seconds. `None` unless exactly one is lost and links fail at random only.
     agreed_s: Option<f32>,
     loss: f32,
     left_out: usize,
     majority: bool,
-    /// Divisions that nobody was lost for, or a vehicle that was heard all the time, and whose part
-    /// others took.
+    /// Text about a division without a lost vehicle, or about a vehicle whose part others took
+    /// although it was heard all the time.
     needless: Option<String>,
 }
 
@@ -100,7 +103,7 @@ fn uniform(random: &mut Pcg32) -> f32 {
     (random.next_u32() >> 8) as f32 / (1u32 << 24) as f32
 }
 
-/// Whether vehicles obey their lease; a planted error if not.
+/// Whether vehicles obey their lease; `Ignored` is a planted error.
 #[derive(Clone, Copy, PartialEq)]
 enum Lease {
     Obeyed,
@@ -114,7 +117,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
     let loss = LOSSES[(random.next_u32() % 3) as usize];
     let delay_s = [0.05, 0.5, 1.9][(random.next_u32() % 3) as usize];
     let deaf = |random: &mut Pcg32| uniform(random) < 0.1;
-    // Links that fail for good, one way, and a partition for a while.
+    // One-way links that fail for good, and a partition for a while.
     let fails: Vec<Vec<bool>> =
         (0..count).map(|_| (0..count).map(|_| deaf(&mut random)).collect()).collect();
     let apart = (uniform(&mut random) < 0.5).then(|| {
@@ -201,7 +204,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             let (path, goes_on) = vehicle.path();
             let length = path.len();
             let (done, asks) = (at >= length, goes_on && at + 5 >= length);
-            // Of the others each waits at the end of its part.
+            // In the other fleets each vehicle waits at the end of its part.
             if (seed / 2).is_multiple_of(2) {
                 vehicle.fly_home(done);
             }
@@ -214,7 +217,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             vehicle.down |= ends;
             let stop_dm =
                 vehicle.along_dm.saturating_add((STOP_S * PER_S * f32::from(WAYPOINT_DM)) as u16);
-            // On its path home it promises a place beyond its waypoints.
+            // On its path home a vehicle commits to a place beyond its waypoints.
             let last_dm = if goes_on { length as u16 * WAYPOINT_DM } else { u16::MAX };
             let promise_dm = stop_dm.next_multiple_of(WAYPOINT_DM).min(last_dm);
             let holds =
@@ -239,7 +242,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             }
             if vehicle.fleet.division_count() > vehicle.division {
                 vehicle.division = vehicle.fleet.division_count();
-                // What is under way now is not part of it.
+                // The new part counts no division that is still under way.
                 vehicle.part = counted_parts(&whole, &vehicle.fleet, count).swap_remove(own);
                 (vehicle.along_dm, vehicle.home_s) = (0, 0.0);
             }
@@ -274,7 +277,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
         {
             agreed_s.get_or_insert(t_s - detected_s);
         }
-        // Intents each 0.25 s, rosters each half second, as often as intents while dividing.
+        // Intents are sent every 0.25 s, rosters every 0.5 s, while dividing as often as intents.
         for own in 0..count {
             if vehicles[own].dead {
                 continue;
@@ -325,8 +328,8 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
         majority: alive > 0,
         needless: vehicles.iter().enumerate().filter(|_| clean).find_map(|(rank, vehicle)| {
             let given_away = vehicle.fleet.is_excluded() && !lost(rank);
-            // Where half of the messages are lost, what others said may be known before what a
-            // vehicle said of itself.
+            // If half of the messages are lost, others' reports about a vehicle may arrive before
+            // its own.
             let needless = given_away
                 || (loss < 0.5
                     && most == usize::MAX
@@ -338,19 +341,19 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
     }
 }
 
-/// Whether it knows that all that live have computed its division.
+/// Whether the vehicle knows that all living vehicles have computed the same division.
 fn has_all_hashes(fleet: &Whole) -> bool {
     let roster = fleet.roster_message(0);
     roster.hash != 0 && roster.entries.iter().all(|e| e.status != MemberStatus::Alive || e.agrees)
 }
 
-/// The parts by what counts alone.
+/// Each vehicle's part by the divisions that count, without one under way.
 fn counted_parts(whole: &[u32], fleet: &Whole, count: usize) -> Vec<Vec<u32>> {
     assert!(!fleet.needs_division(), "what begins to count leaves nothing under way");
     parts(whole, fleet, count).0
 }
 
-/// A waypoint that two vehicles may yet photograph.
+/// Text about a waypoint that two vehicles may still photograph; `None` without one.
 fn owned_twice(vehicles: &[Vehicle], whole: &[u32], lease: Lease, now: Instant) -> Option<String> {
     let mut owner = vec![None; whole.len()];
     for (rank, vehicle) in vehicles.iter().enumerate() {
@@ -409,7 +412,7 @@ fn no_waypoint_has_two_owners_and_none_is_left_out() {
     );
 }
 
-/// The test sees what it is there for.
+/// The test detects the planted error that it is made for.
 #[test]
 fn vehicles_that_fly_on_without_their_lease_are_found() {
     let wrong = |seed: &u64| fly(*seed, Lease::Ignored).wrong.is_some();
@@ -418,7 +421,8 @@ fn vehicles_that_fly_on_without_their_lease_are_found() {
     assert!(found > 0);
 }
 
-/// The model found that such a vehicle flew on, while its promise already counted for another one.
+/// The fleet model found that a vehicle flew on in this case, while another one already counted on
+/// its commitment.
 #[test]
 fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
     let mut fleet = Whole::new(1, 3, FleetTimeouts::of_flight(Duration::from_secs(60)));

@@ -3,7 +3,7 @@
 
 use flockmate_tests::hostile;
 
-/// Forged frames.
+/// Number of forged frames.
 const FRAMES: u64 = 1_000_000;
 
 #[test]
@@ -29,9 +29,9 @@ fn forged_rosters_break_no_rule() {
     assert!(seen >= 10, "only {seen} states were attacked");
 }
 
-/// Attacks that once broke a rule: floods of requests after positions that jump, setpoints that
-/// followed them; EKF origins a thousand kilometres away, which round a setpoint out of the fence;
-/// a place that moved 12 m while no setpoint was sent.
+/// Seeds of attacks that once broke a rule: floods of requests after positions that jump, and
+/// setpoints that followed such positions; EKF origins a thousand kilometres away, whose rounding
+/// moves a setpoint out of the fence; a position that moved 12 m while no setpoint was sent.
 const ONCE_BROKEN: [u64; 29] = [
     309, 979, 1069, 1079, 1141, 1301, 1458, 1603, 1644, 1731, 1987, 105_762, 106_380, 110_700,
     112_885, 373_325, 392_626, 214_779, 113_333, 116_978, 117_203, 101_349, 12_140, 15_858, 65_229,

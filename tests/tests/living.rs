@@ -1,5 +1,5 @@
-//! A companion lives with what real autopilots were seen to do, here done by the simulated ones:
-//! docs/autopilots.md has the list. In memory, byte by byte, on flat ground.
+//! A companion copes with behaviour observed in real autopilots, here shown by the simulated ones:
+//! docs/autopilots.md has the list. Both run in memory and exchange bytes, on flat ground.
 
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config, Event, Instant, Link, State};
@@ -16,12 +16,12 @@ const ARM: u16 = 400;
 const HEARTBEAT: u32 = 0;
 const SETPOINT: u32 = 84;
 
-/// A companion and its autopilot, and all that the companion said.
+/// A companion and its autopilot, and all frames that the companion sent.
 struct Pair {
     autopilot: Autopilot,
     companion: Companion<4, 16, 8>,
     now_us: u64,
-    /// A companion that stands still: bytes wait.
+    /// Whether the companion is stalled: bytes for it wait.
     stalled: bool,
     waiting: Vec<u8>,
     framer: Framer,
@@ -52,7 +52,7 @@ impl Pair {
         }
     }
 
-    /// In the middle of its path.
+    /// A pair in flight, in the middle of its path.
     fn following(personality: AutopilotKind) -> Self {
         let mut pair = Self::new(personality);
         pair.until(State::Ready);
@@ -159,7 +159,8 @@ impl Pair {
         }
     }
 
-    /// COMMAND_LONG the companion sent since: command, first parameter.
+    /// First parameters of the COMMAND_LONGs with this command that the companion sent after
+    /// `since_us`.
     fn asked(&self, since_us: u64, command: u16) -> Vec<f32> {
         let sent = self.said.iter().filter(|(at, f)| *at > since_us && f.message_id == 76);
         let fields = sent.map(|(_, f)| f.padded_payload());
@@ -220,8 +221,8 @@ fn px4s_failsafe_is_left_alone_to_the_ground() {
     pair.stalled = false;
     let resumed_us = pair.now_us;
     pair.until(State::Failsafe);
-    // One setpoint would bring it back to Offboard by itself; the gimbal commands it sends are not
-    // ours to answer.
+    // One setpoint would bring PX4 back to Offboard by itself; the gimbal commands that PX4 sends
+    // need no answer.
     pair.until(State::Aborted);
     assert!(!pair.autopilot.true_state().armed && pair.at().z < 0.31, "landed by its failsafe");
     assert_eq!((pair.count(resumed_us, SETPOINT), pair.count(resumed_us, 77)), (0, 0));
@@ -307,7 +308,8 @@ fn a_stall_beside_arducopter_does_not_fly_the_last_velocity_on() {
         pair.step();
         farthest_m = farthest_m.max((pair.at() - before).norm());
     }
-    // Held for its own 3 s the velocity of 2 m/s would have led more than 6 m away.
+    // With ArduCopter's own timeout of 3 s, the velocity of 2 m/s would have led more than 6 m
+    // away.
     assert!(farthest_m < 3.0, "{farthest_m} m: GUID_TIMEOUT was set");
     pair.stalled = false;
     pair.until(State::Done);

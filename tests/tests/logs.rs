@@ -1,9 +1,9 @@
-//! All logs of the shared data: read as pymavlink reads them, and survived in whatever state they
-//! arrive.
+//! All logs of the shared data: we read them as pymavlink does, and survive them however they are
+//! damaged.
 //!
-//! Damage is seeded by the log's place in the folder and the round.
-//! `FLOCKMATE_FUZZ_ROUNDS=20 cargo test -p flockmate-tests --test logs` continues for twenty rounds
-//! instead of one.
+//! The random damage is seeded by the log's index in the folder and the round.
+//! `FLOCKMATE_FUZZ_ROUNDS=20 cargo test -p flockmate-tests --test logs` runs twenty rounds instead
+//! of one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -30,7 +30,7 @@ const ROUND_BYTES: usize = 120_000;
 /// SET_POSITION_TARGET_LOCAL_NED.
 const SETPOINT: u32 = 84;
 
-/// Messages of each id, unknown ones apart.
+/// Number of messages by id, and of those with unknown ids.
 #[derive(Debug, Default, PartialEq)]
 struct Counts {
     known: BTreeMap<u32, usize>,
@@ -47,7 +47,7 @@ fn counts(path: &Path) -> (Vec<Frame>, Counts) {
         }
     };
     bytes.chunks(61).for_each(|piece| hear(Instant::ZERO, piece));
-    // An unknown frame at the end is known for whole when nothing has followed it.
+    // The framer takes an unknown frame at the end for whole once no byte has followed for a while.
     hear(Instant::from_millis(200), &[]);
     let counters = framer.counters();
     assert_eq!((counters.bad_crc, counters.noise_bytes), (0, 0), "{path:?}");
@@ -90,14 +90,14 @@ fn messages_are_counted_as_pymavlink_counts_them() {
         let mut expected = Counts::default();
         for (id, count) in theirs[path.to_str().unwrap()].as_object().unwrap() {
             let count = count.as_u64().unwrap() as usize;
-            // Negative where pymavlink knows no message of the id.
+            // Messages whose id pymavlink does not know are counted under −2.
             match id.parse() {
                 Ok(id) if frame::extra_crc(id).is_some() => drop(expected.known.insert(id, count)),
                 _ => expected.unknown += count,
             }
         }
         assert!(!expected.known.is_empty());
-        // Ids that only we know are among their unknown ones.
+        // Ids that only we know are among pymavlink's unknown ones.
         let ours_alone: Vec<u32> =
             ours.known.keys().filter(|id| !expected.known.contains_key(id)).copied().collect();
         for id in ours_alone {
@@ -113,13 +113,14 @@ fn messages_are_counted_as_pymavlink_counts_them() {
     }
 }
 
-/// What must survive: a companion and a simulated autopilot of each kind, and what they say.
+/// What must survive: a companion and a simulated autopilot of each kind; framers check what they
+/// send.
 #[derive(Clone)]
 struct Victims {
     now: Instant,
     companion: Companion<4, 16, 8>,
     autopilots: [Autopilot; 2],
-    /// What left each link and each autopilot.
+    /// Framers of what each link of the companion and each autopilot sends.
     heard: [Framer; 4],
     said: usize,
 }
@@ -142,7 +143,7 @@ impl Victims {
         }
     }
 
-    /// Bytes arrive everywhere, then time passes.
+    /// Gives bytes to both links and both autopilots, then lets time pass.
     fn hear(&mut self, bytes: &[u8], passes: Duration) {
         for link in [Link::Autopilot, Link::Swarm] {
             self.companion.handle_bytes(link, self.now, bytes);
@@ -190,7 +191,7 @@ impl Victims {
         }
     }
 
-    /// What they say is whole frames, and no setpoint leads nowhere.
+    /// Asserts that what they send is whole frames, and that setpoints are finite.
     fn check(&mut self, at: usize, mut bytes: &[u8]) {
         while let Some(frame) = self.heard[at].next(self.now, &mut bytes) {
             self.said += 1;
@@ -206,7 +207,7 @@ impl Victims {
         assert_eq!((counters.bad_crc, counters.noise_bytes), (0, 0));
     }
 
-    /// Time passes, and all of them still answer.
+    /// Lets time pass and asserts that all of them still send messages.
     fn recover(mut self) {
         for _ in 0..100 {
             self.hear(&[], Duration::from_millis(20));
@@ -268,7 +269,7 @@ fn on_every_log(damage: impl Fn(&mut Victims, &[Vec<u8>], &mut Pcg32) + Sync) {
 fn any_prefix_is_survived() {
     on_every_log(|victims, records, rng| {
         let bytes = records.concat();
-        // After every byte there is a prefix; some of them end there for good.
+        // The stream is cut after random bytes: a copy must recover from there.
         for byte in bytes.iter().take(ROUND_BYTES / 4) {
             victims.hear(core::slice::from_ref(byte), Duration::from_micros(90));
             if below(rng, 2000) == 0 {
@@ -314,8 +315,8 @@ fn shuffled_pieces_are_survived() {
     });
 }
 
-/// A random bit passes no checksum: here the checksum fits, the sender is the one listened to, and
-/// the content is damaged.
+/// A flipped bit would fail the CRC. Here the CRC is right, the sender is one that is listened to,
+/// and the payload is damaged.
 #[test]
 fn forged_payloads_are_survived() {
     on_every_log(|victims, records, rng| {

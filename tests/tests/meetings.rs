@@ -9,13 +9,13 @@ use flockmate_tests::setpoints::SetpointStats;
 use flockmate_tests::swarms::number;
 use rayon::prelude::*;
 
-/// Random meetings.
+/// Number of random meetings.
 const MEETINGS: u64 = 200;
-/// Pairs that pass at exactly the scheduled separation.
+/// Number of pairs that pass at exactly the scheduled separation.
 const PASSINGS: u64 = 60;
-/// More than this is asked of no vehicle, m/s².
+/// Greatest acceleration that setpoints may demand, m/s².
 const ACCEL_MPS2: f32 = 3.5;
-/// A stop that lasts no longer is none, seconds.
+/// Time up to which a stop does not count as one, seconds.
 const STOP_S: f32 = 0.5;
 
 fn report(outcomes: &[Outcome]) {
@@ -47,7 +47,7 @@ fn nobody_is_stopped_who_passes_at_the_scheduled_separation() {
     }
 }
 
-/// Meetings in which something catches a vehicle.
+/// Number of meetings in which something catches a vehicle.
 const CATCHES: u64 = 100;
 
 #[test]
@@ -65,7 +65,7 @@ fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
             (windy, meeting::fly(&scene, false))
         })
         .collect();
-    // One that the wind carries off may be carried into others.
+    // A vehicle that the wind carries off may be carried into others.
     let bad = |(windy, outcome): &&(bool, Outcome)| match windy {
         true => !outcome.stuck.is_empty(),
         false => outcome.is_bad(),
@@ -82,11 +82,12 @@ fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
-/// Meetings in which a vehicle was not on the ground after 180 s, or for good: it relayed a dead
-/// one's age too young (9037, 10847), was planned a way that the filter does not let it fly (1990,
-/// 9937, 15531, 16491, 18737, 18921, 19058), hung over a place where one it no longer heard may lie
-/// (3949, 10013), or searched in vain for too long (4512, 18268). In 15632 it landed on one beside
-/// the goal from which its pilot had carried it.
+/// Seeds of meetings in which a vehicle was once not on the ground after 180 s, or never. It
+/// relayed too small an age of a dead vehicle's message (9037, 10847), got a plan that the safety
+/// filter did not let it fly (1990, 9937, 15531, 16491, 18737, 18921, 19058), hovered above a place
+/// where an unheard vehicle may lie (3949, 10013), or searched a path in vain for too long (4512,
+/// 18268). In 15632 it landed on a vehicle that its pilot had carried from its goal to a place
+/// beside it.
 const NOT_LANDED_ONCE: [u64; 14] =
     [1990, 3949, 4512, 9037, 9937, 10013, 10847, 15531, 15632, 16491, 18268, 18737, 18921, 19058];
 
@@ -100,11 +101,11 @@ fn nobody_stays_in_the_air_where_a_wait_once_had_no_end() {
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
-/// Meetings in which no stop would have kept the distance.
+/// Greatest fraction of meetings in which no stop would have kept the safety distance.
 const UNAVOIDABLE_MOST: f32 = 0.05;
 
-/// More often no vehicle finds its path blocked: it stays so until it is free, or the vehicle flies
-/// around.
+/// Most times that a vehicle finds its path blocked in a meeting: a path stays blocked until it is
+/// free, or the vehicle flies a detour.
 const BLOCKED_MOST: u32 = 15;
 
 #[test]
@@ -115,7 +116,7 @@ fn companions_that_meet_at_random_keep_apart() {
         .collect();
     report(&outcomes);
     let sum = meeting::summary(&outcomes);
-    // Of 10 000 some are left: `docs/safety.md`.
+    // Among 10 000 meetings some failures are left: `docs/safety.md`.
     assert_eq!((sum.too_near[0], sum.touches, sum.stuck), (0, [0; 2], [0; 2]), "{sum}");
     let blocked = outcomes.iter().map(|outcome| outcome.most_blocked).max();
     assert!(blocked <= Some(BLOCKED_MOST), "a vehicle found its path blocked {blocked:?} times");

@@ -1,8 +1,8 @@
 //! Missions by latitude and longitude, anywhere on earth, flown by autopilots that share neither
-//! origin nor home nor projection: everybody is where the mission frame says, and goes where it
-//! says.
+//! origin nor home nor projection: every vehicle's position is right in the mission frame, and so
+//! is its goal.
 //!
-//! Seeds are the numbers of the missions; a failing one is named.
+//! A mission's number is its seed; a failing one is printed.
 
 use companion::Instant;
 use companion::link::frame::Framer;
@@ -22,12 +22,13 @@ use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
 const MISSIONS: u64 = 200;
-/// Right to this, metres: 0.1 m, and what the estimate errs by, 0.1 m across and 0.15 m in height.
+/// Greatest position error, metres: 0.1 m, and the error of the estimate, 0.1 m horizontal and 0.15
+/// m vertical.
 const RIGHT_M: f32 = 0.1 + 0.18;
-/// A broadcast position is the last one heard of the autopilot, and the radio takes its time: no
-/// older than this, µs.
+/// Greatest age of a broadcast position, µs: it is the last one received from the autopilot, and
+/// the radio adds a delay.
 const AGE_US: u64 = 200_000;
-/// Simulated time given to a mission, seconds: ArduCopter's estimator takes 40 of it.
+/// Time limit of a mission, simulated seconds: ArduCopter's estimator takes 40 of it.
 const LIMIT_S: u64 = 120;
 
 fn uniform(rng: &mut Pcg32, low: f64, high: f64) -> f64 {
@@ -82,14 +83,14 @@ fn scenario_text(rng: &mut Pcg32) -> String {
     text
 }
 
-/// What one mission came to: worst errors, metres.
+/// Greatest errors of one mission, metres.
 #[derive(Clone, Copy, Debug, Default)]
 struct Errors {
-    /// Of a position as the companion has it, the moment it hears it.
+    /// Error of the position that the companion has when it receives it.
     known_m: f32,
-    /// Of a position as a companion broadcasts it, beside where the vehicle was lately.
+    /// Distance of a broadcast position from the vehicle's track of the last [`AGE_US`].
     broadcast_m: f32,
-    /// From a vehicle's place where it flies over its goal, beside the goal.
+    /// Smallest distance of a vehicle's true position from its goal.
     goal_m: f32,
 }
 
@@ -111,7 +112,7 @@ fn fly(seed: u64) -> Errors {
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("the lobby is free");
     let plan = mission.plan().expect("they fly side by side");
     let mut members = vehicles_on_pads(&mission).expect("good vehicles");
-    // One station more than vehicles: it listens.
+    // The radio has one station more than vehicles, which only listens.
     let listener = members.len();
     let mut radio =
         Radio::new(RadioConfig { range_m: 1e6, loss: 0.0, delay_s: 0.05 }, listener + 1, seed);

@@ -1,5 +1,5 @@
-//! The demo's building flown by PX4 and ArduCopter together: the same companions, the same plan,
-//! nobody touches anything.
+//! The demo's building flown by PX4 and ArduCopter together: with the same companions and the same
+//! plan, no vehicle touches anything.
 
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;

@@ -1,4 +1,4 @@
-//! Recordings of real autopilots: what was said to them is said to the simulated one, and its
+//! Recordings of real autopilots: the messages sent to them are sent to the simulated ones, and the
 //! answers are compared.
 //!
 //! A `.tlog` holds the frames of both directions with their times. What the autopilot (component 1
@@ -21,8 +21,8 @@ const HEARTBEAT: u32 = 0;
 const EXTENDED_SYS_STATE: u32 = 245;
 const STEP_S: f64 = 0.004;
 
-/// One recorded frame: seconds since the first, its bytes, and what they say if the dialect knows
-/// it.
+/// One recorded frame: seconds since the first one, its bytes, and the decoded frame if the dialect
+/// knows it.
 struct Recorded {
     t_s: f64,
     bytes: Vec<u8>,
@@ -39,10 +39,10 @@ fn recording(path: &Path) -> Vec<Recorded> {
     records.into_iter().map(decoded).collect()
 }
 
-/// What an autopilot did, as far as the two are compared.
+/// What an autopilot did, as far as real and simulated one are compared.
 #[derive(Debug, Default)]
 struct Story {
-    /// Acknowledged: when, command, result.
+    /// Acknowledgements: time (s), command, result.
     acks: Vec<(f64, u16, u8)>,
     /// HEARTBEAT's custom mode, each time it changed. The armed bit may be on and off between two
     /// heartbeats.
@@ -72,8 +72,8 @@ impl Story {
     }
 }
 
-/// Says to a simulated autopilot what was said to the real one, which had booted `booted_s` before
-/// the recording.
+/// Sends a simulated autopilot the messages that were sent to the real one, which had booted
+/// `booted_s` before the recording. Returns both stories.
 fn replay(recorded: &[Recorded], config: &Config, booted_s: f64) -> (Story, Story) {
     let mut autopilot = Autopilot::new(config).unwrap();
     let (mut framer, mut buffer) = (Framer::new(), [0; 2048]);
@@ -112,7 +112,8 @@ fn replay(recorded: &[Recorded], config: &Config, booted_s: f64) -> (Story, Stor
     (real, simulated)
 }
 
-/// Acks in the same order with the same results, each about as late as the real one.
+/// Asserts that acks come in the same order with the same results, each about as late as the real
+/// one.
 fn assert_same_acks(real: &Story, simulated: &Story) {
     assert!(real.acks.len() > 15);
     assert_eq!(real.results(), simulated.results());
@@ -153,7 +154,8 @@ fn the_simulated_px4_answers_as_the_recorded_one_did() {
     let (real, simulated) = replay(&recording(&path), &config, 1.0);
     assert_same_acks(&real, &simulated);
     assert_eq!(real.modes, simulated.modes);
-    // Where exactly LANDING is reported is the land detector's; the rest is the flight's.
+    // When exactly LANDING is reported depends on the land detector; only the first and last states
+    // are compared.
     assert_eq!(
         (real.landed.first(), real.landed.last()),
         (simulated.landed.first(), simulated.landed.last())
@@ -168,9 +170,9 @@ struct Seen {
     frames: u32,
 }
 
-/// Plays what the autopilot said to a companion whose mission origin is `origin`. Wherever a global
-/// position was sent, the companion's own, from local metres by that autopilot's projection, must
-/// be the same place.
+/// Plays the autopilot's messages to a companion whose mission origin is `origin`. Where a global
+/// position was sent, the companion's own one, computed from local metres by that autopilot's
+/// projection, must be the same place.
 fn play(
     recorded: &[Recorded],
     origin: Geodetic,
@@ -226,7 +228,7 @@ fn play(
             let age_s = (now - at).as_secs_f32();
             let apart =
                 telemetry.position + telemetry.velocity * age_s - geodetic_to_enu(&origin, &place);
-            // The two are sent up to a stream's period apart.
+            // Local and global position are sent up to a stream's period apart.
             assert!(
                 age_s > 0.2 || apart.xy().norm() < 0.1,
                 "{apart} at {} s, {age_s} s old",

@@ -1,6 +1,6 @@
-//! What docs/companion.md says, rehearsed: `host-sim companion` in a process of its own beside an
-//! autopilot in another, over every kind of link, through a pilot's takeover, lost setpoints and a
-//! reboot. All in real time; waits are patient.
+//! Rehearses docs/companion.md: `host-sim companion` and an autopilot in two processes, over every
+//! kind of link, through a pilot's takeover, lost setpoints and a reboot. All in real time, with
+//! long timeouts.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::{Child, Command, Stdio};
@@ -14,7 +14,7 @@ use flockmate_tests::{Guard, autopilot, free_port, host_sim, listening, workspac
 use host_sim::link::{Link, LinkUrl};
 use serialport::TTYPort;
 
-/// A machine may stand still for long; nothing that works takes half as long.
+/// Timeout of a wait. A machine may stand still for long; no step that works takes half as long.
 const PATIENCE: Duration = Duration::from_secs(150);
 /// ArduCopter, whose estimator is ready sooner than the real one's.
 const ARDUPILOT: &[&str] = &["--personality", "ardupilot", "--ready-after", "3"];
@@ -45,7 +45,7 @@ impl Flight {
         Self { process: Guard(child), lines, seen: Vec::new() }
     }
 
-    /// Waits for a line that holds `text`, doing `meanwhile` every half second.
+    /// Waits for a line that contains `text`, and calls `meanwhile` every half second.
     fn until(&mut self, text: &str, mut meanwhile: impl FnMut()) {
         let began = Clock::now();
         while !self.seen.last().is_some_and(|line| line.contains(text)) {
@@ -154,7 +154,7 @@ fn radio(links: usize, loss: &str) -> (Guard, Vec<String>) {
     listening(command, links)
 }
 
-/// Uploads a file; what is printed.
+/// Uploads a file; returns what the program prints.
 fn upload(link: &str, file: &std::path::Path) -> String {
     let done = Command::new(host_sim()).args(["upload", "--link", link]).arg(file).output();
     let done = done.expect("the upload starts");
@@ -171,7 +171,7 @@ fn wire() -> [String; 2] {
         (near, path)
     });
     let [(mut a, path_a), (mut b, path_b)] = ends;
-    // Until both ends are open, and after they are closed, there is nobody: errors are silence.
+    // Before both ends are open, and after they are closed, reads fail: errors count as silence.
     thread::spawn(move || {
         let mut buffer = [0; 1024];
         loop {
@@ -215,7 +215,7 @@ fn px4_is_flown_over_udp_and_given_back_by_its_pilot() {
     let mut flight = Flight::begin(&format!("udp-listen:127.0.0.1:{port}"));
     flight.until("Climb → Follow", || ());
     flight.until("Pilot has control: mission stopped", || pilot.command(1, 176, PX4_HOLD));
-    // Offboard alone does not continue; the operator's word does.
+    // Offboard alone does not continue the mission; the operator's command does.
     flight.until("Resumed after the pilot", || {
         pilot.command(1, 176, PX4_OFFBOARD);
         operator.command(191, 193, [1.0, 0.0, 0.0]);
@@ -230,7 +230,7 @@ fn px4_lands_when_its_companion_stalls_and_gets_no_setpoint_afterwards() {
         autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let mut pilot = Ground::new(&format!("udp:{}", at[1]));
     let mut flight = Flight::begin(&format!("udp-listen:127.0.0.1:{port}"));
-    // Again and again: an address that is silent for long is sent nothing any more.
+    // The message is repeated: an address that is silent for long is sent nothing any more.
     flight.until("Climb → Follow", || pilot.set_integer("COM_OBL_RC_ACT", 4));
     pilot.set_integer("COM_OBL_RC_ACT", 4);
     flight.signal("-STOP");

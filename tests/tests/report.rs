@@ -1,8 +1,8 @@
-//! The report page in headless Chromium: it opens clean, and map, paths and moving vehicles are on
-//! the picture.
+//! The report page in headless Chromium: it opens without console messages, and map, paths and
+//! moving vehicles are on the picture.
 //!
 //! Chromium is the one named by `FLOCKMATE_CHROMIUM`, else `chromium` or `google-chrome` of the
-//! path; without one the tests say so and pass.
+//! path; without one the tests print a line and pass.
 
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -158,7 +158,7 @@ fn report() -> ReportData {
     }
 }
 
-/// What Chromium made of one opening of the page.
+/// Document and screenshot of the page as Chromium opened it.
 struct Opened {
     dom: String,
     pixels: Vec<[u8; 3]>,
@@ -217,7 +217,7 @@ fn browse(chromium: &Path, page: &Path, hash: &str, screenshot: &Path) -> String
 }
 
 impl Opened {
-    /// A number the page left on its body.
+    /// A number that the page wrote into a `data-` attribute.
     fn count(&self, name: &str) -> f64 {
         let (_, rest) = self
             .dom
@@ -229,8 +229,8 @@ impl Opened {
             .unwrap_or_else(|| panic!("data-{name} is no number"))
     }
 
-    /// Places in the scene (left of the side panel, above the plots) of this colour, `tolerance`
-    /// steps a channel.
+    /// Pixels in the scene (left of the side panel, above the plots) of this colour, within
+    /// `tolerance` per channel.
     fn places(&self, color: [u8; 3], tolerance: u8) -> Vec<(u32, u32)> {
         let at = |i: usize| (i as u32 % WINDOW.0, i as u32 / WINDOW.0);
         let matches = self
@@ -335,7 +335,7 @@ fn map_style_and_roadmap_change_the_picture() {
     assert!(changed(&glass, &none) > 20_000, "x-ray: {}", changed(&glass, &none));
     assert!(changed(&solid, &none) > 20_000, "solid: {}", changed(&solid, &none));
     assert!(changed(&solid, &glass) > 20_000, "solid against x-ray: {}", changed(&solid, &glass));
-    // Beside the lines themselves one row of the layer panel goes with the roadmap.
+    // With the roadmap its row in the layer panel disappears, besides the lines themselves.
     assert!(changed(&none, &bare) > 300, "roadmap: {}", changed(&none, &bare));
 }
 
@@ -368,7 +368,8 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     assert_eq!(waypoints(after).iter().map(|(id, _)| *id).collect::<Vec<_>>(), [1, 3]);
     let all: u64 = waypoints(plan).iter().map(|(_, count)| count).sum();
     assert_eq!(all, data["result"]["coverage"]["waypoints"].as_u64().expect("a number"));
-    // The loss is seen no sooner than 45 s after it; what the lost one left has others now.
+    // The loss is noticed no sooner than 45 s after it; then others have what the lost vehicle
+    // left.
     assert!(after["t_s"].as_f64().expect("a time") > 90.0 + 45.0);
     assert_eq!((&plan["lost"], &after["lost"]), (&json!([]), &json!([2])));
     let taken = after["taken"].as_array().expect("what changed hands").iter();
@@ -400,7 +401,7 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     assert!(changed > 20_000, "{changed} pixels differ");
 }
 
-/// Vehicle 2 is lost when its power fails, 90 s after the start, and flies no longer than it falls.
+/// Vehicle 2 is lost when its power fails, 90 s after the start; its flight ends with its fall.
 fn check_lost_vehicle(data: &serde_json::Value) {
     let of_vehicles = |list: &serde_json::Value, key: &str| -> Vec<Option<f64>> {
         list.as_array().expect("vehicles").iter().map(|vehicle| vehicle[key].as_f64()).collect()
@@ -429,7 +430,7 @@ fn page_of_a_plan_offers_no_flown_tracks() {
     assert_eq!(opened.count("lost"), 0.0);
 }
 
-/// What the page draws is what the tables say.
+/// The page draws what the tables state.
 #[test]
 fn page_of_a_paper_draws_its_figures() {
     let dir = tempfile::tempdir().expect("a directory");

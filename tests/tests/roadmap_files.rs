@@ -1,5 +1,5 @@
-//! Roadmap files that somebody changed and gave the right CRC: refused, or every search is right
-//! and bounded.
+//! Changed roadmap files with a right CRC: each is refused, or every search on it is right and
+//! bounded.
 
 use std::collections::BTreeMap;
 
@@ -7,10 +7,10 @@ use flockmate_tests::meeting::dice::Dice;
 use flockmate_tests::roadmaps::Forger;
 use planner_core::roadmap::RoadmapError;
 
-/// Files forged of one roadmap.
+/// Number of files forged from one roadmap.
 const OF_ONE: usize = 50;
 
-/// `FLOCKMATE_FILES` sets how many; CI forges a few.
+/// `FLOCKMATE_FILES` sets the number of files.
 #[test]
 fn forged_files_are_refused_or_searched_right() {
     let files =
@@ -38,7 +38,7 @@ fn forged_files_are_refused_or_searched_right() {
     println!("{files} forged files: {verdicts:?}");
     let seen = |verdict: &str| verdicts.get(verdict).copied().unwrap_or(0);
     assert!(seen("searched") > files / 100, "{verdicts:?}");
-    // Each check of a reader was what refused some of them.
+    // Each check of the reader refused some files.
     for check in [
         "Magic",
         "Version",

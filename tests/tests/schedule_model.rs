@@ -2,24 +2,24 @@
 //!
 //! Plans and gates come from the planner as vehicles get them; the model knows nothing else of the
 //! schedule. The state is the progress of each vehicle: the stretch between two marks that it is
-//! on. Marks are its own gates, its waypoints, and where a report, wrong by as much as may be,
-//! opens a gate of another vehicle. Actions: each vehicle advances by a stretch, or stops where it
-//! is; what it reports is wrong by up to 0.25 m either way; it leaves the plan, and its gates open.
-//! A message that is heard late is a step of the other vehicle that is not taken yet: the search
-//! takes the steps in every order.
+//! on. Marks are its own gates, its waypoints, and the places where a report with the greatest
+//! error opens a gate of another vehicle. Actions: each vehicle advances by a stretch, or stops
+//! where it is; its reported progress is wrong by up to 0.25 m either way; it leaves the plan,
+//! which opens the gates that wait for it. A message that arrives late is a step of the sender that
+//! is not taken yet: the search takes the steps in every order.
 //!
 //! - No conflict: where two vehicles that fly the plan can be at the same time, they are no nearer
-//!   than the safety distance. A gate counts as open as soon as some report may open it.
-//! - No deadlock: some vehicle can continue until all have landed. A gate counts as open only if
-//!   every report opens it.
+//!   than the safety distance. Here a gate counts as open as soon as some report may open it.
+//! - No deadlock: some vehicle can continue until all have landed. Here a gate counts as open only
+//!   if every report opens it.
 //!
-//! Planted errors must be found. Which plans they spoil is known without the search: gates only
-//! open, so two vehicles can be at two places at once if they come there when each goes as far as
-//! it may and no further than its place, with all others out of the plan. So a dropped
-//! gate *matters* in a plan, and every gate that does is dropped. Likewise for vehicles that do not
-//! stop at a gate when they already stand at it (`<` for `≤` in the gate's place). Gates that open
-//! only beyond their progress (`<` for `≤` there) matter where somebody is stuck when each goes as
-//! far as it may; those plans are looked for among more.
+//! Planted errors must be found. Which plans they spoil is known without the search. Gates only
+//! open: so two vehicles can be at two places at once if both reach these when each goes as far as
+//! it may but no further than its place, with all others out of the plan. By this test a dropped
+//! gate *matters* in a plan; each gate that matters is dropped in turn. The same test serves for
+//! vehicles that do not stop at a gate when they already stand at it (`<` for `≤` in the gate's
+//! place). Gates that open only beyond their progress (`<` for `≤` there) matter if a vehicle is
+//! stuck when each goes as far as it may; such plans are searched among more.
 //!
 //! `FLOCKMATE_MODELS=N` searches N plans each in place of [`PLANS`].
 
@@ -30,9 +30,10 @@ use planner_core::Point;
 use planner_core::flight::{Gate, PROGRESS_ERROR_M};
 use rayon::prelude::*;
 
-/// Plans searched of each number of vehicles, all of them with a gate that matters.
+/// Number of plans searched for each number of vehicles, each with a gate that matters.
 const PLANS: usize = 1000;
-/// For so many of them one in which somebody is stuck if gates open only beyond their progress.
+/// Per so many plans one must be found in which a vehicle is stuck if gates open only beyond their
+/// progress.
 const PLANS_FOR_ONE_STUCK: usize = 20;
 /// Longest flight from the pad to the ground, metres: ten timed segments.
 const LONGEST_M: f32 = 15.0;
@@ -46,7 +47,8 @@ type State = [u8; 4];
 /// One vehicle's flight in stretches: the first is its pad, the last the ground below its goal.
 struct Course {
     marks: Vec<f32>,
-    /// For each stretch: the gates passed where it begins.
+    /// For each stretch the gates at its beginning: index of the awaited vehicle, and its progress
+    /// that opens the gate, metres.
     gates: Vec<Vec<(usize, f32)>>,
     /// Points of each stretch, near each other.
     points: Vec<Vec<Point>>,
@@ -62,7 +64,7 @@ impl Course {
 #[derive(Clone, Copy, PartialEq)]
 enum Obeys {
     Right,
-    /// A planted error: the progress asked for does not open a gate, more does.
+    /// A planted error: a gate opens only beyond the required progress.
     OpensBeyond,
     /// A planted error: a gate does not hold a vehicle that already stands at it.
     NotAtGate,
@@ -71,7 +73,7 @@ enum Obeys {
 struct Model {
     courses: Vec<Course>,
     obeys: Obeys,
-    /// Stretches of each pair of vehicles that come too near.
+    /// For each pair of vehicles the pairs of stretches that are too near to each other.
     near: Vec<Vec<HashSet<(u8, u8)>>>,
 }
 
@@ -96,14 +98,14 @@ impl Model {
                 heard.flat_map(|g| [g.until_m - PROGRESS_ERROR_M, g.until_m + PROGRESS_ERROR_M]);
             let all = waypoints.chain(waits).chain(reports).chain([end]);
             let mut marks: Vec<f32> = all.filter(|&m| m > pad_m + ROUNDING_M && m <= end).collect();
-            // On the pad from mark 0 to mark 1, which is the same place.
+            // The stretch from mark 0 to mark 1, which is the same place, is the pad.
             marks.extend([pad_m, pad_m]);
             marks.sort_by(f32::total_cmp);
             let (pad, mut flown) = (marks[0], marks.split_off(1));
             flown.dedup_by(|b, a| *b - *a < ROUNDING_M);
             let marks: Vec<f32> = std::iter::once(pad).chain(flown).collect();
             let begins = |at_m: f32| -> usize {
-                // The stretch that begins at this mark; of the pad that is the second one.
+                // The stretch that begins at this mark; at the pad the second one.
                 (1..marks.len()).rfind(|&k| marks[k] <= at_m + ROUNDING_M).unwrap()
             };
             let mut at: Vec<Vec<(usize, f32)>> = vec![Vec::new(); marks.len()];
@@ -137,7 +139,8 @@ impl Model {
         Self { courses, obeys, near }
     }
 
-    /// Whether vehicle `i` may continue from its stretch; `wrong_m` is what reports are wrong by.
+    /// Whether vehicle `i` may continue from its stretch, if reports are as high as possible
+    /// (`most`) or as low as possible.
     fn goes_on(&self, state: &State, i: usize, most: bool) -> bool {
         let course = &self.courses[i];
         if state[i] >= course.last() {
@@ -152,12 +155,12 @@ impl Model {
             let reported_m = match (k, most) {
                 (0, _) => other.marks[0],
                 _ if landed => other.marks[k] + 1.0,
-                // It may be anywhere on its stretch: some report is this high, but none is beyond
-                // the ground ...
+                // The other vehicle may be anywhere on its stretch: some report is this high, but
+                // none is beyond the ground ...
                 (_, true) => {
                     (other.marks[k] + PROGRESS_ERROR_M).min(other.marks[usize::from(other.last())])
                 }
-                // ... and once it stands at the end of it, none is lower than this.
+                // ... and once it stands at the end of the stretch, no report is lower than this.
                 (_, false) => other.marks[k + 1] - PROGRESS_ERROR_M,
             };
             match self.obeys {
@@ -168,8 +171,8 @@ impl Model {
         })
     }
 
-    /// Where each vehicle ends up that goes as far as it may, and no further than `most`; vehicles
-    /// may begin out of the plan.
+    /// The stretch that each vehicle reaches if it goes as far as it may, but no further than
+    /// `until`; `most` as in [`Self::goes_on`]. Vehicles may begin out of the plan.
     fn furthest(&self, begin: State, until: State, most: bool) -> State {
         let mut state = begin;
         loop {
@@ -251,13 +254,13 @@ struct Sum {
     largest: usize,
     wrong: Vec<String>,
     gates: usize,
-    /// Gates that were dropped, all of which matter.
+    /// Number of gates that were dropped, all of which matter.
     dropped: usize,
-    /// Plans in which gates that open only beyond their progress matter.
+    /// Number of plans in which gates that open only beyond their progress matter.
     beyond: usize,
 }
 
-/// A plan that is short enough, and its gates.
+/// A plan whose flights are short enough, its gates, and the safety distance.
 struct Short {
     plan: Box<Plan>,
     gates: Vec<Vec<Gate>>,
@@ -281,7 +284,7 @@ impl Short {
         Model::new(&self.plan, &self.gates, obeys, self.safety_m)
     }
 
-    /// One gate less.
+    /// The model without one gate of a vehicle.
     fn dropped(&self, vehicle: usize, gate: usize) -> Model {
         let mut gates = self.gates.clone();
         gates[vehicle].remove(gate);
@@ -289,7 +292,7 @@ impl Short {
     }
 }
 
-/// The plan of one seed, if there is one in which a dropped gate matters.
+/// Searches the plan of one seed; `None` if there is no plan, or no gate of it matters.
 fn one(seed: u64, count: usize) -> Option<Sum> {
     let short = Short::random(seed, count)?;
     let each =

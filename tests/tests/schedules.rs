@@ -2,10 +2,10 @@
 //! else. None may come nearer to another than the safety distance, none may wait forever, and a
 //! plan that is `Ok` has a part for every vehicle.
 //!
-//! Rooms, corridors with side rooms, shafts, and ways of up to 1.5 km; climbs and descents of 0.5 m
-//! to 30 m; pads on one floor or anywhere; 2 to 32 vehicles of several sizes with the capacities of
-//! a board; safety distances of 0.8 m to 3 m. Delays, speeds, pauses and the error of the reported
-//! progress are random. `FLOCKMATE_SCHEDULES=N` flies N swarms in place of [`SWARMS`],
+//! Rooms, corridors with side rooms, shafts, and paths of up to 1.5 km; climbs and descents of 0.5
+//! m to 30 m; pads on one floor or anywhere; 2 to 32 vehicles of several sizes with the capacities
+//! of a board; safety distances of 0.8 m to 3 m. Delays, speeds, pauses and the error of the
+//! reported progress are random. `FLOCKMATE_SCHEDULES=N` flies N swarms in place of [`SWARMS`],
 //! `FLOCKMATE_SCHEDULES_FROM=SEED` begins at another seed.
 
 use std::collections::BTreeMap;
@@ -16,16 +16,16 @@ use planner_core::plan::PlanError;
 use planner_core::schedule::ScheduleError;
 use rayon::prelude::*;
 
-/// Swarms flown where nothing else is asked for.
+/// Number of swarms unless `FLOCKMATE_SCHEDULES` sets another.
 const SWARMS: u64 = 300;
-/// The fastest vehicle flies so far in one step, metres.
+/// Flight of the fastest vehicle in one step, metres.
 const STEP_M: f32 = 0.3;
 
 /// How one vehicle disturbs the schedule.
 struct Manner {
     delay_s: f32,
     speed_mps: f32,
-    /// It stands for this long whenever it has flown as far as the second number, metres.
+    /// Duration of its pauses, seconds, and the distance flown between two pauses, metres.
     pause: (f32, f32),
 }
 
@@ -75,7 +75,8 @@ fn fly(plan: &Plan, owns: &[Own], safety_m: f32, rng: &mut Random) -> Result<f32
     let (mut smallest, mut still) = (f32::INFINITY, 0);
     for step in 0.. {
         let t_s = step as f32 * step_s;
-        // What was reported: wrong by as much as may be; on the ground it is known.
+        // The reported progress, too high or too low by the greatest error; on the ground it is
+        // exact.
         let reported: Vec<f32> = (0..count)
             .map(|i| match along[i] {
                 m if m <= -flights[i].climb_m => m,
@@ -139,7 +140,7 @@ struct Sum {
     swarms: u64,
     planned: u64,
     flights: u64,
-    /// `Ok`, but a vehicle's part did not fit.
+    /// Number of plans that are `Ok` although a vehicle's part did not fit.
     unfit: u64,
     refused: BTreeMap<String, u64>,
     failures: Vec<String>,

@@ -13,14 +13,17 @@ use self::public_functions::public_functions;
 #[path = "../../firmware/src/calls/public_functions.rs"]
 mod public_functions;
 
-/// Another compiler's code may need so much more, and what has grown a little needs no new table.
+/// Factor by which a count may exceed the table: another compiler's code may need more, and a
+/// little growth needs no new table.
 const SLACK: f64 = 1.25;
-/// Instructions of a control step among 32 neighbours, whatever they do, in a coverage mission too.
+/// Most instructions of a control step among 32 neighbours, whatever they do, in a coverage mission
+/// too.
 const STEP: u64 = 75_000;
-/// Instructions of the safety filter in the worst case seen.
+/// Most instructions of the safety filter.
 const FILTER: u64 = 12_000;
-/// Of a coverage mission: its whole plan, with and without zones, and the whole call of a board for
-/// a further division, among 3 vehicles, with and without zones, and among 32 on 512 lanes.
+/// Most instructions for a coverage mission: its whole plan, with and without zones, and a board's
+/// whole call for a further division, among 3 vehicles, with and without zones, and among 32 on 512
+/// lanes.
 const COVERAGE: [(&str, u64); 8] = [
     ("a coverage plan, 3", 20_000_000),
     ("planner::coverage::plan_flights, 3", 20_000_000),
@@ -31,11 +34,10 @@ const COVERAGE: [(&str, u64); 8] = [
     ("losses::redivide_work, 3", 1_000_000),
     ("losses::redivide_work, 32", 10_000_000),
 ];
-/// Modules and folders of companion that are its own, where no call is public, and doubles of its
-/// tests.
+/// Modules and folders of companion without public calls, and those with test doubles.
 const PRIVATE: [&str; 7] =
     ["guidance", "testing", "sweep", "journal", "packet", "memory", "stream"];
-/// Where the page names the calls that are not counted by themselves.
+/// Heading of the page's section about calls that are not counted by themselves.
 const OTHERS: &str = "## Not counted by themselves";
 
 /// A public function: its crate and modules, the type that has it, its name.
@@ -46,8 +48,8 @@ struct Call {
 }
 
 impl Call {
-    /// Whether a path of the page, as `file::Type::name`, is this call's: its name, and nothing
-    /// that this call is not in.
+    /// Whether a path of the page, as `file::Type::name`, names this call: the last word is its
+    /// name, and all others are in its path.
     fn is(&self, words: &[&str]) -> bool {
         let Some((name, path)) = words.split_last() else { return false };
         *name == self.name
@@ -122,7 +124,7 @@ fn every_public_call_is_on_the_page() {
     };
     let missing: Vec<&Call> = calls.iter().filter(|call| !is_named(call)).collect();
     assert!(missing.is_empty(), "not in {}: {missing:?}", bounds::PAGE);
-    // What the page names is there: but for rows of more than one call, which have no path.
+    // All calls that the page names exist; rows of more than one call have no path.
     let is_there = |path: &&Vec<String>| {
         let words: Vec<&str> = path.iter().map(String::as_str).collect();
         words.len() == 1 || calls.iter().any(|call| call.is(&words))

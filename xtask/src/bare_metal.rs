@@ -165,8 +165,8 @@ pub fn build(board: Board) -> Result<Built> {
     // A tenth less code than opt-level 3, and a control step takes no more instructions.
     building.args(["--config", "profile.release.opt-level=2"]);
     building.args(["--config", "profile.release.package.planner-core.opt-level=3"]);
-    // With several units a function's neighbours in its unit, and so what is inlined, depend on
-    // the path of the checkout: two clones differed by 6 kB and 1 % of the instructions.
+    // With several units the functions that share a unit, and so what is inlined, depend on the
+    // path of the checkout: two clones differed by 6 kB of code and 1 % of the instructions.
     building.args(["--config", "profile.release.codegen-units=1"]);
     // The chip's drivers only set registers: optimized for size they are as fast.
     building.args(["--config", "profile.release.package.embassy-stm32.opt-level='s'"]);

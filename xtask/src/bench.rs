@@ -92,7 +92,8 @@ pub fn run_bench(args: &Args) -> Result<()> {
     run(&mut bench)
 }
 
-/// Flies the demo by a debug and a release build: both write the same `result.json`.
+/// Flies the demo by a debug and a release build, and checks that both write the same
+/// `result.json`.
 fn compare_profiles() -> Result<()> {
     let mut results = Vec::new();
     for (profile, option) in [("debug", None), ("release", Some("--release"))] {

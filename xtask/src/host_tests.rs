@@ -1,5 +1,5 @@
-//! The host's tests and examples: built by cargo, then run several programs at once. cargo itself
-//! runs one after the other, and most of them have one long test, beside which the other cores
+//! The host's tests and examples: built by cargo, then several programs run at once. cargo itself
+//! runs one program after the other, and most have one long test, during which the other cores
 //! would be idle.
 
 use std::ffi::OsString;
@@ -38,16 +38,16 @@ const NEED_OTHERS: [&str; 9] = [
 ];
 /// Variables by which tests find boards, browser and Python clients.
 const OTHERS: [&str; 3] = ["FLOCKMATE_FIRMWARE", "FLOCKMATE_CHROMIUM", "FLOCKMATE_PYTHON"];
-/// Programs that hold the companion to the wall clock: nothing runs beside them.
+/// Programs whose tests measure the companion by the wall clock: they run alone.
 const ALONE: [&str; 1] = ["rehearsal"];
-/// Tests of one program that run at once, on a core each. Those with boards mostly wait, so there
-/// is more than one.
+/// Number of tests of one program that run at once. Tests with boards mostly wait, so it is more
+/// than one.
 const TESTS_AT_ONCE: &str = "2";
-/// The same of programs whose tests wait for Python clients, or for processes that keep real time.
+/// The same number for programs whose tests wait for Python clients or for processes in real time.
 const WAITING_AT_ONCE: [(&str, &str); 3] =
     [("closed_loop", "4"), ("conformance", "4"), ("rehearsal", "6")];
 
-/// Variables with which programs run.
+/// Environment variables with which programs run: name and value.
 pub type Environment = Vec<(&'static str, OsString)>;
 
 /// A program of tests, or an example, which fails if its own checks fail.
@@ -73,7 +73,7 @@ fn program(artifact: &Value) -> Option<Program> {
     })
 }
 
-/// Builds programs, tests and examples of the workspace without a warning and names the latter two.
+/// Builds all of the workspace and returns its test programs and examples; a warning is an error.
 pub fn build() -> Result<Vec<Program>> {
     let built = compile(cargo().args(["test", "--workspace", "--no-run", "--locked"]))?;
     ensure!(built.warnings == 0, "{} warnings", built.warnings);
@@ -82,7 +82,7 @@ pub fn build() -> Result<Vec<Program>> {
     Ok(programs)
 }
 
-/// Place of a program in the order of their starts.
+/// Sort key of a program: those with a smaller number start earlier.
 fn turn(program: &Program) -> usize {
     FIRST.iter().position(|first| *first == program.name).unwrap_or(FIRST.len())
 }
@@ -95,7 +95,7 @@ fn passes(program: &Program, environment: &Environment) -> Result<bool> {
     let waiting = WAITING_AT_ONCE.iter().find(|(name, _)| *name == program.name);
     let at_once = waiting.map_or(TESTS_AT_ONCE, |(_, at_once)| *at_once);
     tests.env("RUST_TEST_THREADS", at_once).envs(environment.iter().cloned());
-    // The programs that tests run are built with them.
+    // The programs that tests run were built together with the tests.
     tests.env("FLOCKMATE_BUILT", "1");
     let output = tests.output().with_context(|| format!("cannot start {tests:?}"))?;
     let printed = [output.stdout, output.stderr].concat();
@@ -128,8 +128,9 @@ fn failures(
     Ok(failed.into_iter().collect::<Result<Vec<_>>>()?.concat())
 }
 
-/// Runs tests and examples, those in documentation too, all of them although some fail. Those that
-/// need what `others` brings, and names by variables, wait for it; `None`: they run without it.
+/// Runs all tests and examples, also those in documentation, even if some fail. `others` builds
+/// boards, browser and clients and returns the variables that name them; the programs of
+/// `NEED_OTHERS` run after it. With `None` they run without these variables.
 ///
 /// # Errors
 ///
@@ -144,7 +145,8 @@ pub fn run(
     let (waiting, free): (Vec<_>, Vec<_>) = programs.into_iter().partition(belongs(&NEED_OTHERS));
     // One more than there are cores: some wait for processes or clients that keep real time.
     let at_once = 1 + std::thread::available_parallelism().map_or(2, usize::from);
-    // With these a test that asks for the others fails, where it would be skipped without.
+    // With these variables a test that needs a board, browser or client fails; without them it
+    // would be skipped.
     let absent = || OTHERS.map(|name| (name, "/not/built/yet".into())).into();
     let mut failed = failures(free, at_once, &others.as_ref().map_or_else(Vec::new, |_| absent()))?;
     let found = others.map_or_else(|| Ok(Vec::new()), |bring| bring())?;

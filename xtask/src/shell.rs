@@ -31,7 +31,7 @@ pub fn cargo() -> Command {
     command(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// Runs the command to its end. The error of a failed one names it.
+/// Runs the command and waits until it ends. If it fails, the error names it.
 pub fn run(command: &mut Command) -> Result<()> {
     let status = command.status().with_context(|| format!("cannot start {command:?}"))?;
     if !status.success() {
@@ -44,7 +44,7 @@ pub fn run(command: &mut Command) -> Result<()> {
 pub struct Compiled {
     /// Number of the compiler's warnings, repeated ones of earlier builds included.
     pub warnings: usize,
-    /// What it built, as cargo's messages give it.
+    /// The artifacts that were built, as cargo's JSON messages.
     pub artifacts: Vec<Value>,
 }
 

@@ -137,7 +137,7 @@ fn parts(program: &Path, board: Board) -> Result<Parts> {
 /// was renamed would silently lie in the default memory.
 fn ensure_placed(elf: &object::File<'_>, board: Board) -> Result<()> {
     let path = match board {
-        // Its map places what measuring programs have, too.
+        // QEMU's `memory.x` also places statics that only the measuring programs have.
         Board::Qemu => return Ok(()),
         Board::NucleoH743 => root().join("memory.x"),
         Board::Pico2 => root().join("firmware/src/boards/pico2/memory.x"),

@@ -34,7 +34,7 @@ fn host() -> Result<Vec<Program>> {
 }
 
 /// Builds the firmware for every board and installs what the tests run beside it. Returns the
-/// variables by which tests find these.
+/// environment variables by which tests find these.
 fn boards_and_clients() -> Result<Environment> {
     let mut found = Vec::new();
     step("boards", || {
@@ -55,8 +55,9 @@ fn boards_and_clients() -> Result<Environment> {
     Ok(found)
 }
 
-/// Runs every step. Boards are built beside the host, because each build waits for one crate at a
-/// time for minutes, and beside the tests that do not need them; then the steps follow one another.
+/// Runs every step. The firmware is built in parallel with the host's programs, because each build
+/// spends minutes on one crate at a time, and with the tests that need no board. The later steps
+/// run one after the other.
 fn steps(args: &Args) -> Result<()> {
     step("format", || shell::run(cargo().args(["fmt", "--all", "--check"])))?;
     std::thread::scope(|scope| {

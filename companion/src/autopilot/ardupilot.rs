@@ -18,14 +18,14 @@ pub const BRAKE: u32 = 17;
 /// 0xC00, with acceleration, is not used: no recording shows that ArduCopter flies it.
 pub const MASK_POSITION_VELOCITY: u16 = 0xDC0;
 
-/// Time, seconds, by which the velocity in a setpoint leads the reference: the velocity sent is the
-/// smoothed setpoint's plus its acceleration times this. It replaces the acceleration that the mask
-/// leaves out. Guided closes an error of velocity with `WPNAV_ACCEL` / `PSC_JERK_XY`, and flew the
-/// recorded circle 0.6 s late.
+/// Time, seconds, by which the velocity in a setpoint leads the smoothed setpoint: the velocity
+/// sent is the smoothed setpoint's plus its acceleration times this. It replaces the acceleration
+/// that the mask leaves out. Guided corrects an error of velocity with the time constant
+/// `WPNAV_ACCEL` / `PSC_JERK_XY`, and flew the recorded circle 0.6 s late.
 pub const VELOCITY_LEAD_S: f32 = 0.5;
 
-/// Parameters that limit how ArduCopter flies, with 4.6's defaults: centimetres, the jerk in
-/// metres.
+/// Parameters that limit how ArduCopter flies, with 4.6's defaults; their units are centimetres,
+/// those of the jerks metres.
 pub const LIMITS: [LimitParameter; 8] = [
     LimitParameter { name: "WPNAV_SPEED", limit: Limit::Speed, unit: 0.01, default: 1000.0 },
     LimitParameter { name: "WPNAV_SPEED_UP", limit: Limit::Climb, unit: 0.01, default: 250.0 },
@@ -57,8 +57,8 @@ pub fn estimator_ready(flags: u16) -> bool {
     flags & EKF_POSITION_KNOWN == EKF_POSITION_KNOWN && flags & EKF_UNINITIALISED == 0
 }
 
-/// Variance ratio of EKF_STATUS_REPORT from which the estimate counts as unsound. The ratio is an
-/// innovation as a share of the largest that the filter accepts; `FS_EKF_THRESH` is 0.8.
+/// Variance ratio of EKF_STATUS_REPORT from which on the estimate counts as unsound: an innovation
+/// as a share of the largest that the filter accepts. `FS_EKF_THRESH` is 0.8.
 const MAX_VARIANCE_RATIO: f32 = 0.8;
 
 /// Whether a variance ratio of EKF_STATUS_REPORT is that of a sound estimate; false for NaN.

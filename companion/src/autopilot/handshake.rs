@@ -14,7 +14,7 @@ const MAX_ARMING_TRIES: u8 = 2;
 /// Most different refusals (command and result) that are reported in one mission state.
 const MAX_REFUSALS: usize = 4;
 /// Estimated height above the pad from which the vehicle counts as risen, whatever the landing
-/// detector reports, metres; the estimate's error is the same before.
+/// detector reports, metres; an error of the estimate that was there before arming cancels out.
 const RISEN_M: f32 = 0.25;
 
 const NAV_TAKEOFF: u16 = 22;
@@ -137,8 +137,8 @@ impl Handshake {
         self.heartbeat_gap = true;
     }
 
-    /// Handles the autopilot's COMMAND_ACK. Returns a refusal to be reported, once a state for each
-    /// command and result: text, and as its numbers command and result.
+    /// Handles the autopilot's COMMAND_ACK. Returns a refusal that is to be reported, each command
+    /// and result once in a state: the text, and as its numbers the command and the result.
     pub(crate) fn handle_ack(
         &mut self,
         state: State,

@@ -62,7 +62,7 @@ impl AutopilotKind {
     }
 
     /// `type_mask` of a SET_POSITION_TARGET_LOCAL_NED that moves the vehicle: its position and
-    /// feed-forward count, its yaw is ignored.
+    /// feed-forward count, its yaw is ignored unless the sender clears that bit for a heading.
     pub fn move_type_mask(self) -> u16 {
         match self {
             Self::Px4 => px4::MASK_POSITION_VELOCITY_ACCELERATION,
@@ -70,8 +70,8 @@ impl AutopilotKind {
         }
     }
 
-    /// Time, seconds, by which the velocity in a setpoint leads the reference: the velocity sent is
-    /// the reference's plus its acceleration times this.
+    /// Time, seconds, by which the velocity in a setpoint leads the smoothed setpoint: the velocity
+    /// sent is the smoothed setpoint's plus its acceleration times this.
     pub fn velocity_lead_s(self) -> f32 {
         match self {
             Self::Px4 => 0.0,

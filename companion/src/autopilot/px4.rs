@@ -14,7 +14,7 @@ pub const HOLD: u32 = 0x0304_0000;
 pub const RTL: u32 = 0x0504_0000;
 
 /// `type_mask` of a setpoint: position counts, velocity and acceleration are feed-forward; yaw and
-/// yaw rate are ignored, so PX4 keeps the heading.
+/// yaw rate are ignored, so PX4 keeps the heading. For a heading the sender clears the yaw bit.
 pub const MASK_POSITION_VELOCITY_ACCELERATION: u16 = 0xC00;
 
 /// Parameters that limit how PX4 flies, with 1.17's defaults; all are floats.

@@ -203,7 +203,7 @@ impl Requests {
         let heard = telemetry.heartbeat_at.is_some();
         let silent = telemetry.heartbeat_age(now) > MAX_HEARTBEAT_AGE;
         if silent && s.state == State::Disarm {
-            // What was reported before the silence says nothing of now.
+            // Reports from before the silence no longer count.
             timers.set(Timer::Request, now + DISARM_EVERY);
         }
         if heard {

@@ -33,8 +33,9 @@ const EXTENDED_SYS_STATE: u32 = 245;
 const FLAG_ARMED: u8 = 0x80;
 const STATE_CRITICAL: u8 = 5;
 const LANDED_STATE_ON_GROUND: u8 = 1;
-/// Distance, metres, from the predicted position (the last position and velocity extrapolated) to
-/// the reported one, beyond which the position has jumped; [`POSITION_JUMP_MPS`] × time is added.
+/// Distance between the reported position and the predicted one (the last position and velocity
+/// extrapolated) beyond which the position has jumped, metres; [`POSITION_JUMP_MPS`] × time is
+/// added.
 const POSITION_JUMP_M: f32 = 1.0;
 /// Change of velocity between two reported positions that no vehicle has exceeded so far, m/s.
 const POSITION_JUMP_MPS: f32 = 5.0;
@@ -133,9 +134,10 @@ pub struct Telemetry {
     /// EKF origin, which positions are relative to; `None` until one is received, and again after
     /// it was refused as too far away, or after the autopilot restarted or its position jumped.
     pub ekf_origin: Option<Geodetic>,
-    /// EKF origin with which the vehicle was armed; `None` while disarmed.
+    /// EKF origin with which the vehicle was armed, kept while it stays armed; `None` while
+    /// disarmed.
     last_armed_origin: Option<Geodetic>,
-    /// Since when, while armed, only EKF origins other than that one were received.
+    /// Since when, while armed, only EKF origins other than `last_armed_origin` were received.
     origin_doubtful_since: Option<Instant>,
     /// Whether the EKF origin moved while armed.
     pub(crate) origin_moved: bool,
@@ -166,8 +168,8 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// Telemetry before any frame. With `anywhere` (a board without a mission) an EKF origin is
-    /// accepted at any distance.
+    /// Telemetry before any frame was received. With `anywhere` (a board without a mission) an EKF
+    /// origin is accepted at any distance.
     pub fn new(anywhere: bool) -> Self {
         Self { battery_percent: -1, accept_any_origin: anywhere, ..Self::default() }
     }
@@ -221,8 +223,8 @@ impl Telemetry {
         now < self.settled_at
     }
 
-    /// Updates the telemetry from a frame of the autopilot's link; `mission_origin` is the mission
-    /// frame's.
+    /// Updates the telemetry from a frame of the autopilot's link; `mission_origin` is the origin
+    /// of the mission frame.
     pub fn handle_frame(
         &mut self,
         now: Instant,

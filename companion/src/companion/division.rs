@@ -22,15 +22,16 @@ const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
 const AT_HOLD_M: f32 = 0.2;
 /// Time under a pilot's control after which a vehicle counts as having left the mission.
 const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
-/// Time for which a vehicle on the ground that can promise nothing keeps its share while another
-/// one flies.
+/// Time for which a vehicle on the ground that cannot make a commitment keeps its share while
+/// another one flies.
 pub(super) const CANNOT_START_MOST: Duration = Duration::from_secs(60);
-/// Time for which a vehicle waits above its pad for missing ones. Twice what one needs to be
-/// counted as lost, or to leave without a lease: a false report keeps nobody in the air for longer.
+/// Time for which a vehicle waits above its pad for missing vehicles: twice the time after which a
+/// missing one counts as lost, or leaves for want of a lease. A false report keeps no vehicle in
+/// the air for longer.
 const WAIT_FOR_MISSING_MOST: Duration = Duration::from_secs(180);
-/// Time after a lost vehicle is down within which a division becomes binding.
+/// Time after the last lost vehicle is down within which a division must become binding.
 const DIVIDES_WITHIN: Duration = Duration::from_secs(60);
-/// Stands for the plan's CRC where the planner cannot divide the rest of the area.
+/// Used in place of the plan's CRC where the planner cannot divide the rest of the area.
 const UNDIVIDED: u32 = u32::MAX;
 /// Time after which an unanswered request for a division is sent to the shell again.
 const REQUEST_RETRY: Duration = Duration::from_secs(30);
@@ -143,8 +144,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether all are to divide what is left, because this vehicle's path ends soon and its route
-    /// goes on.
+    /// Whether all vehicles are to divide the rest of the area, because the path of this vehicle
+    /// holds only the first part of its route and ends soon.
     fn wants_division(&self) -> bool {
         let Some(plan) = self.mission.plan() else { return false };
         let Task::Photograph(photographs) = &plan.task else { return false };
@@ -153,9 +154,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && photographs.last_picture_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
     }
 
-    /// Whether this vehicle on the ground can promise nothing, so that others in flight could not
-    /// divide: ready, it is heard by no majority; or while another one flies it has no autopilot,
-    /// position or plan, is away from its pad, or has another plan than that one.
+    /// Whether this vehicle, on the ground, cannot make a commitment, so that vehicles in flight
+    /// could not divide the area. Either it is ready or started and no majority hears it; or
+    /// another vehicle takes part, and this one has no autopilot, position or plan, is away from
+    /// its pad, or hears another plan.
     fn lacks_promise(&self) -> bool {
         use State::*;
         let Some(fleet) = self.neighbours.fleet() else { return false };
@@ -219,9 +221,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         waypoints.iter().nth_back(1).map_or(f32::NEG_INFINITY, |home| home.along_m)
     }
 
-    /// Place where this vehicle would hold if it promised now, decimetres along its path: at the
-    /// last picture within `COMMITMENT_S` of flight, no further than gates and other vehicles let
-    /// it fly, and no nearer than it can stop. `None` where it cannot promise, or has promised.
+    /// Commitment that this vehicle can make now: place where it will hold, decimetres along its
+    /// path, at the last picture within `COMMITMENT_S` of flight, no further than gates and other
+    /// vehicles let it fly, and no nearer than it can stop. `None` where it cannot make one, or has
+    /// made one.
     fn commitment_dm(&self) -> Option<u16> {
         use State::*;
         let fleet = self.neighbours.fleet()?;
@@ -240,7 +243,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { COMMITMENT_S };
         let ahead_m = along_m + promise_s * self.config.cruise_mps;
         let gates_m = self.guidance.gates_open_up_to_m(&self.guidance_inputs());
-        // What stops the vehicle before another one may stay: it promises no place beyond that.
+        // The vehicle that it stops for may stay there: it promises no place beyond that stop.
         let clear_m = gates_m.min(along_m + self.guidance.advice.stop_within_m.max(0.0));
         let most_m = ahead_m.min(clear_m).min(self.last_descent_start_m()).max(along_m);
         let stop_m = (self.guidance.stopping_point_m() + EXTRA_STOPPING_MARGIN_M).min(most_m);
@@ -252,8 +255,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Place where this vehicle is to hold for a division, metres along its path: from its promise
     /// until it gets its plan of that division. `None` where it does not hold.
     pub(super) fn division_hold_m(&self) -> Option<f32> {
-        // A promise is a place along its own path, and binds no vehicle that is off that path. The
-        // fleet learns of a command only in the next step.
+        // A promise is a place along its own path, and binds no vehicle that is off that path. This
+        // is checked here too, as the fleet learns of a landing or return only in the next step.
         let elsewhere = self.will_land_off_plan() || self.detours.is_beside_plan();
         let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !elsewhere)?;
         let behind = fleet.division_count() > self.mission.division_count();

@@ -149,7 +149,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Handles the intent of vehicle `id`; one of another mission changes nothing but is reported.
+    /// Handles the intent of vehicle `id`; an intent of another mission changes nothing but is
+    /// reported.
     fn handle_intent(&mut self, id: u8, sequence: u8, intent: &Intent) {
         if intent.mission_crc != self.config.mission_crc {
             if self.config.roster.iter().any(|entry| entry.system_id == id) {

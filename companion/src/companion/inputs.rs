@@ -19,21 +19,22 @@ const LANDING_DRIFT_M: f32 = 1.0;
 /// Greatest horizontal distance from the place where landing was commanded to the touchdown, for a
 /// vehicle that stood still then, metres.
 const STANDING_DRIFT_M: f32 = 0.3;
-/// Time without its lease renewed, after which silence counts in a coverage mission: 1 s before the
-/// lease ends. The row `NeighboursSilent` stops the vehicle 1 s later.
+/// Time since the last renewal of its lease after which a vehicle in a coverage mission counts as
+/// unheard: 1 s before the lease ends. The row `NeighboursSilent` stops the vehicle 1 s later.
 const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
 /// Height above the pad below which a climb is not interrupted by a pause, metres: lower, an
 /// autopilot may take a hovering vehicle for landed, and disarm it.
 const MIN_PAUSE_HEIGHT_M: f32 = 1.0;
-/// Time unheard after which a vehicle without a part no longer waits for one.
+/// Time without being heard after which a vehicle that has no part of the area no longer waits for
+/// one.
 const RESERVE_UNHEARD_MOST: Duration = Duration::from_secs(300);
-/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle in a coverage mission may be off a
-/// setpoint that stands before it lands: gusts push it further there than walls would allow
+/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle in a coverage mission may be away
+/// from a setpoint that stands; then it lands. Gusts push it further there than walls would allow
 /// indoors.
 const MAX_SWAY_OVER_AREA: Duration = Duration::from_secs(60);
 /// Greatest distance from its setpoint at which that additional time applies, metres.
 const MAX_SWAY_M: f32 = 2.0;
-/// A closed gate nearer ahead than this stops an unheard vehicle: it has no path to fly on, metres.
+/// An unheard vehicle stops if its next closed gate is less than this ahead, metres.
 const MIN_GATE_AHEAD_M: f32 = 0.2;
 /// Longest time of a climb beyond 1 s for each metre of height, seconds: idling motors, and the
 /// stop at the top.
@@ -223,10 +224,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether this vehicle has no part of the area, but may get one if another one is lost.
+    /// Whether this vehicle has no part of the area, but may get one if another vehicle is lost.
     fn is_in_reserve(&self) -> bool {
         let needed = |fleet: &Fleet<V>| {
-            // The plan of a division that counts already may give it a part.
+            // A committed division whose plan has not come yet may give it a part.
             let behind = fleet.division_count() > self.mission.division_count();
             (behind || fleet.is_reserve_needed())
                 && fleet.lease_age(self.now) < RESERVE_UNHEARD_MOST
@@ -246,19 +247,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         away.xy().length() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m
     }
 
-    /// Time for which this vehicle has been unheard, beyond what it may fly on for; in a coverage
-    /// mission since shortly before its lease ended.
+    /// Time for which this vehicle has been unheard; zero while it may fly on unheard. In a
+    /// coverage mission it counts from 1 s before the end of the lease.
     fn neighbour_age(&self) -> Duration {
         let (now, state) = (self.now, self.mission.state());
         if let Some(fleet) = self.neighbours.fleet() {
             let age = fleet.unheard_for(now).saturating_sub(UNHEARD_STOP_AFTER);
-            // On its pad it is reported again after a while only.
+            // On the pad the age counts from the entry into the state, so that the warning row that
+            // enters `Scheduled` again is not taken in each step.
             let on_pad = state == State::Scheduled;
             return if on_pad { age.min(self.mission.time_in_state(now)) } else { age };
         }
         // A vehicle that flies back, or aside to land, does not stop because no other vehicle hears
-        // it: it is about to land anyway. Unless it was paused: others assume that it is down after
-        // a while, however long it has stood.
+        // it: it is about to land anyway. A vehicle that stands does: others assume after a while
+        // that it is down.
         let stands = matches!(state, State::Paused | State::AutopilotSilent);
         let is_landing =
             self.guidance.returning || self.detours.lands_at_end() || self.detours.seeks_landing();
@@ -269,9 +271,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// The part of the time for which the safety filter has kept this vehicle from moving on that
-    /// counts against it. It begins once a vehicle that came down unheard must lie on the ground:
-    /// that one takes longer than this one yields, and then leaves room.
+    /// The part of `hindered_for` that counts: the time since the safety filter last kept this
+    /// vehicle from moving on because of a vehicle that comes down unheard. Such a descent takes
+    /// longer than the limits for hindrances, and leaves room once it ends.
     fn counted_hindrance(&self, hindered_for: Duration) -> Duration {
         hindered_for.min(self.guidance.filter.time_since_fall(self.now))
     }
@@ -284,7 +286,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         match follow && (homeward || (descends && self.config.lost_vehicle_down_s.is_some())) {
             true if homeward && descends => self.guidance.filter.hindered_for(self.now),
             // The end of its path in a coverage mission is above its pad: there is no other way
-            // down to that.
+            // down to the pad.
             true => self.guidance.filter.blocked_for_good_for(self.now),
             false => Duration::default(),
         }
@@ -341,8 +343,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let scene = self.detour_view().scene;
                 let (clear_m, in_s) =
                     self.guidance.unheard_reach(&scene, &self.neighbours, progress_m, self.now);
-                // Idling motors before, and the stop at the top after it, on top of a climb at 1
-                // m/s, which is slow, or at less where the settings ask for it.
+                // The climb is assumed at 1 m/s, or slower if the settings say so; idling motors
+                // before it and the stop at its top are added.
                 let climb_s = if progress_m < 0.0 {
                     MAX_CLIMB_OVERHEAD_S
                         + libm::ceilf(-progress_m / libm::fminf(self.config.climb_mps, 1.0))

@@ -44,9 +44,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         !self.plans_with_others() && !matches!(self.mission.state(), State::Done | State::Aborted)
     }
 
-    /// Notes, stores and reports the photographed waypoints; those of the own path only where
-    /// pictures are taken up to `pictures_to_m` metres along it, at the latest where the vehicle
-    /// leaves it.
+    /// Notes, stores and reports the photographed waypoints, at 1 Hz. Those of its own path are
+    /// noted up to `pictures_to_m` metres along it, and also when the vehicle leaves the path; that
+    /// is `None` where it takes no pictures.
     pub(super) fn update_photographed(&mut self, pictures_to_m: Option<f32>, leaves_path: bool) {
         let due = self.is_area_mission() && self.timers.take_due(Timer::Done, self.now, NOTE_EVERY);
         let flies = self.has_left_pad();
@@ -110,7 +110,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether this vehicle's plan agrees with the others': it has stood ready for as long as their
-    /// reports take, and no vehicle was heard with another plan. True where the mission is no area.
+    /// reports take, and no vehicle was heard with another plan. True in a mission without an area.
     pub(super) fn plans_as_others(&self) -> bool {
         !self.is_area_mission()
             || (self.mission.time_in_state(self.now) >= OTHERS_REPORT_WITHIN

@@ -54,7 +54,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Requests a path from the shell: a detour, aside, home or back, by its purpose.
+    /// Requests from the shell a path for this purpose: a detour, or a path aside, home or back.
     pub(super) fn request_detour(&mut self, aim: DetourPurpose) {
         self.detours.note_request(aim);
         self.guidance.reset_trap_timer();
@@ -124,8 +124,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// The detour that [`PlanKind::Detour`] requests from the shell; `None` if none is requested,
     /// or none can be planned. `visit` is called with each keep-out zone. The next answer counts
-    /// for this request: an answer before the shell has read a request belongs to an older one and
-    /// is ignored.
+    /// for this request: an answer that comes before the shell has read the request belongs to an
+    /// older one and is ignored.
     pub fn detour_request(&mut self, visit: impl FnMut(KeepOutZone)) -> Option<DetourRequest> {
         let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);
         self.detours.note_request_read();

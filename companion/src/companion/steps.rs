@@ -114,8 +114,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Sets the share of the speed at which the error bound of the position estimate fits into the
-    /// margin to walls, and reports a change.
+    /// Sets the share of the cruise speed at which the error bound of the position estimate fits
+    /// into the margin to walls, and reports a change.
     pub(super) fn check_estimate_error(&mut self) {
         let (now, config) = (self.now, &self.config);
         let bound_m = self.telemetry.estimate_bound_m(now, config.estimate_m);
@@ -163,7 +163,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     pub(super) fn apply_row(&mut self, row: &'static TransitionRow) {
         let now = self.now;
-        // A vehicle that sought a landing place resumes, after an interruption, as a landing.
+        // After an interruption, a vehicle that sought a landing place resumes with a landing.
         let lands =
             self.detours.seeks_landing() && !self.guidance.returning && !self.detours.is_homeward();
         let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, lands, now);
@@ -208,7 +208,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     .prepare_plan_request(self.config.skips_photographed);
                 if let Some(fleet) = self.neighbours.fleet_mut() {
                     if fleet.has_reported_leaving() {
-                        // It takes part again: others have to hear it first.
+                        // The vehicle takes part again: it leaves its share at the earliest after
+                        // this time, since others have to hear it first.
                         self.timers.set(Timer::LeaveUnstarted, now + CANNOT_START_MOST);
                     }
                     fleet.begin_flight(now);
@@ -282,7 +283,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | Disarm => {
                 self.guidance.cancel_evasion();
             }
-            // Off the path the reference may be behind a wall, so it holds where the vehicle is.
+            // Off the path the reference may be behind a wall, so the vehicle holds where it is.
             _ => self.guidance.hold_at(position),
         }
     }

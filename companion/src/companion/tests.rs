@@ -1,11 +1,11 @@
-//! The mission against a scripted PX4: the way it should go, and every way it should not.
+//! Whole missions on a scripted PX4: the regular flight, and what may go wrong.
 
 extern crate std;
 
-/// Declares what can happen, and the list of all of it.
+/// Declares the enum of events of a random test, and the list of all of them.
 macro_rules! happens {
     ($($name:ident),* $(,)?) => {
-        /// One thing that happens.
+        /// An event in a random test.
         #[derive(Clone, Copy, Debug)]
         enum Happens {
             $($name),*
@@ -37,8 +37,7 @@ use crate::testing::fake_autopilot::*;
 use planner_core::Point;
 use planner_core::flight::{HeadingMode, PicturePlan, Task, Trigger, WaypointRange};
 
-/// Rule of every flight: from before Offboard until the landing no gap between setpoints above 100
-/// ms.
+/// Checks that no two setpoints of the flight are more than 100 ms apart.
 pub(super) fn assert_no_gap(bench: &Bench) {
     for pair in bench.setpoints.windows(2) {
         assert!(pair[1].0 - pair[0].0 <= Duration::from_millis(100), "{pair:?}");
@@ -72,17 +71,17 @@ fn flies_the_mission_and_lands_at_the_goal() {
     assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
     assert!(!bench.armed);
     assert_no_gap(&bench);
-    // A second of setpoints before Offboard is asked for.
+    // DO_SET_MODE requests Offboard.
     let engaged = bench.commands.iter().position(|c| c.0 == 176).unwrap();
     assert_eq!(bench.commands[engaged], (176, 1.0, 6.0, 0.0));
-    // The setpoints never leave the tube around the way, though the EKF origin is 300 m away.
+    // The setpoints stay within a tube around the path, though the EKF origin is 300 m away.
     for (_, at, mask) in &bench.setpoints {
         assert_eq!(*mask, px4::MASK_POSITION_VELOCITY_ACCELERATION);
         assert!((at.y - 12.0).abs() < 0.02 && at.x > 7.98 && at.x < 16.02 && at.z < 3.52, "{at:?}");
     }
 }
 
-/// At every setpoint with a place; without a heading it looks where it did.
+/// Every setpoint with a position has the heading of the task; without one the yaw is ignored.
 #[test]
 fn looks_where_its_task_says() {
     for look in [None, Some(0.7f32), Some(-2.5)] {
@@ -108,8 +107,8 @@ fn looks_where_its_task_says() {
     }
 }
 
-/// Lines 18 to 25 of the paper: waypoint after waypoint, then it lands where it is, without a
-/// guided descent.
+/// Algorithm 2 of paper P3D, lines 18 to 25: the vehicle flies waypoint after waypoint, then lands
+/// where it is, without a guided descent.
 #[test]
 fn algorithm2_lands_where_it_reaches_its_last_waypoint() {
     let mut slow = config();
@@ -123,8 +122,8 @@ fn algorithm2_lands_where_it_reaches_its_last_waypoint() {
     for (_, at, _) in &bench.setpoints {
         assert!((at.y - 12.0).abs() < 0.02 && at.x > 7.98 && at.x < 16.02 && at.z < 3.52, "{at:?}");
     }
-    // Up to the landing no setpoint leads down, and the corner is not left before the vehicle has
-    // come to it.
+    // Up to the landing no setpoint leads down, and none leaves the corner before the vehicle has
+    // reached it.
     let heights: Vec<f32> = bench.setpoints.iter().map(|(_, at, _)| at.z).collect();
     assert!(heights.windows(2).all(|pair| pair[1] > pair[0] - 1e-3), "{heights:?}");
     let (_, last, _) = bench.setpoints.last().unwrap();
@@ -145,7 +144,7 @@ fn a_pilot_is_never_fought() {
     let (_, at, _) = *bench.setpoints.last().unwrap();
     assert!((at - bench.enu).norm() < 0.01, "only the current position goes out");
     assert_eq!(bench.commands.len(), asked, "and no command");
-    // Offboard alone does not resume, nor resume alone.
+    // Offboard alone does not resume the mission: the resume command is needed too.
     bench.mode = px4::OFFBOARD;
     bench.run(3.0);
     assert_eq!(bench.state(), State::PilotReturned);
@@ -185,8 +184,7 @@ fn a_jump_of_five_metres_is_not_flown_after() {
                 && lasted < Duration::from_millis(1300),
             "{lasted:?}"
         );
-        // The first setpoint after the jump may still be made before the position is heard, the
-        // last is to land.
+        // The first setpoint after the jump may be made before the new position is received.
         let mut stops = 0;
         for (at, place, mask) in &bench.setpoints {
             if *at > jumped_at + Duration::from_millis(60) {
@@ -280,7 +278,7 @@ fn the_heartbeat_is_believed_and_no_ack() {
     bench.refused.push(176);
     bench.start();
     bench.run_until(State::Engaging, 6.0);
-    // PX4's first ack of DO_SET_MODE says accepted, whatever comes of it.
+    // PX4 first acknowledges DO_SET_MODE as accepted, whether or not the mode changes.
     let ack = |result| COMMAND_ACK_DATA { command: MavCmd::MAV_CMD_DO_SET_MODE, result };
     bench.send(&ack(MavResult::MAV_RESULT_ACCEPTED));
     bench.run(2.0);
@@ -340,7 +338,7 @@ fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
     let named = |bench: &Bench| {
         bench.texts.iter().filter(|text| text.contains("it has not started")).count()
     };
-    // Never heard; on its pad; flying, whatever waits for it.
+    // Vehicle 77 is never heard; is heard on its pad; is heard in flight.
     let grounded = crate::link::intent::ON_PLAN | crate::link::intent::GROUNDED;
     let flying = crate::link::intent::ON_PLAN | crate::link::intent::FLYING;
     for (flags, expected) in [(None, 2..5), (Some(grounded), 2..5), (Some(flying), 0..1)] {
@@ -354,7 +352,7 @@ fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
             bench.neighbour = flags.map(|flags| (Point::new(8.0, 60.0, 10.0), flags, 0.0, 5));
             bench.run(1.0);
         }
-        // On both links.
+        // Each text is sent on both links.
         assert!(expected.contains(&named(&bench)), "{flags:?}: {:?}", bench.texts);
         let reported = bench.events.contains(&Event::WaitsForStart { id: 77 });
         assert_eq!(reported, flags != Some(flying), "{:?}", bench.events);

@@ -274,8 +274,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | flag(intent::ON_DETOUR, self.is_detouring())
     }
 
-    /// Whether this companion leads the vehicle beside its plan, or will. Where somebody else flies
-    /// it, nothing keeps it from coming down on others.
+    /// Whether this companion flies the vehicle off its plan, on a detour or to evade, or will.
+    /// False while a pilot or a failsafe flies it: nothing then keeps it from coming down on
+    /// others.
     fn is_detouring(&self) -> bool {
         use State::*;
         !matches!(self.mission.state(), Failsafe | PilotControl | PilotReturned | Aborted)
@@ -369,8 +370,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             _ => here,
         };
         let mut add = |point: Point| {
-            // With `MAX_POINTS` points the list is full: the rest is further than it flies before
-            // its next intent.
+            // With `MAX_POINTS` points the list is full: the other points are further ahead than
+            // the vehicle flies before its next intent.
             let _ = points.push(point);
         };
         let Some(plan) = self.mission.plan() else { return (points, true) };
@@ -414,7 +415,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 }
 
-/// Writes a message of the swarm's own.
+/// Writes a TUNNEL frame with one of the swarm's own payloads.
 fn encode_tunnel(header: frame::Header, payload: &[u8], out: &mut [u8]) -> usize {
     frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, payload, out)
 }

@@ -94,8 +94,8 @@ impl Guidance {
     }
 
     /// Place along its path up to which others expect an `alone` vehicle, metres: gates that opened
-    /// since may have led it beyond what it could report. ∞ for any other vehicle, in a coverage
-    /// mission, and with a known radio range, where they expect it further on.
+    /// since may have let it fly beyond what it could report. ∞ for any other vehicle, in a
+    /// coverage mission, and where the radio's range is known, so that others expect it further on.
     fn expected_up_to_m<const V: usize>(&self, alone: bool, neighbours: &Neighbours<V>) -> f32 {
         let expected = alone && neighbours.fleet().is_none() && !neighbours.knows_range();
         if expected { self.known_way.from_m.max(self.known_way.to_m) } else { f32::INFINITY }
@@ -111,7 +111,7 @@ impl Guidance {
         self.trapped_since = None;
     }
 
-    /// Forgets where the vehicle waits, and what it reports of that: somebody else flies it now.
+    /// Forgets where the vehicle waits and what it reports of that: guidance no longer moves it.
     pub(super) fn forget_waiting(&mut self) {
         self.cancel_evasion();
         self.hold_changed |= self.hold.end();
@@ -119,8 +119,8 @@ impl Guidance {
         self.trapped_since = None;
     }
 
-    /// Notes whether the vehicle is trapped below one that descends: no place is better, or the way
-    /// back is barred. `blocked`: a raw point of this step could not go back.
+    /// Notes whether the vehicle is trapped below one that descends: no place back along the path
+    /// is better, or the way back is barred. `blocked`: a raw point of this step could not go back.
     pub(super) fn mark_trapped(&mut self, blocked: bool, now: Instant) {
         let barred = blocked || (self.filter.scans_backwards() && self.filter.is_stopped());
         if self.no_better_place || (self.back_to_m.is_some() && barred) {

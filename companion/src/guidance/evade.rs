@@ -3,14 +3,15 @@
 //!
 //! A vehicle that left the plan and is still in the air is landed by its autopilot, which does not
 //! avoid others. No vehicle waits within [`EVADE_MARGIN_M`] beyond the safety distance of the
-//! column in which that one may come down (`neighbours.rs`). A vehicle that is to wait at a place
-//! in there waits at the nearest free place before it on its path; one that holds its place there
-//! flies back from where it stands. It came that way, so the way is free of walls. It comes no
-//! nearer to a vehicle behind it than [`TRAILING_VEHICLE_MARGIN_M`] beyond the safety distance.
+//! column in which such a vehicle may come down (`Neighbours::landing_column`). A vehicle that is
+//! to wait at a place in the column waits at the nearest free place before that place on its path;
+//! one that holds there already flies back. It came along that path, so the path is free of walls.
+//! It comes no nearer to a vehicle behind it than [`TRAILING_VEHICLE_MARGIN_M`] beyond the safety
+//! distance.
 //!
-//! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several
-//! steps: one for the column of one neighbour, a dozen among the most columns there can be; in
-//! theory six for each place, if each place is inside a column of its own.
+//! ENU metres. Cost: [`MAX_SEARCH_COST`] a step. A search takes one step for the column of one
+//! neighbour and a dozen steps for the most columns that there can be; in theory six steps for each
+//! place, if each place is inside another column.
 
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::KeepOutZone;
@@ -28,7 +29,7 @@ pub const EVADE_MARGIN_M: f32 = 0.6;
 const TRAILING_VEHICLE_MARGIN_M: f32 = 0.6;
 /// Spacing of the places along the path that are compared with the columns, metres.
 const PLACE_STEP_M: f32 = 0.25;
-/// Maximum number of places along the path that one search compares.
+/// Maximum number of steps of [`PLACE_STEP_M`] back along the path that one search takes.
 const MAX_PLACES: u16 = 48;
 /// Greatest cost of a search in one step: 1 for each neighbour and for each column, and
 /// [`PLACE_COST`] for each place.
@@ -36,8 +37,8 @@ const MAX_SEARCH_COST: u16 = 96;
 const PLACE_COST: u16 = 4;
 /// Greatest speed backward along a straight segment of the own path, m/s.
 const MAX_EVADE_MPS: f32 = 1.5;
-/// Greatest speed backward through a waypoint, m/s: at this speed the vehicle deviates from a right
-/// angle by 0.47 m.
+/// Greatest speed backward through a waypoint, m/s: at this speed the vehicle is up to 0.47 m off
+/// the path in a right-angled corner.
 const MAX_CORNER_MPS: f32 = 0.6;
 /// Acceleration backward along the path, m/s².
 const EVADE_MPS2: f32 = 1.0;
@@ -119,8 +120,8 @@ impl EvadeSearch {
 }
 
 /// One step of `dt_s` seconds back along the path towards `to_m`, after braking where the reference
-/// still moves forward. Returns the new raw point; `None`, without a step, if a neighbour is
-/// behind.
+/// still moves forward. Returns the new raw point; `None`, without a step, if a neighbour behind is
+/// too near.
 pub fn step_back<const W: usize>(
     path: &Path<W>,
     tracker: &mut ReferenceState,
@@ -192,18 +193,19 @@ mod tests {
         }
     }
 
-    /// The column of one that comes down from 8 m.
+    /// The column of a vehicle that comes down from 8 m.
     fn column(x: f32, y: f32, radius_m: f32) -> KeepOutZone {
         let (from, to) = (Point::new(x, y, 8.0), Point::new(x, y, 0.0));
         KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending }
     }
 
-    /// Result of a search for a place to wait at 9 m, and the steps that it takes.
+    /// Result of a search for a waiting place back from 9 m along the path, and the steps that it
+    /// takes.
     fn search(columns: &[KeepOutZone]) -> (EvadeTarget, usize) {
         let path = path();
         let mut search = EvadeSearch { found: EvadeTarget::Back(99.0), ..EvadeSearch::default() };
         for steps in 1.. {
-            // A neighbour gives up to 16.
+            // Each neighbour gives up to 16 columns.
             let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
             search.continue_search(&path, 9.0, 31, |i, visit| {
                 of(i).iter().for_each(|column| visit(*column));
@@ -228,7 +230,7 @@ mod tests {
             (EvadeTarget::Nowhere, 2),
             "nowhere is better"
         );
-        // A place to wait at that is no whole number of steps from the start of the path.
+        // A waiting place that is no whole number of steps from the start of the path.
         let mut search = EvadeSearch::default();
         search.continue_search(&path(), 1.1, 1, |_, visit| visit(column(2.1, 0.0, 2.0)));
         assert_eq!(search.found, EvadeTarget::Back(0.0), "its start is the last place");

@@ -1,11 +1,11 @@
-//! The geofence of the smoother: a box that no setpoint leaves, and that the follower keeps inside.
+//! The geofence of the smoother: a box that no setpoint leaves. The follower stops inside.
 //!
-//! A point keeps inside smoothly if it can always still stop: in each axis the distance that a stop
-//! takes, by a part of the vehicle's acceleration and jerk, is no longer than what is left to the
-//! wall. A step that would break this is replaced, in that axis, by the nearest one that does not
+//! A point stays inside smoothly if it can always still stop: in each axis the stopping distance,
+//! with a part of the vehicle's acceleration and jerk, is no longer than the distance to the wall.
+//! A step that would break this is replaced, in that axis, by the nearest one that does not
 //! ([`Fence::limit_jerk`]). The part is such that all three axes can brake at once: 1/√3 of the
-//! jerk for each, 1/√2 of the horizontal acceleration; the stop is planned with a little less,
-//! which pays for steps of finite length.
+//! jerk for each, 1/√2 of the horizontal acceleration; stops are planned with a little less, which
+//! pays for steps of finite length.
 //!
 //! ENU metres, seconds. Constant work.
 
@@ -16,7 +16,7 @@ use planner_core::Point;
 use super::limits::MotionLimits;
 use super::motion::{Motion, clamp_length};
 
-/// Distance by which setpoints keep inside the fence, metres: the autopilot's frame rounds a
+/// Distance by which setpoints stay inside the fence, metres: the autopilot's frame rounds a
 /// setpoint by up to 1.4 mm, 30 km from its origin.
 const FRAME_ROUNDING_M: f32 = 2e-3;
 /// Distance before the fence at which the follower turns, metres: steps of finite length overshoot
@@ -46,8 +46,8 @@ struct BrakingLimits {
 }
 
 impl Fence {
-    /// The mission's box, made smaller by what the autopilot's frame rounds, or by a quarter of its
-    /// size where it is thinner than that.
+    /// The mission's box, made smaller on each side by the rounding of the autopilot's frame, but
+    /// by no more than a quarter of its size.
     pub(super) fn new((low, high): (Point, Point)) -> Self {
         let slack = (high - low).map(|size| fminf(FRAME_ROUNDING_M, 0.25 * size));
         Self { low: low + slack, high: high - slack }
@@ -108,8 +108,8 @@ impl Fence {
                     continue;
                 }
                 (brakes[axis], changed) = (true, true);
-                // Away from the wall that it comes to: the acceleration that braking may take, if
-                // one step reaches it.
+                // Jerk away from the wall ahead: the acceleration that braking may use, if one step
+                // reaches it.
                 let (ahead, pace, push) = next(jerk[axis]);
                 let away = if walls.can_stop_below_high(ahead, pace, push) { 1.0 } else { -1.0 };
                 let part = JERK_SHARES[0] * most_mps3;

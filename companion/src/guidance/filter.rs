@@ -3,13 +3,13 @@
 //!
 //! In each step it compares the places that this vehicle can no longer avoid with those where each
 //! neighbour can be ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It
-//! continues once the next metre of its path is free. Of two vehicles, the one that yields also
-//! waits until 3 s of the other one's points are free, or that one stands. In a descent it flies
-//! back up its own column. The filter trusts no gates, progress or advice: gates only decide which
-//! of two vehicles goes first that have both stopped.
+//! continues once the next metre of its path is free. If it is the one of the two that yields, it
+//! also waits until the part of the neighbour's path flown in 3 s is free, or the neighbour stands.
+//! In a descent the vehicle that yields climbs back up its own column. The filter trusts no gates,
+//! progress or advice: gates only decide which of two stopped vehicles goes first.
 //!
-//! ENU metres. Cost: a bound for each neighbour, reachable sets for those within it; more than four
-//! of those stop the vehicle.
+//! ENU metres. Cost: a cheap bound for each neighbour, a reachable set for each one that may be
+//! within reach; more than four of those stop the vehicle.
 
 mod conflict;
 mod look;
@@ -34,18 +34,17 @@ const MAX_TURNING_SETPOINT_MPS: f32 = 0.05;
 /// A setpoint that is further than this behind the reference still flies forward along the path,
 /// metres.
 const MAX_TURNING_SETPOINT_M: f32 = 0.03;
-/// A vehicle nearer than this to its advised stop stands before it, metres: a little more than the
-/// distance that advice looks ahead.
+/// A vehicle nearer than this to its advised stop counts as standing there, metres: a little more
+/// than the distance that advice looks ahead.
 const STANDSTILL_WITHIN_M: f32 = 0.6;
-/// Time since the filter last kept the vehicle from continuing within which it still counts as
-/// kept.
+/// A vehicle that the filter kept from continuing within this time still counts as hindered.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
-/// Time for which the filter lets the vehicle fly after which a later stop begins a new count.
+/// Time without a hindrance by the filter after which the next one begins a new count.
 const FREE_AFTER: Duration = Duration::from_secs(5);
 /// A vehicle that yields in its descent climbs back up its column after standing for this long.
 const ABORT_DESCENT_AFTER: Duration = Duration::from_secs(1);
 
-/// A neighbour that may come nearer to this vehicle than the distance that is kept.
+/// A neighbour that may come nearer to this vehicle than the distance to be kept from it.
 struct FilterConflict {
     id: u8,
     yields: bool,
@@ -86,7 +85,7 @@ pub(crate) struct SafetyFilter {
     hindered_at: Instant,
     /// Whether this vehicle was to yield when the filter last kept it from continuing.
     hindered_yields: bool,
-    /// When the filter last kept the vehicle from continuing because of one that comes down
+    /// When the filter last kept the vehicle from continuing because of a neighbour that comes down
     /// unheard.
     fall_at: Instant,
     /// Number of times that the filter stopped the vehicle.
@@ -118,7 +117,7 @@ impl SafetyFilter {
     }
 
     /// Time for which the filter has kept the vehicle from continuing although the vehicle goes
-    /// first; zero once the last such step is `free` ago.
+    /// first; zero if it has not done so within the last `free`.
     pub(crate) fn blocked_for(&self, now: Instant, free: Duration) -> Duration {
         let blocked = !self.hindered_yields && now - self.hindered_at < free;
         if blocked { now - self.hindered_since } else { Duration::default() }
@@ -188,8 +187,8 @@ impl SafetyFilter {
         if hindered { now - self.hindered_since } else { Duration::default() }
     }
 
-    /// Time since the filter last kept the vehicle from continuing because of one that comes down
-    /// unheard: that one is soon out of its path.
+    /// Time since the filter last kept the vehicle from continuing because of a neighbour that
+    /// comes down unheard, and so is soon out of this vehicle's path.
     pub(crate) fn time_since_fall(&self, now: Instant) -> Duration {
         now - self.fall_at
     }
@@ -209,7 +208,7 @@ impl SafetyFilter {
         self.is_stopped() && (self.sets_intersect || !self.passes_stranger(now))
     }
 
-    /// Share of the nominal speed at which the vehicle may fly: less past a stranger.
+    /// Share of the nominal speed at which the vehicle may fly: less than 1 past a stranger.
     pub(super) fn speed_scale(&self, now: Instant) -> f32 {
         if self.passes_stranger(now) { PAST_STRANGER_SHARE } else { 1.0 }
     }

@@ -1,16 +1,18 @@
 //! The last stage of the smoother: a point that follows the curve and never exceeds the limits of
 //! acceleration and jerk.
 //!
-//! The curve is within the limits but for rare moments: corners that come close together, a clock
-//! that changes its speed in a corner. There the follower falls behind it by centimetres and comes
-//! up again. It integrates a jerk that is constant within a step, so the jerk of the *positions* is
-//! bounded too. Its acceleration moves towards a wanted one, inside a convex set of accelerations
-//! (a disc across, an interval upwards), by no more than the jerk allows: it cannot leave that set.
+//! The curve is within the limits except for rare moments: corners that come close together, a
+//! clock that changes its speed in a corner. There the follower lags the curve by centimetres and
+//! then catches up. It integrates a jerk that is constant within a step, so the jerk of the
+//! *positions* is bounded too. Its acceleration moves towards a wanted one, inside a convex set of
+//! accelerations (a disc horizontally, an interval vertically), by no more than the jerk allows: it
+//! cannot leave that set.
 //!
-//! Wanted is the curve's acceleration, and what leads back to its place and velocity: a critically
-//! damped loop. Its rate is such that a velocity is taken on from the greatest acceleration without
-//! more jerk than allowed ([`LOOP_RATE_SHARE`]): the limits do not make it swing. Where what it
-//! deviates from the curve would lead out of the geofence, it brakes before, by the same limits
+//! The wanted acceleration is the curve's, plus the feedback that leads back to the curve's place
+//! and velocity: a critically damped loop. The loop's rate ([`LOOP_RATE_SHARE`]) is low enough that
+//! an error of velocity is removed, starting from the greatest acceleration, without more jerk than
+//! allowed: so the limits do not make the loop oscillate. Where the deviation from the curve would
+//! lead out of the geofence, the follower brakes before the fence, by the same limits
 //! ([`super::fence`]).
 //!
 //! ENU metres, seconds. Constant work.
@@ -37,7 +39,7 @@ impl Motion {
         dt_s: f32,
     ) {
         let (velocity, before) = (self.velocity, self.acceleration);
-        // Place, and speed, at the end of the step if the acceleration goes over to the curve's.
+        // Place and velocity at the end of the step if the acceleration changes to the curve's.
         let place = self.position
             + velocity * dt_s
             + (before * 2.0 + to.acceleration) * (dt_s * dt_s / 6.0);

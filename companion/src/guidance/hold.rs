@@ -1,7 +1,7 @@
 //! A vehicle that stands reports that it will stay there, so that others may pass it closely.
 //!
-//! Of a vehicle heard to stand half a second ago, others must assume that it has begun to fly
-//! since. Two that stopped for each other would never continue. So a stopped vehicle reports no
+//! Others must assume that a vehicle that stood half a second ago has begun to fly since. Two
+//! vehicles that stopped for each other would never continue. So a stopped vehicle reports no
 //! points ahead of its setpoint. It does not move again until [`HOLD_REPORT_LIFETIME`] and the
 //! delay of its messages have passed since the last such report, by when the others have heard new
 //! points. The vehicle that yields reports its hold at once, the other one only after standing for
@@ -42,7 +42,7 @@ impl Hold {
         core::mem::replace(&mut self.on, on) != on
     }
 
-    /// Ends the hold: the vehicle is led by somebody else. Returns whether it was on.
+    /// Ends the hold: guidance no longer moves the vehicle. Returns whether it was on.
     pub(super) fn end(&mut self) -> bool {
         self.since = None;
         core::mem::take(&mut self.on)

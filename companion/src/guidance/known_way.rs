@@ -1,5 +1,5 @@
-//! What other vehicles know of this vehicle's way along its path: once unheard it lands where they
-//! expect it, though gates may have led it further.
+//! What other vehicles know of this vehicle's way along its path: once no vehicle hears it, it
+//! lands where they expect it, though gates may have let it fly further.
 
 use crate::time::Instant;
 

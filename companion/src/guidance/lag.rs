@@ -1,4 +1,4 @@
-//! The setpoint waits for a vehicle that lags behind it, and measures for how long in vain.
+//! The setpoint waits for a vehicle that lags behind it; how long it has waited in vain.
 
 use super::{ARRIVED_M, Guidance};
 use crate::autopilot::telemetry::Telemetry;
@@ -6,8 +6,9 @@ use crate::time::{Duration, Instant};
 use planner_core::Length;
 
 impl Guidance {
-    /// Share of its speed at which the setpoint advances: 1 up to half of the greatest lead over
-    /// the vehicle, 0 at all of it. `moves`: the vehicle is to fly on.
+    /// Share of the nominal speed at which the setpoint advances: 1 while its lead over the vehicle
+    /// is at most half of the greatest lead, 0 at the greatest lead. `moves`: the vehicle is to fly
+    /// on.
     pub(super) fn lag_share(&mut self, telemetry: &Telemetry, moves: bool, now: Instant) -> f32 {
         let place = self.smoother.position();
         let lead_m = self.lead_m(telemetry);

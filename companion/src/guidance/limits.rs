@@ -17,8 +17,8 @@ pub const MAX_URGENT_JERK_MPS3: f32 = 8.0;
 /// the autopilot's limit is lower.
 const MAX_SETPOINT_ACCEL_FACTOR: f32 = 1.5;
 
-/// Longest window of the smoother's moving averages, seconds: where a low limit of jerk would need
-/// a longer one, the acceleration is lowered.
+/// Longest window of the smoother's moving averages, seconds. Where a low jerk limit would need a
+/// longer window, the acceleration is lowered.
 pub(crate) const MAX_SMOOTHING_S: f32 = 1.2;
 /// Least time that is assumed until a vehicle that no other one hears has stopped, seconds.
 const UNHEARD_STOPPED_S: f32 = 3.0;
@@ -156,8 +156,7 @@ impl Settings {
 pub(crate) fn filter_bounds(track: &TrackConfig, fastest_mps: f32) -> MotionBounds {
     let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: MAX_URGENT_JERK_MPS3 };
     let speed_max_mps = fmaxf(track.cruise_mps, fastest_mps);
-    // Distance that an unheard vehicle flies until it has stopped, as the time for it at full
-    // speed.
+    // Distance that an unheard vehicle flies until it has stopped, expressed as time at full speed.
     let stopped_s = UNHEARD_NOTICED_S + braking.stop_m(speed_max_mps) / speed_max_mps;
     MotionBounds { braking, speed_max_mps, silent_s: fmaxf(UNHEARD_STOPPED_S, stopped_s) }
 }

@@ -6,7 +6,7 @@ use planner_core::flight::Path;
 
 use super::{Guidance, SETTLE_WINDOW_M};
 
-/// Distance along the path by which the place nearest to the setpoint may move at once, metres:
+/// Distance along the path by which the point nearest to the setpoint may jump in a step, metres:
 /// from one leg to the next where the setpoint rounds a corner, by 0.25 m at most.
 const CORNER_REACH_M: f32 = 0.5;
 /// Rounding of an arc length, metres: where the setpoint stands, its place must not creep.
@@ -14,8 +14,8 @@ const ROUNDING_M: f32 = 1e-3;
 /// A nearest point this close to the end of the path counts as its end, metres.
 const AT_PATH_END_M: f32 = 0.02;
 
-/// Arc length of the path's point nearest to `place`, searched `window_m` around `near_m`, metres;
-/// the path's length where that is less than 0.02 m away.
+/// Arc length of the path's point nearest to `place`, searched up to `window_m` to either side of
+/// `near_m`, metres; the path's length where that is less than 0.02 m away.
 pub(super) fn nearest_arc_length_m<const W: usize>(
     path: &Path<W>,
     place: &Point,
@@ -27,10 +27,10 @@ pub(super) fn nearest_arc_length_m<const W: usize>(
 }
 
 impl Guidance {
-    /// Follows the setpoint forward along the path: it has moved by at most a step of `dt_s` at
-    /// cruise speed since its place was last sought, and never beyond the reference. The setpoint
-    /// is up to 1.2 s of flight behind the reference, 18 m at 15 m/s. In a window of that length a
-    /// leg that is flown back over the one before would be found too early.
+    /// Follows the setpoint forward along the path. Since its place was last sought, the setpoint
+    /// has moved by at most a step of `dt_s` at cruise speed, and it is never beyond the reference.
+    /// It may be 1.2 s of flight behind the reference, 18 m at 15 m/s. A window of that length
+    /// could find a later leg too early, where that leads back over the one before.
     pub(super) fn follow_setpoint<const W: usize>(&mut self, path: &Path<W>, dt_s: f32) {
         let (from_m, along_m) = (self.setpoint_m, self.tracker.along_m);
         let reach_m = 0.5 * (CORNER_REACH_M + self.track.cruise_mps * dt_s);

@@ -25,8 +25,8 @@ impl Guidance {
     }
 
     /// Holds where the pilot left the vehicle, until the mission resumes; the place along the path
-    /// where the flight was interrupted is kept. Carried away from the end of its path, the vehicle
-    /// is no longer there: the ground below it is not that of the goal.
+    /// where the flight was interrupted is kept. If the pilot flew the vehicle away from the end of
+    /// its path, it is no longer at the end: the ground below it is not that of the goal.
     pub fn hold_after_pilot<const W: usize, const G: usize>(
         &mut self,
         point: Point,
@@ -100,8 +100,8 @@ impl Guidance {
         self.smoother.position()
     }
 
-    /// Whether the setpoint has come to the reference, at which a path aside begins: one that was
-    /// stopped short of it would first have to fly on.
+    /// Whether the setpoint has reached the reference, at which a path aside begins: a setpoint
+    /// that was stopped short of the reference would first have to fly on.
     pub(crate) fn is_setpoint_at_reference(&self) -> bool {
         libm::fabsf(self.tracker.along_m - self.setpoint_m) < SETTLED_M
     }
@@ -145,7 +145,8 @@ impl Guidance {
     }
 
     /// Resumes the flight after an interruption, from the setpoint, or from the vehicle where there
-    /// is none: up its climb, down its descent, or from the nearest point of the path on.
+    /// is none: up its climb (`climbs`), down its descent, or on from the nearest point of the
+    /// path.
     pub fn resume_flight<const W: usize, const G: usize>(
         &mut self,
         plan: &VehiclePlan<W, G>,
@@ -175,9 +176,9 @@ impl Guidance {
         self.start_following(now);
     }
 
-    /// Replaces the path by the way back to its first point, with the clearance of each leg. The
-    /// raw point may still move forward: the new path begins where it can have braked, and the raw
-    /// point at first moves backwards on it.
+    /// Replaces the path by the way back to its first point, each leg with its clearance. The raw
+    /// point may still move forward: the new path begins where it can have braked, and the raw
+    /// point at first moves backwards on the new path.
     pub fn reverse_path<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);

@@ -12,11 +12,11 @@ use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
-/// Speed up to which a vehicle's place is sought within three times the largest lead behind the
-/// reference, m/s.
+/// Cruise speed up to which the vehicle's place on the path is searched within three times the
+/// greatest lead behind the reference, m/s.
 const LAG_WINDOW_ABOVE_MPS: f32 = 2.0;
-/// Half of the additional distance behind the reference for each m/s above that, seconds: the
-/// setpoint's curve follows the reference by up to 1.2 s, and the vehicle that curve by 0.4 s.
+/// Half of the distance searched in addition for each m/s above [`LAG_WINDOW_ABOVE_MPS`], seconds:
+/// the setpoint's curve follows the reference by up to 1.2 s, and the vehicle that curve by 0.4 s.
 const LAG_WINDOW_S: f32 = 1.0;
 
 impl Guidance {
@@ -41,8 +41,8 @@ impl Guidance {
         self.track.cruise_mps
     }
 
-    /// Place along the plan's path up to which all gates are open, metres; −∞ for a vehicle that
-    /// flies back or a detour.
+    /// Place along the plan's path up to which all gates are open, metres; −∞ on the way back or on
+    /// a detour.
     pub(crate) fn gates_open_up_to_m<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -55,8 +55,8 @@ impl Guidance {
     }
 
     /// Arc length reported to neighbours, for their gates, metres: before and in the climb minus
-    /// the height still to climb, beyond the path's length in the descent. It never falls on one
-    /// path.
+    /// the height still to climb, in the descent beyond the path's length. On one path it never
+    /// falls.
     pub fn progress_m<const W: usize, const G: usize>(
         &self,
         state: State,
@@ -76,7 +76,8 @@ impl Guidance {
         let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
         let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
         if matches!(state, State::Disarm | State::Done) && self.has_reached_end(path) {
-            // One metre below the ground, so that every gate that waits for this flight opens.
+            // As if one metre below the ground, so that every gate that waits for this flight
+            // opens.
             return length_m + plan.descent_m + 1.0;
         }
         match self.phase {
@@ -112,7 +113,8 @@ impl Guidance {
         }
     }
 
-    /// Whether the reference has come to the end of a path that leads neither back nor aside.
+    /// Whether the reference has reached the end of a path that ends at the vehicle's goal: not
+    /// aside, not back on the plan's path, not back at the path's start.
     pub fn is_at_goal<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -122,7 +124,7 @@ impl Guidance {
             && scene.plan.is_some_and(|plan| self.has_reached_end(&plan.path))
     }
 
-    /// Whether the reference has come to the end of the path.
+    /// Whether the reference has reached the end of the path, wherever that leads.
     pub fn is_at_end<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,

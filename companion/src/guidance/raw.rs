@@ -18,8 +18,8 @@ use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
 impl Guidance {
-    /// Advances the raw point by a tick, and the phase where it is done. `blocked` is set if a step
-    /// back from below a vehicle that descends was not possible.
+    /// Advances the raw point by a tick, and the phase if the present one is done. Sets `blocked`
+    /// if a step back from below a vehicle that descends was not possible.
     #[expect(clippy::too_many_arguments, reason = "what a step knows")]
     pub(super) fn next_raw_point<const V: usize, const W: usize, const G: usize>(
         &mut self,
@@ -123,7 +123,8 @@ impl Guidance {
         if let Some(to_m) = self.back_to_m {
             let safety_m = self.deconflict.safety_distance_m;
             let near = neighbours.states_at(now);
-            // Back only if the filter has checked the path backwards, and found it free.
+            // The reference steps back only if the filter has checked the path backwards and found
+            // it free.
             let free = self.filter.scans_backwards() && !self.filter.is_stopped();
             if !free {
                 advice.stop_within_m = 0.0;
@@ -180,7 +181,7 @@ impl Guidance {
                     [from, to] => (to.position - from.position) / (to.along_m - from.along_m),
                     _ => Point::zeros(),
                 };
-                // Of the old leg's speed the part in the direction of the new one is kept.
+                // The component of the old leg's velocity along the new leg is kept.
                 let kept =
                     self.leg.as_ref().map_or(0.0, |old| course(old).dot(&course(&leg)).max(0.0));
                 let speed_mps = self.leg_tracker.speed_mps * kept;
@@ -235,8 +236,9 @@ impl Guidance {
         if scene.telemetry.kind == Some(AutopilotKind::Px4) { 0.0 } else { self.low_height_m }
     }
 
-    /// Whether setpoints lead the landing down in this step: once the setpoint stands, and no other
-    /// vehicle may be in the column. Leading ends at the lower end, or after 4 s without progress.
+    /// Whether setpoints lead the landing down in this step: once the setpoint stands, and while no
+    /// other vehicle may be in the column. Ends the guided landing at its lower end, or after 4 s
+    /// without progress.
     pub(super) fn update_guided_landing<const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -259,8 +261,9 @@ impl Guidance {
         self.guides_landing && self.phase == Phase::Descent && self.filter.column_clear()
     }
 
-    /// Share of the leg's speed for a descent: so that it is no faster than [`TOUCHDOWN_MPS`] from
-    /// `low_height_m` above the ground on. In that margin to walls the ground may already be.
+    /// Share of the leg's speed for a descent, such that it is no faster than [`TOUCHDOWN_MPS`]
+    /// from `low_height_m` above the ground on: within that margin to walls the real ground may
+    /// already lie.
     fn descent_scale<const W: usize, const G: usize>(
         &self,
         plan: &VehiclePlan<W, G>,

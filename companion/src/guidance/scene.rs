@@ -4,7 +4,7 @@ use planner_core::flight::VehiclePlan;
 
 use crate::autopilot::telemetry::Telemetry;
 
-/// Inputs of guidance beside its own state.
+/// Inputs of guidance in a step, other than its own state.
 pub struct GuidanceInputs<'a, const W: usize, const G: usize> {
     /// The path that the vehicle flies, with its gates; `None` without a path.
     pub plan: Option<&'a VehiclePlan<W, G>>,

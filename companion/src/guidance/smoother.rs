@@ -44,14 +44,16 @@ const MIN_WINDOW_TICKS: usize = 8;
 const JERK_RESERVE: f32 = 1.12;
 /// Number of raw steps that enter one value of both averages.
 const HISTORY_LEN: usize = 2 * MAX_WINDOW_TICKS - 1;
-/// Share of the jerk left by the curve that the clock takes: the clock's own steps are 50 ms long.
+/// Share of the jerk limit with which a stop by the clock is assumed to begin, in steps of 50 ms:
+/// the curve may need the rest.
 const CLOCK_JERK_SHARE: f32 = 0.7;
-/// Share of the jerk with which the end of a change of speed is planned: the curve may need the
-/// rest.
+/// Share of the jerk limit with which the end of a change of speed is planned: the curve may need
+/// the rest.
 const END_JERK_SHARE: f32 = 0.4;
 /// A setpoint slower than this stands, m/s.
 const SETPOINT_STANDSTILL_MPS: f32 = 0.01;
-/// Rate of decay at the end of a stop, 1/s: speed falls by this share of itself each second.
+/// Rate of decay at the end of a stop, 1/s: the deceleration is at most this times the speed that
+/// is left.
 const STOP_DECAY_PER_S: f32 = 4.0;
 /// Greatest speed of a setpoint that follows a vehicle under other control, m/s: a position that
 /// moves faster is an estimate that jumps.
@@ -196,12 +198,12 @@ impl SetpointSmoother {
         self.motion.acceleration
     }
 
-    /// The raw point: ahead of the setpoint by the steps that the averages still hold.
+    /// The raw point. It is ahead of the setpoint by the steps that the averages still hold.
     pub(crate) fn raw_point(&self) -> Point {
         self.raw
     }
 
-    /// Speed of the newest raw step, m/s: that of the setpoint T later, if the clock runs on.
+    /// Speed of the newest raw step, m/s: the setpoint has it T later, if the clock runs on.
     pub(crate) fn raw_speed_mps(&self) -> f32 {
         self.steps[self.newest_step].length() / TICK_S * self.clock_speed
     }
@@ -227,8 +229,8 @@ impl SetpointSmoother {
         self.velocity().norm_squared() < SETPOINT_STANDSTILL_MPS * SETPOINT_STANDSTILL_MPS
     }
 
-    /// Distance of a stop of the setpoint from now on, metres: until the braking has built up, and
-    /// the braking.
+    /// Length of a stop of the setpoint that begins now, metres: while the braking builds up, and
+    /// while the setpoint brakes. `urgent`: for the safety filter.
     pub(crate) fn stopping_distance_m(&self, urgent: bool) -> f32 {
         let velocity = self.velocity();
         let speed = sqrtf(velocity.norm_squared());
@@ -299,9 +301,10 @@ impl SetpointSmoother {
         self.last_sent = Some(self.position());
     }
 
-    /// Gives the setpoint the vehicle's velocity: it brakes from that, and comes back to its place.
-    /// The velocity is limited to 1.5 times that of the followed places, and so that it can stop
-    /// inside the fence.
+    /// Gives the setpoint the vehicle's velocity: the setpoint brakes from that, and returns to its
+    /// place. The velocity is limited to 1.5 times the followed velocity
+    /// ([`MAX_SPEED_OVER_FOLLOWED`]), to the speed limit, and so that the setpoint can stop inside
+    /// the fence.
     pub(crate) fn hold_with_velocity(&mut self, velocity: &Point) {
         let most_mps = fminf(
             self.limits.max_speed_mps(),
@@ -361,8 +364,9 @@ impl SetpointSmoother {
         due
     }
 
-    /// Takes the next raw point. One outside the fence is moved inside, one too far or not finite
-    /// leaves the raw point where it is; either makes [`Self::make_setpoint`] report it.
+    /// Takes the next raw point. One outside the fence is moved inside; one too far from the last,
+    /// or not finite, leaves the raw point where it is. Either makes [`Self::make_setpoint`] return
+    /// false.
     pub(crate) fn push_raw_point(&mut self, next: Point) {
         let step = self.nearest_inside_fence(next) - self.raw;
         let furthest = self.limits.max_speed_mps() * TICK_S + STEP_SLACK_M;

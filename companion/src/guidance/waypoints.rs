@@ -1,20 +1,20 @@
-//! P3D Algorithm 2, lines 10, 11 and 18 to 25, as printed: the waypoint a vehicle flies to, and the
-//! end of its path.
+//! Paper P3D, Algorithm 2, lines 10, 11 and 18 to 25, as printed: the waypoint that a vehicle flies
+//! to, and the end of its path.
 //!
 //! The vehicle flies straight to its current waypoint at the speed that lines 12 to 17 leave
-//! ([`planner_core::deconflict`]). The next one is loaded when the vehicle is nearer than
-//! `Wp_radius`; within that of the last the path is completed: speed 0, then it lands where it is.
-//! Nothing of our tracker is in it: no speed that follows from a corner's clearance, no reference
-//! that waits, no guided descent. The paper does not state `Wp_radius`.
+//! ([`planner_core::deconflict`]). The next waypoint is loaded once the vehicle is nearer than
+//! `Wp_radius` to the current one. That near to the last waypoint the path is completed: speed 0,
+//! then the vehicle lands where it is. Nothing of our tracker is used: no speed limit by a corner's
+//! clearance, no reference that waits, no guided descent. The paper does not state `Wp_radius`.
 
 use planner_core::flight::Path;
 use planner_core::{Length, Point};
 
-/// A waypoint is reached within this distance, metres: nearer than the referee requires, by the
-/// greatest error of an RTK estimate.
+/// `Wp_radius`, metres: a waypoint is reached within this distance. It is less than the referee's
+/// radius by the greatest error of an RTK estimate.
 const WP_RADIUS_M: f32 = 0.4;
 
-/// The paper's `nWaypoint`, and whether the path is completed.
+/// The paper's `nWaypoint`, the index of the current waypoint, and whether the path is completed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Algorithm2Waypoints {
     next: usize,
@@ -22,8 +22,8 @@ pub(super) struct Algorithm2Waypoints {
 }
 
 impl Algorithm2Waypoints {
-    /// One turn of the loop for a vehicle at `position`: the waypoint that the vehicle flies to;
-    /// `None` once the path is completed.
+    /// One turn of Algorithm 2's loop for a vehicle at `position`. Returns the waypoint that it
+    /// flies to; `None` once the path is completed.
     pub(super) fn next_waypoint<const W: usize>(
         &mut self,
         path: &Path<W>,

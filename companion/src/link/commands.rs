@@ -1,10 +1,10 @@
 //! Commands to the companion, by COMMAND_LONG or COMMAND_INT. They are decoded field by field: the
-//! crate rejects a whole message whose command it does not know, and that must still be answered
-//! UNSUPPORTED.
+//! `mavlink` crate rejects a whole message whose command it does not know, and such a command must
+//! still be answered UNSUPPORTED.
 //!
 //! A command counts on either link, if it is addressed to this vehicle's system id or to all (0),
-//! and to this component or to all (0). One that changes something counts only from a ground
-//! station that the mission names (`answer_limits`); from other senders it is DENIED. It is
+//! and to this component or to all (0). A command that changes something counts only from a ground
+//! station that the mission names (`answer_limits`); from other senders it is DENIED. A command is
 //! answered only if it names this system id: a broadcast acts on every vehicle, and none answers.
 //! An unknown command to all components belongs to another component and stays unanswered.
 

@@ -27,7 +27,7 @@ pub struct IntentEcho {
     pub rank: u8,
     /// MAVLink sequence number of the other vehicle's intent.
     pub sequence: u8,
-    /// Time from the reception of that intent to its echo, in 10 ms, at most 254.
+    /// Time from the reception of that intent to its echo, in units of 10 ms, at most 254.
     pub held: u8,
 }
 

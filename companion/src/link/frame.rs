@@ -1,19 +1,20 @@
 //! MAVLink framing: checked frames from received bytes, and bytes to send from messages.
 //!
 //! Source: MAVLink guide, "Packet Serialization" and "Message Signing". The `mavlink` crate gives
-//! the message types and their CRC seeds. Framing is our own: the crate's reader drops a frame of
-//! unknown id and then searches its payload for a start byte, and one false 0xFD there holds back
-//! every frame behind it.
+//! the message types and their CRC_EXTRA bytes. Framing is our own: the crate's reader drops a
+//! frame of unknown id and then searches its payload for a start byte, and one false 0xFD there
+//! holds back every frame behind it.
 //!
 //! One rule finds the frames of any stream. A candidate is a start byte with a plausible header
 //! whose message id the dialect knows. Of candidates that overlap, the first one with a correct
 //! checksum is the frame. A candidate with a wrong checksum costs only its start byte: the search
-//! continues with the next byte. So no garbage hides a whole frame behind it. Bytes without a
-//! checksum of ours are searched too: a frame of unknown id, and a signature, which is not
-//! verified. They do not count as noise.
+//! continues with the next byte. So no garbage hides a whole frame behind it. Bytes that no known
+//! CRC covers are searched too: a frame of unknown id, and a signature, which is not verified. They
+//! do not count as noise.
 //!
-//! An incomplete candidate holds back the bytes behind it for at most [`PARTIAL_LIFETIME`] after
-//! its own first byte and an eighth of that. Each byte costs O(1), after false start bytes O(267).
+//! An incomplete candidate holds back the bytes behind it for at most nine eighths of
+//! [`PARTIAL_LIFETIME`] after its own first byte. Each byte costs O(1), after false start bytes
+//! O(267).
 
 use crc::{CRC_16_MCRF4XX, Crc, Table};
 use heapless::Vec;
@@ -29,7 +30,7 @@ pub const MAX_FRAME_LEN: usize = 267;
 
 const V1_START: u8 = 0xFE;
 const V2_START: u8 = 0xFD;
-/// A deprecated message, the only one of the dialect whose CRC seed is 0.
+/// A deprecated message, the only one of the dialect whose CRC_EXTRA is 0.
 const COMPONENT_INFORMATION: u32 = 395;
 const FLAG_SIGNED: u8 = 0x01;
 const SIGNATURE_LEN: usize = 13;
@@ -321,9 +322,9 @@ fn is_start(byte: u8) -> bool {
     byte == V1_START || byte == V2_START
 }
 
-/// CRC-16/MCRF4XX of a frame without its start byte, then of its message's CRC seed. By a table of
-/// 8 kB, 16 bytes at a time: on a crowded radio the CRC is most of the work, and the `mavlink`
-/// crate computes it byte by byte.
+/// CRC-16/MCRF4XX of a frame without its start byte, then of its message's CRC_EXTRA. It uses a
+/// table of 8 kB, 16 bytes at a time: on a crowded radio the CRC is most of the work, and the
+/// `mavlink` crate computes it byte by byte.
 fn calculate_crc(frame: &[u8], extra_crc: u8) -> u16 {
     const CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MCRF4XX);
     let mut digest = CRC.digest();
@@ -332,8 +333,8 @@ fn calculate_crc(frame: &[u8], extra_crc: u8) -> u16 {
     digest.finalize()
 }
 
-/// The CRC seed of a message id; `None` if the dialect does not know the id. The crate returns 0
-/// for unknown ids, which is also the true seed of COMPONENT_INFORMATION.
+/// CRC_EXTRA of a message id; `None` if the dialect does not know the id. The crate returns 0 for
+/// unknown ids, which is also the CRC_EXTRA of COMPONENT_INFORMATION.
 pub fn extra_crc(message_id: u32) -> Option<u8> {
     let extra = MavMessage::extra_crc(message_id);
     (extra != 0 || message_id == COMPONENT_INFORMATION).then_some(extra)
@@ -367,8 +368,8 @@ pub fn encode_message(header: Header, message: &MavMessage, out: &mut [u8]) -> u
     encode_raw(header, id, MavMessage::extra_crc(id), &payload[..len], out)
 }
 
-/// As [`encode`], for a payload of at most 255 bytes that the caller has laid out: the crate's
-/// enums cannot hold it, as TUNNEL's private payload types. Trailing zeros are cut.
+/// As [`encode`], for a payload of at most 255 bytes that the caller has encoded, since the crate's
+/// types cannot hold it (such as TUNNEL's private payload types). Trailing zeros are cut.
 pub fn encode_raw(
     header: Header,
     message_id: u32,

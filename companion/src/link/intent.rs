@@ -13,10 +13,10 @@
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 | f32 | progress along the sender's own path, metres; negative while climbing |
 //! | 16 | f32 | place along the sender's path up to which its gates are open or will be, metres: it flies on to there though no other vehicle hears it; −1e6 if it may stop at once |
-//! | 20 | u32 | vehicles that the sender heard in the last seconds: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
+//! | 20 | u32 | vehicles that the sender heard in the last seconds: bit i for the vehicle of rank i, 0…31, in the roster sorted by system id |
 //! | 24 | f32 | height of the ground below the sender, as far as it knows, metres up in the mission frame |
 //! | 28 | u8 | bit 0: the sender climbs, descends or lands, or a pilot or a failsafe flies it, so that it may come down from where it is; bits 1–7: greatest delay, seconds, of the flight to the place at byte 16, by its gates and its climb, compared with a flight from its progress at 0.4 of the nominal speed |
-//! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long the sender held it in 10 ms; 0 for none |
+//! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long the sender held it, in units of 10 ms; 0 for none |
 //! | 32 | 12 × n | points that the sender flies along next: f32 east, north, up in the mission frame. They begin at its setpoint and lead to where it will stop for now. No points while a pilot or a failsafe flies it; the setpoint alone while it holds its place. Over an area corners of its path follow, as far as it flies on if no other vehicle hears it |
 //!
 //! A receiver rejects another version, NaN, and a system id that is not the sender's.
@@ -73,8 +73,8 @@ pub struct Intent {
     /// Place along the sender's path up to which its gates are open or will be, metres: it flies on
     /// to there though no other vehicle hears it.
     pub gates_open_up_to_m: f32,
-    /// Greatest delay of the flight to there, seconds, by gates and climb, compared with a flight
-    /// at 0.4 of the nominal speed; at most 127.
+    /// Greatest delay of the flight to `gates_open_up_to_m`, seconds, by gates and climb, compared
+    /// with a flight at 0.4 of the nominal speed; at most 127.
     pub unheard_delay_s: u8,
     /// Vehicles that the sender heard in the last seconds: bit i for rank i in the roster.
     pub heard_bits: u32,

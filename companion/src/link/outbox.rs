@@ -128,7 +128,7 @@ impl Outbox {
         QUEUE_DEPTH - self.queue.len()
     }
 
-    /// The MAVLink header of the link's next frame; counts the sequence number up.
+    /// The MAVLink header of the link's next frame; increments the sequence number.
     pub fn next_header(&mut self, system: u8) -> Header {
         let sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);

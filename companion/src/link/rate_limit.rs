@@ -3,10 +3,10 @@
 //! [`ARMED_BYTES_PER_S`] or [`DISARMED_BYTES_PER_S`] allow.
 //!
 //! State is sent at a fixed rate ([`state_bytes_per_s`]; in a coverage mission also
-//! [`COVERAGE_BYTES_PER_S`]). Everything else (acks, texts, parameters,
-//! files, messages requested by REQUEST_MESSAGE) takes tokens from a bucket that fills with time.
-//! So in any t seconds the radio gets at most t times the sum of these rates, plus
-//! [`MAX_SAVED_BYTES`], plus one frame, whatever is requested.
+//! [`COVERAGE_BYTES_PER_S`]). Everything else (acks, texts, parameters, files, messages requested
+//! by REQUEST_MESSAGE) takes tokens from a bucket that fills with time. So in any t seconds the
+//! radio gets at most t times the sum of these rates, plus [`MAX_SAVED_BYTES`], plus one frame,
+//! whatever is requested.
 
 use crate::link::frame::MAX_FRAME_LEN;
 use crate::time::Instant;
@@ -23,8 +23,8 @@ pub const DISARMED_BYTES_PER_S: u32 = 4500;
 pub const COVERAGE_BYTES_PER_S: u32 = 5 * (145 + 85) / 2 + 30 + 141;
 /// Capacity of the token bucket, bytes: a list of all parameters, or five texts.
 pub const MAX_SAVED_BYTES: u32 = 1000;
-/// Bytes of a GLOBAL_POSITION_INT with its frame; no other requested message that is composed when
-/// polled is longer.
+/// Bytes of a GLOBAL_POSITION_INT with its frame: the tokens that a requested message takes when it
+/// is requested. AUTOPILOT_VERSION is longer, and takes its own length when it is sent.
 pub(crate) const POSITION_BYTES: usize = 40;
 /// Bytes of a GLOBAL_POSITION_INT and of the longest intent, each with its frame.
 const STATE_BYTES: u32 = POSITION_BYTES as u32 + 145;

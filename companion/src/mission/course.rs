@@ -198,8 +198,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         commands::apply_command(&mut self.pending, self.state, inputs, command)
     }
 
-    /// Changes the state as a row says: `lands` while a place to land is sought. Returns the states
-    /// before and after.
+    /// Changes the state as a row says. `lands`: a place to land is being sought, so an
+    /// interruption resumes with a landing. Returns the states before and after.
     pub(crate) fn enter_state(
         &mut self,
         row: &TransitionRow,
@@ -409,8 +409,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Puts the detour `way` in place of the plan's path, which the vehicle leaves `along_m` metres
-    /// along it. Without gates and departure time; the climb becomes the height above the ground at
-    /// `ground_m`.
+    /// along it. Gates and departure time are cleared. The climb becomes the height of the detour's
+    /// start above the ground, which is at `ground_m`.
     pub(crate) fn switch_to_detour(
         &mut self,
         way: &VehiclePlan<W, G>,
@@ -430,8 +430,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Puts the vehicle's own plan in place again, after a detour that left its path at `left_m`
-    /// and came back at `back_m` metres along it. Returns the number of pictures between: they
-    /// count as not taken, since the detour's show another place.
+    /// and came back at `back_m` metres along it. Returns the number of pictures between the two
+    /// places: they count as not taken, since those from the detour show other ground.
     pub(crate) fn resume_own_path(
         &mut self,
         plan: &VehiclePlan<W, G>,
@@ -446,9 +446,9 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.pictures_before_rejoin.saturating_sub(taken(left_m))
     }
 
-    /// Replaces the path by the one that `turn` makes of it, back to the start, as the vehicle
-    /// leaves it `along_m` metres along it. That path is not of the shared plan: neighbours keep
-    /// clear of this vehicle as of a stranger.
+    /// Replaces the path, which the vehicle leaves `along_m` metres along it, by the path back to
+    /// the start that `turn` makes of it. The new path is not part of the shared plan: neighbours
+    /// keep clear of this vehicle as of one outside the plan.
     pub(crate) fn reverse_path(&mut self, along_m: f32, turn: impl FnOnce(&mut Path<W>)) {
         self.leave_path(along_m);
         if let Some(plan) = &mut self.plan {

@@ -4,7 +4,7 @@ use super::inputs::GuardInputs;
 use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
 use crate::time::Duration;
 
-/// Age up to which a position is known.
+/// Age from which a position counts as unknown.
 pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500);
 /// Time without progress after which a vehicle at the geofence no longer waits for room below: its
 /// landing is held then, and it flies back.
@@ -122,7 +122,7 @@ pub enum Guard {
     PathDone,
     /// The vehicle has made no progress along its path for the limit.
     Stalled,
-    /// For the limit the vehicle has not come to its setpoint, nor has the setpoint moved on:
+    /// For the limit the vehicle has not reached its setpoint, nor has the setpoint moved on:
     /// something holds the vehicle, or carries it away.
     Unfollowed,
     /// DO_PAUSE_CONTINUE 0 (pause).
@@ -185,9 +185,10 @@ pub enum Guard {
     /// The column below was occupied for the limit (5 s by a vehicle that rests for good), and the
     /// vehicle can turn back along its path to the pad.
     NoRoomToLand,
-    /// Before take-off: the column above the pad has not been free for the limit.
+    /// Before take-off: the column above the pad has been occupied for the limit.
     ColumnBlocked,
-    /// In a coverage mission, on the pad without a part: no vehicle will leave one to it any more.
+    /// In a coverage mission, on the pad without a part of the area: the vehicle will not get a
+    /// part any more.
     ReserveEnds,
     /// In a coverage mission, on the pad: a vehicle above the pad or an obstacle on the path has
     /// barred the start for the limit, and another vehicle that takes part flies.
@@ -201,8 +202,8 @@ pub enum Guard {
     /// The column below was occupied for the limit (5 s by a vehicle that rests for good), and a
     /// place aside to land at may be sought.
     NoRoomHere,
-    /// For the limit the descent to its pad on the way home was blocked by any vehicle, or the way
-    /// home, or the end of a coverage path, by one that rests for good.
+    /// For the limit any vehicle has blocked the descent to the pad on the way home, or one that
+    /// rests for good has blocked the way home or the descent at the end of a coverage path.
     PadTaken,
     /// A place aside to land at was sought, but none exists, or the shell has not answered within
     /// the limit.
@@ -245,8 +246,8 @@ pub enum Guard {
     NoWayAround,
     /// Several searches found no detour, and the vehicle can turn back along its path to the pad.
     NoWayOn,
-    /// For longer than the limit the vehicle has waited below one that lands, with no better place
-    /// along its path.
+    /// For longer than the limit the vehicle has waited below one that lands, without a place along
+    /// its path to evade to.
     Underneath,
     /// Setpoint and vehicle stand.
     Standing,
@@ -255,14 +256,14 @@ pub enum Guard {
     /// The waypoints that this vehicle's plan is to leave out have changed since the plan was
     /// requested.
     MoreIsDone,
-    /// In a coverage mission: the lease has ended, and the limit has passed since.
+    /// In a coverage mission: the limit has passed since 1 s before the end of the lease.
     LeaseLost,
-    /// The division has not become binding within the limit, nor within a minute from when a lost
-    /// vehicle is down.
+    /// The division has not become binding within the limit, nor within a minute after the last
+    /// lost vehicle must be down.
     NotDivided,
     /// A pause is commanded in a climb that has not left the ground: the landing detector has not
-    /// reported flight, and the vehicle has not risen. Otherwise a report of ground may be false,
-    /// and disarming a fall.
+    /// reported flight, and the vehicle has not risen. Later a report of ground may be false, and
+    /// the vehicle would fall when disarmed.
     PausedBeforeLiftOff,
     /// The safety filter has barred for the limit a climb that has not left the ground, as in
     /// [`Guard::PausedBeforeLiftOff`].
@@ -279,7 +280,7 @@ pub enum Guard {
 }
 
 /// Age of the last HEARTBEAT from which the autopilot counts as silent: HEARTBEAT comes at 1 Hz,
-/// and one late is not yet silence.
+/// and a late one is not yet silence.
 pub(super) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 
 impl Guard {

@@ -18,15 +18,16 @@ pub struct GuardInputs {
     /// Time since this vehicle last made progress along its path; zero in states other than
     /// `Follow` and `Blocked`.
     pub stalled_for: Duration,
-    /// Time for which this vehicle has neither come to its setpoint nor its setpoint moved on.
+    /// Time for which this vehicle has not reached its setpoint, nor its setpoint moved on.
     pub unfollowed_for: Duration,
-    /// Time since this vehicle's path was first found blocked at the place beyond which it has not
-    /// come since, even if the path was clear meanwhile.
+    /// Time since this vehicle's path was first found blocked about where it was last found
+    /// blocked, even if it was clear meanwhile.
     pub blocked_for: Duration,
     /// Time for which this vehicle has heard no neighbour, or none has reported that it hears this
     /// vehicle, in this state; zero once all have landed or left the plan.
     pub neighbour_age: Duration,
-    /// Whether all lost vehicles have been down for a minute: from then on a division is due.
+    /// Whether all lost vehicles must have been down for a minute: a division under way is then
+    /// overdue.
     pub division_overdue: bool,
     /// Whether this vehicle may fly on unheard: all others are out of radio range, and its next
     /// gate is open or none is left.
@@ -34,7 +35,7 @@ pub struct GuardInputs {
     /// Whether all other vehicles that still fly were last heard near the edge of the radio range.
     pub out_of_range: bool,
     /// Whether in the last second a neighbour was heard, and one reported that it hears this
-    /// vehicle; in a coverage mission a majority of them.
+    /// vehicle; in a coverage mission, whether a majority reported that.
     pub neighbour_heard: bool,
     /// Whether other vehicles have divided this vehicle's share of the area, or count this vehicle
     /// as lost.
@@ -79,7 +80,8 @@ pub struct GuardInputs {
     pub start: bool,
     /// Whether DO_PAUSE_CONTINUE 0 is pending.
     pub pause: bool,
-    /// Whether the climb has only begun.
+    /// Whether the climb has only begun: the vehicle is less than 1 m, and less than half the
+    /// climb, above its pad.
     pub lifting_off: bool,
     /// Whether DO_PAUSE_CONTINUE 1 is pending.
     pub resume: bool,
@@ -103,7 +105,7 @@ pub struct GuardInputs {
     pub own_plan_ready: bool,
     /// Whether the rest of its own plan could not be planned for this vehicle, back on its path.
     pub own_plan_lost: bool,
-    /// Whether this vehicle seeks a path home, over the heights of the ground, or flies one.
+    /// Whether this vehicle seeks a path home over the field of heights, or flies one.
     pub homeward: bool,
     /// Time for which this vehicle has sought its path home; `None` if it seeks none.
     pub seeking_home_for: Option<Duration>,

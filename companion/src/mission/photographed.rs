@@ -1,12 +1,12 @@
 //! The waypoints of an area that are known to be photographed, by any vehicle, in earlier flights
 //! and before restarts, so that a new start flies the rest.
 //!
-//! It is a set that only grows, so lost, repeated and reordered reports do no harm. Before it
-//! starts, a vehicle adds what all others on the ground know, so that all plan the rest of the same
-//! set. Where others already fly, it takes the set that their plans leave out. A start waits while
-//! another plan is heard. In flight the vehicle notes what it photographs and what others report,
-//! for its next start. An area that is photographed as a whole is begun again: that is another
-//! round, and waypoints of earlier rounds do not count.
+//! Their set only grows, so lost, repeated and reordered reports do no harm. Before it starts, a
+//! vehicle adds the waypoints that all others on the ground know, so that all plan the same rest of
+//! the area. Where others already fly, it takes the set that their plans leave out. A start waits
+//! while another plan is heard. In flight the vehicle notes what it photographs and what others
+//! report, for its next start. An area that is photographed as a whole is begun again: that is
+//! another round, and waypoints of earlier rounds do not count.
 
 use planner_core::flight::{Path, PicturePlan, WaypointRange, WaypointSet};
 
@@ -65,8 +65,9 @@ impl PhotographedWaypoints {
         self.left_out_by_plan = self.known.clone();
     }
 
-    /// The flash record to be written now. `None` unless 10 more waypoints are known than in the
-    /// last record (`STORE_EVERY_WAYPOINTS`), with `at_once` one more, or fewer.
+    /// The flash record to be written now. `None` unless at least 10 more waypoints
+    /// (`STORE_EVERY_WAYPOINTS`; with `at_once` one more) are known than in the last record, or
+    /// fewer than in it.
     pub(crate) fn record_to_store(
         &mut self,
         mission_crc: u32,
@@ -81,7 +82,7 @@ impl PhotographedWaypoints {
         }
         self.stored_count = count;
         let mut kept = store::PhotographedRecord::new();
-        // Both fit: mission CRC, round and the most ranges are no longer than a block.
+        // All fit: mission CRC, round and the most ranges are no longer than a block.
         let _ = kept.extend_from_slice(&mission_crc.to_le_bytes());
         let _ = kept.push(self.round);
         self.known
@@ -120,9 +121,9 @@ impl PhotographedWaypoints {
         self.known.count()
     }
 
-    /// Notes that the vehicle leaves its pad. If the known set was the whole area, the plan is for
-    /// all of it again and a new round begins, unless a vehicle that left before has reported that
-    /// round.
+    /// Notes that the vehicle leaves its pad. If the waypoints to be left out were the whole area,
+    /// the plan covers all of it again and a new round begins, unless a vehicle that left before
+    /// has reported that round.
     pub(crate) fn leave_pad(&mut self, photographs: &PicturePlan) {
         self.has_flown = true;
         let whole = photographs.area_waypoint_count() > 0
@@ -152,7 +153,8 @@ impl PhotographedWaypoints {
     }
 
     /// Handles another vehicle's report of photographed waypoints. `waits`: this vehicle stands on
-    /// the ground and must plan as those in flight do; `plans`: and as those on the ground do.
+    /// the ground and must plan as those in flight do; `plans`: it must also plan as those on the
+    /// ground do.
     pub(crate) fn handle_report(
         &mut self,
         report: &PhotographedReport,
@@ -188,7 +190,8 @@ impl PhotographedWaypoints {
         }
     }
 
-    /// Leaves out of the next plan what the plan of a vehicle leaves out that has already started.
+    /// Leaves out of the next plan the waypoints that are left out by the plan of a vehicle that
+    /// has already started.
     fn adopt_plan_of(&mut self, report: &PhotographedReport, now: Instant) {
         self.followed_at = Some(now);
         if self.left_out_by_plan.ranges() != &report.ranges[..] {
@@ -199,8 +202,8 @@ impl PhotographedWaypoints {
     }
 
     /// This vehicle's next report: 19 ranges (`MAX_RANGES`) of the known waypoints in turn. In
-    /// flight every other report has the waypoints that the plan leaves out, if one report holds
-    /// them.
+    /// flight every other report has the waypoints that the plan leaves out, if they fit into one
+    /// report.
     pub(crate) fn next_report(&mut self, waits: bool, flies: bool) -> PhotographedReport {
         let plan =
             flies && !self.reports_plan && self.left_out_by_plan.ranges().len() <= MAX_RANGES;

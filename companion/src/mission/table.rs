@@ -1,5 +1,5 @@
-//! The rows of the mission's transition table; [`crate::mission`] explains states, guards and
-//! actions.
+//! The rows of the mission's transition table; [`State`], [`Guard`] and [`Action`] explain their
+//! terms.
 
 use super::guard::Guard;
 use super::row::{AT_ONCE, Action, TransitionRow, state_mask};
@@ -76,7 +76,7 @@ const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 /// Time for which the column above the pad may be occupied after the gates have opened, before
 /// arming; then the start goes back to waiting. Meanwhile arming is not requested.
 const COLUMN_BLOCKED_MOST: Duration = Duration::from_millis(200);
-/// Time for which a vehicle may neither come to its setpoint nor its setpoint move on; then
+/// Time for which a vehicle may not reach its setpoint while the setpoint does not move on; then
 /// something holds the vehicle or carries it away, and it lands.
 pub(crate) const UNFOLLOWED_MOST: Duration = secs(20);
 /// Time for which the start of a vehicle in a coverage mission may be barred; then it leaves its
@@ -122,7 +122,7 @@ pub(crate) const ON_PATH_WITH_POSITION: &[State] =
 pub(crate) const FLYING_BEFORE_LANDING: &[State] =
     &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping];
 
-/// States of [`FLYING`] in which the autopilot was heard last.
+/// States of [`FLYING`] in which the autopilot does not count as silent.
 pub(crate) const FLYING_LINKED: &[State] = &[
     TakeOff,
     Climb,
@@ -146,7 +146,8 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(FLYING,              G::ModeTaken,       AT_ONCE,    PilotControl, A::None,             "Pilot has control: mission stopped"),
     warning_row(&[Land, Disarm],     G::FailsafeActs,    AT_ONCE,    Failsafe,    A::None,              "Autopilot failsafe while landing"),
     warning_row(&[Land, Disarm],     G::ModeTaken,       AT_ONCE,    PilotControl, A::None,             "Pilot has control: landing stopped"),
-    // Once armed it may be in the air, or be flown from there: it is given back as from a flight.
+    // Once armed the vehicle may be in the air, or be flown on by its pilot: these rows act as in
+    // flight.
     warning_row(&[Arming, CancelStart], G::FailsafeActsArmed, AT_ONCE, Failsafe,  A::None,              "Autopilot failsafe: setpoints stopped"),
     warning_row(&[Arming, CancelStart], G::ModeTakenArmed, AT_ONCE,  PilotControl, A::None,             "Pilot has control: mission stopped"),
     warning_row(ON_PAD,              G::FailsafeActs,    AT_ONCE,    Aborted,     A::ForgetStart,       "Failsafe before take-off: start cancelled"),
@@ -267,7 +268,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Climb],            G::BarredBeforeLiftOff, secs(4), CancelStart, A::RequestDisarming, "Vehicle above the pad: start waits"),
     info_row(&[Climb, Follow, Alone, Blocked, Replanning, Dividing], G::PauseCommanded, AT_ONCE, Paused, A::BrakeOnPath, "Paused"),
     warning_row(&[Follow, Blocked, Dividing], G::NeighboursSilent, secs(1), Alone, A::BrakeOnPath,      "Neighbours silent: stopping"),
-    // Others take what they do not hear to be down after a while: no state keeps it up longer.
+    // Neighbours assume after a while that an unheard vehicle is down: no state keeps it up longer.
     warning_row(&[Paused, AutopilotSilent], G::NeighboursSilent, secs(20), Land,  A::RequestLandMode,   "Neighbours silent while it stands: landing"),
     warning_row(&[TakeOff, Climb],   G::LeaseLost,       secs(20),   Land,        A::RequestLandMode,   "Neighbours silent in the climb: landing"),
     warning_row(&[Follow],           G::PadTaken,        secs(20),   Replanning,  A::RequestLanding,    "No room to land: seeking a place aside"),

@@ -1,5 +1,5 @@
-//! The table against its copy in the README, and against itself: every state reachable, left again,
-//! and texts that fit.
+//! Checks the table against its copy in docs/table.md, and that every state can be reached and
+//! left, and that all texts fit.
 
 extern crate std;
 use std::fmt::Write;
@@ -44,10 +44,10 @@ fn printed() -> String {
     out
 }
 
-/// How the inputs show an interruption.
+/// Sets the inputs that an interruption changes.
 type Shows = fn(&mut GuardInputs);
 
-/// What may interrupt a state.
+/// The interruptions: name, and change of the inputs.
 const INTERRUPTIONS: &[(&str, Shows)] = &[
     ("pause", |i| i.pause = true),
     ("resume", |i| i.resume = true),
@@ -92,7 +92,8 @@ pub(crate) fn quiet(state: State) -> GuardInputs {
     i
 }
 
-/// The page: the table, and where each interruption of each state leads.
+/// The text of docs/table.md: the table, and the state to which each interruption of each state
+/// leads.
 fn page() -> String {
     let mut out = String::from(
         "# The mission's table\n\nGenerated from `companion/src/mission/table.rs` by the test `the_page_prints_this_table`; \
@@ -153,7 +154,8 @@ fn every_state_is_reached_and_every_wait_ends() {
             .any(|row| row.to == TargetState::State(*state) && !row.from.contains(state));
         assert!(reached || *state == WaitAutopilot, "{state:?} is never reached");
         let timed = |row: &&TransitionRow| row.from.contains(state) && row.min_duration > AT_ONCE;
-        // On the ground, disarmed, waiting for a person, an autopilot or a neighbour may last.
+        // On the ground, disarmed, a state that waits for the operator, the autopilot or a
+        // neighbour needs no limit.
         let patient = [WaitAutopilot, WaitPosition, Ready, Scheduled, Done, Aborted];
         assert!(
             TABLE.iter().any(|row| timed(&row)) || patient.contains(state),
@@ -165,7 +167,7 @@ fn every_state_is_reached_and_every_wait_ends() {
     }
 }
 
-/// Inputs under which a guard holds for ever, everything else quiet.
+/// Inputs under which this guard is met for any limit, and as few others as possible.
 fn inputs_for(guard: Guard) -> GuardInputs {
     let long = Duration::from_secs(3600);
     let mut i = GuardInputs { armed: true, landing: true, ..GuardInputs::default() };
@@ -306,7 +308,8 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
     for row in TABLE {
         for from in row.from {
             let mut inputs = inputs_for(row.guard);
-            // Where a position or an autopilot heard already moves on, they are not known yet.
+            // Where a known position or an autopilot that is heard would take another row, they are
+            // not known yet.
             match (from, row.guard) {
                 (PositionLost, G::BackOnPath | G::BackOffPath)
                 | (AutopilotSilent, G::AutopilotHeard) => {}
@@ -328,7 +331,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
             if row.guard == G::NoHeartbeat {
                 inputs.heartbeat_age = Duration::from_secs(3600);
             }
-            // On the pad, where it should be.
+            // The vehicle is at its pad, unless the guard says otherwise.
             inputs.at_pad |= !matches!(row.guard, G::AwayFromPad | G::StartElsewhere);
             let taken = first_applicable_row(*from, &inputs).expect("a row");
             assert!(core::ptr::eq(taken, row), "{from:?} with {:?}: {}", row.guard, taken.text);

@@ -1,7 +1,7 @@
 //! Two kinds of waits of a vehicle: for another one that has not started, reported so that the
 //! operator sees why the swarm waits; and on its own pad while something bars its start.
 //!
-//! Constant work.
+//! Each call does constant work.
 
 use crate::time::{Duration, Instant};
 

@@ -1,5 +1,5 @@
 //! The planner of coverage missions: from the area in the mission file to the flights of all
-//! vehicles (CPP §3).
+//! vehicles (paper CPP §3).
 
 use core::fmt;
 
@@ -45,11 +45,11 @@ pub struct Workspace<const X: usize, const L: usize, const K: usize> {
     planned: Planned,
 }
 
-/// Which plan a workspace holds, together with the flights that were planned in it: a further
-/// division begins from there, not from the whole area again.
+/// Identifies the plan that a workspace and the flights planned with it hold: a further division
+/// starts from that plan instead of planning the whole area again.
 #[derive(Clone, Copy, PartialEq, Eq)]
 struct Planned {
-    /// Number of plans that led to it, the one before take-off included; 0 if there is none.
+    /// Number of plans up to this one, the one before take-off included; 0 if there is no plan.
     plans: u32,
     /// CRC of the inputs of all these plans.
     inputs_crc: u32,
@@ -100,7 +100,7 @@ pub enum Error {
     Coverage(CoverageError),
     /// The flights cannot be planned.
     Plan(PlanError),
-    /// The mission has uneven ground, and its field of heights is missing or another one.
+    /// The mission has uneven ground, and its field of heights is missing or is not the mission's.
     NoField,
 }
 
@@ -168,8 +168,8 @@ fn packing_vehicle(
         cruise_mps: libm::fminf(mission.header().cruise_mps, vehicle.speed_max_mps),
         climb_mps: share.map_or(0.0, |s| s.climb_mps),
         descend_mps: share.map_or(0.0, |s| s.descend_mps),
-        // Otherwise weights are sizes of parts, not of vehicles: whoever flies on after a loss gets
-        // an equal share.
+        // With `Anyone` the weights are sizes of parts, not of vehicles: after a loss each vehicle
+        // that flies on gets an equal share.
         weight: match view.header().parts {
             PartEligibility::SameWeight => share.map_or(0.0, |s| s.weight),
             PartEligibility::Anyone => 1.0,
@@ -184,9 +184,10 @@ pub struct Request<'a, 'm> {
     pub mission: &'a MissionView<'m>,
     /// The coverage block of the mission.
     pub view: &'a CoverageView<'m>,
-    /// The field of heights on this computer, if any; it counts only if its CRC is the mission's.
+    /// The field of heights on this computer, if any; it is used only if its CRC is the mission's
+    /// `roadmap_crc`.
     pub field: Option<FieldView<'m>>,
-    /// Most gates that one vehicle has room for.
+    /// Most gates that one vehicle's plan has room for.
     pub max_gates: usize,
     /// Waypoints that are photographed already, as ranges of their numbers along all lanes.
     pub photographed: &'a [WaypointRange],
@@ -226,8 +227,9 @@ fn read_area<'a, const X: usize>(
     Area::new(vertices, rings).map_err(CoverageError::Area)
 }
 
-/// Plans one vehicle's detour over the area: its way home, aside, or back to its path. It keeps
-/// clear of all `obstacles`, above the field, and out of no-fly zones, which may have `C` corners.
+/// Plans one vehicle's detour over the area: its way home, aside, or back to its path. The detour
+/// keeps clear of all `obstacles`, stays above the field of heights and out of no-fly zones, which
+/// may have `C` corners.
 ///
 /// # Errors
 /// [`PlanFailure`] says why there is no detour.
@@ -301,8 +303,8 @@ fn division_inputs_crc(before: u32, inputs: &[DivisionInput]) -> u32 {
 /// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` has for each
 /// division so far the inputs of all vehicles, by the rank of their system ids.
 ///
-/// Where `ws` and `out` still hold the plan of the first of these divisions, only the later ones
-/// are computed; the result is the same.
+/// Where `ws` and `out` still hold the plan after the first few of these divisions, only the later
+/// ones are computed; the result is the same.
 ///
 /// # Errors
 /// The error says why there is no plan.
@@ -327,7 +329,7 @@ pub fn plan_flights<
     let mut transit = Transit::<C>::empty();
     transit.set_area(area)?;
     let (vehicles, pads) = read_fleet::<K>(mission, view, &area)?;
-    // A failure leaves neither plan.
+    // After a failure the workspace counts as holding no plan.
     let planned = core::mem::replace(&mut ws.planned, Planned::NOTHING);
     let mut wanted = Planned { plans: 1, inputs_crc: start_inputs_crc(request), plan_crc: out.crc };
     let mut known = u32::from(planned == wanted);
@@ -377,7 +379,7 @@ pub fn plan_flights<
             PartEligibility::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
             PartEligibility::Anyone => {
                 let shares: Vec<f32, K> = view.shares().map(|share| share.weight).collect();
-                // Here weights are sizes of parts, which any vehicle may get.
+                // With `Anyone` the weights are sizes of parts, which any vehicle may get.
                 pack::binpat_by_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
             }
         }

@@ -6,9 +6,9 @@
 //! the client chooses the session id (`mavftp` writes to it before the reply to its open); CRC-32
 //! starts at 0 and is not inverted; the last packet of a burst is marked.
 //!
-//! Requests may be lost, repeated and overtaken. Those that a repetition does no harm (read, list,
-//! write of the same bytes at the same offset) are executed again. Those that it would harm (open,
-//! close, remove, reset) are remembered and only answered again (`ftp/memory.rs`). A client that
+//! Requests may be lost, repeated and overtaken. Requests that may safely be executed twice (read,
+//! list, write of the same bytes at the same offset) are. The others (open, close, remove, reset)
+//! are remembered, and a repetition only gets the same answer (`ftp/memory.rs`). A client that
 //! opens its session again before it wrote keeps that session. A request that cannot be executed
 //! now is not answered: the client repeats it. There is one session at a time, and one request at a
 //! time; others wait in a short queue. A reply that needs the flash is sent when the flash is done.
@@ -68,7 +68,8 @@ struct Session {
     used_at: Instant,
 }
 
-/// Operation that the server executes; the flag is whether the store has taken the read.
+/// Operation that the server executes; the flag of `Read` and `Sum`: whether the store has accepted
+/// the read.
 #[derive(Clone, Copy, Debug)]
 enum FtpOperation {
     Nothing,
@@ -428,7 +429,7 @@ impl Ftp {
     }
 
     /// Opens a session in place of the client's own or an idle one. False, with a NAK, if another
-    /// client uses one.
+    /// client uses the session.
     fn open_session(
         &mut self,
         request: &Request,

@@ -1,9 +1,9 @@
 //! The tunables of one vehicle as MAVLink parameters: names, ranges, defaults, and their record in
 //! flash.
 //!
-//! All are sent as REAL32, since ground tools decode parameters by the autopilot's kind. Settings
-//! that the whole swarm must share are in the mission file instead. A changed value takes effect
-//! once the vehicle is disarmed and idle; a changed system id only after a restart.
+//! All are sent as REAL32, since ground tools decode integers differently for each autopilot kind.
+//! Settings that the whole swarm must share are in the mission file instead. A changed value takes
+//! effect once the vehicle is disarmed and idle; a changed system id only after a restart.
 
 use crate::config::{Config, REACHES_ALL_M};
 

@@ -30,7 +30,7 @@ impl Ground {
         Self { bench, flash, sequence: 0 }
     }
 
-    /// Sends a message by a link; the frames that come back by it.
+    /// Sends a message on a link. Returns the frames that come back on that link.
     fn ask<M: MessageData>(&mut self, link: Link, message: &M) -> Vec<Frame> {
         let header = Header { system: GROUND.0, component: GROUND.1, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
@@ -162,7 +162,7 @@ fn a_restart_is_asked_of_the_shell_unless_armed() {
         (reboot(0.0, 1.0, crate::COMPANION_COMPONENT), Some(MavResult::MAV_RESULT_ACCEPTED), 1),
         (reboot(0.0, 1.0, 0), Some(MavResult::MAV_RESULT_ACCEPTED), 1),
         (reboot(2.0, 0.0, crate::COMPANION_COMPONENT), Some(MavResult::MAV_RESULT_DENIED), 0),
-        // The autopilot's.
+        // This command is for the autopilot.
         (reboot(1.0, 0.0, 0), None, 0),
     ] {
         let heard = ground.ask(Link::Autopilot, &message);
@@ -179,7 +179,7 @@ fn a_restart_is_asked_of_the_shell_unless_armed() {
 fn a_flying_companion_asks_for_no_erasure() {
     let mut ground = Ground::new();
     ground.bench = Bench::following(config());
-    // A flash as it comes: everything would have to be erased.
+    // A flash as delivered: all areas would have to be erased.
     let mut flash = Flash::new(1);
     ground
         .bench

@@ -3,9 +3,9 @@
 //!
 //! The file is little-endian, has a version, and ends with a CRC-32; `companion/README.md` lists it
 //! byte by byte. Lengths are metres, speeds m/s, points east, north, up in the mission frame.
-//! Companions compare its CRC by radio. It covers the roadmap's CRC, so vehicles with the same CRC
-//! compute the same plan. What each vehicle may choose for itself (own speed limit, tolerances) is
-//! a parameter instead.
+//! Companions compare the file's CRC by radio. The file holds the roadmap's CRC, so vehicles with
+//! the same CRC compute the same plan. What each vehicle may choose for itself (own speed limit,
+//! tolerances) is a parameter instead.
 //!
 //! [`MissionView::parse`] checks the whole file once, in O(vehicles² + goals); afterwards every
 //! accessor returns numbers in range, whatever the bytes were.

@@ -70,8 +70,9 @@ pub struct Store {
 }
 
 impl Store {
-    /// Reads the flash: which slots hold complete files, and the last complete records of mission
-    /// and parameters. It reads whole slots to check their CRC, so it takes milliseconds.
+    /// Reads the flash: which slots hold complete files, and the last complete records of mission,
+    /// parameters and photographed waypoints. It reads whole slots to check their CRC, so it takes
+    /// milliseconds.
     pub fn mount(layout: FlashLayout, flash: &mut impl ReadFlash) -> Self {
         let slots = [0, 1].map(|i| area::read_condition(&layout, FlashArea::Slot(i), flash));
         let mut store = Self {
@@ -181,8 +182,8 @@ impl Store {
     }
 
     /// Starts reading up to `len` bytes of a file (at most [`MAX_READ`], fewer at the file's end).
-    /// False if the file ends before `offset`, or the store is at work; then it is to be called
-    /// again.
+    /// False if the file ends before `offset`, or if the store is at work: in that case it is to be
+    /// called again.
     pub fn request_read(&mut self, file: File, offset: u32, len: usize) -> bool {
         let Some(extent) =
             self.file_range(file).filter(|extent| offset < extent.end - extent.start)
@@ -195,7 +196,7 @@ impl Store {
     }
 
     /// Starts computing the CRC-32 of a whole file, beginning with `state`. False if there is no
-    /// such file, or the store is at work; then it is to be called again.
+    /// such file, or if the store is at work: in that case it is to be called again.
     pub fn request_crc(&mut self, file: File, state: u32) -> bool {
         let Some(extent) = self.file_range(file) else { return false };
         self.start_read(FlashJob::Sum { at: extent.start, end: extent.end, sum: state })

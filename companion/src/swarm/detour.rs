@@ -1,25 +1,24 @@
 //! Detours around vehicles that left the plan, and around reported obstacles: which vehicles count
-//! as out of the plan, whether something blocks the path, and the turn to fly a detour.
+//! as out of the plan, whether something blocks the path, and whose turn it is to fly a detour.
 //!
 //! A vehicle that is out of the plan (landed elsewhere, with its pilot for good, or silent for so
 //! long that it counts as dead) opens every gate that waits for it, and is an obstacle where it
-//! rests. A vehicle whose path it blocks, or which was out itself and may fly again, stops and
-//! waits until all others are out of the plan, or stand and wait too. Then the blocked one with the
-//! lowest system id requests a detour from its shell and flies it to its goal. Meanwhile it reports
-//! the progress at which it left the plan: vehicles that wait for it go on waiting, so it flies
-//! alone. Once it has landed it is out of the plan, and the next may go.
-//!
+//! rests. A vehicle whose path is blocked by it, or which was out itself and may fly again, stops
+//! and waits until all others are out of the plan, or stand and wait too. Then the blocked vehicle
+//! with the lowest system id requests a detour from its shell and flies it to its goal. Meanwhile
+//! it reports the progress at which it left the plan: vehicles that wait for it go on waiting, so
+//! it flies alone. Once it has landed it is out of the plan, and the next may go.
 //! Two vehicles must not begin a detour at once, each before it hears of the other. So a turn is
 //! claimed first: for [`TURN_CLAIM`], longer than messages take, the vehicle reports that its path
 //! is blocked and no longer that it waits. It begins only if all others wait then; a vehicle that
 //! hears a lower system id claim waits again.
 //!
-//! The place of a vehicle that is out is compared with the whole path before its gates open, and
-//! from then on twice a second: [`MAX_STRETCHES_PER_STEP`] stretches of the path a step, so a scan
-//! with many vehicles takes several steps.
+//! The place of a vehicle that is out of the plan is compared with the whole path before its gates
+//! open, and from then on twice a second, with [`MAX_STRETCHES_PER_STEP`] stretches of the path a
+//! step, so a scan with many vehicles takes several steps.
 //!
-//! Over an area there is no roadmap and no turn: a stopped vehicle flies around the obstacle and
-//! back to its path ([`beside`]), or home ([`homeward`]). ENU metres.
+//! In a coverage mission there is no roadmap and no turn: a stopped vehicle flies around the
+//! obstacle and back to its path ([`beside`]), or home ([`homeward`]). ENU metres.
 
 pub(crate) mod asking;
 mod beside;
@@ -112,8 +111,8 @@ pub(crate) struct Detours {
     /// Whether a further search is useless: no other vehicle will move any more, or searches from
     /// this place have failed for [`GIVE_UP_AFTER_S`].
     no_retry: bool,
-    /// Number of failed searches from about this place, the place along the path, metres, and the
-    /// times of the first and of the last anywhere.
+    /// Number of failed searches from about the same place; that place along the path, metres; and
+    /// the times of the first of them and of the last failed search anywhere.
     failures_here: u8,
     failed_at_m: f32,
     failed_since: Instant,
@@ -199,8 +198,8 @@ impl Detours {
         self.left_plan
     }
 
-    /// First free place along the path in a coverage mission beyond the block, metres, for the end
-    /// of a detour; `None` if there is none.
+    /// First free place along the path beyond the block in a coverage mission, metres, where a
+    /// detour can end; `None` if there is none.
     pub(crate) fn rejoin_m<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -208,8 +207,8 @@ impl Detours {
         beside::first_rejoin_m(view, self.obstacles.all())
     }
 
-    /// Whether the vehicle, in the air in a coverage mission, is on its plan's path, or beside it
-    /// on a detour that leads back to it.
+    /// Whether the vehicle, in the air in a coverage mission, is on its plan's path, or on a detour
+    /// that leads back to that path.
     pub(crate) fn keeps_to_plan_over_area<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -447,8 +446,8 @@ impl Detours {
                 Some(obstacle) => visit(*obstacle),
                 None => neighbours.for_each_new_zone_of(source - new.len(), now, apart_m, visit),
             },
-            // Over an area only the path just ahead counts: the vehicle goes on taking pictures
-            // until it is near the obstacle.
+            // In a coverage mission only the path just ahead counts: the vehicle goes on taking
+            // pictures until it is near the obstacle.
             |obstacle| {
                 let until_m = match view.config.lost_vehicle_down_s {
                     Some(_) => view.guidance.stopping_point_m().max(0.0) + beyond_m,
@@ -475,7 +474,7 @@ impl Detours {
         let wait_s = ALL_STAND_S
             + TURN_DELAY_S * view.neighbours.blocked_count_before(view.config.system_id)
             + DETOUR_RETRY_S * u64::from(self.failures);
-        // Over an area vehicles take no turns.
+        // In a coverage mission vehicles take no turns.
         self.blocked
             && self.may_search_again(view.now)
             && view.config.lost_vehicle_down_s.is_none()

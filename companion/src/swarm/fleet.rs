@@ -3,12 +3,13 @@
 //!
 //! Each vehicle keeps an entry for every vehicle of the roster. Entries only grow and are merged by
 //! maximum, so lost, repeated and reordered messages do no harm. Where a vehicle is lost or leaves,
-//! each of the others reports once how far it still flies along its path: its promise. It holds
-//! there. From the entries all compute the same division, report its hash, and fly on once all that
-//! live have reported the same hash and hold ([`Fleet::step`]). A vehicle photographs only while it
-//! has its lease: within [`LEASE`] a majority reported that they hear it. Others take its part no
-//! sooner than [`SILENT_AFTER`] after each of them last heard it. Why no waypoint has two owners is
-//! in `docs/coverage.md`, claim by claim; `tests/tests/fleet_model` searches it.
+//! each of the others reports once its commitment: the place along its path up to which it still
+//! flies, and where it then holds. From the entries all compute the same division, and report its
+//! hash. Once all that live have reported the same hash and hold, the division is binding, and all
+//! fly on ([`Fleet::step`]). A vehicle photographs only while it has its lease: within [`LEASE`] a
+//! majority reported that they hear it. Others take its part no sooner than [`SILENT_AFTER`] after
+//! each of them last heard it. Why no waypoint has two owners is in `docs/coverage.md`, claim by
+//! claim; `tests/tests/fleet_model` searches for a counterexample.
 
 use heapless::Vec;
 use planner_core::file::CRC32;
@@ -26,17 +27,17 @@ mod timeouts;
 pub use division_input::{DivisionInput, DivisionInputs};
 pub use timeouts::{FleetTimeouts, LEASE, LEASE_HEARD_WITHIN, SILENT_AFTER};
 
-/// Time of flight for which a vehicle promises to fly on, seconds: up to the last picture that it
-/// takes within it. A vehicle whose path ends before its route requests a division this long before
-/// that end.
+/// Time of flight up to a vehicle's commitment, seconds: it commits itself to fly to the last
+/// picture that it takes in that time. A vehicle whose path ends before its route requests a
+/// division this long before that end.
 pub const COMMITMENT_S: f32 = 10.0;
 /// Maximum number of divisions of a mission; after the last one the waypoints that a vehicle leaves
 /// stay unphotographed.
 pub const MAX_DIVISIONS: usize = 12;
-/// Silence of another vehicle after which it may be lost, and get no part: this one waits for that
-/// before it comes down.
+/// Silence after which a vehicle may be lost, and get no part in a division: the others wait above
+/// their pads until that is decided.
 pub(crate) const MISSED_AFTER: Duration = Duration::from_secs(3);
-/// Silence of a vehicle that was in flight after which it has landed, whatever it flew on.
+/// Silence of a vehicle that was in flight after which it has landed, however it flew on.
 const LANDED_AFTER_SILENCE: Duration = Duration::from_secs(1800);
 /// Number of distinct incarnations, the counts of a vehicle's flights: 3 bits.
 const INCARNATIONS: u8 = 8;
@@ -54,11 +55,13 @@ pub struct OwnReport {
     pub division: usize,
     /// Progress along its path, decimetres.
     pub progress_dm: u16,
-    /// Place where this vehicle would hold if it promised now, decimetres along its path.
+    /// The commitment that this vehicle would report now, decimetres along its path: where it would
+    /// hold. `None` if it cannot make one.
     pub commitment_dm: Option<u16>,
-    /// Whether this vehicle stands where it promised to hold.
+    /// Whether this vehicle holds at its commitment.
     pub holds: bool,
-    /// Whether this vehicle's path, the first part of its route, ends soon: all are to divide.
+    /// Whether this vehicle's path, the first part of its route, ends soon, so that all are to
+    /// divide.
     pub wants_division: bool,
 }
 
@@ -78,7 +81,7 @@ pub struct MemberReception {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 struct FleetMember {
     entry: RosterReportEntry,
-    /// Whether the member was alive when the last division became binding: then it has a part.
+    /// Whether the member has a part: it was alive when the last division became binding.
     in_roster: bool,
     /// When the member was last heard, by this vehicle or by one that this vehicle hears.
     heard_at: Instant,
@@ -214,7 +217,7 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// One step: updates this vehicle's entry, the reception of the others, the lease, and the
-    /// division under way.
+    /// division under way. `hearing` returns the reception of the vehicle of a rank.
     pub fn step(
         &mut self,
         now: Instant,
@@ -247,12 +250,13 @@ impl<const V: usize> Fleet<V> {
                 let down_at = member.heard_at + self.limits.down;
                 self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
             }
-            // One that hears no majority is to land, and leaves its part, as its lease ends.
+            // A vehicle that hears no majority is to land, and leaves its part, as its lease ends.
             let cut_off = lately && !Self::is_majority_of(heard.hears | bit, counted);
             self.any_missing |= (silence >= MISSED_AFTER || cut_off) && member.takes_part();
             if silence >= self.limits.silent {
                 self.hear_flight &= !bit;
-                // A majority has counted it as lost, so it has landed; or its battery is empty.
+                // A majority has counted the vehicle as lost, so it has landed; or its battery is
+                // empty.
                 let lost = member.entry.status == MemberStatus::Lost;
                 if (lost && silence >= self.limits.down) || silence >= LANDED_AFTER_SILENCE {
                     self.in_flight &= !bit;
@@ -284,8 +288,8 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Whether another vehicle is in flight, as far as this one has heard, or as one that it hears
-    /// has. A vehicle that fell silent in flight may still fly.
+    /// Whether another vehicle is in flight, as far as this one has heard, or as a vehicle that it
+    /// hears has heard. A vehicle that fell silent in flight may still fly.
     fn knows_flight(&self) -> bool {
         self.heard_flights() | self.hear_flight & !self.own_bit() != 0
     }
@@ -312,9 +316,9 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Whether a division is under way: a vehicle was lost or left, or one has promised where to
-    /// hold. A promise binds until a division does, even if the lost vehicle turns out to have
-    /// finished: others may already count on it.
+    /// Whether a division is under way: a vehicle was lost or left, or one has reported its
+    /// commitment. A commitment binds until a division does, even if the lost vehicle turns out to
+    /// have finished: others may already count on it.
     pub fn is_dividing(&self) -> bool {
         let asks = |m: &FleetMember| match m.entry.status {
             MemberStatus::Alive => m.entry.commitment_dm.is_some(),
@@ -330,8 +334,8 @@ impl<const V: usize> Fleet<V> {
         self.members[rank].takes_part()
     }
 
-    /// Computes the inputs of the division, once all vehicles that live have promised, and this
-    /// vehicle has not heard the lost ones for [`SILENT_AFTER`] either.
+    /// Computes the inputs of the division, once all vehicles that live have reported commitments,
+    /// and this vehicle has not heard the lost ones for [`SILENT_AFTER`] either.
     fn prepare_division_inputs(&mut self, now: Instant) {
         let known = |m: &FleetMember| match m.entry.status {
             MemberStatus::Alive => m.entry.commitment_dm.is_some(),
@@ -366,7 +370,8 @@ impl<const V: usize> Fleet<V> {
         self.hash == 0 && !self.division_inputs.is_empty()
     }
 
-    /// The inputs of every binding division, and of the one under way where that is to be computed.
+    /// The inputs of every binding division, and of the one under way where its hash is still to be
+    /// computed.
     pub fn inputs_of_divisions(&self) -> impl Iterator<Item = &[DivisionInput]> + Clone {
         let under_way = self.needs_division().then_some(&self.division_inputs);
         self.divisions.iter().chain(under_way).map(|inputs| &inputs[..])
@@ -441,7 +446,8 @@ impl<const V: usize> Fleet<V> {
         self.members.len()
     }
 
-    /// Hash of the inputs of all binding divisions, and of the one that is to be computed.
+    /// Hash of the inputs of all binding divisions, and of the one under way if that is to be
+    /// computed.
     pub fn division_hash(&self) -> u32 {
         let mut digest = CRC32.digest();
         for input in self.inputs_of_divisions().flatten() {
@@ -451,8 +457,8 @@ impl<const V: usize> Fleet<V> {
         digest.finalize()
     }
 
-    /// Place where this vehicle promised to hold, decimetres along its path, while a division is
-    /// under way; `None` before its promise.
+    /// This vehicle's commitment, the place where it is to hold, decimetres along its path, while a
+    /// division is under way; `None` before it was reported.
     pub fn commitment_dm(&self) -> Option<u16> {
         self.members[usize::from(self.own)].entry.commitment_dm.filter(|_| self.is_dividing())
     }
@@ -475,8 +481,9 @@ impl<const V: usize> Fleet<V> {
     }
 }
 
-/// The status that counts for another plan or division than that of the report: one that had
-/// finished its part then may have another part now, so it counts as having left.
+/// The status that counts in this plan and division; `same`: the report is of the same ones. A
+/// vehicle that had finished its part in an earlier one may have another part now: it counts as
+/// having left.
 fn status_in_division(standing: MemberStatus, same: bool) -> MemberStatus {
     if standing == MemberStatus::Finished && !same { MemberStatus::Left } else { standing }
 }

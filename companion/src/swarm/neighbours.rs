@@ -1,10 +1,10 @@
 //! The neighbours as last heard on the swarm link, one entry for each system id, in the mission
 //! frame.
 //!
-//! From the byte to the speed scale: GLOBAL_POSITION_INT → [`Neighbours::handle_position`] → ENU in
-//! [`Neighbour::position`]; TUNNEL → [`Neighbours::handle_intent`] → [`Neighbour::progress_m`];
-//! [`Neighbours::states_at`] computes the ages, and `planner_core::deconflict::advise` computes the
-//! speed scale from the result.
+//! Data flow from received bytes to the speed scale: GLOBAL_POSITION_INT →
+//! [`Neighbours::handle_position`] → ENU in [`Neighbour::position`]; TUNNEL →
+//! [`Neighbours::handle_intent`] → [`Neighbour::progress_m`]; [`Neighbours::states_at`] computes
+//! the ages, and `planner_core::deconflict::advise` computes the speed scale from the result.
 
 mod bounds;
 mod contact;
@@ -63,7 +63,7 @@ pub struct Neighbours<const V: usize> {
     fleet: Option<Fleet<V>>,
     /// Heights of the ground of an area that is not level.
     ground: Option<Ground>,
-    /// Silence after which a vehicle is on the ground.
+    /// Silence after which a lost vehicle is assumed to be on the ground.
     down_after: Duration,
     /// Distance by which two vehicles in the air in a coverage mission may be nearer than their
     /// estimates say, metres; 0 in other missions.
@@ -73,10 +73,10 @@ pub struct Neighbours<const V: usize> {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// A table of the roster's vehicles, sorted by id, without the own one; none of them was heard
-    /// yet. Their progress is believed to grow no faster than `fastest_mps`, or than they land, and
-    /// unheard no slower than a share of `slowest_mps`: of the whole mission's vehicles, since what
-    /// one reports and another makes of it must agree.
+    /// A table of the vehicles of `roster`, which is sorted by id, without this one; none of them
+    /// was heard yet. Their progress is believed to grow no faster than `fastest_mps` or the speed
+    /// of a landing, and, while unheard, no slower than a share of `slowest_mps`. Both are speeds
+    /// of the whole mission, so that all vehicles judge a report alike.
     pub fn new(roster: &[RosterEntry], own_id: u8, slowest_mps: f32, fastest_mps: f32) -> Self {
         let mut table = Self {
             contacts: Vec::new(),
@@ -108,7 +108,7 @@ impl<const V: usize> Neighbours<V> {
         table
     }
 
-    /// Sets this vehicle's position, and the range of the radio, metres.
+    /// Sets this vehicle's position, ENU, and the range of the radio, metres.
     pub(crate) fn set_place(&mut self, place: Point, radio_range_m: f32) {
         let all = radio_range_m >= REACHES_ALL_M;
         self.range_edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
@@ -239,8 +239,8 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether an intent of `id` is newer than its last one, by the sequence number. To be called
-    /// only for an intent that decodes and is of our mission: what anybody can send must not make
-    /// the next true one look late. Positions carry a time instead.
+    /// only for an intent that decodes and is of our mission: a message that anybody can send must
+    /// not make the next genuine one look late. Positions are ordered by their time instead.
     pub fn accept_intent(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
             let contact = &mut self.contacts[at];
@@ -252,8 +252,8 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Handles a neighbour's position. It is that of the roster's vehicle only if that has lately
-    /// sent an intent of our mission; else it is a stranger's.
+    /// Handles a position sent by `id`. It counts as that of the roster's vehicle only if that
+    /// vehicle has lately sent an intent of our mission; otherwise as that of a stranger.
     pub fn handle_position(
         &mut self,
         now: Instant,
@@ -287,7 +287,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Handles a neighbour's intent. It counts only from a vehicle of the roster with our mission's
-    /// CRC, its progress only with our plan's CRC. `rank` is our own.
+    /// CRC, its progress only with our plan's CRC. `rank` is this vehicle's.
     pub fn handle_intent(
         &mut self,
         now: Instant,
@@ -319,7 +319,7 @@ impl<const V: usize> Neighbours<V> {
         }
         let out = contact.reports(OUT_OF_PLAN) && contact.position_at.is_some();
         contact.out_since = contact.out_since.or(Some(now)).filter(|_| out);
-        // From rank 32 on there is no bit: this vehicle counts as heard.
+        // From rank 32 on there is no bit: this vehicle counts as heard by the neighbour.
         if rank >= 32 || intent.heard_bits & (1 << rank) != 0 {
             contact.hears_us_at = Some(now);
         }
@@ -355,7 +355,7 @@ impl<const V: usize> Neighbours<V> {
                 continue;
             }
             let state = Neighbour {
-                // Of a vehicle known by relays alone, only the progress is known.
+                // Of a vehicle known only by relays, only the progress is known.
                 position: placed_at.map_or(FAR_AWAY, |_| contact.state.position),
                 age_s: placed_at.map_or(0.0, |at| (now - at).as_secs_f32()),
                 rank: contact.rank,
@@ -410,7 +410,8 @@ impl<const V: usize> Neighbours<V> {
         self.fleet().is_some_and(|fleet| fleet.has_lease(now))
     }
 
-    /// An echo of a neighbour's last intent, for the next own intent: of each neighbour in turn.
+    /// An echo of a neighbour's last intent, for this vehicle's next intent; the neighbours take
+    /// turns.
     pub(crate) fn next_echo(&self, turn: usize, now: Instant) -> Option<IntentEcho> {
         let contact = self.contacts[..self.roster_count].get(turn % self.roster_count.max(1))?;
         IntentEcho::new(contact.rank, contact.intent_sequence, now - contact.intent_at?)
@@ -438,7 +439,7 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.is_empty()
     }
 
-    /// Forgets what holds for an older plan only: the scan's result, avoided vehicles, relayed
+    /// Forgets what holds only for an older plan: the scan's result, avoided places, relayed
     /// progress and open gates.
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;

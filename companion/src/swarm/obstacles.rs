@@ -11,7 +11,8 @@ use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
 pub(crate) const MAX_OBSTACLES: usize = 16;
 /// Greatest radius of a reported obstacle, metres: a wrong digit must not close a whole building.
 pub(crate) const MAX_OBSTACLE_RADIUS_M: f32 = 20.0;
-/// Centres nearer than this are those of one obstacle, reported or revoked again, metres.
+/// Centres nearer than this to each other are of the same obstacle, reported or revoked again,
+/// metres.
 const SAME_OBSTACLE_M: f32 = 0.1;
 
 /// Reported obstacles; the first `avoided` of them are avoided by the detour that is flown.
@@ -41,10 +42,10 @@ impl Obstacles {
         }
     }
 
-    /// Handles the command that reports an obstacle; returns the MAV_RESULT. The place is its
-    /// centre, ENU about `origin`, `param1` its radius, metres, to which the required clearance is
-    /// added. A radius that is not above zero revokes the obstacle there. It stays until revoked,
-    /// or until the companion starts again: a wall does not go away by itself.
+    /// Handles the command that reports an obstacle; returns the MAV_RESULT. The command's place is
+    /// the centre, `param1` the radius, metres, to which the required clearance is added; `origin`
+    /// is the mission frame's. A radius of zero or less revokes the obstacle there. An obstacle
+    /// stays until revoked, or until the companion starts again: a wall does not go away by itself.
     pub(crate) fn handle_command(
         &mut self,
         command: &Command,

@@ -1,10 +1,10 @@
-//! Does one of many keep-out zones meet a condition? A scan that is asked a few zones at a time, so
-//! that a control step takes no longer with more neighbours.
+//! An incremental scan: whether one of many keep-out zones meets a condition. Each control step
+//! tests a few zones, so that it takes no longer with more neighbours.
 //!
-//! The zones ([`KeepOutZone`]) come from sources: a neighbour gives up to 16. A step tests as many
-//! as its budget pays for, the next step continues from there. One zone that meets the condition
-//! ends the scan with yes, and the next scan begins with its source: an obstacle on the path mostly
-//! stays there. The scan ends with no after all zones were tested.
+//! The zones ([`KeepOutZone`]) come from sources, such as neighbours, of which each gives up to 16.
+//! A step tests as many as its budget pays for; the next step continues from there. One zone that
+//! meets the condition ends the scan with yes, and the next scan begins with that zone's source: an
+//! obstacle on the path mostly stays there. The scan ends with no after all zones were tested.
 
 use planner_core::detour::KeepOutZone;
 
@@ -22,10 +22,10 @@ pub struct IncrementalScan {
 
 impl IncrementalScan {
     /// Continues the scan. `visit` calls back with each zone of a source; a zone costs `each` of
-    /// `budget`, a source 1. Returns `Some(true)` at the first zone that `is_in_the_way`,
-    /// `Some(false)` when no zone of all `sources` is; the next call begins a new scan. `None` when
-    /// the budget is spent; it has to be at least `each`. Where the number of sources changes, the
-    /// scan begins again.
+    /// `budget`, a source 1. Returns `Some(true)` at the first zone for which `is_in_the_way`
+    /// holds, `Some(false)` when it holds for no zone of all `sources`; the next call begins a new
+    /// scan. Returns `None` when the budget, of at least `each`, is spent. The scan restarts where
+    /// the number of sources changes.
     pub fn continue_scan(
         &mut self,
         sources: usize,
@@ -79,7 +79,7 @@ mod tests {
 
     use super::*;
 
-    /// Seven sources of so many things; the first number of a thing is its source's, the second its
+    /// Numbers of zones of seven sources. The x coordinate of a zone is its source's index, y its
     /// own.
     const THINGS: [usize; 7] = [0, 3, 16, 0, 1, 0, 2];
 
@@ -90,7 +90,7 @@ mod tests {
         }
     }
 
-    /// The answer where the thing `at` is on the path, and the steps it took.
+    /// The answer where the zone `at` is on the path, and the number of steps that it took.
     fn ask(sweep: &mut IncrementalScan, each: u16, at: Option<(f32, f32)>) -> (bool, usize) {
         for steps in 1.. {
             let mut budget = 5;

@@ -1,4 +1,4 @@
-//! What decisions about detours are made from, and the place that a vehicle reports to the others.
+//! The inputs of decisions about detours, and the place that a vehicle reports to the others.
 
 use planner_core::Point;
 
@@ -11,7 +11,7 @@ use crate::mission::course::Mission;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
-/// References to the companion's parts by which decisions about detours are made.
+/// The inputs of decisions about detours: references to parts of the companion.
 pub(crate) struct DetourView<'a, const V: usize, const W: usize, const G: usize> {
     pub(crate) now: Instant,
     pub(crate) config: &'a Config<V>,

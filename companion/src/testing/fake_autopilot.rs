@@ -103,8 +103,8 @@ pub struct Bench {
     idle_since: Option<Instant>,
     pub origin: Geodetic,
     pub answer_plan: Option<Result<Plan, crate::PlanFailure>>,
-    /// Answer of the shell to a request for a detour: with `Ok` a path by y = 16, over a field one
-    /// that is planned; `None`: no answer.
+    /// Answer of the shell to a request for a detour: with `Ok` a fixed path by y = 16 m, or a
+    /// planned one if the detour leads home; `None`: no answer.
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Whether the shell answers requests for a division.
     pub answer_division: bool,

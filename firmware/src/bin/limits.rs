@@ -1,6 +1,6 @@
 //! Test program: calls every public function of planner-core with extreme and invalid arguments on
-//! a board. It runs in QEMU; `tests/tests/board.rs` reads its output and compares the sums with the
-//! host's. If a call panics, its name is printed.
+//! a board. It runs in QEMU; `tests/tests/board.rs` reads its output and compares the checksums
+//! with the host's. If a call panics, its name is printed.
 #![no_std]
 #![no_main]
 

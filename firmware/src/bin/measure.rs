@@ -71,8 +71,8 @@ fn print_instructions<T>(name: &str, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// Counts the steps of planning one swarm, the roadmap's starts and goals: costs, assignment,
-/// paths, schedule.
+/// Counts the instructions of each step of planning a swarm from the roadmap's starts to its goals:
+/// costs, assignment, paths, schedule.
 fn measure_plan(view: &RoadmapView<'_>, ws: &mut Planner) {
     let plan = PLAN.take();
     let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
@@ -102,7 +102,8 @@ fn measure_paths(
     }
 }
 
-/// Counts [`StepCase`]s: advice among 32 neighbours. Prints the largest and the mean count.
+/// Counts the instructions of each [`StepCase`], advice among 32 neighbours. Prints the largest and
+/// the mean count.
 fn measure_steps() {
     let mut rng = Pcg32::seed_from_u64(1);
     let (mut worst, mut sum) = (0, 0);
@@ -116,7 +117,7 @@ fn measure_steps() {
     println!("count mean-step {}", sum / cases::STEP_CASES as u64);
 }
 
-/// Counts the building of a roadmap from the map, with this clearance.
+/// Counts the instructions of building a roadmap from the map, with this clearance.
 fn measure_build(scratch: &mut WorkspaceOverlay, clearance_m: f32) {
     let (head, words) = memory::measurement_map();
     let grid = cases::voxel_map(&head, words);

@@ -7,10 +7,10 @@ use embassy_sync::blocking_mutex::raw::RawMutex;
 use super::chosen::LINKS_PRIORITY;
 
 /// Raw mutex that raises BASEPRI to the priority of the links' executor: while it is held neither
-/// executor runs another task, but device interrupts still receive bytes. An asynchronous mutex
-/// cannot be used: it keeps one waiting task. Two waiting tasks of the higher executor would wake
-/// each other for ever, and the lower executor, which holds the mutex, would never run to release
-/// it.
+/// executor runs another task, but device interrupts still receive bytes. Embassy's asynchronous
+/// mutex cannot be used: it stores the waker of one task only. Two waiting tasks of the higher
+/// executor would wake each other for ever, and the lower executor, which holds the mutex, would
+/// never run to release it.
 pub struct BasepriRawMutex(());
 
 // SAFETY: it is locked by tasks only, never in a device's interrupt; so while it is held no code

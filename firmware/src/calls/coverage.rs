@@ -66,7 +66,7 @@ pub fn measure_coverage_calls(meter: &mut impl Meter, lent: &mut CoverageBenchWo
     let five = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]].map(flat);
     let area = Area::new(&five, &[Ring { end: 5, kind: RingKind::Outer }]).expect("an area");
     measure_plans(meter, area, lent, &mut sum);
-    // Area of as many lanes as a board holds, 512, for as many vehicles, 32.
+    // Area of 512 lanes for 32 vehicles: as many of both as a board holds.
     let wide = [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(flat);
     let area = Area::new(&wide, &[Ring { end: 4, kind: RingKind::Outer }]).expect("an area");
     measure_division(meter, area, lent, &mut sum);
@@ -237,7 +237,8 @@ fn measure_division(
     }));
 }
 
-/// Plans three detours home and one to a place aside, among no-fly zones and 128 keep-out zones.
+/// Plans three detours home and one to a place beside the path, among no-fly zones and 128 keep-out
+/// zones.
 fn measure_ways_home(
     meter: &mut impl Meter,
     transit: &Transit<'_, AREA_CORNERS>,

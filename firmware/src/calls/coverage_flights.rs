@@ -70,7 +70,7 @@ pub(super) fn add_to_checksum(sum: &mut u32, flights: &Flights) {
     *sum = sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ flights.crc;
 }
 
-/// The rings of an area of so many corners with `zones` no-fly zones of four vertices.
+/// The rings of an area: an outer ring of `corners` vertices, and `zones` no-fly zones of four.
 pub(super) fn rings(corners: usize, zones: usize) -> Vec<Ring, 4> {
     let zone = |k: usize| Ring { end: (corners + 4 * (k + 1)) as u16, kind: RingKind::NoFly };
     let outer = Ring { end: corners as u16, kind: RingKind::Outer };

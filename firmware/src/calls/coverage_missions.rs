@@ -29,7 +29,7 @@ use crate::scratch;
 /// Most divisions of a mission that are measured.
 const DIVISIONS: usize = 3;
 
-/// A coverage mission, and the rows of its calls.
+/// A coverage mission, and the names of its calls' rows in `docs/worst-case.md`.
 struct Mission<'a> {
     outline: &'a [[f32; 2]],
     zones: &'a [[[f32; 2]; 4]],
@@ -39,10 +39,10 @@ struct Mission<'a> {
     count: usize,
     /// Row of the plan before take-off.
     plan: &'static str,
-    /// Row of a division of which the board has planned all before: one further loss.
+    /// Row of a division after one further loss: the board has planned all divisions before it.
     further: &'static str,
-    /// Row of a division of which the board has planned nothing: it was restarted, or the division
-    /// before it was withdrawn.
+    /// Row of a division of which the board has planned nothing yet: the board was restarted, or
+    /// the division before was withdrawn.
     whole: &'static str,
 }
 
@@ -202,8 +202,8 @@ impl Board<'_> {
         add_to_checksum(self.sum, self.out);
     }
 
-    /// Inputs of a division: the first `lost` vehicles are lost, and all others hold at `share` of
-    /// their paths.
+    /// Inputs of a division: the first `lost` vehicles are lost, and all others hold at the
+    /// fraction `share` of their paths' lengths.
     fn inputs(&self, lost: usize, share: f32) -> DivisionInputs<VEHICLES> {
         let input = |k: usize| {
             let flight = &self.out.flights[k];
@@ -215,8 +215,9 @@ impl Board<'_> {
     }
 }
 
-/// Measures the plan before take-off; two losses, one after the other; the second one again with
-/// other inputs, since the first ones were withdrawn; and both at once.
+/// Measures the plan before take-off, a division after a first and after a second loss, the second
+/// division again with other inputs (the first ones were withdrawn), and one after both losses at
+/// once.
 fn measure_losses(meter: &mut impl Meter, board: &mut Board<'_>) {
     let Mission { plan, further, whole, .. } = *board.mission;
     let mut losses = Divisions::new();

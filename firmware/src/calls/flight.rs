@@ -1,9 +1,9 @@
 //! Scripted flights of a companion among 32 neighbours, to count whole control steps.
 //!
 //! The script acts as a PX4 that moves to each setpoint, and as neighbours that send random
-//! positions, intents and flags, or fall silent. In half of the flights (hard) all neighbours are
-//! off the plan, out of it, or silent for up to 90 s; they are near, but for the silent ones of
-//! some flights.
+//! positions, intents and flags, or fall silent. In half of the flights (the hard ones) all
+//! neighbours are off the plan, out of the plan, or silent for up to 90 s. All are near, except the
+//! silent neighbours of some flights.
 
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
@@ -26,7 +26,7 @@ use crate::cases::{random_below, random_between, random_point};
 
 /// Origin of the mission frame, and EKF origin, of every flight.
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
-/// Row of the table: a control step while all neighbours are heard.
+/// Row of the table in `docs/worst-case.md`: a control step while all neighbours are heard.
 pub const STEP: &str = "Companion::handle_timeout, 32 speak";
 /// Row of the table: a control step after most neighbours left the plan or fell silent.
 pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
@@ -276,7 +276,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         self.send_states_from(&mut rng, |_| true);
         for step in 0..MAX_TAKE_OFF_STEPS {
             if step.is_multiple_of(4) {
-                // Before it takes off over an area a majority has to hear it.
+                // In a coverage mission the vehicle takes off only if a majority hears it.
                 let count = if self.has_area() { self.others.len() } else { 1 };
                 (0..count).for_each(|i| self.send_state_from(i, &mut rng));
             }
@@ -401,7 +401,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         );
     }
 
-    /// Passes a neighbour's roster message to the companion, which reports that all vehicles fly.
+    /// Passes a neighbour's roster message to the companion; it reports every vehicle as alive.
     fn send_roster_from(&mut self, system_id: u8) {
         for first in (0..VEHICLES).step_by(roster::MAX_ENTRIES) {
             let known = VEHICLES.min(first + roster::MAX_ENTRIES) - first;

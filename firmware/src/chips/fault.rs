@@ -4,7 +4,7 @@
 use core::ops::Range;
 
 /// CFSR bits: DACCVIOL is a data access that the MPU refused, its address in MMFAR if MMARVALID is
-/// set; MSTKERR is one while registers were pushed at an exception's entry, without an address.
+/// set; MSTKERR is a refused push of registers at an exception's entry, without an address.
 const DACCVIOL: u32 = 1 << 1;
 const MSTKERR: u32 = 1 << 4;
 /// CFSR bits: MLSPERR is a refused access while the floating-point registers were pushed; MMARVALID
@@ -15,7 +15,8 @@ const MMARVALID: u32 = 1 << 7;
 const STKOF: u32 = 1 << 20;
 
 /// Whether a fault with these CFSR and MMFAR values is a stack overflow: the stack pointer went
-/// below MSPLIM, or an access hit the address range `guard` below the stack.
+/// below MSPLIM, a push of registers was refused, or a data access hit the address range `guard`
+/// below the stack.
 pub fn is_overflow(cfsr: u32, mmfar: u32, guard: &Range<u32>) -> bool {
     let in_guard = cfsr & DACCVIOL != 0 && cfsr & MMARVALID != 0 && guard.contains(&mmfar);
     cfsr & (STKOF | MSTKERR | MLSPERR) != 0 || in_guard

@@ -27,8 +27,8 @@ pub enum Overlap {
 }
 
 /// The first overlap of an area's rings, or hole that is not inside an outer ring, or outer ring
-/// that its holes fill; `None` if the rings are a valid area. Edges must not cross: that is checked
-/// elsewhere.
+/// that its holes fill; `None` if the rings are a valid area. Edges must not cross:
+/// [`planner_core::coverage::area::Area::new`] checks that.
 pub fn find_overlap(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
     let (outers, holes) = (rings_to_f64(outers), rings_to_f64(holes));
     if let Some((i, j)) = first_overlapping_pair(&outers) {
@@ -70,8 +70,8 @@ struct RingF64 {
     high: [f64; 2],
 }
 
-/// Whether some edge of a ring lies strictly inside another ring, and whether some lies strictly
-/// outside it.
+/// Whether a part of some edge of a ring lies strictly inside another ring, and whether a part lies
+/// strictly outside that ring.
 #[derive(Default)]
 struct RingRelation {
     inside: bool,

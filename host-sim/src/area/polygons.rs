@@ -41,7 +41,7 @@ pub enum AreaFileError {
     /// The file holds no polygon; the text is a hint that the message ends with.
     #[error("holds no polygon{0}")]
     NoPolygon(&'static str),
-    /// The file holds more than [`MAX_VERTICES`] vertices; their number.
+    /// The file holds more than [`MAX_VERTICES`] vertices; the field is their number.
     #[error("holds {0} vertices; at most {MAX_VERTICES} can be used")]
     TooManyVertices(usize),
 }

@@ -11,8 +11,8 @@ use crate::flash::{HOST_FLASH_LAYOUT, HostFlash};
 
 /// Address of flash bank 2 on the emulated board.
 pub const FLASH_BANK2_ADDRESS: u32 = 0x6000_0000;
-/// Address of the word marks, one byte for each flash word: [`ERASED`], [`PROGRAMMED`]
-/// (programmed), or [`TORN`] while the word is being programmed or erased.
+/// Address of the word marks, one byte for each flash word: [`ERASED`], [`PROGRAMMED`], or [`TORN`]
+/// while the word is being programmed or erased.
 pub const WORD_MARKS_ADDRESS: u32 = 0x6020_0000;
 pub const ERASED: u8 = 0;
 pub const PROGRAMMED: u8 = 1;
@@ -39,7 +39,7 @@ pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8
     settle(&mut store);
     let map = if roadmap.starts_with(&field::MAGIC) { File::Field } else { File::Roadmap };
     let files = [(map, roadmap), (File::Mission, mission)];
-    // A file may be empty: a coverage mission has no roadmap, and no field over level ground.
+    // An empty file is left out: a coverage mission has no roadmap, and over level ground no field.
     for (file, bytes) in files.into_iter().filter(|(_, bytes)| !bytes.is_empty()) {
         let opened = store.open_upload(file, ErasePermission::Allowed);
         ensure!(opened.is_ok(), "a board's store takes no {}: {opened:?}", file.name());

@@ -2,8 +2,8 @@
 //!
 //! A board runs the firmware built for `qemu`, on an emulated Cortex-M7 on which an instruction
 //! takes 2 ns (`-icount shift=1,sleep=off`). It runs for the time that the host grants it, and then
-//! stands still until the next grant. So its behaviour depends on no clock and no load of the host
-//! ([`lock_step`] has the protocol).
+//! stands still until the next grant. So its behaviour depends neither on the host's clock nor on
+//! the host's load ([`lock_step`] has the protocol).
 
 mod bank;
 mod probe;
@@ -50,7 +50,7 @@ pub struct GrantResult {
     pub restarted: bool,
     /// Bytes that the board sent during the grant, in order.
     pub sent: Vec<PortBytes>,
-    /// Bytes of the board's memory that the answer to a read carries.
+    /// Bytes of the board's memory, in the answer to a request to read them; otherwise empty.
     memory: Vec<u8>,
 }
 
@@ -190,7 +190,8 @@ impl Drop for EmulatedBoard {
     }
 }
 
-/// Reads records of the board up to the one that ends an answer, or that reports its start.
+/// Reads records of the board up to the one that ends an answer ([`FromBoard::Waits`]) or reports a
+/// start or reset of the board ([`FromBoard::Started`]).
 fn read_answer(output: &mut BufReader<ChildStdout>) -> anyhow::Result<GrantResult> {
     let mut answer = GrantResult::default();
     loop {

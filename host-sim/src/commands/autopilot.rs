@@ -21,8 +21,8 @@ use crate::progress::check_printed;
 use crate::say;
 
 const PHYSICS_STEP: Duration = Duration::from_millis(4);
-/// Time by which the simulation may be behind the wall clock; what is lost beyond it is not caught
-/// up with.
+/// Greatest time by which the simulation may be behind the wall clock and still catches up. If it
+/// is further behind, it skips the missed steps.
 const MAX_CLOCK_LAG: Duration = Duration::from_secs(1);
 /// Longest datagram that is sent, bytes: fits the MTU of any network.
 const MAX_DATAGRAM: usize = 1400;

@@ -52,8 +52,7 @@ const POLL_SLEEP: Duration = Duration::from_millis(1);
 /// Time for which a companion whose mission has ended continues to report that to other vehicles
 /// and ground stations; on a board it continues for ever.
 const REPORT_END_FOR: Duration = Duration::from_secs(2);
-/// Silence of the autopilot after which the companion does not wait for the vehicle's landing any
-/// more.
+/// Silence of the autopilot after which this command no longer waits for the vehicle's landing.
 const MAX_AUTOPILOT_SILENCE: companion::Duration = companion::Duration::from_secs(5);
 
 /// Runs the companion until its mission ends. Exit code 0 if the mission was flown to its end.

@@ -100,8 +100,8 @@ fn extra_file_names(scenario: &Scenario) -> Vec<String> {
     scenario.vehicles.iter().flat_map(|vehicle| own(vehicle.id)).chain(shared).collect()
 }
 
-/// Adds each flight's plans, `waypoints.csv` and `area.geojson` to the results. Returns the names
-/// of the plans.
+/// Adds each flight's plan files (`.plan` and `.waypoints`), `waypoints.csv` and `area.geojson` to
+/// the results. Returns the names of the plan files.
 fn add_flights(
     planned: &CoveragePlan<'_>,
     flights: &[SortieFlight],
@@ -129,8 +129,8 @@ fn add_flights(
     Ok(written)
 }
 
-/// Removes plans in the directory that an earlier run wrote and this one did not, so that none of
-/// them is uploaded together with the new ones.
+/// Removes plan files in the directory that an earlier run wrote and this one did not, so that none
+/// of them is uploaded together with the new ones.
 fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
     let number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let is_plan = |name: &str| {
@@ -275,7 +275,8 @@ fn print(result: &CoverResult, findings: &CoverageFindings, dir: &std::path::Pat
     say!("report     {}", dir.join("report.html").display());
 }
 
-/// Prints the place that written plans are for: without `area.origin` a polygon in metres has none.
+/// Prints the origin for which plan files were written: without `area.origin`, a polygon in metres
+/// has no known place on earth.
 fn print_origin(planned: &CoveragePlan<'_>) {
     let origin = &planned.area_settings.origin;
     let note = match *origin == DEFAULT_ORIGIN {
@@ -285,8 +286,8 @@ fn print_origin(planned: &CoveragePlan<'_>) {
     say!("origin     {:.6}, {:.6}, {:.1} m{note}", origin.lat_deg, origin.lon_deg, origin.alt_m);
 }
 
-/// Prints the longest flight of a vehicle without `endurance_s`, for which it cannot be checked
-/// whether its battery lasts.
+/// Prints the longest flight of the vehicles without `endurance_s`, for which nothing can check
+/// whether a battery lasts.
 fn print_batteries(planned: &CoveragePlan<'_>) {
     let unknown = planned.sorties.iter().filter(|sortie| {
         planned.scenario.vehicles[usize::from(sortie.route.vehicle)].endurance_s.is_none()

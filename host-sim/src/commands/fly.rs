@@ -54,8 +54,8 @@ pub struct FlyArgs {
     #[arg(long, value_name = "URL")]
     companion: Vec<LinkUrl>,
     /// Link to that companion by its port for the radio; given again, to the second companion, and
-    /// so on. A companion without it and the others hear each other only if its own radio joins
-    /// them; otherwise none of them starts
+    /// so on. A companion without this link and the others hear each other only through the
+    /// companion's own radio; if they do not, no vehicle starts
     #[arg(long, value_name = "URL", requires = "companion")]
     radio: Vec<LinkUrl>,
     /// Firmware for boards in QEMU that run the companions in lock step with the simulation, from
@@ -68,7 +68,8 @@ pub struct FlyArgs {
     /// is judged by the pictures of all flights
     #[arg(long, value_name = "DIR", conflicts_with_all = ["companion", "emulate"])]
     flash: Option<PathBuf>,
-    /// Number of the scenario's first vehicles that have such a board; all if absent
+    /// Number of the scenario's first vehicles that have a board in QEMU (`--emulate`); all if
+    /// absent
     #[arg(long, value_name = "N", requires = "emulate")]
     boards: Option<usize>,
 }
@@ -105,7 +106,8 @@ pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
     plan_and_fly(scenario, "fly", &args.out, &shown, args.flash.as_deref())
 }
 
-/// Makes the scenario's first vehicles use companions behind these links, one link each.
+/// Makes the scenario's first vehicles use companions elsewhere: the n-th vehicle uses the n-th
+/// link of `companions`, and of `radios` if there are as many.
 fn set_board_links(
     scenario: &mut Scenario,
     companions: &[LinkUrl],
@@ -145,8 +147,8 @@ fn keep_flashes(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Makes the scenario's first `boards` vehicles use companions on boards in QEMU; all vehicles
-/// without a number.
+/// Makes the scenario's first `boards` vehicles use companions on boards in QEMU; `None` means all
+/// vehicles.
 fn set_emulated_boards(
     scenario: &mut Scenario,
     program: &Path,
@@ -188,7 +190,8 @@ fn check_emulated_boards(mission: &Mission, plan: &SwarmPlan) -> anyhow::Result<
     Ok(())
 }
 
-/// Prints that the flight was given up, its errors, and how fast it was simulated.
+/// Prints whether the flight was given up at its time limit, its errors, and how fast it was
+/// simulated.
 fn print_course(flight: &Flight, limit_s: f32) {
     let aloft = flight.result.vehicles.iter().filter(|vehicle| !vehicle.landed).count();
     if aloft > 0 && flight.simulated_s >= f64::from(limit_s) {
@@ -206,8 +209,8 @@ fn print_course(flight: &Flight, limit_s: f32) {
     );
 }
 
-/// Adds the pictures of earlier flights if this flight continued them: companions that know of no
-/// photographed waypoint, or of nothing else, begin the area again.
+/// Adds the pictures of earlier flights if this flight continued them. It continued them unless the
+/// companions knew no waypoint, or every waypoint, as photographed: then they began the area again.
 fn add_earlier_pictures(
     kept: &PictureStore,
     mission: &Mission,

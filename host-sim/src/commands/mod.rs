@@ -14,8 +14,8 @@ use std::path::Path;
 
 use crate::scenario::{self, Scenario};
 
-/// Loads a scenario and refuses features that are not available yet; `seed` replaces the
-/// scenario's.
+/// Loads a scenario and refuses features that are not available yet; `seed` replaces the scenario's
+/// seed.
 fn load(path: &Path, seed: Option<u64>) -> anyhow::Result<Scenario> {
     let mut scenario = scenario::load(path)?;
     scenario.check_supported()?;

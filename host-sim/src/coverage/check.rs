@@ -4,8 +4,9 @@
 //! It takes planned flights, or pictures as they were taken in a flight, computes in f64, and
 //! shares no code with the planner. The area is split into square cells of a tenth of the lane
 //! spacing. A cell counts if its centre is in the area and outside no-fly zones; it is photographed
-//! if one picture shows all four of its corners. Where pictures overlap by less than a cell,
-//! several pictures together must show its centre and each of its corners that lies in the area.
+//! if one picture shows all four of its corners. Where neighbouring pictures overlap by less than a
+//! cell, several pictures together must show a cell's centre and each of its corners that lies in
+//! the area.
 
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
@@ -333,13 +334,14 @@ impl CoverageCells {
     ) {
         let spacing = planned.area_settings.spacing;
         let counted = self.points_inside_area(planned, self.size, 0.5);
-        // Neighbouring pictures overlap by a cell or more: one must show all corners of a cell.
+        // Neighbouring pictures overlap by a cell or more, so one picture must show all corners of
+        // a cell.
         let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)
             .min(f64::from(spacing.footprint.along_m - spacing.waypoint_m))
             >= self.side;
         pictures.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         let [columns, rows] = self.size;
-        // Elsewhere corners outside the area are marked as shown; all other corners, and the
+        // Otherwise corners outside the area are marked as shown; all other corners, and the cell's
         // centre, must be in some picture.
         let mut corners: Vec<bool> = match whole {
             true => vec![false; (columns + 1) * (rows + 1)],
@@ -412,7 +414,7 @@ mod tests {
     use crate::scenario;
     use crate::scenario::coverage::Method;
 
-    /// Without a cell that counts nothing is known of the area: that is a fault, not a whole area.
+    /// If no cell counts, nothing is known of the area: that is a fault, not a fully covered area.
     #[test]
     fn an_area_without_a_cell_that_counts_is_not_clean() {
         let text = "[area]\npolygon = [[0, 0], [400, 0], [400, 0.05], [0, 0.05]]\nheight_m = 20.0\n\
@@ -422,7 +424,7 @@ mod tests {
         let planned = CoveragePlan::new(&scenario, Method::Binpat).unwrap();
         let fine = check_plan(&planned);
         assert!(fine.is_clean() && fine.cells > 0 && fine.covered_share == 1.0, "{fine:?}");
-        // Cells of a metre, of which the middles lie beside the area.
+        // Cells of one metre, whose centres all lie outside the area.
         let coarse = CoverageCells::new(&planned).halved_until_one_counts(&planned, 0.0);
         let mut findings = CoverageFindings::default();
         let flights = planned.flights();

@@ -41,8 +41,8 @@ pub struct MissionItem {
     /// Parameters 1 to 4. `None` becomes null (NaN: the current value) in `.plan`, and 0 in
     /// `.waypoints`.
     pub params: [Option<f64>; 4],
-    /// Latitude and longitude, degrees, and metres above home; zeros where the item has no position
-    /// (parameter 5 of commands stands in the first).
+    /// Latitude and longitude, degrees, and metres above home. Zeros if the item has no position,
+    /// except that the first may hold parameter 5 of the command.
     pub place: [f64; 3],
 }
 
@@ -52,8 +52,7 @@ impl MissionItem {
     }
 }
 
-/// Home position of a route's vehicle, WGS84: its start in the scenario, with the altitude of the
-/// ground there.
+/// Home position of a route's vehicle, WGS84: its pad in the scenario, with the pad's altitude.
 fn home_position(planned: &CoveragePlan<'_>, route: &Route) -> Geodetic {
     let start = planned.scenario.vehicles[usize::from(route.vehicle)].start;
     Geodetic {

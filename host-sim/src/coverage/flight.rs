@@ -15,7 +15,8 @@ use planner_core::coverage::pack::Route;
 use super::{CoveragePlan, MAX_CORNERS};
 use crate::scenario::coverage::Trigger;
 
-/// A corner of the path within this distance of a picture is at the picture's position, metres.
+/// A corner of the path within this distance of a picture counts as at the picture's position,
+/// metres.
 const SAME_PLACE_M: f32 = 0.01;
 
 /// Action of a vehicle at a point of its flight.
@@ -132,8 +133,8 @@ fn first_lane_start(planned: &CoveragePlan<'_>, begin: &Flat, end: &Flat) -> Poi
     }
 }
 
-/// Corners of the straight leg from `from` to above `to`, which is the last of them; over level
-/// ground there is no other.
+/// Corners of the straight leg from `from` to above `to`. The last is the point above `to`; over
+/// level ground it is the only one.
 fn leg_corners(planned: &CoveragePlan<'_>, from: &Point, to: &Flat) -> Vec<Point> {
     let mut corners = Vec::new();
     let Some(following) = &planned.terrain_following else {
@@ -187,7 +188,8 @@ fn add_picture_points(
 /// Corners of the shortest way around no-fly zones between two points; empty for a straight way.
 fn corners_between(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> Fixed<Flat, MAX_CORNERS> {
     let mut corners = Fixed::new();
-    // There is a way between any two points of a plan: its length was finite. So this never fails.
+    // The planner found a finite length of the way between any two points of a plan, so this never
+    // fails.
     if planned.transit.shortest_path(from, to, &mut corners).is_err() {
         corners.clear();
     }

@@ -1,5 +1,5 @@
-//! Checks the pictures of a coverage mission that was flown; where the mission asks for none, the
-//! places where a camera that is triggered by other means could take them.
+//! Checks the pictures of a coverage mission that was flown. If the mission triggers no camera, it
+//! checks instead the places on the lanes where a camera triggered by other means could take them.
 
 use planner_core::Point;
 use planner_core::flight::Trigger;
@@ -23,8 +23,9 @@ pub struct FlightFindings {
     pub complete: bool,
 }
 
-/// The places of a flight at the heights of its lanes, each as a picture in the lanes' direction;
-/// `None` where the companions trigger the camera, so that there are pictures to judge.
+/// Every track point at the height of the lanes, as a picture taken there whose heading is the
+/// lanes' direction. `None` if companions trigger the camera: then there are real pictures to
+/// judge.
 ///
 /// # Errors
 /// As [`CoveragePlan::new`].

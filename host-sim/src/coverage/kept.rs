@@ -47,7 +47,8 @@ impl PictureStore {
     }
 
     /// Inserts the pictures of earlier flights before those of this flight, which continued them. A
-    /// flight may do so although the area was whole: a journal may be some waypoints behind.
+    /// flight may continue even if the earlier pictures already show the whole area: a companion's
+    /// journal may be some waypoints behind.
     pub fn add_to(&self, pictures: &mut Vec<Picture>) {
         pictures.splice(..0, self.before.iter().copied());
     }

@@ -55,7 +55,7 @@ impl<'a> CoveragePlan<'a> {
     /// # Errors
     /// No plan was found; the error says why, and names the place in the scenario.
     pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
-        // A pad may be a roof, but not where altitude 0 only stands for one that is not given.
+        // A pad may be on a roof, unless the origin's altitude is 0, which counts as not given.
         let given = scenario.area.as_ref().is_some_and(|area| area.origin.alt_m != 0.0);
         check_starts(scenario, if given { f32::INFINITY } else { MAX_OFF_GROUND_M })?;
         Self::plan_with_search(scenario, method, MAX_ORDER_CHANGES)
@@ -432,8 +432,8 @@ pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
 }
 
 /// Shares with which BINPAT cuts the path where the exact division does; `exact` then becomes
-/// BINPAT's plan. `None` if BINPAT's assignment of the parts to vehicles takes longer: companions
-/// plan by shares alone, so they cannot fly the exact plan.
+/// BINPAT's plan. `None` if BINPAT cuts elsewhere, or assigns the parts to vehicles so that they
+/// take longer: companions plan by shares alone, so they cannot fly the exact plan.
 fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     exact: &mut Plan<K>,

@@ -1,9 +1,9 @@
 //! The obstacles of a map that is given beside an area, and the no-fly zones around them.
 //!
 //! Method: a column of the map is blocked if an obstacle in it reaches up to where vehicles fly.
-//! Blocked columns between which no vehicle would fit belong together. Around the columns that do,
-//! a zone is their convex hull, moved out by the required clearance. A zone of which too large a
-//! share could be flown over is split in half, again and again: a wall around a field is no field.
+//! Blocked columns between which no vehicle fits form one part. The zone of a part is its convex
+//! hull, moved outward by the required clearance. A zone is split in half, again and again, while
+//! too large a share of it could be flown over: a wall around a field must not block the field.
 //! Zones may overlap. Metres, ENU in the mission frame.
 
 mod polygon;
@@ -30,17 +30,18 @@ const NEAR_M: f32 = 30.0;
 /// Distance by which a kept zone widens the box in which other zones are kept, metres.
 const NEAR_ZONE_M: f32 = 5.0;
 
-/// Ways to draw zones, the preferred one first: the first gives the least area, the last the fewest
-/// corners.
+/// Ways to draw zones, the preferred one first: the first gives zones of the least area, the last
+/// zones with the fewest corners.
 const OUTLINES: [Outline; 2] =
     [Outline { boxes: false, free_share: 0.3 }, Outline { boxes: true, free_share: 0.5 }];
 
 /// A way to draw zones around blocked columns.
 #[derive(Clone, Copy)]
 struct Outline {
-    /// Boxes along the axes, in place of convex hulls.
+    /// Whether zones are axis-aligned boxes instead of convex hulls.
     boxes: bool,
-    /// Greatest share of a zone that could be flown over.
+    /// Greatest allowed share of a zone's columns that could be flown over; above it the zone is
+    /// split.
     free_share: f64,
 }
 
@@ -86,7 +87,7 @@ impl Obstacles {
     }
 
     /// Horizontal distance from a vehicle that climbs from `place` to the nearest obstacle beside
-    /// or above it, metres; `None` if it has the clearance.
+    /// or above it, metres; `None` if no obstacle is nearer than the clearance.
     pub fn distance_beside_climb(&self, place: &Point) -> Option<f32> {
         let shape = &self.map.shape;
         let half = Flat::repeat(shape.resolution_m / 2.0);
@@ -100,10 +101,10 @@ impl Obstacles {
         (nearest_m < self.clearance_m).then_some(nearest_m)
     }
 
-    /// Zones around the obstacles that reach above `floor_m` and are near `places`, beyond which
-    /// lanes lead by `beyond_m`. `own` is the number of corners that other no-fly zones have. Of
-    /// the ways to draw zones the first is taken with which a board can plan, else the first within
-    /// `most` corners.
+    /// Zones around the obstacles that reach above `floor_m` and are near `places` (the area's
+    /// vertices and the pads). Lanes extend `beyond_m` beyond these places. `own` is the number of
+    /// corners of all other no-fly zones. Uses the first way to draw zones with which a board can
+    /// plan, else the first within `most` corners.
     ///
     /// # Errors
     /// All zones together have more than `most` corners.
@@ -147,7 +148,7 @@ fn to_flat(polygon: &Polygon) -> Vec<Flat> {
 
 /// The zones that may matter to flights between `places`: those that meet the box around all
 /// places, wider by `near_m`. The box grows by each kept zone, wider by [`NEAR_ZONE_M`], until it
-/// meets no further zone. Zones count by their boxes.
+/// meets no further zone. Each zone is represented by its bounding box.
 fn near_zones(mut zones: Vec<Vec<Flat>>, places: &[Flat], near_m: f32) -> Vec<Vec<Flat>> {
     let extent = |points: &[Flat], around_m: f32| {
         let start = [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)];
@@ -173,7 +174,7 @@ fn near_zones(mut zones: Vec<Vec<Flat>>, places: &[Flat], near_m: f32) -> Vec<Ve
     }
 }
 
-/// The columns of a map, with room around it for the clearance.
+/// The columns of a map, with further columns around the map for the clearance.
 struct Columns {
     size: [usize; 2],
     low: [f64; 2],
@@ -232,8 +233,8 @@ impl Columns {
             steps.filter(|[i, j]| gap_m(*i).hypot(gap_m(*j)) <= self.clearance_m).collect();
         self.grown.clone_from(&self.blocked);
         for column in self.all() {
-            // Only columns at an edge are grown from: all columns around the others are blocked
-            // anyway.
+            // Only from columns at the edge of a blocked region: all columns around the others are
+            // blocked.
             let is_blocked = |column: Column| self.blocked[self.index(column)];
             if !is_blocked(column) || self.around(column).all(is_blocked) {
                 continue;

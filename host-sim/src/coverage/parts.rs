@@ -138,7 +138,7 @@ fn waypoint_owners(flights: &[PathFlight<WAYPOINTS>]) -> WaypointOwners {
     owners
 }
 
-/// Numbers of waypoints that went from one vehicle to another, by pair of vehicles.
+/// Counts the waypoints that went from one vehicle to another, for each pair of vehicles.
 fn reassigned_waypoints(before: &WaypointOwners, now: &WaypointOwners) -> Vec<WaypointTransfer> {
     let mut counts = BTreeMap::<(u8, u8), u32>::new();
     for (number, to) in now {

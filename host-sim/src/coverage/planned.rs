@@ -60,8 +60,8 @@ pub struct CoveragePlan<'a> {
     pub transit: Box<Transit<'a, MAX_CORNERS>>,
     /// Routes of the vehicles that fly, in the order of the path.
     pub plan: Plan<MAX_VEHICLES>,
-    /// The shares W by which companions divide the path into these routes, one a vehicle; `None` if
-    /// no shares give this plan.
+    /// The shares (W in paper CPP) by which companions divide the path into these routes, one for
+    /// each vehicle; `None` if no shares give this plan.
     pub shares: Option<Vec<f32>>,
     /// Lower bound on the largest cost of any division of this path, seconds.
     pub lower_bound_s: f32,

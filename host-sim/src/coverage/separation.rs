@@ -80,10 +80,11 @@ fn sample_positions(flight: &DepartureFlight<'_>) -> Vec<Point> {
     (0..=(end_s / COMPARISON_STEP_S).ceil() as usize).map(place).collect()
 }
 
-/// Least distance between two flights with these departure delays (in steps), from the first
-/// departure to the last landing, metres. `None` where it is less than the separation. Pads may be
-/// nearer to each other than the separation: while both vehicles are over their pads, or one stands
-/// on its pad, only the distance of the pads is required.
+/// Least distance between two flights, each given by its positions and departure delay in steps of
+/// [`COMPARISON_STEP_S`], from the first departure to the last landing, metres. `None` if it is
+/// less than the separation. Pads may be nearer to each other than the separation: while both
+/// vehicles are over their pads, or one stands on its pad, only the distance of the pads is
+/// required.
 fn min_distance_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32) -> Option<f32> {
     let at = |(track, delay): (&[Point], usize), step: usize| {
         track[step.saturating_sub(delay).min(track.len() - 1)]

@@ -1,16 +1,16 @@
 //! Cuts a route that takes longer than a battery lasts into sorties, between its lanes. Each sortie
 //! flies from the pad and back to it, in the route's layer.
 //!
-//! Of all cuts with the fewest sorties it takes the one with the least total time, by dynamic
-//! programming over the lanes. Adding a lane never shortens a sortie, since its ways are shortest
-//! ways. So the search backwards for a sortie's first lane ends at the first lane that is too far
-//! back: n · m steps for n lanes of which at most m fit into a sortie.
+//! Of all cuts with the fewest sorties, dynamic programming over the lanes finds the one with the
+//! least total time. Adding a lane never shortens a sortie, since its ways are shortest ways. So
+//! the search backwards for a sortie's first lane ends at the first lane that is too far back. That
+//! takes n · m steps for n lanes of which at most m fit into a sortie.
 //!
 //! Sorties are flown in rounds: the k-th sorties of all vehicles form a round, which begins
 //! [`BATTERY_SWAP_S`] after the last vehicle of the round before has landed. So departures keep
 //! vehicles apart within a round, however long a swap really takes. Units: seconds, metres.
 //!
-//! The paper's cost C_k has one climb and one descent and no turns. The battery has to last for
+//! The cost C_k of paper CPP has one climb, one descent and no turns. The battery has to last for
 //! what is really flown: also the descent from the layer to the lanes, the climb back, and turns
 //! from rest to rest.
 

@@ -17,7 +17,7 @@
 //! waypoints are nearer than the spacing it may not be found; the check of cells then decides
 //! whether the area is photographed.
 //!
-//! A waypoint is flown twice if vehicles came to it twice: each picture counts for its nearest
+//! A waypoint is flown twice if vehicles reached it twice: each picture counts for its nearest
 //! waypoint, and consecutive pictures of one vehicle there count as one pass. Metres, ENU in the
 //! mission frame.
 
@@ -65,7 +65,8 @@ impl Tolerance {
     }
 
     /// Greatest distance along the lane between a waypoint and its picture, metres;
-    /// [`margins::usable_footprint`] plans with the same.
+    /// [`margins::usable_footprint`] plans with as much, or with less if all vehicles are slower
+    /// than the mission's cruise speed.
     pub fn max_along_m(&self) -> f32 {
         self.cross_track_m + self.late_m
     }
@@ -154,8 +155,8 @@ mod tests {
     use crate::scenario;
     use crate::scenario::coverage::Method;
 
-    /// Pictures of a plan of three lanes and more, 5 m apart at 5 m/s, changed by `change`: index,
-    /// distance along the path.
+    /// [`count_left_and_twice`] with one picture at each waypoint (5 m apart) of a plan of at least
+    /// three lanes, after `change` has changed the pictures.
     fn counted(change: impl Fn(&mut Vec<Picture>)) -> (u64, u64) {
         let text = "[area]\npolygon = [[0, 0], [60, 0], [60, 30], [0, 30]]\nheight_m = 20.0\nlane_m = 10.0\n\
                     waypoint_m = 5.0\ncamera = { fov_deg = 73.7, aspect = 1.5 }\n[mission]\ncruise_mps = 5.0\n\
@@ -178,7 +179,8 @@ mod tests {
     #[test]
     fn pictures_where_waypoints_are_or_late_leave_none_out() {
         assert_eq!(counted(|_| ()), (0, 0));
-        // Later and later, as by distance: up to a whole spacing.
+        // Each picture later than the one before, as with trigger by distance: up to a whole
+        // spacing.
         let later = |pictures: &mut Vec<Picture>| {
             let step = pictures[1].position - pictures[0].position;
             assert!(
@@ -223,7 +225,7 @@ mod tests {
         assert_eq!(again(4, None), (0, 3));
         // Two pictures of one place, one after the other.
         assert_eq!(counted(|pictures| pictures.insert(4, pictures[4])), (0, 0));
-        // Of earlier flights the order is lost.
+        // The order of pictures of earlier flights is not known.
         let earlier = |pictures: &mut Vec<Picture>| {
             pictures.iter_mut().for_each(|picture| picture.vehicle = None);
             pictures.push(pictures[3]);

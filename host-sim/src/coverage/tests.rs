@@ -69,7 +69,7 @@ fn lanes_begin_and_end_a_margin_beyond_the_edge() {
 fn a_sensor_and_a_ground_sampling_distance_give_height_and_spacing() {
     let camera = "camera = { sensor_mm = [23.5, 15.6], focal_mm = 16.0, pixels = [6000, 4000] }";
     let area = field(&format!("{camera}\ngsd_m = 0.02")).area.unwrap();
-    // A pixel of 23.5 mm / 6000 behind 16 mm shows 20 mm from here.
+    // From this height a pixel of 23.5 mm / 6000, 16 mm behind the lens, shows 20 mm.
     let height_m = 0.02 * 16.0 / (23.5 / 6000.0);
     let near = |got: f32, want: f32| assert!((got - want).abs() < 1e-3 * want, "{got} {want}");
     near(area.height_m, height_m);

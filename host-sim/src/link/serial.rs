@@ -75,7 +75,7 @@ mod tests {
     fn pair() -> (Port, Port) {
         let (mut near, far) = TTYPort::pair().unwrap();
         let path = far.name().unwrap();
-        // Held open it could not be opened by anyone else.
+        // Closed, since a port that is open cannot be opened again.
         drop(far);
         let far = Port::open(&path, 921_600).unwrap();
         near.set_timeout(Duration::ZERO).unwrap();

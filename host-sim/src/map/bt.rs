@@ -268,7 +268,8 @@ mod tests {
         assert_eq!(to_bytes(&tree), plain);
     }
 
-    /// Sixteen times the same first child: a chain down to a leaf at depth 16.
+    /// A chain of `levels` inner nodes, each the first child of the one above, then the word
+    /// `last`.
     fn chain(levels: usize, last: u16) -> Vec<u8> {
         let mut data = [3u8, 0].repeat(levels);
         data.extend(last.to_le_bytes());

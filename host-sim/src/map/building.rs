@@ -1,14 +1,14 @@
-//! `builtin:building`: a nine-floor building like that of P3D §4, 41 × 24 × 49 m, generated from a
-//! seed.
+//! `builtin:building`: a nine-floor building like that of paper P3D §4, 41 × 24 × 49 m, generated
+//! from a seed.
 //!
 //! The paper states its outer size (its Fig. 8) and that it has many rooms, doors, windows and a
 //! stairwell; it has no floor plan. Ours: a corridor along the middle of every floor with rooms on
 //! both sides, a stairwell at the west end, an atrium in the middle and a lift shaft at the east
 //! end, all three open through every slab between floors. The ground floor is a lobby. The seed
-//! places partitions and doors. Doors and shafts are just so wide that a uniform roadmap of the
-//! paper's 2300 nodes reaches every room with 0.8 m of clearance, as the paper's does, and one of
-//! far fewer nodes does not. All cells are known, free or occupied. The corner of the outer walls
-//! is at (0, 0, 0), metres.
+//! places partitions and doors. Doors and shafts are just wide enough that a uniform roadmap of the
+//! paper's 2300 nodes reaches every room with 0.8 m of clearance, as the paper's roadmap does, and
+//! a roadmap of far fewer nodes does not. All cells are known, free or occupied. The corner of the
+//! outer walls is at (0, 0, 0), metres.
 
 use planner_core::Point;
 use planner_core::voxel::GridShape;
@@ -182,7 +182,7 @@ mod tests {
         let mut rooms = std::collections::BTreeSet::new();
         while let Some(cell) = queue.pop() {
             let center = shape.center(cell);
-            // A room, not the corridor or a shaft.
+            // Counts rooms only, not the corridor or a shaft.
             if !(CORRIDOR_M[0] - 2.0..CORRIDOR_M[1] + 2.0).contains(&center.y) {
                 rooms.insert((center.z / FLOOR_HEIGHT_M) as u32);
             }

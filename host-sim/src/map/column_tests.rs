@@ -1,4 +1,4 @@
-//! Columns beside brute force over all cells, on random maps.
+//! Columns compared with brute force over all cells, on random maps.
 
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -64,7 +64,7 @@ fn brute_force(
     }
     let mut nearest = f64::INFINITY;
     let [nx, ny, nz] = shape.dims;
-    // Beyond the map too, where that is blocked: a margin of cells all around, but below.
+    // Cells beyond the map are unknown: a margin of cells on all sides but below is checked too.
     let state = |c: [i64; 3]| {
         let inside = (0..3).all(|a| c[a] >= 0 && c[a] < i64::from(shape.dims[a]));
         if inside { map.state_at(c.map(|c| c as u32)) } else { Occupancy::Unknown }
@@ -120,7 +120,7 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
                         clear += 1;
                     }
                     (Err(ColumnError::TooNear { place, distance_m, .. }), _) => {
-                        // The place named is as far from the segment as it says.
+                        // The place in the error is as far from the segment as the error says.
                         let along = place.z.min(p.z);
                         let away = ((place.x - p.x).hypot(place.y - p.y))
                             .hypot((place.z - along).max(0.0));

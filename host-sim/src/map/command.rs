@@ -75,7 +75,8 @@ pub struct MapInfo {
 }
 
 impl MapInfo {
-    /// Summary of an octree whose true position is `shift_m` away from that of its keys.
+    /// Summary of an octree. `shift_m` is the offset from the position that its keys give to its
+    /// true position, metres ENU.
     pub fn from_octree(kind: &'static str, tree: &Octree, shift_m: [f64; 3]) -> Self {
         let counts = tree.counts();
         let (lo, hi) = tree.key_bounds().unwrap_or_default();
@@ -189,7 +190,7 @@ mod tests {
     use super::*;
     use crate::map::Occupancy;
 
-    /// Planning lays a map on cells of any size; what `map info` says of it must not ask for more.
+    /// Planning resamples a map to cells of any size, so `map info` must accept them too.
     #[test]
     fn any_resolution_that_is_planned_on_is_told_about() {
         let folder = tempfile::tempdir().unwrap();

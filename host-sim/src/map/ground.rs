@@ -7,7 +7,7 @@ use super::error::MapError;
 use super::occupancy::OccupancyMap;
 use super::octree::Occupancy;
 
-/// Most cells of such a map; a larger area gets larger cells.
+/// Most cells of a map of level ground; a larger area gets larger cells.
 const MAX_GROUND_CELLS: f32 = 4e6;
 
 /// A map whose floor has its top at the height of `low`, with free space above it up to `high`, in

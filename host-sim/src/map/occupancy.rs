@@ -26,7 +26,7 @@ pub enum Unknown {
     /// Unknown space is an obstacle, and so is everything beyond the map.
     #[default]
     Blocked,
-    /// Unknown space is passable, but no node is placed in it (P3D's
+    /// Unknown space is passable, but no node is placed in it (paper P3D's
     /// `castRay(…, ignoreUnknown = true)`).
     Free,
 }
@@ -76,8 +76,8 @@ impl OccupancyMap {
             return Err(refuse("resolution_m must be positive"));
         }
         let (lo, hi) = tree.key_bounds().ok_or_else(|| refuse("it holds no known space"))?;
-        // Planning cells per smallest cell of the octree. A ratio that is a whole number, or one
-        // over it, but for f32 rounding is taken to be exact.
+        // Planning cells per smallest cell of the octree. A ratio that, but for f32 rounding, is a
+        // whole number or the reciprocal of one is taken to be exactly that.
         let cells_per_metre = 1.0 / f64::from(resolution_m);
         let exact = tree.resolution_m() * cells_per_metre;
         let (multiple, fraction) = ((1.0 / exact).round(), exact.round());
@@ -169,8 +169,8 @@ impl OccupancyMap {
     }
 
     /// The cells as a pruned octree whose keys are rounded to the nearest cell, and the shift from
-    /// the octree to the grid, metres east, north, up. No octree where it would have no root: see
-    /// [`Octree::from_cells`].
+    /// the octree to the grid, metres east, north, up. The octree is `None` where
+    /// [`Octree::from_cells`] returns `None`.
     pub fn to_shifted_octree(&self) -> (Option<Octree>, [f64; 3]) {
         // The shortest decimal that parses to this f32: 0.1, not 0.10000000149.
         let resolution: f64 =

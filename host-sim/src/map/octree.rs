@@ -6,9 +6,9 @@
 //! each child as in the `.bt` file, and the index at which the node's inner children begin. A
 //! lookup reads at most 16 nodes; a traversal of all leaves reads each inner node once.
 
-/// Levels below the root; the smallest cells are at this depth.
+/// Number of levels below the root; the smallest cells are at this depth.
 pub const TREE_DEPTH: u32 = 16;
-/// Smallest cells along one edge of the octree.
+/// Number of smallest cells along one edge of the octree.
 pub const KEYS_PER_AXIS: u32 = 1 << TREE_DEPTH;
 /// Key of the cell whose lower faces pass through coordinate 0.
 pub const KEY_ORIGIN: u32 = KEYS_PER_AXIS / 2;

@@ -33,8 +33,8 @@ impl VoxelMap {
             .expect("the words were made for the shape")
     }
 
-    /// This map, with no roadmap node in a cell that is not entirely inside the box between two
-    /// corners, ENU metres.
+    /// This map, with roadmap nodes allowed only in cells that lie entirely inside the box between
+    /// two corners, ENU metres.
     pub fn with_nodes_inside(&self, low: &Point, high: &Point) -> Self {
         let masks = [0, 1, 2].map(|axis| {
             let cells = |at_m: f32| (at_m - self.shape.min[axis]) / self.shape.resolution_m;

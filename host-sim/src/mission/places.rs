@@ -20,8 +20,8 @@ use crate::scenario::{self, Scenario, Terminals};
 const SLOT_GRID_M: f32 = 0.25;
 
 /// Height of a start or goal above the hull centre of a vehicle of `radius_m` that stands on the
-/// ground below it, metres. Fails if the vertical column between is nearer to an obstacle than the
-/// required clearance; the error suggests the nearest place that is not.
+/// ground below it, metres. Fails if the vertical flight between the two is nearer to an obstacle
+/// than the required clearance; the error then suggests the nearest place that has the clearance.
 pub(super) fn height_over_ground(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -197,8 +197,8 @@ pub(super) fn build_roadmap(
     // edges whose stored clearance is too small for it.
     let smallest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(f32::INFINITY, f32::min);
     let (edge_min_m, edge_max_m) = edge_lengths(scenario, map)?;
-    // As far from the geofence as hulls are from walls: a vehicle beyond it lands. The fence is a
-    // box, so an edge between two nodes inside is inside.
+    // Nodes keep `safety_margin_m` from the geofence: a vehicle beyond it lands. The fence is a
+    // box, so an edge between two nodes inside lies inside.
     let room = Point::repeat(settings.safety_margin_m);
     let fence = scenario.mission.geofence.as_ref();
     let fenced = fence.map(|f| map.with_nodes_inside(&(f.min + room), &(f.max - room)));

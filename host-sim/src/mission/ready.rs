@@ -51,8 +51,8 @@ pub struct Mission {
     pub mission_file: Vec<u8>,
     /// The vehicles' tasks, in the order of the scenario.
     pub tasks: Vec<VehicleTask>,
-    /// For each goal: its height above the hull centre of a vehicle of the largest radius that
-    /// stands on the ground below it, metres; the length of the landing.
+    /// Length of the landing at each goal, metres: from the goal down to the hull centre of a
+    /// vehicle that stands on the ground below it, computed for the largest radius of all vehicles.
     pub descents_m: Vec<f32>,
     pub(super) schedule: ScheduleConfig,
     /// Computing times of the steps done so far.
@@ -127,8 +127,8 @@ impl Mission {
     }
 
     /// Height of the ground on which a vehicle that sinks vertically from `place` would come to
-    /// stand, metres ENU; `None` where the map has no ground below. Over terrain it is the
-    /// terrain's, and beside an area's map the top of an obstacle.
+    /// stand, metres ENU; `None` where the map has no ground below. In a coverage mission it is the
+    /// height of the terrain, or the top of an obstacle of the area's map where that is higher.
     pub fn ground_below(&self, place: &Point) -> Option<f32> {
         let below_m = self.map.ground_below(place)?;
         let Some(area) = &self.scenario.area else { return Some(below_m) };

@@ -1,5 +1,5 @@
-//! Routes with more lanes than one path holds are flown in stretches. Counts the divisions of the
-//! remaining area that they take if no vehicle is lost.
+//! Routes with more lanes than one path holds are flown in stretches, with a division of the
+//! remaining area between them. Counts the divisions that a mission takes if no vehicle is lost.
 
 use anyhow::bail;
 use companion::swarm::fleet::{COMMITMENT_S, DivisionInput, MAX_DIVISIONS};
@@ -20,8 +20,8 @@ fn division_due_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     Some(flight.depart_s + end.arrive_s - COMMITMENT_S)
 }
 
-/// What a vehicle contributes to a division if all hold `t_s` seconds after the start: whether it
-/// still takes part, and how far along its path it holds, decimetres (0 on its pad).
+/// The input of a vehicle to a division if all vehicles hold `t_s` seconds after the start: whether
+/// it still takes part, and how far along its path it holds, decimetres (0 on its pad).
 fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> DivisionInput {
     let waypoints = flight.path.waypoints();
     let flown_s = t_s - flight.depart_s;

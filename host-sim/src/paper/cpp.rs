@@ -1,10 +1,11 @@
-//! Recomputes Tables 2 to 6 and A1 to A12 of CPP (Luna 2022) with our planner, prints them beside
-//! the paper's values, and draws the paper's Figs. 8 to 10, 12 and 13 in the report.
+//! Recomputes Tables 2 to 6 and A1 to A12 of paper CPP (Luna 2022) with our planner, prints them
+//! beside the paper's values, and draws the paper's Figs. 8 to 10, 12 and 13 in the report.
 //!
-//! The paper states neither areas nor places of the vehicles, camera, V_a, V_d or Δh. Ours are in
-//! [`SHORT_TRACK`], [`LONG_TRACK`], [`CONVEX`], [`COMPARED_AREAS`] and [`TABLE_4_AREA`]; V_a 3 m/s,
-//! V_d 1 m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to A12 were flown in Gazebo;
-//! ours are the planned costs C_k, without turns. CV is 100 · SD / Av in both, SD the sample's.
+//! The paper states neither areas nor places of the vehicles, camera, V_a (climb speed), V_d
+//! (descent speed) or Δh (layer spacing). Ours are in [`SHORT_TRACK`], [`LONG_TRACK`], [`CONVEX`],
+//! [`COMPARED_AREAS`] and [`TABLE_4_AREA`]; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as
+//! lanes. The paper's times in Tables A1 to A12 were flown in Gazebo; ours are the planned costs
+//! C_k, without turns. CV is 100 · SD / Av in both, with SD the sample standard deviation.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -38,7 +39,7 @@ const COMPARED_AREAS: [&str; 2] = [
     "[[0, 0], [300, 0], [340, 110], [160, 190], [0, 150]]",
     "[[0, 0], [200, -15], [260, 120], [90, 200]]",
 ];
-/// Polygon of Table 4, east and north in metres: so small that the flight to it counts.
+/// Polygon of Table 4, east and north in metres: so small that the flight to it matters.
 const TABLE_4_AREA: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
 /// Starts of the three UAVs of Table 4, east and north in metres: the first is far away.
 const TABLE_4_STARTS: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
@@ -77,8 +78,8 @@ fn in_a_row(count: usize) -> Vec<[f64; 2]> {
 struct Tables {
     rows: Vec<Row>,
     complete: bool,
-    /// Cost in seconds and `result.json` of the plan with the greatest cost so far; a plan with
-    /// findings ranks above all without.
+    /// Cost in seconds and `result.json` of the plan with the greatest cost so far; a plan in which
+    /// the check found a fault ranks above all others.
     worst: Option<(f64, serde_json::Value)>,
 }
 
@@ -117,7 +118,7 @@ impl Tables {
         both: [Vec<f64>; 2],
     ) {
         let [ours, theirs] = both;
-        // Planning times are of one fleet after another, not of the vehicles of one.
+        // A row of planning times has one value for each fleet size, not one for each vehicle.
         let of_a_fleet = ours.len() > 1 && unit != PLANNING_UNIT;
         let summary = |values: &[f64]| of_a_fleet.then(|| Summary::of(values));
         self.rows.push(Row {
@@ -198,8 +199,9 @@ fn table_2(tables: &mut Tables) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Our part of Table 3: median seconds to compute a whole plan, a row a method, a column for each
-/// of 2 to 7 vehicles. They depend on the machine and its load; all other rows do not.
+/// Our part of Table 3: median seconds to compute a whole plan, one row for each method, one column
+/// for each of 2 to 7 vehicles. These times depend on the machine and its load; the values of all
+/// other tables do not.
 fn table_3(tables: &mut Tables) -> anyhow::Result<[[f64; 6]; 3]> {
     let mut all = [[0.0; 6]; 3];
     for (row, method) in all.iter_mut().zip(METHODS) {

@@ -1,4 +1,4 @@
-//! Values that CPP (Luna 2022) printed in its Tables 2 to 6 and A1 to A12.
+//! Values that paper CPP (Luna 2022) prints in its Tables 2 to 6 and A1 to A12.
 
 /// One of Tables A1 to A12: flight times of each vehicle in Gazebo, seconds, for six pairs of lane
 /// spacing and height.
@@ -195,10 +195,11 @@ pub(super) const PLANNING_S: [[f64; 6]; 3] = [
 /// ground.
 pub(super) const TABLE_4_COSTS_M: [[f64; 3]; 2] = [[390.72, 401.93, 394.62], [0.0, 370.73, 383.99]];
 
-/// Table 5: mean of the largest times, seconds: short and long track, by method.
+/// Table 5: mean over the cases of the largest flight time in a fleet, seconds: short and long
+/// track, by method.
 pub(super) const MEAN_LARGEST_TIME_S: [[f64; 3]; 2] =
     [[300.42, 330.08, 322.0], [795.58, 754.25, 735.42]];
 
-/// Table 6: real flight, seconds, three vehicles, by method.
+/// Table 6: flight times of three real vehicles, seconds, by method.
 pub(super) const REAL_S: [[f64; 3]; 3] =
     [[289.0, 305.0, 276.0], [279.0, 298.0, 268.0], [285.0, 282.0, 271.0]];

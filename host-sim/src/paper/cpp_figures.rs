@@ -1,6 +1,6 @@
-//! CPP's Figs. 8, 9, 10, 12 and 13, drawn with our plans. The paper prints them as pictures only:
-//! its half of Figs. 12 and 13 is drawn from the times in its Tables A1 to A12. It does not state
-//! the areas of Figs. 8 to 10; ours are in `cpp.rs`.
+//! Figs. 8, 9, 10, 12 and 13 of paper CPP, drawn with our plans. The paper prints them as pictures
+//! only: its values in Figs. 12 and 13 are drawn here from the times in its Tables A1 to A12. It
+//! does not state the areas of Figs. 8 to 10; ours are in `cpp.rs`.
 
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;

@@ -1,4 +1,4 @@
-//! Rows of CPP's tables: the paper's values, ours, and the statistics of both.
+//! Rows of paper CPP's tables: the paper's values, ours, and the statistics of both.
 
 use serde::Serialize;
 

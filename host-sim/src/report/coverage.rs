@@ -19,7 +19,7 @@ pub struct CoverageLayers {
     pub footprints: Vec<Footprint>,
 }
 
-/// How the area is divided among the vehicles from a time on.
+/// How the area is divided among the vehicles from `t_s` on, until the next division.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Division {
     /// Time from which the division holds, seconds.

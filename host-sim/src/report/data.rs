@@ -36,11 +36,11 @@ pub struct ReportData {
     pub events: Vec<Event>,
     /// Plots over time, in order.
     pub plots: Vec<Plot>,
-    /// Figures that repeat a paper's, at the end of the page.
+    /// Figures that reproduce those of a paper, at the end of the page.
     pub figures: Vec<Figure>,
     /// Content of `result.json`.
     pub result: serde_json::Value,
-    /// Content of `timing.json`.
+    /// Content of `timing.json`; `None` leaves it out.
     pub timing: Option<serde_json::Value>,
 }
 
@@ -86,7 +86,7 @@ pub struct VehicleTrack {
     pub radius_m: f32,
     /// Colour in the page, sRGB; `None` takes [`vehicle_color`] of the vehicle's index.
     pub color: Option<[u8; 3]>,
-    /// Index of the goal that the vehicle was assigned; `None` if it has none.
+    /// Index (from 0) of the goal that the vehicle was assigned; `None` if it has none.
     pub goal_index: Option<usize>,
     /// Where the vehicle's path begins, metres.
     #[serde(serialize_with = "pack::point")]
@@ -127,7 +127,7 @@ pub enum Level {
     Info,
     /// A fault or a deviation that was handled.
     Warning,
-    /// The mission, or a safety figure, is lost.
+    /// The mission failed, or a safety rule was violated.
     Error,
 }
 
@@ -171,7 +171,7 @@ pub struct Limit {
 pub struct Curve {
     /// Name in the legend.
     pub name: String,
-    /// Id of the vehicle whose colour the curve has; `None` for one of the whole swarm.
+    /// Id of the vehicle whose colour the curve has; `None` for a curve of the whole swarm.
     pub vehicle: Option<u8>,
     /// Rising times, seconds.
     #[serde(serialize_with = "pack::floats")]

@@ -66,7 +66,7 @@ pub struct Chart {
     pub cases: Vec<String>,
     /// The series.
     pub series: Vec<Series>,
-    /// Charts of the page with the same `scale` are drawn with the same largest value.
+    /// Name of the value axis: charts of the page with the same name have the same largest value.
     pub scale: &'static str,
 }
 

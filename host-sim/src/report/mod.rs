@@ -28,7 +28,8 @@ pub use track::{Footprint, TrackPoint};
 /// The report page as one self-contained HTML text of a few megabytes.
 ///
 /// # Errors
-/// The data disagrees with itself: an edge without its node, a curve of unequal lengths.
+/// The data is inconsistent: an edge names a node that does not exist, or a curve or chart has not
+/// as many values as times or cases.
 pub fn page(data: &ReportData) -> anyhow::Result<String> {
     check(data).context("cannot report")?;
     page::html(data)

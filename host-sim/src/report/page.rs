@@ -14,7 +14,7 @@ const LIBRARIES: &str = concat!(
     "\n",
     include_str!("../../assets/vendor/uPlot.iife.min.js")
 );
-/// All scripts of ours in one function scope, so that none of their names is global.
+/// All our own scripts in one function scope, so that none of their names is global.
 const SCRIPT: &str = concat!(
     "(() => {\n\"use strict\";\n",
     include_str!("../../assets/report/data.js"),
@@ -34,7 +34,7 @@ const SCRIPT: &str = concat!(
 struct PageData<'a> {
     #[serde(flatten)]
     data: &'a ReportData,
-    /// [`vehicle_color`] of each vehicle, by index; used for one without a `color`.
+    /// [`vehicle_color`] of each vehicle, by index; used for a vehicle without a `color`.
     palette: Vec<[u8; 3]>,
 }
 
@@ -71,8 +71,8 @@ fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// Escapes `<`, `>` and `&` in JSON, so that no data can end the `<script>` element around it: they
-/// stand only inside JSON strings, where `\\u003c` means the same.
+/// Escapes `<`, `>` and `&` in JSON, so that no data can end the `<script>` element around it.
+/// These characters occur only inside JSON strings, where `\\u003c` means the same as `<`.
 fn script_safe(json: &str) -> String {
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }

@@ -166,8 +166,8 @@ impl Cells {
     }
 }
 
-/// Covers the non-zero cells of `mask` (`nu` a row) with rectangles of one value each, calls
-/// `rectangle(value, a, b, width, height)` for each, and sets the cells to 0.
+/// Covers the non-zero cells of `mask` (rows of `nu` cells) with rectangles of one value each,
+/// calls `rectangle(value, a, b, width, height)` for each, and sets the cells to 0.
 fn merge(mask: &mut [u8], nu: usize, mut rectangle: impl FnMut(u8, usize, usize, usize, usize)) {
     let nv = mask.len() / nu;
     for b in 0..nv {
@@ -210,7 +210,7 @@ mod tests {
         MapSurface::of(&VoxelGrid::new(shape, Outside::Blocked, &words).expect("a valid grid"))
     }
 
-    /// Faces of the surface in cells, counted without merging.
+    /// Exposed area of the surface, in faces of cells.
     fn area(surface: &MapSurface) -> usize {
         surface.faces.chunks(6).map(|f| usize::from(f[4]) * usize::from(f[5])).sum()
     }

@@ -2,18 +2,18 @@
 //! shortest paths become little longer.
 //!
 //! 1. *Connected.* The edges of a spanning forest of greatest clearances are kept (Kruskal 1956):
-//!    between two nodes it has a path whose narrowest edge is as wide as that of the widest path
-//!    there is (Hu 1961). So whatever clearance is required, a node that could reach another one
-//!    before still can.
+//!    between any two nodes the forest has a path whose narrowest edge is as wide as that of the
+//!    widest path in the whole roadmap (Hu 1961). So whatever clearance is required, a node that
+//!    could reach another one before still can.
 //! 2. *Near.* Of the other edges, those to each node's nearest neighbours come first, up to
 //!    `NEAREST_EDGE_SHARE` of the room left.
 //! 3. *Far.* The rest of the room goes to the edges whose loss would lengthen the shortest paths
-//!    from [`PATH_SOURCES`] nodes most: the number of paths over an edge, times how much longer the
-//!    detour around it is over the edges kept so far. Half of them are chosen first: these shorten
-//!    the detours around the others.
+//!    from [`PATH_SOURCES`] nodes most: the number of paths over an edge, times the extra length of
+//!    the detour around it over the edges kept so far. Half of these edges are chosen first: they
+//!    shorten the detours around the others.
 //!
-//! Vehicles of several sizes fly on one roadmap, so nearest neighbours and shortest paths are those
-//! of each class of required clearances ([`CLEARANCE_CLASSES_M`]).
+//! Vehicles of several sizes fly on one roadmap, so nearest neighbours and shortest paths are
+//! determined for each class of required clearances ([`CLEARANCE_CLASSES_M`]).
 //!
 //! Cost: a sort of the edges, a Dijkstra search for each source and class, and a short one for each
 //! node, class and round, on all cores.
@@ -27,8 +27,8 @@ use rayon::prelude::*;
 
 /// Required clearances for which shortest paths are kept short, metres.
 pub const CLEARANCE_CLASSES_M: [f32; 3] = [0.3, 0.8, 1.2];
-/// Share of the edges beyond the forest that goes to nearest neighbours. A larger share shortens
-/// the longest detours, a smaller one the usual ones; measured on the scanned maps of
+/// Share of the kept edges beyond the forest that join nearest neighbours. A larger share shortens
+/// the longest detours, a smaller one the typical detours; measured on the scanned maps of
 /// `tests/tests/boards_hold.rs`.
 const NEAREST_EDGE_SHARE: f32 = 0.65;
 /// Number of nodes from which shortest paths are counted.
@@ -39,8 +39,8 @@ const FAR_EDGE_ROUNDS: usize = 2;
 /// this long.
 const MAX_DETOUR_RATIO: f32 = 1.5;
 
-/// Keeps at most `most` of the edges, in their order; `None` if that many cannot keep connected
-/// what is connected.
+/// Keeps at most `most` of the edges, in their order; `None` if so few edges cannot keep every
+/// connected pair of nodes connected.
 pub fn limit_edges(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
     if edges.len() <= most {
         return Some(edges.to_vec());
@@ -94,9 +94,8 @@ fn adjacency_lists(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out
     rows
 }
 
-/// The rank of each edge: how many shorter edges one of its nodes has that vehicles of some class
-/// can fly, among the classes that can fly the edge itself; the least over both nodes and these
-/// classes.
+/// The rank of each edge: the number of shorter edges at its node that vehicles of a class can fly;
+/// the least of these numbers over both nodes and all classes that can fly the edge itself.
 fn edge_ranks(rows: &[Vec<OutgoingEdge>], edges: usize) -> Vec<u32> {
     let mut ranks = vec![u32::MAX; edges];
     for row in rows {
@@ -112,7 +111,8 @@ fn edge_ranks(rows: &[Vec<OutgoingEdge>], edges: usize) -> Vec<u32> {
     ranks
 }
 
-/// Marks the edges of a spanning forest of greatest clearances; of equal edges the first.
+/// Marks the edges of a spanning forest of greatest clearances; of equally wide edges it takes the
+/// first.
 fn widest_forest(nodes: usize, edges: &[Edge]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..edges.len()).collect();
     order.sort_by(|&a, &b| edges[b].clearance_m.total_cmp(&edges[a].clearance_m).then(a.cmp(&b)));
@@ -139,7 +139,8 @@ fn widest_forest(nodes: usize, edges: &[Edge]) -> Vec<bool> {
     kept
 }
 
-/// Keeps `count` more edges: the first by `order`, then the shortest, then the lowest index.
+/// Keeps the first `count` more edges by `order`; ties go to the shorter edge, then to the lower
+/// index.
 fn keep_first<O: Ord>(
     kept: &mut [bool],
     count: usize,
@@ -160,9 +161,9 @@ fn clearance_classes() -> impl Iterator<Item = u8> {
     1..=CLEARANCE_CLASSES_M.len() as u8
 }
 
-/// By how many metres the shortest paths become longer without an edge, for each edge that is not
-/// kept: the mean over all paths of a class, summed over the classes. `usages[class][edge]` is the
-/// number of paths over an edge.
+/// For each edge that is not kept, by how many metres shortest paths become longer without it,
+/// times its share of all uses of edges by paths of a class; summed over the classes.
+/// `usages[class][edge]` is the number of paths over an edge.
 fn path_length_losses(rows: &[Vec<OutgoingEdge>], usages: &[Vec<u32>], kept: &[bool]) -> Vec<f32> {
     let is_kept = |out: &&OutgoingEdge| kept[out.edge as usize];
     let kept_rows: Vec<Vec<OutgoingEdge>> =
@@ -230,7 +231,7 @@ fn shortest_distances_within(
 }
 
 /// How many shortest paths lead over each edge, of those from [`PATH_SOURCES`] nodes to all others
-/// over edges of at least `class`.
+/// over edges whose clearance class is at least `class`.
 fn edge_usage(rows: &[Vec<OutgoingEdge>], edges: usize, class: u8) -> Vec<u32> {
     let sources = PATH_SOURCES.min(rows.len());
     let searches: Vec<Vec<(u32, u32)>> = (0..sources)
@@ -244,8 +245,8 @@ fn edge_usage(rows: &[Vec<OutgoingEdge>], edges: usize, class: u8) -> Vec<u32> {
     usage
 }
 
-/// The edges of the shortest paths from `source` to all nodes over edges of at least `class`, each
-/// with the number of these paths that lead over it (Dijkstra 1959).
+/// The edges of the shortest paths from `source` to all nodes over edges whose clearance class is
+/// at least `class`, each with the number of these paths that lead over it (Dijkstra 1959).
 fn shortest_path_edge_counts(
     source: usize,
     rows: &[Vec<OutgoingEdge>],
@@ -286,7 +287,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// For each node the least node that it reaches over edges wider than what is required.
+    /// For each node, the lowest node that it reaches over edges wider than `required_m`.
     fn reached(nodes: usize, edges: &[Edge], required_m: f32) -> Vec<u16> {
         let mut least: Vec<u16> = (0..nodes as u16).collect();
         for _ in 0..nodes {

@@ -7,8 +7,8 @@
 //! new edges are as clear as any other.
 //!
 //! Cost: an A* search over the map's cells for each pair of components that is to be joined; a
-//! mission whose roadmap connects all its starts and goals pays for the tree of boxes and the test
-//! of that.
+//! mission whose roadmap connects all its starts and goals pays only for the tree of boxes and for
+//! testing whether they are connected.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -20,8 +20,8 @@ use planner_core::voxel::GridShape;
 
 use crate::map::{BoxTree, VoxelMap};
 
-/// Clearance of a passage's path beyond the required one, metres: more than rounding, and than the
-/// millimetre that the file rounds down to.
+/// Clearance of a passage's path beyond the required one, metres: more than rounding errors, and
+/// more than the millimetre to which the roadmap file rounds down.
 const CLEARANCE_SLACK_M: f32 = 1.2e-3;
 /// Largest map that is searched, cells: the search keeps about nine bytes a cell.
 const MAX_SEARCHED_CELLS: usize = 1 << 25;
@@ -38,8 +38,8 @@ pub struct WantedConnection {
     pub required_m: f32,
 }
 
-/// Nodes that connect each wanted pair that `edges` do not connect, where the map has a path for
-/// it.
+/// Nodes that connect each wanted pair that `edges` do not connect. A pair for which the map has no
+/// path gets none.
 pub fn missing_passage_nodes(
     map: &VoxelMap,
     tree: &BoxTree,
@@ -157,8 +157,8 @@ impl<'a> CellSearch<'a> {
         })
     }
 
-    /// The cells at and next to `place` that a clear straight segment from it to their centre
-    /// joins.
+    /// Of the cell that holds `place` and its neighbours, those to whose centres a clear straight
+    /// segment leads from `place`.
     fn cells_seen_from(&self, place: &Point) -> Vec<usize> {
         let Some(cell) = self.shape.cell_of(place) else { return Vec::new() };
         let sees =
@@ -214,8 +214,8 @@ impl<'a> CellSearch<'a> {
     }
 }
 
-/// The inner corners of the path with the fewest edges along `way`, at least one: each edge is
-/// clear and between the edge lengths of `config`. `None` if no such path exists.
+/// The inner corners (at least one) of the path along `way` that has the fewest edges. Each edge is
+/// clear, and its length is within the limits of `config`. `None` if no such path exists.
 fn fewest_corners(
     tree: &BoxTree,
     way: &[Point],

@@ -13,7 +13,8 @@ use rand_pcg::Pcg32;
 
 const REQUIRED_M: f32 = 0.24;
 
-/// Rooms of 3 × 4 m in a row, each wall with a door of 0.5 m, from the floor up, somewhere in it.
+/// Rooms of 3 × 4 m in a row; each wall between two has a full-height door 0.5 m wide at a random
+/// place.
 fn rooms(rng: &mut Pcg32, count: u32) -> VoxelMap {
     let dims = [30 * count, 40, 20];
     let shape = GridShape { dims, min: Point::zeros(), resolution_m: 0.1 };

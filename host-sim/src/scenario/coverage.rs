@@ -28,8 +28,8 @@ pub struct Area {
     pub vertices: Vec<Flat>,
     /// Kind of each ring, and where its vertices end.
     pub rings: Vec<Ring>,
-    /// Number of no-fly zones that the scenario and its file give; in `rings` those around
-    /// obstacles of the map come after them.
+    /// Number of no-fly zones that the scenario and its area file give. In `rings` the zones around
+    /// the map's obstacles come after these.
     pub given_zones: usize,
     /// Origin of the mission frame.
     pub origin: Geodetic,
@@ -37,7 +37,8 @@ pub struct Area {
     pub camera: Option<Camera>,
     /// Footprint of a picture, and distances of lanes and waypoints, metres.
     pub spacing: Spacing,
-    /// `spacing` with the part of the footprint that the plan counts on despite errors in flight.
+    /// `spacing` with its footprint reduced to the part that the plan counts on despite flight
+    /// errors.
     pub usable: Spacing,
     /// Height of the pictures, metres: above the ground with terrain, else above the origin.
     pub height_m: f32,
@@ -71,7 +72,7 @@ pub struct Terrain {
     pub field: Arc<[u8]>,
     /// How far vehicles may fly higher above the field than [`Area::height_m`], metres.
     pub tolerance_m: f32,
-    /// Steepest slope that vehicles fly, metres of height a metre over ground.
+    /// Steepest slope that vehicles fly, metres of height for each metre over ground.
     pub slope: f32,
 }
 
@@ -104,11 +105,11 @@ impl Area {
 /// How the work is divided among the vehicles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
-    /// Whole lanes, in shares by the vehicles' weights (SIMPLE-BINPAT).
+    /// Whole lanes, divided in proportion to the vehicles' weights (SIMPLE-BINPAT).
     SimpleBinpat,
-    /// Waypoints, in shares by the vehicles' weights (BINPAT).
+    /// Waypoints, divided in proportion to the vehicles' weights (BINPAT).
     Binpat,
-    /// Waypoints, in the shares that Powell's method finds best (POWELL-BINPAT).
+    /// Waypoints, divided in the proportions that Powell's method finds best (POWELL-BINPAT).
     #[default]
     PowellBinpat,
     /// The division into contiguous parts whose greatest cost is the least possible.

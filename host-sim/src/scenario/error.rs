@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::quote::{MAX_QUOTE_CHARS, quoted};
 
-/// Characters of a long line that are shown before the marked ones.
+/// Number of characters of a long line that are shown before the marked ones.
 const CONTEXT_CHARS: usize = 40;
 
 /// Error of a scenario: the fault, its place, and a remedy.

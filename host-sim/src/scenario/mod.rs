@@ -48,7 +48,7 @@ fn text(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
     Ok((text, name, folder))
 }
 
-/// Parses a scenario's text; `name` names it in errors, and paths in it are relative to the working
+/// Parses a scenario's text; errors call it `name`, and its paths are relative to the working
 /// directory.
 pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
     read(text, name, Path::new(""))

@@ -77,8 +77,8 @@ struct Common {
     estimator_span: Option<Span>,
 }
 
-/// Reads the settings that every kind of mission has. Two defaults depend on the kind: the
-/// deviation of two vehicles from their paths, metres, and the time limit of a flight, seconds.
+/// Reads the settings that every kind of mission has. Two defaults depend on the kind: by how much
+/// two vehicles together deviate from their paths, metres, and the time limit of a flight, seconds.
 fn read_common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> Result<Common> {
     let seed = root.integer_in_range("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
@@ -100,7 +100,8 @@ fn read_faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result
     items.iter().map(|v| read_fault(&v.table()?, &ids)).collect()
 }
 
-/// Hint at a usual mistake in text that is not TOML, by its next character and `what`.
+/// Hint at a usual mistake in text that is not TOML: `rest` is the text from the error on, `what`
+/// is the parser's message.
 fn syntax_hint(rest: &str, what: &str) -> Option<&'static str> {
     match rest.chars().next() {
         Some('“' | '”' | '„' | '‘' | '’' | '«') => {
@@ -148,7 +149,7 @@ fn read_geodetic(value: &Value<'_>) -> Result<Geodetic> {
     Ok(Geodetic { lat_deg, lon_deg, alt_m })
 }
 
-/// Reads `[map]`; the flag says whether the scenario gives its origin.
+/// Reads `[map]`; the flag says whether the scenario gives the map's origin.
 fn read_map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
     let file_value =
         table.required("file", "a path to an OctoMap `.bt` file, or \"builtin:building\"")?;
@@ -260,8 +261,8 @@ fn read_stations(
     Ok(ids)
 }
 
-/// Reads a point of the mission frame: ENU metres, or latitude, longitude and altitude, for which
-/// the scenario must give its origin.
+/// Reads a point of the mission frame: ENU metres, or latitude, longitude and altitude, which need
+/// an `origin` given in the scenario.
 fn read_place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
     if !value.is_table() {
         return read_point(value);

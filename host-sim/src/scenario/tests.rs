@@ -400,8 +400,8 @@ fn wrong_files_of_an_area_are_named_with_key_place_and_remedy() {
     }
 }
 
-/// Starts and goals clear of everything by more than the required clearance, on a map that can be
-/// loaded.
+/// Asserts that the map loads and that starts and goals are farther from all obstacles than the
+/// required clearance.
 fn check_places(scenario: &Scenario) {
     let map = crate::map::load(&scenario.map.file, scenario.map.resolution_m).unwrap();
     let voxels = map.voxel_map(scenario.map.unknown);

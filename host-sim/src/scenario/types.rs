@@ -43,7 +43,7 @@ pub struct Scenario {
     pub area: Option<Area>,
     /// `[formation]`, which is not supported yet.
     pub formation: Option<UnsupportedTable>,
-    /// An error for each setting that is not supported yet, in the file's order.
+    /// An error for each setting that is not supported yet, in the order of reading.
     pub(super) unsupported: Vec<ScenarioError>,
 }
 
@@ -77,11 +77,11 @@ pub struct Roadmap {
     pub edge_min_m: f32,
     /// Longest length of an edge, metres.
     pub edge_max_m: f32,
-    /// Shortest edge as a share of the map's longest side; with `None`, `edge_min_m` counts (P2D).
+    /// Shortest edge as a share of the map's longest side (paper P2D); `None`: `edge_min_m` counts.
     pub edge_min_share: Option<f32>,
-    /// Longest edge as a share of the map's longest side; with `None`, `edge_max_m` counts (P2D).
+    /// Longest edge as a share of the map's longest side (paper P2D); `None`: `edge_max_m` counts.
     pub edge_max_share: Option<f32>,
-    /// Whether edges may join two starts or goals.
+    /// Whether edges may join two terminals, that is starts or goals.
     pub terminals: Terminals,
     /// Clearance of edges beyond a vehicle's radius, metres.
     pub safety_margin_m: f32,
@@ -94,9 +94,9 @@ pub struct Roadmap {
 /// Whether edges may join two terminals, that is starts or goals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Terminals {
-    /// Two terminals are joined as any other nodes (P3D).
+    /// Two terminals are joined as any other nodes (paper P3D).
     Joined,
-    /// No edge joins two terminals (P2D).
+    /// No edge joins two terminals (paper P2D).
     Apart,
 }
 
@@ -166,7 +166,7 @@ pub struct Vehicle {
     pub id: u8,
     /// Where the vehicle's path begins, ENU metres.
     pub start: Point,
-    /// Index of the vehicle's goal, in labelled missions.
+    /// Index (from 0) into [`Mission::goals`], for labelled missions.
     pub goal: Option<usize>,
     /// Radius of the vehicle's hull, metres.
     pub radius_m: f32,
@@ -180,27 +180,27 @@ pub struct Vehicle {
     pub payload_kg: Option<f32>,
     /// Autopilot of the vehicle: PX4 or ArduPilot.
     pub personality: AutopilotKind,
-    /// Home of the autopilot; `None`: where it arms.
+    /// Home of the autopilot; `None`: the place where it arms.
     pub home: Option<Geodetic>,
-    /// EKF origin of the autopilot; `None`: its pad.
+    /// EKF origin of the autopilot; `None`: the vehicle's pad.
     pub ekf_origin: Option<Geodetic>,
     /// Where the vehicle's companion runs.
     pub companion: Companion,
-    /// Coverage: weight of the vehicle's share of the work.
+    /// Coverage: relative weight of the vehicle in the division of the work; `None`: 1.
     pub weight: Option<f32>,
-    /// Coverage: speed V_a of the vehicle's climbs, m/s.
+    /// Coverage: climb speed (V_a in paper CPP), m/s; `None`: 3 m/s.
     pub climb_mps: Option<f32>,
-    /// Coverage: speed V_d of the vehicle's descents, m/s.
+    /// Coverage: descent speed (V_d in paper CPP), m/s; `None`: 1 m/s.
     pub descend_mps: Option<f32>,
 }
 
-/// Speed V_a of climbs if the vehicle gives none, m/s.
+/// Climb speed (V_a in paper CPP) if the vehicle gives none, m/s.
 const DEFAULT_CLIMB_MPS: f32 = 3.0;
-/// Speed V_d of descents if the vehicle gives none, m/s.
+/// Descent speed (V_d in paper CPP) if the vehicle gives none, m/s.
 const DEFAULT_DESCEND_MPS: f32 = 1.0;
 
 impl Vehicle {
-    /// Speeds of climb and descent, V_a and V_d, m/s.
+    /// Speeds of climb and descent, m/s.
     pub fn climb_and_descent_mps(&self) -> [f32; 2] {
         [
             self.climb_mps.unwrap_or(DEFAULT_CLIMB_MPS),
@@ -239,7 +239,7 @@ pub enum Companion {
 pub struct Deconfliction {
     /// How vehicles keep apart.
     pub method: Method,
-    /// Distance between two vehicles' centres that must not be undercut, metres.
+    /// Least allowed distance between two vehicles' centres, metres.
     pub safety_distance_m: f32,
     /// Distance that the schedule keeps between vehicles' paths, centre to centre, metres.
     pub separation_m: f32,
@@ -252,9 +252,9 @@ pub struct Simulation {
     pub wind_mps: f32,
     /// Peak of the gusts on top of the mean wind, m/s.
     pub gust_mps: f32,
-    /// Standard deviation of the estimated position, metres.
+    /// Standard deviation of a random error of the position estimate, metres.
     pub position_noise_m: f32,
-    /// How far the autopilots' position estimates err.
+    /// Error model of the autopilots' position estimates.
     pub estimator: EstimatorErrors,
     /// Baud rate of the serial links between companions and autopilots.
     pub serial_baud: u32,
@@ -281,9 +281,9 @@ pub struct Fault {
     pub vehicle: Option<u8>,
     /// Kind of the fault: one of [`FAULT_KINDS`], or [`FAULT_OBSTACLE`].
     pub kind: &'static str,
-    /// `radio-cut`: which direction fails, `tx`, `rx` or `both`.
+    /// `radio-cut`: which direction fails, `tx`, `rx` or `both`; `None`: both.
     pub direction: Option<String>,
-    /// `position-jump`, `origin-change`: offset, ENU metres.
+    /// `position-jump`, `origin-change`: offset, ENU metres; `None`: the default of the kind.
     pub offset_m: Option<Point>,
     /// `obstacle`: centre of the sphere, ENU metres.
     pub position: Option<Point>,
@@ -323,7 +323,7 @@ pub const FAULT_KINDS: [&str; 17] = [
 pub const FAULT_OBSTACLE: &str = "obstacle";
 
 impl Scenario {
-    /// Refuses the first setting of the file that is not supported yet, so that none is silently
+    /// Refuses a scenario with a setting that is not supported yet, so that none is silently
     /// ignored.
     pub fn check_supported(&self) -> Result<(), ScenarioError> {
         self.unsupported.first().map_or(Ok(()), |error| Err(error.clone()))

@@ -1,9 +1,9 @@
-//! A vehicle's companion on a board or in another process: our ends of its two serial ports, and
-//! the state, progress and texts that it reports.
+//! A vehicle's companion on a board or in another process: the simulation's ends of its two serial
+//! ports, and the state, progress and texts that it reports.
 //!
 //! The simulation knows what the companion does from its messages only: its state from HEARTBEAT,
 //! its progress from TUNNEL, its texts from STATUSTEXT, all received on the port of its radio. A
-//! board whose radio is not ours is received on the port for the autopilot, which carries no
+//! board whose radio is not simulated is received on the port for the autopilot, which carries no
 //! TUNNEL.
 //!
 //! A board in QEMU is in lock step with the simulation ([`crate::boards`]): it runs through a step
@@ -52,7 +52,7 @@ pub struct BoardLinks<'a> {
 /// How the simulation is connected to a board.
 enum BoardConnection {
     /// Opened links to a board that runs by its own clock; `radio` is `None` if its radio is not
-    /// ours.
+    /// simulated.
     Links { autopilot: Box<dyn Link>, radio: Option<Box<dyn Link>> },
     /// An emulated board that runs only while the simulation grants it time.
     LockStep(LockStep),
@@ -63,7 +63,7 @@ struct LockStep {
     board: EmulatedBoard,
     /// Simulation time at which the board last started, microseconds.
     started_us: u64,
-    /// Whether the board runs through a grant that is not finished yet.
+    /// Whether the board was granted a step that it has not finished yet.
     runs: bool,
 }
 

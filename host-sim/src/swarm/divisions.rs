@@ -1,6 +1,6 @@
 //! Logs the divisions that companions of a coverage mission agree on in flight, from their radio
-//! messages: the plan that each vehicle flies after one, and the inputs that the plan is computed
-//! from. With these inputs and the mission file anybody can compute it again.
+//! messages: the plan that each vehicle flies after a division, and the inputs that the plan is
+//! computed from. The plan can be computed again from these inputs and the mission file.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -13,7 +13,7 @@ use companion::time::Instant;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 
-/// A division that the fleet agreed on, as flown by one vehicle.
+/// A division that the swarm agreed on, as flown by one vehicle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Division {
     /// When the vehicle first reported the plan of this division, seconds.

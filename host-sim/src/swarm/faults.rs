@@ -4,7 +4,7 @@
 //! | kind | strikes | ends after `duration_s` |
 //! |---|---|---|
 //! | `kill` | all power gone: silent, falls to the floor below and lies there | never |
-//! | `radio-cut` | sends (`tx`), hears (`rx`) or does neither (`both`, if not given) | hears and sends again |
+//! | `radio-cut` | cannot send (`tx`), cannot hear (`rx`), or can do neither (`both`, if not given) | hears and sends again |
 //! | `serial-stall` | no byte between companion and autopilot, either way | 3 s if not given |
 //! | `serial-corrupt` | [`CORRUPTED_SHARE`] of all bytes change a bit | as before |
 //! | `position-jump` | the estimate moves by `offset_m`, 5 m east if not given | jumps back |
@@ -13,14 +13,14 @@
 //! | `battery-low` | [`BATTERY_LEFT`] of the charge is left | never |
 //! | `pilot-takeover` | Position or Brake mode by the pilot's switch | as `pilot-return` |
 //! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station commands the companion to continue | |
-//! | `autopilot-reboot` | motors off, everything forgotten, silent while it boots | 3 s if not given |
-//! | `companion-reset` | a new companion with a new clock | |
+//! | `autopilot-reboot` | motors off, mode and streams reset, silent in its boot | 3 s if not given |
+//! | `companion-reset` | the companion restarts, its clock at 0 | |
 //! | `late-plan` | a request for a plan gets no answer | answered |
-//! | `bad-roadmap` | the roadmap on the board is damaged | the board holds the right one again |
+//! | `bad-roadmap` | plans are computed on a damaged roadmap | on the right one again |
 //! | `pause-order` | the ground station commands a pause | commands to continue |
 //! | `return-order` | the ground station commands to fly home | |
 //! | `land-order` | the ground station commands to land | |
-//! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and reports to all companions | gone; the companions keep off on |
+//! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and reports to all companions | the sphere is gone; companions still avoid it |
 //!
 //! A fault without a vehicle strikes all vehicles; an obstacle strikes none.
 
@@ -45,8 +45,8 @@ const ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
 /// Duration of a serial stall or an autopilot's boot if the fault has no `duration_s`, seconds.
 const DEFAULT_FAULT_S: f32 = 3.0;
 
-/// Refuses faults that this simulation cannot do to their vehicle: resetting a companion, its
-/// planner or its radio needs them in this process.
+/// Refuses faults that the simulation cannot play on a vehicle: resetting a companion needs it in
+/// this process, disturbing its planner too; a radio cut needs the simulated radio.
 ///
 /// # Errors
 /// Names the fault and the vehicle.

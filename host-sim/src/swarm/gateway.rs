@@ -40,8 +40,8 @@ impl Gateway {
         members.iter_mut().for_each(|member| member.autopilot.add_ground_port());
     }
 
-    /// Passes on what the ground station sent since the last step; then sends it what the
-    /// autopilots have for it, and the packets of companions among `overheard` that it gets.
+    /// Passes on what the ground station sent since the last step. Then sends the ground station
+    /// the packets among `overheard` that are for it, and the autopilots' frames.
     ///
     /// # Errors
     /// The link is gone for good.
@@ -78,7 +78,7 @@ impl Gateway {
         self.flush()
     }
 
-    /// Appends whole frames to the datagram; sends that first if they do not fit any more.
+    /// Appends whole frames to the datagram; sends the datagram first if they do not fit any more.
     fn send(&mut self, frames: &[u8]) -> io::Result<()> {
         if self.datagram.len() + frames.len() > MAX_DATAGRAM {
             self.flush()?;
@@ -96,7 +96,8 @@ impl Gateway {
     }
 }
 
-/// Whether a packet's frame, one a packet from companions, is among [`FORWARDED_MESSAGE_IDS`].
+/// Whether a companion's packet, which holds one frame, is of a message among
+/// [`FORWARDED_MESSAGE_IDS`].
 fn is_for_ground(packet: &[u8]) -> bool {
     let mut input = packet;
     let frame = Framer::new().next(Instant::ZERO, &mut input);

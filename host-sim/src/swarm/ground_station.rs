@@ -1,7 +1,7 @@
 //! The simulated operator's ground station. As QGroundControl or a script would, it starts the
 //! whole swarm by radio once every companion is ready, gives the commands of the fault script,
 //! resumes a vehicle that its pilot gave back, and reports each obstacle that appears. It does not
-//! wait for a vehicle that cannot fly, and only 90 s for one that is late.
+//! wait for a vehicle that cannot fly, and waits at most 90 s for a late one.
 
 use companion::State;
 use companion::link::frame::{self, Header};
@@ -17,7 +17,7 @@ use super::radio::Radio;
 const COMPONENT_ID: u8 = 190;
 /// Time after which a command that a vehicle has not obeyed is repeated, microseconds.
 const COMMAND_EVERY_US: u64 = 1_000_000;
-/// Time after the first vehicle is ready after which the ready vehicles are started without the
+/// Time from the readiness of the first vehicle until ready vehicles are started without the
 /// others, microseconds.
 const START_WITHOUT_REST_US: u64 = 90_000_000;
 /// Time for which a command to one vehicle is repeated, microseconds: some messages are lost.

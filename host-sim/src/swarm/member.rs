@@ -39,7 +39,7 @@ pub enum Planner {
 pub struct SimulatedVehicle {
     /// Autopilot of the vehicle.
     pub autopilot: Autopilot,
-    /// The vehicle's companion; idle if a board runs it.
+    /// The companion in this process; idle if `board` flies the vehicle.
     pub companion: Box<HostCompanion>,
     /// The board or process whose companion flies the vehicle instead of `companion`.
     board: Option<Board>,
@@ -53,8 +53,8 @@ pub struct SimulatedVehicle {
     pub last_warning: Option<&'static str>,
     /// When the vehicle first left the ground, seconds.
     pub took_off_s: Option<f64>,
-    /// When the vehicle first stood on the ground again, disarmed, seconds; `None` for one that
-    /// lost its power before.
+    /// When the vehicle first stood on the ground again, disarmed, seconds; `None` for a vehicle
+    /// that lost its power before.
     pub landed_s: Option<f64>,
     /// When the vehicle first stood or lay on the ground again, its motors off, seconds.
     pub down_s: Option<f64>,
@@ -150,7 +150,7 @@ impl SimulatedVehicle {
         self.config.system_id
     }
 
-    /// Silence after which a vehicle of a coverage mission is on the ground, seconds; else 0.
+    /// Longest time that a lost vehicle takes to come down, seconds; 0 in a mission with goals.
     pub fn lost_vehicle_down_s(&self) -> f32 {
         self.config.lost_vehicle_down_s.unwrap_or(0.0)
     }
@@ -372,7 +372,7 @@ impl SimulatedVehicle {
             .or_else(|| self.to_autopilot.describe_fault(lasted_s))
     }
 
-    /// Gives a ground station's frame to a board that has no radio of ours, by the autopilot's
+    /// Gives a ground station's frame to a board whose radio is not simulated, by the autopilot's
     /// serial link, as an autopilot forwards it.
     pub fn forward_to_board(&mut self, now_us: u64, frame: &[u8]) {
         if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_down(now_us) {
@@ -435,8 +435,8 @@ impl SimulatedVehicle {
         }
     }
 
-    /// The most urgent plan that the companion has requested; `None` if there is none, or if it is
-    /// not to be answered (`late-plan`).
+    /// Removes and returns the companion's most urgent plan request; `None` if there is none, or if
+    /// requests are not answered (`late-plan`).
     pub fn next_plan_request(&self) -> Option<PlanKind> {
         if self.planner == Planner::Late { None } else { self.plan_requests.take() }
     }
@@ -489,7 +489,7 @@ impl SimulatedVehicle {
     }
 }
 
-/// Whether a vehicle in this state was started: one without a goal may get a part of an area later.
+/// Whether a vehicle in this state was started, so that it may get a part of an area later.
 pub fn is_started(state: State) -> bool {
     !matches!(state, State::WaitAutopilot | State::WaitPosition | State::Planning | State::Ready)
 }

@@ -50,12 +50,12 @@ const REACHED_M: f32 = 0.5;
 const OFF_PAD_M: f32 = 2.0;
 /// Simulated time after the last vehicle is done, before the simulation ends, seconds.
 const AFTERMATH_S: f64 = 1.0;
-/// Time without any vehicle in motion, after all faults, after which none is expected to fly any
+/// Time without any armed vehicle, after all faults, after which no vehicle is expected to fly any
 /// more, seconds: longer than from a gate's opening to the take-off.
 const STANDSTILL_S: f64 = 30.0;
-/// Greatest lag of the simulation behind the wall clock that is caught up with; a longer one is
-/// kept: while the simulation hurried, autopilots would pass seconds in which no companion in
-/// another process can send anything.
+/// Greatest lag behind the wall clock that the simulation makes up for; a longer lag remains. If
+/// the simulation hurried, autopilots would pass seconds in which no companion in another process
+/// can send anything.
 const MAX_CLOCK_LAG: Duration = Duration::from_millis(200);
 
 /// Outcome of a simulated flight.
@@ -125,7 +125,7 @@ struct SimulationRun<'a> {
     nearest_goal_m: Vec<f32>,
     /// Simulated time so far, seconds.
     t_s: f64,
-    /// When some vehicle was last seen armed, or was still awaited, seconds.
+    /// When some vehicle was last seen armed, or the start or a fault was still awaited, seconds.
     moved_s: f64,
     ends_at_s: f64,
 }
@@ -312,7 +312,7 @@ impl<'a> SimulationRun<'a> {
         if !(self.script.is_over() && started && members.iter().all(still)) {
             self.moved_s = self.t_s;
         }
-        // In a coverage mission those on the ground wait until a lost vehicle is down.
+        // In a coverage mission vehicles on the ground wait until a lost vehicle is down.
         let still_s = STANDSTILL_S + f64::from(members[0].lost_vehicle_down_s());
         let over = (0..members.len()).all(done) || self.t_s - self.moved_s > still_s;
         if self.ends_at_s.is_infinite() && self.script.is_over() && over {
@@ -363,7 +363,8 @@ impl<'a> SimulationRun<'a> {
 
     fn vehicle_result(&self, i: usize) -> VehicleResult {
         let scenario = &self.mission.scenario;
-        // The vehicle cannot correct the error of its position estimate, so that is subtracted.
+        // The vehicle cannot correct the error of its position estimate, so that error is
+        // subtracted.
         let error_m = margins::max_estimate_error_m(
             scenario.simulation.estimator,
             scenario.vehicles[i].personality,
@@ -379,8 +380,8 @@ impl<'a> SimulationRun<'a> {
         !has_flight(&self.members[i], flight) || (vehicle.reached && vehicle.landed)
     }
 
-    /// Whether a fault struck the vehicle and it has come to its end: without power, never taken
-    /// off, finished, or with its pilot.
+    /// Whether a fault struck the vehicle and its flight is over: it has no power, never took off,
+    /// is finished, or is left to its pilot.
     fn is_disabled_by_fault(&self, i: usize) -> bool {
         let member = &self.members[i];
         self.script.is_struck(i)
@@ -411,7 +412,7 @@ impl<'a> SimulationRun<'a> {
     }
 }
 
-/// Whether a pilot has, or has just given back, the vehicle: it may stay so for any time.
+/// Whether a pilot controls the vehicle or has just given it back: this may last for any time.
 fn is_left_to_pilot(member: &SimulatedVehicle) -> bool {
     matches!(member.state(), State::PilotControl | State::PilotReturned)
 }
@@ -428,7 +429,8 @@ fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
     }
 }
 
-/// Whether the plan gives the vehicle a flight, and earlier flights have not left it without one.
+/// Whether the vehicle took off, or the plan gives it a flight that earlier flights did not
+/// complete.
 fn has_flight(
     member: &SimulatedVehicle,
     flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,

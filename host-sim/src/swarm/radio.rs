@@ -11,9 +11,9 @@ use super::serial::uniform_unit;
 /// Properties of the emulated radio.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RadioConfig {
-    /// Distance of two stations beyond which they do not hear each other, metres.
+    /// Distance between two stations beyond which they do not hear each other, metres.
     pub range_m: f32,
-    /// Probability that a receiver misses a packet, for each receiver alone.
+    /// Probability that a receiver misses a packet, independent for each receiver.
     pub loss: f64,
     /// Time from sending a packet to its reception, seconds.
     pub delay_s: f64,

@@ -3,8 +3,8 @@
 //!
 //! A wall contact is a body (a sphere of the vehicle's radius) that reaches into an obstacle of the
 //! exact map; a contact that lasts counts once. While a vehicle takes off or lands, obstacle cells
-//! below its centre are the floor, no wall. A wreck is an obstacle too: to touch it is a contact,
-//! to pass near it no violation.
+//! below its centre are the floor, no wall. A wreck is an obstacle too: touching it is a contact,
+//! passing near it is no violation.
 
 use planner_core::Point;
 use planner_core::segment::point_clearance;
@@ -59,7 +59,8 @@ pub struct Observation {
 pub struct Sample {
     /// Seconds since the start of the simulation.
     pub t_s: f32,
-    /// Smallest distance between two centres, not both on the ground, metres; else infinite.
+    /// Smallest distance between two centres, not both on the ground, metres; infinite if no such
+    /// pair.
     pub separation_m: f32,
     /// Smallest distance of a flying centre to an obstacle, metres; infinite if none was near.
     pub clearance_m: f32,
@@ -97,8 +98,8 @@ pub struct Referee<'a> {
     touching: Vec<bool>,
     recorded_s: f64,
     window: Sample,
-    /// Whether a deadlock that dissolves is taken back: where faults strike, vehicles wait until it
-    /// is known what became of the one struck, and for their turn to fly around it.
+    /// Whether a deadlock that ends no longer counts: where faults strike, vehicles wait until it
+    /// is known what became of the struck vehicle, and for their turn to fly around it.
     pub retracts_ended_deadlocks: bool,
     /// Spherical obstacles that are in no map: centre and radius, metres.
     pub obstacles: Vec<(Point, f32)>,
@@ -193,7 +194,7 @@ impl<'a> Referee<'a> {
         &self.vehicles[vehicle].track
     }
 
-    /// Whether a body in flight reaches into uneven ground; records its height above that too.
+    /// Whether a body in flight reaches into uneven ground; records its height above ground too.
     fn reaches_ground(&mut self, place: &Point, radius_m: f32) -> bool {
         let Some(ground_m) = self.terrain.and_then(|terrain| terrain.height_at(&place.xy())) else {
             return false;
@@ -266,7 +267,8 @@ impl<'a> Referee<'a> {
         })
     }
 
-    /// Whether a body on or near the floor touches an obstacle cell whose top is above its centre.
+    /// Whether a body on or near the floor touches an obstacle cell whose top is above the body's
+    /// centre.
     fn touches_beside(&self, position: &Point, radius_m: f32) -> bool {
         let walls = self.walls.map(|walls| walls.map.grid());
         let mut grids = walls.iter().chain([&self.grid]);
@@ -329,7 +331,7 @@ impl<'a> Referee<'a> {
 
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
-        // Progress falls only because it now counts along another path.
+        // Progress decreases only if it is now counted along another path.
         let on_other_path =
             now.progress_m.filter(|progress_m| *progress_m < vehicle.best_progress_m - OFF_HOVER_M);
         if let Some(progress_m) = on_other_path {
@@ -344,7 +346,7 @@ impl<'a> Referee<'a> {
                 now.progress_m.unwrap_or(f32::NEG_INFINITY).max(vehicle.best_progress_m);
             vehicle.progressed_at = now.position;
             vehicle.progressed_s = t_s;
-            // One whose power fails may have waited for a good reason.
+            // A vehicle whose power fails may have waited for a good reason.
             let ends = moved || now.phase != Phase::Flying;
             if std::mem::take(&mut vehicle.stuck) && ends && self.retracts_ended_deadlocks {
                 self.deadlocks -= 1;
@@ -363,7 +365,7 @@ impl<'a> Referee<'a> {
     }
 }
 
-/// Whether a body touches an obstacle cell of this grid whose top is above its centre.
+/// Whether a body touches an obstacle cell of this grid whose top is above the body's centre.
 fn touches_cell_beside(grid: &VoxelGrid<'_>, position: &Point, radius_m: f32) -> bool {
     let shape = grid.shape();
     let reach = Point::repeat(radius_m);

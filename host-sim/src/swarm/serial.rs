@@ -128,8 +128,8 @@ impl SerialLink {
     }
 
     /// Takes the next write whose last byte arrives by `until_us`: its time of arrival and its
-    /// bytes. `until_us` may be in the future; `None` if there is none, or the link is stalled
-    /// then.
+    /// bytes. `until_us` may be in the future; `None` if there is none, or the link is stalled at
+    /// that time.
     pub fn take_write_by(&mut self, until_us: u64) -> Option<(u64, Vec<u8>)> {
         let &(arrives_us, length) = self.writes.front()?;
         if arrives_us > until_us || until_us < self.stalled_until_us {

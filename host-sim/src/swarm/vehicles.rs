@@ -104,7 +104,8 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
     let config = mission.mission_view().companion_config(id);
     let config =
         config.map_err(|e| anyhow::anyhow!("no companion: {}: {e}", mission.scenario.path))?;
-    // The same plan may be flown by another method and inside another fence than its file has.
+    // The same plan may be flown by another method and inside another fence than its mission file
+    // has.
     let scenario = &mission.scenario;
     let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
     // The operator sets this radio range; from 500 m on, radio silence is never explained by

@@ -1,10 +1,10 @@
 //! Checks the sizes that a point cloud states of its parts before its readers allocate memory for
 //! them.
 //!
-//! LAS 1.4 specification, R15: the header, variable length records behind it with headers of 54
-//! bytes, and extended ones behind the returns with headers of 60. LAZ: a table of chunks, whose
-//! offset stands before the returns or, where it could not be written there, at the end of the
-//! file, and layers in each chunk.
+//! LAS 1.4 specification, R15: the header; behind it variable length records (VLRs), each with a
+//! header of 54 bytes; behind the returns extended ones (EVLRs), each with a header of 60 bytes.
+//! LAZ: a table of chunks, whose offset stands before the returns or, where it could not be written
+//! there, at the end of the file, and layers in each chunk.
 
 use std::io::{self, Read, Seek, SeekFrom};
 

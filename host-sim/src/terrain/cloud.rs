@@ -26,11 +26,11 @@ const FORMAT: &str = "a point cloud";
 const RETURNS_PER_CELL: f64 = 4.0;
 /// Least side of a cell of the grid, metres.
 const MIN_CELL_M: f64 = 0.5;
-/// Widest gap of empty cells, to either side, that is filled from cells with heights.
+/// An empty cell is filled if cells on both sides, at most this many cells away, have heights.
 const BRIDGED_CELLS: usize = 3;
 /// Number of returns decoded at a time.
 const RETURNS_PER_BATCH: u64 = 4096;
-/// Classes of returns that are errors.
+/// Classes of returns that are measurement errors.
 const NOISE: [Classification; 2] = [Classification::LowPoint, Classification::HighNoise];
 
 pub(super) fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {

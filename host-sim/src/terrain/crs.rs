@@ -133,8 +133,8 @@ impl Crs {
         match self {
             Self::Unstated => Some([f64::from(place.x), f64::from(place.y)]),
             Self::Stated(system) => {
-                // The place at the origin's altitude there, not on the plane that touches the earth
-                // at the origin: found in three iterations.
+                // The point at the origin's altitude, not the one on the plane that touches the
+                // earth at the origin: three iterations find it.
                 let mut up_m = 0.0;
                 let mut found = *origin;
                 for _ in 0..3 {

@@ -1,7 +1,7 @@
-//! Makes the height field that vehicles follow from a height map: `field.bin`.
+//! Makes `field.bin`, the height field that vehicles follow, from a height map.
 //!
-//! A node has the height of the highest ground within [`READ_AROUND_SAMPLE_CELLS`] cells of it and
-//! the distance that a vehicle may be beside its path. Then nodes are raised until no slope is
+//! A node has the height of the highest ground around it: within [`READ_AROUND_SAMPLE_CELLS`] cells
+//! plus the distance that a vehicle may be beside its path. Then nodes are raised until no slope is
 //! steeper than vehicles climb and descend at cruise speed. The whole box must have heights.
 
 use planner_core::coverage::Flat;
@@ -10,8 +10,8 @@ use thiserror::Error;
 
 use super::grid::HeightGrid;
 
-/// How far from a point on a path heights matter to it, in cells: samples of the path are half a
-/// cell apart, and the nodes of a sample lie within one cell of the sample.
+/// How far from a point on a path heights of nodes matter to that point, in cells: samples of the
+/// path are half a cell apart, and the nodes of a sample lie within one cell of the sample.
 pub const READ_AROUND_SAMPLE_CELLS: f32 = 1.5;
 /// Least distance between two nodes, metres.
 const MIN_CELL_M: f32 = 2.0;
@@ -40,13 +40,13 @@ pub struct FieldConfig {
     pub area: [Flat; 2],
     /// Greatest distance of a vehicle from its path to the side, metres.
     pub reach_m: f32,
-    /// Steepest slope of the field, metres of height a metre over ground.
+    /// Steepest slope of the field, metres of height for each metre over ground.
     pub slope: f32,
 }
 
 impl FieldConfig {
-    /// How far around a node heights count for it, metres: `cell_m` is the distance of the nodes,
-    /// `own_cell_m` that of the map's cells.
+    /// How far around a node the map's heights count for that node, metres. `cell_m` is the
+    /// distance between nodes, `own_cell_m` the side of the map's cells.
     fn around_m(&self, cell_m: f32, own_cell_m: f32) -> f32 {
         // A height in a cell of the map may come from up to one cell beside it.
         READ_AROUND_SAMPLE_CELLS * cell_m + self.reach_m + own_cell_m
@@ -57,7 +57,7 @@ impl FieldConfig {
         let sides = self.area[1] - self.area[0];
         let rise = MIN_RISE_STEPS * HEIGHT_STEP_M * std::f32::consts::SQRT_2 / self.slope;
         let fits = (sides.x * sides.y / (MAX_NODES as f32 * 0.9)).sqrt();
-        // In a long and narrow box the nodes on the border count.
+        // In a long and narrow box the added row of border nodes matters.
         let long = sides.amax() / (MAX_NODES as f32 / 8.0);
         MIN_CELL_M.max(rise).max(fits).max(long)
     }
@@ -71,7 +71,7 @@ impl FieldConfig {
     }
 }
 
-/// Makes the field as bytes of its file.
+/// Makes the height field, encoded as in `field.bin`.
 ///
 /// # Errors
 /// The map has a hole in the window, or heights that do not fit into the file.
@@ -166,7 +166,8 @@ mod tests {
             let view = FieldView::parse(&bytes).unwrap();
             for [x, y, east, north] in places {
                 let at = area[0] + (area[1] - area[0]).component_mul(&Flat::new(x, y));
-                // Beside it by what a vehicle may be, and half a cell of the path's samples.
+                // As far beside `at` as a vehicle may be, plus half a cell, the spacing of a path's
+                // samples.
                 let beside = at + Flat::new(east, north) * (reach_m + view.shape().cell_m / 2.0);
                 prop_assert!(view.height_at(&at) >= grid.height_at(&beside).unwrap() - 1e-3);
                 let step = Flat::new(east, north);

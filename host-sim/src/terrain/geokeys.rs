@@ -27,7 +27,7 @@ pub(super) struct GeoKeys(Vec<(u16, u16)>);
 
 impl GeoKeys {
     /// Reads the key directory: four numbers, then four a key. Keys whose values stand in another
-    /// tag are skipped: none of those used do.
+    /// tag are skipped: no key used here has such a value.
     pub(super) fn new(directory: &[u16]) -> Self {
         let entries = directory.chunks_exact(4).skip(1);
         Self(entries.filter(|entry| entry[1] == 0).map(|entry| (entry[0], entry[3])).collect())

@@ -13,7 +13,7 @@ pub struct HeightGrid {
     size: [usize; 2],
     /// Height of each cell, metres, row by row from the south; NaN: no height.
     heights_m: Vec<f32>,
-    /// The file's own height at the centre of each cell, in that order; empty if it equals
+    /// The file's own height at the centre of each cell, in the same order; empty if the same as
     /// `heights_m`.
     middles_m: Vec<f32>,
 }
@@ -74,7 +74,7 @@ impl HeightGrid {
         self.low + Flat::new(column as f32 + 0.5, row as f32 + 0.5) * self.cell_m
     }
 
-    /// Height of the cell.
+    /// Height of the cell, metres; `None` if it has none or is outside the grid.
     pub fn cell_height(&self, [column, row]: [usize; 2]) -> Option<f32> {
         let height_m = *self.heights_m.get(row * self.size[0] + column)?;
         (column < self.size[0] && !height_m.is_nan()).then_some(height_m)
@@ -91,8 +91,8 @@ impl HeightGrid {
         Some([known().reduce(f32::min)?, known().reduce(f32::max)?])
     }
 
-    /// The height at a place, metres: that which the file has at the centre of the place's cell.
-    /// `None` where there is no height, and outside the grid.
+    /// The height at a place, metres: the file's height at the centre of the cell that holds the
+    /// place. `None` where there is no height, and outside the grid.
     pub fn height_at(&self, place: &Flat) -> Option<f32> {
         let [column, row] = self.cell_of(place)?;
         match self.middles_m.get(row * self.size[0] + column) {
@@ -138,7 +138,7 @@ impl HeightGrid {
         found
     }
 
-    /// Heights above `zero_m` instead of above the present zero.
+    /// The grid with heights above `zero_m`, a height above the present zero, metres.
     pub fn relative_to(mut self, zero_m: f64) -> Self {
         for height_m in self.heights_m.iter_mut().chain(&mut self.middles_m) {
             *height_m = (f64::from(*height_m) - zero_m) as f32;

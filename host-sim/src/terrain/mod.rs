@@ -6,8 +6,9 @@
 //! file without a coordinate system is read as metres from the mission's origin if the mission's
 //! own coordinates are metres, else it is refused.
 //!
-//! Datums fixed to tectonic plates (ETRS89, NAD83) are taken for WGS84, 1 to 2 m apart; those that
-//! need a grid of datum shifts are refused. Heights are above sea level as in the file.
+//! Datums fixed to tectonic plates (ETRS89, NAD83) are taken for WGS84, from which they differ by 1
+//! to 2 m; those that need a grid of datum shifts are refused. Heights are above sea level as in
+//! the file.
 
 mod asc;
 mod claims;

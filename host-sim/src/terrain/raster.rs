@@ -1,9 +1,9 @@
 //! Heights of a file in its own coordinates, resampled to a grid in the mission frame.
 //!
-//! A cell of the grid has the height of the file's cell at its centre, or a greater one of a file's
-//! cell whose centre is in it. So no height is lost where the grids are rotated against each other,
-//! and the greatest height in a box that is enlarged by one cell each way is never less than in the
-//! file.
+//! A cell of the grid has the height of the file's cell at its centre, or that of a higher cell of
+//! the file whose centre lies in it. So no height is lost where the grids are rotated against each
+//! other, and the greatest height in a box that is enlarged by one cell each way is never less than
+//! in the file.
 
 use planner_core::coverage::Flat;
 use planner_core::frames::Geodetic;
@@ -87,7 +87,8 @@ impl Raster {
         Ok(grid)
     }
 
-    /// The height of the file's cell at a place; `None` where it has none, and outside the file.
+    /// The height of the file's cell at a place; `None` if that cell has none, and outside the
+    /// file.
     pub(super) fn height_at(&self, origin: &Geodetic, place: &Flat) -> Option<f32> {
         let [column, row] = self.cell_coordinates(self.crs.at_mission_place(origin, place)?);
         let inside =
@@ -141,7 +142,8 @@ impl Raster {
             [pick(f64::min, 0), pick(f64::max, 1)]
         })?;
         let range = |axis: usize, most: usize| {
-            // A straight border there is slightly curved here: some cells more.
+            // A straight border in the mission frame is slightly curved in the file's: some cells
+            // more.
             let beyond = 2.0 + 0.01 * (to[axis] - from[axis]);
             let first = (from[axis] - beyond).floor().clamp(0.0, most as f64) as usize;
             let end = (to[axis] + beyond).ceil().clamp(0.0, most as f64) as usize;

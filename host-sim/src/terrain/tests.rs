@@ -1,4 +1,5 @@
-//! Readers beside the real files, beside brute force over random grids, and on damaged files.
+//! Tests of the readers: on real files, against brute force over random grids, and on damaged
+//! files.
 
 mod damaged;
 mod real;
@@ -15,15 +16,15 @@ use super::crs::Crs;
 use super::raster::Raster;
 use super::*;
 
-/// Somewhere in zone 30 north.
+/// A place in UTM zone 30 north.
 pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 43.3, lon_deg: -2.9, alt_m: 0.0 };
 
 pub(super) fn anywhere(origin: &Geodetic) -> Frame<'_> {
     Frame { origin, metres: false, window: None }
 }
 
-/// A GeoTIFF of signed 16 bit numbers: in `system`, its first corner and cell size as given, 99 for
-/// no height.
+/// A GeoTIFF of signed 16-bit heights with the GeoKeys `system`; `corner` is the north-western one,
+/// 99 stands for no height.
 pub(super) fn tiff(
     size: [u32; 2],
     values: &[i16],
@@ -44,7 +45,7 @@ pub(super) fn tiff(
     bytes.into_inner()
 }
 
-/// Keys of a system: by its model (1 projected, 2 degrees) and number.
+/// GeoKeys of a coordinate system, by its model (1 projected, 2 geographic) and EPSG code.
 pub(super) fn keys(model: u16, code: u16) -> Vec<u16> {
     let key = if model == 1 { 3072 } else { 2048 };
     vec![1, 1, 0, 3, 1024, 0, 1, model, 1025, 0, 1, 1, key, 0, 1, code]
@@ -116,7 +117,8 @@ proptest! {
     fn no_height_is_lost_where_grids_are_turned(
         values in prop::collection::vec(-20i16..100, 24 * 17),
         (model, code, corner, cell) in prop::sample::select(vec![
-            // Far from the zone's middle, so that its north is not ours; degrees; feet.
+            // Far from the zone's central meridian, so that grid north is not true north; degrees;
+            // feet.
             (1u16, 32631u16, [40_000.0, 4_800_000.0], 7.0),
             (2, 4326, [-2.91, 43.31], 2e-4),
             (1, 2225, [6_000_000.0, 2_000_000.0], 30.0),
@@ -125,7 +127,7 @@ proptest! {
         let raster = geotiff_of(&values, model, code, corner, cell);
         let Crs::Stated(system) = &raster.crs else { panic!("it names its system") };
         let [lon_deg, lat_deg] = system.to_degrees(corner).unwrap();
-        // A frame that begins there, as missions are near their origin.
+        // A frame with its origin at that corner, as missions are near their origin.
         let origin = Geodetic { lat_deg, lon_deg, alt_m: 0.0 };
         let grid = raster.resampled(&anywhere(&origin)).unwrap();
         let unit_m = if code == 2225 { 0.3048 } else { 1.0 };
@@ -143,7 +145,7 @@ proptest! {
                     if value != 99.0 {
                         prop_assert!(near.highest_m.unwrap() >= value * unit_m - 1e-3);
                     }
-                    // And what is found is near.
+                    // The height at the place is that of a near cell.
                     let around = (row.saturating_sub(3)..(row + 4).min(17)).flat_map(|r| {
                         (column.saturating_sub(3)..(column + 4).min(24)).map(move |c| r * 24 + c)
                     });
@@ -221,7 +223,8 @@ fn what_cannot_be_honoured_is_refused_by_name() {
     for (keys, text) in [
         (keys(1, 1), "EPSG:1,"),
         (keys(1, 32767), "a system of its own"),
-        // NAD27 needs a grid of shifts; 2225 is in feet, and does not say what its heights are.
+        // NAD27 needs a grid of datum shifts; EPSG:2225 is in feet, and does not state the unit of
+        // heights.
         (keys(2, 4267), "EPSG:4267"),
         (keys(1, 2225), "feet, and does not say"),
         (vec![1, 1, 0, 0], "does not say where it is"),

@@ -1,18 +1,19 @@
 //! Decides when a request without an answer is sent again, and how many requests are under way at
 //! once.
 //!
-//! Source: RFC 6298 (retransmission timeout) and RFC 5681 (congestion window). A radio in the air
-//! gives files 250 bytes a second: four answers take it longer than any fixed time that suits a
-//! cable, and each request repeated too early is answered too, which makes the next answer later
-//! still. So the timeout follows the round trips of this link, measured on requests that were sent
-//! once (Karn). Where no answer comes it doubles and the window halves, until answers come in time.
+//! Source: RFC 6298 (retransmission timeout) and RFC 5681 (congestion window). The air radio link
+//! gives files 250 bytes a second: four answers take longer on it than any fixed timeout that suits
+//! a cable. Each request repeated too early is answered too, which delays the next answer further.
+//! So the timeout follows the round trips of this link, measured on requests that were sent only
+//! once (Karn's algorithm). Where no answer comes the timeout doubles and the window halves, until
+//! answers come in time.
 
 use std::time::{Duration, Instant as Clock};
 
 /// First and shortest timeout, seconds: a companion that is planning answers late.
 const MIN_TIMEOUT_S: f32 = 0.4;
 /// Longest timeout, seconds: MAVLink FTP servers recognise a repeated request for a few seconds,
-/// ours for at least three.
+/// the companion's for at least three.
 const MAX_TIMEOUT_S: f32 = 2.0;
 /// Weights of a new round trip time and of its deviation, and number of deviations added to the
 /// timeout (RFC 6298, section 2).
@@ -83,8 +84,8 @@ mod tests {
 
     use super::*;
 
-    /// 200 pieces on a link whose answers come one each `every_ms`, and every `loses`th of what is
-    /// sent is lost: how many were sent, and seconds it took.
+    /// Uploads 200 pieces over a link that delivers one answer each `every_ms` and loses every
+    /// `loses`th request. Returns the number of requests sent and the time taken, seconds.
     fn upload(every_ms: u64, loses: usize) -> (usize, f32) {
         const PIECES: usize = 200;
         let began = Clock::now();
@@ -127,8 +128,8 @@ mod tests {
 
     #[test]
     fn a_slow_link_is_not_filled_with_repeats() {
-        // On a cable, of 30-byte answers in the air, and behind a machine that emulates at a third
-        // of its speed.
+        // As on a cable, as for 30-byte answers by radio, and as behind an emulator that runs at a
+        // third of the real speed.
         for every_ms in [10, 120, 360] {
             let (sent, took_s) = upload(every_ms, usize::MAX);
             assert!(sent < 220, "every {every_ms} ms an answer: {sent} sent for 200");

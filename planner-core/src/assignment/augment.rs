@@ -38,7 +38,7 @@ pub(super) fn augment_from_free_rows(
     augment_shortest_path(costs, state, paths, least)
 }
 
-/// Settles columns in the order of their distances until a free one is nearest; then updates the
+/// Settles columns in the order of their distances until a free column is nearest; then updates the
 /// prices and flips the path to it. Returns false if no free column can be reached.
 fn augment_shortest_path(
     costs: &CostMatrix<'_>,
@@ -190,8 +190,8 @@ fn flip_augmenting_path(state: &mut MatchingState<'_>, previous: &[u16], end: u1
     }
 }
 
-/// Adds one pair to the matching, by the path from any free row whose largest cost is least;
-/// returns that cost. `None` if there is no such path.
+/// Adds one pair to the matching, by that augmenting path from any free row whose largest cost is
+/// least; returns this cost. `None` if there is no such path.
 pub(super) fn augment_bottleneck(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,

@@ -92,8 +92,8 @@ fn cheapest_rows_by<const K: usize>(
     }
 }
 
-/// Least cost of `K` columns, and the first row that has it, for a square matrix, which is never
-/// transposed.
+/// Writes the least cost of each of the `K` columns from `first` on, and the first row with that
+/// cost. For square matrices only, which are never transposed.
 fn cheapest_rows<const K: usize>(
     costs: &CostMatrix<'_>,
     first: usize,
@@ -132,8 +132,8 @@ fn least_reduced_cost(line: &[f32], price: &[f64]) -> f64 {
 }
 
 /// Matches every free row to its cheapest column and lowers that column's price until the second
-/// cheapest is as good. The row that had the column is matched next, or left for an augmenting path
-/// if no price fell. Returns the number of rows left free.
+/// cheapest column is as good. The row that had the column is matched next, or left for an
+/// augmenting path if no price fell. Returns the number of rows left free.
 fn reduce_rows(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
@@ -199,8 +199,8 @@ impl TwoCheapestColumns {
             second_col: UNASSIGNED,
         };
         // The first columns give a rough bound on the second cheapest. After them most chunks hold
-        // nothing below it, which eight subtractions and comparisons find out without a branch
-        // inside.
+        // no value below this bound, which eight subtractions and comparisons show without a
+        // branch.
         let head = line.len().min(2 * SIMD_LANES);
         two.update_cheapest(0, &line[..head], &price[..head]);
         let (lines, line_rest) = line[head..].as_chunks::<SIMD_LANES>();

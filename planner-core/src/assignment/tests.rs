@@ -11,7 +11,7 @@ use super::*;
 
 const CAPACITY: usize = 8;
 
-/// The best of all assignments, by `(pairs, key)`, tried one by one.
+/// The best of all assignments by `(pairs, key)`, found by trying all.
 fn brute_force(costs: &[f32], rows: usize, cols: usize, objective: Objective) -> Assignment {
     fn extend(
         costs: &[f32],
@@ -58,8 +58,8 @@ enum Objective {
     Makespan,
 }
 
-/// The checker of assignments: each column once, only pairs that can be, the figures are those of
-/// the pairs.
+/// Checks an assignment: each column at most once, only possible pairs, and figures that are those
+/// of the pairs.
 fn check_assignment(costs: &[f32], cols: usize, out: &[Option<u16>], said: Assignment) {
     let mut used = vec![false; cols];
     let mut sum = Assignment { pairs: 0, total: 0.0, largest: f32::NEG_INFINITY };
@@ -96,7 +96,8 @@ fn solve_checked<const N: usize>(
     result
 }
 
-/// Square, wide and tall; reals and small integers full of ties; a share of the pairs cannot be.
+/// Square, wide and tall matrices; reals, and small integers with many ties; some of the pairs are
+/// impossible.
 fn matrices() -> impl Strategy<Value = (usize, usize, Vec<f32>)> {
     (1usize..=6, 1usize..=6, any::<bool>(), 0u8..=9).prop_flat_map(
         |(rows, cols, integers, blocked)| {
@@ -187,7 +188,7 @@ fn bad_input_is_refused_by_name() {
 
 #[test]
 fn huge_and_tiny_costs_lose_nothing_to_a_stand_in_for_infinity() {
-    // With 1e38 for "cannot be", the thousandths would vanish.
+    // With 1e38 for impossible pairs, the thousandths would vanish.
     let costs =
         [1e-3, 2e-3, f32::INFINITY, 3e-3, 1e-3, 1e37, f32::INFINITY, f32::INFINITY, f32::INFINITY];
     let mut ws = AssignmentWorkspace::<CAPACITY>::new();

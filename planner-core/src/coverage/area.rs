@@ -31,7 +31,7 @@ pub enum RingKind {
 /// One ring. Its vertices are those from the `end` of the ring before it up to its own `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ring {
-    /// Index of its last vertex plus one.
+    /// Index of the ring's last vertex plus one.
     pub end: u16,
     /// Kind of the region that the ring encloses.
     pub kind: RingKind,
@@ -54,7 +54,7 @@ pub enum AreaError {
         /// The vertex.
         vertex: u16,
     },
-    /// A coordinate of a vertex is more than [`MAX_VERTEX_M`].
+    /// A coordinate of a vertex is greater than [`MAX_VERTEX_M`] in magnitude.
     TooFar {
         /// The vertex.
         vertex: u16,
@@ -71,9 +71,9 @@ pub enum AreaError {
     },
     /// Two edges of one ring cross.
     SelfCrossing {
-        /// The vertex at which the first of them begins.
+        /// The vertex at which the first edge begins.
         vertex: u16,
-        /// The vertex at which the second one begins.
+        /// The vertex at which the second edge begins.
         other: u16,
     },
     /// Edges of two rings cross, both of them outer rings or holes.
@@ -257,8 +257,8 @@ impl<'a> Area<'a> {
         Ok(())
     }
 
-    /// Checks which rings are inside others. Rings do not cross, so one interior point shows it for
-    /// the whole ring.
+    /// Checks which rings are inside others. Rings do not cross, so one interior point of a ring
+    /// decides for the whole ring.
     fn check_nesting(&self) -> Result<(), AreaError> {
         for (i, (kind, ring)) in self.rings_with_kind().enumerate() {
             if kind == RingKind::NoFly {

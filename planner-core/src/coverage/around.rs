@@ -1,12 +1,12 @@
-//! One vehicle's detour over a height field, home or to a place aside: around no-fly zones and
-//! vehicles that left the plan, without a roadmap.
+//! One vehicle's detour over a height field, without a roadmap, home or to a place aside: around
+//! no-fly zones and vehicles that are out of the plan.
 //!
-//! Home: vertically to the vehicle's own layer, there on the shortest path to above its pad, and
-//! down. Obstacles in the layer are flown around: a visibility graph over the zones' corners
-//! ([`Transit::corners`]) and eight corners around each end of every [`KeepOutZone`] that reaches
-//! the layer is searched by A*. Legs stay above terrain. If there is no path in the layer, the same
-//! is tried at the height at which the vehicle hovers. Aside: straight to the nearest free point on
-//! rings around the vehicle.
+//! Home: the path leads vertically to the vehicle's own layer, in the layer on the shortest path to
+//! above its pad, and down. Obstacles in the layer are flown around: a visibility graph over the
+//! zones' corners ([`Transit::corners`]) and eight corners around each end of every [`KeepOutZone`]
+//! that reaches the layer is searched by A*. Legs stay above terrain. If there is no path in the
+//! layer, the same is tried at the height at which the vehicle hovers. Aside: the path leads
+//! straight to the nearest free point on rings around the vehicle.
 //!
 //! No leg leaves the request's fence. ENU metres. Cost for n nodes: at most n² / 2 visibility
 //! checks, each against all edges of zones and all [`KeepOutZone`]s.
@@ -26,7 +26,7 @@ use crate::{Length, Point};
 const MAX_PLACES: usize = 320;
 /// Corners around each end of a keep-out zone's axis.
 const CORNERS_PER_END: usize = 8;
-/// Distance of the corners from the axis, as a multiple of the zone's radius: the line between two
+/// Distance of the corners from the zone's axis, as a multiple of its radius: the line between two
 /// neighbouring corners still stays outside the radius.
 const CORNER_RADIUS_SHARE: f32 = 1.09;
 /// Distance added to the corners' distance from the axis, against rounding, metres.
@@ -145,7 +145,8 @@ pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
     Ok(())
 }
 
-/// The nearest point on the rings that is outside all zones and reached by a free straight leg.
+/// The nearest point on the rings that is outside all zones and reached by a free straight leg;
+/// `None` if there is none.
 fn nearest_reachable_place<const N: usize>(clear: &LegConstraints<'_, '_, N>) -> Option<Point> {
     let here = clear.request.here;
     let step = core::f32::consts::TAU / SIDESTEP_DIRECTIONS as f32;
@@ -235,7 +236,7 @@ impl VisibilityGraph {
     }
 
     /// Collects the nodes at the height of `from`: both ends, corners of no-fly zones, and corners
-    /// around keep-out zones that reach this height. More than the capacity are dropped.
+    /// around keep-out zones that reach this height. Nodes beyond the capacity are dropped.
     fn collect_nodes<const N: usize>(
         &mut self,
         clear: &LegConstraints<'_, '_, N>,

@@ -2,9 +2,9 @@
 //!
 //! The larger of two bounds. (1) If m vehicles fly, their routes leave out at most the m − 1
 //! longest steps between waypoints, each vehicle flies at least to its nearest waypoint and back,
-//! and all use different layers. The largest cost is no less than the mean of these sums; the bound
-//! is the least over m. (2) Some vehicle flies to the waypoint that is furthest from all vehicles.
-//! O(n · K).
+//! and all use different layers. The largest cost is no less than the mean of these m costs; the
+//! bound is the least such mean over m. (2) Some vehicle flies to the waypoint that is furthest
+//! from all vehicles. O(n · K).
 
 use crate::Length;
 use libm::{fmaxf, fminf};

@@ -2,14 +2,14 @@
 //!
 //! A cell is a group of lanes in consecutive strips, one per strip: the boustrophedon decomposition
 //! (Choset 2000), made of lanes. From the end of each cell the path goes on to the nearest corner
-//! of a cell that is left. O(cells · lanes + lanes²) sums, and few distances around zones.
+//! of a cell that is not flown yet. O(cells · lanes + lanes²) sums, and few distances around zones.
 
 use super::lanes::Lane;
 use super::transit::Transit;
 use crate::Length;
 
-/// Groups lanes into cells. They must be in the lanes' frame and in the order of their strips. Sets
-/// `first` of each lane to the number of its cell.
+/// Groups lanes into cells. The lanes must be in the lane frame and in the order of their strips.
+/// Sets `first` of each lane to the number of its cell.
 pub(super) fn group_into_cells(lanes: &mut [Lane]) {
     let touch = |a: &Lane, b: &Lane| a.from.x < b.to.x && b.from.x < a.to.x;
     let (mut cells, mut below, mut row) = (0, 0, 0);
@@ -37,8 +37,8 @@ pub(super) fn is_cell_boundary(lanes: &[Lane], k: usize) -> bool {
     k == 0 || k == lanes.len() || lanes[k - 1].first != lanes[k].first
 }
 
-/// Sorts lanes that are grouped into cells: the first cell comes first, then always the one whose
-/// corner is nearest to the end of the one before.
+/// Sorts lanes that are grouped into cells: the first cell comes first, then each time the cell
+/// with the corner nearest to the end of the cell before.
 pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>) {
     for k in 1..lanes.len() {
         let place = lanes[..k].partition_point(|lane| lane.first <= lanes[k].first);
@@ -74,8 +74,8 @@ struct CellEntry {
     turned: bool,
 }
 
-/// Index of the first lane of the cell, among those from lane `done` on, of which a corner is
-/// nearest to the end of the lane before `done`; and how the cell is then flown.
+/// Finds, among the cells from lane `done` on, the one with the corner nearest to the end of the
+/// lane before `done`. Returns the index of its first lane, and how the cell is then flown.
 fn nearest_cell<const N: usize>(
     lanes: &[Lane],
     done: usize,

@@ -1,4 +1,4 @@
-//! The waypoints of a path that are left after a loss, as a path of its own, which
+//! The waypoints of a path that remain after the loss of a vehicle, as a path of their own, which
 //! [`super::pack::binpat`] then divides among the remaining vehicles.
 //!
 //! A pure function of the path and of the waypoints that are photographed or promised, so that
@@ -12,7 +12,7 @@ use crate::flight::WaypointRange;
 
 /// Writes the lanes without the waypoints `done` to `left`. The ranges must be in ascending order
 /// and not overlap. A remaining waypoint gets a new number; [`original_waypoint_number`] returns
-/// its old one.
+/// its number on the whole path.
 ///
 /// # Errors
 /// [`CoverageError::SettingOutOfRange`] for ranges out of order or beyond the path,

@@ -1,11 +1,11 @@
 //! The exact minimum of max C_k over all contiguous divisions, subsets of vehicles, layers and
 //! directions: the benchmark of the other methods. For desktops only: 10 vehicles have 2²⁰ states.
 //!
-//! A dynamic program decides whether all can be photographed within a time T. Its state (vehicles,
-//! layers) holds the most waypoints, counted from the first, that this set of vehicles in this set
-//! of layers can photograph within T. A route's cost does not fall if it is extended at either end,
-//! by the triangle inequality; so each step takes as many waypoints as fit, which two pointers find
-//! for all first waypoints at once. T is found by bisection to [`TIME_RESOLUTION`].
+//! A dynamic program decides whether all waypoints can be photographed within a time T. Its state
+//! (vehicles, layers) holds the most waypoints, counted from the first, that this set of vehicles
+//! in this set of layers can photograph within T. A route's cost does not fall if it is extended at
+//! either end, by the triangle inequality; so each step takes as many waypoints as fit, which two
+//! pointers find for all first waypoints at once. T is found by bisection to [`TIME_RESOLUTION`].
 //!
 //! Cost: a few dozen rounds of Σ C(K, m)² · (K − m)² steps, m to K, and K² · n for the pointers.
 
@@ -41,6 +41,7 @@ impl Workspace<'_> {
 
 /// Writes the plan with the least max C_k to `out`.
 ///
+/// # Errors
 /// Those of [`binpat`]; [`CoverageError::Vehicles`] for more than [`MAX_EXACT_VEHICLES`];
 /// [`CoverageError::WorkspaceTooSmall`].
 pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
@@ -102,8 +103,8 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
         }
     }
 
-    /// Whether vehicle `v` can photograph waypoints `from` to `end` − 1 with at most `most_m`
-    /// metres of flight over ground.
+    /// Whether vehicle `v` can photograph waypoints `from` to `end` − 1, transits included, with at
+    /// most `most_m` metres of flight over ground.
     fn is_within_length(&self, v: usize, from: usize, end: usize, most_m: f32) -> bool {
         let to = &self.ws.ways_m[2 * v * self.waypoints..][..self.waypoints];
         let home = &self.ws.ways_m[(2 * v + 1) * self.waypoints..][..self.waypoints];
@@ -158,7 +159,7 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
         (0..1usize << (2 * self.count)).filter(all).min_by_key(|state| state.count_ones())
     }
 
-    /// Writes the plan that leads to that state.
+    /// Writes the plan that leads to the state of [`Self::complete_state`].
     fn write_plan<const K: usize>(&self, out: &mut Plan<K>) {
         let Some(mut state) = self.complete_state() else { return };
         let (count, sets) = (self.count, 1usize << self.count);

@@ -1,10 +1,10 @@
 //! Flights of a coverage mission: each vehicle's path along its route, and the order of take-offs.
 //!
-//! Source: CPP §3.2: climb to the vehicle's own layer, transit, descent, lanes, climb, transit home
-//! in the layer, descent. Take-off ends and landing begins close above the pad: all between is
-//! path, on which the vehicle can wait. [`crate::schedule`] separates the flights as in any other
-//! mission: the vehicle that flies longest takes off first, each other one as early as those before
-//! it allow, and gates keep that order in the air.
+//! Source: paper CPP §3.2: climb to the vehicle's own layer, transit, descent, lanes, climb,
+//! transit home in the layer, descent. Take-off ends and landing begins close above the pad: all
+//! between is path, on which the vehicle can wait. [`crate::schedule`] separates the flights as in
+//! any other mission: the vehicle with the longest flight takes off first, each other one as early
+//! as those before it allow, and gates keep that order in the air.
 
 mod builder;
 
@@ -35,11 +35,11 @@ pub const MAX_PATH_LENGTH_M: f32 = 6_553.0;
 pub struct Pad {
     /// Id of the vehicle, unique in the swarm.
     pub id: u8,
-    /// First point of its path, above the pad, over [`Vehicle::place`]; ENU metres.
+    /// First point of the vehicle's path, above the pad, over [`Vehicle::place`]; ENU metres.
     pub start: Point,
     /// Height of `start` above the pad, metres; 0 for a vehicle in the air.
     pub climb_m: f32,
-    /// Height of its path's last point, above its home: z in the mission frame, metres.
+    /// Height of the path's last point, above the vehicle's home: z in the mission frame, metres.
     pub end_z_m: f32,
     /// Height of that point above the ground below it, metres.
     pub descent_m: f32,
@@ -61,7 +61,7 @@ pub struct CaptureSettings {
 /// Inputs of [`plan_flights`] besides the routes.
 #[derive(Clone, Copy, Debug)]
 pub struct FlightInputs<'a> {
-    /// The vehicles, in the order of [`Work::vehicles`].
+    /// The vehicles' pads, in the order of [`Work::vehicles`].
     pub pads: &'a [Pad],
     /// Settings of the camera during a flight.
     pub capture: CaptureSettings,
@@ -86,6 +86,7 @@ pub struct FlightInputs<'a> {
 /// ([`PicturePlan::is_first_part`]): as many as leave room for the path home. The next division
 /// ([`super::losses`]) divides the others.
 ///
+/// # Errors
 /// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a
 /// vehicle that cannot be kept apart from the others, [`PlanError::Terminals`] if pads, vehicles,
 /// routes and lanes are inconsistent, [`PlanError::Config`] for a setting, [`PlanError::BadTask`]
@@ -198,8 +199,8 @@ pub(super) fn free_layers(held: u64) -> impl Iterator<Item = u8> {
 }
 
 /// Schedules the vehicle that flies longest first, each other one to take off as early as those
-/// before it allow. One for which they leave no take-off time is moved to the front, and all are
-/// scheduled again. Returns an upper bound of each vehicle's number of gates.
+/// before it allow. A vehicle for which they leave no take-off time is moved to the front, and all
+/// are scheduled again. Returns an upper bound of each vehicle's number of gates.
 fn schedule_departures<const V: usize, const W: usize>(
     inputs: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
@@ -265,7 +266,7 @@ fn schedule_in_order<const V: usize, const W: usize>(
     Ok(most_gates)
 }
 
-/// The flight of a vehicle that stays on its pad: one waypoint above it.
+/// The flight of a vehicle that stays on its pad: one waypoint above the pad.
 fn grounded_flight<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
     let mut path = Path::new();
     path.push(pad.start, 0.0)?;
@@ -281,8 +282,8 @@ fn grounded_flight<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
     })
 }
 
-/// Duration of a leg flown at up to `most_mps`, from rest to rest since a vehicle nearly stops at
-/// corners, seconds.
+/// Duration of a leg flown at up to `most_mps`, seconds: from rest to rest, since a vehicle nearly
+/// stops at corners.
 fn leg_duration_s(length_m: f32, most_mps: f32) -> f32 {
     if length_m * PLANNED_ACCEL_MPS2 > most_mps * most_mps {
         length_m / most_mps + most_mps / PLANNED_ACCEL_MPS2
@@ -291,13 +292,13 @@ fn leg_duration_s(length_m: f32, most_mps: f32) -> f32 {
     }
 }
 
-/// Numbers of the first and the last waypoint of a lane that belong to the route.
+/// Numbers of the first and the last waypoint, both inclusive, of a lane that belong to the route.
 fn lane_part_of_route(lane: &Lane, route: &Route) -> (u32, u32) {
     (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1)
 }
 
-/// Heading of a vehicle on this route. A lane of one waypoint has no direction: a route with such a
-/// lane keeps the direction of the other lanes instead of that along the path.
+/// Heading of a vehicle on this route. A lane of one waypoint has no direction: on a route with
+/// such a lane the heading is fixed to the direction of the lanes, instead of following the path.
 fn heading_mode<const L: usize, const N: usize>(
     work: &Work<'_, L, N>,
     route: &Route,

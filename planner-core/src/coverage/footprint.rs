@@ -1,6 +1,6 @@
 //! The ground that a camera looking straight down shows, and the spacings that follow from it.
 //!
-//! Source: CPP eqs. 1 and 2, as SPEC §7 reads them. Heights and sides in metres.
+//! Source: paper CPP eqs. 1 and 2, as SPEC §7 reads them. Heights and sides in metres.
 
 use fpu::sqrtf;
 use libm::tanf;

@@ -1,4 +1,4 @@
-//! Orders lanes that another tool has laid, as one vehicle flies them.
+//! Orders lanes that another tool has laid, as one vehicle would fly them.
 
 use libm::roundf;
 
@@ -12,8 +12,8 @@ use super::transit::Transit;
 use super::{CoverageError, Flat};
 use crate::{Length, sort};
 
-/// Orders lanes that are given by both their ends, all parallel, and turns them as they are flown:
-/// by the same search as the lanes of [`super::tracks::build_lanes`].
+/// Orders parallel lanes, each given by its two ends, and turns each into the direction in which it
+/// is flown, by the same search as the lanes of [`super::tracks::build_lanes`].
 ///
 /// # Errors
 /// Spacings that are wrong, memory that is too small, [`CoverageError::NothingToCover`] where no

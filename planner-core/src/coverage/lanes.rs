@@ -17,8 +17,8 @@ const MAX_WAYPOINTS: f32 = (1 << 24) as f32;
 pub struct LanePattern {
     /// Footprint of an image, and spacings.
     pub spacing: Spacing,
-    /// Direction of the lanes, degrees counter-clockwise from east; `None` chooses that of least
-    /// width.
+    /// Direction of the lanes, degrees counter-clockwise from east; `None` chooses the direction
+    /// across which the area is least wide.
     pub angle_deg: Option<f32>,
     /// Distance by which lanes begin before and end beyond the area's border, metres.
     pub margin_m: f32,
@@ -27,22 +27,23 @@ pub struct LanePattern {
     pub search_steps: u32,
 }
 
-/// One lane. Its waypoint `k` lies at the share `k / (count − 1)` from `from` to `to`.
+/// One lane. Its waypoint `k` lies at the fraction `k / (count − 1)` of the way from `from` to
+/// `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lane {
     /// First waypoint of the lane in the direction of flight, east and north.
     pub from: Flat,
     /// Last waypoint of the lane.
     pub to: Flat,
-    /// Number of its first waypoint along the whole path. While lanes are being ordered: the number
-    /// of its cell.
+    /// Number of the lane's first waypoint along the whole path. While lanes are being ordered: the
+    /// number of the lane's cell.
     pub first: u32,
     /// Number of waypoints on the lane, at least 1.
     pub count: u32,
     /// Length of the path from its beginning to this lane, metres. While lanes are being ordered:
     /// length of the link to the next lane.
     pub start_m: f32,
-    /// Index of the strip in which it lies.
+    /// Index of the strip in which the lane lies.
     pub strip: u16,
 }
 

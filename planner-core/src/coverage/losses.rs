@@ -1,10 +1,10 @@
-//! The division after a loss: the waypoints that are left go to the remaining vehicles, which
-//! continue from where they hold.
+//! The division after the loss of a vehicle: the waypoints that are left go to the remaining
+//! vehicles, which continue from where they hold.
 //!
-//! Beyond CPP, which names this as future work. It is BINPAT over the remaining lanes
-//! ([`super::divide`]): a pure function of the plan before it and of the [`VehicleStatus`] of every
-//! vehicle, on which all vehicles agree. So every vehicle computes the same bits. A further loss is
-//! divided starting from the division before.
+//! Beyond paper CPP, which names this as future work. The division is BINPAT over the remaining
+//! lanes ([`super::divide`]): a pure function of the plan before and of the [`VehicleStatus`] of
+//! every vehicle, on which all vehicles agree. So every vehicle computes the same bits. A further
+//! loss is divided starting from the division before.
 
 use heapless::Vec;
 
@@ -20,7 +20,7 @@ use crate::schedule::{ScheduleError, ScheduleWorkspace};
 
 /// Most separate ranges of waypoints that are photographed or promised.
 const MAX_DONE_RANGES: usize = 128;
-/// Number of times that vehicles exchange their routes where no take-off times keep them apart.
+/// Most times that vehicles exchange their routes where no take-off times keep them apart.
 const MAX_EXCHANGES: usize = 3;
 
 /// Status of one vehicle at a division. All vehicles agree on it before the area is divided again.
@@ -28,10 +28,10 @@ const MAX_EXCHANGES: usize = 3;
 pub struct VehicleStatus {
     /// Whether the vehicle continues, and gets a part of the remaining lanes.
     pub alive: bool,
-    /// Arc length of its path up to which the pictures count as its own, taken or promised, metres.
-    /// A vehicle that continues holds there; at 0 it is still on its pad. If it does not continue,
-    /// its last picture is taken again, since it may be missing. Infinite if it took all its
-    /// pictures.
+    /// Arc length of the vehicle's path up to which its pictures count as taken or promised,
+    /// metres. A vehicle that continues holds there; at 0 it is still on its pad. If it does not
+    /// continue, its last picture is taken again, since that picture may be missing. Infinite if it
+    /// took all its pictures.
     pub along_m: f32,
 }
 
@@ -100,7 +100,7 @@ impl<const L: usize, const K: usize> Default for Workspace<L, K> {
     }
 }
 
-/// A loss: the plan before it, and the status of all vehicles.
+/// A loss: the plan before the loss, and the status of all vehicles.
 #[derive(Clone, Copy)]
 pub struct Loss<'a, const L: usize, const N: usize> {
     /// The lanes of the whole area and all vehicles, as before any loss.
@@ -137,6 +137,7 @@ impl From<PlanError> for Error {
 ///
 /// Where no take-off times keep the vehicles apart, they exchange their routes.
 ///
+/// # Errors
 /// Those of [`divide::remaining_lanes`], [`pack::binpat`] and [`flights::plan_flights`];
 /// [`CoverageError::Vehicles`] if fates, routes and vehicles are inconsistent;
 /// [`CoverageError::SettingOutOfRange`] for an `along_m` that is NaN or negative.

@@ -1,8 +1,8 @@
 //! The order in which lanes are flown, and the direction of each: a local search for the shortest
 //! path along all of them.
 //!
-//! A convex area has one lane per strip. These are flown back and forth (CPP §3.2.1), from the end
-//! of the first lane that gives the shorter links. Other areas start from an order by cells
+//! A convex area has one lane per strip. These are flown back and forth (paper CPP §3.2.1), from
+//! the end of the first lane that gives the shorter links. Other areas start from an order by cells
 //! (`cells`). Parts of it are reversed (2-opt) and cells of up to ten lanes moved (Or-opt) as long
 //! as that shortens the path. Then the lanes that were added beside no-fly zones (`patches`) are
 //! inserted where they lengthen the path least. Then the same moves are tried with single lanes
@@ -82,8 +82,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         left
     }
 
-    /// Length of the link between two lane ends, around zones, metres; 0 where one is `None`, at an
-    /// end of the path.
+    /// Length of the link between two lane ends, around zones, metres; 0 if one of them is `None`,
+    /// as at an end of the path.
     fn transit_length_m(&self, from: Option<Flat>, to: Option<Flat>) -> f32 {
         match (from, to) {
             (Some(from), Some(to)) => self.transit.distance_m(&from, &to),
@@ -100,7 +100,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         }
     }
 
-    /// 2-opt: reverses parts of the order where that shortens the path. Returns whether any was.
+    /// 2-opt: reverses parts of the order where that shortens the path. Returns whether any part
+    /// was reversed; false when the search steps are used up.
     fn two_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         for i in 0..lanes.len() {
@@ -134,7 +135,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
     }
 
     /// Or-opt: moves up to [`MAX_MOVED`] consecutive lanes, in the first search whole cells, as
-    /// they are or reversed, where that shortens the path. Returns whether any were.
+    /// they are or reversed, where that shortens the path. Returns whether any were moved; false
+    /// when the search steps are used up.
     fn or_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         let count = lanes.len();
@@ -203,8 +205,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         self.measure_links(lanes, &[place, place + 1]);
     }
 
-    /// Updates `best` if a part with ends `from` and `to` lengthens the path less when it is
-    /// inserted before lane `place`.
+    /// Updates `best` if a sequence of lanes with ends `from` and `to` lengthens the path less when
+    /// it is inserted before lane `place`.
     #[inline(never)]
     fn try_insertion(
         &self,
@@ -233,7 +235,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
 }
 
 /// The best insertion so far: by how much it lengthens the path, before which lane, and whether the
-/// part is reversed.
+/// inserted lanes are reversed.
 struct Insertion {
     more_m: f32,
     at: Option<(usize, bool)>,

@@ -1,16 +1,16 @@
 //! SIMPLE-BINPAT and BINPAT: the path is cut into contiguous routes, which are assigned to
 //! vehicles.
 //!
-//! Source: CPP §3.2.2, Algorithms 1 and 2 as SPEC §7 reads them. CBinPack fills bin after bin with
-//! tracks until the bin's share of the path's length is reached. The track that would exceed the
-//! share goes in only if the result is nearer to the share. The last bin with a share gets the
+//! Source: paper CPP §3.2.2, Algorithms 1 and 2 as SPEC §7 reads them. CBinPack fills bin after bin
+//! with tracks until the bin's share of the path's length is reached. The track that would exceed
+//! the share goes in only if the result is nearer to the share. The last bin with a share gets the
 //! rest. Bins are assigned to vehicles by linear sum assignment of transit lengths: from the
 //! vehicle's place to the first waypoint and from the last one home, in the shorter of both
-//! directions. The longer a route takes, the lower its layer.
-//! `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (CPP eq. 4).
+//! directions. The route that takes longest gets the lowest transit layer, and so on. Climb and
+//! descent take `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (paper CPP eq. 4).
 //!
-//! Δh is at least one layer, so a vehicle in transit is never at the height at which others
-//! photograph.
+//! Δh, the height of the layer above picture height, is at least one layer spacing, so a vehicle in
+//! transit is never at the height at which others photograph.
 //!
 //! Cost for K vehicles and n lanes: K · log n steps, K² transits, one assignment (K³).
 
@@ -35,7 +35,8 @@ pub struct Vehicle {
     pub climb_mps: f32,
     /// Speed of descent (V_d in the paper), m/s.
     pub descend_mps: f32,
-    /// W_k: the vehicle's share of the path is this divided by the sum over all vehicles.
+    /// W_k: the vehicle's share of the path is this weight divided by the sum of all vehicles'
+    /// weights.
     pub weight: f32,
 }
 
@@ -78,7 +79,8 @@ pub struct Route {
     pub end: u32,
     /// Direction in which the route is flown.
     pub heading: RouteDirection,
-    /// Transit layer, from 1: it is this many layer heights above the height of pictures.
+    /// Transit layer, from 1: it is this many times [`Heights::layer_m`] above the height of
+    /// pictures.
     pub layer: u8,
     /// Length over ground, metres: transit to the first waypoint, route, transit home.
     pub ground_m: f32,
@@ -152,7 +154,8 @@ impl<const K: usize> PackWorkspace<K> {
 }
 
 impl<const K: usize> PackWorkspace<K> {
-    /// The shares by which the bins were filled last, one per vehicle, in any unit.
+    /// The shares of the path by which the bins were filled last, one per vehicle; only their
+    /// ratios count.
     pub fn shares(&self) -> &[f32; K] {
         &self.shares
     }
@@ -248,7 +251,8 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         };
         let forward = transit_m(&ends.first, &ends.last);
         let backward = if vehicle.place == vehicle.home {
-            // From and to one place the transits are the same in the opposite direction.
+            // If the vehicle starts and ends at one place, the transits are equal in both
+            // directions.
             forward
         } else {
             transit_m(&ends.last, &ends.first)
@@ -333,7 +337,8 @@ pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
     Ok(())
 }
 
-/// CBinPack: sets `ends[k]` to the number after that of the last waypoint of bin `k`.
+/// CBinPack: sets `ends[k]` to the number of the last waypoint of bin `k` plus one. Bin `k` is
+/// filled by `shares[k]`.
 pub fn cbinpack<const L: usize>(
     tracks: &Tracks<L>,
     unit: TrackUnit,
@@ -357,7 +362,7 @@ pub fn cbinpack<const L: usize>(
 }
 
 /// Fills a bin with tracks from waypoint `from` on, up to the length `full_m` of the path. Returns
-/// the number after that of its last waypoint, and the length of the path up to that waypoint.
+/// the number of its last waypoint plus one, and the length of the path up to that waypoint.
 fn fill_bin<const L: usize>(
     tracks: &Tracks<L>,
     unit: TrackUnit,

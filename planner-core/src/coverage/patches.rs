@@ -3,9 +3,9 @@
 //! A strip that a zone reaches into, and of which the lanes leave ground unphotographed, is cut
 //! into eighths. Each eighth with such ground gets lanes along the strip border next to it, which
 //! is furthest from the blocked middle, then along its own middle, then along lines beside that: an
-//! image reaches at least half a lane spacing to both sides. Ground that one image shows gets one
-//! image, as near to its middle as is free. O(strips at zones · 8 · (vertices + lanes)), and 18
-//! lines for each eighth of which some ground remains.
+//! image reaches at least half a lane spacing to both sides. Ground that fits into one image gets a
+//! single image, as near to the ground's middle as zones allow. O(strips at zones · 8 · (vertices +
+//! lanes)), and 18 lines for each eighth of which some ground remains.
 
 use libm::{fmaxf, fminf};
 
@@ -47,7 +47,7 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
 }
 
 /// Adds lanes for an eighth of a strip, `span`, until no ground of it is left or all lines are
-/// tried. `border` is the strip's border nearer to it.
+/// tried. `border` is the strip's border nearer to the eighth.
 fn lay_missing_lanes_of<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     (strip, border): (u16, f32),

@@ -1,8 +1,8 @@
-//! POWELL-BINPAT: a search for the shares W, 0 ≤ W_k ≤ 1, with the least max C_k. A vehicle with
-//! share 0 stays on the ground.
+//! POWELL-BINPAT: a search for the vehicles' shares W of the path, 0 ≤ W_k ≤ 1, with the least max
+//! C_k (the largest route cost). A vehicle with share 0 stays on the ground.
 //!
-//! Source: CPP §3.2.3; M. J. D. Powell, "An efficient method for finding the minimum of a function
-//! of several variables without calculating derivatives", Computer Journal 7 (1964). An
+//! Source: paper CPP §3.2.3; M. J. D. Powell, "An efficient method for finding the minimum of a
+//! function of several variables without calculating derivatives", Computer Journal 7 (1964). An
 //! implementation of our own, bounded by at most `evaluations` packings.
 //!
 //! max C_k over W is a staircase with flat steps (a waypoint goes to one vehicle or to another), so
@@ -30,7 +30,7 @@ impl PowellConfig {
 const LINE_POINTS: u32 = 8;
 /// Times that a line search halves its step around the best point found so far.
 const STEP_HALVINGS: u32 = 7;
-/// The search ends with a round that lowers the cost by less than this share of it.
+/// The search ends with a round that lowers the cost by less than this share of the cost.
 const MIN_ROUND_GAIN: f32 = 1e-4;
 
 /// Memory of the search: shares, search directions, and the packings' workspace.
@@ -100,8 +100,8 @@ pub fn powell<const L: usize, const N: usize, const K: usize>(
             }
             cost = found;
         }
-        // The sum of this round's moves becomes a search direction; it replaces the one that gained
-        // most.
+        // The sum of this round's moves becomes a search direction; it replaces the direction that
+        // gained most.
         let mut whole = search.ws.current;
         whole.iter_mut().zip(from).for_each(|(to, from)| *to -= from);
         if whole[..count].iter().any(|step| *step != 0.0) {
@@ -153,7 +153,7 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
     }
 
     /// Searches along a line through `current`, within 0 ≤ W_k ≤ 1, for the least cost. Returns
-    /// that cost, and moves `current` to its place.
+    /// that cost, and moves `current` to the point that has it.
     fn line_search(
         &mut self,
         line: &[f32; K],
@@ -208,8 +208,8 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
     }
 }
 
-/// Range of the line's parameter within which all shares stay from 0 to 1; `None` if that is one
-/// point, or the line has no length.
+/// Range of the line's parameter within which all shares stay from 0 to 1; `None` if the range is
+/// one point, or the line has no length.
 fn range_in_box(from: &[f32], line: &[f32]) -> Option<(f32, f32)> {
     let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
     for (from, step) in from.iter().zip(line).filter(|(_, step)| **step != 0.0) {

@@ -13,8 +13,8 @@ use super::{CoverageError, Flat};
 use crate::geometry::{Length as _, clamp_to};
 use crate::sort;
 
-/// Share of a lane by which rounding may raise a width that is a whole number of lanes; it does not
-/// add another strip.
+/// Share of a lane spacing by which rounding may raise a width that is a whole number of lane
+/// spacings, without adding another strip.
 pub(super) const WIDTH_ROUNDING: f32 = 1e-4;
 
 /// Memory of the lanes' computation; `V` must be at least the number of the area's vertices.
@@ -163,8 +163,8 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Sets `ws.barred` to all `u` along the lane line `v` at which it is nearer than
-    /// [`ZONE_CLEARANCE_M`] to a no-fly zone, or inside one.
+    /// Sets `ws.barred` to all `u` at which the line `v` is nearer than [`ZONE_CLEARANCE_M`] to a
+    /// no-fly zone, or inside one.
     fn compute_barred<const V: usize>(
         &self,
         v: f32,
@@ -198,7 +198,7 @@ impl<'a> Strips<'a> {
     }
 
     /// Lays lanes along the line `v` that photograph what is in `ws.needed`, and are no longer than
-    /// that takes.
+    /// necessary.
     pub(super) fn lay_missing<const L: usize, const V: usize>(
         &self,
         strip: u16,
@@ -212,8 +212,8 @@ impl<'a> Strips<'a> {
     }
 
     /// Lays lanes along the line `v` where `ws.barred` allows them, from border to border among
-    /// `ws.crossings`. A part that one image shows, and that contains no border, gets one image, as
-    /// near to its middle as is allowed.
+    /// `ws.crossings`. An interval of `ws.needed` that one image shows, and that contains no
+    /// border, gets one image, as near to its middle as is allowed.
     #[inline(never)]
     fn lay_between_borders<const L: usize, const V: usize>(
         &self,
@@ -266,10 +266,10 @@ impl<'a> Strips<'a> {
         })
     }
 
-    /// Distance along the lane that an image reliably shows on each side of its middle: half its
-    /// side, less a margin for rounding. Where images overlap, the margin is such that a cell (a
-    /// tenth of the lane spacing) that a border cuts is entirely in one image: two neighbouring
-    /// images overlap by more than that.
+    /// Distance along the lane that an image reliably shows on each side of its middle: half of the
+    /// footprint's side, less a margin for rounding. Where images overlap, the margin is such that
+    /// a cell (a tenth of the lane spacing) that a border cuts is entirely in one image: two
+    /// neighbouring images overlap by more than that.
     pub(super) fn picture_half_width(&self) -> f32 {
         let spacing = self.pattern.spacing;
         let half = spacing.footprint.along_m / 2.0;
@@ -305,7 +305,7 @@ fn line_crossings<const V: usize>(
 
 /// Adds to `out` all `u` at which the rings contain a point between the two `v`: those inside on
 /// both border lines, and those of the rings' edges between the lines. From any other inner point
-/// the way across to a border line crosses an edge first, at the same `u`.
+/// the line across to a border line crosses an edge first, at the same `u`.
 fn project_rings<const V: usize>(
     edges: impl Iterator<Item = (Flat, Flat)> + Clone,
     [low, high]: Span,

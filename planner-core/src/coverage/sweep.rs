@@ -1,8 +1,8 @@
 //! The direction of the lanes: that across which the area's convex hull is least wide, so that
-//! lanes and turns are fewest. It is parallel to a side of the hull.
+//! lanes and turns are fewest. This direction is parallel to a side of the hull.
 //!
-//! Source: CPP §3.2.1 (after Huang 2001); rotating calipers: Shamos 1978; hull: Andrew's monotone
-//! chain. O(n log n).
+//! Source: paper CPP §3.2.1 (after Huang 2001); rotating calipers: Shamos 1978; hull: Andrew's
+//! monotone chain. O(n log n).
 
 use heapless::Vec;
 
@@ -84,8 +84,8 @@ fn convex_hull<const V: usize>(
     let mut side = 0;
     for step in 0..2 * count {
         let place = sorted[if step < count { step } else { 2 * count - 1 - step }];
-        // A vertex above the line between both ends is no corner of the lower chain, one below it
-        // none of the upper chain.
+        // A vertex above the line between both ends is no corner of the lower chain; a vertex below
+        // that line is none of the upper chain.
         let above = (sorted[count - 1] - sorted[0]).perp(&(place - sorted[0]));
         if (step < count && above > 0.0) || (step > count && step + 1 < 2 * count && above <= 0.0) {
             continue;

@@ -1,6 +1,6 @@
 //! Back-and-forth lanes over an area that may be concave and have holes and no-fly zones.
 //!
-//! Source: CPP §3.2.1, Fig. 4. The area is cut into strips of equal width, at most the lane
+//! Source: paper CPP §3.2.1, Fig. 4. The area is cut into strips of equal width, at most the lane
 //! spacing. In each strip a lane runs along the middle, from border to border of the area along
 //! that line, and further where the strip's area would otherwise extend beyond the last image. The
 //! "simple" and "sampled" patterns of the paper have the same lanes: the first packs whole lanes,

@@ -27,9 +27,9 @@ pub struct Transit<'a, const N: usize> {
     between_m: [[f32; N]; N],
 }
 
-/// The memory of a [`Transit`], before it is given an area.
+/// The memory of a [`Transit`], before its area is set.
 impl<const N: usize> Transit<'_, N> {
-    /// Creates an empty graph; [`Transit::set_area`] gives it an area.
+    /// Creates an empty graph; [`Transit::set_area`] sets its area.
     pub const fn empty() -> Self {
         Self { area: Area::NOWHERE, corners: Vec::new(), between_m: [[0.0; N]; N] }
     }

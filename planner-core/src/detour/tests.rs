@@ -6,8 +6,8 @@ use super::*;
 use crate::roadmap::Edge;
 use crate::roadmap::tests::{encode, header};
 
-/// A start, a goal 8 m east of it, a way straight there and one by the north, and a shaft up from
-/// the middle.
+/// A start, a goal 8 m east of it, a straight path between them, another by the north, and a shaft
+/// up from the middle.
 const NODES: [Point; 6] = [
     Point::new(0.0, 0.0, 5.0),
     Point::new(8.0, 0.0, 5.0),
@@ -39,8 +39,8 @@ fn landing(from: Point) -> KeepOutZone {
     KeepOutZone { to: Point::new(from.x, from.y, 0.0), kind: ZoneKind::Descending, ..at(from, 2.0) }
 }
 
-/// Plans, and holds the path against what every path must keep: it begins here, joins nodes and
-/// ends at one.
+/// Plans a detour, and checks what holds for every path: it begins at the vehicle, joins nodes and
+/// ends at a node.
 fn planned(
     request: &DetourRequest,
     obstacles: &[KeepOutZone],
@@ -91,7 +91,7 @@ fn who_is_too_near_already_may_leave_but_come_no_nearer() {
     assert_eq!(planned(&request(), &[ahead]).unwrap()[1], NODES[0]);
 }
 
-/// Small vehicles have small zones: only one that the vehicle is in is left out, whatever its size.
+/// Small vehicles have small zones: of any size, only a zone that contains the vehicle is ignored.
 #[test]
 fn zones_of_any_size_ahead_are_kept_out_of() {
     for radius_m in [0.1, 0.3, 0.5, 0.7] {
@@ -130,7 +130,8 @@ fn aside_is_the_nearest_node_that_nobody_lands_on() {
 fn aside_does_not_lead_up_to_who_lands() {
     let aside =
         DetourRequest { aside: true, leg: [NODES[2], NODES[2]], here: NODES[2], ..request() };
-    // The ways on the floor are taken by others: what is left is the shaft, from which it comes.
+    // The nodes on the floor are taken by others: only the shaft is left, down which another
+    // vehicle lands.
     let floor = [at(NODES[0], 1.0), at(NODES[1], 1.0), at(NODES[3], 1.0)];
     let with = |top_z: f32| {
         let mut all = floor.to_vec();
@@ -163,7 +164,7 @@ fn a_path_is_blocked_by_what_is_ahead_of_it_only() {
 }
 
 proptest::proptest! {
-    /// Looking along the axes first changes no answer.
+    /// The quick check along the axes changes no answer.
     #[test]
     fn touching_is_being_nearer_than_the_radius(
         c in proptest::collection::vec(-4.0f32..4.0, 12),

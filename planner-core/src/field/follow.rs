@@ -1,12 +1,13 @@
 //! A path with few corners at a height above the field and at most a tolerance higher, no steeper
 //! than the vehicle can climb and descend.
 //!
-//! Method: at each sample the path's height must be in the tunnel between the two bounds. The
-//! slopes from the last corner that keep it there for all samples so far form a cone. Where the
-//! next sample would empty the cone, the path gets a corner at the sample before: as high as
-//! possible where the ground rises, as low as possible where it falls. Each corner lies in the
-//! tunnel and the field is nowhere steeper than the path may be, so the next sample can always be
-//! reached. Samples are half a node spacing apart. Cost: one lookup of the field per sample.
+//! Method: at each sample the path's height must be in the tunnel, from `height_m` to
+//! `height_m + tolerance_m` above the field. The slopes from the last corner that keep the path in
+//! the tunnel at all samples so far form a cone. Where the next sample would empty the cone, the
+//! path gets a corner at the sample before: as high as possible where the ground rises, as low as
+//! possible where it falls. Each corner lies in the tunnel and the field is nowhere steeper than
+//! the path may be, so the next sample can always be reached. Samples are half a node spacing
+//! apart. Cost: one lookup of the field per sample.
 
 use libm::{ceilf, fmaxf, fminf};
 
@@ -24,7 +25,7 @@ pub struct TerrainFollowing<'a> {
     pub field: FieldView<'a>,
     /// Least height of the path above the field, metres.
     pub height_m: f32,
-    /// Most metres by which the path may be higher than that.
+    /// Most metres by which the path may be higher than this least height.
     pub tolerance_m: f32,
     /// Greatest slope of the path: metres up or down per metre over ground.
     pub slope: f32,
@@ -41,8 +42,8 @@ impl TerrainFollowing<'_> {
         self.field.highest_m() + self.height_m + self.tolerance_m
     }
 
-    /// Start, above `from`, of the path to `to` with the fewest corners; of three start heights in
-    /// the tunnel (bottom, middle, top) the lowest such one.
+    /// Start, above `from`, of a path to `to`. Of three start heights in the tunnel (bottom,
+    /// middle, top) the one whose path has the fewest corners; among equals the lowest.
     pub fn start_point(&self, from: &Flat, to: &Flat) -> Point {
         let low_m = self.lowest_m(from);
         let mut best = (usize::MAX, low_m);
@@ -61,8 +62,8 @@ impl TerrainFollowing<'_> {
         Point::new(from.x, from.y, best.1)
     }
 
-    /// Passes the corners of a path from `from`, which is in the tunnel, to above `to` to `corner`,
-    /// in order and without the start; the last one is above `to`.
+    /// Calls `corner` with each corner of a path from `from`, which is in the tunnel, to a point
+    /// above `to`: in order, without the start; the last corner is above `to`.
     ///
     /// # Errors
     /// The first error that `corner` returns; the path ends there.
@@ -112,7 +113,7 @@ impl TerrainFollowing<'_> {
         corner(Point::new(to.x, to.y, z_m))
     }
 
-    /// `z_m` limited to the tunnel above `low_m`: rounding may leave it slightly.
+    /// `z_m` limited to the tunnel above `low_m`: rounding may move it slightly out of the tunnel.
     fn clamp_to_tunnel(&self, z_m: f32, low_m: f32) -> f32 {
         fminf(fmaxf(z_m, low_m), low_m + self.tolerance_m)
     }

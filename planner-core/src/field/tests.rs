@@ -15,7 +15,7 @@ fn field(shape: &FieldShape, nodes_dm: &[i16]) -> Vec<u8> {
     out
 }
 
-/// No steeper than so many decimetres a node.
+/// Raises node heights until no slope is steeper than `most` decimetres per node.
 fn flattened(columns: usize, nodes: &mut [i16], most: i16) {
     for _ in 0..nodes.len() {
         let before = nodes.to_vec();
@@ -98,8 +98,8 @@ proptest! {
             for k in 0..=samples {
                 let at: Point = leg[0] + step * (k as f32 / samples as f32);
                 let low_m = following.lowest_m(&at.xy());
-                // Between two samples of the path, half a node apart, the field bends by a part of
-                // its slope.
+                // Between two samples of the path, half a node spacing apart, the field may rise by
+                // half of what `most` allows per node.
                 let bent_m = f32::from(most) * HEIGHT_STEP_M / 2.0;
                 prop_assert!(at.z >= low_m - bent_m - 0.01, "{} {}", at.z, low_m);
                 prop_assert!(at.z <= low_m + tolerance_m + bent_m + 0.01, "{} {}", at.z, low_m);

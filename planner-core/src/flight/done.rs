@@ -8,7 +8,7 @@ use heapless::{Vec, VecView};
 pub struct WaypointRange {
     /// Number of the first waypoint.
     pub first: u32,
-    /// Number after that of the last waypoint.
+    /// Number of the last waypoint plus one.
     pub end: u32,
 }
 
@@ -48,14 +48,15 @@ impl<const N: usize> WaypointSet<N> {
     /// Adds a range. Returns whether at least one of its waypoints was not in the set.
     ///
     /// # Errors
-    /// The range, if it touches no range of the set and there are `N` already; the set is then
-    /// unchanged.
+    /// Returns `range` if it touches no range of the set and the set has `N` ranges already; the
+    /// set is then unchanged.
     pub fn insert(&mut self, range: WaypointRange) -> Result<bool, WaypointRange> {
         insert(&mut self.ranges, range)
     }
 }
 
-/// A function that does not depend on `N`, so that the program has one copy of it.
+/// [`WaypointSet::insert`] without the parameter `N`, so that the program has one copy of this
+/// code.
 fn insert(
     ranges: &mut VecView<WaypointRange>,
     range: WaypointRange,

@@ -18,8 +18,8 @@ pub enum HeadingMode {
 /// How the camera is triggered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trigger {
-    /// By the autopilot, each time it has flown a distance; switched on and off at the ends of a
-    /// stretch.
+    /// By the autopilot, each time it has flown a given distance; switched on and off at the ends
+    /// of a stretch.
     Distance,
     /// By one command of the companion for each picture.
     Waypoint,
@@ -131,13 +131,14 @@ pub struct PicturePlan {
     begins: u64,
     /// Bit `i`: a stretch ends at waypoint `i` of the path.
     ends: u64,
-    /// For each stretch, in order, the lowest number that the area gives to one of its pictures.
+    /// For each stretch, in order, the lowest number of the area's waypoints that it photographs.
     numbers: [u16; Self::MAX_STRETCHES],
     /// For each stretch, in order, the number of its pictures.
     counts: [u16; Self::MAX_STRETCHES],
-    /// Whether the area's numbers fall along the path: it follows the area's lanes backwards.
+    /// Whether the area's waypoint numbers fall along the path, which then follows the lanes
+    /// backwards.
     backward: bool,
-    /// Number of waypoints of the whole area; 0 where they have no numbers.
+    /// Number of waypoints of the whole area; 0 if not set by [`Self::with_area`].
     area: u32,
     /// Greatest distance over ground between neighbouring pictures, metres.
     pub spacing_m: f32,
@@ -175,20 +176,20 @@ impl PicturePlan {
         }
     }
 
-    /// The same plan for an area of `area_waypoint_count` waypoints, whose numbers rise along the
-    /// path, or fall if `backward`.
+    /// The same plan for an area of `area` waypoints, whose numbers rise along the path, or fall if
+    /// `backward`.
     pub const fn with_area(self, area: u32, backward: bool) -> Self {
         Self { area, backward, ..self }
     }
 
-    /// Number of waypoints of the whole area; 0 where they have no numbers.
+    /// Number of waypoints of the whole area; 0 if not set by [`Self::with_area`].
     pub fn area_waypoint_count(&self) -> u32 {
         self.area
     }
 
-    /// Adds a stretch from waypoint `from` to waypoint `to` of the path, both after those of the
-    /// stretches before. It has one picture for each of the area's `waypoints`, spread evenly from
-    /// end to end.
+    /// Adds a stretch from waypoint `from` to waypoint `to` of the path, both after the waypoints
+    /// of the stretches added before. It has one picture for each of the area's `waypoints`, spread
+    /// evenly from end to end.
     ///
     /// # Errors
     /// [`PathError::PathFull`] beyond [`Self::MAX_PATH_WAYPOINTS`], [`Self::MAX_STRETCHES`] or
@@ -248,7 +249,7 @@ impl PicturePlan {
     }
 
     /// Number of pictures certainly taken at arc length `along_m`: those up to one spacing before
-    /// it. A later one may still be missing.
+    /// that arc length. A later one may still be missing.
     pub fn certainly_taken_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
         self.taken_count(path, along_m - self.spacing_m)
     }

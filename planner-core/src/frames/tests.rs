@@ -6,12 +6,12 @@ fn at(lat_deg: f64, lon_deg: f64, alt_m: f64) -> Geodetic {
     Geodetic { lat_deg, lon_deg, alt_m }
 }
 
-/// From MAVLink's integers: 1e-7 degrees, millimetres.
+/// A position from MAVLink's integers: 1e-7 degrees, millimetres.
 fn from_int(lat: f64, lon: f64, alt_mm: i32) -> Geodetic {
     at(lat * 1e-7, lon * 1e-7, f64::from(alt_mm) / 1000.0)
 }
 
-/// The checker of positions: the same place to `metres`, longitudes in range.
+/// Checks that two positions are the same place to within `metres`, with longitudes in range.
 fn check_same_place(a: &Geodetic, b: &Geodetic, metres: f64) {
     assert!(a.is_valid() && b.is_valid(), "{a:?} {b:?}");
     assert!((a.ecef() - b.ecef()).norm() <= metres, "{a:?} {b:?}");
@@ -205,7 +205,7 @@ proptest! {
         }
     }
 
-    /// What makes PX4's projection what it is: the distance from the origin is the great circle's.
+    /// PX4's projection keeps the distance from the origin: it is that along the great circle.
     #[test]
     fn px4_keeps_distances_from_the_origin(
         lat in -85.0f64..85.0,

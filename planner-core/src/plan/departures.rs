@@ -2,9 +2,9 @@
 //!
 //! Paths do not change. For each pair of flights one interval covers all differences of their
 //! take-off times at which they would come near each other. With these intervals, the take-off
-//! times of an order cost a few comparisons per pair, so many orders can be tried, each made by
-//! moving one vehicle to another place. The best order is then scheduled exactly, and kept if the
-//! last vehicle lands earlier.
+//! times of an order cost a few comparisons per pair, so many orders can be tried, each made from
+//! the last by moving one vehicle to another place in it. The best order is then scheduled exactly,
+//! and kept if the last vehicle lands earlier.
 //!
 //! Cost: the timed segments of each pair of flights, then [`MAX_COMPARISONS`] comparisons.
 
@@ -22,14 +22,15 @@ use crate::sort;
 /// Most comparisons of a take-off time with that of a scheduled flight, in a whole search: a third
 /// of a second on a board.
 const MAX_COMPARISONS: u32 = 150_000;
-/// Comparisons per pair of vehicles in a swarm larger than [`BOARD_VEHICLES`], if that is more.
+/// Comparisons per pair of vehicles in a swarm larger than [`BOARD_VEHICLES`], if that is more than
+/// [`MAX_COMPARISONS`].
 const COMPARISONS_PER_PAIR: u32 = 200;
 /// Weight of the mean landing time relative to the last landing time: of two orders with the same
 /// end of the mission, the one with less waiting wins.
 const MEAN_LANDING_WEIGHT: f32 = 0.02;
 
-/// For each pair of flights the forbidden interval of take-off time differences: of `i` minus that
-/// of `j`, seconds.
+/// For each pair of flights `i` and `j` the forbidden interval of the difference of their take-off
+/// times, that of `i` minus that of `j`, seconds.
 struct ForbiddenDifferences<'a> {
     /// For a pair i < j the interval's lower end is at `[i][j]`, its upper end at `[j][i]`.
     ends: &'a [f32],
@@ -44,8 +45,8 @@ impl ForbiddenDifferences<'_> {
     }
 
     /// Computes the take-off times of vehicles that are scheduled in this `order`, each as early as
-    /// those before it allow. Returns the order's cost in seconds: last landing time and weighted
-    /// mean landing time.
+    /// those before it allow. Returns the order's cost in seconds: last landing time plus weighted
+    /// mean landing time. `looks` is the number of comparisons left.
     fn departure_times(
         &self,
         order: &[u16],
@@ -154,7 +155,8 @@ pub(super) fn improve_departure_order<
     Ok(())
 }
 
-/// The forbidden differences of departures of every two flights, put into `ends`.
+/// Writes the forbidden interval of each pair of flights to `ends`, in the layout of
+/// [`ForbiddenDifferences::ends`].
 fn find_differences<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],

@@ -1,10 +1,10 @@
-//! Prioritised planning: vehicle by vehicle gets its path and its times in the schedule.
+//! Prioritised planning: one vehicle after the other gets its path and its times in the schedule.
 //!
 //! Each vehicle keeps clear of those planned before it: by the shortest path and a wait on the pad
-//! if that is enough, else by waiting and stepping aside on the way ([`sipp`]). A vehicle for which
+//! if that is enough, else by waiting and stepping aside in flight ([`sipp`]). A vehicle for which
 //! no times are found is moved to the front in the next round. When that does not help, the others
-//! leave it a head start. If this fails, all is tried again with the shortest path first. The
-//! number of rounds is bounded.
+//! leave it a head start. If this fails too, all is tried again with the vehicles of the shortest
+//! paths first. The number of rounds is bounded.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -48,7 +48,7 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     let mut failed = Ok(());
     for first in [InitialOrder::Longest, InitialOrder::Shortest] {
         // Vehicles that stay on their pads come first, since they block all others. Among equal
-        // lengths the higher id is first (P3D §3.4).
+        // lengths the higher id is first (paper P3D §3.4).
         sort::sort_by(&mut order, |&a, &b| {
             let (a, b) = (usize::from(a), usize::from(b));
             let (goals, ids) = (
@@ -76,7 +76,7 @@ enum InitialOrder {
 }
 
 /// Schedules in this order. In the next round a vehicle for which no times were found is moved to
-/// the front; after [`MAX_REORDERINGS`] of these it is moved to the end and gets a head start.
+/// the front; after [`MAX_REORDERINGS`] such rounds it is moved to the end and gets a head start.
 fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -114,8 +114,7 @@ fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, cons
 const MAX_REORDERINGS: usize = 64;
 /// Most rounds in which the others depart later, each time by [`HEAD_START_S`] more.
 const MAX_HEAD_STARTS: usize = 8;
-/// Time that two vehicles need to get out of each other's way from head-on into a side room,
-/// seconds.
+/// Time in which one of two vehicles that meet head-on can step aside into a side room, seconds.
 const HEAD_START_S: f32 = 3.0;
 
 /// Head start: the last `count` vehicles in the order may take off at once, all others after
@@ -170,7 +169,7 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
 }
 
 /// The vehicle's flight on a shortest path after the shortest wait on its pad that avoids
-/// conflicts; `None` if no wait is long enough.
+/// conflicts; `None` if no wait on the pad avoids all conflicts.
 fn plan_with_pad_wait<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -264,7 +263,7 @@ const MAX_DEPARTURES: usize = 6;
 /// seconds: half of what counts as a standstill (20 s).
 const LONG_WAIT_S: f32 = 10.0;
 
-/// The longest wait of a flight on its way, and the sum of all its waits, seconds.
+/// The longest wait of a flight at a waypoint, and the sum of all its waits there, seconds.
 fn wait_durations_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
     let waits = flight.path.waypoints().iter().map(|w| w.leave_s - w.arrive_s);
     waits.fold((0.0, 0.0), |(longest, all), wait| (fmaxf(longest, wait), all + wait))
@@ -277,7 +276,7 @@ enum AvoidedParking {
     WaitingPads,
     /// The pads and landing places of all other vehicles: then waiting on the pad is always enough.
     AllPlaces,
-    /// None: one that is parked on the path has to leave first.
+    /// No parked vehicle: one that is parked on the path has to leave first.
     Nothing,
 }
 

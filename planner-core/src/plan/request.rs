@@ -83,7 +83,8 @@ impl PlanRequest<'_> {
 /// Reason why there is no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanError {
-    /// The numbers of starts and goals in the roadmap are not those of the request.
+    /// The numbers of starts and goals in the roadmap are not those of the request; or pads, routes
+    /// and lanes of a coverage mission are inconsistent.
     Terminals,
     /// More than `V` vehicles or goals.
     SwarmFull,

@@ -93,7 +93,7 @@ fn spread(count: usize, seed: u64) -> StdVec<Point> {
     points
 }
 
-/// Nodes that are reached from the first.
+/// Nodes that can be reached from node 0.
 fn connected(view: &RoadmapView<'_>) -> BTreeSet<u16> {
     let (mut reached, mut open) = (BTreeSet::from([0]), std::vec![0]);
     while let Some(node) = open.pop() {
@@ -106,7 +106,7 @@ fn connected(view: &RoadmapView<'_>) -> BTreeSet<u16> {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(150))]
-    /// Ten vehicles over open ground, at any speeds: all arrive, none comes near another.
+    /// Ten vehicles over open ground, at any speeds: all arrive, and no two come near each other.
     #[test]
     fn swarms_arrive_apart_at_any_speeds(
         seed in any::<u64>(),
@@ -116,7 +116,7 @@ proptest! {
         let terminals = spread(20, seed);
         let bytes = open_roadmap(&terminals, 10, 300, seed);
         let view = RoadmapView::parse(&bytes).unwrap();
-        // One in a corner may have no node within reach, or none that leads to the others.
+        // A terminal in a corner may have no node within reach, or none that leads to the others.
         let connected = connected(&view);
         prop_assume!((0..20).all(|terminal| connected.contains(&terminal)));
         let mode =
@@ -182,7 +182,7 @@ fn head_on_in_a_corridor_one_steps_into_the_side_room() {
         assert!(plan.flights.iter().any(aside), "side room at {side_at_m}, {depth_m} deep");
         let waits =
             plan.flights.iter().flat_map(|f| f.path.waypoints()).map(|w| w.leave_s - w.arrive_s);
-        // It waits on its pad, and in the side room only while the other passes.
+        // The vehicle that steps aside waits in the side room only while the other passes.
         assert!(waits.fold(0.0, f32::max) < 2.1, "side room at {side_at_m}, {depth_m} deep");
         for speeds in [[1.0, 1.0], [0.3, 2.0], [2.0, 0.3]] {
             let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 20_000);
@@ -310,7 +310,7 @@ fn queue(
     (bytes, tasks(vehicles, true))
 }
 
-/// Whether every vehicle's part fits that many gates, and what the plan says of it.
+/// Whether every vehicle's plan fits `G` gates, and the result of planning with that limit.
 fn fits<const G: usize>(bytes: &[u8], vehicles: &[VehicleTask]) -> (bool, Result<(), PlanError>) {
     let view = RoadmapView::parse(bytes).unwrap();
     let mut ws = Box::new(PlanWorkspace::<1024, 16, 4096>::new());

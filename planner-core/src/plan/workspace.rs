@@ -40,7 +40,8 @@ pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
     pub sipp: SippWorkspace<N, P>,
     /// Memory of [`crate::assignment`].
     pub assignment: AssignmentWorkspace<V>,
-    /// Starts × goals, row-major and contiguous from the first number on.
+    /// Path lengths from starts to goals, row-major and contiguous from the first number on; then
+    /// the intervals of `departures.rs`.
     pub(super) costs: [[f32; V]; V],
     /// Memory of the schedule, also for [`super::vehicle_plan`].
     pub schedule: ScheduleWorkspace,

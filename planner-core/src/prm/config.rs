@@ -4,8 +4,8 @@
 /// one free cell in a thousand a node is still found with a probability of 1 − e⁻¹⁰.
 pub const TRIES_PER_NODE: usize = 10_000;
 
-/// Random pairs that are drawn for one node by the bridge test before a uniform node replaces it: a
-/// map without narrow passages has no such node.
+/// Random pairs of points that the bridge test draws for one node before a uniform node takes its
+/// place: in a map without narrow passages no pair passes the test.
 pub const TRIES_PER_BRIDGE: usize = 1_000;
 
 /// Distribution of the random nodes.
@@ -45,12 +45,12 @@ pub struct Config {
 pub enum PrmError {
     /// The named setting is NaN, infinite, negative, too large, or makes an empty range.
     Config(&'static str),
-    /// The terminal with this index is not finite, not in the map or inside an obstacle.
+    /// The terminal with this index is not finite, is outside the map, or is inside an obstacle.
     TerminalBlocked(usize),
     /// More nodes than the caller's memory or 16-bit indices hold.
     TooManyNodes,
-    /// After this many random nodes none was found in [`TRIES_PER_NODE`] draws: hardly any space is
-    /// free.
+    /// This many random nodes were found, but [`TRIES_PER_NODE`] draws found no free place for the
+    /// next one: hardly any space is free.
     NoFreeSpace(usize),
     /// The node with this index is not finite, or beyond 1e6 m.
     NotFinite(usize),

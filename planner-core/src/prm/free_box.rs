@@ -2,11 +2,11 @@
 //! segment.
 //!
 //! Boxes are convex, so a segment with both ends strictly inside the box is clear; a segment that
-//! leaves it enters the cell behind a face, which is mostly an obstacle. One box serves all
-//! segments from a node, and those from other nodes in it. Both answers are given only where
-//! rounding cannot change them: if the ends are at least [`ROUNDING_CELLS`] cells inside the box,
-//! or if a point of the segment is at least [`ROUNDING_CELLS`] cells inside an occupied cell. All
-//! other segments go to the exact check.
+//! leaves the box enters the cell behind a face, which is mostly an obstacle. One box serves all
+//! segments from a node, and those from other nodes in the box. The box decides only where rounding
+//! cannot change the answer: "clear" if both ends are at least [`ROUNDING_CELLS`] cells inside the
+//! box, "blocked" if a point of the segment is at least [`ROUNDING_CELLS`] cells inside an occupied
+//! cell. All other segments go to the exact check.
 
 use super::config::Config;
 use super::neighbours::NodeIndex;
@@ -163,8 +163,8 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         Ok(())
     }
 
-    /// The exact check of the segment from `here` to `there`; its first share `known` lies in the
-    /// free box and is skipped.
+    /// The exact check of the segment from `here` to `there`; the first part, `known` (0 to 1) of
+    /// its length, lies in the free box and need not be checked.
     #[inline]
     fn check_exactly(&self, there: [f32; 3], known: f32) -> bool {
         let there = Point::from(there);
@@ -214,8 +214,8 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         if t < 0.999 && self.is_obstacle(at(t)) {
             return RayClass::Blocked;
         }
-        // The segment leaves the box, but the cell behind is free or not certain. Clear for certain
-        // is the share up to the first face ahead, less the probe depth and the clearance.
+        // The segment leaves the box, but the cell behind is free or not certain. The part up to
+        // the first face ahead, less the probe depth and the clearance, is certainly clear.
         let near =
             [0, 1, 2].map(|axis| leave[axis] - (PROBE_DEPTH_CELLS + view.inset) / d[axis].abs());
         let known = near[0].min(near[1]).min(near[2]).clamp(0.0, 1.0);
@@ -241,13 +241,13 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
 
 /// What the free box alone says about the segment from `here` to another node.
 enum RayClass {
-    /// The segment ends inside the box; at least this many cells from the nearest face, up to
-    /// rounding.
+    /// The segment ends inside the box, and keeps at least this many cells from the nearest face,
+    /// up to rounding.
     Clear(f32),
     /// The segment leaves the box into an occupied cell.
     Blocked,
-    /// The first share of the segment, this number, lies in the box and is clear; the exact check
-    /// decides on the rest.
+    /// The segment leaves the box. Its first part, this share (0 to 1) of its length, is clear; the
+    /// exact check decides on the rest.
     Leaves(f32),
 }
 

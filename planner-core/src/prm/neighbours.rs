@@ -86,7 +86,7 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
         let count = nx * ny * nz;
         self.first.fill(0);
         // `first` counts the nodes of each cube, then holds the end of each cube's run. Placing a
-        // node moves that end down by one, so that it ends as the run's beginning.
+        // node lowers that end by one, so that finally `first` holds the run's beginning.
         for node in nodes {
             self.first[self.cube_of(node)] += 1;
         }

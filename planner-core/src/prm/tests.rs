@@ -1,4 +1,4 @@
-//! The builder against the all-pairs loop, and its refusals.
+//! The builder compared with the all-pairs loop, and what it refuses.
 
 extern crate std;
 
@@ -50,7 +50,7 @@ fn rooms(rng: &mut Pcg32, resolution_m: f32) -> (GridShape, Vec<u64>) {
     (shape, words)
 }
 
-/// The one checker of edges: the same set as all pairs give, none twice.
+/// Checks edges: the same set as the all-pairs loop gives, none twice.
 fn check_edges(grid: &VoxelGrid<'_>, nodes: &[Point], config: &Config) -> usize {
     let mut workspace = NodeIndex::<400, 600>::new();
     let mut edges = vec![Edge::default(); 50_000];
@@ -84,7 +84,7 @@ fn edges_are_those_of_all_pairs() {
                 let config = Config { clearance_m, ..config(seed) };
                 let mut nodes = vec![Point::zeros(); 400];
                 let count = sample_nodes(&grid, None, &[], &config, &mut nodes).unwrap();
-                // Some on cell corners, and two in one place.
+                // Some nodes on cell corners, and two at one place.
                 for node in &mut nodes[..20] {
                     *node = ((*node - shape.min) / shape.resolution_m).map(f32::round)
                         * shape.resolution_m

@@ -60,11 +60,11 @@ impl RoadmapView<'_> {
     }
 
     /// Checks that the distances to landmarks are, to the bit, the shortest ones over all edges;
-    /// only then are their differences lower bounds. No search is needed. They are right if the
-    /// landmark's own is zero, no edge makes one shorter, and each other one is the sum of an
-    /// edge's length and the smaller distance at the edge's other end. (Following ever smaller
-    /// distances leads to the landmark, so none is too small; along the true shortest path, none is
-    /// too large.)
+    /// only then are their differences lower bounds. No search is needed. The distances are right
+    /// if the landmark's own is zero, no edge leads to a shorter one, and each other distance is
+    /// the sum of an edge's length and the smaller distance at that edge's other end. (Following
+    /// ever smaller distances leads to the landmark, so none is too small; along the true shortest
+    /// path, none is too large.)
     pub(super) fn check_landmarks(&self) -> Result<(), RoadmapError> {
         if self.landmarks.is_empty() {
             return Ok(());

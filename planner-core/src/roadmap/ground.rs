@@ -1,10 +1,11 @@
-//! Ground height below nodes, and an estimate of it below any point from the nodes around.
+//! Ground height below nodes, and an estimate of the ground height below any point from the nodes
+//! around it.
 //!
 //! The desktop writes with each node its height above the first obstacle below it. Between a node
 //! and its ground all space is free, so a point beside the node at a height between the two is on
 //! the same storey. A node lower than the point may be below that storey's floor, but not if it is
-//! lower by less than twice the clearance of every edge: each of the two has at least that
-//! clearance to the floor.
+//! lower by less than twice the clearance to which all edges were tested: both node and point keep
+//! at least that clearance from the floor.
 
 use libm::{fmaxf, fminf};
 
@@ -13,9 +14,9 @@ use crate::Point;
 
 /// Horizontal distance within which nodes count for the ground below a point, metres.
 pub const GROUND_REACH_M: f32 = 3.0;
-/// Most nodes, the nearest ones, that count for the ground below a point. Fewer miss edges of the
-/// floor; more give a range of heights too wide for a detour to leave the path. Measured by
-/// `tests/tests/detours.rs`.
+/// Most nodes, the nearest ones, that count for the ground below a point. With fewer, edges of the
+/// floor are missed; with more, the range of heights is too wide for a detour to leave the path.
+/// Measured by `tests/tests/detours.rs`.
 const MAX_GROUND_NODES: usize = 6;
 
 impl RoadmapView<'_> {

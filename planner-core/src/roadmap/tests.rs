@@ -87,7 +87,7 @@ fn small() -> (Vec<Point>, Vec<Edge>) {
     (nodes, vec![Edge { a: 0, b: 1, clearance_m: 0.7 }, Edge { a: 2, b: 0, clearance_m: 0.25 }])
 }
 
-/// Bytes of a file with its CRC made good again: what only the other checks can catch.
+/// Bytes of a file with its CRC corrected, so that only the other checks can find the fault.
 fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let end = bytes.len() - 4;
     let crc = CRC32.checksum(&bytes[..end]).to_le_bytes();
@@ -298,7 +298,7 @@ fn heights_over_ground_are_written_and_checked() {
     }
     assert_eq!(with_heights(&[1.0; 2]), Err(RoadmapError::Height(2)));
     assert_eq!(with_heights(&[1.0; 4]), Err(RoadmapError::Height(3)));
-    // A file of version 1 says nothing of the ground.
+    // A file of version 1 has no ground heights.
     let old = with_heights(&[]).unwrap();
     let view = RoadmapView::parse(&old).unwrap();
     assert_eq!(

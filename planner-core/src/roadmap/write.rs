@@ -23,8 +23,8 @@ pub struct Edge {
 }
 
 /// Length of a roadmap file in bytes, or `None` if it exceeds the file's 32-bit length. `columns`
-/// is how many numbers are stored per node besides position and row: 0, or [`LANDMARKS`] for
-/// [`write_with_landmarks`], and one more with heights.
+/// is how many numbers are stored per node besides its position and row offset: 0, or [`LANDMARKS`]
+/// for [`write_with_landmarks`], and one more with heights.
 pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> {
     let a_node = columns.checked_add(4)?;
     let words = nodes.checked_mul(a_node)?.checked_add(2)?.checked_add(edges.checked_mul(2)?)?;
@@ -47,12 +47,12 @@ pub fn write(
     Ok(append_crc(out))
 }
 
-/// As [`write()`], with the shortest distances from each node to [`LANDMARKS`] landmarks, which
-/// spare a search half its nodes in a building. The first landmark is node 0, a start if there are
-/// any; the second is the node farthest from it. Costs one more search per landmark.
+/// As [`write()`], with the shortest distances from each node to [`LANDMARKS`] landmarks, with
+/// which a search in a building settles half as many nodes. The first landmark is node 0, a start
+/// if there are any; the second is the node farthest from it. Costs one more search per landmark.
 ///
-/// `heights_m` are the nodes' heights above the ground, infinite where nothing is below; or it is
-/// empty, and the file has none.
+/// `heights_m` are the nodes' heights above the ground, infinite where nothing is below; if the
+/// slice is empty, the file has no heights.
 pub fn write_with_landmarks<const N: usize>(
     header: &RoadmapHeader,
     nodes: &[Point],
@@ -215,8 +215,8 @@ fn write_header(
 }
 
 /// Fills the compressed sparse rows, each sorted by target, with clearances limited to the header's
-/// greatest; an error if an edge is there twice. `offsets` first counts the degrees, then holds
-/// each row's write position, then is shifted by one entry to hold each row's begin.
+/// greatest; an error if an edge occurs twice. `offsets` first counts the degrees, then holds each
+/// row's write position, then is shifted by one entry to hold each row's begin.
 fn write_rows(
     header: &RoadmapHeader,
     edges: &[Edge],

@@ -12,7 +12,7 @@ use crate::Point;
 use crate::geometry::{point_distance_sq, segments_distance_sq};
 
 /// Rounding of distances, metres: an approach by less than this does not count as one. No vehicle
-/// can creep past another by so little.
+/// can get past another by coming so little nearer.
 const APPROACH_ROUNDING_M: f32 = 0.003;
 /// Margin added to bounding boxes, metres: more than the rounding of a coordinate of the mission
 /// frame.
@@ -66,14 +66,14 @@ pub struct OwnSet<'a> {
     /// Centre of the bounding box, and half of its size.
     middle: Point,
     half: Point,
-    /// Distance of centres at which the two hulls touch, metres: a vehicle that is already as near
-    /// to where another one may come has nothing to keep there, and only has to leave.
+    /// Distance of centres at which the two hulls touch, metres: a vehicle already this near to
+    /// where another one may come has no distance left to keep, and only has to leave.
     pub touching_m: f32,
 }
 
 impl<'a> OwnSet<'a> {
-    /// Prepares the set that the own vehicle can no longer avoid. The caller lends the memory for
-    /// its legs: copying them takes a board long.
+    /// Prepares the own vehicle's reachable set. The caller lends the memory for its legs: copying
+    /// them takes long on a board.
     pub fn new<'s: 'a>(set: &'s ReachableSet, legs: &'a mut Legs<'s>) -> Self {
         let first = set.points[0];
         // Where the first leg has length 0, the second begins at the same point, and the first is
@@ -113,7 +113,7 @@ impl<'a> OwnSet<'a> {
     }
 
     /// Square of the least distance between the polylines of both sets, and the segment of the
-    /// other one that is so near; none where they are no nearer than `most_m`.
+    /// other set at that distance; `None` if the sets are no nearer than `most_m`.
     #[inline(always)]
     fn nearest_segment<'o>(
         &self,
@@ -163,10 +163,11 @@ impl<'a> OwnSet<'a> {
         }
         let here = &self.set.points[0];
         // The motion comes no nearer if the vehicle is already as near to a leg of the neighbour's
-        // set, or would be hit by a neighbour on that leg.
+        // set, or so near that it would touch a neighbour on that leg.
         let here_m = greater(sqrtf(motion_sq) + APPROACH_ROUNDING_M, self.touching_m);
         let is_here = |leg| point_distance_sq(leg, here) <= here_m * here_m;
-        // Most often that is the leg that the motion comes nearest to.
+        // Most often such a leg is the one that the motion comes nearest to, so it is checked
+        // first.
         if here_m < most_m && !is_here(nearest) && !other.segments().any(is_here) {
             return true;
         }
@@ -182,14 +183,15 @@ impl<'a> OwnSet<'a> {
     }
 }
 
-/// The greater of two. A board takes three times as long for `max`, which asks for NaN too.
+/// The greater of two numbers. `f32::max`, which also checks for NaN, takes three times as long on
+/// a board.
 #[inline]
 fn greater(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// For each coordinate that of `b` if it is `more` than that of `a`, else that of `a`. Not `min`:
-/// its handling of NaN takes a board three times as long.
+/// For each coordinate that of `b` if it is `more` than that of `a`, else that of `a`. Not `min`,
+/// whose handling of NaN takes three times as long on a board.
 #[inline]
 fn select_per_axis(a: &Point, b: &Point, more: impl Fn(f32, f32) -> bool) -> Point {
     let of = |a: f32, b: f32| if more(b, a) { b } else { a };

@@ -1,4 +1,5 @@
-//! Where a neighbour is on the points that it reports to fly along next, and how far these lead it.
+//! Where a neighbour is on the path points that it reports to fly along next, and how far these
+//! points lead it.
 
 use fpu::sqrtf;
 
@@ -6,15 +7,15 @@ use crate::Point;
 use crate::geometry::{Length, clamp_share};
 use crate::track::{LEAD_PER_SPEED_S, WALKING_SPEED_MPS};
 
-/// Distance of a vehicle at walking speed from the path points that it reports beyond which it does
-/// not count as flying along them, metres: real vehicles lag by up to 0.5 m and deviate by 0.4 m.
+/// Greatest distance from its reported path points at which a vehicle at walking speed counts as
+/// flying along them, metres: real vehicles lag by up to 0.5 m and deviate by 0.4 m.
 pub const OFF_REPORTED_PATH_M: f32 = 0.9;
-/// Further distance behind the first of those points, the setpoint, for each m/s above walking
-/// speed, seconds: as much more the setpoint may lead the vehicle.
+/// Addition to [`OFF_REPORTED_PATH_M`] behind the first of those points, the setpoint, per m/s
+/// above walking speed, seconds: the setpoint may lead the vehicle by that much more.
 pub const OFF_REPORTED_PATH_S: f32 = LEAD_PER_SPEED_S;
-/// Greatest distance of a vehicle at this speed from the path points that it reports at which it
-/// counts as flying along them, metres: so far behind the first of them, elsewhere
-/// [`OFF_REPORTED_PATH_M`].
+/// Greatest distance behind its first reported point, the setpoint, at which a vehicle at this
+/// speed counts as flying along its points, metres; beside the other points [`OFF_REPORTED_PATH_M`]
+/// applies.
 #[inline]
 fn off_reported_path_m(speed_mps: f32) -> f32 {
     let faster_mps = speed_mps - WALKING_SPEED_MPS;
@@ -39,9 +40,9 @@ pub enum PlaceOnPoints {
     On {
         /// Index of the point that ends the first leg on which the vehicle may be.
         leg: u8,
-        /// Further distance along the points that it may have flown already, where they turn back
-        /// and lead past it again: from that first place to the last one, decimetres, rounded up.
-        /// Two bytes, since one is stored for each neighbour.
+        /// Distance along the points from the first place where the vehicle may be to the last one,
+        /// decimetres, rounded up: above 0 where the points turn back and lead past the vehicle
+        /// again. Two bytes, since this is stored for each neighbour.
         more_dm: u16,
     },
 }
@@ -57,7 +58,7 @@ impl PlaceOnPoints {
     pub fn find(position: &Point, points: &[Point], velocity: &Point) -> Self {
         let Some((mut from, others)) = points.split_first() else { return Self::Beside };
         let away_m = |place: &Point| sqrtf((position - place).norm_squared());
-        // Distance of the vehicle from the place that `from` is.
+        // Distance of the vehicle from `from`.
         let mut start_m = away_m(from);
         // Whether the vehicle follows its setpoint, the first point, at a distance.
         let follows = start_m > OFF_REPORTED_PATH_M
@@ -70,7 +71,8 @@ impl PlaceOnPoints {
             (None, OFF_REPORTED_PATH_M)
         };
         // Arc length from that place to the current leg; whether the points have led away from the
-        // vehicle since. It flies to its setpoint even where they lead nearer past it later.
+        // vehicle since. A vehicle that follows its setpoint flies to it even where later points
+        // lead nearer past the vehicle.
         let (mut along_m, mut more_m, mut left) = (0.0, 0.0, follows);
         for (to, leg) in others.iter().zip(1_u8..) {
             let place = nearest_point_on_leg(position, from, to);
@@ -105,8 +107,8 @@ impl PlaceOnPoints {
         let Self::On { leg, .. } = *self else { return None };
         let leg = usize::from(leg);
         let to = points.get(leg)?;
-        // No leg ends at the first point: it is the place itself, and would take up the room of
-        // another point.
+        // No leg ends at the first point: that point is the place itself, and would take up the
+        // room of another point.
         let ahead = &points[leg.max(1).min(points.len())..];
         Some((nearest_point_on_leg(position, &points[leg.saturating_sub(1)], to), ahead))
     }
@@ -129,15 +131,15 @@ fn nearest_point_on_leg(position: &Point, from: &Point, to: &Point) -> Point {
     from + leg * clamp_share(share)
 }
 
-/// How far a neighbour's points lead it, from its position and in a straight line: computed once,
-/// when they were heard.
+/// Bounds of how far a neighbour's points lead it, as straight distances from its position:
+/// computed once, when the points are heard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PointsReach {
-    /// Distance beyond the one that the neighbour flies until it has stopped, metres: to its place
-    /// on the points, and between the places where it may be.
+    /// Addition to the distance that the neighbour flies until it has stopped, metres: from its
+    /// position to its place on the points, and from the first place where it may be to the last.
     pub beyond_m: f32,
-    /// Distance to the furthest place on the points, metres; infinite where the neighbour may leave
-    /// them.
+    /// Upper bound of the distance to any place on the points, metres; infinite where the neighbour
+    /// may leave them.
     pub most_m: f32,
 }
 
@@ -157,7 +159,8 @@ impl PointsReach {
         let away_m = |place: &Point| sqrtf((place - position).norm_squared());
         let Some(first) = points.first() else { return Self::OPEN };
         if *place_on_points == PlaceOnPoints::Unknown {
-            // Only the points' extent bounds the place. Near the first one it is on them.
+            // Only the points' extent bounds the place. Near the first point the vehicle is on
+            // them.
             let first_m = away_m(first);
             let on = first_m < OFF_REPORTED_PATH_M;
             let most_m = if on { first_m + extent_m } else { f32::INFINITY };

@@ -1,4 +1,4 @@
-//! The own set as prepared, against the definition: every leg with every other one.
+//! The prepared own set, compared with the definition: every leg against every other one.
 
 extern crate std;
 
@@ -10,7 +10,7 @@ use super::*;
 use crate::geometry::segments_distance_sq;
 
 const BRAKING: Braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
-/// As in the definition.
+/// The same value as in the definition.
 const NEARER_M: f32 = 0.003;
 
 impl ReachableSet {
@@ -56,8 +56,8 @@ fn conflict(own: &ReachableSet, other: &ReachableSet, place: &Point, apart_m: f3
     least_m < (own.points[0] - place).norm_squared().sqrt().min(2.0 * most_m) - NEARER_M
 }
 
-/// A way of up to so many legs: nearly straight, or to and fro, or straight up and down; the first
-/// may have no length.
+/// A polyline of up to that many legs: nearly straight, to and fro, or straight up and down; the
+/// first leg may have length 0.
 fn way(rng: &mut Pcg32, from: Point, most: u32) -> StdVec<Point> {
     let leg_m = one_of(rng, &[0.2, 1.0, 5.0]);
     let onward = near(rng, leg_m);
@@ -211,8 +211,8 @@ fn the_nearest_place_is_among_the_remembered_ones() {
     assert!(on > 2000 && back > 200, "{on} {back}");
 }
 
-/// Points may lead past a vehicle again, or straight back: wherever on them it truly is, it stays
-/// in its set.
+/// Points may lead past a vehicle again, or straight back: wherever on them the vehicle truly is,
+/// it stays in its set.
 #[test]
 fn a_vehicle_stays_in_its_set_where_points_lead_back() {
     let bounds = MotionBounds { braking: BRAKING, speed_max_mps: 5.0, silent_s: 3.0 };
@@ -221,7 +221,7 @@ fn a_vehicle_stays_in_its_set_where_points_lead_back() {
         let rng = &mut Pcg32::seed_from_u64(seed);
         let mut points = way(rng, Point::zeros(), 8);
         if rng.next_u32().is_multiple_of(2) {
-            // As it came, one leg or all.
+            // The points lead back the same way, along one leg or all.
             let corner = points.len().saturating_sub(1);
             let from = if rng.next_u32().is_multiple_of(2) { 0 } else { corner.saturating_sub(1) };
             let mut again: StdVec<Point> = points[from.min(corner)..corner.max(from)].to_vec();
@@ -233,7 +233,7 @@ fn a_vehicle_stays_in_its_set_where_points_lead_back() {
             continue;
         }
         let (places, stray_m) = (places(&points), uniform(rng, 0.0, 0.3));
-        // It flies a little way between its message and now, as slowly as it may.
+        // The vehicle flies a short distance between its message and now, at any low speed.
         let (truly_m, truly) = places[rng.next_u32() as usize % places.len()];
         let position = truly + near(rng, stray_m / 2.0);
         let speed_mps = uniform(rng, 0.0, 2.0);

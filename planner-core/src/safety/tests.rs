@@ -92,7 +92,7 @@ proptest! {
             column_to_m: None,
         };
         let there = places(&heard.reachable_set(&BOUNDS, 0.0));
-        // It flew on, and stops after the reaction.
+        // The vehicle flew on, and stops after the reaction time.
         let flown_m = speed_mps * (age_s + goes_on_s) + BRAKING.stop_m(speed_mps);
         let set = ReachableSet::along(path[0], path.iter().copied(), flown_m);
         for place in places(&set) {
@@ -136,8 +136,8 @@ proptest! {
     }
 }
 
-/// Its points begin at its setpoint, which leads it by up to 11 m at 15 m/s. They may turn by any
-/// angle, back past the vehicle too.
+/// The reported points begin at the setpoint, which leads the vehicle by up to 11 m at 15 m/s. They
+/// may turn by any angle, also back past the vehicle.
 #[test]
 fn a_fast_vehicle_behind_its_setpoint_stays_inside_its_set_around_a_corner() {
     let bounds = MotionBounds { speed_max_mps: 15.0, ..BOUNDS };
@@ -172,7 +172,7 @@ fn a_fast_vehicle_behind_its_setpoint_stays_inside_its_set_around_a_corner() {
         let points_reach = points_reach(&heard.position, &points, joint);
         let reach_m = NeighbourMotion { points_reach, ..heard }.reach_m(&bounds, 0.0);
         assert!(set.reach_m() <= reach_m + 0.01, "{} of {reach_m} m", set.reach_m());
-        // Beyond the last point that was heard it flies on.
+        // The vehicle flies on beyond the last point that was heard.
         let beyond = NeighbourMotion { points: &[place(-1.5)], ..heard };
         let there = places(&beyond.reachable_set(&bounds, 0.0));
         assert!(least(&[Point::new(flown_m, 0.0, 0.0)], &there) < 0.1);
@@ -184,8 +184,7 @@ struct Flier {
     path: StdVec<Point>,
     along_m: f32,
     speed_mps: f32,
-    /// What the other heard of it last: place, velocity, when, and from which of its points on it
-    /// flies.
+    /// What the other vehicle heard last: place, velocity, time, and index of the next path point.
     reported: (Point, Point, f32, usize),
 }
 

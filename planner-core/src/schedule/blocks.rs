@@ -2,9 +2,9 @@
 //! flight has a bounding box and a capsule. Segments of two flights are compared only where the
 //! volumes of both come near each other.
 //!
-//! Pairs in conflict are never ruled out, and the others come in order, so schedules are, bit by
-//! bit, those of a comparison of all with all. Cost: one pass over the own flight, and the straight
-//! parts or blocks of the other flight × the own blocks.
+//! Pairs in conflict are never ruled out, and the remaining pairs keep their order, so schedules
+//! are bit for bit those of a comparison of all pairs. Cost: one pass over the own flight, and the
+//! straight parts or blocks of the other flight × the own blocks.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -27,9 +27,9 @@ const MAX_GROUPS: usize = MAX_BLOCKS.div_ceil(BLOCKS_PER_GROUP);
 /// metres.
 const BLOCK_ROUNDING_M: f32 = 0.1;
 
-/// Most by which rounding shortens the length of a block's eight segments, metres, and as a share
-/// of the arc length up to there.
+/// Most by which rounding shortens the length of a block's eight segments, metres.
 const LENGTH_ROUNDING_M: f32 = 0.01;
+/// The same as a share of the arc length at the block's end; the greater of both counts.
 const LENGTH_ROUNDING: f32 = 2e-6;
 
 /// A set of blocks of a flight: bit `i` is block `i`.
@@ -102,7 +102,7 @@ impl BoundingBox {
 
     #[inline(never)]
     fn include(&mut self, low: &Point, high: &Point) {
-        // Not `fminf`: its handling of NaN takes a board ten times as long.
+        // Not `fminf`, whose handling of NaN takes ten times as long on a board.
         for axis in 0..3 {
             if low[axis] < self.0[axis] {
                 self.0[axis] = low[axis];
@@ -133,7 +133,7 @@ impl BoundingBox {
 }
 
 /// The blocks of one flight, with boxes around groups of blocks and around all. Boxes are widened
-/// by `reach_m`, so that a line outside one is in no conflict with its segments.
+/// by `reach_m`, so that a line outside a box is in no conflict with the segments in it.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
     blocks: Vec<SegmentBlock, MAX_BLOCKS>,
@@ -266,8 +266,8 @@ impl Blocks {
     }
 }
 
-/// Number of legs from the first waypoint on that stay at its height, and their bounding box, by
-/// which all of them can be ruled out at once.
+/// Number of legs from the first waypoint on that stay at that waypoint's height, and their
+/// bounding box, by which all these legs can be ruled out at once.
 fn leading_level_legs(waypoints: &[Waypoint]) -> Option<(usize, BoundingBox)> {
     let (first, rest) = waypoints.split_first()?;
     let (mut low, mut high) = (first.position, first.position);
@@ -324,7 +324,7 @@ mod tests {
         vertical_mps: 1.0,
     };
 
-    /// A place, and steps from there: which way, and whether straight on instead.
+    /// A place, and steps from there: each a vector, and whether to repeat the last vector instead.
     type Steps = ((f32, f32), List<(f32, f32, f32, bool)>);
 
     /// A flight of steps from a place, some of which are holds and some go straight on.

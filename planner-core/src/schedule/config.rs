@@ -5,7 +5,7 @@ use crate::{ConfigError, all_positive};
 /// Separations and nominal speeds of a schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduleConfig {
-    /// Distance that two moving vehicles keep, metres: the safety distance, and the deviation of
+    /// Distance that two moving vehicles keep, metres: the safety distance plus the deviations of
     /// both from their paths.
     pub separation_m: f32,
     /// Distance that a vehicle keeps from one that stands on the ground, metres.

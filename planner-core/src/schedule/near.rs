@@ -123,7 +123,7 @@ mod tests {
     }
 
     proptest! {
-        /// The cells about a piece hold every piece in conflict with it.
+        /// The cells around a timed segment hold every timed segment in conflict with it.
         #[test]
         fn none_in_conflict_is_missed(
             others in proptest::collection::vec(place(), 0..200),

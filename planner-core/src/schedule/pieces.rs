@@ -27,8 +27,8 @@ pub(super) struct TimedSegment {
     pub(super) from: Point,
     pub(super) to: Point,
     /// Arc length at which the vehicle would wait before it enters this segment, metres. That is
-    /// the segment's beginning, or in a climb or a descent the beginning of that: no vehicle waits
-    /// within one.
+    /// the segment's beginning, or for a segment of a climb or descent the beginning of the whole
+    /// climb or descent, within which no vehicle waits.
     pub(super) from_m: f32,
     /// Arc length at which the segment ends, metres.
     pub(super) to_m: f32,

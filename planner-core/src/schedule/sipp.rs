@@ -1,5 +1,5 @@
 //! Safe-interval path planning on the roadmap (Phillips and Likhachev 2011): the route of earliest
-//! arrival past flights that are already scheduled, with waits and sidesteps at nodes. Its
+//! arrival past flights that are already scheduled, with waits and sidesteps at nodes. The route's
 //! departures are as late as that arrival allows.
 //!
 //! Each node has *safe intervals*: times in which a vehicle that hovers there is in no conflict
@@ -32,7 +32,8 @@ struct SippState {
     node: u16,
     /// Index plus one of the next state of the same node; 0 ends the list.
     next: u16,
-    /// Index of the state from which this one is reached; its own index if that is the pad's climb.
+    /// Index of the state from which this one is reached; its own index if it is reached by the
+    /// climb from the pad.
     parent: u16,
     /// Time at which the vehicle leaves the parent's node, seconds.
     left_parent_s: f32,
@@ -67,7 +68,7 @@ pub struct SippWorkspace<const N: usize, const P: usize> {
     heap: Heap<N>,
     cut: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
     forbidden: ForbiddenIntervals,
-    /// Time for which the route sought needs a place to have been left, seconds.
+    /// Time from when another vehicle has left a place until this route may use it, seconds.
     handover_s: f32,
 }
 
@@ -114,7 +115,7 @@ pub struct RouteQuery<'a> {
 /// The climb from the pad to the first node.
 struct Climb {
     up: Leg,
-    /// Latest take-off, seconds: later, another vehicle needs the space of the pad.
+    /// Latest take-off, seconds: after it, another vehicle needs the space of the pad.
     leave_by_s: f32,
 }
 
@@ -339,7 +340,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         descent_m: f32,
     ) -> Result<Landing, ScheduleError> {
         let ground = goal - Point::new(0.0, 0.0, descent_m);
-        // Held from the beginning of the descent, so the descent begins when others have left it.
+        // The landing place is held from the beginning of the descent, so the descent begins only
+        // when other vehicles have left that place.
         let standing = stationary_segment(ground, true);
         let after_s = self
             .conflicting_segments(cfg, &standing)

@@ -55,7 +55,7 @@ fn head_on_onto_each_others_pads_is_blocked() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(4000))]
-    /// Whatever the speeds, gates keep the pieces apart and let both arrive.
+    /// Whatever the speeds, gates keep the timed segments apart and let both vehicles arrive.
     #[test]
     fn any_speeds_keep_apart_and_arrive(
         xs in proptest::collection::vec((0.0f32..12.0, 0.0f32..12.0), 6),

@@ -47,7 +47,7 @@ impl<const N: usize> Heap<N> {
         Self { len: 0, entries: [0; N], places: [NOT_REACHED; N] }
     }
 
-    /// Empties the heap, and marks the nodes below `nodes` as not reached.
+    /// Empties the heap, and marks the nodes with indices below `nodes` as not reached.
     pub(crate) fn clear(&mut self, nodes: usize) {
         self.len = 0;
         self.places[..nodes].fill(NOT_REACHED);

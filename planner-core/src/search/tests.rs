@@ -65,8 +65,8 @@ fn encode_either(nodes: &[Point], edges: &[Edge], landmarks: bool) -> StdVec<u8>
     }
 }
 
-/// The checker of paths: joins its ends over passable edges, visits no node twice, is as long as it
-/// says.
+/// Checks a path: it joins its ends over passable edges, visits no node twice, and has the stated
+/// length.
 fn check_path(view: &RoadmapView<'_>, path: &[u16], ends: (u16, u16), length: f32) {
     assert_eq!((path[0], path[path.len() - 1]), ends);
     let mut sum = 0.0f64;
@@ -206,7 +206,7 @@ proptest! {
         let view = RoadmapView::parse(&bytes).unwrap();
         let picks: StdVec<u16> = picks.iter().map(|pick| pick % nodes.len() as u16).collect();
         let (starts, goals) = picks.split_at(split.index(picks.len() + 1));
-        // A rule with a direction shows whether the search against the flight turns it round.
+        // A rule that depends on the direction shows whether the backward search reverses it.
         let passable = |from: u16, edge: &HalfEdge| (from + 2 * edge.target) % 4 >= one_way;
         let mut ws = Box::new(SearchWorkspace::<CAPACITY>::new());
         let mut matrix = vec![f32::NAN; starts.len() * goals.len()];

@@ -98,8 +98,8 @@ impl Segment {
     /// Calls `visit` with each word that may hold an obstacle within `reach` cells of the segment,
     /// and with the minimum corner of the word's brick. Cells outside the bounding boxes of the
     /// swept volume are cleared in that word. `visit` returns the reach for the words that follow,
-    /// which may be lower. The caller knows that nothing is within reach of the first share `known`
-    /// of the segment, which is skipped.
+    /// which may be lower. The first part of the segment, `known` (0 to 1) of its length, is
+    /// skipped: the caller knows that nothing is within reach of it.
     fn visit_near_words(
         &self,
         grid: &VoxelGrid<'_>,
@@ -117,8 +117,8 @@ impl Segment {
         let (begin, end) =
             (self.a[axis_u] + self.d[axis_u] * known, self.a[axis_u] + self.d[axis_u]);
         let (least, most) = if begin < end { (begin, end) } else { (end, begin) };
-        // Cells are searched to a thousandth of a cell, and the rounding of large coordinates,
-        // beyond the reach, so that rounding loses no cell.
+        // The search extends beyond the reach by a thousandth of a cell and by the rounding of
+        // large coordinates, so that rounding loses no cell.
         let largest = self.a.amax() + self.d.amax();
         let slack = 1e-3 + largest * (8.0 * f32::EPSILON);
         let Some((first, last)) = cell_range(least, most, reach + slack, shape.dims[axis_u]) else {
@@ -202,8 +202,8 @@ fn occupied_corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point>
 /// Whether the segment from `a` to `b` is strictly farther than `clearance_m` (positive, finite)
 /// from every obstacle. The caller has checked that the ends are finite and near the grid and, if
 /// the clearance is less than `TOUCH_CHECK_BELOW_CELLS`, that the segment touches nothing. The
-/// first share `known` of the segment is skipped: the caller knows that it is farther, by much more
-/// than rounding.
+/// first part of the segment, `known` (0 to 1) of its length, is skipped: the caller knows that it
+/// is farther than the clearance, by much more than rounding.
 pub(crate) fn is_farther_than(
     grid: &VoxelGrid<'_>,
     a: &Point,
@@ -286,8 +286,8 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     }
 }
 
-/// Euclidean distance from a point to the nearest obstacle, metres, at most `max_m`; 0 in the cases
-/// of [`segment_clearance`].
+/// Euclidean distance from a point to the nearest obstacle, metres, at most `max_m`; 0 in the same
+/// cases as [`segment_clearance`].
 pub fn point_clearance(grid: &VoxelGrid<'_>, p: &Point, max_m: f32) -> f32 {
     segment_clearance(grid, p, p, max_m)
 }

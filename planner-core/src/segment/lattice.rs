@@ -15,8 +15,8 @@ pub const MAX_SNAPPED: i32 = (2 * MAX_DIM as i32) << FRACTION_BITS;
 /// A point in units of 2⁻¹⁴ cell, relative to the grid's minimum corner.
 pub type Snapped = [i32; 3];
 
-/// `p` rounded to the lattice of 2⁻¹⁴ cell; `None` if a coordinate is not finite, or not within −1
-/// to 2 times [`MAX_DIM`] cells of the grid's minimum corner.
+/// `p` rounded to the lattice of 2⁻¹⁴ cell; `None` if a coordinate is not finite, or outside −1 to
+/// 2 times [`MAX_DIM`] cells from the grid's minimum corner.
 #[inline]
 pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
     /// [`snap`] accepts coordinates from −1 to 2 times this number, in cells.

@@ -1,5 +1,5 @@
-//! The segment queries against brute force: distances in f64 to every occupied cell, by another
-//! route.
+//! The segment queries compared with brute force: f64 distances to every occupied cell, by another
+//! method.
 
 extern crate std;
 
@@ -67,7 +67,7 @@ fn brute_distance(a: [f64; 3], b: [f64; 3], low: [f64; 3], high: [f64; 3]) -> f6
             best = best.min(at((num / den).clamp(0.0, 1.0)));
         }
     }
-    // Where it runs through the box no sum of squares is least: the clipped stretch tells.
+    // If the segment runs through the box, no sum of squares is least: the clipped part shows it.
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     for i in 0..3 {
         let d = b[i] - a[i];

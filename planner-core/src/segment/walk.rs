@@ -11,8 +11,8 @@ pub fn snapped_segment_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped) -
     snapped_rest_touches(grid, a, b, 0.0)
 }
 
-/// As [`snapped_segment_touches`], but the caller knows that the first part of the segment, the
-/// share `known` from `a`, touches nothing, and that part is skipped.
+/// As [`snapped_segment_touches`], but skips the first part of the segment, `known` (0 to 1) of its
+/// length from `a`: the caller knows that this part touches nothing.
 #[inline]
 pub(crate) fn snapped_rest_touches(
     grid: &VoxelGrid<'_>,
@@ -99,8 +99,8 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     #[inline(always)]
     fn new(grid: &VoxelGrid<'g>, a: &Snapped, b: &Snapped, known: f32) -> Self {
         let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        // Skips a thousandth and one cell less than the share that is known, against the rounding
-        // of `known` and of this product.
+        // Skips a thousandth and one cell less than the part that is known to be free, against the
+        // rounding of `known` and of this product.
         let skip = ((d[U].unsigned_abs() as f32 * known * 0.999) as i32 - ONE_CELL).max(0);
         // Ends are swapped where needed, so that the walk always goes up along U.
         let ((a, b), (start, end)) = if d[U] < 0 {
@@ -134,7 +134,8 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
 
     #[inline(always)]
     fn touches_obstacle(&self) -> bool {
-        // Cells are closed: an end on a cell's lower face touches the cell before it too.
+        // Cells are closed: an end on a cell's lower face touches the neighbour below that face
+        // too.
         let whole = Span::new(self.start, self.end, 1, self.dims[U]);
         if whole.first > whole.last {
             return false;

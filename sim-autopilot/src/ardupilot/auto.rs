@@ -1,10 +1,10 @@
 //! ArduCopter's mode AUTO, which flies an uploaded mission.
 //!
-//! It can be entered only with a mission; if armed on the ground, only with one that begins with a
-//! take-off. It cannot be armed in AUTO. On the ground it waits for MISSION_START (no throttle
-//! stick is simulated); in the air it continues at once. The vehicle faces its direction of flight
-//! (`WP_YAW_BEHAVIOR` 2), whatever heading an item has. Return and landing items are flown within
-//! AUTO.
+//! AUTO can be entered only with a mission; if armed on the ground, only with one that begins with
+//! a take-off. The vehicle cannot be armed in AUTO. On the ground it waits for MISSION_START (no
+//! throttle stick is simulated); in the air it flies the mission at once. The vehicle faces its
+//! direction of flight (`WP_YAW_BEHAVIOR` 2), whatever heading an item has. Return and landing
+//! items are flown within AUTO.
 
 use planner_core::Point;
 

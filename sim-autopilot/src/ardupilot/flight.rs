@@ -9,8 +9,8 @@ use crate::platform::SensorReadings;
 use crate::shaping::approach_rate;
 use crate::vehicle::Demand;
 
-/// Distance below its height at which a take-off is complete, metres: then landed_state 2 comes 9.3
-/// s after the command to 10 m, as recorded.
+/// Distance below its target height at which a take-off is complete, metres. With this value
+/// landed_state 2 comes 9.3 s after a command to 10 m, as recorded.
 const TAKEN_OFF_M: f32 = 0.12;
 /// Profile of a lift-off as recorded: time since lift-off until which each entry applies (s), and
 /// upward acceleration (m/s²). First the throttle slowly passes hover while the controllers'
@@ -90,8 +90,8 @@ impl Copter {
         goal
     }
 
-    /// The goal of Guided in this step: moves a position with its velocity, and stops after
-    /// `GUID_TIMEOUT`.
+    /// The goal of Guided in this step. A goal position moves with the goal velocity, which becomes
+    /// zero after `GUID_TIMEOUT`.
     fn guided_goal(&mut self, now_us: u64, dt: f32) -> Goal {
         let age_us = now_us.saturating_sub(self.goal_us);
         if self.goal.expires && age_us > micros_from_s(self.tuning.guided_timeout_s) {

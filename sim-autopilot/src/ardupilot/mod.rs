@@ -1,11 +1,11 @@
 //! ArduCopter 4.6's state machine: arming, modes, take-off, Guided, failsafes and landing, as
 //! observed.
 //!
-//! | state | leaves it |
+//! | state | left by |
 //! |---|---|
 //! | disarmed | arm command in a mode that allows it, with the estimator ready |
-//! | armed, on the ground | NAV_TAKEOFF in Guided; `DISARM_DELAY` disarms. Setpoints do not lift it |
-//! | take-off | lifts 2.3 s after the command and climbs; a setpoint ends it, before the lift-off for good |
+//! | armed, on the ground | NAV_TAKEOFF in Guided; `DISARM_DELAY` disarms. Setpoints do not lift the vehicle |
+//! | take-off | lifts off 2.07 s after the command (at the earliest 3.05 s after arming) and climbs; a setpoint ends it (before lift-off: stays on the ground) |
 //! | flying | on the ground for 1.6 s without a demand to climb: landed |
 //! | landed | in LAND and RTL disarms 0.4 s later, else after `DISARM_DELAY` |
 //!
@@ -51,15 +51,15 @@ const LAND_DETECTOR_S: f32 = 1.6;
 const LAND_DISARM_S: f32 = 0.4;
 /// Time by which ArduCopter disarms earlier than `DISARM_DELAY`, seconds: 9.94 s of 10 seen.
 const DISARM_EARLY_S: f32 = 0.06;
-/// Delay of the failsafe beyond `FS_GCS_TIMEOUT`, seconds: 5.1 s of 5 seen.
+/// Delay of the ground-station failsafe beyond `FS_GCS_TIMEOUT`, seconds: 5.1 s of 5 seen.
 const GCS_REACTION_S: f32 = 0.1;
 /// Time from the loss of the position to the EKF failsafe, seconds (`EKF_CHECK_ITERATIONS_MAX` and
 /// the estimator's own timeout).
 const ESTIMATOR_REACTION_S: f32 = 1.5;
 /// Time from boot until the estimator has an attitude, seconds: 5.8 s seen.
 const BOOT_TO_ATTITUDE_S: f32 = 5.8;
-/// Share of the time until the estimator has a position after which it has an origin: 20 of 41.6 s
-/// seen.
+/// Time from boot until the estimator has an origin, as a share of the time until it has a
+/// position: 20 of 41.6 s seen.
 const ORIGIN_SHARE: f32 = 0.48;
 /// Time from boot until HEARTBEAT reports STANDBY, seconds.
 const BOOT_TO_STANDBY_S: f32 = 3.0;
@@ -138,7 +138,8 @@ pub struct Copter {
     runtime_us: u64,
     armed: bool,
     since: PhaseStartTimes,
-    /// The position controller starts in flight in this step, so its integral is initialised.
+    /// Whether the position controller starts in flight in this step, so that its integral is
+    /// initialised.
     controller_starts: bool,
     landed: bool,
     mode: Mode,

@@ -12,7 +12,8 @@ pub enum Mode {
     Auto = 3,
     /// Follows setpoints.
     Guided = 4,
-    /// Sticks control the position; the throttle is low: it descends at `PILOT_SPEED_UP`.
+    /// Sticks control the position; the throttle is low: it descends at `PILOT_SPEED_DN`, or at
+    /// `PILOT_SPEED_UP` if that is 0.
     Loiter = 5,
     /// Climbs, flies home and lands.
     Rtl = 6,

@@ -82,7 +82,7 @@ pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
 
 const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 
-/// Values of the parameters that have an effect, named by it. Metres, seconds, m/s.
+/// Values of the parameters that have an effect, each named by its effect. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
 #[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
 pub struct Tuning {

@@ -3,7 +3,7 @@
 //!
 //! If the type mask leaves out one axis, the whole vector is left out. A message without any
 //! demand, in an unsupported frame, with force, or with acceleration alone (which ArduCopter would
-//! fly, but this does not) is not refused: the vehicle stops.
+//! fly, but this simulation does not) is not refused: the vehicle stops.
 
 use nalgebra::Vector3;
 use planner_core::Point;

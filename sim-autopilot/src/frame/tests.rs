@@ -1,4 +1,4 @@
-//! The framing against the companion's, each other's only witness, and in noise.
+//! Tests of the framing: against the companion's independent implementation, and in noise.
 
 use companion::link::frame as other;
 use companion::time::Instant;
@@ -8,7 +8,7 @@ use proptest::sample::select;
 
 use super::*;
 
-/// Any message the dialect knows by id, any sender, any payload.
+/// Any message id, known to the dialect or not, with any sender and payload.
 fn any_frame() -> impl Strategy<Value = (u32, (u8, u8, u8), Vec<u8>)> {
     let known: Vec<u32> = (0..=u32::from(u16::MAX)).filter(|&id| crc_seed(id).is_some()).collect();
     // Half of the bytes are zero, as at the end of many payloads.
@@ -29,7 +29,7 @@ fn all(framer: &mut Framer, now_us: u64, mut input: &[u8]) -> Vec<Frame> {
 }
 
 proptest! {
-    /// Both write the same bytes, and each reads what the other wrote.
+    /// Both framings write the same bytes, and each reads what the other wrote.
     #[test]
     fn both_framings_agree(frame in any_frame()) {
         let ours = written(&frame);
@@ -57,8 +57,8 @@ proptest! {
         }
     }
 
-    /// Frames between noise, cut anywhere, are all found, once what looked like a start has been
-    /// given up.
+    /// Frames between noise, received in parts of any length, are all found once false starts have
+    /// timed out.
     #[test]
     fn no_noise_hides_a_frame(
         frames in vec(
@@ -87,7 +87,8 @@ proptest! {
             again
         };
         let wholes: Vec<Vec<u8>> = frames.iter().map(|(_, frame)| written(frame)).collect();
-        // Of 65 536 false starts one has a right checksum by chance, and nobody can tell.
+        // One of 65 536 false starts has a correct checksum by chance, which no receiver can
+        // detect.
         prop_assume!(found.iter().all(|found| wholes.contains(&again(found))));
         for (whole, (_, frame)) in wholes.iter().zip(&frames) {
             let there = found.iter().any(|found| again(found) == *whole);
@@ -108,7 +109,7 @@ fn version_1_and_signed_frames_are_read() {
     let found = all(&mut framer, 0, &[first, signed.clone()].concat());
     assert_eq!(found.iter().map(|frame| frame.sequence).collect::<Vec<_>>(), [7, 8]);
     assert_eq!(found[0].padded_payload()[..9], [0, 0, 0, 0, 2, 12, 1, 3, 3]);
-    // A flag that nobody knows may change the whole frame.
+    // An unknown incompatibility flag may change the frame's layout.
     signed[2] = 2;
     assert!(all(&mut framer, 0, &signed).is_empty());
 }

@@ -101,7 +101,8 @@ impl Commander {
         }
     }
 
-    /// Demand to hold at `hold`: the horizontal approach is smoothed as in PX4's automatic modes.
+    /// Demand to hold at `hold_point`: the horizontal approach is smoothed as in PX4's automatic
+    /// modes.
     fn approach_demand(
         &mut self,
         sensors: &SensorReadings,

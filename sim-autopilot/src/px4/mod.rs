@@ -1,6 +1,6 @@
 //! PX4's commander: arming, modes, failsafe, take-off and landing, as observed in PX4 1.17.
 //!
-//! | state | leaves it |
+//! | state | left by |
 //! |---|---|
 //! | disarmed | arm command, unless the mode cannot run (Offboard without a stream, Land, Return) |
 //! | armed, on the ground | a demand to climb, `COM_SPOOLUP_TIME` after arming; `COM_DISARM_PRFLT` disarms |
@@ -31,8 +31,8 @@ use super::itinerary::MissionLeg;
 use super::platform::{ControlDemand, IntegralAction, SensorReadings};
 use super::shaping::JerkLimitedRate;
 
-/// Delay of the failsafe beyond `COM_OF_LOSS_T`, seconds: in recordings it started at most 1.23 s
-/// after the last setpoint, and gaps of 1.25 s started it.
+/// Delay of the failsafe beyond `COM_OF_LOSS_T`, seconds: in recordings the failsafe started at
+/// most 1.23 s after the last setpoint, and gaps of 1.25 s started it.
 const LOSS_REACTION_S: f32 = 0.15;
 /// Fraction of the thrust ramp after which the land detector reports a take-off: in recordings
 /// after 0.9 to 1.0 s of 3 s, before the vehicle lifts.
@@ -307,8 +307,8 @@ impl Commander {
         accepted
     }
 
-    /// Enters Hold at point `to` (DO_REPOSITION), ENU metres; a NaN axis keeps the stopping
-    /// point's. False if disarmed or refused.
+    /// Enters Hold at point `to` (DO_REPOSITION), ENU metres; a NaN axis keeps the stopping point's
+    /// coordinate. False if disarmed or refused.
     pub fn reposition(
         &mut self,
         to: &Point,

@@ -1,5 +1,5 @@
-//! One test for each thing ArduCopter 4.6 was seen to do: here how it flies, in `protocol` what it
-//! says and answers.
+//! One test for each observed behaviour of ArduCopter 4.6: its flight here, its messages and
+//! answers in `protocol`.
 
 mod protocol;
 
@@ -45,7 +45,7 @@ impl Bench {
         self.of(253).map(|(_, frame)| text(frame)).collect()
     }
 
-    /// Ready, in Guided and armed.
+    /// A bench whose vehicle is armed in Guided.
     pub(super) fn armed() -> Self {
         let mut bench = Self::copter();
         bench.want(245);
@@ -55,7 +55,7 @@ impl Bench {
         bench
     }
 
-    /// Hovering in Guided.
+    /// A bench whose vehicle hovers `up` metres high in Guided.
     pub(super) fn in_guided(up: f32) -> Self {
         let mut bench = Self::armed();
         assert_eq!(bench.take_off(up), [0]);
@@ -202,7 +202,7 @@ fn frames_1_8_and_9_move_it_and_12_stops_it() {
         assert_eq!(speed > 1.8, moves, "frame {frame}: {speed} m/s");
         assert_eq!(bench.texts().len(), texts, "without a word");
     }
-    // In the body's frames ahead is where the nose points, and positions are offsets.
+    // In the body frames forward is where the nose points, and positions are offsets.
     let mut bench = Bench::with(&Config { heading_rad: core::f32::consts::FRAC_PI_2, ..config() });
     bench.run(f64::from(READY_S));
     bench.mode(GUIDED);
@@ -242,7 +242,7 @@ fn guid_timeout_acts_on_position_with_velocity_too() {
         bench.run(0.05);
     }
     bench.run(6.0);
-    // The last target, 7.9 m, ran on for half a second.
+    // The last target, 7.9 m, moved on for half a second.
     assert!((8.5..9.4).contains(&bench.at().y), "at {}", bench.at());
 }
 

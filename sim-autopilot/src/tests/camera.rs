@@ -1,4 +1,4 @@
-//! The camera's trigger, on both firmwares.
+//! Tests of the camera's trigger, on both autopilots.
 
 use super::*;
 use crate::camera::Photo;
@@ -6,8 +6,8 @@ use crate::camera::Photo;
 const DIGICAM: u16 = 203;
 const DISTANCE: u16 = 206;
 
-/// The offsets of latitude, longitude and index in what each firmware says about a picture, and its
-/// first index.
+/// Id of the message that announces a picture, offsets of latitude, longitude and index in its
+/// payload, and the first index.
 fn layout(personality: AutopilotKind) -> (u32, [usize; 3], u32) {
     match personality {
         AutopilotKind::Px4 => (263, [12, 16, 44], 0),
@@ -15,7 +15,7 @@ fn layout(personality: AutopilotKind) -> (u32, [usize; 3], u32) {
     }
 }
 
-/// Hovering ready for setpoints, 10 m up.
+/// A bench whose vehicle hovers at 10 m, ready for setpoints.
 fn hovering(personality: AutopilotKind) -> Bench {
     match personality {
         AutopilotKind::Px4 => Bench::hovering(10.0),
@@ -23,7 +23,7 @@ fn hovering(personality: AutopilotKind) -> Bench {
     }
 }
 
-/// What was said about pictures: index and place in the mission frame, metres east and north.
+/// Index and place (mission frame, metres east and north) of each announced picture.
 fn said(bench: &Bench, personality: AutopilotKind) -> Vec<(u32, [f64; 2])> {
     let (id, [lat, lon, index], _) = layout(personality);
     let long =
@@ -48,7 +48,7 @@ fn across(a: &Photo, b: &Photo) -> f32 {
     (a.position - b.position).xy().norm()
 }
 
-/// Flies north at up to `speed` and returns what was photographed.
+/// Flies to `metres` north of the origin for `seconds` and returns the photos.
 fn fly_north(bench: &mut Bench, metres: f32, seconds: f64) -> Vec<Photo> {
     bench.stream(20.0, setpoint(POSITION, 1, [metres, 0.0, -10.0], [0.0; 3], 0.0));
     bench.run(seconds);
@@ -61,7 +61,7 @@ fn by_distance_it_photographs_where_it_says_and_at_that_distance() {
         let mut bench = hovering(personality);
         let (id, _, first) = layout(personality);
         assert_eq!(bench.of(id).count(), 0);
-        // At once, then every 5 m.
+        // A picture at once, then every 5 m.
         bench.command(DISTANCE, [5.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
         bench.run(0.06);
         assert!(
@@ -72,7 +72,7 @@ fn by_distance_it_photographs_where_it_says_and_at_that_distance() {
         assert_eq!(photos.len(), 9, "{personality:?}: at 0, 5 … 40 m");
         for pair in photos.windows(2) {
             let apart = across(&pair[0], &pair[1]);
-            // At up to 10 m/s, 50 ms late at most.
+            // At up to 10 m/s a picture is at most 50 ms late.
             assert!((4.99..5.6).contains(&apart), "{personality:?}: {apart} m apart");
         }
         let said = said(&bench, personality);
@@ -96,7 +96,7 @@ fn without_a_picture_at_once_px4_begins_with_one_and_ardupilot_does_not() {
         let mut bench = hovering(personality);
         bench.command(DISTANCE, [5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(fly_north(&mut bench, 13.0, 12.0).len(), count, "{personality:?}");
-        // Off and on again counts from there.
+        // Switched off and on again, the distance is measured from there.
         bench.command(DISTANCE, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         bench.run(0.1);
         bench.command(DISTANCE, [20.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
@@ -127,7 +127,8 @@ fn at_once_it_photographs_at_once_and_knows_how_it_was_turned() {
                 assert!((photo.heading_rad - 1.0).abs() < 0.02, "{photo:?}");
             }
         }
-        // Also with what stops the distance: the last picture of a lane.
+        // The command that switches triggering off can request a picture too: the last one of a
+        // lane.
         bench.command(DISTANCE, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
         bench.run(0.1);
         assert_eq!(bench.autopilot.take_photos().len(), 1);

@@ -1,4 +1,4 @@
-//! The failsafes of the simulated PX4: lost setpoints, a lost position, an empty battery.
+//! Tests of the failsafes of the simulated PX4: lost setpoints, a lost position, an empty battery.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Uploaded missions, flown by both firmwares.
+//! Tests of uploaded missions, flown by both autopilots.
 
 use super::*;
 use crate::camera::Photo;
@@ -10,7 +10,7 @@ type Plan<'a> = &'a [(u16, u8, [f32; 4], [f32; 2], f32)];
 const RELATIVE: u8 = 3;
 const NONE: u8 = 2;
 
-/// Up, a lane of 40 m photographed every 10 m, a picture at a place, and home.
+/// Take-off, a lane with a picture every 10 m, one more picture at a waypoint, and the return.
 const SURVEY: Plan<'static> = &[
     (93, NONE, [1.0, -1.0, -1.0, -1.0], [0.0; 2], 0.0),
     (22, RELATIVE, [0.0, 0.0, 0.0, f32::NAN], [0.0; 2], 8.0),
@@ -55,7 +55,7 @@ impl Bench {
         assert_eq!(self.of(47).last().map(|(_, f)| f.padded_payload()[2]), Some(0), "accepted");
     }
 
-    /// Ready to fly a mission that is uploaded: armed where that is another command.
+    /// A bench with an uploaded mission; armed if MISSION_START does not arm (ArduCopter).
     fn with_mission(personality: AutopilotKind, plan: Plan<'_>) -> Self {
         let mut bench = match personality {
             AutopilotKind::Px4 => Self::new(),
@@ -97,8 +97,8 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
         );
         let (lane, last): (&[Photo], Photo) = (&photos[..5], photos[5]);
         for (k, photo) in lane.iter().enumerate() {
-            // Around the lane, as near as waypoints are passed; later by what is flown between two
-            // looks.
+            // As near to the lane as waypoints are passed; late by the distance flown between two
+            // checks.
             let off = photo.position - Point::new(0.0, 20.0, 8.3);
             assert!(off.y.abs() < 2.1 && off.z.abs() < 0.9, "{personality:?}: {off}");
             let along = off.x - 10.0 * k as f32;
@@ -190,8 +190,8 @@ fn what_cannot_be_flown_is_refused_and_passed_over() {
     assert_eq!(bench.arm(), [1]);
     let mut bench = Bench::armed();
     assert_eq!((bench.start(), bench.mode(3.0)), (vec![4], vec![4]), "ArduPilot: FAILED");
-    // ArduPilot, armed on the ground, wants a take-off first, and without MISSION_START stays
-    // there.
+    // ArduPilot, armed on the ground, requires a take-off first, and stays there without
+    // MISSION_START.
     bench.upload(&[(16, RELATIVE, [0.0; 4], [9.0, 9.0], 9.0)]);
     assert_eq!(bench.mode(3.0), [4]);
     assert!(bench.texts().iter().any(|text| text == "Auto: Missing Takeoff Cmd"));
@@ -199,7 +199,7 @@ fn what_cannot_be_flown_is_refused_and_passed_over() {
     assert_eq!(bench.mode(3.0), [0]);
     bench.run(5.0);
     assert!(bench.autopilot.true_state().landed);
-    // Nonsense: passed over, or home.
+    // Unknown commands and invalid values are skipped.
     for personality in BOTH {
         let nan = f32::NAN;
         let mut bench = Bench::with_mission(

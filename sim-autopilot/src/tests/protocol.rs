@@ -1,4 +1,4 @@
-//! What the simulated PX4 says and answers.
+//! Tests of the messages and answers of the simulated PX4.
 
 use super::*;
 
@@ -37,7 +37,7 @@ fn it_floods_at_once_at_px4s_rates() {
 fn sequence_numbers_have_no_gap() {
     let mut bench = Bench::new();
     bench.run(5.0);
-    // Those of unknown id are skipped.
+    // Frames of unknown id are skipped.
     let gap =
         |pair: &[(f64, Frame)]| u32::from(pair[1].1.sequence.wrapping_sub(pair[0].1.sequence)) - 1;
     let gaps: u32 = bench.received.windows(2).map(gap).sum();
@@ -104,7 +104,7 @@ fn commands_are_answered_as_px4_answers_them() {
         assert_eq!(ask(&mut bench, id, param, 0.0), [0], "command {id}");
         assert!(bench.of(message).count() > before, "message {message}");
     }
-    // A command for somebody else is not answered.
+    // A command for another system is not answered.
     let before = bench.of(77).count();
     let mut payload = [0; 33];
     payload[28..32].copy_from_slice(&[144, 1, 1, 154]);
@@ -125,7 +125,7 @@ fn parameters_are_listed_read_and_set_bytewise() {
     bench.set_param("COM_OBL_RC_ACT", f32::from_bits(5), 6);
     let b = bench.of(22).last().unwrap().1.padded_payload();
     assert_eq!((u32::from_le_bytes([b[0], b[1], b[2], b[3]]), b[24]), (5, 6));
-    // The wrong type is refused, and answered with the value that stands.
+    // A value of the wrong type is refused, and answered with the current value.
     bench.set_param("COM_OBL_RC_ACT", 4.0, 9);
     let b = bench.of(22).last().unwrap().1.padded_payload();
     assert_eq!(u32::from_le_bytes([b[0], b[1], b[2], b[3]]), 5);

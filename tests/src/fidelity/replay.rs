@@ -12,7 +12,7 @@ use sim_autopilot::{Autopilot, AutopilotKind, Config};
 use super::recording::{Message, Recording, Sample, Setpoint};
 use super::{Correction, Estimator};
 
-/// Simulated seconds a second of the wall clock: PX4's SIH ran 0.4 to 1.1 % slow when recorded.
+/// Simulated seconds per second of the wall clock: PX4's SIH ran 0.4 to 1.1 % slow when recorded.
 const PX4_CLOCK: f64 = 0.9925;
 const STEP_S: f64 = 0.004;
 /// Simulated time before the first record, seconds: by then ArduCopter has booted and has a
@@ -72,8 +72,8 @@ impl Recording {
         errors
     }
 
-    /// The position error that counts as none in the replay: the mean in the second before arming,
-    /// as for [`Self::start`], or the first one.
+    /// The position error that the replay counts as zero: the mean in the second before arming, as
+    /// for [`Self::start`], or without one the first error.
     fn zero(&self, errors: &[(f64, Point, Point)]) -> Point {
         let before =
             || errors.iter().filter(|e| e.0 < self.armed_s.0 && e.0 > self.armed_s.0 - 1.0);

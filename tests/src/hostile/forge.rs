@@ -26,8 +26,8 @@ impl Flight {
             0 | 1 => NEIGHBOUR,
             2 => ID,
             3 => 1 + pick(16, 5) as u8,
-            // Any sender but the mission's ground station: forging that could only be detected by
-            // signing.
+            // Any sender but the mission's ground station, whose forged frames only signing could
+            // detect.
             _ => pick(16, 255) as u8,
         };
         let component = match pick(24, 4) {
@@ -97,7 +97,7 @@ impl Flight {
         length
     }
 
-    /// Overwrites fields by which the companion would drop the message at once.
+    /// Overwrites fields whose random values would make the companion drop the message at once.
     fn make_believable(&self, id: u32, payload: &mut [u8; 255], how: u8) {
         let near = |shift: u32, how: u8| f32::from(how.rotate_left(shift)) * 0.01 - 1.28;
         match id {
@@ -213,8 +213,8 @@ fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> 
         agrees: bits & 128 != 0,
     };
     let bits = entropy.bits();
-    // Rarely what makes the vehicle land at once: the others have given it up, or are divisions
-    // ahead.
+    // Two contents make the vehicle land at once, so they are rare: the others have given it up, or
+    // they are several divisions ahead.
     let (about_it, ahead) = (bits >> 40 & 255 == 0, bits >> 48 & 255 == 0);
     let mut entry_of = |rank| {
         let drawn = entry(entropy.bits());

@@ -1,8 +1,8 @@
 //! A light simulated autopilot: PX4 or ArduCopter as far as a companion sees it, and an airframe
 //! with a lag and bounded acceleration.
 //!
-//! It is not the simulated autopilot of `host-sim`, which is more faithful and slower. ENU metres,
-//! steps of [`STEP_S`].
+//! It is not the simulated autopilot of the crate `sim-autopilot`, which is more faithful and
+//! slower. Units are ENU metres, steps last [`STEP_S`].
 
 mod flight;
 mod inbox;

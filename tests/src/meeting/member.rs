@@ -19,8 +19,7 @@ const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 
 const DEAF_S: f32 = 20.0;
 /// Speed above which a vehicle does not count as stopped, m/s.
 const MOVES_MPS: f32 = 0.7;
-/// Speed limit of setpoints, m/s: the nominal speed, with what a setpoint that catches up may
-/// exceed it by.
+/// Speed limit of setpoints, m/s: the nominal speed plus the excess of a setpoint that catches up.
 const SPEED_MPS: f32 = 2.2;
 
 type Mate = Companion<VEHICLES, WAYPOINTS, GATES>;
@@ -105,8 +104,8 @@ impl Member {
         }
     }
 
-    /// Updates the length of the longest stop by the filter: one ends when the companion waits for
-    /// no vehicle any more, or the vehicle flies again.
+    /// Updates the length of the longest stop by the filter: a stop ends when the companion waits
+    /// for no vehicle any more, or the vehicle flies again.
     pub(super) fn note_stops(&mut self, now: Instant) {
         let stops = self.companion.filter_stop_count();
         if core::mem::replace(&mut self.stops, stops) != stops {

@@ -4,9 +4,9 @@
 //! - *Own set*: 0.1 s at the present velocity, then a stop; the setpoint is ahead by the vehicle's
 //!   lag. In a landing the column to the floor.
 //! - *A neighbour's set*: if heard within 1 s, the points that it reports from its last position
-//!   on, as far as its speed takes it in its age + 0.1 s and in a stop after that; off these
-//!   points, its velocity, widened by ½·a·age²; if older, a ball. A column to the floor while it
-//!   climbs, descends or lands.
+//!   on, as far as its speed takes it in the message's age + 0.1 s and in a stop after that; if it
+//!   is off these points, along its velocity, widened by ½·a·age². If heard longer ago, a ball.
+//!   While it climbs, descends or lands, also the column to the floor.
 //!
 //! A violation of the safety distance is a failure if a stop of each vehicle, begun at the first
 //! step at which its sets came too near, would have kept the distance.
@@ -29,8 +29,8 @@ const FRESH_S: f32 = 1.0;
 const GROWS_S: f32 = 3.0;
 /// Steps for which sets may be apart within one approach.
 const GAP_STEPS: usize = 40;
-/// Margin over the safety distance by which a stop must have kept it to count as one that would,
-/// metres.
+/// Margin, metres: a stop counts as one that would have kept the safety distance only if it keeps
+/// that plus this margin.
 const SURE_M: f32 = 0.05;
 
 /// What a vehicle last received from another one.
@@ -195,13 +195,14 @@ pub struct Oracle {
     count: usize,
     tracks: Vec<Vec<VehicleState>>,
     approaches: Vec<Option<Approach>>,
-    /// For each pair that is too near: when its sets came too near, the step at which it was
+    /// For each pair that is too near: when its sets came too near, the step at which the pair was
     /// nearest, and that distance.
     near: Vec<Option<Near>>,
     /// Approaches below the safety distance that have ended.
     pub violations: Vec<Violation>,
     touching: Vec<bool>,
-    /// Touches: seconds, index of the vehicle that moved toward the other, the other's, metres.
+    /// Touches: time in seconds, index of the vehicle that moved toward the other one, index of the
+    /// other one, distance in metres.
     pub touches: Vec<(f32, usize, usize, f32)>,
     /// Touches of a vehicle that was carried off unheard: no message places it there.
     pub unforeseen: usize,
@@ -260,8 +261,8 @@ impl Oracle {
                     self.judge_sets(step, now_s, (a, b), &seen[a], &heard(a, b), &floor_z);
                 }
                 if a < b {
-                    // A vehicle carried off unheard by its pilot or autopilot is where its
-                    // companion's silence does not allow it.
+                    // A vehicle that its pilot or autopilot carries off unheard is outside the ball
+                    // in which others assume a silent vehicle.
                     let carried = |from: usize, to: usize| {
                         heard(from, to).position.is_some_and(|(place, _, _, at_s)| {
                             now_s - at_s > GROWS_S
@@ -284,7 +285,7 @@ impl Oracle {
         floor_z: &impl Fn(&Point) -> f32,
     ) {
         let Some((position, ..)) = heard.position else { return };
-        // No set reaches further.
+        // Sets reach less far than this distance.
         if (position - own.position).xy().norm() > 15.0 {
             return;
         }

@@ -20,7 +20,8 @@ pub struct Outcome {
     pub vehicles: usize,
     /// Approaches of two vehicles below the safety distance.
     pub violations: Vec<Violation>,
-    /// Touches: seconds, index of the vehicle that moved toward the other, the other's, metres.
+    /// Touches: time in seconds, index of the vehicle that moved toward the other one, index of the
+    /// other one, distance in metres.
     pub touches: Vec<(f32, usize, usize, f32)>,
     /// Number of touches of a vehicle that was carried off unheard.
     pub unforeseen: usize,

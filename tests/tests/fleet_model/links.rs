@@ -1,16 +1,16 @@
-//! Over which links messages may arrive.
+//! Sets of links over which messages may arrive.
 
 use crate::model::MOST;
 
-/// For each vehicle the others from which messages may reach it, as bits.
+/// For each vehicle a bit mask of the ranks from which messages may reach it.
 pub type Links = [u8; MOST];
 
-/// Everybody hears everybody.
+/// All vehicles hear each other.
 pub fn whole(count: usize) -> Links {
     std::array::from_fn(|rank| if rank < count { ((1 << count) - 1) & !(1 << rank) } else { 0 })
 }
 
-/// Every set of links, each one way.
+/// Every set of one-way links.
 pub fn one_way(count: usize) -> Vec<Links> {
     let all: Vec<(usize, usize)> =
         (0..count).flat_map(|a| (0..count).map(move |b| (a, b))).filter(|(a, b)| a != b).collect();
@@ -23,7 +23,7 @@ pub fn one_way(count: usize) -> Vec<Links> {
     (0..1 << all.len()).map(links).collect()
 }
 
-/// Every partition: whoever hears another hears all that this one hears, and is heard by them.
+/// Every partition: within a part all vehicles hear each other, between parts none does.
 pub fn partitions(count: usize) -> Vec<Links> {
     let closed = |links: &Links| {
         let part = |rank: usize| links[rank] | 1 << rank;

@@ -1,16 +1,16 @@
 //! Every way in which a small fleet can lose vehicles and messages, searched breadth first.
 //!
-//! What vehicles decide is decided by the code that flies: [`Fleet`] and the messages that it makes
-//! and takes in. A tick is 7.5 s: the lease of 20 s is 3 ticks, the silence of 45 s is 6, and a
-//! lost vehicle counts as down as soon as it is silent. In a tick each vehicle takes in what
-//! reached it of what the others sent in the tick before (so much is a message late, and what it
-//! says of others is older still), decides, and photographs its next waypoint. A vehicle stands
-//! within a tick after its lease has run out, and lands after three. One clock may be a tick slow,
-//! and right again, at any time. A vehicle may die, or leave and say so. Each flies as fast as it
-//! may, or only to where it promised to hold: all mixtures of these are searched.
+//! Vehicles decide by the code that flies: [`Fleet`] and the messages that it sends and handles. A
+//! tick is 7.5 s: the lease of 20 s is 3 ticks, the silence of 45 s is 6, and a lost vehicle counts
+//! as down as soon as it is silent. In a tick each vehicle handles the messages of the tick before
+//! that reached it (so messages are a tick late, and their reports of others are older still),
+//! decides, and photographs its next waypoint. A vehicle stops within a tick after its lease has
+//! run out, and lands after three. One clock may become a tick slow, and right again, at any time.
+//! A vehicle may die, or leave and report it. Each flies as far as it may, or only to its
+//! commitment: all mixtures are searched.
 //!
-//! - One owner: no two vehicles may yet photograph the same waypoint.
-//! - Nothing is left out: whatever came before, where messages arrive from now on and some vehicle
+//! - One owner: there is never a waypoint that two vehicles may still photograph.
+//! - Nothing is left out: from every state, if all messages arrive from then on and some vehicle
 //!   flies on, all is photographed in the end, and the fleet comes to rest.
 //!
 //! Planted errors must be found. `FLOCKMATE_MODEL=4` searches more; see `docs/safety.md`.
@@ -23,8 +23,8 @@ use links::partitions;
 use model::{FleetModel, Flight, MOST, Planted, Radio, SETTLES, State};
 use stateright::{Checker, Model};
 
-/// Searches until nothing new is reached, or each property has a counterexample. What was found, by
-/// property.
+/// Searches until no new state is reached, or each property has a counterexample. Returns the
+/// properties with one.
 fn search(model: FleetModel) -> Vec<&'static str> {
     let FleetModel { count, radio, losses, slow, planted, .. } = model;
     let checker = model.checker().spawn_bfs().join();
@@ -41,7 +41,7 @@ fn search_right(count: usize, radio: Radio, losses: u8, slow: Option<usize>) {
     assert_eq!(search(model), Vec::<&str>::new());
 }
 
-/// Whether what takes more than a minute is to be searched too.
+/// Whether searches of more than a minute run too.
 fn searches_all() -> bool {
     number("FLOCKMATE_MODEL", 0) >= 4
 }
@@ -76,7 +76,7 @@ fn four_vehicles_with_partitions() {
     }
 }
 
-/// Paths hold half of each part: the rest is asked for.
+/// A path holds only half of each part: the rest is requested by a division.
 #[test]
 fn stretches_with_any_messages_lost() {
     let stretches = |count, radio, losses, slow| {
@@ -109,8 +109,8 @@ fn planted_errors_are_found() {
     }
 }
 
-/// Of two halves the one with the lowest id continues; else the larger one does. It photographs
-/// all, and the others land.
+/// Of two equal parts of a partition the one with the lowest id continues, else the larger one. It
+/// photographs all, and the others land.
 #[test]
 fn of_parts_for_ever_one_goes_on() {
     for count in 2..=MOST {

@@ -12,15 +12,15 @@ use flockmate_tests::parts::{WAYPOINT_DM, parts};
 
 use crate::links::{Links, one_way, partitions};
 
-/// Most vehicles.
+/// Most vehicles of a fleet.
 pub const MOST: usize = 4;
 const LEASE: u64 = 3;
 const SILENT: u64 = 6;
-/// A vehicle that has lost its lease stops within so many ticks.
+/// Ticks within which a vehicle that has lost its lease stops.
 const STOP: u64 = 1;
-/// It comes to rest within so many ticks.
+/// Ticks within which the fleet comes to rest.
 pub const SETTLES: usize = 80;
-/// The time that every clock says between two ticks.
+/// The time that every clock shows between two ticks.
 const NOW: Instant = Instant::from_millis(100_000);
 
 const fn ticks(count: u64) -> Duration {
@@ -37,7 +37,7 @@ pub enum Planted {
     LeaseIgnored,
     /// Others take a part over after four ticks of silence.
     TakenOverEarly,
-    /// Who is silent does not count: the majority is one of those present.
+    /// Silent vehicles do not count: a majority of those heard is enough.
     PresentAlone,
     /// A vehicle flies on beyond where it promised to hold.
     PromiseBroken,
@@ -46,11 +46,11 @@ pub enum Planted {
 /// Which messages arrive.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Radio {
-    /// Any of those between each two, either way alone.
+    /// Any message may be lost by itself.
     Any,
-    /// Those over any set of links, each one way, that changes so often.
+    /// Messages over a set of one-way links, which changes at most so many times.
     Links(u8),
-    /// Those within each part of a partition, which changes so often.
+    /// Messages within each part of a partition, which changes at most so many times.
     Parts(u8),
 }
 
@@ -67,23 +67,22 @@ pub struct Vehicle {
     pub rank: usize,
     pub fleet: Whole,
     pub flight: Flight,
-    /// Divisions whose part it flies, and waypoints of that.
+    /// Number of divisions that its present part counts, and (`along`) waypoints of the part flown.
     pub division: usize,
     pub along: u16,
-    /// Whom it heard in the last tick.
+    /// Bit mask of the ranks that it heard in the last tick.
     pub hears: u32,
     /// Whether its clock is a tick slow.
     pub slow: bool,
-    /// Whether it stands, and continues only to where it has promised to hold.
+    /// Whether it stands, and continues only to its commitment.
     pub stands: bool,
-    /// Waypoints that it has photographed.
+    /// Bit mask of the waypoints that it has photographed.
     pub taken: u32,
-    /// For how many ticks it has not heard each other one, where [`Planted::PresentAlone`] asks for
-    /// that.
+    /// Ticks since it last heard each other vehicle; counted only for [`Planted::PresentAlone`].
     pub silent: [u8; MOST],
 }
 
-/// What it sends.
+/// Message that a vehicle sends in a tick.
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 struct Message {
     hears: u32,
@@ -93,7 +92,7 @@ struct Message {
 /// What one vehicle may do in a tick.
 #[derive(Clone, Copy)]
 struct Choice {
-    /// Even if it stands.
+    /// Whether it advances even if it stands.
     advances: bool,
     slow: bool,
     leaves: bool,
@@ -105,27 +104,28 @@ const BEST: Choice = Choice { advances: true, slow: false, leaves: false };
 pub struct State {
     pub vehicles: [u32; MOST],
     pub losses: u8,
-    /// From whom a message may reach each vehicle.
+    /// Links over which messages may arrive.
     pub links: Links,
     pub changes: u8,
 }
 
-/// Next states of a vehicle, and what each costs of the losses.
+/// Next states of a vehicle, each with the number of losses that it uses up.
 type Next = Arc<Vec<(u32, u8)>>;
 
-/// Every vehicle's state, message and next states by number, computed once.
+/// Every vehicle state by number, with its message and next states, each computed once.
 #[derive(Default)]
 pub struct Known {
     numbers: HashMap<Vehicle, u32>,
     pub vehicles: Vec<Arc<Vehicle>>,
-    /// The number of the message of each; 0 for none.
+    /// Number of each state's message; 0: it sends none.
     sends: Vec<u32>,
     message_numbers: HashMap<Message, u32>,
     messages: Vec<Message>,
-    /// Next states, and what each costs of the losses, by the vehicle and what may reach it.
+    /// Next states by the number of the vehicle's state and those of the messages that may reach
+    /// it.
     next: HashMap<(u32, [u32; MOST]), Next>,
     best: HashMap<(u32, [u32; MOST]), u32>,
-    /// The waypoints that each may yet photograph, as bits.
+    /// Bit mask of the waypoints that each state may still photograph.
     owned: HashMap<u32, u32>,
     settled: HashSet<State>,
 }
@@ -135,14 +135,13 @@ pub struct FleetModel {
     pub whole: Vec<u32>,
     pub radio: Radio,
     pub losses: u8,
-    /// Whose clock may be slow.
+    /// Rank of the vehicle whose clock may be slow.
     pub slow: Option<usize>,
     pub planted: Planted,
-    /// So many waypoints of its part are a vehicle's path: of a longer one that is the first
-    /// stretch.
+    /// Most waypoints of a vehicle's path, which is the first stretch of a longer part.
     pub most: usize,
     pub limits: FleetTimeouts,
-    /// What the links may change to.
+    /// All sets of links to which `links` may change.
     pub all_links: Vec<Links>,
     pub known: Mutex<Known>,
 }
@@ -174,7 +173,7 @@ impl FleetModel {
         }
     }
 
-    /// The waypoints of its path, and whether its part continues after them.
+    /// The waypoints of a vehicle's path, and whether its part continues after them.
     fn path(&self, vehicle: &Vehicle) -> (Vec<u32>, bool) {
         let mut part = parts(&self.whole, &vehicle.fleet, self.count).0.swap_remove(vehicle.rank);
         let goes_on = part.len() > self.most;
@@ -182,21 +181,21 @@ impl FleetModel {
         (part, goes_on)
     }
 
-    /// Whether it may photograph: it has its lease, or has not come to a stop since.
+    /// Whether a vehicle may photograph: it has its lease, or has not stopped since it lost it.
     fn flies(&self, vehicle: &Vehicle) -> bool {
         let unheard = vehicle.fleet.unheard_for(NOW);
         vehicle.flight == Flight::Flies
             && (unheard <= ticks(LEASE + STOP) || self.planted == Planted::LeaseIgnored)
     }
 
-    /// Up to where on its part it flies, in waypoints.
+    /// Number of waypoints of its part up to which a vehicle flies.
     fn end(&self, vehicle: &Vehicle) -> u16 {
         let promise =
             vehicle.fleet.commitment_dm().filter(|_| self.planted != Planted::PromiseBroken);
         promise.map_or(u16::MAX, |dm| dm / WAYPOINT_DM)
     }
 
-    /// The waypoints that it may yet photograph, as bits.
+    /// Bit mask of the waypoints that a vehicle may still photograph.
     fn owned(&self, vehicle: &Vehicle) -> u32 {
         if !self.flies(vehicle) {
             return 0;
@@ -331,7 +330,7 @@ impl FleetModel {
         }
     }
 
-    /// What may reach vehicle `rank`, by number.
+    /// Numbers of the messages that may reach vehicle `rank`, by sender; 0: none.
     fn reach(&self, known: &Known, state: &State, rank: usize) -> [u32; MOST] {
         std::array::from_fn(|from| match state.links[rank] >> from & 1 {
             0 => 0,
@@ -339,7 +338,8 @@ impl FleetModel {
         })
     }
 
-    /// All that vehicle `at` may be a tick later, and what that costs of the losses.
+    /// All states that vehicle state `at` may have a tick later, each with the losses that it uses
+    /// up.
     fn next(&self, known: &mut Known, at: u32, reach: [u32; MOST]) -> Next {
         if let Some(next) = known.next.get(&(at, reach)) {
             return next.clone();
@@ -380,7 +380,7 @@ impl FleetModel {
         all
     }
 
-    /// All states a tick later.
+    /// Adds all states of the fleet a tick later to `all`.
     fn tick(&self, known: &mut Known, state: &State, all: &mut Vec<State>) {
         let from = all.len();
         all.push(*state);

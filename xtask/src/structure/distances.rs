@@ -1,8 +1,9 @@
 //! Makes and checks docs/margins.md, the page of all distances, speeds and accelerations that the
 //! code on board decides by.
 //!
-//! It lists every `const` of planner-core and companion whose name ends in such a unit: value, doc
-//! comment, and the files that use it. Two constants of one name are an error.
+//! It lists every f32 or f64 `const` of planner-core and companion whose name ends in `_M`, `_MPS`
+//! or `_MPS2`: value, doc comment, and the files that use it. Two constants of one name are an
+//! error.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;

@@ -10,8 +10,8 @@ use super::sources::{Source, Tree};
 /// Most `pub use` items in a row that are followed to find the file that defines an item.
 const MAX_REEXPORTS: usize = 6;
 
-/// Every cycle: a set of files that import each other, directly or not. Each is a list of its
-/// imports, `file → file`.
+/// Every cycle: a set of files that import each other, directly or not. Each cycle is returned as
+/// the list of its imports, `file → file`.
 pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
     let imports: Vec<BTreeSet<usize>> =
         (0..tree.sources.len()).map(|at| of_file(tree, at)).collect();
@@ -62,7 +62,7 @@ fn of_file(tree: &Tree, at: usize) -> BTreeSet<usize> {
     files.filter(|file| *file != at).collect()
 }
 
-/// Collects the paths in a file, each with the module in which it stands.
+/// Collects the item paths in a file, each with the module in which it stands.
 struct Paths {
     module: Vec<String>,
     found: Vec<(Vec<String>, Vec<String>)>,

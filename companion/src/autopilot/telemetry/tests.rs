@@ -1,5 +1,5 @@
-//! The autopilot's frame about random EKF origins: a place of the mission survives it, or the
-//! origin is not used.
+//! The autopilot's frame about random EKF origins: a place of the mission converted to it and back
+//! stays the same, or the origin is not used.
 
 extern crate std;
 

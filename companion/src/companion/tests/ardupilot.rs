@@ -10,7 +10,7 @@ use crate::autopilot::ardupilot;
 use crate::testing::fake_autopilot::*;
 use planner_core::Point;
 
-/// A bench in the middle of its path.
+/// A bench whose vehicle is in the middle of its path.
 fn following() -> Bench {
     let mut bench = Bench::ardupilot(config());
     bench.run_until(State::Ready, 6.0);
@@ -55,7 +55,7 @@ fn flies_guided_from_silence_to_the_goal() {
     // Home lies two metres below the pad; the climb is 1.5 m.
     assert!((bench.takeoff_m - 3.5).abs() < 0.01, "take-off to {} m above home", bench.takeoff_m);
     assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
-    // In its own projection about its own origin 300 m away the way is still the way.
+    // The setpoints stay on the path, though ArduCopter projects about its own origin, 300 m away.
     for (_, at, mask) in &bench.setpoints {
         assert_eq!(*mask, ardupilot::MASK_POSITION_VELOCITY);
         assert!((at.y - 12.0).abs() < 0.02 && at.x > 7.98 && at.x < 16.02 && at.z < 3.52, "{at:?}");
@@ -72,7 +72,7 @@ fn waits_for_the_estimator() {
     }
     bench.ekf_flags = 0x33F;
     bench.run_until(State::Ready, 3.0);
-    // Lost in flight it is a position lost.
+    // In flight an estimator that is no longer ready counts as a lost position.
     let mut bench = following();
     bench.ekf_flags = 0xA7;
     bench.run_until(State::PositionLost, 3.0);
@@ -88,7 +88,7 @@ fn asks_for_the_streams_again_after_a_reboot() {
     bench.run(4.0);
     assert_eq!(bench.state(), State::Ready, "back before the position counts as lost");
     assert!(ardupilot::STREAMS.iter().all(|(id, _)| bench.streams.contains(id)));
-    // In flight too: here the pilot has it.
+    // The same in flight, here under the pilot.
     let mut bench = following();
     bench.mode = ardupilot::BRAKE;
     bench.run_until(State::PilotControl, 3.0);
@@ -105,8 +105,8 @@ fn a_pilot_is_never_fought_and_gets_the_current_position_back() {
     let asked = numbers(&bench).len();
     bench.enu += Point::new(0.0, 0.3, 0.0);
     bench.run(3.0);
-    // The stream that still runs takes effect at once when Guided is entered: it must hold the
-    // place.
+    // The setpoints that are still sent take effect as soon as Guided is entered: they must hold
+    // the current position.
     bench.mode = ardupilot::GUIDED;
     let at = bench.enu;
     bench.run(3.0);
@@ -151,7 +151,7 @@ fn what_was_flown_while_the_estimator_was_not_ready_is_no_jump() {
     let mut bench = following();
     bench.ekf_flags = 0xA7;
     bench.stuck = true;
-    // Two and a half metres before the next position counts.
+    // The vehicle moves 2.5 m before its position counts again.
     for _ in 0..10 {
         bench.enu.x += 0.25;
         bench.run(0.05);

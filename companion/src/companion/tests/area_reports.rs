@@ -43,7 +43,7 @@ fn counted_rosters(b: &mut Bench, state: State) -> (Vec<usize>, RosterReport) {
     (lengths, last.expect("it is valid"))
 }
 
-/// Whatever the rate of position and intent.
+/// The rate of position and intent, `swarm_hz`, makes no difference.
 #[test]
 fn rosters_go_out_twice_a_second_in_flight_and_five_times_while_dividing() {
     for swarm_hz in [2, 3, 5, 10] {
@@ -62,12 +62,12 @@ fn rosters_go_out_twice_a_second_in_flight_and_five_times_while_dividing() {
         let (dividing, report) = counted_rosters(&mut b, Dividing);
         assert!(dividing.len().abs_diff(5 * COUNTED_S) <= 1, "{} at {swarm_hz} Hz", dividing.len());
         assert_eq!(report.entries[2].status, MemberStatus::Left);
-        // The table of docs/coverage.md: three vehicles.
+        // Length of a roster report of three vehicles by the table of docs/coverage.md.
         assert!(flying.iter().chain(&dividing).all(|length| *length == 50), "{dividing:?}");
     }
 }
 
-/// Ready to take four pictures, 2, 4, 6 and 8 m along the path.
+/// A bench in `Ready`, whose plan has four pictures, 2, 4, 6 and 8 m along the path.
 fn over_four_pictures() -> Bench {
     let mut photographs = PicturePlan::new(2.0, HeadingMode::Ahead, Trigger::None);
     photographs.add_stretch(1, 3, WaypointRange { first: 0, end: 4 }).unwrap();
@@ -80,7 +80,7 @@ fn over_four_pictures() -> Bench {
     b
 }
 
-/// The vehicle's FLK_DONE of the last second.
+/// Values of FLK_DONE that the vehicle sends in the next second.
 fn done_count(b: &mut Bench) -> Vec<f32> {
     b.swarm.clear();
     b.run(1.0);
@@ -92,7 +92,7 @@ fn done_count(b: &mut Bench) -> Vec<f32> {
     b.swarm.iter().filter(of_count).map(value).collect()
 }
 
-/// It counts the waypoints that the vehicle is a picture's spacing past, before its start none.
+/// A waypoint counts once the vehicle is one picture spacing past it; none counts before the start.
 #[test]
 fn the_number_of_photographed_waypoints_is_sent_each_second() {
     let mut b = over_four_pictures();
@@ -129,7 +129,7 @@ fn set_parameter(b: &mut Bench, name: &str, value: f32) {
     b.run(1.0);
 }
 
-/// A flight that ends early, and what the next start leaves out.
+/// A flight ends early; checks what the next start leaves out.
 #[test]
 fn a_new_start_leaves_out_what_is_done_unless_flk_resume_is_0() {
     for resume in [1.0, 0.0] {
@@ -143,12 +143,13 @@ fn a_new_start_leaves_out_what_is_done_unless_flk_resume_is_0() {
         }
         b.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
         b.run_until(Aborted, 30.0);
-        // It passes the place of the next one while it brakes to land, and takes no picture there.
+        // While it brakes to land the vehicle passes the place of the next picture, and takes none
+        // there.
         assert!(flown_m(&b) > 6.1, "{}", flown_m(&b));
         let known = done_count(&mut b);
         assert_eq!(known, [1.0]);
         set_parameter(&mut b, "FLK_RESUME", resume);
-        // It is carried back to its pad.
+        // The vehicle is carried back to its pad.
         b.enu = Point::new(START.x, START.y, 0.0);
         b.start();
         b.run_until(Ready, 10.0);

@@ -1,6 +1,6 @@
-//! What interrupts a division, at random: whatever happens, a vehicle flies no part that is not its
-//! own any more, and an order of a person's outlasts the division. Vehicle 78 leaves; 77 agrees to
-//! everything, and its radio comes and goes.
+//! Random interruptions of a division: the vehicle flies no part that is no longer its own, and an
+//! operator's command outlasts the division. Vehicle 78 leaves the mission; 77 agrees to every
+//! division, and its radio fails and recovers.
 
 extern crate std;
 use std::format;
@@ -18,11 +18,11 @@ use crate::link::intent::{FLYING, GROUNDED, ON_PLAN, OUT_OF_PLAN};
 use crate::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
 use crate::{Link, RosterEntry};
 
-/// Vehicle 77, where it is in no way.
+/// Vehicle 77 far away from the path.
 pub(super) const FAR_AWAY: Option<(Point, u8, f32, u32)> =
     Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
 
-/// A place ahead on the vehicle's path, at this height.
+/// Place 2.5 m ahead on the vehicle's path, at this height.
 fn ahead(b: &Bench, height_m: f32) -> Point {
     let (plan, along_m) = (b.companion.mission.plan(), b.companion.guidance.along_m());
     let place = plan.and_then(|plan| plan.path.point_at(along_m.max(0.0) + 2.5));
@@ -30,12 +30,13 @@ fn ahead(b: &Bench, height_m: f32) -> Point {
     Point::new(place.x, place.y, height_m)
 }
 
-/// Three vehicles photograph an area, this one along the usual path; the first other one is heard.
+/// A coverage mission of three vehicles: this one flies the path of `field_plan`, 77 is heard, 78
+/// is not.
 pub(super) fn over_a_field(px4: bool) -> Bench {
     over_a_field_with(px4, |_| {})
 }
 
-/// The same with other settings.
+/// As [`over_a_field`], with settings changed by `set`.
 pub(super) fn over_a_field_with(px4: bool, set: impl Fn(&mut Config<4>)) -> Bench {
     let mut config = two_vehicles();
     config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
@@ -48,13 +49,13 @@ pub(super) fn over_a_field_with(px4: bool, set: impl Fn(&mut Config<4>)) -> Benc
     bench
 }
 
-/// A roster of vehicle 77, as this one would have it.
+/// A roster report of vehicle 77 with this vehicle's own view of the fleet.
 pub(super) fn own_roster(b: &Bench) -> RosterReport {
     let fleet = b.companion.neighbours.fleet().expect("an area");
     RosterReport { system_id: 77, mission_crc: 0xC0FFEE, ..fleet.roster_message(0) }
 }
 
-/// The bytes of a roster of vehicle 77.
+/// The frame of a roster report.
 pub(super) fn bytes(roster: &RosterReport, sequence: u8) -> Vec<u8> {
     let (mut payload, mut out) = ([0; roster::MAX_LEN], [0; MAX_FRAME_LEN]);
     let len = roster.encode(&mut payload);
@@ -70,19 +71,20 @@ pub(super) fn bytes(roster: &RosterReport, sequence: u8) -> Vec<u8> {
     out[..n].to_vec()
 }
 
-/// Vehicle 77: what it knows follows from what this one reports while it hears it.
+/// Vehicle 77: its view of the fleet follows from the reports of this vehicle.
 #[derive(Default)]
 struct Other {
     known: Option<RosterReport>,
-    /// It reports nothing; it hears all the same.
+    /// Whether it sends no reports; it still hears.
     mute: bool,
     sequence: u8,
-    /// Reports of this vehicle after which it lets the division count.
+    /// Number of reports of this vehicle after which it commits the division.
     counts_after: u32,
 }
 
 impl Other {
-    /// Handles what this one reports, agrees, lets it count once both hold, and says so.
+    /// Takes over the view of this vehicle, agrees to the division, commits it once both vehicles
+    /// hold, and reports that.
     fn tick(&mut self, b: &mut Bench) {
         self.sequence = self.sequence.wrapping_add(1);
         if !self.sequence.is_multiple_of(4) {
@@ -135,11 +137,11 @@ happens! {
 
 struct Watch {
     other: Other,
-    /// It was ordered to end its flight.
+    /// Whether this vehicle was commanded to land or return.
     ends: bool,
-    /// Ticks for which it waits on its way back.
+    /// Number of ticks for which it has waited on its way back.
     returns: u32,
-    /// Whether the other vehicle, heard or not, was last near.
+    /// Whether vehicle 77 was last near the path, heard or not.
     near: bool,
     log: Vec<String>,
 }
@@ -249,7 +251,7 @@ proptest::proptest! {
             watch.happen(&mut b, ALL[what]);
             (0..ticks).for_each(|_| watch.tick(&mut b));
         }
-        // All is well again.
+        // All faults end.
         (b.silent, b.no_position, b.answer_division) = (false, false, true);
         b.planner_takes.clear();
         watch.happen(&mut b, Happens::Hears);
@@ -264,8 +266,8 @@ proptest::proptest! {
             if matches!(b.state(), PilotReturned | Paused) {
                 watch.happen(&mut b, Happens::Resume);
             }
-            // Its pilot gave it back while the autopilot was silent: whose it is, a person has to
-            // say.
+            // The pilot gave the vehicle back while the autopilot was silent: the operator has to
+            // land it.
             if b.state() == Aborted && b.armed && second == 40 {
                 watch.happen(&mut b, Happens::Land);
             }
@@ -284,7 +286,7 @@ proptest::proptest! {
     }
 }
 
-/// A vehicle that was ordered home lands on its pad although another one is silent.
+/// A vehicle that was commanded to return lands on its pad although another vehicle is silent.
 #[test]
 fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
     for run_s in [3.0, 5.0, 7.0] {
@@ -299,8 +301,8 @@ fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
     }
 }
 
-/// Its part may yet be another's: above its pad a vehicle waits while one that takes part is
-/// silent.
+/// While a vehicle that takes part is silent, another one waits above its pad: it may still get a
+/// part of that one's area.
 #[test]
 fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
     let mut b = over_a_field(true);
@@ -319,8 +321,8 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
     b.run_until(Done, 60.0);
 }
 
-/// It waits too for one that reports that it hears nobody, since that one is to land; but if it
-/// says so for ever and flies on, for three minutes only.
+/// It also waits for a vehicle that reports to hear nobody, since that one is to land; but if that
+/// one flies on, it waits for three minutes only.
 #[test]
 fn above_its_pad_a_vehicle_waits_for_one_that_hears_nobody_for_a_limited_time() {
     let mut b = over_a_field_with(true, |config| _ = config.roster.pop());
@@ -332,7 +334,8 @@ fn above_its_pad_a_vehicle_waits_for_one_that_hears_nobody_for_a_limited_time() 
     b.run_until(Done, 150.0);
 }
 
-/// Beside its path it waits for none: what it comes to is not its pad. Vehicle 77 lies there.
+/// On a detour beside its path a vehicle waits for no silent one: the end of that path is not its
+/// pad. Vehicle 77 lies on the path.
 #[test]
 fn a_vehicle_flies_around_what_lies_on_its_path_while_another_is_silent() {
     let mut b = over_a_field(true);
@@ -347,7 +350,7 @@ fn a_vehicle_flies_around_what_lies_on_its_path_while_another_is_silent() {
     assert!(b.texts.iter().any(|text| text == "Flown around: on its path again"), "{:?}", b.texts);
 }
 
-/// A roster as a liar sends it: one that would be true, with some of it replaced.
+/// A false roster report: a true one with some fields replaced.
 #[derive(Clone, Debug)]
 struct Lie {
     system_id: u8,
@@ -409,9 +412,9 @@ impl Lie {
 
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 200 } else { 5000 }))]
-    /// Rosters of strangers, of another mission and in this vehicle's own name change nothing. One
-    /// vehicle of the roster that lies may end the flight, by a landing; it moves the vehicle
-    /// nowhere.
+    /// Roster reports of unknown ids, of another mission or with this vehicle's own id change
+    /// nothing. False reports of one vehicle of the roster may make this one land, but never move
+    /// it off its path.
     #[test]
     fn lies_of_a_roster_land_a_vehicle_at_worst(
         waits in any::<bool>(),
@@ -457,7 +460,7 @@ proptest::proptest! {
     }
 }
 
-/// Its lease says how far it flies on, not the radio's range.
+/// In a coverage mission the lease limits how far an unheard vehicle flies on, not the radio range.
 #[test]
 fn a_vehicle_over_an_area_whose_lease_ends_stands_and_lands_whatever_the_radios_range() {
     for (px4, radio_range_m) in [(true, 60.0), (false, 60.0), (true, 10_000.0)] {

@@ -1,4 +1,4 @@
-//! What the companion makes of an estimate that is worse than the margin allows.
+//! Flights with a position estimate that is worse than the margin allows.
 
 extern crate std;
 
@@ -7,8 +7,8 @@ use crate::autopilot::AutopilotKind;
 use crate::testing::fake_autopilot::*;
 use planner_core::Point;
 
-/// An estimate that is worse than the margin leaves: no start; in flight slower, then a stop, and
-/// on again.
+/// With an estimate that is worse than the margin allows, the start is refused; a vehicle in flight
+/// slows, then stops, and flies on once the estimate is better.
 #[test]
 fn the_pace_follows_the_estimate() {
     let fastest = |bench: &mut Bench, seconds: f32| {
@@ -20,7 +20,7 @@ fn the_pace_follows_the_estimate() {
             .map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).as_secs_f32())
             .fold(0.0, f32::max)
     };
-    // The margin of 0.5 m leaves 0.25 m at cruise and 0.4 m at a crawl.
+    // The margin of 0.5 m leaves 0.25 m for the estimate at cruise and 0.4 m at a crawl.
     for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
         let mut bench = match kind {
             AutopilotKind::Px4 => Bench::new(config()),
@@ -62,7 +62,7 @@ fn the_pace_follows_the_estimate() {
     assert_eq!(bench.state(), State::Follow);
     bench.accuracy_m = Some(0.02);
     assert!(fastest(&mut bench, 2.0) > 1.5, "{:?}", bench.texts);
-    // Three seconds without a report are an unknown accuracy.
+    // After three seconds without a report the accuracy is unknown.
     bench.accuracy_m = None;
     bench.run(3.0);
     assert!(fastest(&mut bench, 2.0) < 0.05);

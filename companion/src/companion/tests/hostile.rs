@@ -1,4 +1,4 @@
-//! What must change nothing, what is sent to the swarm, and the memory it takes.
+//! Frames that must change nothing; what is sent to the swarm; the memory of a companion.
 
 extern crate std;
 use std::vec::Vec;
@@ -28,12 +28,12 @@ fn nuisance(bench: &mut Bench, kind: u8, seed: u8) -> Vec<u8> {
         out[..len].to_vec()
     };
     match kind {
-        // Damaged, cut, repeated, of another component, of another system, noise.
+        // The kinds: damaged, cut, repeated, from another component, from another system, noise.
         0 => {
             let at = usize::from(seed) % wrong.len();
             wrong[at] ^= 1 << (seed % 8);
         }
-        // Without its CRC: a next frame that begins with the one byte cut would complete it.
+        // At least the CRC is cut: if one byte were, the next bytes could complete the frame.
         1 => wrong.truncate(usize::from(seed) % (wrong.len() - 2)),
         2 => {
             let now = bench.heartbeat();
@@ -72,8 +72,8 @@ proptest::proptest! {
     }
 }
 
-/// What a hostile radio peer sends: a command of each kind, a parameter, a file request, a
-/// question, a place, an intent.
+/// A frame of a hostile peer, of one of 14 kinds: commands, parameters, files, TIMESYNC, position,
+/// intent.
 fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
     use crate::link::frame::{Header, MAX_FRAME_LEN, encode};
     use mavlink::dialects::ardupilotmega::*;
@@ -148,7 +148,8 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
             encode(header, &file, &mut out)
         }
         12 => {
-            // Far from every path: what is near one is the safety filter's.
+            // Far from every path: a position near one would make the safety filter stop the
+            // vehicle.
             let data = GLOBAL_POSITION_INT_DATA {
                 time_boot_ms: u32::from(seed) * 1000,
                 lat: lat + 20_000,
@@ -184,8 +185,8 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
     out[..len].to_vec()
 }
 
-/// System ids of hostile peers: of the roster, of nobody, the vehicle's own; never the ground
-/// station's.
+/// System id of a hostile peer: one of the roster, an unknown one or the vehicle's own, but never
+/// the ground station's.
 fn hostile_id(seed: u8) -> u8 {
     match seed % 4 {
         0 => 77,
@@ -196,8 +197,8 @@ fn hostile_id(seed: u8) -> u8 {
 
 proptest::proptest! {
     #![proptest_config(proptest::prelude::ProptestConfig::with_cases(48))]
-    /// On the pad nothing starts, in flight nothing changes, and the ground station is answered all
-    /// the same.
+    /// On the pad nothing starts, in flight nothing changes, and the ground station still gets its
+    /// answers.
     #[test]
     fn hostile_radio_peers_command_nothing_and_starve_nothing(
         frames in proptest::collection::vec(proptest::prelude::any::<(u8, u8, u8, bool)>(), 1..400),
@@ -224,7 +225,8 @@ proptest::proptest! {
         bench.events.clear();
         for (i, (kind, seed, who, wired)) in frames.into_iter().enumerate() {
             let link = if wired { Link::Autopilot } else { Link::Swarm };
-            // By the autopilot's link its own position would be believed: that is in SECURITY.md.
+            // No forged positions on the autopilot's link, where telemetry is believed
+            // (SECURITY.md).
             let kind = if wired && matches!(kind % 14, 12 | 13) { 8 } else { kind };
             bench.companion.handle_bytes(link, bench.now, &forged(kind, hostile_id(who), seed));
             if i % 8 == 0 {
@@ -244,7 +246,7 @@ proptest::proptest! {
             bench.companion.services.parameters().to_bytes() == parameters
                 && bench.companion.config == config
         );
-        // The radio gives the ground station all it requests within as long as its budget needs.
+        // The ground station gets all that it requests, within the time that its rate limits need.
         bench.swarm.clear();
         bench.acks.clear();
         let ask = |bench: &mut Bench, bytes: &[u8]| {
@@ -295,10 +297,10 @@ proptest::proptest! {
 
 proptest::proptest! {
     #![proptest_config(proptest::prelude::ProptestConfig::with_cases(300))]
-    /// Positions of ids that the roster does not name, anywhere, the goal included, for as long as
-    /// they like: the vehicle comes to the ground all the same, and where the strangers leave 0.4 m
-    /// more than the safety distance beside the path, at its goal: a vehicle that was stopped
-    /// continues only with some room to spare.
+    /// Vehicles that the roster does not name report positions anywhere, even at the goal, for any
+    /// time. The vehicle still lands in the end; it lands at its goal if all of them are 0.4 m more
+    /// than the safety distance beside the path, since a stopped vehicle needs that room to
+    /// continue.
     #[test]
     fn strangers_deny_no_goal(
         places in proptest::collection::vec((5f32..19.0, 0f32..4.0, 0f32..5.0, 1u8..=255), 1..7),
@@ -327,7 +329,7 @@ proptest::proptest! {
     }
 }
 
-/// A position report of a vehicle that stands.
+/// The position report of a vehicle that stands at `place`.
 fn stranger(now: Instant, system: u8, sequence: u8, place: Point) -> Vec<u8> {
     let at = planner_core::frames::enu_to_geodetic(&ORIGIN, &place);
     let data = GLOBAL_POSITION_INT_DATA {
@@ -476,7 +478,7 @@ fn the_swarm_is_told_where_it_is_and_where_it_goes() {
     assert_eq!(intent.points.last(), Some(&GOAL));
 }
 
-/// What the README says it takes on a board, where pointers are shorter.
+/// The README states this size for a board, where pointers are shorter.
 #[test]
 fn a_companion_fits_its_memory() {
     let bytes = core::mem::size_of::<Companion<32, 64, 64>>();

@@ -118,7 +118,7 @@ fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<
         }
         _ => return None,
     }
-    // On its path a vehicle that does not follow is elsewhere.
+    // In `Follow` it must keep following: a vehicle that stands would be off its setpoint.
     b.stuck = state != Follow;
     if state == TakeOff {
         b.spool = Duration::from_secs(1000);
@@ -146,7 +146,7 @@ fn an_interruption_returns_to_the_state_that_it_interrupted() {
         (
             "jump",
             State::PositionLost,
-            // Where it is at last, it was before.
+            // The vehicle is in the end where it was before the jump.
             |b| {
                 b.enu.y += 5.0;
                 b.run(0.05);
@@ -174,7 +174,8 @@ fn an_interruption_returns_to_the_state_that_it_interrupted() {
         for &(state, paused_in) in CASES {
             for (name, through, there, back) in there_and_back {
                 let Some(mut b) = reach(kind, state, paused_in) else { continue };
-                // The autopilot lands by itself: no position is needed, and a silence ends nothing.
+                // The autopilot lands by itself: neither a lost position nor a silence interrupts
+                // the landing.
                 if state == State::Land && *through != State::PilotControl {
                     continue;
                 }
@@ -220,7 +221,7 @@ fn after_an_interruption_of_the_climb_the_climb_goes_on_and_the_goal_is_reached(
             let mut b = bench(kind);
             b.start();
             b.run_until(State::Climb, 20.0);
-            // A pause waits until the climb is past its half.
+            // A pause takes effect only in the upper half of the climb.
             b.run_until_lifted();
             while b.enu.z < 0.8 {
                 b.run(0.05);
@@ -303,7 +304,7 @@ fn a_vehicle_that_is_landed_before_it_lifts_off_ends_on_the_ground() {
 
 #[test]
 fn a_disarm_is_never_answered_by_arming() {
-    // Undone before HEARTBEAT shows it; with the ack, and with the ack lost.
+    // Arming is undone before HEARTBEAT shows it: first with the ack received, then with it lost.
     let mut b = bench(AutopilotKind::Px4);
     b.never_arms = true;
     b.start();
@@ -315,7 +316,7 @@ fn a_disarm_is_never_answered_by_arming() {
     b.start();
     b.run(30.0);
     assert_eq!(b.commands.iter().filter(|c| c.0 == ARM && c.1 == 1.0).count(), 2);
-    // Silent meanwhile: not even once more.
+    // The autopilot is silent meanwhile: arming is requested at most once more.
     let mut b = bench(AutopilotKind::Px4);
     b.start();
     b.run_until(State::Arming, 5.0);
@@ -327,7 +328,7 @@ fn a_disarm_is_never_answered_by_arming() {
     b.silent = false;
     b.run(5.0);
     assert!(b.commands.iter().filter(|c| c.0 == ARM && c.1 == 1.0).count() <= asked + 1);
-    // Seen armed, then disarmed.
+    // HEARTBEAT shows the vehicle armed, then disarmed.
     let mut b = bench(AutopilotKind::ArduPilot);
     b.start();
     b.run_until(State::TakeOff, 10.0);
@@ -352,7 +353,7 @@ fn a_denied_arming_is_requested_each_second_for_twenty_seconds() {
         .count();
     assert!((1..=4).contains(&said), "{said} on two links, arming and disarming: {:?}", b.texts);
     assert_eq!(b.state(), State::Aborted);
-    // Accepted at last.
+    // Arming is accepted in the end.
     let mut b = bench(AutopilotKind::Px4);
     b.refused.push(ARM);
     b.start();
@@ -375,7 +376,7 @@ fn after_the_pilot_one_point_is_held_until_the_resume() {
         b.run_until(State::PilotReturned, 2.0);
         let held = b.enu;
         let sent = b.setpoints.len();
-        // The wind, or an estimate, carries it off.
+        // Wind or a drifting estimate moves the vehicle.
         for _ in 0..100 {
             b.enu.y += 0.15;
             b.tick();
@@ -397,7 +398,7 @@ fn a_battery_that_is_not_reported_holds_the_take_off_and_is_requested_again() {
     assert!(asked > 5, "{asked} requests");
     b.no_battery = false;
     b.run_until(State::Follow, 20.0);
-    // Reported as unknown, what was known still counts.
+    // While the charge is not reported, the last known one counts.
     b.battery = 2;
     b.no_battery = true;
     b.run(8.0);
@@ -469,7 +470,7 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     b.answer_detour = None;
     b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
     b.run_until(State::Replanning, 10.0);
-    // Upon the detour that comes a second later.
+    // The obstacle lies on the detour that is returned next.
     obstacle(&mut b, Point::new(13.0, 16.0, 2.0));
     let request = b.companion.detour_request(|_| {}).expect("planning");
     let mut path = planner_core::flight::Path::new();

@@ -1,5 +1,5 @@
-//! Fast flights that are stopped and continue at any moment, as over a field: the setpoint stays on
-//! its path, and on the curve that stops with it. Descents to the ground.
+//! Fast flights that stop and continue at any moment, as over a field: the setpoint stays on the
+//! path and on the smoother's curve. Descents to the ground.
 
 use planner_core::flight::Path;
 use proptest::prelude::ProptestConfig;
@@ -7,7 +7,7 @@ use proptest::prelude::ProptestConfig;
 use super::*;
 use crate::autopilot::AutopilotKind;
 
-/// A way back and forth over a field, lanes `apart_m` apart.
+/// The plan of a flight over four lanes, `apart_m` metres apart.
 fn lanes(long_m: f32, apart_m: f32) -> Plan {
     let mut path = Path::new();
     path.push(START, 1.2).unwrap();
@@ -82,7 +82,8 @@ proptest::proptest! {
     }
 }
 
-/// Gates of others open by the progress that it reports, and by it others count pictures as taken.
+/// The reported progress opens gates of other vehicles, and counts pictures as taken: it must not
+/// be early.
 #[test]
 fn no_place_counts_as_reached_before_the_vehicle_is_there_at_any_speed() {
     for cruise_mps in [2.0, 5.0, 8.0, 12.0, 15.0] {
@@ -113,13 +114,13 @@ fn no_place_counts_as_reached_before_the_vehicle_is_there_at_any_speed() {
 
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 30 } else { 300 }))]
-    /// A PX4 that lands by itself holds where it was when it was ordered to: the wind has carried
-    /// it off by then.
+    /// In its own landing mode PX4 would hold the place where the mode was commanded, from which
+    /// wind has carried it off by then. So setpoints guide it down.
     #[test]
     fn a_px4_is_led_to_the_ground_and_touches_it_slowly(
         margin_m in 0.1f32..3.0,
         (descend_mps, cruise_mps) in (0.3f32..3.0, 1f32..4.0),
-        // The ground may be higher than it is said to be, and the path low.
+        // The ground may be higher than planned, and the path low.
         (higher_m, end_m) in (0f32..1.0, 1f32..6.0),
     ) {
         for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
@@ -166,8 +167,8 @@ proptest::proptest! {
             }
             for pair in bench.setpoints.windows(2) {
                 let sinks_mps = (pair[0].1.z - pair[1].1.z) / (pair[1].0 - pair[0].0).as_secs_f32();
-                // What is sent is smoothed, and slow a little later than the raw point: 0.61 m/s at
-                // the margin.
+                // The setpoint is smoothed, so it slows a little later than the raw point: 0.61 m/s
+                // at the margin.
                 let slow = pair[0].1.z > low_m - 0.3 || sinks_mps < 0.55;
                 proptest::prop_assert!(
                     slow,
@@ -181,8 +182,8 @@ proptest::proptest! {
 
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 30 } else { 300 }))]
-    /// Others keep off a narrow strip of its path: it does not leave it before it is low, and no
-    /// ground holds it up.
+    /// Others keep clear of a narrow column only: the vehicle stays in it until it is low, and
+    /// ground that is higher than planned does not keep it from landing.
     #[test]
     fn a_vehicle_that_nobody_hears_is_led_straight_down(
         (flown_s, end_m) in (0.5f32..4.0, 1.5f32..8.0),

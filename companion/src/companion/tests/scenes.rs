@@ -37,7 +37,7 @@ struct Scenes {
 }
 
 impl Scenes {
-    /// After `script` the state `end` is reached within so many seconds.
+    /// Runs `script`; the state `end` must be reached within `seconds` after it.
     #[track_caller]
     fn play(
         &mut self,
@@ -119,21 +119,21 @@ fn resume(b: &mut Bench) {
     b.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPANION_COMPONENT);
 }
 
-// What happens in many scenes.
+// Events of many scenes.
 
 fn nothing(_: &mut Bench) {}
 
-/// The autopilot's failsafe.
+/// The autopilot's failsafe takes the vehicle.
 fn fails_safe(b: &mut Bench) {
     (b.mode, b.status) = (px4::RTL, 5);
 }
 
-/// The pilot's switch.
+/// The pilot takes the vehicle by the mode switch.
 fn pilot_takes(b: &mut Bench) {
     b.mode = px4::HOLD;
 }
 
-/// Dragged on the ground by `by` three times, not so fast that it were a jump.
+/// Moves the vehicle by `by` three times, too slowly to count as a jump.
 fn drag(b: &mut Bench, by: Point) {
     for _ in 0..3 {
         b.enu += by;
@@ -141,14 +141,14 @@ fn drag(b: &mut Bench, by: Point) {
     }
 }
 
-/// For so long nothing moves it.
+/// Keeps the vehicle from moving for `seconds`.
 fn stuck(b: &mut Bench, seconds: f32) {
     b.stuck = true;
     b.run(seconds);
     b.stuck = false;
 }
 
-// Where scenes begin.
+// Starting points of scenes.
 
 fn ready_with(config: Config<4>) -> Bench {
     let mut bench = Bench::new(config);
@@ -156,12 +156,12 @@ fn ready_with(config: Config<4>) -> Bench {
     bench
 }
 
-/// On its pad, with nothing to wait for but the start.
+/// A vehicle on its pad, in `Ready`.
 fn ready() -> Bench {
     ready_with(config())
 }
 
-/// Started, and as far as this state.
+/// A vehicle that was started and has reached this state.
 fn to(state: State) -> Bench {
     let mut bench = ready();
     bench.start();
@@ -169,12 +169,12 @@ fn to(state: State) -> Bench {
     bench
 }
 
-/// In the middle of its path.
+/// A vehicle in the middle of its path.
 fn flying() -> Bench {
     Bench::following(config())
 }
 
-/// Commanded to land, which the autopilot does not get done.
+/// A vehicle that was commanded to land, but does not descend.
 fn landing() -> Bench {
     let mut bench = flying();
     bench.never_lands = true;
@@ -184,7 +184,7 @@ fn landing() -> Bench {
     bench
 }
 
-/// For so many seconds in this state, while vehicle 77 stands on its pad.
+/// A vehicle `seconds` after it reached this state, while vehicle 77 stands on its pad.
 fn accompanied(state: State, seconds: f32) -> Bench {
     accompanied_with(two_vehicles(), state, seconds)
 }
@@ -202,7 +202,7 @@ fn fenced(mut config: Config<4>, low: Point, high: Point) -> Config<4> {
     config
 }
 
-// The other vehicle.
+// Reports of the other vehicle.
 
 fn stands(place: Point, flags: u8) -> Neighbour {
     Some((place, GROUNDED | flags, 0.0, 5))
@@ -212,7 +212,7 @@ fn flies(place: Point, flags: u8) -> Neighbour {
     Some((place, FLYING | flags, 0.0, 5))
 }
 
-/// It has followed its plan to the end.
+/// The other vehicle has landed at the end of its plan.
 fn landed(place: Point) -> Neighbour {
     Some((place, GROUNDED | LANDED | ON_PLAN, 99.0, 5))
 }

@@ -1,5 +1,5 @@
-//! Where the setpoint is along its path, at any speed, on lanes near each other: the points that
-//! neighbours hear and the safety filter's own set begin there.
+//! Place of the setpoint along its path, at any speed and on lanes near each other: the points of
+//! the intent and those of the safety filter begin there.
 
 use planner_core::flight::Path;
 use proptest::prelude::*;
@@ -9,10 +9,10 @@ use super::*;
 /// Raw steps that one setpoint may depend on: both windows of the smoother's averages at their
 /// longest, and the spline.
 const RAW_STEPS: usize = 52;
-/// Distance along the path by which the place may be off in a corner that the setpoint rounds,
-/// metres: where the path leads straight back, it flies there and back again on the same points.
+/// Greatest error of the place along the path in a corner that the setpoint rounds, metres. Where
+/// the path turns straight back, the setpoint passes the same points twice.
 const CORNER_M: f32 = 0.8;
-/// Setpoints further from the path than this are on their way to it, metres.
+/// Setpoints further from the path than this are not checked: they are on their way to it, metres.
 const BESIDE_M: f32 = 0.4;
 
 /// What interrupts the flight.
@@ -21,7 +21,8 @@ enum Interruption {
     Pause,
     /// The vehicle stops this far ahead, metres.
     Halt(f32),
-    /// The pilot takes over, brakes for so many seconds of flight, and gives back.
+    /// The pilot takes over, moves the vehicle along its path by this many seconds of cruise
+    /// flight, and gives it back.
     Pilot(f32),
     /// The position is lost for this many ticks; the vehicle flies on meanwhile, braking.
     Lost(u32),
@@ -66,24 +67,25 @@ fn random_path(
     path
 }
 
-/// The path's places that a setpoint may count as at: those nearest to it between where the
-/// reference was when the oldest raw step that it depends on was made, and where the reference is.
+/// Places along the path that the reference has passed, metres. The setpoint's place must be the
+/// nearest of those that the raw steps on which it depends have passed.
 struct Reference {
     places: Vec<f32>,
 }
 
 impl Reference {
     fn note(&mut self, along_m: f32) {
-        // A clock that stands takes no raw steps.
+        // Without progress of the reference no raw step is noted.
         if self.places.last() != Some(&along_m) {
             self.places.push(along_m);
         }
     }
 
-    /// First and last place, metres, and the distance from there.
+    /// First and last of the places nearest to the point `place`, metres along the path, and the
+    /// distance to them.
     fn nearest(&self, path: &Path<WAYPOINTS>, place: &Point) -> Option<(f32, f32, f32)> {
         let last = *self.places.last()?;
-        // A reference that stops is set back to the setpoint.
+        // The reference may go back: when it stops it is set back to the setpoint.
         let lately = &self.places[self.places.len().saturating_sub(RAW_STEPS)..];
         let first = lately.iter().fold(last, |least, along_m| least.min(*along_m));
         let steps = ((last - first) / 0.05) as usize + 1;
@@ -98,14 +100,14 @@ impl Reference {
     }
 }
 
-/// A flight, and how far off its own places along the path were.
+/// A flight, and the greatest errors of the place of its setpoint, metres.
 struct Flight {
     bench: Bench,
     path: Path<WAYPOINTS>,
     reference: Reference,
     early_m: f32,
     late_m: f32,
-    /// Greatest change of the place in a step, beyond what cruise speed allows, metres.
+    /// Greatest change of the place in a step beyond that at cruise speed, metres.
     jump_m: f32,
     checked: u32,
 }
@@ -158,7 +160,7 @@ impl Flight {
         self.bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, go, SYSTEM, id);
     }
 
-    /// Moves the vehicle along its path, in two seconds.
+    /// Moves the vehicle along its path within two seconds, by `by_s` seconds of cruise flight.
     fn drift(&mut self, by_s: f32) {
         let guidance = &self.bench.companion.guidance;
         let by_m = by_s * guidance.cruise_mps();
@@ -214,7 +216,7 @@ proptest! {
         let mut flight = Flight::new(cruise_mps, random_path(&turns, back, lanes));
         for (flown, by, stopped) in events {
             flight.run(flown);
-            // On a leg flown back a resumed flight may skip what is behind its turn.
+            // On a leg that is flown back and forth a resumed flight may skip the turn.
             let resumes = !matches!(by, Interruption::Halt(_));
             if flight.bench.state() == State::Follow && !(back && resumes) {
                 flight.interrupt(by, stopped);

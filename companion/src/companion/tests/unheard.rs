@@ -1,12 +1,13 @@
-//! A vehicle that no other vehicle hears any more in a coverage mission is found where it last said
-//! that it may be.
+//! A vehicle that no other vehicle hears any more in a coverage mission stays where its last intent
+//! says that it may be.
 
 use super::State::*;
 use super::divisions::over_a_field;
 use super::*;
 use crate::link::intent::Intent;
 
-/// Distance of a place from the way that an intent reports, seen from above, metres.
+/// Horizontal distance of a place from the path that an intent reports, beginning at `from`,
+/// metres.
 fn beside_m(intent: &Intent, from: &Point, place: &Point) -> f32 {
     let legs = core::iter::once(from).chain(&intent.points).zip(&intent.points);
     legs.fold((from - place).xy().norm(), |least, (a, b)| {
@@ -16,8 +17,8 @@ fn beside_m(intent: &Intent, from: &Point, place: &Point) -> f32 {
     })
 }
 
-/// Whenever its radio fails, in its climb too, it is on the way of its last intent until it stands,
-/// and that is no longer than it flies.
+/// Whenever its radio fails, also in the climb, the vehicle stays on the path of its last intent
+/// until it stands.
 #[test]
 fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
     let (mut furthest_m, mut beyond) = (0.0_f32, 0);

@@ -23,12 +23,12 @@ const MAX_NEAR_COMPARED: usize = 4;
 const OVERSHOOT_MARGIN_M: f32 = 0.25;
 /// Tracking error of this vehicle beside its path, metres: kept from a vehicle on the ground.
 const TRACKING_MARGIN_M: f32 = 0.1;
-/// Distance between the hulls that is kept from a stranger while this vehicle passes it slowly,
-/// metres.
+/// Distance between the hulls that is kept from a stranger that is passed slowly, and in a late
+/// landing, metres.
 const STRANGER_HULL_GAP_M: f32 = 0.3;
-/// Speed by which the vehicle may exceed its setpoint's without a longer stop, m/s: sway.
+/// Sway, m/s: speed of the vehicle in excess of its setpoint's for which no longer stop is assumed.
 const STOPPING_SWAY_MPS: f32 = 0.3;
-/// Time for which a landing was held, after which it keeps only the hulls apart.
+/// Time for which a landing was held, after which only the hulls are kept apart.
 const LATE_LANDING_AFTER: Duration = Duration::from_secs(40);
 
 impl Guidance {
@@ -140,7 +140,7 @@ impl Guidance {
                 if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
             let held = self.filter.landing_held_for(now);
             if lands && met.stranger && held >= LATE_LANDING_AFTER {
-                // A stranger, which anybody can feign, keeps no vehicle in the air for good.
+                // A stranger, which anybody can fake, keeps no vehicle in the air for good.
                 continue;
             }
             // Flying back to its pad, before its path, or hearing nobody, this vehicle has no other

@@ -118,7 +118,7 @@ impl Guidance {
         own.touching_m = 2.0 * self.track.radius_m;
         let mut found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
         if found.is_none() && on_pad {
-            // PX4 disarms within seconds on the ground. So it does not arm beside a vehicle that
+            // PX4 disarms within seconds on the ground. So a vehicle does not arm beside one that
             // may just have fallen silent, whose set would soon bar the climb.
             let apart_m =
                 self.deconflict.safety_distance_m + bounds.speed_max_mps * bounds.silent_s;
@@ -167,8 +167,8 @@ impl Guidance {
         }
     }
 
-    /// Least height that the ground below the vehicle may have, ENU up, metres; at most the
-    /// vehicle's.
+    /// Least height that the ground below the vehicle may have, ENU up, metres; never above the
+    /// vehicle.
     pub(super) fn landing_height_m<const W: usize, const G: usize>(
         &self,
         state: State,
@@ -191,8 +191,8 @@ impl Guidance {
         if between { ground_m - GROUND_BELOW_PAD_M } else { ground_m }
     }
 
-    /// Whether the vehicle flies back along its path, or stands and is about to. As long as the
-    /// setpoint is still to fly forward to the reference, it does not.
+    /// Whether the vehicle flies back along its path, or stands and is about to; false as long as
+    /// the setpoint is still to fly forward to the reference.
     fn is_flying_back<const W: usize>(&self, path: &Path<W>) -> bool {
         if self.tracker.along_m > self.setpoint_m + MAX_TURNING_SETPOINT_M {
             return false;
@@ -212,8 +212,8 @@ impl Guidance {
         self.tracker.speed_mps < 0.0 || self.back_to_m.is_some()
     }
 
-    /// Counts it as a stop by the filter if advice stops the vehicle right before another one
-    /// although no gate nearby waits for that one.
+    /// Counts a stop by advice as a stop by the filter if the vehicle stands right before a
+    /// neighbour for which no gate nearby waits.
     fn count_standstill<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,

@@ -13,7 +13,7 @@ const PLANNED_JERK_SHARE: f32 = 0.9;
 /// Share of the jerk limit with which the clock's speeding up ends: small, since nothing depends on
 /// how soon the clock runs at 1 again.
 const RISE_JERK_SHARE: f32 = 0.15;
-/// Least value of the curve's speed where the clock's acceleration is a quotient by it, m/s.
+/// Least speed of the curve by which the clock's acceleration is divided, m/s.
 const MIN_CURVE_MPS: f32 = 0.2;
 
 impl SetpointSmoother {
@@ -30,8 +30,8 @@ impl SetpointSmoother {
             / (TICK_S * TICK_S * TICK_S);
         let clock = self.clock_speed;
         let accel = limits.accel_along(&(slope / fmaxf(true_speed, 1e-3)));
-        // Wanted change of the speed: towards the pace, and such that it ends there without a step
-        // of the acceleration.
+        // Wanted change of the speed: towards the pace, and such that the change ends without a
+        // step of the acceleration.
         let lack = (pace.speed_share.clamp(0.0, 1.0) - clock) * speed;
         let size = fmaxf(fabsf(lack) - fabsf(self.clock_acceleration) * speed * dt_s, 0.0);
         let end_share = if lack > 0.0 { RISE_JERK_SHARE } else { END_JERK_SHARE };

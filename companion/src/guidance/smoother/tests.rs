@@ -1,4 +1,4 @@
-//! The smoother over random paths, paces and steps: what it makes of them is finite, smooth, inside
+//! The smoother over random paths, paces and step lengths: its setpoints are finite, smooth, inside
 //! the fence and on the path.
 
 extern crate std;
@@ -79,7 +79,7 @@ proptest! {
             let place = smoother.position();
             let moved = (smoother.position() - at).norm();
             prop_assert!(moved <= 2.1 * dt_s + 1e-3, "{moved} m in {dt_s} s");
-            // The velocity is that of the positions.
+            // The velocity agrees with the change of the positions.
             let mean = (smoother.velocity() + velocity) * 0.5;
             let off = ((smoother.position() - at) / dt_s - mean).norm();
             prop_assert!(
@@ -95,8 +95,8 @@ proptest! {
             if let Some((low, high)) = fence {
                 prop_assert!((0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]));
             }
-            // Corners are rounded, stops are not overshot: never far from the path that the raw
-            // point has drawn, though every seventh step of a hairpin is late.
+            // Corners are rounded, stops are not overshot: the setpoint is never far from the path
+            // that the raw point has flown, though every seventh step of a hairpin is late.
             if fence.is_none() && step % 16 == 0 {
                 let place = smoother.position();
                 let near = path.project(&place, tracker.along_m, path.length_m());
@@ -109,7 +109,8 @@ proptest! {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
-    /// Whatever the raw point does beside the fence, and however the vehicle came there.
+    /// Setpoints stay inside the fence and smooth, whatever the raw point does beside the fence and
+    /// with whatever motion the setpoint reached it.
     #[test]
     fn the_fence_is_kept_without_a_jerk(
         size in (2.0f32..30.0, 2.0f32..30.0, 1.0f32..10.0),

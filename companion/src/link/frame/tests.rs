@@ -21,7 +21,7 @@ fn heartbeat(sequence: u8) -> Vec<u8> {
     out[..len].to_vec()
 }
 
-/// A frame of an id no dialect here knows, its payload full of start bytes.
+/// A frame whose message id the dialect does not know, with a payload full of start bytes.
 fn unknown() -> Vec<u8> {
     let mut out = [0; MAX_FRAME_LEN];
     let len =
@@ -139,8 +139,8 @@ fn every_id_of_the_dialect_is_known() {
 }
 
 proptest! {
-    /// Whatever the bytes and however they are cut, nothing panics, the buffer never overflows, and
-    /// undamaged frames in quiet surroundings still arrive.
+    /// Random bytes in chunks of any length neither panic nor overflow the buffer, and a frame that
+    /// comes after them, and after a pause, still arrives.
     #[test]
     fn hostile_bytes_are_survived(
         noise in proptest::collection::vec(
@@ -176,8 +176,8 @@ proptest! {
     }
 }
 
-/// The rule of the module's documentation, read off the whole stream: where each frame starts, and
-/// its sequence number.
+/// Reference implementation of the module's rule on a whole stream: start and sequence number of
+/// each frame.
 fn reference(stream: &[u8]) -> Vec<(usize, u8)> {
     let (mut found, mut at) = (Vec::new(), 0);
     while at < stream.len() {
@@ -203,7 +203,7 @@ fn reference(stream: &[u8]) -> Vec<(usize, u8)> {
     found
 }
 
-/// A frame of any version and length: of a known id, signed or not.
+/// A frame of a known id, of any version and length, signed or not.
 fn whole_frame() -> impl Strategy<Value = Vec<u8>> {
     let ids = MavMessage::all_ids();
     let payload = prop_oneof![
@@ -281,8 +281,8 @@ proptest! {
             stream.extend(frame);
         }
         let expected = reference(&stream);
-        // Two checksums of 16 bits agree by chance now and then; a signature's or a cut frame's
-        // candidates may too.
+        // Sometimes a wrong CRC of 16 bits is right by chance, also that of a candidate in a
+        // signature or a cut frame.
         let by_chance = expected.iter().any(|(at, _)| !starts.contains(at));
         for at in &starts {
             prop_assert!(
@@ -293,7 +293,7 @@ proptest! {
         let (mut framer, mut got, mut rest) = (Framer::new(), Vec::new(), &stream[..]);
         for (step, chunk) in chunks.iter().cycle().enumerate() {
             let (now, later) = rest.split_at((*chunk).min(rest.len()));
-            // All within the lifetime of a partial frame.
+            // All bytes arrive within the lifetime of a partial frame.
             got.extend(drain(&mut framer, Instant::from_micros(step as u64), now));
             rest = later;
             if rest.is_empty() {
@@ -305,8 +305,8 @@ proptest! {
         prop_assert_eq!(framer.expires_at(), None);
     }
 
-    /// A frame is given out at most a lifetime and an eighth after its last byte, whatever precedes
-    /// it and however slowly bytes come.
+    /// A frame is returned at most 9/8 of a lifetime after its last byte, whatever precedes it and
+    /// however slowly bytes arrive.
     #[test]
     fn a_frame_is_held_back_for_a_lifetime_at_most(
         before in proptest::collection::vec(garbage(), 0..8),
@@ -319,7 +319,7 @@ proptest! {
         let mut framer = Framer::new();
         let mut now = Instant::ZERO;
         for (i, byte) in stream.iter().enumerate() {
-            // The garbage slowly, the frame at once, and then a stream that continues.
+            // The garbage arrives slowly, the frame at once.
             now = now + Duration::from_micros(if i < garbage.len() { gap_us } else { 0 });
             let got = drain(&mut framer, now, &[*byte]);
             prop_assert!(got.is_empty() || i + 1 == stream.len());
@@ -340,7 +340,7 @@ proptest! {
 #[test]
 fn a_false_start_costs_no_frame_behind_it() {
     let ten: Vec<u8> = (0..11).flat_map(heartbeat).collect();
-    // The second start is that of an unknown id, as long as ten heartbeats.
+    // The second start byte begins a frame of unknown id, as long as ten heartbeats.
     let len = (10 * heartbeat(0).len() - 2) as u8;
     let garbage = [V1_START, 5, V2_START, len, 0, 0, 1, 7, 1, 0xF0, 0xF0, 0xF0];
     let mut framer = Framer::new();

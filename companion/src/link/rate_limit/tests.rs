@@ -1,4 +1,4 @@
-//! The radio gets what the rate limit says, whatever is asked.
+//! The radio gets no more bytes than the rate limit allows, whatever is requested.
 
 extern crate std;
 use std::vec::Vec;
@@ -17,7 +17,7 @@ use crate::testing::fake_autopilot::*;
 use crate::testing::fake_flash::{Flash, execute, started};
 use crate::{Duration, Link, State};
 
-/// A ground station that asks for everything at once by the radio.
+/// A companion, and a ground station that requests everything at once by the radio.
 struct Greedy {
     bench: Bench,
     flash: Flash,
@@ -25,9 +25,9 @@ struct Greedy {
     packet: u16,
     /// Bytes that went to the radio, and when.
     sent: Vec<(Instant, usize)>,
-    /// Intents among them, and reports of a coverage mission.
+    /// Number of TUNNEL messages sent: intents, and reports of a coverage mission.
     reported: usize,
-    /// Roster reports among them.
+    /// Number of roster reports sent.
     rosters: usize,
 }
 
@@ -62,7 +62,7 @@ impl Greedy {
             target_component: crate::COMPANION_COMPONENT,
         });
         self.ask(&TIMESYNC_DATA { tc1: 0, ts1: 5 });
-        // A listing: any answer of the file server is as long as a frame can be.
+        // A request to list files: each FTP answer is as long as a frame can be.
         self.packet = self.packet.wrapping_add(1);
         let mut payload = [0; 251];
         payload[..2].copy_from_slice(&self.packet.to_le_bytes());
@@ -93,7 +93,7 @@ impl Greedy {
         }
     }
 
-    /// So many seconds in which all is asked for forty times each.
+    /// Runs for `seconds`, in each of which everything is requested forty times.
     fn run(&mut self, seconds: u32) {
         (self.reported, self.rosters, self.bench.swarm) = (0, 0, Vec::new());
         self.sent.clear();
@@ -207,7 +207,7 @@ fn state_is_as_long_as_said() {
         bench.bench.tick();
     }
     bench.drain();
-    // Ten seconds; this plan has fewer points than an intent holds.
+    // The bytes of ten seconds; intents of this plan have fewer than the most points.
     assert!(
         bench.bytes() <= 10 * state_bytes_per_s(HZ)
             && bench.bytes() > 10 * state_bytes_per_s(HZ) / 3,

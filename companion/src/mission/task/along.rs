@@ -19,6 +19,6 @@ pub(crate) struct PathProgress {
     pub(crate) progress_m: f32,
     /// Distance of the reference along that path, metres: where a vehicle that holds comes to rest.
     pub(crate) reference_m: f32,
-    /// Which path that is.
+    /// Relation of that path to the path of the plan.
     pub(crate) place: PathRelation,
 }

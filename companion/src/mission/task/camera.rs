@@ -41,7 +41,8 @@ const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 /// A camera command to the autopilot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum CameraCommand {
-    /// Take a picture now, and one after each such distance, metres; at 0 no more after the first.
+    /// Take a picture now, then one after each distance of this many metres; with 0 only the one
+    /// now.
     Every(f32),
     /// Stop taking pictures.
     Off,
@@ -76,8 +77,8 @@ pub(super) struct CameraControl {
     beside_m: f32,
     /// Which path the vehicle flies.
     place: PathRelation,
-    /// The trigger between the first picture of a stretch, or of a detour, and the last: by
-    /// distance the autopilot's is on. `None` elsewhere.
+    /// The trigger in use from the first picture of a stretch or detour to the last; with
+    /// [`Trigger::Distance`] the autopilot's trigger is on. `None` elsewhere.
     running: Option<Trigger>,
     commands: Deque<CameraCommand, MAX_COMMANDS>,
     /// Number of commands sent since the last answer, repetitions included, and (`sent_at`) when
@@ -124,9 +125,9 @@ impl CameraControl {
         (before, along.place) == (PathRelation::OnPath, PathRelation::Elsewhere)
     }
 
-    /// Begins another path, once the queued commands are sent. A vehicle that holds where a picture
-    /// is due takes it now: the autopilot's trigger may lag behind the last pictures, and is
-    /// switched off.
+    /// Begins another path; commands that are still queued are sent first. A vehicle that holds
+    /// where a picture is due takes it now: the autopilot's trigger may lag behind the last
+    /// pictures, and is switched off.
     pub(super) fn begin_path(&mut self) {
         match self.due.take() {
             Some(Trigger::Distance) => self.queue_command(CameraCommand::Every(0.0)),
@@ -160,8 +161,8 @@ impl CameraControl {
         }
     }
 
-    /// On a detour beside the path pictures are taken at the path's spacing, even where the path
-    /// has none.
+    /// On a detour beside the path pictures are taken at the path's spacing, even beside parts of
+    /// the path without pictures.
     fn photograph_whole_detour(&mut self, photographs: &PicturePlan, progress_m: f32) {
         let spacing_m = photographs.spacing_m;
         if photographs.trigger == Trigger::Distance {
@@ -184,7 +185,8 @@ impl CameraControl {
             Trigger::Distance => shots.from_m,
             _ => shots.picture_at_m(self.picture),
         };
-        // A vehicle holds once its setpoint stands, up to a metre before it is there itself.
+        // A vehicle counts as holding once its setpoint stands; it may still be up to a metre short
+        // of it.
         self.due = Some(trigger).filter(|_| along.reference_m >= next_m - HELD_WITHIN_M);
         if progress_m < shots.from_m {
             self.switch_off();
@@ -218,7 +220,7 @@ impl CameraControl {
 
     fn queue_command(&mut self, order: CameraCommand) {
         // The queue is full while the autopilot is silent: drop the oldest command, whose place is
-        // farthest away. Its tries count for the next, so that the silence is reported.
+        // farthest away. Its tries count for the next command, so that the silence is reported.
         if self.commands.is_full() {
             self.commands.pop_front();
             self.sent_at = None;

@@ -1,5 +1,5 @@
-//! A burst: one request that is answered by several packets, each as if it had been requested by
-//! itself.
+//! A burst: one request that is answered by several packets, each as if it had been requested
+//! alone.
 
 use super::packet::{Request, chunk_len};
 

@@ -1,4 +1,5 @@
-//! The FTP server against a client over a bad link: requests and answers lost, repeated, overtaken.
+//! The FTP server with a client over a bad link that loses, repeats and reorders requests and
+//! answers.
 
 extern crate std;
 
@@ -128,7 +129,7 @@ fn what_is_asked_wrongly_is_refused_as_the_protocol_says() {
     assert_eq!(listed, b"Fmission.bin\t396\0");
     no(world.ask(0, op::LIST, 1, b"/"), 6);
     no(world.ask(0, op::TRUNCATE, 0, b"mission.bin"), 9);
-    // A session of another client is not taken from it while it is alive.
+    // Another client cannot take over a session that is in use.
     let opened = world.ask(0, op::CREATE, 0, b"roadmap.bin");
     assert_eq!(world.ask(opened.session, op::WRITE, 1 << 20, &[1; 50]).data, [2, EFBIG]);
     world.client = (254, 1);
@@ -158,7 +159,7 @@ fn a_damaged_upload_keeps_the_old_file_and_says_so() {
     assert_eq!(world.download("roadmap.bin", 239), old);
 }
 
-/// A field of heights of so many rows.
+/// A field of heights of `rows` rows.
 fn field_file(rows: u16) -> Vec<u8> {
     let shape = FieldShape { low: Flat::new(-20.0, 10.0), cell_m: 5.0, columns: 31, rows };
     let heights: Vec<i16> = (0..31 * rows as i16).map(|node| 3 * node - 400).collect();
@@ -183,7 +184,7 @@ fn a_field_goes_into_its_slots_in_turn_and_a_damaged_one_keeps_the_old() {
             let extent = world.store.roadmap().expect("it is in a slot");
             slots.push(extent.start / LAYOUT.slot_len);
             assert_eq!(bytes_at(&world.flash, Some(extent)), Some(&file[..]));
-            // Whatever byte is damaged, and a file of another kind.
+            // Files with any byte damaged, and a file of another kind, are refused.
             let refused = [10, file.len() / 2, file.len() - 1].map(|at| {
                 let mut damaged = field_file(rows + 1);
                 damaged[at] ^= 0x10;
@@ -222,7 +223,8 @@ fn nothing_is_erased_while_armed() {
     assert_eq!((refused.opcode, refused.data), (NAK, vec![9]));
     assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
     world.heard.clear();
-    // What was asked before that was known waits, and is refused once it is.
+    // A request that comes before the arming state is known waits, and is refused once the vehicle
+    // is known to be armed.
     world.erasing = ErasePermission::NotYet;
     let opens = world.packet(0, op::CREATE, 11, 0, b"roadmap.bin");
     world.send(&opens);
@@ -239,8 +241,8 @@ fn nothing_is_erased_while_armed() {
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
 }
 
-/// Asks, and again after 4 s each, under the same sequence number or a new one; the answers'
-/// opcodes.
+/// Sends a request three times, 4 s apart, with the same sequence number or new ones. Returns the
+/// opcodes of the answers.
 fn ask_three_times(world: &mut World, renumbers: bool, opcode: u8, data: &[u8]) -> [u8; 3] {
     let mut request = world.packet(0, opcode, data.len() as u8, 0, data);
     [(); 3].map(|()| {
@@ -282,7 +284,7 @@ fn an_upload_after_a_download_of_the_same_numbers_is_stored() {
     world.restart();
     world.sequence = 100;
     assert_eq!(world.download("roadmap.bin", 239), old);
-    // Its TerminateSession has the number of the download's.
+    // The TerminateSession of this upload has the sequence number of the download's.
     world.sequence -= 2 + new.chunks(239).len() as u16;
     world.heard.clear();
     assert_eq!(world.upload("roadmap.bin", &new, 239).opcode, ACK);
@@ -297,7 +299,7 @@ fn what_came_of_an_earlier_request_of_the_same_number_is_not_told_of_a_later_one
         damaged[100] ^= 1;
         assert_eq!(world.upload("roadmap.bin", &damaged, 239).opcode, NAK);
         world.now = world.now + Duration::from_secs(pause);
-        // A client that was restarted counts from zero again, and hears no late answers.
+        // A restarted client counts sequence numbers from zero again, and receives no late answers.
         world.sequence = 0;
         world.heard.clear();
         assert_eq!(world.upload("roadmap.bin", &good, 239).opcode, ACK, "{pause} s later");
@@ -329,7 +331,7 @@ fn any_packets_in_any_order_are_survived() {
             let offset = world.rng.next_u32() >> (world.rng.next_u32() % 32);
             let size =
                 if world.chance(200) { name.len() as u8 } else { world.rng.next_u32() as u8 };
-            // Removing is what it says it is; here everything else must leave the file alone.
+            // All requests but a removal must leave the file as it is.
             if opcode != op::REMOVE {
                 let packet = world.packet(session, opcode, size, offset, name);
                 world.send(&packet);

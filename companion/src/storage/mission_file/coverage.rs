@@ -1,8 +1,8 @@
 //! The coverage block of a mission file: the area, how it is photographed, and each vehicle's share
-//! (CPP §3); `companion/README.md` lists it byte by byte.
+//! (paper CPP §3); `companion/README.md` lists it byte by byte.
 //!
 //! Lanes, routes and flights are not in the file: each companion computes them from these numbers.
-//! The shares W of POWELL are computed on the host.
+//! The shares W of POWELL-BINPAT (paper CPP §3.2.3) are computed on the host.
 
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind};
@@ -167,9 +167,9 @@ pub struct CoverageView<'a> {
     vertices: &'a [[u8; VERTEX_LEN]],
 }
 
-/// Time, beside its flight, after which a vehicle that no other vehicle hears any more is on the
-/// ground, seconds: its lease, age and delay of the last message, the stop, the wait of the row
-/// `Alone`, and the slow end of a descent.
+/// Time, in addition to that of its descent, after which a vehicle that no other vehicle hears any
+/// more is on the ground, seconds: its lease, age and delay of the last message, the stop, the wait
+/// of the row `Alone`, and the slow end of a descent.
 const UNHEARD_DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {

@@ -16,7 +16,7 @@ use crate::config::GROUND_STATIONS;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MissionHeader {
     /// CRC-32 of the roadmap file that the mission was made for; in a coverage mission over uneven
-    /// ground of the field.
+    /// ground, of its field of heights.
     pub roadmap_crc: u32,
     /// Rule by which goals are assigned to vehicles.
     pub mode: GoalMode,

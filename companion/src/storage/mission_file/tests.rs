@@ -1,4 +1,4 @@
-//! The mission file: what is written comes back, what is not sound is refused by name.
+//! The mission file: values that were written are read back, and invalid ones are refused by name.
 
 extern crate std;
 use std::vec;
@@ -71,7 +71,7 @@ fn all_vehicles_know_the_slowest_and_the_fastest_of_the_mission() {
     }
 }
 
-/// A file with bytes changed and the CRC made right again.
+/// A file with changed bytes and a corrected CRC.
 fn forged(at: usize, bytes: &[u8]) -> List<u8> {
     let mut file = file();
     file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -99,7 +99,7 @@ fn comes_back_as_written() {
     assert_eq!(MissionView::parse(&whole).unwrap().crc(), view.crc(), "as it lies in flash");
 }
 
-/// A roadmap of so many starts and goals, without edges.
+/// A roadmap with these numbers of starts and goals, without edges.
 fn roadmap(starts: u16, goals: u16) -> List<u8> {
     let header = RoadmapHeader {
         origin: header().origin,
@@ -234,8 +234,8 @@ fn a_text_has_room_for_why_a_mission_is_refused() {
     }
 }
 
-/// The mission of [`file`] byte by byte as version 1 or 2 was laid out, by no code that writes
-/// files today.
+/// The mission of [`file`] in the layout of version 1 or 2, byte by byte, independent of the code
+/// that writes files.
 fn old_file(version: u8) -> List<u8> {
     let f32s = |numbers: &[f32]| -> List<u8> {
         numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
@@ -244,7 +244,7 @@ fn old_file(version: u8) -> List<u8> {
     out.extend([version, 0, 104, 0, 236, 0, 0, 0, 0x78, 0x56, 0x34, 0x12]);
     // Least makespan, priority, a geofence; three vehicles, two goals.
     out.extend([2, 2, 1, 0, 3, 0, 2, 0]);
-    // Reserved in version 1.
+    // Ground stations; reserved bytes in version 1.
     out.extend(if version == 1 { [0; 4] } else { [255, 0, 245, 9] });
     out.extend([40.3327f64, -3.7659, 700.0].iter().flat_map(|number| number.to_le_bytes()));
     out.extend(f32s(&[2.0, 1.0, 1.5, 2.0, 1.75, -5.0, -5.0, 0.0, 50.0, 30.0, 60.0, 1.8]));
@@ -274,7 +274,7 @@ fn files_of_versions_1_and_2_are_read_with_their_values() {
         assert_eq!((config.check(), config.ground_stations), (Ok(()), ground_stations));
         assert_eq!((config.mission_crc, config.geofence), (view.crc(), header().geofence));
     }
-    // What version 1's reserved bytes hold does not count, and version 2 has no coverage missions.
+    // The bytes reserved in version 1 are ignored.
     let reserved = forged(8, &[1]);
     let config = MissionView::parse(&reserved).unwrap().companion_config::<3>(2).unwrap();
     assert_eq!(config.ground_stations, [255, 0, 0, 0]);

@@ -3,11 +3,11 @@
 //!
 //! | offset | word of 32 bytes | programmed |
 //! |---|---|---|
-//! | 0 | "clean" | after all sectors of the area were erased: an erasure that was cut has none |
 //! | 0 | "clean" | after all sectors of the area were erased; an interrupted erasure leaves none |
 //! | 32 | "used" | before anything else is written to the area |
 //! | 64 | seal: sequence number, length and CRC of the data | last of all, after the data was read back |
 //! | 256 | data | between "used" and the seal |
+//!
 //! A word whose programming was interrupted may read as anything, or not at all. So no decision
 //! relies on one such word: a seal counts only with its CRC, and an area is written only if it is
 //! marked "clean" and not "used".
@@ -78,7 +78,8 @@ pub fn seal_mark(layout: &FlashLayout, area: FlashArea, seal: &Seal) -> WordToPr
     (area.offset(layout) + SEAL_OFFSET, seal.to_bytes())
 }
 
-/// Seal of a complete area: sequence number, and of a slot's file the length, CRC and kind.
+/// Seal of a complete area: its sequence number; for a slot also the length, CRC and kind of its
+/// file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seal {
     /// Sequence number; of two slots or halves the higher one is newer.
@@ -152,8 +153,8 @@ impl AreaCondition {
     }
 }
 
-/// The condition of an area in flash by its three marks; a slot's whole file is read to check its
-/// CRC.
+/// The condition of an area, read from its three marks in flash; a slot's whole file is read to
+/// check its CRC.
 pub fn read_condition(
     layout: &FlashLayout,
     area: FlashArea,

@@ -4,7 +4,7 @@
 use planner_core::file::CRC32;
 
 /// Bytes of a flash word of the H743: programmed together, and after a power loss complete or torn.
-/// The words of other boards' flash are smaller and divide it.
+/// The words of other boards' flash are smaller, and their length divides this one.
 pub const WORD: usize = 32;
 /// Most bytes that one request programs: a page of the RP2350's flash.
 pub const MAX_PROGRAM: usize = 256;
@@ -34,8 +34,8 @@ pub struct FlashLayout {
     pub slot_len: u32,
     /// Length of a half of the journal, bytes: whole sectors.
     pub half_len: u32,
-    /// Whether the processor stands still while the flash is programmed: then it is programmed only
-    /// where erasing is not forbidden, on the ground.
+    /// Whether the processor stands still while the flash is programmed: then it is erased and
+    /// programmed only where [`ErasePermission`] is not `Forbidden`, on the ground.
     pub stalls: bool,
 }
 
@@ -62,7 +62,7 @@ impl FlashLayout {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FlashFault;
 
-/// The flash at the start, when it may be read directly: nothing flies that would have to wait.
+/// Direct reads of the flash while the board starts: nothing flies yet that would have to wait.
 pub trait ReadFlash {
     /// Reads bytes from an offset of the storage bank.
     ///

@@ -1,5 +1,5 @@
-//! Records of the journal while they are written: the next one, or copies of those that count to
-//! the other half when the first is full.
+//! Records of the journal while they are written: the next new record or, once a half is full,
+//! copies of the records that count to the other half.
 
 use super::flash::WORD;
 use core::ops::Range;

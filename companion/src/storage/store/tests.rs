@@ -140,7 +140,7 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
     assert_eq!(store.take_piece(24 << 10, &[0; 1]), PieceOutcome::TooLarge);
 }
 
-/// Does what the store asks for while armed, which must be reading alone.
+/// Executes the requests of the store while armed: only reads are allowed.
 fn run_armed(store: &mut Store, flash: &mut Flash) {
     let mut read = [0; MAX_READ];
     while let Some(request) = store.poll_request(ErasePermission::Forbidden) {
@@ -162,7 +162,7 @@ fn a_flash_that_stalls_only_reads_while_armed() {
     for file in File::ALL {
         assert_eq!(store.open_upload(file, ErasePermission::Forbidden), Err(UploadError::Armed));
     }
-    // A parameter is kept when it is over.
+    // A parameter is stored once the vehicle is disarmed.
     store.set_parameter(0, 3.5).unwrap();
     run_armed(&mut store, &mut flash);
     assert!(store.is_unsaved());
@@ -170,7 +170,7 @@ fn a_flash_that_stalls_only_reads_while_armed() {
     run_armed(&mut store, &mut flash);
     run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
     assert!(!store.is_unsaved());
-    // Armed at any moment of an upload: nothing is programmed, and it continues when it is over.
+    // Armed at any moment of an upload: nothing is programmed until the vehicle is disarmed again.
     let pieces: Vec<_> = road.chunks(239).collect();
     for armed_at in 0..=pieces.len() {
         let mut flash = Flash::new(2);
@@ -213,7 +213,7 @@ fn nothing_is_erased_while_armed() {
     assert!(store.is_unsaved(), "there is no clean half to keep it in yet");
     run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
     assert!(!store.is_unsaved());
-    // With areas erased ahead, parameters are kept and a roadmap is taken in while armed.
+    // With areas erased ahead of time, parameters and a roadmap are stored while armed.
     store.set_parameter(0, 3.5).unwrap();
     run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
     let road = roadmap(50);
@@ -305,7 +305,7 @@ fn cut_anywhere(
         assert!(store.parameters().get(0).unwrap().1 == 1.5, "never asked to keep it");
         store.set_parameter(0, 1.0).unwrap();
         run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
-        // How many words the change takes, from a first go without a cut.
+        // Counts the words that the change programs, by a first run without a cut.
         let (bytes, torn, rng) = (flash.bytes.clone(), flash.torn.clone(), flash.rng.clone());
         let begun = flash.programmed;
         change(&mut Store::mount(LAYOUT, &mut flash), &mut flash).expect("the power is on");
@@ -314,7 +314,7 @@ fn cut_anywhere(
         flash.power = Some(flash.rng.next_u32() % words);
         change(&mut Store::mount(LAYOUT, &mut flash), &mut flash).expect_err("the power goes");
         flash.power = None;
-        // Some boards are cut again while they tidy up.
+        // In every third case the power is cut again while the store cleans up.
         if cut % 3 == 0 {
             flash.power = Some(flash.rng.next_u32() % 40);
             let mut store = Store::mount(LAYOUT, &mut flash);
@@ -332,7 +332,7 @@ fn cut_anywhere(
         let value = store.parameters().get(0).unwrap().1;
         assert!(value == 1.0 || value == 2.0, "cut {cut}: {value}");
         found[usize::from(is_new)] += 1;
-        // And everything still works.
+        // Uploads still work.
         assert_eq!(
             upload(&mut store, &mut flash, File::Roadmap, &new_road, 239).unwrap(),
             Ok(()),
@@ -416,7 +416,7 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
 #[test]
 fn an_upload_waits_until_it_is_known_whether_the_vehicle_is_armed() {
     for (file, bytes) in [(File::Roadmap, roadmap(60)), (File::Mission, mission(3))] {
-        // As it comes: nothing was erased ahead of time.
+        // A flash as delivered: nothing was erased ahead of time.
         let mut flash = Flash::new(77);
         let mut store = Store::mount(LAYOUT, &mut flash);
         store.open_upload(file, ErasePermission::NotYet).expect("it may be allowed yet");
@@ -482,7 +482,7 @@ fn a_roadmap_that_cannot_be_used_is_refused_or_given_up_for_the_one_before() {
     let old = roadmap(60);
     upload(&mut store, &mut flash, File::Roadmap, &old, 239).unwrap().unwrap();
     store = started(&mut flash);
-    // Another version of the format, its CRC right.
+    // Another version of the format, with a valid CRC.
     let mut other = roadmap(80);
     other[8] += 1;
     let covered = other.len() - 4;

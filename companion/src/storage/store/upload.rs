@@ -54,7 +54,8 @@ impl Store {
     }
 
     /// Ends an upload whose pieces were all sent: checks the file and starts to store it.
-    /// [`Self::upload_state`] becomes `Ended`.
+    /// [`Self::upload_state`] becomes `Closing`, then `Ended`; at once `Ended` for a file that is
+    /// incomplete or damaged.
     pub fn finish_upload(&mut self) {
         let Some((file, UploadState::Taking)) = self.upload else { return };
         let state = match (file, self.reassembly.last_part()) {

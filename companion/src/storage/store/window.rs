@@ -3,8 +3,8 @@
 
 use super::flash::MAX_PROGRAM;
 
-/// Bytes of the reassembly window: a mission file fits in it, a roadmap passes through. With a bit
-/// for each byte 4.5 kB.
+/// Bytes of the reassembly window: a mission file fits in it, a roadmap passes through. With one
+/// mark bit per byte the reassembly takes 4.5 kB.
 pub const WINDOW_LEN: usize = 4096;
 
 /// What became of a piece of an upload.
@@ -26,7 +26,7 @@ pub struct UploadReassembly {
     marks: [u64; WINDOW_LEN / 64],
     /// Offset in the file of the window's first byte; a multiple of [`MAX_PROGRAM`].
     front: u32,
-    /// Greatest end of a piece in the file.
+    /// End of the furthest piece received, as an offset in the file.
     high: u32,
 }
 

@@ -34,8 +34,8 @@ pub(crate) enum RetryOutlook {
 }
 
 impl Detours {
-    /// Whether a blocked vehicle in a coverage mission is held no longer, by a gate or by the
-    /// safety filter: what blocked its path has come down.
+    /// Whether a blocked vehicle in a coverage mission is no longer held by a gate or by the safety
+    /// filter: what blocked its path has come down.
     pub(super) fn is_freed_over_area<const V: usize, const W: usize, const G: usize>(
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
@@ -102,14 +102,14 @@ impl Detours {
         self.request_read
     }
 
-    /// Whether the last failed search is long enough ago for the next. The number of failures alone
-    /// makes no pause: while a silent vehicle comes down it does not grow.
+    /// Whether the last failed search is long enough ago for the next one. A delay by the number of
+    /// failures is not enough: that number stops growing while a silent vehicle comes down.
     pub(super) fn may_search_again(&self, now: Instant) -> bool {
         now - self.failed_at >= Duration::from_secs(DETOUR_RETRY_S)
     }
 
-    /// Where the path that is requested begins: on the path, or for a landing aside where the
-    /// setpoint stands. Held far from its path, the vehicle may not be able to fly to that first.
+    /// Where the requested path begins: at the reference, or for a landing aside where the setpoint
+    /// stands. A vehicle that is held far from its path may not be able to fly to the path first.
     pub(crate) fn start_of_detour<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -190,8 +190,8 @@ impl Detours {
     }
 
     /// Makes the path that has come for `purpose` the one flown. `progress_m` is the progress on
-    /// the path before, which last grew at `progress_at`: a detour on which that is longer than
-    /// [`STUCK_AFTER`] ago counts as one without progress.
+    /// the path before, which last grew at `progress_at`. If the path before was a detour and its
+    /// progress last grew longer than [`STUCK_AFTER`] ago, it counts as a detour without progress.
     pub(crate) fn begin_detour(
         &mut self,
         purpose: DetourPurpose,
@@ -219,8 +219,8 @@ impl Detours {
         };
     }
 
-    /// Notes that there is no free place on the plan's path to come back to, so that no detour can
-    /// be requested.
+    /// Notes that there is no free place on the plan's path to return to, so that no detour can be
+    /// requested.
     pub(crate) fn note_no_rejoin_place(&mut self, now: Instant) {
         self.area_searches.note_failure(now);
     }

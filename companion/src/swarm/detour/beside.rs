@@ -2,15 +2,15 @@
 //! beyond it.
 //!
 //! The vehicle stops, requests from its shell the way to the first free place of its path beyond
-//! the obstacle, flies it beside the plan, and then requests its own plan again, to continue from
-//! there. It keeps its part of the area: its progress stays where it left its path until it is
-//! back, and others wait for it. It comes back no further than its gates are open. From under a
+//! the obstacle, and flies it beside the plan. Then it requests its own plan again, to continue
+//! from there. It keeps its part of the area: until it is back, its progress stays where it left
+//! its path, and others wait for it. It rejoins no further on than its gates are open. From below a
 //! vehicle that descends it first flies aside, and seeks the way back from there: to where it left
-//! its path, or beyond that if that place stays barred.
+//! its path, or to beyond the block if that place stays barred.
 //!
-//! ENU metres. Constant work but for [`is_barred`], which asks for the places of all others, and
-//! [`first_rejoin_m`], once an attempt each: at most [`MAX_SAMPLES`] places on the path, each
-//! compared with [`MAX_ZONES`] zones.
+//! ENU metres. Constant work except for [`is_barred`], which visits the zones of all others, and
+//! [`first_rejoin_m`], called once for each attempt: at most [`MAX_SAMPLES`] places on the path,
+//! each compared with [`MAX_ZONES`] zones.
 
 use heapless::Vec;
 use planner_core::detour::{KeepOutZone, ZoneKind};
@@ -19,17 +19,19 @@ use planner_core::{Length, Point};
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
-/// Deviation, metres: a neighbour within the safety distance plus this of the path blocks it.
+/// Deviation of a vehicle from its path, metres: a neighbour within the safety distance plus this
+/// of the path blocks it.
 pub(super) const BLOCKED_WITHIN_M: f32 = 0.25;
-/// Distance beyond where the vehicle can stop within which a keep-out zone blocks its path, metres:
-/// what of the path is before that, it photographs, and no more of it than this is cut off by the
-/// detour. As far as 15 m/s lead while the zones of 32 vehicles are compared with the path.
+/// Distance beyond where the vehicle can stop within which a keep-out zone blocks its path, metres.
+/// The vehicle photographs the path up to its stop, and the detour cuts off no more than this of
+/// the rest. It is the distance flown at 15 m/s while the zones of 32 vehicles are compared with
+/// the path.
 const BLOCKED_BEYOND_STOP_M: f32 = 8.0;
-/// Further distance within which it stays blocked once it is, metres: where the vehicle stops a
-/// little sooner than expected.
+/// Added to [`BLOCKED_BEYOND_STOP_M`] once the path is blocked, metres: the vehicle may have
+/// stopped a little sooner than expected.
 const STAYS_BLOCKED_BEYOND_M: f32 = 4.0;
-/// Distance ahead along the path within which zones count for the place where a detour returns to
-/// it, metres.
+/// Distance from the vehicle within which zones count, and along the path within which a block is
+/// searched, for the place where a detour returns to the path, metres.
 const LOOK_AHEAD_M: f32 = 60.0;
 /// Margin beyond the safety distance on a detour, metres: a zone that deviates a little does not
 /// block the detour again.
@@ -76,8 +78,9 @@ impl AreaDetourSearches {
     }
 }
 
-/// How near to the path a zone blocks it, and how far beyond where the vehicle can stop, metres;
-/// `waits`: it is blocked already.
+/// Distance from the path within which a zone blocks it, beyond the safety distance, and distance
+/// beyond where the vehicle can stop up to which that counts, metres. `waits`: the path is blocked
+/// already.
 pub(super) const fn blocking_distances_m(waits: bool) -> [f32; 2] {
     if waits {
         [DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + STAYS_BLOCKED_BEYOND_M]
@@ -86,7 +89,7 @@ pub(super) const fn blocking_distances_m(waits: bool) -> [f32; 2] {
     }
 }
 
-/// Number of sources that [`zones_of_source`] knows: two for each neighbour.
+/// Number of sources for [`zones_of_source`]: two for each neighbour.
 fn source_count<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
 ) -> usize {

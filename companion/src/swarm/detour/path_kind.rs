@@ -1,7 +1,7 @@
 //! The path that a vehicle flies, and the path that it seeks: one value each.
 //!
-//! A path is sought from the request to the shell until it comes, or the vehicle leaves the state
-//! in which it waits for it. A path that has come is flown for the purpose for which it was
+//! A path is sought from the request to the shell until the path comes, or the vehicle leaves the
+//! state in which it waits for it. A path that has come is flown for the purpose for which it was
 //! requested.
 
 use planner_core::Point;
@@ -19,8 +19,8 @@ pub(crate) struct RejoinPlace {
 pub(crate) struct RejoinPlaces {
     /// Place where the vehicle left its path, or where it is to hold for a division.
     pub own: RejoinPlace,
-    /// First free place beyond the block when the vehicle left, used if `own` stays barred; equal
-    /// to `own` where there was none.
+    /// First free place beyond the block as it was when the vehicle left, used if `own` stays
+    /// barred; equal to `own` where there was none.
     pub beyond: RejoinPlace,
 }
 

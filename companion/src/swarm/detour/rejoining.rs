@@ -8,7 +8,7 @@ use crate::swarm::view::DetourView;
 use crate::time::Duration;
 
 /// Time for which a vehicle aside waits until the place where it left its path is free, seconds:
-/// less than until it flies home.
+/// less than the time after which it flies home.
 const MAX_BARRED_WAIT_S: u64 = 60;
 /// Time for which a vehicle aside seeks a way to the place where it left its path, once that is
 /// free, seconds.
@@ -70,9 +70,9 @@ impl Detours {
         self.path_kind.purpose().and_then(|purpose| purpose.rejoin())
     }
 
-    /// Place where a vehicle aside comes back to its path now: where it left that; or beyond the
-    /// block, once that place has been barred, or no way to it was found, for too long. `None`
-    /// while it waits for that place to be free.
+    /// Place where a vehicle aside returns to its path now: where it left the path; or beyond the
+    /// block, once the first place has been barred, or no way to it was found, for too long. `None`
+    /// while the vehicle waits for that place to be free.
     pub(crate) fn rejoin_from_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,

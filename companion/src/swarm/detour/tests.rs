@@ -62,7 +62,7 @@ fn a_turn_is_claimed_before_it_is_taken_and_only_by_one() {
     while bench.companion.detours.claimed_since.is_none() {
         bench.run(0.05);
     }
-    // It claims; the other began to claim at the same time.
+    // This vehicle claims the turn; the other vehicle began to claim it at the same time.
     bench.neighbour = other(BLOCKED);
     bench.run(4.0);
     assert_eq!(bench.state(), State::Blocked, "two would begin at once");
@@ -74,7 +74,7 @@ fn a_turn_is_claimed_before_it_is_taken_and_only_by_one() {
     bench.run_until(State::Follow, 1.0);
 }
 
-/// On its path, beside a vehicle with a lower system id.
+/// A vehicle that follows its path, with a second vehicle of a lower system id.
 fn beside_a_lower_id() -> Bench {
     let mut config = two_vehicles();
     config.roster[1].system_id = 7;
@@ -96,7 +96,7 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
         bench.companion.detours.is_waiting(&bench.companion.detour_view())
             && bench.state() == State::Blocked
     );
-    // It flies: what was quiet is not any more.
+    // The other vehicle flies its detour: not all stand any more.
     bench.neighbour = other(ON_DETOUR);
     bench.run(1.0);
     bench.neighbour = other(BLOCKED | WAITING);
@@ -145,7 +145,7 @@ fn who_died_may_have_been_flown_back_to_its_pad() {
     );
 }
 
-/// What is kept clear vehicle 77 half a minute on.
+/// Zones of vehicle 77, with these flags, after 30 s; with `moves` false its position stays old.
 fn kept_off(flags: u8, moves: bool) -> Vec<KeepOutZone> {
     let mut bench = Bench::started_with_neighbour(two_vehicles());
     let at = Point::new(8.0, 40.0, 9.0);
@@ -200,7 +200,7 @@ fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
     for tenth in 0..8 {
         let mut bench = Bench::new(two_vehicles());
         bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
-        // So many things beside the path that the one on it is checked in a later step.
+        // So many obstacles beside the path that the one on it is checked in a later step.
         for i in 0..MAX_OBSTACLES {
             exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
         }
@@ -257,7 +257,7 @@ fn who_was_flown_around_by_one_plan_is_looked_at_for_the_next() {
 #[test]
 fn a_look_among_many_takes_several_steps_and_finds_what_is_last() {
     let mut bench = Bench::following(config());
-    // The first ones are far beside the path; each costs a share of a step.
+    // The first obstacles are far from the path; each costs a share of a step.
     for i in 0..MAX_OBSTACLES - 1 {
         exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
     }

@@ -10,7 +10,7 @@ impl<const V: usize> Fleet<V> {
     pub(super) fn is_majority_of(ranks: u32, counted: u32) -> bool {
         let among = ranks & counted;
         let lowest = among & counted.wrapping_neg() != 0;
-        // All of them, as a rule: boards count bits in steps.
+        // Usually all of them: that test comes first, since boards count bits in a loop.
         among == counted || 2 * among.count_ones() + u32::from(lowest) > counted.count_ones()
     }
 
@@ -81,8 +81,8 @@ impl<const V: usize> Fleet<V> {
         self.knows_flight() || self.members.iter().any(ended)
     }
 
-    /// When the last of the vehicles that may be lost is down: of those that have been silent for
-    /// `MISSED_AFTER`. `None` if there is none.
+    /// When the last of the vehicles that have been silent for `MISSED_AFTER`, and so may be lost,
+    /// is down. `None` if there is none.
     pub(crate) fn last_down_at(&self) -> Option<Instant> {
         Some(self.down_at).filter(|at| *at > Instant::ZERO)
     }
@@ -101,8 +101,8 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Takes part again on the ground after this vehicle could not start, or no vehicle heard it,
-    /// once it can and no flight is under way.
+    /// Takes part again, on the ground, after this vehicle could not start or no vehicle heard it,
+    /// once it can start and no flight is under way.
     pub(super) fn rejoin_if_ready(&mut self, now: Instant, own: MemberStatus) {
         let RosterReportEntry { incarnation, status, .. } =
             self.members[usize::from(self.own)].entry;
@@ -116,15 +116,17 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Promises and holds where a division is under way or asked for, and commits to it once it is
-    /// agreed. This vehicle has the path of the last one.
+    /// Enters this vehicle's commitment and hold where a division is under way or asked for, and
+    /// makes the division binding once it is agreed. To be called only if this vehicle's path is
+    /// that of the last binding division.
     pub(super) fn step_division(&mut self, now: Instant, own: &OwnReport) {
         let is_alive = self.is_alive(usize::from(self.own));
         let asks = own.wants_division && is_alive && !self.divisions.is_full();
         if !self.is_dividing() && !asks {
             return;
         }
-        // This vehicle's promise, in its next report, also requests the division from the others.
+        // This vehicle's commitment, in its next report, also requests the division from the
+        // others.
         let entry = &mut self.members[usize::from(self.own)].entry;
         entry.commitment_dm = entry.commitment_dm.or(own.commitment_dm);
         entry.holds |= own.holds && entry.commitment_dm.is_some();

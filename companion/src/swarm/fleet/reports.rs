@@ -1,4 +1,5 @@
-//! What the vehicles of a fleet report to each other, and how a report changes what this one knows.
+//! What the vehicles of a fleet report to each other, and how a report changes a vehicle's
+//! knowledge.
 
 use super::{Fleet, FleetMember, INCARNATIONS, status_in_division};
 use crate::link::roster::{MAX_ENTRIES, MemberStatus, RosterReport, RosterReportEntry};
@@ -13,7 +14,7 @@ impl<const V: usize> Fleet<V> {
         self.note_flight(sender, roster.in_flight, roster.hears_flight);
         let here = self.divisions.len() as u8;
         // The sender may fly, or have flown, by another plan: before a restart, or without what was
-        // photographed meanwhile. Its divisions and places are none of this vehicle's plan.
+        // photographed meanwhile. Its divisions and places then belong to another plan than ours.
         let same_plan = roster.plan == self.plan;
         if same_plan && roster.divisions > here {
             let left = self.has_left(sender, roster);
@@ -51,9 +52,9 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Whether the sender of a report has left, as it says there or said before. A division that
-    /// only it had agreed to before it was cut off excludes nobody: it flew by that until its lease
-    /// ended, and the others divide what they had heard of it.
+    /// Whether the sender of a report has left, as this report or an earlier one says. A division
+    /// that only the sender had agreed to before it was cut off excludes nobody: the sender flew by
+    /// it until its lease ended, and the others divide what they had heard of the sender.
     fn has_left(&self, sender: usize, roster: &RosterReport) -> bool {
         let own = sender.checked_sub(usize::from(roster.first)).and_then(|i| roster.entries.get(i));
         let known = &self.members[sender].entry;
@@ -61,8 +62,8 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
-    /// then the others counted on that. Returns whether it did.
-    /// Where the sender has `left`, the others may meanwhile have counted on a later hash instead.
+    /// then the others counted on that. Returns whether it did so. Where the sender has `left`, the
+    /// others may meanwhile have counted on a later hash instead.
     fn adopt_division(&mut self, roster: &RosterReport, left: bool) -> bool {
         let here = self.divisions.len() as u8;
         if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
@@ -88,7 +89,8 @@ impl<const V: usize> Fleet<V> {
         self.introduced |= bit;
     }
 
-    /// Merges what another vehicle reports of the vehicle of this rank; `waits` as above.
+    /// Merges what another vehicle reports of the vehicle of this rank. `same`: the report is of
+    /// our plan and last division; `waits`: this vehicle was not started.
     fn merge_entry(&mut self, rank: usize, entry: &RosterReportEntry, same: bool, waits: bool) {
         let newer =
             entry.incarnation.wrapping_sub(self.members[rank].entry.incarnation) % INCARNATIONS;
@@ -124,7 +126,7 @@ impl<const V: usize> Fleet<V> {
         member.hash = 0;
     }
 
-    /// Handles the entry about this vehicle in another one's report.
+    /// Handles the entry about this vehicle in another one's report; `waits`: it was not started.
     fn handle_own_entry(&mut self, entry: &RosterReportEntry, waits: bool) {
         let flies = self.knows_flight();
         let own = &mut self.members[usize::from(self.own)].entry;
@@ -134,7 +136,7 @@ impl<const V: usize> Fleet<V> {
             (false, _) => {}
             // This vehicle was restarted: the others report its flight before.
             (true, true) if !flies => self.rejoin((entry.incarnation + 1) % INCARNATIONS),
-            // It was restarted in their flight, in which it is no new vehicle.
+            // This vehicle was restarted during the others' flight, in which it is no new vehicle.
             (true, true) => own.incarnation = entry.incarnation,
             (true, false) => (own.incarnation, self.excluded) = (entry.incarnation, true),
         }

@@ -1,5 +1,5 @@
 //! Fleets whose vehicles are started again, switched off and on, or started one after another, at
-//! random. Vehicles are points along a path of no end; what they agree by is the code that flies.
+//! random. Vehicles are points along an endless path; they agree by the code that flies.
 
 extern crate std;
 
@@ -54,7 +54,7 @@ impl Vehicle {
         }
     }
 
-    /// What its clock says now.
+    /// The time by the vehicle's own clock at `now`.
     fn clock(&self, now: Instant) -> Instant {
         Instant::ZERO + (now - self.booted)
     }
@@ -66,7 +66,7 @@ fn lately(now: Instant, at: Option<Instant>, most_ms: u64) -> bool {
 
 struct Swarm {
     vehicles: Vec<Vehicle>,
-    /// For each vehicle the others from which messages reach it, as bits.
+    /// For each vehicle, the others whose messages reach it, as bits.
     links: [u32; MOST],
     /// Share of the messages that are lost.
     loss: f32,
@@ -247,8 +247,8 @@ fn some_of(count: usize, bits: u32) -> Vec<usize> {
     if some.is_empty() { std::vec![bits as usize % count] } else { some }
 }
 
-/// One that no majority heard before the start leaves, and is a new vehicle once it is heard: by
-/// the plan that it holds, and without counting as lost those that it had heard all the time.
+/// A vehicle that no majority heard before the start leaves, and is a new vehicle once it is heard:
+/// by the plan that it holds. The vehicles that it had heard all the time do not count as lost.
 #[test]
 fn one_that_left_before_the_start_takes_part_again_by_its_plan() {
     let mut swarm = Swarm::new(3, 0.0, 1);
@@ -269,8 +269,8 @@ fn one_that_left_before_the_start_takes_part_again_by_its_plan() {
     assert_eq!([1, 2].map(|own| swarm.inputs(own).len()), [1, 1], "they divide");
 }
 
-/// One that sends and hears nobody is to leave its part: it is missed, so nobody comes down that
-/// could take the part over. Of two halves the one with the lowest id goes on, and is not missed.
+/// A vehicle that hears nobody is to leave its part: it counts as missing, so nobody that could
+/// take its part lands. Of two halves the one with the lowest id goes on, and is not missing.
 #[test]
 fn a_vehicle_that_hears_no_majority_is_missed_until_it_leaves() {
     for (deaf, heard_by) in [(2, 0b111), (0, 0b111), (1, 0b11), (0, 0b11)] {
@@ -292,8 +292,8 @@ fn a_vehicle_that_hears_no_majority_is_missed_until_it_leaves() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 300 } else { 600 }))]
 
-    /// One that nobody hears any more may be the only one that knows that all have agreed on a
-    /// division. Heard again, it goes on with the others. Once it has landed, they have divided
+    /// A vehicle that nobody hears any more may be the only one that knows that all agreed on a
+    /// division. Heard again, it goes on with the others. If it has landed, they have divided
     /// without it, or are about to: they fly on.
     #[test]
     fn a_division_that_only_one_cut_off_agreed_to_excludes_nobody(
@@ -326,7 +326,7 @@ proptest! {
         }
     }
 
-    /// What landed vehicles report of an earlier flight, places and divisions, is of its plan.
+    /// Places and divisions that landed vehicles report of an earlier flight belong to its plan.
     #[test]
     fn of_an_earlier_flight_nothing_counts(
         count in 2usize..=MOST, bits in any::<u32>(), seed in any::<u64>(), lossy in any::<bool>(),
@@ -357,7 +357,7 @@ proptest! {
     ) {
         let loss = if lossy { 0.3 } else { 0.0 };
         let mut swarm = Swarm::flown_and_left(count, loss, seed, PLANS[0]);
-        // Some are off until they come up; the others still stand as they landed.
+        // Some vehicles are off until their reset; the others stand as they landed.
         for own in (0..count).filter(|own| left >> own & 1 != 0) {
             swarm.vehicles[own].on = false;
         }
@@ -381,8 +381,8 @@ proptest! {
         }
     }
 
-    /// One that has finished or left, or was lost, is started again while others fly; then the
-    /// fleet falls apart. Of any two parts one at most is a majority and takes the other's part.
+    /// A vehicle that has finished or left, or was lost, is started again while others fly; then
+    /// the fleet is split. At most one part is a majority and takes the other's part of the area.
     #[test]
     fn one_started_again_in_the_flight_of_others_makes_no_second_majority(
         count in 3usize..=MOST, seed in any::<u64>(), lossy in any::<bool>(),
@@ -439,7 +439,7 @@ proptest! {
         part(&mut swarm);
         for second in 0..120 {
             swarm.run_s(1);
-            // By then each side's lease ended that a majority of it does not hear.
+            // By then the lease of each side that is no majority has ended.
             let holds = |own: &usize| {
                 let vehicle = &swarm.vehicles[*own];
                 !vehicle.waits
@@ -484,7 +484,7 @@ proptest! {
         let struck = swarm.below(count as u32) as usize;
         let progress_dm = swarm.vehicles[struck].progress_dm;
         swarm.reset(struck);
-        // Until it finds itself in the air it may hear others.
+        // Until the vehicle finds that it is in the air, it may hear others.
         (0..hears).for_each(|_| swarm.step());
         swarm.start(struck);
         swarm.end(struck, MemberStatus::Left);

@@ -7,7 +7,7 @@ use crate::time::Duration;
 pub const LEASE: Duration = Duration::from_secs(20);
 /// Greatest age of a neighbour's report that renews the lease.
 pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);
-/// Silence of a vehicle after which it counts as lost, and its share is divided among the others.
+/// Silence of a vehicle after which it counts as lost, and the others divide its share of the area.
 pub const SILENT_AFTER: Duration = Duration::from_secs(45);
 
 /// Time limits of a fleet. A vehicle without a lease lands after twice the lease.

@@ -37,13 +37,15 @@ pub(super) const STANDS_SHORT_M: f32 = 0.5;
 pub(super) const MAX_UNHEARD_FLIGHT_S: f32 = 75.0;
 /// Time for which an unheard vehicle stands on its path before it lands.
 pub(super) const UNHEARD_WAIT: Duration = Duration::from_secs(15);
-/// Silence after which a vehicle is on the ground, from the highest floors too: 50 m at 1.5 m/s.
+/// Silence after which a lost vehicle is on the ground, from the highest floors too: 50 m at 1.5
+/// m/s.
 pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
 /// Silence after which the column of a vehicle that left the plan in the air in a coverage mission
 /// is free again: the vehicle is down by then, whatever it flew there.
 pub(super) const COLUMN_KEPT_FOR: Duration = Duration::from_secs(600);
 /// Stretch of its path that an unheard vehicle may have flown, metres: the vehicle notices after
-/// [`HEARD_WITHIN`] and 1 s, and stops. Over an area it flies on as long as its lease allows.
+/// [`HEARD_WITHIN`] and 1 s, and stops. In a coverage mission it flies on as long as its lease
+/// allows.
 pub(super) const UNHEARD_STRETCH_M: f32 = 6.0;
 /// Growth of [`UNHEARD_STRETCH_M`] for each second that a message takes to another vehicle and
 /// back, m/s.
@@ -51,16 +53,16 @@ pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
 /// Silence after which a vehicle in a coverage mission may have landed further along its path than
-/// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `Alone` waits. No vehicle leaves the
-/// plan for that silence earlier.
+/// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `Alone` waits. No vehicle counts as out
+/// of the plan for a shorter silence.
 pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 /// Rounding of the length of a path of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
 /// Maximum number of spacings of the places on the unheard stretch in a coverage mission, where it
 /// is as long as the lease allows: with eight corners a neighbour makes 17 keep-out zones.
 pub(super) const STRETCH_PLACES: f32 = 8.0;
-/// Height of the column in which a vehicle lies somewhere on the ground, metres; the planner
-/// shortens the column where it knows the ground.
+/// Height of the column below a neighbour's place in which it may lie on the ground, metres; the
+/// planner shortens the column where it knows the ground.
 pub(super) const MAX_COLUMN_M: f32 = 60.0;
 /// Silence after which a vehicle in the air may land before it is heard again.
 pub(super) const MAY_LAND_AFTER: Duration = Duration::from_secs(3);
@@ -75,8 +77,8 @@ pub(super) const MAX_FALL_CARRY_MPS: f32 = 20.0;
 /// Greatest height from which a vehicle is assumed to fall, metres, whatever it reported: none
 /// flies higher.
 pub(super) const MAX_FALL_M: f32 = 150.0;
-/// Depth below a vehicle of known height to which its landing column reaches, metres: further below
-/// it there is time to leave later.
+/// Depth below a vehicle of known height to which its landing column reaches, metres: a vehicle
+/// further below has time to leave later.
 pub(super) const LANDING_COLUMN_DEPTH_M: f32 = 15.0;
 /// Greatest speed of a landing, m/s: the rate at which a landing column grows downwards while the
 /// vehicle's height is unknown.
@@ -85,16 +87,16 @@ pub(super) const MAX_LANDING_MPS: f32 = 2.0;
 pub(super) const MAX_HEIGHT_AGE_S: f32 = 1.0;
 /// [`MAX_HEIGHT_AGE_S`] as a duration.
 pub(super) const MAX_HEIGHT_AGE: Duration = Duration::from_secs(1);
-/// Height by which a landing column begins above the vehicle that lands, metres: a vehicle as
-/// little above it may be below it in a moment.
+/// Height by which a landing column begins above the vehicle that lands, metres: another vehicle
+/// that is above it by less may be below it in a moment.
 pub(super) const COLUMN_TOP_ABOVE_M: f32 = 1.0;
 /// Position error of a neighbour whose own knowledge of its position is old, metres.
 pub(super) const VAGUE_POSITION_M: f32 = 0.5;
 /// Distance beside its path at which a vehicle may come down unheard, beyond the deviation allowed
-/// beside a vehicle on the ground, metres: it leads its landing as at its goal, so it is kept off
-/// as the schedule keeps others off landed vehicles in announced gusts of 3 m/s.
+/// beside a vehicle on the ground, metres. Its landing is guided as at its goal, so the distance is
+/// the one that the schedule keeps from landed vehicles in announced gusts of 3 m/s.
 pub(super) const UNHEARD_BESIDE_M: f32 = 0.15;
-/// Deviation of two vehicles in the air, one of which hovers, together, metres.
+/// Sum of the deviations of two vehicles in the air, one of which hovers, metres.
 pub(super) const PAIR_SWAY_M: f32 = 0.1;
 /// Time for which an intent of our mission shows that the sender's positions are those of the
 /// roster's vehicle: ten intents at the lowest rate.
@@ -107,11 +109,11 @@ pub(super) const STRANGER_LIFETIME: Duration = Duration::from_secs(60);
 pub(super) const STRANGER_RANK: u16 = u16::MAX;
 /// Time of standing after which a neighbour is not expected to fly on at once.
 pub(super) const STANDS_AFTER: Duration = Duration::from_secs(5);
-/// Greatest delay of a message, seconds: a report that comes at once after a late one may show
-/// progress of that much more time.
+/// Greatest delay of a message, seconds: a punctual report right after a late one may show progress
+/// of that much more time.
 pub(super) const MAX_MESSAGE_DELAY_S: f32 = 1.0;
-/// Greatest jump of a reported progress that is believed, metres: a vehicle that takes up its path
-/// again has a new nearest point.
+/// Greatest jump of a reported progress that is believed, metres: a vehicle that resumes its path
+/// has a new nearest point.
 pub(super) const MAX_PROGRESS_JUMP_M: f32 = 1.0;
 /// Longest time for which an unheard vehicle flies on beyond the top of its climb, seconds.
 pub(super) const UNHEARD_BEYOND_TOP_S: f32 = 1.2;

@@ -1,4 +1,4 @@
-//! A neighbour as it was last heard, and where it may be since.
+//! A neighbour as it was last heard, and where it may have got to since.
 
 use heapless::Vec;
 use planner_core::deconflict::Neighbour;
@@ -25,6 +25,7 @@ pub(super) struct AreaGround {
     pub(super) pair_position_error_m: f32,
 }
 
+/// The table's entry of one neighbour: what was last heard of it.
 #[derive(Clone, Debug)]
 pub(crate) struct NeighbourEntry {
     pub(super) id: u8,
@@ -49,23 +50,24 @@ pub(crate) struct NeighbourEntry {
     /// When the neighbour's last intent of our mission was heard.
     pub(super) intent_at: Option<Instant>,
     pub(super) points: Vec<Point, MAX_POINTS>,
-    /// Number of the last of its points that the neighbour flies to only while unheard.
+    /// Number of points, at the end of the list, to which the neighbour flies only while unheard.
     pub(super) unheard_point_count: u8,
     /// Where the neighbour's position is on its reported points.
     pub(super) place_on_points: PlaceOnPoints,
-    /// How far its points, up to its stop for now, lead it.
+    /// How far the neighbour's points, up to its stop for now, lead it.
     pub(super) points_reach: PointsReach,
     /// Greatest distance of the points, up to its stop for now, from the first of them, metres.
     pub(super) extent_m: f32,
-    /// Length of all its points from its position on, metres, if it flies to the last of them
-    /// unheard, as in a coverage mission: as many as its lease allows. Negative elsewhere.
+    /// Length of the polyline from the neighbour's position through all its points, metres: in a
+    /// coverage mission it flies all of it unheard, as far as its lease allows. −1 in other
+    /// missions.
     pub(super) unheard_way_m: f32,
     /// Whether the neighbour may come down from where it is; and the height of the ground below it,
     /// ENU up, metres, NaN if it never reported any.
     pub(super) may_come_down: bool,
     pub(super) ground_m: f32,
-    /// Place along its path up to which its gates were open, or would open after a wait, metres:
-    /// unheard it flies on to there.
+    /// Place along its path up to which the neighbour's gates were open, or would open after a
+    /// wait, metres: unheard it flies on to there.
     pub(super) gates_open_up_to_m: f32,
     /// Seconds by which gates and climb delay its unheard flight to `gates_open_up_to_m`.
     pub(super) unheard_delay_s: u8,
@@ -105,7 +107,9 @@ impl NeighbourEntry {
         self.heard_at.is_some_and(|at| now - at < span)
     }
 
-    // One copy of this, as of other common calls, instead of inlining: a board has little flash.
+    /// Whether the neighbour counts as dead: silent, by relays too, for [`LOST_AFTER`] and the time
+    /// that it may fly on unheard.
+    // Not inlined, as other functions with many callers: a board has little flash.
     #[inline(never)]
     pub(super) fn is_dead(&self, now: Instant) -> bool {
         // Most neighbours are heard: no further work for these.
@@ -167,7 +171,7 @@ impl NeighbourEntry {
         ))
     }
 
-    /// Seconds until the neighbour has surely come past `until_m`, heard or not; `None` where its
+    /// Seconds until the neighbour has surely passed `until_m`, heard or not; `None` where its
     /// gates may stop it before.
     pub(super) fn time_until_passed_s(&self, until_m: f32, now: Instant) -> Option<f32> {
         let known_m = self.progress_m(now).filter(|_| !self.reports(ON_DETOUR | OUT_OF_PLAN))?;
@@ -189,7 +193,7 @@ impl NeighbourEntry {
 
     /// The part of a reported progress that is believed, metres: no more than the vehicle can have
     /// flown since the report before, at `fastest_mps`. The rest is believed by and by; so is a
-    /// landing, which reports the whole way at once. A lower progress is believed: it opens no
+    /// landing, whose report jumps to the end of the way. A lower progress is believed: it opens no
     /// gate. The first report of a plan is believed, and that of a vehicle that was restarted.
     pub(super) fn plausible_progress_m(
         &mut self,
@@ -239,7 +243,7 @@ impl NeighbourEntry {
             && self.state.velocity.length() < MAX_HOVER_MPS
     }
 
-    /// Whether the neighbour may land without looking for others: off the plan, or unheard.
+    /// Whether the neighbour may land without avoiding others: off the plan, or unheard.
     pub(super) fn may_land_unseen(&self, now: Instant) -> bool {
         let silent = !self.heard_within(now, MAY_LAND_AFTER)
             && !self.is_reported_out_of_range(now)
@@ -311,9 +315,9 @@ impl NeighbourEntry {
         (climbs && top.z > here.z + CLIMB_TOP_M).then_some(top.z)
     }
 
-    /// Length of the way along its points that the neighbour may fly unheard, metres: in a coverage
-    /// mission all of it; elsewhere what a stop takes, more where messages are late, its own and
-    /// those by which it learns that no vehicle hears it.
+    /// Distance along its points that the neighbour may fly unheard, metres. In a coverage mission
+    /// that is all of them; elsewhere the length of a stop, plus what delays add: of its own
+    /// messages and of those by which it learns that no vehicle hears it.
     pub(super) fn unheard_distance_m(&self) -> f32 {
         // The slack keeps rounding from cutting off the last corner.
         libm::fmaxf(self.unheard_way_m + LEGS_ROUNDING_M, self.unheard_stop_m())
@@ -381,8 +385,8 @@ impl NeighbourEntry {
         }
     }
 
-    /// Calls `visit` with places along its points that the neighbour may have come to unheard,
-    /// `upto_m` in all, and with its greatest distance from the nearest of them, metres.
+    /// Calls `visit` with places along its points that the neighbour may have reached unheard, up
+    /// to `upto_m` in all, and with its greatest distance from the nearest of them, metres.
     #[inline(never)]
     pub(super) fn for_each_place(&self, upto_m: f32, visit: &mut dyn FnMut(Point, f32)) {
         let step_m = if upto_m > self.unheard_stop_m() {
@@ -404,10 +408,10 @@ impl NeighbourEntry {
         });
     }
 
-    /// Greatest height at which the neighbour may lie after coming down from a place, ENU up,
-    /// metres: the ground that it reported, unless that is just the area's lowest. Then the highest
-    /// ground, but at least half of [`Ground::height_m`] below its path if it was on its plan away
-    /// from its pad.
+    /// Greatest height at which the neighbour may lie after coming down from `place`, ENU up,
+    /// metres: the ground that it reported, unless that is just the area's lowest. In that case the
+    /// area's highest ground; but at least half of [`Ground::height_m`] below `place` if the
+    /// neighbour was on its plan away from its pad.
     pub(super) fn max_ground_m(&self, field: AreaGround, place: &Point) -> f32 {
         let Some(ground) = field.ground.filter(|ground| self.ground_m <= ground.low_m) else {
             return self.ground_m;
@@ -450,8 +454,8 @@ impl NeighbourEntry {
         {
             let below = column(here, ZoneKind::Static);
             visit(KeepOutZone { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
-            // The neighbour's place is not to be approached from above or the side either, whatever
-            // its column leaves.
+            // The neighbour's place is not to be approached from above or the side either, which
+            // the column below it does not cover.
             visit(place(wide_m + PAIR_SWAY_M));
         } else if self.is_dead(now) && self.flies_plan_unheard() {
             // The neighbour is where its gates let it fly: gates keep it apart, no zone.

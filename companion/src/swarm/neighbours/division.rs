@@ -9,10 +9,10 @@ use crate::swarm::fleet::{FleetTimeouts, LEASE_HEARD_WITHIN, MemberReception, Ow
 const PLAN_REPORT_LIFETIME: Duration = Duration::from_secs(3);
 
 impl<const V: usize> Neighbours<V> {
-    /// Makes the mission a coverage mission, with a fleet that divides what a vehicle
-    /// leaves. `down_s`: silence after which a lost vehicle is on the ground, seconds; `ground`:
-    /// heights of ground that is not level; `stray_m`: distance by which two vehicles may be nearer
-    /// than their estimates say.
+    /// Makes the mission a coverage mission, with a fleet that divides what a vehicle leaves.
+    /// `down_s`: silence after which a lost vehicle is on the ground, seconds; `ground`: heights of
+    /// ground that is not level; `stray_m`: distance by which two vehicles may be nearer than their
+    /// estimates say, metres.
     pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, stray_m: f32) {
         (self.ground, self.pair_position_error_m) = (ground, stray_m);
         self.down_after = DOWN_AFTER.max(Duration::from_millis((down_s * 1000.0) as u64));
@@ -24,12 +24,12 @@ impl<const V: usize> Neighbours<V> {
         ));
     }
 
-    /// The fleet; `None` where the mission is no area.
+    /// The fleet; `None` where the mission is no coverage mission.
     pub(crate) fn fleet(&self) -> Option<&Fleet<V>> {
         self.fleet.as_ref()
     }
 
-    /// The fleet, mutable; `None` where the mission is no area.
+    /// The fleet, mutable; `None` where the mission is no coverage mission.
     pub(crate) fn fleet_mut(&mut self) -> Option<&mut Fleet<V>> {
         self.fleet.as_mut()
     }
@@ -64,8 +64,9 @@ impl<const V: usize> Neighbours<V> {
         self.contacts[..self.roster_count].iter().any(|c| c.other_plan && lately(c))
     }
 
-    /// Whether another vehicle that takes part is in flight, and none of those has been silent for
-    /// `missed_after`: while a vehicle may be lost, each that lives counts for a majority.
+    /// Whether another vehicle that takes part is in flight, heard within `missed_after`, and none
+    /// may be lost and no division is under way: while a vehicle may be lost, each that lives is
+    /// needed for a majority.
     pub(crate) fn does_another_fly_its_part(&self, now: Instant, missed_after: Duration) -> bool {
         let whole = |fleet: &Fleet<V>| !fleet.is_dividing() && !fleet.is_any_missing();
         self.fleet.as_ref().is_some_and(whole) && self.does_another_take_part(now, missed_after)

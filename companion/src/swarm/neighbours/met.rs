@@ -1,5 +1,5 @@
-//! Neighbours for the safety filter: a cheap test by which most are too far away to matter, and for
-//! the others the inputs of their reachable sets.
+//! Neighbours as the safety filter compares them: a cheap test that rules out most as too far away,
+//! and for the others the inputs of their reachable sets.
 
 use planner_core::Point;
 use planner_core::safety::{
@@ -53,13 +53,13 @@ pub(crate) struct ReachQuery<'a> {
     /// Whether this vehicle holds the lease in a coverage mission: heard by it or not, no other one
     /// then flies on for long.
     pub(crate) holds_lease: bool,
-    /// Whether this vehicle lands, or descends in a coverage mission: then places count where
-    /// unheard vehicles may lie.
+    /// Whether this vehicle lands, or descends in a coverage mission: then places where unheard
+    /// vehicles may lie count too.
     pub(crate) lands: bool,
 }
 
 impl NeighbourEntry {
-    /// Finds where the neighbour's position is on its points, once, when either was heard.
+    /// Finds where the neighbour's position is on its points; to be called when either is received.
     pub(super) fn update_place_on_points(&mut self) {
         let (at, points) = (&self.state, self.points_for_now());
         let place = PlaceOnPoints::find(&at.position, points, &at.velocity);
@@ -223,8 +223,8 @@ impl NeighbourEntry {
         }
     }
 
-    /// Over an area: for a neighbour silent for longer than a stop takes, replaces the ball around
-    /// its last position by the part of its points that it may have flown since.
+    /// In a coverage mission: for a neighbour silent for longer than a stop takes, replaces the
+    /// ball around its last position by the part of its points that it may have flown since.
     pub(crate) fn follow_unheard<'a>(
         &'a self,
         heard: &mut NeighbourMotion<'a>,
@@ -298,8 +298,8 @@ impl<const V: usize> Neighbours<V> {
         self.contacts[..self.roster_count].iter().find(missed).map(|c| c.id)
     }
 
-    /// The first contact from index `from` on that was placed and may be within reach: its index,
-    /// and whether it counts as dead.
+    /// The first neighbour from index `from` on, inclusive, that has a position and may be within
+    /// reach: its index, its entry, and whether it counts as dead.
     pub(crate) fn next_within(
         &self,
         from: usize,
@@ -315,7 +315,7 @@ impl<const V: usize> Neighbours<V> {
         None
     }
 
-    /// Whether a contact may fly on although it counts as dead
+    /// Whether a neighbour may fly on although it counts as dead
     /// ([`NeighbourEntry::may_fly_on_unheard`]).
     pub(crate) fn may_fly_on_unheard(
         &self,
@@ -326,8 +326,9 @@ impl<const V: usize> Neighbours<V> {
         contact.may_fly_on_unheard(self.down_after, now, reach)
     }
 
-    /// Changes `met`, made by [`NeighbourEntry::as_heard`], if the contact's position is older than
-    /// [`MAX_HEIGHT_AGE`]. Not in one call with that: a board takes long to copy what it returns.
+    /// Changes `met`, made by [`NeighbourEntry::as_heard`], if the neighbour's position is older
+    /// than [`MAX_HEIGHT_AGE`]. A call of its own: a board takes long to copy what one call would
+    /// return.
     #[inline(always)]
     pub(crate) fn add_silence<'a>(
         &'a self,
@@ -360,14 +361,15 @@ impl<const V: usize> Neighbours<V> {
             told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
         // Silent for `down_after`, or grounded without a position of its own, the neighbour lies on
-        // the ground below; before that it rests where reroutes keep off.
+        // the ground below; before that it rests in the zone that detours stay clear of.
         let down = placed_for >= self.down_after
             || (contact.reports(GROUNDED) && contact.lacks_position());
         let lies = down && (dead || contact.reports(GROUNDED)) && !contact.ground_m.is_nan();
         if let Some(first) = contact.points.first().filter(|_| by_intent) {
             motion.position = *first;
         }
-        // A neighbour silent in its climb may have come to the climb's top, and a little further.
+        // A neighbour silent in its climb may have reached the climb's top, and gone a little
+        // further.
         let top = if age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
         let mut highest_m = contact.ground_m;
         if lies {
@@ -380,8 +382,8 @@ impl<const V: usize> Neighbours<V> {
         }
         motion.grounded = (motion.grounded && top.is_none()) || lies;
         let floor_m = contact.floor_m(motion.position.z);
-        // A dead neighbour that flew along its points stopped on them, and rests where reroutes
-        // keep off.
+        // A dead neighbour that flew along its points stopped on them, and rests in the zone that
+        // detours stay clear of.
         motion.age_s = age_s;
         if dead || top.is_some() {
             (motion.speed_mps, motion.age_s) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! Keep-out zones where the other vehicles are and may come to be, for the search for a detour.
+//! Keep-out zones where the other vehicles are or may get to, for the search for a detour.
 
 use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::{Length, Point};
@@ -12,7 +12,7 @@ use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
     /// Distance by which two vehicles in the air, one of them off the plan, may be nearer than
-    /// their estimates say, metres; 0 without an area, where walls leave no room for it.
+    /// their estimates say, metres; 0 outside coverage missions, where walls leave no room for it.
     pub(crate) fn pair_position_error_m(&self) -> f32 {
         self.pair_position_error_m
     }
@@ -26,9 +26,9 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Distance along its points that a contact may have flown unheard, metres. If this vehicle
-    /// hears nobody, rather its own radio has failed: then the others fly on, to places unknown
-    /// here.
+    /// Distance along its points that a neighbour may have flown unheard, metres. If this vehicle
+    /// hears nobody, its own radio has more likely failed: then the others fly on to places unknown
+    /// here, and only a stop is assumed.
     #[inline(never)]
     fn unheard_progress_m(&self, contact: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !contact.heard_within(now, UNHEARD_LANDING_AFTER);
@@ -36,7 +36,7 @@ impl<const V: usize> Neighbours<V> {
         if far { contact.unheard_distance_m() } else { contact.unheard_stop_m() }
     }
 
-    /// Calls `visit` with the keep-out zones, of radius `apart_m`, of contact `i` where it is out
+    /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` where it is out
     /// of the plan, unless the present detour already avoids that place.
     pub fn for_each_new_zone_of(
         &self,
@@ -81,8 +81,8 @@ impl<const V: usize> Neighbours<V> {
         (0..self.roster_count).for_each(|i| self.places_of(i, now, apart, &mut visit));
     }
 
-    /// Calls `visit` with the keep-out zones of contact `i` of the roster where it stands or rests:
-    /// of radius `lying_m` if it is on the ground, else `apart_m`.
+    /// Calls `visit` with the keep-out zones of neighbour `i` of the roster where it stands or
+    /// rests: of radius `lying_m` if it is on the ground, else `apart_m`.
     pub(crate) fn places_of(
         &self,
         i: usize,
@@ -101,10 +101,9 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Calls `visit` with the zones in which the safety filter lets no vehicle come nearer to a
-    /// silent contact in the air than it is: its path once it counts as dead, before that a ball,
-    /// less wide than the filter has it.
-    /// A detour that the filter does not let the vehicle fly would be sought again and again.
+    /// Calls `visit` with zones around a silent neighbour in the air that the safety filter lets no
+    /// vehicle enter: along its path once it counts as dead, before that a ball, smaller than the
+    /// filter's. Otherwise the search would find, again and again, a detour that the filter stops.
     // Not inlined, as other calls that a board seldom makes.
     #[inline(never)]
     fn silent_zones(
@@ -136,7 +135,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Calls `visit` with the columns, of radius `apart_m`, in which vehicles may come down that
-    /// land without looking.
+    /// land without avoiding others.
     pub fn for_each_landing_column(
         &self,
         now: Instant,
@@ -146,8 +145,8 @@ impl<const V: usize> Neighbours<V> {
         (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut visit));
     }
 
-    /// Calls `visit` with the columns, of radius `apart_m`, in which contact `i` may come down, if
-    /// it may land without looking.
+    /// Calls `visit` with the columns, of radius `apart_m`, in which neighbour `i` may come down,
+    /// if it may land without avoiding others.
     pub fn landing_column(
         &self,
         i: usize,
@@ -166,8 +165,9 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Calls `visit` with the zones in which a landing would end within `apart_m` of another
-    /// vehicle: a path may lead through them, but not end there. Over an area a silent vehicle may
-    /// come down anywhere along its points, or at its pad: that bars places at height `height_m`.
+    /// vehicle: a path may lead through them, but not end there. In a coverage mission a silent
+    /// vehicle may come down anywhere along its points, or at its pad: that bars places at height
+    /// `height_m`.
     pub fn for_each_landing_zone(
         &self,
         now: Instant,
@@ -180,8 +180,8 @@ impl<const V: usize> Neighbours<V> {
             };
             let from = contact.state.position;
             zone(from, from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M), apart_m);
-            // Landing places are sought at one height, so a zone is as wide there as the landing
-            // keeps off.
+            // Landing places are sought at one height, so there a zone is as wide as the distance
+            // that a landing keeps.
             let level = |at: Point| Point::new(at.x, at.y, height_m);
             let mut bar = |[a, b]: [Point; 2], wider_m: f32| {
                 zone(level(a), level(b), apart_m + self.pair_position_error_m + wider_m);
@@ -204,7 +204,7 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Calls `visit` with the column above the last position of contact `i`, of radius `apart_m`:
+    /// Calls `visit` with the column above the last position of neighbour `i`, of radius `apart_m`:
     /// there this vehicle might come down on it.
     pub fn column_above(&self, i: usize, apart_m: f32, mut visit: impl FnMut(KeepOutZone)) {
         if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
@@ -214,8 +214,8 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of the column
-    /// from `place` to the ground at `floor_m`. From each place along its points it comes down,
+    /// Whether neighbour `i`, unheard in flight, may have come down within `apart_m` of the column
+    /// from `place` to the ground at `floor_m`: from each place along its points it comes down,
     /// never up. With a time in `fallen` it may also have fallen, and not straight down.
     pub(crate) fn may_lie_below(
         &self,

@@ -1,10 +1,11 @@
-//! How far a vehicle flies on while no other vehicle hears it, and when it comes there.
+//! How far a vehicle flies on while no other vehicle hears it, and how late it may be there.
 //!
-//! A vehicle reports a lower bound of its later progress: from its progress now it flies at least
-//! at the assumed speed, after a delay of some seconds, as far as its gates are open or will be. A
-//! gate adds to the delay only by how much later the vehicle leaves it than that bound passes it: a
-//! gate far ahead that opens soon adds nothing. So a vehicle that waits for one that itself waits
-//! knows how far that one flies meanwhile, and so on along a row of them.
+//! A vehicle reports a lower bound of its later progress: from its present progress it flies at
+//! least at the assumed speed, after a delay of some seconds, as far as its gates are open or will
+//! be. A gate adds to the delay only the time by which the vehicle leaves it later than that bound
+//! passes it: a gate far ahead that opens soon adds nothing. So a vehicle that waits for a second
+//! one, which waits for a third, knows how far the second flies meanwhile, and so on along the
+//! chain.
 
 use planner_core::flight::Gate;
 
@@ -12,14 +13,14 @@ use super::Neighbours;
 use super::bounds::STANDS_SHORT_M;
 use crate::time::Instant;
 
-/// Longest time for which an unheard vehicle waits before a gate, seconds: less than the row
-/// `Alone` waits.
+/// Longest time for which an unheard vehicle waits before a gate, seconds: less than row `Alone` of
+/// the mission table waits.
 const UNHEARD_GATE_WAIT_S: f32 = 14.0;
 
 impl<const V: usize> Neighbours<V> {
     /// Place along the path of the first of `gates` before which this vehicle, unheard, would wait
-    /// too long, metres, ∞ if there is none; and the seconds by which the gates before that delay
-    /// it, compared with a flight at the assumed speed from `progress_m`.
+    /// too long, metres, ∞ if there is none; and the seconds by which the gates before that one
+    /// delay this vehicle, compared with a flight at the assumed speed from `progress_m`.
     pub(crate) fn unheard_reach(&self, gates: &[Gate], progress_m: f32, now: Instant) -> (f32, u8) {
         let mut delay_s = 0.0;
         let closed = gates.iter().find(|gate| {

@@ -1,12 +1,11 @@
-//! Relays of the progress of vehicles that a neighbour does not hear, by a vehicle that hears them.
+//! Relays: a vehicle sends the progress of vehicles that it hears on to neighbours that do not.
 //!
 //! The order of the schedule needs the progress of vehicles that may be out of radio range by then.
 //! So each vehicle relays, once a second at most, the progress of those that one of its neighbours
-//! does not hear: nothing at all while everybody hears everybody. Progress never falls, so it may
-//! be old. It opens gates. And a vehicle that is not heard, but was reported a moment ago to follow
-//! the shared plan, counts neither as lost nor as possibly anywhere near: gates keep it apart. What
-//! a vehicle itself reports goes before what others relay of it.
-//!
+//! does not hear: nothing at all while everybody hears everybody. Relayed progress opens gates; it
+//! may be old, as progress never falls. A vehicle that is not heard, but follows the shared plan by
+//! a recent relay, counts neither as lost nor as possibly nearby: gates keep it apart. A vehicle's
+//! own reports go before what others relay of it.
 //! The payload of TUNNEL under a private payload type, little-endian, at most 122 bytes:
 //!
 //! | byte | type | field |
@@ -18,9 +17,9 @@
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 + 11 i | u8 | rank in the roster sorted by system id |
-//! | 13 + 11 i | u8 | age of its report, 0.1 s; 255: that old or older |
-//! | 14 + 11 i | f32 | its progress along the plan's path, metres |
-//! | 18 + 11 i | f32 | place up to which its gates are open, or will be, metres: as it reported it |
+//! | 13 + 11 i | u8 | age of the vehicle's report, 0.1 s; 255: 25.5 s or older |
+//! | 14 + 11 i | f32 | the vehicle's progress along its path of the plan, metres |
+//! | 18 + 11 i | f32 | place up to which its gates are open or will be, metres, as it reported it |
 //! | 22 + 11 i | u8 | seconds by which gates and climb delay its flight |
 
 use heapless::Vec;
@@ -39,25 +38,26 @@ const HEADER_LEN: usize = 12;
 const ITEM_LEN: usize = 11;
 /// Longest TUNNEL payload, bytes.
 pub(crate) const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_RELAYED * ITEM_LEN;
-/// Age of a vehicle's own message up to which relayed reports of it are ignored.
+/// Age of a vehicle's own last message up to which relayed reports of that vehicle are ignored.
 const HEARD_DIRECTLY_WITHIN: Duration = Duration::from_secs(1);
 /// Silence after which a vehicle that others still hear is out of range; shorter silence may be
 /// lost messages.
 const OUT_OF_RANGE_AFTER: Duration = Duration::from_secs(3);
-/// Time for which a relayed report that a vehicle follows the plan counts: three hops, and the loss
-/// of a message.
+/// Age up to which a relayed report that a vehicle follows the plan counts: three hops, and the
+/// loss of a message.
 const RELAYED_LIFETIME: Duration = Duration::from_secs(6);
 /// Least age that each relay adds to a report, microseconds: longer than most messages take. A
-/// message that takes longer adds that: else a report that is relayed in a circle stays young.
+/// message that takes longer adds its own delay: otherwise a report relayed in a circle stays
+/// young.
 const HOP_AGE_US: u64 = 500_000;
-/// Delay that each relay adds to the delay of a vehicle's flight, seconds: its progress is not as
-/// old as the added age says.
+/// Time that each relay adds to the reported delay of a vehicle's flight, seconds: its progress is
+/// not as old as the added age says.
 const HOP_DELAY_S: u8 = 1;
 /// Unit of an age in the message, microseconds.
 const AGE_TICK_US: u64 = 100_000;
 
-/// Relayed report of the vehicle of a rank: its progress, the age of that in 0.1 s, and how far it
-/// flies on unheard.
+/// Relayed report of the vehicle of one rank: its progress, the report's age in 0.1 s, and how far
+/// the vehicle flies on unheard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct RelayedProgress {
     rank: u8,
@@ -159,7 +159,7 @@ impl NeighbourEntry {
             && self.progress_m(now).is_some()
     }
 
-    /// The report of this vehicle to be relayed; `None` if it is off the plan.
+    /// The neighbour's report as it is to be relayed; `None` if the neighbour is off the plan.
     fn relayed_progress(&self, now: Instant) -> Option<RelayedProgress> {
         let progress_m = self.progress_m(now)?;
         let age = (now - self.intent_at.max(self.relayed_at)?).as_micros().div_ceil(AGE_TICK_US);
@@ -175,8 +175,8 @@ impl NeighbourEntry {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// The next relay message: vehicles that some neighbour does not hear, from where the last
-    /// message was full on.
+    /// The next relay message: the reports of vehicles that some neighbour does not hear, from the
+    /// rank on that no longer fitted into the last message.
     pub(crate) fn next_relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
         let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
         let roster = &self.contacts[..self.roster_count];
@@ -199,7 +199,7 @@ impl<const V: usize> Neighbours<V> {
         relay
     }
 
-    /// Handles a relay, for our plan, from the vehicle `from` of the roster.
+    /// Handles a relay of our plan from the vehicle `from` (system id) of the roster.
     pub(crate) fn handle_relay(&mut self, now: Instant, from: u8, relay: &Relay) {
         let Some(by) = self.active_roster_index(from, now) else { return };
         let hop_us = (self.contacts[by].message_delay.delay_s * 1e6) as u64;

@@ -8,7 +8,7 @@ use crate::time::{Duration, Instant};
 
 impl<const V: usize> Neighbours<V> {
     /// Whether all vehicles of the roster last reported that they have landed or are out of the
-    /// plan, or have been silent for `down_after`, by when a lost vehicle is on the ground.
+    /// plan, or have been silent for `down_after`, when a lost vehicle is on the ground.
     pub(crate) fn are_all_down(&self, now: Instant) -> bool {
         self.contacts[..self.roster_count]
             .iter()

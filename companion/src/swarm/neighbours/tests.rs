@@ -40,7 +40,7 @@ pub(super) fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
     }
 }
 
-/// The same with vehicles 3 and 9 heard of mission 1 at `at_ms`.
+/// The table, after intents of vehicles 3 and 9 for mission 1 were heard at `at_ms`.
 pub(super) fn joined(at_ms: u64) -> Neighbours<4> {
     let mut table = table();
     for system_id in [3, 9] {
@@ -150,8 +150,8 @@ fn a_position_of_the_roster_counts_only_with_the_missions_crc() {
 }
 
 proptest::proptest! {
-    /// Whatever ids send whatever intents and positions, the roster keeps its slots, and what it is
-    /// known by.
+    /// Whatever ids send whatever intents and positions, the roster's vehicles keep their entries
+    /// and what is known of them.
     #[test]
     fn strangers_never_displace_the_roster(
         frames in proptest::collection::vec(
@@ -238,7 +238,7 @@ fn who_is_out_opens_gates_only_after_it_was_looked_at() {
     table.mark_path_clear(at(1400));
     table.handle_intent(at(1500), 1, &intent(0, 7, 8), 7, None);
     assert!(!out(&mut table, at(1600)), "it is not out any more");
-    // Silent from now on: dead later, but nobody counts on that before the next look.
+    // Silent from now on: dead later, but nobody counts on that before the next scan.
     let dead = at(1500) + LOST_AFTER;
     assert!(!out(&mut table, dead) && !table.states_at(dead)[0].grounded);
     table.mark_path_clear(dead);
@@ -263,9 +263,9 @@ fn who_falls_silent_before_its_place_and_plan_were_heard_opens_gates_too() {
 }
 
 proptest::proptest! {
-    /// Whatever is reported, what is believed grows no faster than a vehicle flies, but for a
-    /// message's delay. True reports, however late they come, are believed as they are; a jump is
-    /// believed in the end.
+    /// Whatever is reported, the believed progress grows no faster than a vehicle flies, except for
+    /// a message's delay. True reports, however late, are believed as they are; a jump is believed
+    /// in the end.
     #[test]
     fn progress_grows_no_faster_than_a_vehicle_flies(
         delays_ms in proptest::collection::vec(0u64..1000, 2..60),
@@ -278,7 +278,7 @@ proptest::proptest! {
         let reported = |progress_m| Intent { progress_m, ..intent(ON_PLAN, 1, 2) };
         let (mut last, mut heard_ms) = (None::<(f32, Instant)>, 0);
         for (i, delay_ms) in delays_ms.iter().enumerate() {
-            // Overtaken messages are dropped before.
+            // Messages that were overtaken are dropped before they get here.
             let sent_ms = 200 * (i as u64 + 1);
             heard_ms = heard_ms.max(sent_ms + delay_ms);
             let now = Instant::from_millis(heard_ms);

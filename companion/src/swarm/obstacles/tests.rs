@@ -1,4 +1,4 @@
-//! Spheres of commands.
+//! Tests of obstacles: spheres reported by commands.
 
 extern crate std;
 
@@ -8,7 +8,7 @@ use crate::link::commands::FENCE_EXCLUSION;
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 const CLEARANCE_M: f32 = 0.8;
 
-/// NAV_FENCE_CIRCLE_EXCLUSION.
+/// The command that reports a spherical obstacle.
 pub(crate) fn sphere(at: Point, radius_m: f32) -> Command {
     let place = frames::enu_to_geodetic(&ORIGIN, &at);
     Command {
@@ -60,7 +60,8 @@ fn what_is_no_sphere_is_refused_and_one_too_many_is_for_later() {
 }
 
 proptest::proptest! {
-    /// Whatever is reported and revoked, those that a detour was planned for stay the first ones.
+    /// Whatever is reported and revoked, the obstacles that a detour was planned for stay the
+    /// first.
     #[test]
     fn obstacles_are_those_reported_and_not_revoked(
         orders in proptest::collection::vec(
@@ -74,7 +75,8 @@ proptest::proptest! {
             let result =
                 take(&mut obstacles, &sphere(Point::new(f32::from(x), 30.0, 1.5), radius_m));
             let known = model.iter().any(|(at, _)| *at == x);
-            // A larger one at the same place is another; keep the model to one a place.
+            // A larger obstacle at the same place is another entry; the model keeps one for each
+            // place.
             if radius_m <= 0.0 {
                 model.retain(|(at, _)| *at != x);
                 proptest::prop_assert_eq!(result, ACCEPTED);

@@ -1,5 +1,5 @@
-//! Counts the public calls of companion on the ground: files, parameters, commands, malformed
-//! frames.
+//! Counts the instructions of companion's public calls on the ground: files, parameters, commands,
+//! malformed frames.
 
 use companion::config::USUAL_GROUND_STATIONS;
 use companion::link::commands;
@@ -45,8 +45,8 @@ const ACK: u8 = 128;
 const FTP_DATA: usize = 239;
 const GROUND: (u8, u8) = (255, 190);
 
-/// Counts all calls of companion on the ground, each part in a function that is not inlined: a
-/// companion takes 36 kB of the stack, and three in one stack frame overran the statics below the
+/// Makes all counted calls of companion on the ground, each part in a function that is not inlined:
+/// a companion takes 36 kB of the stack, and three in one stack frame overran the statics below the
 /// stack.
 #[inline(never)]
 pub fn measure_companion_calls(meter: &mut impl Meter) {
@@ -67,8 +67,8 @@ pub fn measure_companion_calls(meter: &mut impl Meter) {
     .run();
 }
 
-/// Counts the framer on chunks of 256 bytes: three of four look like starts of frames again and
-/// again, each with a wrong CRC; the others are random bytes.
+/// Counts the instructions of the framer on chunks of 256 bytes. Three of four chunks are full of
+/// frame starts with a wrong CRC; the others are random bytes.
 #[inline(never)]
 fn measure_framing(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(1);
@@ -165,7 +165,7 @@ fn measure_mission_parsing(meter: &mut impl Meter) {
     });
 }
 
-/// Counts the agreement of a fleet of the most vehicles on lost vehicles' work, while each
+/// Counts the instructions by which the largest fleet agrees on lost vehicles' work, while each
 /// neighbour reports new progress in every round.
 #[inline(never)]
 fn measure_fleet_agreement(meter: &mut impl Meter) {

@@ -26,13 +26,13 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     semihosting::process::exit(1)
 }
 
-/// Flights in which calls of the safety filter are counted.
+/// Number of flights in which the safety filter's instructions are counted.
 const FILTER_FLIGHTS: u64 = 100;
 /// Most different names of calls.
 const MAX_ROWS: usize = 160;
 
-/// Counts instructions of calls, without those of reading the clock: for each name its bytes and
-/// its largest count.
+/// Counts instructions of calls, without those of reading the clock. A row holds a call's name, the
+/// bytes it is lent and its largest count.
 struct Instructions {
     rows: Vec<(&'static str, usize, u64), MAX_ROWS>,
 }
@@ -68,8 +68,8 @@ fn main() -> ! {
     semihosting::process::exit(0)
 }
 
-/// Counts control steps in flight: at least [`cases::STEP_CASES`] among neighbours on the plan, and
-/// as many where most left it or fell silent.
+/// Counts the instructions of control steps in flight: of at least [`cases::STEP_CASES`] among
+/// neighbours on the plan, and of as many where most left it or fell silent.
 #[inline(never)]
 fn measure_flights(meter: &mut Instructions) {
     let mut steps = [0; 2];
@@ -88,7 +88,7 @@ fn measure_flights(meter: &mut Instructions) {
     }
 }
 
-/// Counts control steps of coverage missions in flight.
+/// Counts the instructions of control steps of coverage missions in flight.
 #[inline(never)]
 fn measure_area_flights(meter: &mut Instructions) {
     let mut steps = 0;
@@ -103,7 +103,7 @@ fn measure_area_flights(meter: &mut Instructions) {
     }
 }
 
-/// Counts calls of the safety filter alone.
+/// Counts the instructions of the safety filter alone.
 #[inline(never)]
 fn measure_filter(meter: &mut Instructions) {
     for seed in 0..FILTER_FLIGHTS {

@@ -1,4 +1,4 @@
-//! Counts the public calls of planner-core.
+//! Counts the instructions of planner-core's public calls.
 
 use firmware::boards::chosen::memory;
 use firmware::calls::{Meter, coverage, coverage_missions, flight};
@@ -30,13 +30,13 @@ use static_cell::ConstStaticCell;
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 type Search = SearchWorkspace<ROADMAP_NODES>;
 
-/// Random inputs of a call that takes microseconds.
+/// Number of random inputs of a call that takes microseconds.
 const MANY_CASES: usize = 1000;
-/// Random inputs of a call that takes milliseconds.
+/// Number of random inputs of a call that takes milliseconds.
 const SOME_CASES: usize = 50;
 /// Longest edge of the roadmap, metres.
 const MAX_EDGE_M: f32 = 8.0;
-/// Nodes of a small roadmap, for calls that are only made on the host in use.
+/// Nodes of a small roadmap, for calls that only the host makes in normal use.
 const SMALL_ROADMAP_NODES: usize = 300;
 
 /// Memory of the bench beside the workspace overlay.
@@ -61,8 +61,8 @@ static BENCH_MEMORY: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMe
     lengths: [0.0; 2048],
 });
 
-/// Counts all public calls of planner-core. Returns two checksums of coverage: its calls, its
-/// flights.
+/// Counts the instructions of all public calls of planner-core. Returns two checksums of coverage
+/// results: of its single calls, and of its flights.
 #[inline(never)]
 pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     let scratch = SCRATCH.take();
@@ -181,7 +181,7 @@ fn measure_assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHI
     }
 }
 
-/// Counts the plan of the demo's ten vehicles and its steps.
+/// Counts the instructions of planning for the demo's ten vehicles, as a whole and step by step.
 fn measure_plans(
     meter: &mut impl Meter,
     view: &RoadmapView<'_>,
@@ -231,7 +231,7 @@ fn measure_plans(
     }
 }
 
-/// Counts the scheduling of the largest swarm, on shortest paths between random nodes.
+/// Counts the instructions of scheduling the largest swarm, on shortest paths between random nodes.
 fn measure_largest_swarm(
     meter: &mut impl Meter,
     view: &RoadmapView<'_>,
@@ -413,7 +413,8 @@ fn measure_segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
     }
 }
 
-/// Counts the steps of building the roadmap of P3D's building on board, without and with clearance.
+/// Counts the instructions of each step of building, on board, the roadmap of paper P3D's building,
+/// without and with clearance.
 fn measure_roadmap_builds(
     meter: &mut impl Meter,
     grid: &VoxelGrid<'_>,
@@ -447,7 +448,7 @@ fn measure_roadmap_builds(
         .expect(good);
 }
 
-/// Counts calls that are only made on the host in use, on a small roadmap.
+/// Counts the instructions of calls that only the host makes in normal use, on a small roadmap.
 fn measure_host_calls(
     meter: &mut impl Meter,
     grid: &VoxelGrid<'_>,

@@ -57,7 +57,7 @@ static DMA_RADIO_OUT: ConstStaticCell<transmitter::Buffer> =
 /// Number of the MPU region of the roadmap in use: above that of the whole bank, so that it takes
 /// precedence, and below the stack guard's.
 const ROADMAP_REGION: u32 = 3;
-/// Warning: option bytes are as a new chip has them.
+/// Warning: BOR_LEV in the option bytes is below 3, as on a new chip.
 const BROWN_OUT_OFF: &str = "Brown-out reset is off: set BOR_LEV to 3";
 /// Warning: the ST-LINK outputs no clock.
 const NO_HSE: &str = "No 8 MHz from the ST-LINK: own oscillator";

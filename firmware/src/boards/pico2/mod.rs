@@ -7,10 +7,10 @@
 //! | GP4 / GP5 | UART1 TX / RX, the swarm's radio, 460 800 baud |
 //! | GP25 | the light |
 //!
-//! Code runs from the same flash, so it stops while the flash erases or programs: no setpoint is
-//! sent, and received bytes may be lost. So the flash is changed only while disarmed
-//! (`FlashLayout::stalls`): uploads are refused in flight, and changed parameters are stored after
-//! landing.
+//! Code runs from the flash that also holds the files, so it stops while that flash erases or
+//! programs: no setpoint is sent, and received bytes may be lost. So the flash is changed only
+//! while disarmed (`FlashLayout::stalls`): uploads are refused in flight, and changed parameters
+//! are stored after landing.
 //!
 //! `SYSRESETREQ` resets the processor but not watchdog, UARTs and other peripherals. So this board
 //! restarts by its watchdog, which resets everything but the oscillators.
@@ -94,8 +94,8 @@ pub fn reset() -> ! {
     }
 }
 
-/// Sets the parts that the watchdog resets. To be called after embassy-rp's `start`, which sets
-/// those of the RP2040.
+/// Sets the parts that the watchdog resets. To be called after embassy-rp's `Watchdog::start`,
+/// which sets those of the RP2040.
 fn set_watchdog_resets() {
     pac::PSM.wdsel().write_value(pac::psm::regs::Wdsel(rp2350::WATCHDOG_RESETS));
 }

@@ -81,8 +81,8 @@ pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
     (u64::from(rounds.get()) << 32 | u64::from(u32::MAX - value)) + CLOCK.skipped.borrow(cs).get()
 };
 
-/// Time at which the next sleeping task is due, counts since the start; `u64::MAX` or more in
-/// microseconds if none sleeps. Wakes the tasks that are due at `now`.
+/// Time at which the next sleeping task is due, counts since the start; `u64::MAX` if none sleeps.
+/// Wakes the tasks that are due at `now`.
 pub(super) fn next_alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
     CLOCK
         .queue
@@ -115,8 +115,8 @@ impl Clock {
             }
             let due = next_us.saturating_mul(COUNTS_PER_US);
             if due > now {
-                // If the next task is due later than the timer can count, its interrupt calls this
-                // function again.
+                // If the task is due later than the timer can count, the timer's interrupt comes
+                // early and calls this function again.
                 let wait = (due - now).min(u64::from(u32::MAX)) as u32;
                 Register::new(TIMER1, VALUE).write(wait);
                 return;

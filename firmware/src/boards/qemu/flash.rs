@@ -35,7 +35,7 @@ pub const LAYOUT: FlashLayout = FlashLayout::H743;
 pub struct Flash(FlashLender);
 
 impl Flash {
-    /// Creates the driver, once, at the start. After power-on it makes the bank erased.
+    /// Creates the driver, once, at the start. After power-on this also sets the bank to erased.
     pub(super) fn new() -> Self {
         assert!(Bank2Use::Programmed.claim(), "bank 2 is read as it lies, for measurements");
         // SAFETY: memory of this board that no other code uses yet.

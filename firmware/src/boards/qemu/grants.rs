@@ -45,7 +45,7 @@ const ONE_SHOT: u32 = 0b1110_0011;
 struct SimulationLink {
     input: File,
     output: File,
-    /// Length of the current message, and how many of its bytes are executed.
+    /// Length of the current message, and how many of its bytes are executed (`done`), bytes.
     length: usize,
     done: usize,
     /// Bytes of queued records, which are written at the grant's end.
@@ -58,8 +58,8 @@ struct SimulationLink {
 
 static SIMULATION_LINK: Mutex<RefCell<Option<SimulationLink>>> = Mutex::new(RefCell::new(None));
 
-/// Enters lock step if QEMU was started with its command line: announces the board to the host and
-/// waits for the first message. `receive_on_port` is called with a UART's number and the bytes that
+/// Enters lock step if the board's command line is [`COMMAND_LINE`]: announces the board to the
+/// host and waits for the first message. `take` is called with a UART's number and the bytes that
 /// arrive there.
 pub fn start(take: fn(u8, &[u8])) {
     let mut line = [MaybeUninit::uninit(); 2 * COMMAND_LINE.len()];

@@ -14,7 +14,7 @@ pub fn sleep() {
     }
 }
 
-/// Address of the interrupt control and state register, and its bit that an interrupt is pending.
+/// Address of the interrupt control and state register, and its bit for a pending interrupt.
 const ICSR: usize = 0xE000_ED04;
 const ISRPENDING: u32 = 1 << 22;
 

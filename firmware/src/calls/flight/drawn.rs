@@ -33,8 +33,8 @@ pub fn config() -> Config<VEHICLES> {
     config
 }
 
-/// A random path of 4, 8 or the most waypoints: legs of 0.2, 1 or 5 m, either nearly straight on or
-/// in random directions.
+/// A random path of 4, 8 or [`WAYPOINTS`] waypoints: legs of 0.2, 1 or 5 m, either nearly straight
+/// on or in random directions.
 pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
     let leg_m = [0.2, 1.0, 5.0][random_below(rng, 3)];
     let onward = random_point(rng, leg_m);

@@ -1,4 +1,4 @@
-//! The flights whose steps are counted are flown, and their steps counted.
+//! Checks that the measured flights take off and that their steps are counted.
 
 extern crate std;
 

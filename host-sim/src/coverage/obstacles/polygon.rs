@@ -1,4 +1,4 @@
-//! Convex polygons whose corners turn left.
+//! Convex polygons with corners in counterclockwise order.
 
 /// The corners of a polygon, east and north, metres.
 pub(super) type Polygon = Vec<[f64; 2]>;
@@ -11,7 +11,7 @@ fn cross(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }
 
-/// Twice the area of the triangle `a b c`, positive if it turns left.
+/// Twice the area of the triangle `a b c`, positive if its corners are in counterclockwise order.
 fn turn(a: &[f64; 2], b: &[f64; 2], c: &[f64; 2]) -> f64 {
     cross(&minus(b, a), &minus(c, a))
 }
@@ -46,8 +46,9 @@ pub(super) fn bounding_box(points: &Polygon) -> Polygon {
     vec![low, [high[0], low[1]], high, [low[0], high[1]]]
 }
 
-/// A polygon of at most `most` corners (five or more) around a convex one: the edge that adds the
-/// least area is left out, and those beside it are made longer, until there are as few.
+/// A polygon of at most `most` corners (five or more) around a convex one. While it has more, it
+/// drops the edge that thereby adds the least area, and extends the two neighbouring edges until
+/// they meet.
 pub(super) fn with_fewer_corners(mut polygon: Polygon, most: usize) -> Polygon {
     while polygon.len() > most {
         let n = polygon.len();
@@ -55,7 +56,7 @@ pub(super) fn with_fewer_corners(mut polygon: Polygon, most: usize) -> Polygon {
             let [before, a, b, after] = [i + n - 1, i, i + 1, i + 2].map(|k| polygon[k % n]);
             let (into, out) = (minus(&a, &before), minus(&after, &b));
             let bend = cross(&into, &out);
-            // Where the edges beside this one do not meet, it cannot be left out.
+            // If the neighbouring edges do not meet when extended, this edge cannot be dropped.
             (bend > 0.0).then(|| {
                 let share = cross(&minus(&b, &a), &out) / bend;
                 let meet = [a[0] + into[0] * share, a[1] + into[1] * share];

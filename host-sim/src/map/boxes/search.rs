@@ -1,9 +1,10 @@
 //! Finds the obstacle nearest to a segment by branch and bound over a tree of boxes.
 //!
-//! All boxes of a node are computed at once, with vector instructions where the machine has them:
-//! branches that depend on distances are mispredicted often, and cost more than the arithmetic. The
-//! results are bit-identical with any instruction set. Functions that use [`SimdLanes`] must be
-//! inlined into [`Search::with_simd`]; closures would not be, so there are none.
+//! The distances of all boxes of a node are computed at once, with vector instructions where the
+//! machine has them: branches that depend on distances are mispredicted often, and cost more than
+//! the arithmetic. The results are bit-identical with any instruction set. Functions that use
+//! [`SimdLanes`] must be inlined into [`Search::with_simd`]; closures would not be, so there are
+//! none.
 
 use pulp::{Simd, WithSimd};
 

@@ -32,7 +32,7 @@ use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
 /// longer than a battery lasts.
 const DEFAULT_AREA_TIME_LIMIT_S: f32 = 3600.0;
 
-/// Cell of the level ground that a coverage mission has in place of a map, metres.
+/// Edge of a cell of the level ground that a coverage mission has in place of a map, metres.
 const LEVEL_GROUND_CELL_M: f32 = 1.0;
 /// Extent in metres up to which an area in "metres" is refused: its numbers must be degrees.
 const MAX_DEGREES_EXTENT_M: f64 = 0.5;
@@ -118,7 +118,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
     })
 }
 
-/// Errors of goals, which a coverage mission does not fly to, and of how they are assigned.
+/// An error for each given key about goals or their assignment: a coverage mission has no goals.
 fn goal_keys_beside_area(text: Text<'_>, mission: &Table<'_>) -> Vec<ScenarioError> {
     let unsupported = |key: &'static str| {
         let value = mission.get(key)?;
@@ -194,8 +194,8 @@ fn read_coverage_mission(
     Ok(mission)
 }
 
-/// Reads the area, and which file has the heights of the ground below it, if any.
-/// `origin` is that of the map beside it, if it is given.
+/// Reads the area, and which file has the heights of the ground below it, if any. `origin` is the
+/// origin of `[map]`, if the scenario gives it.
 fn read_area(
     table: &Table<'_>,
     folder: &Path,
@@ -411,7 +411,8 @@ fn rings_in_mission_frame(
     }
 }
 
-/// Key and place of a ring that stands in the scenario beside the border; `None` for others.
+/// Key and place of a hole or no-fly zone that the scenario's own keys give; `None` for other
+/// rings.
 fn ring_span(table: &Table<'_>, rings: &[Ring], ring: usize) -> Option<(&'static str, Span)> {
     let kind = rings[ring].kind;
     let key = match kind {
@@ -420,7 +421,7 @@ fn ring_span(table: &Table<'_>, rings: &[Ring], ring: usize) -> Option<(&'static
         RingKind::NoFly => "no_fly",
     };
     let items = table.get(key)?.items().ok()?;
-    // Those of the file come before those of the key.
+    // Rings of the area file come before those of the scenario's key.
     let all = rings.iter().filter(|other| other.kind == kind).count();
     let nth = rings[..ring].iter().filter(|other| other.kind == kind).count();
     items.get((nth + items.len()).checked_sub(all)?).map(|item| (key, item.span.clone()))

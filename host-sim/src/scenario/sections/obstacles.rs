@@ -112,8 +112,8 @@ impl MapBesideArea {
 }
 
 impl Flown<'_> {
-    /// Horizontal distance between paths and obstacles, metres: how far companions let a vehicle
-    /// stray from its path over a field, and never less than the margin to walls.
+    /// Horizontal distance between paths and obstacles, metres: the largest radius, plus how far
+    /// companions let a vehicle deviate from its path over a field, at least the margin to walls.
     fn clearance_m(&self) -> f32 {
         let Deconfliction { separation_m, safety_distance_m, .. } = *self.deconfliction;
         let walls_m = margins::required_distances(self.simulation, 0.0, self.vehicles).margin_m;
@@ -121,7 +121,7 @@ impl Flown<'_> {
         self.largest_radius_m() + stray_m.max(walls_m).max(self.roadmap.safety_margin_m)
     }
 
-    /// Height of a path above obstacles that it leads over, metres.
+    /// Height that a path keeps above obstacles below it, metres.
     fn clearance_below_m(&self) -> f32 {
         let lower_m = |vehicle: &Vehicle| {
             margins::max_height_error_m(self.simulation.estimator, vehicle.personality)

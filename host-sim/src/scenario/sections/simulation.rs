@@ -8,7 +8,7 @@ use super::values::{MAX_ID, read_point};
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
 
-/// Reads `[deconfliction]`. The default of `separation_m` is the safety distance and `stray_m`, by
+/// Reads `[deconfliction]`. The default of `separation_m` is the safety distance plus `stray_m`, by
 /// which two vehicles together deviate from their paths, metres.
 pub(super) fn read_deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
     let methods =

@@ -101,7 +101,8 @@ impl TerrainFile {
         })
     }
 
-    /// Reads the heights; sets the area's heights above them, and puts the vehicles on the ground.
+    /// Reads the terrain file; sets the area's terrain and mission height, and puts the vehicles on
+    /// the ground.
     pub(super) fn apply_terrain(
         &self,
         text: Text<'_>,

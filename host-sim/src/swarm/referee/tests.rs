@@ -66,7 +66,7 @@ fn a_near_pair_is_one_violation_unless_both_stand() {
         referee.observe(0.1, &pair(1.4, Phase::Flying));
         referee.observe(0.2, &pair(1.3, Phase::Flying));
         assert_eq!(referee.violations, 1);
-        // Of the two vehicles the text names the other one, by its id.
+        // The text names the other vehicle of the pair by its id.
         assert_eq!(
             (referee.incidents[0].1, &*referee.incidents[0].2),
             (1, "nearer than the safety distance to vehicle 7")

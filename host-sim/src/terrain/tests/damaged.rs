@@ -1,4 +1,5 @@
-//! Cut, flipped and overblown files: an error or heights, never a panic.
+//! Files cut short, with changed bytes or with exaggerated sizes: an error or heights, never a
+//! panic.
 
 use las::{Builder, Color, Point as Return, Transform, Vector, Writer};
 use rand_core::Rng as _;
@@ -6,7 +7,7 @@ use rand_pcg::Pcg32;
 
 use super::*;
 
-/// A small cloud in metres of zone 30, compressed or not.
+/// A small cloud in metres of UTM zone 30, compressed or not.
 fn returns(compressed: bool, format: u8) -> Vec<u8> {
     let mut builder = Builder::from((1, 4));
     builder.point_format = las::point::Format::new(format).unwrap();
@@ -35,7 +36,7 @@ fn returns(compressed: bool, format: u8) -> Vec<u8> {
         };
         writer.write_point(point).unwrap();
     }
-    // The last two are higher than all: noise, and a return that was deleted.
+    // The last two returns are higher than all others: one is noise, one was deleted.
     for withheld in [false, true] {
         let noise = las::point::Classification::LowPoint;
         let deleted = Return {
@@ -106,7 +107,7 @@ fn damaged_files_end_in_an_error_or_in_heights() {
                     cuts += u32::from(decode(&bytes).is_ok());
                 }
                 1 => {
-                    // The header counts most.
+                    // Half of the changes hit the header, where they matter most.
                     let at = if random.next_u32().is_multiple_of(2) {
                         at % 400 % bytes.len()
                     } else {
@@ -123,7 +124,7 @@ fn damaged_files_end_in_an_error_or_in_heights() {
                 }
             }
         }
-        // A return may be flipped to another one.
+        // Not every change is an error: it may turn a return into another valid one.
         assert!(refused > 0, "{name}: {refused} refused");
         assert!(cuts <= tries / 30, "{name}: {cuts} cut files were read");
     }
@@ -179,7 +180,7 @@ fn files_that_say_that_they_are_vast_are_refused() {
             .to_string()
             .contains("it has 3 heights, its header says 4")
     );
-    // Two cells of a file far apart in a frame of small ones: a box of 100 km in cells of 1 m.
+    // A window of 100 km in cells of 1 m has too many cells.
     let values = vec![5i16; 4];
     let bytes = tiff([2, 2], &values, &keys(1, 32630), [500_000.0, 4_794_000.0], 1.0);
     let window = Some([Flat::repeat(-50_000.0), Flat::repeat(50_000.0)]);

@@ -1,4 +1,4 @@
-//! Every real file with heights, where the shared data is present.
+//! Tests of the readers on real files with heights, where the shared data is present.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ fn data(name: &str) -> Option<PathBuf> {
 
 #[test]
 fn bilbao_is_where_its_system_says() {
-    // Cells, and the sum of all heights, by another reader.
+    // Number of cells and sum of all heights as another reader finds them.
     for (name, size, sum, range) in [
         ("bilbao_DEM.tif", 680, 9_637_843.0, [-2.0, 103.0]),
         ("bilbao_BDSM.tif", 1359, 4_762_879.0, [0.0, 52.0]),
@@ -25,7 +25,8 @@ fn bilbao_is_where_its_system_says() {
         let raster = geotiff::read(&path).unwrap();
         assert_eq!((raster.columns, raster.rows), (size, size));
         assert_eq!(raster.heights_m.iter().map(|h| f64::from(*h)).sum::<f64>(), sum);
-        // The middle of zone 30 is 3° west; across, a metre of the file is 1 / 0.9996 m there.
+        // The central meridian of UTM zone 30 is 3° west; there a metre east in the file is 1 /
+        // 0.9996 m.
         let on_meridian = |x: f64| {
             let origin = Geodetic { lat_deg: 43.3, lon_deg: -3.0, alt_m: 0.0 };
             raster.crs.to_mission(&origin, [x, 4_794_000.0]).unwrap()
@@ -39,7 +40,8 @@ fn bilbao_is_where_its_system_says() {
         let grid = super::read(&path, &Frame { origin: &origin, metres: false, window }).unwrap();
         let highest = grid.heights_in_box(&Flat::repeat(-300.0), &Flat::repeat(800.0));
         assert!(!highest.holes, "{name}");
-        // Beside the file's own cells in that box, which lies along its rows here.
+        // Compared with the file's own cells in that box, whose sides are along the file's rows
+        // here.
         let cells = |from: f64, to: f64, corner: f64, side: f64| {
             ((from - corner) / side) as usize..((to - corner) / side) as usize
         };
@@ -53,7 +55,7 @@ fn bilbao_is_where_its_system_says() {
     }
 }
 
-/// The latitude of a northing in the middle of a zone: the meridian's arc, added up (GRS 1980).
+/// The latitude of a northing on a zone's central meridian, by summing its arc (GRS 1980).
 fn latitude_deg(northing_m: f64) -> f64 {
     let (a, e2) = (6_378_137.0, 0.006_694_380_022_90);
     let (steps, mut lat, mut arc) = (200_000, 0.0f64, 0.0);
@@ -67,8 +69,8 @@ fn latitude_deg(northing_m: f64) -> f64 {
     lat.to_degrees()
 }
 
-/// Lambert's conformal conic of the file, by Snyder's formulas (1987, 15-7 to 15-11), in degrees:
-/// another way to its places.
+/// Longitude and latitude (degrees) of a place in the file's Lambert conformal conic projection,
+/// independently by Snyder's formulas (1987, 15-7 to 15-11).
 fn autzen([x, y]: [f64; 2]) -> [f64; 2] {
     let e = 0.006_694_380_022_90f64.sqrt();
     let [lat1, lat2, lat0] = [43.0f64, 45.5, 41.75].map(f64::to_radians);
@@ -96,7 +98,7 @@ fn autzen([x, y]: [f64; 2]) -> [f64; 2] {
 #[test]
 fn autzen_is_in_feet_and_where_its_system_says() {
     let Some(path) = data("autzen_trim.las") else { return };
-    // The file read by hand: 34 bytes a return from byte 2038 on.
+    // The file decoded here without the reader: 34 bytes a return from byte 2038 on.
     let bytes = std::fs::read(&path).unwrap();
     let number =
         |at: usize| f64::from(i32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())) * 0.01;
@@ -159,11 +161,11 @@ fn clouds_without_returns_or_a_system_are_refused_by_name() {
     assert!(error.contains("no height here"), "{error}");
     let error = super::read(&simple, &anywhere(&ORIGIN)).unwrap_err().to_string();
     assert!(error.contains("does not say where it is"), "{error}");
-    // Where the mission's numbers are metres its are too, by the user's word.
+    // If the mission's coordinates are metres, the file's are taken for metres too.
     let grid = super::read(&simple, &Frame { metres: true, ..anywhere(&ORIGIN) }).unwrap();
     let range = grid.range_m().unwrap();
     assert!(range[0] >= 406.59 && (range[1] - 586.38).abs() < 0.01, "{range:?}");
-    // Its place is far from any mission.
+    // The file's coordinates are far from any mission.
     let window = Some([Flat::repeat(-100.0), Flat::repeat(100.0)]);
     let error =
         super::read(&simple, &Frame { metres: true, window, ..anywhere(&ORIGIN) }).unwrap_err();

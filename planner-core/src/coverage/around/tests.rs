@@ -51,7 +51,7 @@ fn field(zones: &[Option<(f32, f32, f32, u8)>]) -> (StdVec<Flat>, StdVec<Ring>) 
 
 type Way = Result<StdVec<Point>, DetourError>;
 
-/// Plans, and holds the way against what every way must keep. Also the length of the shortest one
+/// Plans a path, and checks what holds for every path. Also returns the length of the shortest path
 /// around the zones alone.
 fn planned(
     zones: &[Option<(f32, f32, f32, u8)>],
@@ -73,7 +73,7 @@ fn planned(
         assert_eq!(points[0], request.here);
         for leg in points.windows(2) {
             assert!(transit.is_line_clear(&leg[0].xy(), &leg[1].xy()), "{leg:?} meets a zone");
-            // Nearer than at the beginning it comes to nothing that it was too near already.
+            // Where the vehicle was too near already, the path leads no nearer.
             for obstacle in &known {
                 assert!(
                     !obstacle.impassable_part(&request.here).intersects(&leg[0], &leg[1]),
@@ -177,7 +177,7 @@ proptest! {
         };
         let things: StdVec<_> = things.iter().map(thing).collect();
         let Some((way, shortest_m)) = planned(&zones, &request, &things) else { return Ok(()) };
-        // A fence that holds both ends takes ways away, and adds none.
+        // A fence that contains both ends removes paths, and adds none.
         let room = Point::repeat(room_m);
         let fence = Some((
             here.inf(&OVER) - room,

@@ -36,7 +36,7 @@ fn each_cell_is_flown_back_and_forth_in_one_go() {
     let mut lanes = laid.clone();
     group_into_cells(&mut lanes);
     order_cells(&mut lanes, &Transit::<1>::empty());
-    // Up on one side, down on the other, and over both.
+    // Up on one side of the zone, down on the other, and over both.
     let strips: Vec<u16> = lanes.iter().map(|lane| lane.strip).collect();
     assert_eq!(strips, [0, 1, 2, 3, 4, 5, 6, 7, 8, 5, 4, 3, 2]);
     for pair in lanes.windows(2).filter(|pair| pair[0].first == pair[1].first) {

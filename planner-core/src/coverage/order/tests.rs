@@ -52,7 +52,7 @@ fn a_search_makes_no_way_longer_and_knows_its_length() {
         let strips = 2 + (unit() * (count - 2) as f32) as usize;
         let mut laid = Vec::new();
         for k in 0..count {
-            // Two lanes in each strip of those along strips; the others anywhere.
+            // The first lanes: two in each strip. The others: anywhere.
             let v = if k < strips {
                 10.0 * (k / 2) as f32
             } else {

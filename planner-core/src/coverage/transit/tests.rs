@@ -7,7 +7,7 @@ use rand_pcg::Pcg32;
 use super::*;
 use crate::coverage::area::{Ring, edges_of};
 
-/// Whether a line meets an edge of a zone: by each edge, whatever is on which side of the line.
+/// Whether a line meets an edge of a zone: every edge is tested, without a test of sides first.
 fn meets_an_edge(area: &Area<'_>, from: &Flat, to: &Flat) -> bool {
     let zones = area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly);
     zones.flat_map(|(_, ring)| edges_of(ring)).any(|(a, b)| {
@@ -18,7 +18,7 @@ fn meets_an_edge(area: &Area<'_>, from: &Flat, to: &Flat) -> bool {
     })
 }
 
-/// The shortest way over corners, by Bellman and Ford over all of them.
+/// The length of the shortest path over corners, by Bellman and Ford over all corners.
 fn shortest_m<const N: usize>(
     transit: &Transit<'_, N>,
     area: &Area<'_>,
@@ -52,7 +52,7 @@ fn ways_around_zones_are_the_shortest_there_are() {
             .into();
         let mut rings = std::vec![Ring { end: 4, kind: RingKind::Outer }];
         for zone in 0..1 + case % 4 {
-            // One in each quarter, so that none meets another; slanted, and some with an inward
+            // One zone in each quarter, so that no two meet; slanted, and some with an inward
             // corner.
             let middle =
                 Flat::new(25.0 + 50.0 * (zone % 2) as f32, 25.0 + 50.0 * (zone / 2) as f32);

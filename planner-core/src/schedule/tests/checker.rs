@@ -1,4 +1,4 @@
-//! The checker of schedules: flies them at any speeds and measures.
+//! The checker of schedules: flies them at any speeds and measures distances.
 
 extern crate std;
 
@@ -7,9 +7,9 @@ use std::vec::Vec as StdVec;
 use super::super::*;
 use crate::Point;
 
-/// Flies all in lock-step along their paths, gates obeyed, vehicle `i` at `speeds[i]`. Returns the
-/// smallest distance between two of which one moves, or that were still under way after `steps` of
-/// 50 ms.
+/// Flies all vehicles in lock-step along their paths, obeying gates, vehicle `i` at `speeds[i]`.
+/// Returns the smallest distance between two vehicles of which one moves, or those that were still
+/// under way after `steps` steps of 50 ms.
 pub(crate) fn fly<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
@@ -40,7 +40,7 @@ pub(crate) fn fly<const W: usize>(
                 g.at_m >= along[i] - 0.01 && along[other] < g.until_m
             };
             let free = gates[i].iter().filter(shut).map(|g| g.at_m).fold(f32::INFINITY, fminf);
-            // `until_m` lies a hair beyond the end of the last piece.
+            // `until_m` lies slightly beyond the end of the last timed segment.
             let goal = end(&flights[i]) + if flights[i].task.leaves_pad() { 0.02 } else { 0.0 };
             along[i] = fmaxf(along[i], fminf(fminf(along[i] + speeds[i] * 0.05, free), goal));
         }

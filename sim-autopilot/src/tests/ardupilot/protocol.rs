@@ -1,4 +1,4 @@
-//! What the simulated ArduCopter says unasked, when asked, and refuses.
+//! Tests of what the simulated ArduCopter sends without a request, answers and refuses.
 
 use planner_core::frames::Projection;
 

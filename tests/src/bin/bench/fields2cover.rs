@@ -151,7 +151,7 @@ impl Field {
         field
     }
 
-    /// Share of it that lanes sweep.
+    /// Share of the field's area that lanes sweep.
     fn swept_share(&self, lanes: &[[Place; 2]], lane_m: f32) -> f64 {
         let outer = &self.vertices[..usize::from(self.rings[0].end)];
         let (mut low, mut high) = (outer[0], outer[0]);

@@ -1,5 +1,5 @@
-//! Times our roadmap and searches beside `algorithm1.cpp`: P3D Algorithm 1 as printed, over all
-//! pairs, with OctoMap's `castRay`.
+//! Times our roadmap and searches beside `algorithm1.cpp`: paper P3D's Algorithm 1 as printed, over
+//! all pairs, with OctoMap's `castRay`.
 //!
 //! Both programs get the same map (the built-in building at 0.25 m, for theirs written as `.bt`),
 //! the same ten starts and goals, 2300 random nodes, Dmin 0.5 m, Dmax 8 m, margin 0, and are run
@@ -357,7 +357,8 @@ impl<'a> Ours<'a> {
         Ok([measured, labelled, start.elapsed()].map(|time| time.as_secs_f64() * 1e3))
     }
 
-    /// Number of node pairs within the range of lengths, for each of which Algorithm 1 casts a ray.
+    /// Number of node pairs within the range of edge lengths, for each of which Algorithm 1 casts a
+    /// ray.
     fn rays(&self) -> usize {
         let range = EDGE_MIN_M * EDGE_MIN_M..=EDGE_MAX_M * EDGE_MAX_M;
         let near = |k: usize, l: usize| {

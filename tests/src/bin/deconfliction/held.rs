@@ -20,7 +20,7 @@ const LATTICE_M: f32 = 0.5;
 const JOIN_M: f32 = 1.0;
 /// Height above its final position from which on a vehicle counts as in the air, metres.
 const ALOFT_M: f32 = 1.0;
-/// How far along its path a vehicle whose radio fails may come unheard, metres.
+/// How far along its path a vehicle whose radio fails may fly unheard, metres.
 const STRETCH_M: f32 = 6.0;
 /// Distance kept from that stretch beyond the safety distance, metres.
 const BESIDE_M: f32 = 0.4;
@@ -164,7 +164,7 @@ pub fn rest_offsets_m(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Opti
     Some([rest.1, rest.0 - heard.0])
 }
 
-/// Points on the ground below the path, as far as the vehicle may come unheard from where it was
+/// Points on the ground below the path, as far as the vehicle may fly unheard from where it was
 /// last heard.
 fn possible_rest_places(
     plan: &SwarmPlan,

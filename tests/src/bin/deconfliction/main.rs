@@ -72,18 +72,18 @@ struct Row {
     deadlocks: u32,
     /// Number of vehicles without a fault that did not reach their goals.
     held_up: usize,
-    /// Causes of these, counted in the order of [`Cause::ALL`].
+    /// Number of these vehicles by cause, in the order of [`Cause::ALL`].
     held_up_by: [usize; Cause::ALL.len()],
     /// Greatest distance of silent vehicles on the ground: beside their path, and along it from
     /// where they were last heard, metres.
     lies_m: [f32; 2],
     /// Smallest distance of two vehicles seen, metres.
     min_separation_m: f64,
-    /// Mean excess of the flight time, from take-off to landing, over that of the flight alone, as
-    /// a share.
+    /// Mean excess of the flight time, from take-off to landing, over that of the same flight
+    /// alone, as a fraction of the latter.
     extra_flight: f64,
     /// Mean excess of the last landing's time over that if each vehicle flew alone, all at once, as
-    /// a share.
+    /// a fraction of the latter.
     extra_makespan: f64,
     /// As `extra_makespan`, by the times of the plan's schedule.
     #[serde(skip_serializing_if = "Option::is_none")]

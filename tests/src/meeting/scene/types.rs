@@ -75,7 +75,7 @@ pub enum MeetingEvent {
     Fails(Failsafe),
     /// The companion stops for good.
     Dies,
-    /// Directions of its radio fail.
+    /// Its radio fails in one or both directions.
     Cut {
         /// Whether sending fails.
         sends: bool,

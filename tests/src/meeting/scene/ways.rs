@@ -185,7 +185,8 @@ pub(super) fn pads(flight: &Flight<WAYPOINTS>) -> [Point; 2] {
     ]
 }
 
-/// Whether no flight passes close over another's platforms, and all pads lie apart.
+/// Whether `next` fits beside `flights`: no flight passes close over a platform, all pads lie
+/// apart.
 pub(super) fn fits(flights: &[Flight<WAYPOINTS>], next: &Flight<WAYPOINTS>) -> bool {
     let own = pads(next);
     let over = |pads: &[Point; 2], path: &Path<WAYPOINTS>| {

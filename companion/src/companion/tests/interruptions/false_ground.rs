@@ -1,5 +1,5 @@
-//! A landing detector that reports ground in the air; a start that is cancelled there; what the
-//! pilot gives back.
+//! A landing detector that reports ground in the air; a start that is cancelled in the air; a
+//! vehicle that the pilot gives back.
 
 use super::*;
 
@@ -20,8 +20,8 @@ fn climbing(kind: AutopilotKind, flown: bool) -> Bench {
     b
 }
 
-/// A start that is cancelled, and a vehicle that somebody arms and takes up all the same; its
-/// landing detector never reports flight.
+/// A vehicle whose start is cancelled, but that is armed and lifted off by others; its landing
+/// detector never reports flight.
 fn cancelled_in_air() -> Bench {
     let mut b = bench(AutopilotKind::Px4);
     (b.refused, b.false_ground) = (std::vec![ARM], true);
@@ -43,7 +43,7 @@ fn cancelled_in_air() -> Bench {
 #[test]
 fn a_pause_disarms_no_vehicle_in_the_air() {
     use AutopilotKind::*;
-    // An ArduCopter that reports no flight climbs by its own take-off.
+    // An ArduCopter that reports no flight stays in `TakeOff`, not in `Climb`.
     for (kind, flown) in [(Px4, true), (Px4, false), (ArduPilot, true)] {
         let mut b = climbing(kind, flown);
         assert_eq!(pause(&mut b), Some(ACCEPTED));

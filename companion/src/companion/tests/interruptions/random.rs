@@ -1,5 +1,5 @@
-//! Random sequences of commands, faults and the pilot's acts: what must hold at every tick, and
-//! that all end on the ground.
+//! Random sequences of commands, faults and the pilot's acts: checks what must hold at every tick,
+//! and that every flight ends on the ground.
 
 use std::string::String;
 
@@ -10,17 +10,18 @@ happens! {
     Silent, Heard, Disarm, Battery, FalseGround, TrueGround, Refuses, Obeys, Mute, Wait
 }
 
-/// What must hold at every tick, whatever happens.
+/// Checks what must hold at every tick.
 struct Watch {
-    /// The setpoint mode, in the air, heard, and no setpoints, for so many ticks.
+    /// Number of ticks without setpoints, in the air and the setpoint mode, with the autopilot
+    /// heard.
     unattended: u32,
-    /// Commands seen so far.
+    /// Number of commands checked so far.
     commands: usize,
-    /// NAV_LAND was accepted in the air.
+    /// Whether NAV_LAND was accepted in the air.
     landing: bool,
-    /// Ticks in a mode of the pilot's, heard.
+    /// Number of ticks in a mode of the pilot's, with the autopilot heard.
     piloted: u32,
-    /// Arming requests since the last start or resume, and whether one took effect.
+    /// Whether an arming request has taken effect since the last start or resume.
     armed_once: bool,
     log: Vec<String>,
 }
@@ -84,7 +85,7 @@ impl Watch {
             );
         }
         self.commands = b.commands.len();
-        // What the companion can know: the armed bit, or the ack.
+        // The companion knows of the arming by the armed bit or by the ack.
         let acked =
             b.companion.requests.handshake().is_armed_bit_overdue(b.now + Duration::from_secs(9));
         self.armed_once |= b.companion.telemetry.armed || (acked && state == State::Arming);
@@ -177,7 +178,7 @@ proptest::proptest! {
             watch.happen(&mut b, ALL[what]);
             (0..ticks).for_each(|_| watch.tick(&mut b));
         }
-        // All is well again, and whoever took the vehicle gives it back or lands it.
+        // All faults end, and a pilot or failsafe that has the vehicle lands it.
         (b.silent, b.no_position, b.false_ground, b.status) = (false, false, false, 3);
         b.refused.clear();
         if b.armed && b.mode != b.kind.setpoint_mode() {
@@ -187,7 +188,7 @@ proptest::proptest! {
             if matches!(b.state(), State::PilotReturned | State::Paused) {
                 watch.happen(&mut b, Happens::Resume);
             }
-            // What the companion of an earlier flight would be: nobody's, until it is landed.
+            // As with a companion that was restarted in the air, the state lasts until NAV_LAND.
             if b.state() == State::Failsafe && second == 40 {
                 watch.happen(&mut b, Happens::Land);
             }

@@ -8,7 +8,7 @@ use crate::link::intent::{FLYING, Intent};
 
 type Cause = (&'static str, fn(&mut Fall));
 
-/// Reasons to land, and to give up.
+/// Causes of a landing or of an aborted mission.
 const CAUSES: &[Cause] = &[
     ("nothing: it lands at its goal", |_| {}),
     ("NAV_LAND", |f| _ = land(&mut f.b)),
@@ -120,7 +120,7 @@ impl Fall {
         b.false_ground = b.now >= self.ground_from;
         let lands = b.mode == b.kind.land_mode();
         b.step_m = if lands { self.sinks_m } else { 0.1 };
-        // What holds a landing vehicle up near the ground is not known to it.
+        // A landing vehicle is not held in the air.
         b.stuck &= !lands;
         let (before, armed) = (b.state(), b.armed);
         b.tick();
@@ -164,7 +164,7 @@ proptest::proptest! {
         f.run(at_s);
         CAUSES[cause].1(&mut f);
         f.run(150.0);
-        // What nobody flies, or waits in the air, is landed.
+        // A vehicle that still waits in the air is commanded to land.
         for _ in 0..8 {
             f.run(20.0);
             land(&mut f.b);
@@ -178,7 +178,7 @@ proptest::proptest! {
     }
 }
 
-/// In flight, with a false report of the ground from then on.
+/// A vehicle in `Follow` whose landing detector reports ground from then on.
 fn flying(kind: AutopilotKind, up_m: f32) -> Bench {
     let mut b = high_bench(kind, up_m, 0.0);
     b.start();

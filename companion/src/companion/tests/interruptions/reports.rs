@@ -1,12 +1,13 @@
-//! What a vehicle that somebody else flies reports to the others: not what it reported before.
+//! The intent of a vehicle that a pilot or a failsafe flies: it no longer reports what it did
+//! before.
 
 use super::*;
 use crate::link::intent::ON_DETOUR;
 
-/// Takes the vehicle, or comes to, one of these modes.
+/// States in which a failsafe or a pilot flies the vehicle.
 const OTHERS_FLY: [State; 2] = [State::Failsafe, State::PilotControl];
 
-/// Somebody else flies the vehicle from now on.
+/// A failsafe or the pilot, by the state `by`, flies the vehicle from now on.
 fn take(b: &mut Bench, by: State) {
     (b.mode, b.status) = match (by, b.kind) {
         (State::Failsafe, AutopilotKind::Px4) => (px4::RTL, 5),
@@ -17,7 +18,7 @@ fn take(b: &mut Bench, by: State) {
     b.run(0.5);
 }
 
-/// It may come down anywhere and flies along no points.
+/// Checks that the intent has no points and says that the vehicle may come down.
 fn check(b: &Bench, case: &str) {
     let intent = b.companion.own_intent();
     assert!(intent.may_come_down, "{case}: {intent:?}");
@@ -25,7 +26,8 @@ fn check(b: &Bench, case: &str) {
     assert_eq!(intent.flags & (ON_DETOUR | ON_PLAN), 0, "{case}: {intent:?}");
 }
 
-/// A vehicle that stood said that it stays: until the autopilot or the pilot took it.
+/// A vehicle that stood reported that it stays; once a failsafe or the pilot flies it, it no longer
+/// does.
 #[test]
 fn who_is_taken_where_it_stood_no_longer_reports_that_it_stays() {
     let mut held = 0;
@@ -46,7 +48,7 @@ fn who_is_taken_where_it_stood_no_longer_reports_that_it_stays() {
     assert!(held >= 4, "{held} of these reported that they stay");
 }
 
-/// Nor that it flies a detour, on which it would look for others before it lands.
+/// It does not report a detour either, on which it would look for others before it lands.
 #[test]
 fn who_is_taken_on_a_detour_no_longer_reports_it() {
     for by in OTHERS_FLY {

@@ -3,7 +3,8 @@
 use super::State::*;
 use super::*;
 
-/// "On ground" close to it: disarming is refused, and the autopilot does not land.
+/// A vehicle in `Disarm`, close to the ground, that falsely reports the ground, refuses to disarm
+/// and does not descend.
 fn hovers() -> Bench {
     let mut bench = flying();
     land(&mut bench);
@@ -15,7 +16,7 @@ fn hovers() -> Bench {
     bench
 }
 
-/// In the air when the companion starts.
+/// A vehicle that is in the air when the companion starts.
 fn found_in_the_air() -> Bench {
     let mut bench = Bench::new(config());
     (bench.armed, bench.mode, bench.enu.z) = (true, px4::OFFBOARD, 1.5);
@@ -23,7 +24,7 @@ fn found_in_the_air() -> Bench {
     bench
 }
 
-/// Its failsafe, and the end of one.
+/// The autopilot disarms, or its failsafe acts and ends.
 pub(super) fn takes_over(scenes: &mut Scenes) {
     scenes.play(flying(), |b| b.armed = false, Aborted, 3.0);
     scenes.play(flying(), fails_safe, Failsafe, 3.0);
@@ -44,7 +45,7 @@ pub(super) fn takes_over(scenes: &mut Scenes) {
         b.refused.push(176);
     };
     scenes.play(to(Streaming), another_mode, Aborted, 5.0);
-    // Given up in the air: somebody has to land it.
+    // The mission is aborted in the air: the companion lands the vehicle.
     let given_up = |b: &mut Bench| {
         b.armed = false;
         b.run_until(Aborted, 2.0);
@@ -65,7 +66,7 @@ pub(super) fn does_not_do_as_asked(scenes: &mut Scenes) {
     scenes.play(flying(), stays_armed, Aborted, 60.0);
     scenes.play(hovers(), |b| b.mode = px4::OFFBOARD, Land, 2.0);
     scenes.play(hovers(), |b| b.false_ground = false, Land, 1.0);
-    // One that takes off by command, and does not.
+    // An ArduCopter that refuses NAV_TAKEOFF.
     let mut grounded = Bench::ardupilot(config());
     grounded.refused = std::vec![22];
     grounded.run_until(Ready, 6.0);
@@ -99,7 +100,7 @@ pub(super) fn is_not_heard(scenes: &mut Scenes) {
     scenes.play(flying(), is_to_be_landed, Aborted, 130.0);
 }
 
-/// Nothing is sent until it is commanded to land; the autopilot's failsafe lands.
+/// The companion sends no commands until NAV_LAND; the autopilot may land by itself.
 pub(super) fn flies_when_the_companion_starts(scenes: &mut Scenes) {
     let lands_by_itself = |b: &mut Bench| {
         b.start();

@@ -1,5 +1,5 @@
-//! Another vehicle comes down, led by nobody, over one that holds its place: whatever it waits for,
-//! it makes room and goes on.
+//! Another vehicle comes down without guidance above one that holds its place: that one makes room,
+//! whatever it waits for, and continues its flight.
 
 use std::collections::VecDeque;
 
@@ -16,17 +16,16 @@ use super::*;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::intent::{Intent, WAITING};
 
-/// Random falls over a vehicle in each of the states.
+/// Number of random falls for each state of the vehicle below.
 const FALLS: u64 = if cfg!(debug_assertions) { 10 } else { 40 };
-/// Time of the scene by which the flight is over, once the vehicle that fell is on the ground,
-/// seconds.
+/// Time after the fall within which the flight must be over, seconds.
 const FLIGHT_OVER_BY_S: f32 = 500.0;
 
 /// The vehicle that comes down, heard five times a second, late and with losses.
 struct Faller {
     id: u8,
     place: Point,
-    /// Before it comes down.
+    /// Flags of its intent before it comes down.
     flags: u8,
     falls_mps: f32,
     loss: f32,
@@ -63,8 +62,9 @@ impl Faller {
         b.drain();
     }
 
-    /// The planner of the vehicle below: aside, away from what comes down, at once; around in a
-    /// while, in a coverage mission once that is down.
+    /// The planner of the vehicle below. It answers a request for a path aside at once, with a path
+    /// away from the falling vehicle; a request for a detour after a random time, in a coverage
+    /// mission not at all.
     fn plan_away(&mut self, b: &mut Bench) {
         let over_area = b.companion.config.lost_vehicle_down_s.is_some();
         let answered = |request: &DetourRequest| request.aside || !over_area;
@@ -88,7 +88,7 @@ impl Faller {
         self.asked = None;
     }
 
-    /// Its intent and its position.
+    /// The falling vehicle's intent and position.
     fn reports(&mut self, now: Instant) -> [Vec<u8>; 2] {
         let (falls, down) = (self.falls_mps > 0.0, self.place.z <= 0.0);
         let flags = match falls {
@@ -143,7 +143,7 @@ impl Faller {
     }
 }
 
-/// Up and out, and around a corner.
+/// A path that rises and then turns a corner.
 fn path(last_m: f32) -> Path<WAYPOINTS> {
     let mut path = Path::new();
     for (x, y, z) in [(8.0, 12.0, 1.5), (22.0, 12.0, 4.0), (22.0, 12.0 + last_m, 4.0)] {
@@ -152,7 +152,7 @@ fn path(last_m: f32) -> Path<WAYPOINTS> {
     path
 }
 
-/// A vehicle that has flown some metres, and holds its place in this state.
+/// A vehicle that has flown a few metres and holds its place in this state.
 fn holding(state: State, over_area: bool, faller: &mut Faller) -> Bench {
     let mut config = two_vehicles();
     let mut wanted = VehiclePlan { path: path(faller.real(1.0, 6.0)), descent_m: 4.0, ..plan() };
@@ -166,7 +166,7 @@ fn holding(state: State, over_area: bool, faller: &mut Faller) -> Bench {
         wanted = VehiclePlan { path: out, ..field_plan() };
     }
     if state == Dividing {
-        // Of two vehicles this one goes on.
+        // With two vehicles in the roster this one may continue alone.
         faller.id = 77;
     } else {
         config
@@ -202,7 +202,7 @@ fn holding(state: State, over_area: bool, faller: &mut Faller) -> Bench {
     b
 }
 
-/// One that flies far away.
+/// A falling vehicle, still far away.
 fn faller(state: State, seed: u64) -> Faller {
     Faller {
         id: 78,
@@ -219,20 +219,21 @@ fn faller(state: State, seed: u64) -> Faller {
     }
 }
 
-/// The least distance to what comes down, and whether the vehicle is down in the end; in a coverage
-/// mission its part is flown by then.
+/// Plays one fall. Returns the least distance between the two vehicles, metres, and whether the
+/// flight ended; in a coverage mission, whether it ended in `Done`.
 fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
     let mut faller = faller(state, seed);
     let mut b = holding(state, over_area, &mut faller);
     let wait_s = if state == Replanning { faller.real(0.0, 2.0) } else { faller.real(2.0, 6.0) };
     faller.until(&mut b, wait_s, |_| false);
     (faller.loss, faller.delay_s) = (faller.real(0.0, 0.3), faller.real(0.0, 0.8));
-    // One in three right above: every way out leads nearer to the vertical first.
+    // One fall in three begins right above: every path out then first leads nearer to the vertical.
     let off_most_m = if seed.is_multiple_of(3) { 0.1 } else { 1.2 };
     let (angle, off_m) = (faller.real(-3.2, 3.2), faller.real(0.0, off_most_m));
     let mut beside = Point::new(libm::cosf(angle), libm::sinf(angle), 0.0) * off_m;
     if state == Paused {
-        // It flies no way but its own: that leads out of the column at once.
+        // A paused vehicle evades along its own path only: here that leads out of the column at
+        // once.
         beside.x = beside.x.abs();
     }
     faller.place = b.enu + beside + Point::new(0.0, 0.0, faller.real(10.0, 16.0));
@@ -247,7 +248,7 @@ fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
             least_m = least_m.min((b.enu - faller.place).norm());
         }
     }
-    // What it waits for comes, but no way around.
+    // What the vehicle waits for happens, but outside a coverage mission no detour is found.
     b.answer_detour = if over_area { Some(Ok(())) } else { detours::NO_WAY };
     b.answer_division = true;
     match state {
@@ -262,7 +263,8 @@ fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
     (least_m, ended && (!over_area || b.state() == Done))
 }
 
-/// A third of them right above it, where every way out leads nearer to the vertical first.
+/// In a third of the falls the other vehicle is right above, so that every path out first leads
+/// nearer to the vertical.
 #[test]
 fn whoever_holds_its_place_makes_room_for_one_that_comes_down() {
     let safety_m = config().safety_distance_m;
@@ -278,8 +280,8 @@ fn whoever_holds_its_place_makes_room_for_one_that_comes_down() {
     }
 }
 
-/// What came down lies on the ground: the place where the vehicle left its path is free again, and
-/// so no picture is left out.
+/// Once the fallen vehicle is on the ground, the place where this one left its path is free again:
+/// it comes back there and leaves out no picture.
 #[test]
 fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
     let mut returns = 0;
@@ -290,7 +292,7 @@ fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
         faller.place = b.enu + Point::new(east_m, north_m, faller.real(10.0, 16.0));
         faller.until(&mut b, 1.0, |_| false);
         faller.falls_mps = faller.real(0.3, 1.5);
-        // Or it stepped back along its path.
+        // Otherwise it evaded backwards along its path.
         let aside = faller.until(&mut b, 20.0, |b| b.companion.detours.is_beside_plan());
         (b.answer_detour, b.answer_division) = (Some(Ok(())), true);
         if !aside || !faller.until(&mut b, 120.0, |b| b.companion.detours.leads_back()) {
@@ -304,8 +306,8 @@ fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
     assert!(returns > FALLS / 8, "{returns}");
 }
 
-/// Its planner does not answer before it is paused: what it sought is forgotten, and it flies its
-/// part all the same.
+/// The vehicle is paused before its planner answers: the search for a path aside is forgotten, and
+/// it still flies its part.
 #[test]
 fn whoever_is_interrupted_while_it_seeks_a_way_aside_flies_its_part() {
     let mut sought = 0;
@@ -317,7 +319,7 @@ fn whoever_is_interrupted_while_it_seeks_a_way_aside_flies_its_part() {
             faller.place = b.enu + Point::new(east_m, north_m, faller.real(10.0, 16.0));
             faller.until(&mut b, 1.0, |_| false);
             (faller.falls_mps, faller.answers) = (1.0, false);
-            // Or it steps back along its path.
+            // Otherwise it evades backwards along its path.
             if !faller.until(&mut b, 20.0, |b| b.state() == Replanning) {
                 continue;
             }

@@ -10,7 +10,7 @@ use super::*;
 
 pub(super) const NO_WAY: Option<Result<(), PlanFailure>> = Some(Err(PlanFailure::Unreachable));
 
-/// Another comes to lie below the path.
+/// Another vehicle lies below the path from now on.
 fn blocked(b: &mut Bench) {
     b.neighbour = below_the_path(OUT_OF_PLAN);
     b.run_until(Blocked, 3.0);
@@ -26,7 +26,8 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
         b.neighbour = on_pad(ON_PLAN);
     };
     scenes.play(accompanied(Follow, 1.0), for_a_while, Done, 60.0);
-    // It is out of radio range, and flies on past the gate that waits for it, or may not have.
+    // The other vehicle is out of radio range. It reported that it flies on beyond the place that
+    // opens the gate, or only up to before that place.
     let mut far = two_vehicles();
     far.radio_range_m = 5.0;
     let mut gated = plan();
@@ -48,9 +49,9 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
         };
         scenes.play(gated_until(clear_m), out_of_range, end, 60.0);
     }
-    // It is heard, and never passes the place that opens the gate.
+    // The other vehicle is heard, and never passes the place that opens the gate.
     scenes.play(gated_until(5.0), |b| b.run(605.0), Aborted, 60.0);
-    // A third vehicle is never heard: nobody knows that it stands.
+    // A third vehicle is never heard: it does not count as standing.
     let mut three = two_vehicles();
     three.roster.push(RosterEntry { system_id: 78, ..three.roster[1] }).unwrap();
     let third_unheard = |b: &mut Bench| {
@@ -60,7 +61,7 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
     scenes.play(accompanied_with(three, Follow, 1.0), third_unheard, Aborted, 60.0);
 }
 
-/// Once all stand it is flown around, or the vehicle lands.
+/// Once all others stand this vehicle flies around the other one, or lands.
 pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
     scenes.play(accompanied(Follow, 1.0), blocked, Done, 60.0);
     let for_a_while = |b: &mut Bench| {
@@ -68,7 +69,7 @@ pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
         b.neighbour = on_pad(ON_PLAN);
     };
     scenes.play(accompanied(Follow, 1.0), for_a_while, Done, 60.0);
-    // Without a goal the detour leads home.
+    // In a plan without a goal the detour leads home.
     let mut bench = Bench::new(two_vehicles());
     (bench.answer_plan, bench.neighbour) = (Some(Ok(field_plan())), on_pad(ON_PLAN));
     bench.run_until(Ready, 6.0);
@@ -93,7 +94,8 @@ pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
         blocked(b);
     };
     scenes.play(accompanied(Follow, 1.0), no_way, Aborted, 120.0);
-    // It lies so near that there is no room to land either: back along the path there is.
+    // The other vehicle lies so near that there is no room to land either: this one flies back
+    // along its path.
     let so_near = |b: &mut Bench| {
         no_way(b);
         b.run_until(Blocked, 5.0);
@@ -118,19 +120,19 @@ pub(super) fn before_take_off(scenes: &mut Scenes) {
 }
 
 pub(super) fn another_flies_where_it_is_to_fly(scenes: &mut Scenes) {
-    // Down on the first stretch of the path: there is no place before it, so this one goes aside,
-    // as often as need be.
+    // The other vehicle comes down over the first stretch of the path: this one cannot evade
+    // backwards, so it requests a path aside, repeatedly.
     let comes_down = |b: &mut Bench| {
         b.answer_detour = None;
         b.neighbour = flies(Point::new(9.5, 12.0, 2.8), 0);
     };
     scenes.play(accompanied(Follow, 0.0), comes_down, Replanning, 6.0);
-    // One that flies a way of its own stays in front of it.
+    // A vehicle on a detour stays in front of this one.
     let stays_in_front = |b: &mut Bench| {
         b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::ON_DETOUR);
     };
     scenes.play(accompanied(Follow, 0.0), stays_in_front, Aborted, 140.0);
-    // On its way back it yields to one that follows the plan, and lands in the end.
+    // On its way back this vehicle yields to one that follows the plan, and lands in the end.
     let yields = |b: &mut Bench| {
         back(b);
         b.run(0.2);
@@ -139,7 +141,8 @@ pub(super) fn another_flies_where_it_is_to_fly(scenes: &mut Scenes) {
     scenes.play(accompanied(Follow, 3.0), yields, Aborted, 100.0);
 }
 
-/// One that hovers beside a lane and sways lets nobody stop and go on again and again.
+/// A vehicle that hovers and sways beside a lane does not make this one stop and continue
+/// repeatedly.
 #[test]
 fn who_sways_beside_the_path_over_a_field_blocks_it_once_or_not() {
     let safety_m = config().safety_distance_m;

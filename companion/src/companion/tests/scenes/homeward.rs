@@ -1,4 +1,5 @@
-//! Over a field: it is ordered back, or its path stays blocked, and it flies straight home.
+//! In a coverage mission: the vehicle flies straight home on command, or because its path stays
+//! blocked.
 
 use planner_core::flight::Gate;
 
@@ -6,7 +7,7 @@ use super::State::*;
 use super::losses::over_a_field;
 use super::*;
 
-/// Over its pad it came down.
+/// The vehicle has landed on its pad.
 fn is_home(b: &mut Bench) {
     b.run_until(Aborted, 240.0);
     assert!((b.enu - START).xy().norm() < 0.3, "at its pad: {:?} {:?}", b.enu, b.texts);
@@ -31,7 +32,7 @@ pub(super) fn is_ordered(scenes: &mut Scenes) {
     }
 }
 
-/// What lies on its path it flies around, and back to that.
+/// It flies around a vehicle that lies on its path, and back to the path.
 pub(super) fn flies_around(scenes: &mut Scenes) {
     let around = |b: &mut Bench| {
         b.neighbour = below_the_path(OUT_OF_PLAN);
@@ -58,7 +59,7 @@ pub(super) fn is_blocked(scenes: &mut Scenes) {
         is_home(b);
     };
     scenes.play(over_a_field(Follow), blocked, Aborted, 1.0);
-    // It sways: the path is clear for a moment now and then.
+    // The other vehicle comes and goes: the path is clear for a moment now and then.
     let sways = |b: &mut Bench| {
         let reported = |b: &Bench, text: &str| b.texts.iter().any(|reported| reported == text);
         for _ in 0..20 {
@@ -75,7 +76,7 @@ pub(super) fn is_blocked(scenes: &mut Scenes) {
     scenes.play(over_a_field(Follow), sways, Aborted, 1.0);
 }
 
-/// Another vehicle flies elsewhere, and never passes the place that it waits for.
+/// Another vehicle flies elsewhere, and never passes the place that opens the gate.
 pub(super) fn waits_for_nothing(scenes: &mut Scenes) {
     let mut plan = field_plan();
     plan.gates.push(Gate { at_m: 4.0, id: 77, until_m: 60.0 }).unwrap();
@@ -88,7 +89,7 @@ pub(super) fn waits_for_nothing(scenes: &mut Scenes) {
     scenes.play(bench, waits, Aborted, 1.0);
 }
 
-/// Another vehicle flies where it is to fly: on its path home it lets one on its plan go first.
+/// Another vehicle flies on this one's path; on its path home this one yields to one on its plan.
 pub(super) fn is_in_the_way_of_another(scenes: &mut Scenes) {
     let stays_in_front = |b: &mut Bench| {
         b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::ON_DETOUR);
@@ -107,7 +108,7 @@ pub(super) fn is_in_the_way_of_another(scenes: &mut Scenes) {
     scenes.play(over_a_field(Follow), yields, Aborted, 1.0);
 }
 
-/// There is no way home: it flies back as it came.
+/// The planner finds no path home, or answers late.
 pub(super) fn finds_no_way(scenes: &mut Scenes) {
     let no_way = |b: &mut Bench| {
         b.answer_detour = detours::NO_WAY;
@@ -128,7 +129,7 @@ pub(super) fn finds_no_way(scenes: &mut Scenes) {
     scenes.play(over_a_field(Follow), late, Aborted, 1.0);
 }
 
-/// Whatever stops it on its path home, it continues there.
+/// A vehicle that is paused on its path home continues on it.
 #[test]
 fn an_interrupted_way_home_is_flown_to_its_end() {
     for at_s in [0.2, 1.5, 3.0] {
@@ -143,8 +144,8 @@ fn an_interrupted_way_home_is_flown_to_its_end() {
     }
 }
 
-/// Another vehicle stops it on its way around, for so long that there it is blocked too, and flies
-/// on.
+/// Another vehicle stops this one on its detour for so long that the detour counts as blocked too,
+/// and then flies on.
 #[test]
 fn a_vehicle_that_was_stopped_on_its_way_around_goes_on() {
     let mut b = over_a_field(Follow);
@@ -164,7 +165,8 @@ fn a_vehicle_that_was_stopped_on_its_way_around_goes_on() {
     assert!(b.texts.iter().any(|text| text == "Flown around: on its path again"), "{:?}", b.texts);
 }
 
-/// Ordered home, it was out of the plan. A new start is another flight: it flies its part.
+/// A vehicle that was commanded home is out of the plan. A new start is another flight, in which it
+/// flies its part.
 #[test]
 fn a_vehicle_that_came_home_early_takes_part_again_after_a_new_start() {
     let mut b = over_a_field(Follow);

@@ -1,4 +1,4 @@
-//! Reason why the vehicle lands, and where there is room for it.
+//! Reasons for a landing, and where there is room for it.
 
 use planner_core::flight::{Path, VehiclePlan};
 use rand_core::Rng;
@@ -7,7 +7,7 @@ use rand_pcg::Pcg32;
 use super::State::*;
 use super::*;
 
-/// Commanded to land while the other is where there is then no room: it waits above.
+/// The vehicle is commanded to land while the neighbour leaves no room below: the landing is held.
 fn held_by(b: &mut Bench, neighbour: Neighbour) {
     b.neighbour = neighbour;
     b.run(0.3);
@@ -15,7 +15,7 @@ fn held_by(b: &mut Bench, neighbour: Neighbour) {
     b.run_until(LandingHeld, 8.0);
 }
 
-/// In the middle of its path, to land while another is below.
+/// A vehicle in the middle of its path whose landing is held, since another one is below.
 fn held() -> Bench {
     let mut bench = accompanied(Follow, 2.0);
     let below = bench.enu + Point::new(1.0, 0.0, -2.5);
@@ -23,12 +23,12 @@ fn held() -> Bench {
     bench
 }
 
-/// So near the pad that there is no room over it.
+/// Another vehicle so near the pad that there is no room to land on it.
 fn at_the_pad() -> Neighbour {
     flies(START - Point::new(1.35, 0.0, 1.35), ON_PLAN)
 }
 
-/// Where the way aside ends it lands.
+/// The vehicle lands at the end of the path aside.
 fn lands_aside(b: &mut Bench, seconds: f32) {
     b.run_until(Land, seconds);
     assert!((b.enu - GOAL).xy().norm() < 0.5, "where the way aside ends: {:?}", b.enu);
@@ -39,14 +39,14 @@ pub(super) fn are_commanded(scenes: &mut Scenes) {
     scenes.play(to(Climb), back, Aborted, 60.0);
 }
 
-/// Of the battery, and of the geofence.
+/// Landings at limits of the battery and of the geofence.
 pub(super) fn at_a_limit(scenes: &mut Scenes) {
     scenes.play(flying(), |b| b.battery = 10, Aborted, 30.0);
     scenes.play(flying(), |b| b.battery = 5, Aborted, 30.0);
     let low = Point::new(0.0, 0.0, -1.0);
     let narrow = fenced(config(), low, Point::new(12.0, 30.0, 10.0));
     scenes.play(Bench::following(narrow), nothing, Aborted, 60.0);
-    // The same while another vehicle lies below: it waits inside until there is room.
+    // While another vehicle lies below, this one waits inside the geofence until there is room.
     let narrow = fenced(two_vehicles(), low, Point::new(10.0, 30.0, 10.0));
     let waits_inside = |b: &mut Bench| {
         b.neighbour = landed(Point::new(11.0, 12.0, 0.0));
@@ -58,9 +58,9 @@ pub(super) fn at_a_limit(scenes: &mut Scenes) {
     scenes.play(Bench::started_with_neighbour(narrow), waits_inside, Aborted, 60.0);
 }
 
-/// Wherever and at whatever angle the path leaves the geofence, and where on the path the vehicle
-/// begins: it stops there, and does not fly on along the fence. The estimate is exact, and so no
-/// error of it ends the flight.
+/// At random places and angles a path leaves the geofence: the vehicle stops there and does not fly
+/// on along the fence. The position estimate is exact here, so that its error does not end the
+/// flight.
 #[test]
 fn who_comes_to_the_fence_lands_where_its_path_leaves_it() {
     let mut rng = Pcg32::new(1, 1);
@@ -87,11 +87,11 @@ fn who_comes_to_the_fence_lands_where_its_path_leaves_it() {
     }
 }
 
-/// Another is below where it lands.
+/// Another vehicle is below where this one lands.
 pub(super) fn wait_for_room(scenes: &mut Scenes) {
     let nowhere_for_long = |b: &mut Bench| {
         b.run_until(Follow, 25.0);
-        // Back over its pad there is no room either, nor aside.
+        // There is no room above its pad either, and no place aside.
         b.neighbour = at_the_pad();
         b.answer_detour = Some(Err(PlanFailure::Unreachable));
         b.run_until(LandingHeld, 120.0);
@@ -103,7 +103,7 @@ pub(super) fn wait_for_room(scenes: &mut Scenes) {
     scenes.play(held(), |b| b.battery = 5, Aborted, 30.0);
 }
 
-/// Over its pad is no room, but aside there is.
+/// There is no room above its pad, but a place aside.
 pub(super) fn end_aside(scenes: &mut Scenes) {
     let on_its_way_up = |b: &mut Bench| {
         held_by(b, stands(Point::new(b.enu.x - 1.0, b.enu.y, 0.0), OUT_OF_PLAN));

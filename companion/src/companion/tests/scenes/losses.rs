@@ -1,4 +1,4 @@
-//! In a coverage mission another vehicle leaves, or the others have given this one up.
+//! In a coverage mission another vehicle leaves, or the others count this one as lost.
 
 use super::State::*;
 use super::*;
@@ -9,17 +9,17 @@ use crate::swarm::fleet::Fleet;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 
-/// The two vehicles photograph an area, along the usual path.
+/// A coverage mission of two vehicles with the path of `field_plan`, in this state.
 pub(super) fn over_a_field(state: State) -> Bench {
     over_a_field_with(field_plan(), state)
 }
 
-/// The same by this plan.
+/// As [`over_a_field`], with this plan.
 pub(super) fn over_a_field_with(plan: Plan, state: State) -> Bench {
     over_a_field_of(two_vehicles(), plan, state)
 }
 
-/// The same with this roster.
+/// As [`over_a_field`], with these settings and this plan.
 fn over_a_field_of(mut config: Config<4>, plan: Plan, state: State) -> Bench {
     config.lost_vehicle_down_s = Some(60.0);
     let mut bench = Bench::new(config);
@@ -33,7 +33,7 @@ fn over_a_field_of(mut config: Config<4>, plan: Plan, state: State) -> Bench {
     bench
 }
 
-/// Three vehicles: alone each is no majority.
+/// Settings with three vehicles, of which one alone is no majority.
 fn three() -> Config<4> {
     let mut config = two_vehicles();
     let start = Point::new(8.0, 28.0, 1.5);
@@ -41,7 +41,7 @@ fn three() -> Config<4> {
     config
 }
 
-/// The other vehicle reports what it knows of this one and of itself.
+/// The other vehicle sends a roster report with these states of this vehicle and of itself.
 pub(super) fn tells(b: &mut Bench, own: MemberStatus, other: MemberStatus) {
     let entry = |standing| RosterReportEntry { status: standing, ..RosterReportEntry::default() };
     let entries = [entry(own), entry(other)].into_iter().collect();
@@ -66,7 +66,7 @@ pub(super) fn tunnels(b: &mut Bench, payload: &[u8]) {
     b.companion.handle_bytes(Link::Swarm, b.now, &out[..n]);
 }
 
-/// The other one leaves.
+/// The other vehicle leaves the mission; runs until this one holds for the division.
 pub(super) fn leaves(b: &mut Bench) {
     tells(b, MemberStatus::Alive, MemberStatus::Left);
     b.run_until(Dividing, 30.0);
@@ -74,8 +74,8 @@ pub(super) fn leaves(b: &mut Bench) {
 
 pub(super) fn another_leaves(scenes: &mut Scenes) {
     scenes.play(over_a_field(Follow), leaves, Done, 120.0);
-    // A promise binds until the division counts, whatever is heard later: others may have divided
-    // on it.
+    // A commitment binds until the division is committed, whatever is heard later: others may have
+    // computed the division with it.
     let had_finished = |b: &mut Bench| {
         b.answer_division = false;
         leaves(b);
@@ -119,7 +119,8 @@ pub(super) fn the_others_give_it_up(scenes: &mut Scenes) {
     }
 }
 
-/// What bars the start for long leaves this one's part to others, unless none of them is in flight.
+/// A vehicle whose start is barred for long leaves its part to the others, unless none of them
+/// flies.
 pub(super) fn another_bars_the_start(scenes: &mut Scenes) {
     let over_the_pad = |flags| flies(Point::new(8.0, 12.0, 3.0), flags);
     let started_below = |b: &mut Bench, flags| {
@@ -129,7 +130,7 @@ pub(super) fn another_bars_the_start(scenes: &mut Scenes) {
         assert_eq!(b.state(), Scheduled);
     };
     scenes.play(over_a_field(Ready), |b| started_below(b, ON_PLAN), Aborted, 15.0);
-    // A pause counts not.
+    // A pause does not count.
     let paused = |b: &mut Bench| {
         started_below(b, ON_PLAN);
         pause(b);
@@ -148,7 +149,7 @@ pub(super) fn another_bars_the_start(scenes: &mut Scenes) {
     scenes.play(over_a_field(Ready), with_its_pilot, Follow, 30.0);
 }
 
-/// A vehicle without a part waits for one that another may leave.
+/// A vehicle without a part waits, since it may get the part of a vehicle that leaves.
 pub(super) fn it_is_in_reserve(scenes: &mut Scenes) {
     let without_part = || Plan { task: Task::Stay, ..field_plan() };
     let started = |b: &mut Bench| {
@@ -175,8 +176,8 @@ pub(super) fn it_is_in_reserve(scenes: &mut Scenes) {
     scenes.play(over_a_field_of(three(), without_part(), Ready), unheard, Done, 30.0);
 }
 
-/// A vehicle that reported that it leaves is no new one in flight, whatever its autopilot says of
-/// the ground.
+/// A vehicle that reported in flight that it leaves does not count as a new one, even if its
+/// autopilot reports ground.
 #[test]
 fn a_vehicle_that_has_left_in_flight_never_takes_part_again() {
     for false_ground in [false, true] {
@@ -194,7 +195,7 @@ fn a_vehicle_that_has_left_in_flight_never_takes_part_again() {
     }
 }
 
-/// What the others know of a flight before does not keep a vehicle from a new one.
+/// A vehicle that the others count as lost since an earlier flight takes part in a new one.
 #[test]
 fn a_vehicle_that_was_restarted_comes_back_as_a_new_one() {
     let mut bench = over_a_field(Ready);
@@ -205,8 +206,8 @@ fn a_vehicle_that_was_restarted_comes_back_as_a_new_one() {
     bench.run_until(Done, 120.0);
 }
 
-/// The last that takes part, in reserve until then: what the others left may be its own by the
-/// division that counts, so it waits for its plan of that.
+/// The other vehicle leaves while this one is in reserve. The committed division may give this one
+/// a part, so it waits for its plan of that division.
 #[test]
 fn a_vehicle_in_reserve_waits_for_its_plan_of_a_division_that_counts() {
     let without_part = Plan { task: Task::Stay, ..field_plan() };
@@ -216,7 +217,7 @@ fn a_vehicle_in_reserve_waits_for_its_plan_of_a_division_that_counts() {
     b.run_until(Scheduled, 10.0);
     tells(&mut b, MemberStatus::Alive, MemberStatus::Left);
     for _ in 0..400 {
-        // It has computed the division: from now on its shell is late.
+        // Once the division is computed the shell no longer answers.
         if b.answer_division {
             b.tick();
             b.answer_division = super::super::divisions::own_roster(&b).hash == 0;

@@ -16,16 +16,16 @@ pub(super) fn in_flight(scenes: &mut Scenes) {
         b.run(601.0);
     };
     scenes.play(flying(), for_too_long, Aborted, 30.0);
-    // In the climb, and called back.
+    // Paused in the climb, then commanded to return.
     let called_back = |b: &mut Bench| {
         b.run_until_lifted();
         pause(b);
         back(b);
     };
     scenes.play(to(Climb), called_back, Land, 1.0);
-    // Before it has left the ground.
+    // Paused before it has left the ground.
     scenes.play(to(Climb), pause, Scheduled, 6.0);
-    // Others take it to be down after a while.
+    // Paused and unheard: others assume after a while that it is down.
     let unheard = |b: &mut Bench| {
         pause(b);
         b.neighbour = None;

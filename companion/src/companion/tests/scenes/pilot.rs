@@ -3,7 +3,7 @@
 use super::State::*;
 use super::*;
 
-/// Taken by the pilot in flight.
+/// A vehicle that its pilot took over in flight.
 fn piloted() -> Bench {
     let mut bench = flying();
     pilot_takes(&mut bench);
@@ -15,7 +15,7 @@ fn gives_back(b: &mut Bench) {
     b.mode = px4::OFFBOARD;
 }
 
-/// Given back by the pilot, and not resumed.
+/// A vehicle that its pilot gave back, before the resume command.
 fn returned() -> Bench {
     let mut bench = piloted();
     gives_back(&mut bench);

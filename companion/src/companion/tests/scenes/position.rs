@@ -1,4 +1,4 @@
-//! Where the vehicle is is not known, or not well enough.
+//! The position of the vehicle is not known, or not precisely enough.
 
 use super::State::*;
 use super::*;

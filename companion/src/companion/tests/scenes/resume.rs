@@ -52,7 +52,8 @@ pub(super) fn another_plan_is_flown(scenes: &mut Scenes) {
     scenes.play(over_a_field(Scheduled), another, Follow, 30.0);
 }
 
-/// One that comes late plans as those that fly, whatever others on the ground know.
+/// A vehicle that starts late leaves out the same waypoints as those in flight, whatever others on
+/// the ground report.
 #[test]
 fn who_comes_late_takes_the_set_of_those_that_fly() {
     let mut bench = over_a_field(Ready);
@@ -69,8 +70,8 @@ fn who_comes_late_takes_the_set_of_those_that_fly() {
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
 }
 
-/// What a vehicle in flight photographs changes no plan on the ground, nor does a round before; a
-/// later round takes all back.
+/// Waypoints photographed by a vehicle in flight, or in an earlier round, change no plan on the
+/// ground; a later round replaces all known waypoints.
 #[test]
 fn only_what_others_on_the_ground_know_changes_the_plan() {
     let mut bench = over_a_field(Ready);
@@ -91,8 +92,8 @@ fn only_what_others_on_the_ground_know_changes_the_plan() {
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
 }
 
-/// What vehicles know that landed with their parts done takes no part from one that is yet to
-/// start: it would plan another flight than the one under way.
+/// Reports of vehicles that have landed do not change the plan of one that was started but still
+/// waits: it would fly another plan than the flight under way.
 #[test]
 fn whoever_was_started_keeps_its_plan_when_others_have_landed() {
     for status in [MemberStatus::Finished, MemberStatus::Left] {

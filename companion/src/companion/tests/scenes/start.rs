@@ -11,7 +11,7 @@ fn answered(answer: Option<Result<Plan, PlanFailure>>) -> Bench {
     bench
 }
 
-/// Started, and waiting for vehicle 77 to pass.
+/// A started vehicle that waits at a gate for vehicle 77.
 fn gated() -> Bench {
     let mut gated = plan();
     gated.gates.push(Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
@@ -24,7 +24,7 @@ fn gated() -> Bench {
     bench
 }
 
-/// To be armed by an autopilot that `script` made odd.
+/// A vehicle in `Arming`, whose autopilot was changed by `script` before.
 fn arming_after(script: impl FnOnce(&mut Bench)) -> Bench {
     let mut bench = to(Streaming);
     script(&mut bench);
@@ -37,7 +37,7 @@ fn denied() -> Bench {
     arming_after(|b| b.refused.push(400))
 }
 
-/// Armed all the same, once it is not to start any more.
+/// The vehicle becomes armed after its start was paused.
 fn armed_late(b: &mut Bench) {
     pause(b);
     b.armed = true;
@@ -63,7 +63,7 @@ pub(super) fn planned(scenes: &mut Scenes) {
     }
 }
 
-/// What the start meets on the pad.
+/// Conditions on the pad at MISSION_START.
 pub(super) fn started(scenes: &mut Scenes) {
     let dragged = |b: &mut Bench| {
         drag(b, Point::x());
@@ -93,7 +93,7 @@ pub(super) fn started(scenes: &mut Scenes) {
     scenes.play(ready(), again, Ready, 6.0);
 }
 
-/// While others go first.
+/// In `Scheduled`, while the vehicle waits for others.
 pub(super) fn scheduled(scenes: &mut Scenes) {
     scenes.play(gated(), |b| b.armed = true, Aborted, 2.0);
     scenes.play(gated(), |b| b.battery = 9, Aborted, 2.0);
@@ -109,7 +109,7 @@ pub(super) fn scheduled(scenes: &mut Scenes) {
         b.run(25.0);
     };
     scenes.play(Bench::new(two_vehicles()), hovers_over_the_pad, Scheduled, 1.0);
-    // It comes when the gates are open and arming is not requested yet.
+    // Another vehicle comes above the pad once the gates are open, before arming is requested.
     for state in [Streaming, Engaging] {
         let comes_over_the_pad = |b: &mut Bench| {
             b.refused.push(176);
@@ -121,7 +121,7 @@ pub(super) fn scheduled(scenes: &mut Scenes) {
         };
         scenes.play(Bench::new(two_vehicles()), comes_over_the_pad, Scheduled, 2.0);
     }
-    // Nobody hears it on the ground.
+    // No neighbour hears the vehicle on the ground.
     let unheard = |b: &mut Bench| {
         b.start();
         b.run(12.0);
@@ -137,7 +137,8 @@ pub(super) fn streaming(scenes: &mut Scenes) {
     scenes.play(to(Streaming), |b| b.refused.push(400), Aborted, 30.0);
 }
 
-/// Paused, cancelled, never answered, disarmed at once, or armed and lifted off all the same.
+/// In `Arming` the start is paused or cancelled, arming is not answered or undone, or the vehicle
+/// arms and lifts off in spite of a pause.
 pub(super) fn arming(scenes: &mut Scenes) {
     scenes.play(denied(), pause, Scheduled, 4.0);
     scenes.play(denied(), land, Aborted, 4.0);
@@ -158,8 +159,8 @@ pub(super) fn arming(scenes: &mut Scenes) {
     scenes.play(denied(), lifted_off, Land, 2.0);
 }
 
-/// Another vehicle comes over the pad of one that is armed and has not left the ground: it disarms
-/// before its autopilot does, waits, and starts once the column is free.
+/// Another vehicle comes above the pad of one that is armed and has not left the ground. The
+/// companion disarms it before the autopilot would, and starts again once the column is free.
 fn climb_barred(b: &mut Bench) {
     b.neighbour = on_pad(ON_PLAN);
     b.run_until(Ready, 6.0);
@@ -176,7 +177,7 @@ fn climb_barred(b: &mut Bench) {
     b.run_until(Follow, 20.0);
 }
 
-/// Another vehicle comes over the pad so late that the mode is entered first: arming is not
+/// Another vehicle comes above the pad just as the setpoint mode is entered: arming is not
 /// requested, and the start waits again.
 fn arming_held(scenes: &mut Scenes) {
     let comes_after = |b: &mut Bench, steps: u32| {
@@ -200,9 +201,9 @@ fn arming_held(scenes: &mut Scenes) {
     scenes.play(Bench::new(two_vehicles()), |b| comes_after(b, steps), Scheduled, 2.0);
 }
 
-/// One flies by and falls silent: where it may go then would bar the climb, and the autopilot
-/// disarms a vehicle that waits on the ground. So arming is requested only where it was heard just
-/// now.
+/// A vehicle flies by and falls silent. The places that it may reach would bar the climb, and the
+/// autopilot disarms a vehicle that waits on the ground: arming is requested only if the neighbour
+/// was heard just before.
 #[test]
 fn nobody_arms_where_one_beside_was_not_heard_just_now() {
     let (mut waits, mut latest_s) = (0, 0.0_f32);

@@ -1,5 +1,5 @@
-//! Whatever is lost and however the flight is interrupted, no gap between two pictures is wider
-//! than it may be.
+//! No gap between two pictures is too wide, whatever frames are lost and however the flight is
+//! interrupted.
 
 extern crate std;
 
@@ -17,9 +17,10 @@ use crate::link::frame::{Frame, Framer};
 
 const STEP_S: f32 = 0.05;
 const MPS: f32 = 5.0;
-/// What is flown between a place and the look that finds it passed, and until the command is there.
+/// Distance flown from a picture's place until a step finds it passed and the command has arrived,
+/// metres.
 const LATE_M: f32 = 3.0 * STEP_S * MPS;
-/// The same where every try but the last is lost.
+/// As [`LATE_M`], where every try of the command but the last is lost.
 const LOST_M: f32 = LATE_M + MPS * 0.3 * (MAX_TRIES as f32 - 1.0);
 
 fn path() -> Path<16> {
@@ -74,7 +75,7 @@ impl Fake {
     }
 }
 
-/// What was sent to the autopilot since the last call.
+/// The frames sent to the autopilot since the last call.
 fn sent_frames(links: &mut Links, framer: &mut Framer, now: Instant) -> Vec<Frame> {
     let mut out = [0; 512];
     let length = links.write_queued(Link::Autopilot, 1, &mut out);
@@ -82,7 +83,7 @@ fn sent_frames(links: &mut Links, framer: &mut Framer, now: Instant) -> Vec<Fram
     core::iter::from_fn(|| framer.next(now, &mut bytes)).collect()
 }
 
-/// Hands all that was sent to the autopilot, which is at this place and accepts it.
+/// Delivers all frames to the autopilot, which is at `at_m` and accepts all commands.
 fn deliver(
     camera: &mut CameraControl,
     fake: &mut Fake,
@@ -99,7 +100,8 @@ fn deliver(
     }
 }
 
-/// Flies the path. Returns where pictures were taken, and whether a trigger was left on.
+/// Flies the path. Returns where pictures were taken, metres along it, and whether the trigger was
+/// left on.
 fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32>, bool) {
     let path = path();
     let mut rng = Pcg32::seed_from_u64(seed);
@@ -107,7 +109,8 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32
     let (mut camera, mut links, mut fake) =
         (CameraControl::default(), Links::default(), Fake::default());
     let (mut framer, mut now, mut at_m, mut held) = (Framer::default(), Instant::ZERO, 0.0, 0);
-    // Of a command's tries one is heard: one that is not is given up and reported.
+    // At least one try of each command arrives; otherwise the command would be given up and
+    // reported.
     let (mut settle, mut lost) = (0, 0);
     while settle < 60 {
         now = now + Duration::from_millis(50);
@@ -145,7 +148,8 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32
     (fake.pictures_m, fake.step_m > 0.0)
 }
 
-/// Each stretch is photographed from end to end; the gap that is too wide, if one is.
+/// Checks that each stretch is photographed from end to end; the error is the first gap that is too
+/// wide.
 fn widest(photographs: &PicturePlan, pictures_m: &[f32], late_m: f32) -> Result<(), (f32, f32)> {
     for shots in photographs.stretches(&path()) {
         let mut before_m = shots.from_m - shots.step_m;
@@ -173,7 +177,7 @@ proptest! {
         prop_assert_eq!(widest(&photographs, &pictures_m, LATE_M), Ok(()), "{:?}", pictures_m);
         prop_assert!(!on);
         if !stops {
-            // By distance the last of a stretch may be taken twice.
+            // With the trigger by distance the last picture of a stretch may be taken twice.
             let least = photographs.count(&path());
             prop_assert!(
                 (least..=least + 3).contains(&(pictures_m.len() as u32)),
@@ -193,9 +197,9 @@ proptest! {
 }
 
 proptest! {
-    /// A vehicle whose reference holds at a picture's place, or a little before it, has that
-    /// picture when its path is replaced, however late the autopilot looks and however far the
-    /// vehicle lags; and no trigger is left on.
+    /// If the reference holds at a picture's place or a little before it, that picture is taken
+    /// before the path is replaced, however rarely the autopilot's trigger checks the distance and
+    /// however far the vehicle lags. The trigger is then off.
     #[test]
     fn where_a_vehicle_holds_for_another_path_the_last_picture_is_taken(
         distance in any::<bool>(),
@@ -235,8 +239,8 @@ proptest! {
 }
 
 proptest! {
-    /// A vehicle that leaves its path for good between two pictures of a stretch takes one there,
-    /// one only, and leaves no trigger on: what it photographed ends where it left.
+    /// A vehicle that leaves its path for good between two pictures of a stretch takes exactly one
+    /// there and switches the trigger off: its pictures end where it left the path.
     #[test]
     fn where_a_vehicle_leaves_its_path_a_last_picture_is_taken(
         distance in any::<bool>(),
@@ -263,14 +267,14 @@ proptest! {
         }
         let last_m = *fake.pictures_m.last().unwrap();
         prop_assert!((last_m - leaves_m).abs() <= LATE_M, "{} m: {:?}", leaves_m, fake.pictures_m);
-        // Where the first picture of the stretch is still on its way, it may be that one.
+        // The command for the first picture of the stretch may still be under way.
         prop_assert!(fake.pictures_m.len() <= taken_before + 2);
         prop_assert_eq!(fake.step_m, 0.0);
     }
 }
 
-/// Pictures follow each other faster than a silent autopilot's commands are given up: the queue
-/// overflows, and the silence is reported all the same, once.
+/// With a silent autopilot pictures follow each other faster than commands are given up: the queue
+/// overflows, and the silence is still reported, once.
 #[test]
 fn a_silent_autopilot_is_reported_at_any_speed() {
     let (photographs, path) = (photographs(Trigger::Waypoint), path());

@@ -1,4 +1,4 @@
-//! A client, a bad link and the server.
+//! A client, a bad link and the FTP server.
 
 extern crate std;
 
@@ -18,7 +18,7 @@ use crate::testing::fake_flash::{Flash, execute, started};
 const US: (u8, u8) = (7, crate::COMPANION_COMPONENT);
 const LINK: usize = 1;
 
-/// Session, opcode, request's opcode, burst complete, offset, data.
+/// A reply of the server; `answers` is the request's opcode, `last` whether the burst is complete.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Packet {
     pub(super) sequence: u16,
@@ -78,7 +78,7 @@ impl World {
         self.rng.next_u32() % 256 < share
     }
 
-    /// A request as it goes onto the link.
+    /// The payload of a request with the next sequence number.
     pub(super) fn packet(
         &mut self,
         session: u8,
@@ -106,12 +106,12 @@ impl World {
         }
     }
 
-    /// A few milliseconds: what is under way arrives in some order, the server works, its answers
+    /// Lets 5 ms pass: requests under way arrive in random order, the server works, and its replies
     /// come back.
     pub(super) fn step(&mut self) {
         self.now = self.now + Duration::from_millis(5);
         while !self.under_way.is_empty() {
-            // What stays under way is overtaken.
+            // The requests that stay under way are overtaken by later ones.
             if self.under_way.len() > 1 && self.chance(40) {
                 break;
             }
@@ -158,7 +158,7 @@ impl World {
         }
     }
 
-    /// Asks until answered, as clients do.
+    /// Sends a request until it is answered, as clients do.
     pub(super) fn ask(&mut self, session: u8, opcode: u8, offset: u32, data: &[u8]) -> Packet {
         let request = self.packet(session, opcode, data.len() as u8, offset, data);
         self.ask_again(&request)
@@ -183,8 +183,8 @@ impl World {
         let opened = self.ask(0, op::CREATE, 0, name.as_bytes());
         assert_eq!(opened.opcode, ACK, "{opened:?}");
         let session = opened.session;
-        // By the sequence number of the answer: late answers of an upload before this one mean
-        // nothing.
+        // Pieces by the sequence number of their answer, so that late answers of an earlier upload
+        // are ignored.
         let mut missing: BTreeMap<u16, Vec<u8>> = BTreeMap::new();
         for (i, part) in file.chunks(piece).enumerate() {
             let packet =
@@ -208,7 +208,7 @@ impl World {
         panic!("it never ends");
     }
 
-    /// Reads a whole file by single reads.
+    /// Reads a whole file by single read requests.
     pub(super) fn download(&mut self, name: &str, piece: u8) -> Vec<u8> {
         let opened = self.ask(0, op::OPEN_READ, 0, name.as_bytes());
         assert_eq!(opened.opcode, ACK, "{opened:?}");

@@ -1,5 +1,5 @@
-//! A coverage mission's file: what is written comes back and can be planned, what is not sound is
-//! refused by name.
+//! The file of a coverage mission: values that were written are read back and can be planned, and
+//! invalid ones are refused by name.
 
 extern crate std;
 use std::boxed::Box;
@@ -22,7 +22,7 @@ use crate::storage::mission_file::{
 };
 use crate::swarm::fleet::DivisionInput;
 
-/// Bytes before the block of two vehicles.
+/// Bytes before the coverage block in a file of two vehicles.
 const BEFORE: usize = mission_file::HEADER_LEN + 2 * mission_file::VEHICLE_LEN;
 
 fn mission() -> MissionHeader {
@@ -94,7 +94,7 @@ fn file() -> List<u8> {
     out
 }
 
-/// The CRC made right again.
+/// The file with its CRC corrected.
 fn sealed(mut file: List<u8>) -> List<u8> {
     let end = file.len() - 4;
     let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&file[..end]);
@@ -108,7 +108,7 @@ fn forged(at: usize, bytes: &[u8]) -> List<u8> {
     sealed(file)
 }
 
-/// Above ground of this height, tolerance, and lowest and highest.
+/// A file with this [`Ground`]: height, tolerance, lowest and highest ground, metres.
 fn above(ground: [f32; 4]) -> List<u8> {
     let bytes: List<u8> = ground.into_iter().flat_map(f32::to_le_bytes).collect();
     forged(44, &bytes)
@@ -161,7 +161,7 @@ fn comes_back_as_written_and_is_planned() {
     assert_eq!(pictures.sum::<u32>(), ws.tracks().waypoint_count());
 }
 
-/// Of the vertices as many rings are formed as there can be.
+/// The vertices form as many rings as possible.
 #[test]
 fn what_32_vehicles_photograph_within_256_vertices_fits_into_a_board() {
     let vehicles: List<MissionVehicle> = (1..=32)
@@ -224,7 +224,7 @@ fn above_uneven_ground_only_the_field_of_the_mission_is_planned_on() {
         )?;
         let points =
             plan.flights.iter().flat_map(|flight| flight.path.waypoints()).map(|w| w.position);
-        // Over their pads they are lower.
+        // Points above the pads are lower, and not checked.
         Ok(points
             .filter(|p| p.z > 4.0)
             .map(|p| p.z - field.map_or(0.0, |f| f.height_at(&p.xy())))
@@ -277,7 +277,7 @@ fn what_is_not_sound_is_refused_by_name() {
 }
 
 proptest! {
-    /// Whatever a file with the right CRC says, it is refused or planned, soon and without a panic.
+    /// A file with random values and the right CRC is refused or planned, soon and without a panic.
     #[test]
     fn any_bytes_are_survived(
         patches in proptest::collection::vec((20usize..300, any::<u8>()), 0..8),
@@ -302,7 +302,8 @@ proptest! {
     }
 }
 
-/// A step of a fleet: a further division, another one in place of the last, none, or a new start.
+/// A change between two plans: a further division, another one in place of the last, the last one
+/// withdrawn, a new start, another mission file.
 #[derive(Clone, Copy)]
 enum Step {
     Further,

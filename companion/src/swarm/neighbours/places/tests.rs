@@ -8,8 +8,8 @@ use super::super::{GROUNDED, OUT_OF_PLAN, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
 
-/// Whatever way a vehicle reports in a coverage mission: wherever on it it is after it fell silent,
-/// nobody lands below, and no place below is taken for free.
+/// Wherever a vehicle in a coverage mission is on the points that it reported before it fell
+/// silent: nobody lands below, and no place below is taken for free.
 #[test]
 fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
     let mut rng = Pcg32::seed_from_u64(14);
@@ -18,7 +18,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
     for _ in 0..2000 {
         let mut table = joined(0);
         table.form_fleet(90.0, None, 1.0);
-        // The other one, by which the own vehicle knows that it hears.
+        // The other vehicle, which shows this one that its receiver works.
         let heard = Intent { system_id: 3, ..intent(0, 1, 2) };
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 40_000));
         let from = table.contacts[1].state.position;
@@ -61,7 +61,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
                 "{silent_s} s, {points:?}, {here:?}: {ends} {columns}"
             );
         }
-        // What is far from all of the way is free.
+        // A place that is far from all of its points is free.
         let aside =
             from + Point::new(uniform(&mut rng, -60.0, 60.0), uniform(&mut rng, -60.0, 60.0), 0.0);
         let legs = core::iter::once(&from).chain(&points).zip(&points);
@@ -99,7 +99,8 @@ fn where_a_vehicle_may_have_fallen_nobody_lands() {
         if case % 4 == 0 {
             contact.flags |= OUT_OF_PLAN;
         }
-        // As it is simulated: air holds it back, and half of the wind carries it.
+        // The fall as it is simulated: drag slows the vehicle, and half of the wind's speed carries
+        // it.
         let wind =
             0.5 * 3.0 * Point::new(uniform(&mut rng, -0.7, 0.7), uniform(&mut rng, -0.7, 0.7), 0.0);
         let mut at = from + velocity * uniform(&mut rng, 0.0, 1.0);
@@ -118,7 +119,7 @@ fn where_a_vehicle_may_have_fallen_nobody_lands() {
         table.for_each_landing_zone(now, [apart_m, here.z], |off| ends |= off.contains(&here));
         assert!(ends, "{case}: {from:?}, {here:?}");
         off_its_way += usize::from(!table.may_lie_below(1, &here, 0.0, apart_m, None));
-        // While it is heard it has not fallen, and it has not fallen far away.
+        // While the vehicle is heard it has not fallen; unheard, it has not fallen far away.
         let heard = Instant::from_millis(2900);
         assert!(
             here.xy().norm() < apart_m || !table.may_lie_below(1, &here, 0.0, apart_m, Some(heard))
@@ -129,8 +130,8 @@ fn where_a_vehicle_may_have_fallen_nobody_lands() {
     assert!(off_its_way > 1000 && free == 2000, "{off_its_way} {free}");
 }
 
-/// Wherever on the stretch a vehicle is that fell silent, a place that is kept off is half a
-/// spacing away at most: to its end, and around its corners.
+/// Wherever on its unheard stretch a silent vehicle is, a keep-out place is at most half a spacing
+/// away: up to the stretch's end, and around its corners.
 #[test]
 fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
     let mut rng = Pcg32::seed_from_u64(15);
@@ -186,7 +187,7 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
         let lies = flags & GROUNDED != 0 || (flags & OUT_OF_PLAN == 0 && silent_s >= 75.0);
         let comes_down = flags & (GROUNDED | OUT_OF_PLAN) == 0 && (45.0..75.0).contains(&silent_s);
         table.for_each_place(now, [apart_m, lying_m], |off| {
-            // Of a silent one the place is not known any better than that.
+            // The place of a silent vehicle is not known any better than that.
             let most_m = lying_m + VAGUE_POSITION_M;
             let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };
             assert!(fits && off.radius_m >= lying_m, "{flags:#x}, {silent_s} s: {off:?}");

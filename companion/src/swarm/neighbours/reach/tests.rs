@@ -1,6 +1,6 @@
-//! Vehicles in a row, each of which follows the one before it through gates, lose one another: what
-//! each reckons of the others is never more than they have flown, and it is enough for the whole
-//! row to come to its end.
+//! Vehicles in a row, each of which follows the one before it through gates, lose radio contact:
+//! the progress that each assumes of the others is never more than they have flown, and it is
+//! enough for the whole row to reach its end.
 
 extern crate std;
 use std::vec::Vec as List;
@@ -22,7 +22,7 @@ const STEP_S: f32 = 0.2;
 const CRUISE_MPS: f32 = 2.0;
 /// Spacing of gates, metres.
 const GATES_M: f32 = 1.4;
-/// Progress of the vehicle ahead that opens a gate, metres beyond the gate.
+/// A gate opens once the vehicle ahead has passed it by this distance, metres.
 const AHEAD_M: f32 = 3.0;
 
 /// The row: tables, true progress and gates of each.
@@ -94,8 +94,8 @@ impl Row {
         }
     }
 
-    /// All fly on; a vehicle hears those beside it, if `heard`, but for a quarter of their
-    /// messages.
+    /// All fly on. If `heard`, a vehicle hears its neighbours in the row, except for a quarter of
+    /// their messages.
     fn step(&mut self, heard: bool) {
         self.now = self.now + Duration::from_millis(STEP_MS);
         for rank in 0..self.tables.len() {

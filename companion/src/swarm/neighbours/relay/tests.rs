@@ -1,4 +1,4 @@
-//! Progress reaches vehicles that are out of range, and is never more than was reported.
+//! Relayed progress reaches vehicles out of range, and is never more than was reported.
 
 extern crate std;
 use std::vec::Vec as List;
@@ -63,7 +63,8 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
     }
 }
 
-/// A swarm in a row, each of which hears only its next; the progress of each grows with time.
+/// A swarm in a row, each vehicle of which hears only the next; the progress of each grows with
+/// time.
 struct Swarm {
     tables: List<Neighbours<8>>,
     now: Instant,
@@ -104,7 +105,7 @@ impl Swarm {
         }
     }
 
-    /// What vehicle `of` believes of `other`.
+    /// The progress of vehicle `other` that vehicle `of` believes.
     fn believed_m(&mut self, of: usize, other: usize) -> Option<f32> {
         let (now, id) = (self.now, other as u8 + 1);
         self.tables[of].states_at(now).iter().find(|n| n.id == id).and_then(|n| n.progress_m)
@@ -139,7 +140,8 @@ fn a_vehicle_that_was_heard_off_the_plan_is_not_believed_back_onto_it() {
     let mut swarm = Swarm::new(3);
     (0..30).for_each(|_| swarm.step(&[true; 3], &[false; 3], true));
     assert!(swarm.believed_m(2, 0).is_some() && swarm.believed_m(1, 0).is_some());
-    // The one in the middle hears that it left the plan; from then on it is not heard any more.
+    // Only the middle vehicle hears that the first left the plan; then nobody hears the first any
+    // more.
     swarm.step(&[false, true, true], &[false; 3], true);
     (0..30).for_each(|_| swarm.step(&[true; 3], &[true, false, false], true));
     assert_eq!(swarm.believed_m(1, 0), None);
@@ -147,8 +149,8 @@ fn a_vehicle_that_was_heard_off_the_plan_is_not_believed_back_onto_it() {
     assert!(held_m.is_some_and(|m| m < swarm.progress_m(0) - 5.0), "{held_m:?}");
 }
 
-/// What was heard of a vehicle stays known, and is passed on, when it is not heard any more: nobody
-/// may have relayed it before.
+/// Progress that was heard of a vehicle stays known, and is passed on, when the vehicle is no
+/// longer heard: perhaps nobody relayed it before.
 #[test]
 fn progress_outlives_the_sight_of_a_vehicle() {
     let mut rng = Pcg32::seed_from_u64(11);
@@ -159,7 +161,7 @@ fn progress_outlives_the_sight_of_a_vehicle() {
         (0..together).for_each(|_| swarm.step(&[true; 8], &[false; 8], true));
         let last_m = swarm.progress_m(0) - 0.2;
         let before_m = swarm.believed_m(1, 0).unwrap();
-        // The first one leaves the range of all.
+        // The first vehicle leaves the range of all.
         let lost: List<_> = (0..8).map(|i| i == 0).collect();
         let apart = 1 + rng.next_u32() % 100;
         for _ in 0..apart {
@@ -177,8 +179,8 @@ fn progress_outlives_the_sight_of_a_vehicle() {
     }
 }
 
-/// Those that heard it just as long pass on what they heard last: that does not make it one that
-/// flies on elsewhere.
+/// Vehicles that heard a failed vehicle for just as long pass on its last report: that does not
+/// make it a vehicle that flies on out of range.
 #[test]
 fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
     let mut rng = Pcg32::seed_from_u64(12);
@@ -198,8 +200,8 @@ fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
     }
 }
 
-/// How far it flies and with what delay belong to the progress that they came with: an older report
-/// changes none of them.
+/// How far a vehicle flies unheard, and its delay, belong to the progress with which they came: a
+/// report of lower progress changes neither.
 #[test]
 fn the_delay_of_a_flight_goes_with_its_progress() {
     let roster = [1, 2, 3].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
@@ -238,8 +240,8 @@ fn the_delay_of_a_flight_goes_with_its_progress() {
     assert!(believed_m(16, &mut table) > 8.0);
 }
 
-/// Whatever messages take: what two vehicles relay to each other of a third one, which failed, does
-/// not keep that one young.
+/// However late messages are: what two vehicles relay to each other of a third one, which failed,
+/// does not keep that report young.
 #[test]
 fn a_vehicle_that_fails_is_lost_in_time_though_messages_are_late() {
     let mut rng = Pcg32::seed_from_u64(13);

@@ -5,7 +5,7 @@ use planner_core::coverage::area::{self as core_area, MAX_VERTEX_M, Ring, RingKi
 use crate::area::AreaFileError;
 use crate::area::overlap::{self, Overlap};
 
-/// Reason why rings that do not cross still form no area, and a remedy; `None` if they do.
+/// Reason why rings that do not cross still form no area, and a remedy; `None` if they form one.
 pub(super) fn overlap_error(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
     let of = |kind: RingKind| {
         let indices = 0..area.rings().len();

@@ -39,7 +39,7 @@ fn read_pair<T: Copy>(value: &Value<'_>, item: impl Fn(&Value<'_>) -> Result<T>)
     Ok([item(a)?, item(b)?])
 }
 
-/// Height of the pictures, metres: given, or that of the ground sampling distance.
+/// Height of the pictures, metres: given, or computed from the ground sampling distance.
 fn read_height(table: &Table<'_>, camera: Option<&Camera>) -> Result<f32> {
     let height = table.get("height_m");
     let gsd = table.get("gsd_m");

@@ -4,8 +4,8 @@
 //! connections. With obstacles a straight connection may cross one, so it is led around by the
 //! shortest path instead; and its orders in one cell compete with its boustrophedon decomposition:
 //! the cells in their best order, each in its best direction (its own planner for that needs
-//! OR-tools). Both favour it: nothing that it offers without OR-tools is shorter and crosses
-//! nothing.
+//! OR-tools). Both choices favour Fields2Cover: no route that it offers without OR-tools is shorter
+//! and crosses no obstacle.
 
 use anyhow::{Context, Result};
 use planner_core::coverage::Flat;
@@ -20,7 +20,7 @@ pub fn wide(at: Flat) -> Place {
 /// Scale of the obstacles: paths run along their borders, where Fields2Cover's lanes end, and must
 /// not count as crossing them.
 const SHRUNK: f64 = 0.999;
-/// Depth to which a path may enter an obstacle and only touch it, metres.
+/// Depth up to which a path that enters an obstacle counts as only touching it, metres.
 const TOUCHES_M: f64 = 1e-6;
 /// Most cells of a decomposition whose orders are all compared.
 const MAX_CELLS: usize = 14;

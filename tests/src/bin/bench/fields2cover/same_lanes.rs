@@ -25,7 +25,7 @@ pub fn way_m(
     lane_m: f32,
 ) -> Result<f64> {
     // Fields2Cover's lanes end at the obstacles. So our graph has the obstacles slightly shrunk, as
-    // those by which its routes are measured.
+    // those are by which Fields2Cover's routes are measured.
     let mut vertices = outer.to_vec();
     let mut rings = vec![Ring { end: outer.len() as u16, kind: RingKind::Outer }];
     for ring in obstacles.rings() {
