@@ -211,6 +211,7 @@ impl<const V: usize> Fleet<V> {
             hear_flight: self.hear_flight,
             airborne: self.airborne,
             plan: self.plan,
+            idle: self.idle,
             ..Self::new(usize::from(self.own), 0, self.limits)
         };
         self.members[usize::from(self.own)].entry.incarnation = incarnation;
@@ -272,7 +273,8 @@ impl<const V: usize> Fleet<V> {
             self.forget_earlier_flight(now);
         }
         self.rejoin_if_ready(now, own.status);
-        if self.has_lease(now) {
+        // One that has left may have been deaf meanwhile: whom it does not hear others may hear.
+        if self.has_lease(now) && self.is_alive(usize::from(self.own)) {
             self.count_silent_as_lost(now);
         }
         if caught_up {

@@ -23,6 +23,9 @@ struct Watch {
     piloted: u32,
     /// Whether an arming request has taken effect since the last start or resume.
     armed_once: bool,
+    /// Whether the start that a pause on the pad ended was resumed before the disarming: the next
+    /// arming request after that is the resume's.
+    resumed: bool,
     log: Vec<String>,
 }
 
@@ -57,6 +60,9 @@ impl Watch {
         );
         let foreign = !ours && b.mode != b.kind.land_mode() && b.armed && !b.silent;
         self.piloted = if foreign { self.piloted + 1 } else { 0 };
+        if self.resumed && !b.companion.telemetry.armed {
+            (self.resumed, self.armed_once) = (false, false);
+        }
         for &(command, param1, ..) in &b.commands[self.commands..] {
             let acts = matches!(command, SET_MODE | TAKE_OFF) || (command, param1) == (ARM, 1.0);
             assert!(
@@ -121,6 +127,7 @@ impl Watch {
             Resume => {
                 let resumed = resume(b) == Some(ACCEPTED);
                 self.armed_once &= b.armed || !resumed;
+                self.resumed |= resumed && state == State::CancelStart;
             }
             Land => {
                 self.landing |= land(b) == Some(ACCEPTED) && b.armed && b.state() != State::Aborted;
@@ -171,6 +178,7 @@ proptest::proptest! {
             landing: false,
             piloted: 0,
             armed_once: false,
+            resumed: false,
             log: Vec::new(),
         };
         (0..begin).for_each(|_| watch.tick(&mut b));
