@@ -180,7 +180,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             path_done: follow
                 && (self.guidance.is_path_done(scene, now)
                     || (self.guidance.is_descending() && on_ground)),
-            flies_back: self.guidance.returning || self.detours.is_homeward(),
+            flies_back: self.is_homeward(),
             at_goal: self.guidance.is_at_goal(scene) && !self.detours.is_homeward(),
             near_path: match (beneath, self.mission.state()) {
                 // Resuming a take-off or a landing does not depend on a place along the path.
@@ -202,7 +202,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.guidance.returning
                 && (self.config.lost_vehicle_down_s.is_none() || self.detours.home.is_seeking())
                 && !self.neighbours.hears_nobody(now),
+            can_fly_on_back: can_leave
+                && self.guidance.returning
+                && !self.guidance.is_at_end(scene)
+                && self.config.lost_vehicle_down_s.is_none()
+                && !self.neighbours.hears_nobody(now),
             pad_blocked_for: self.pad_blocked_for(),
+            way_back_blocked_for: self.way_back_blocked_for(),
             can_land_aside: can_leave && self.detours.can_land_aside(&view),
             seeks_landing: self.detours.seeks_landing(),
             lands_aside: self.detours.seeks_landing() || self.detours.lands_at_end(),
@@ -281,7 +287,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Time for which other vehicles have barred the descent to its pad, or the path there.
     fn pad_blocked_for(&self) -> Duration {
         let follow = self.mission.state() == State::Follow;
-        let homeward = self.guidance.returning || self.detours.is_homeward();
+        let homeward = self.is_homeward();
         let descends = self.guidance.is_descending();
         match follow && (homeward || (descends && self.config.lost_vehicle_down_s.is_some())) {
             true if homeward && descends => self.guidance.filter.hindered_for(self.now),
@@ -290,6 +296,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             true => self.guidance.filter.blocked_for_good_for(self.now),
             false => Duration::default(),
         }
+    }
+
+    /// Time for which a vehicle that rests for good has barred the way back to its pad.
+    fn way_back_blocked_for(&self) -> Duration {
+        match self.mission.state() == State::Follow && self.is_homeward() {
+            true if self.config.lost_vehicle_down_s.is_none() => {
+                self.guidance.filter.blocked_for_good_for(self.now)
+            }
+            _ => Duration::default(),
+        }
+    }
+
+    fn is_homeward(&self) -> bool {
+        self.guidance.returning || self.detours.is_homeward()
     }
 
     /// Whether this vehicle lately heard others and they heard it (within 1 s); in a coverage

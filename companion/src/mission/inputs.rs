@@ -181,10 +181,16 @@ pub struct GuardInputs {
     /// Whether the vehicle can turn back along the path flown so far: it is on that path and does
     /// not fly back yet. In a coverage mission only while it seeks a path home.
     pub can_turn_back: bool,
+    /// Whether the vehicle flies back along its path, is not at the end of that, and can fly on. In
+    /// a coverage mission never: there it seeks its way home.
+    pub can_fly_on_back: bool,
     /// Time for which the last leg of this vehicle has been blocked: on its way home the descent to
     /// its pad by any vehicle; the way home before that, and the descent at the end of a coverage
     /// path, by a vehicle that rests for good.
     pub pad_blocked_for: Duration,
+    /// Time for which a vehicle that rests for good has barred the way back to its pad; over an
+    /// area, where that one may only be silent, zero.
+    pub way_back_blocked_for: Duration,
     /// Whether a place aside to land at may be sought.
     pub can_land_aside: bool,
     /// Whether a place aside to land at is being sought.
@@ -224,7 +230,8 @@ pub struct GuardInputs {
     pub standing: bool,
 }
 
-/// Longest time that a vehicle waits above one that rests for good, which will not leave.
+/// Longest time that a vehicle waits above one that rests for good, or on its way back before one:
+/// that one will not leave.
 const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 
 /// Estimated height from which a vehicle is in the air, metres: above
@@ -253,5 +260,11 @@ impl GuardInputs {
     pub(super) fn is_landing_blocked_for(&self, limit: Duration) -> bool {
         self.column_blocked_for >= limit
             || self.column_blocked_for_good_for >= MAX_WAIT_ABOVE_RESTING
+    }
+
+    /// Whether the way to its pad has been barred for `limit`, or for 5 s
+    /// (`MAX_WAIT_ABOVE_RESTING`) by a vehicle that rests for good.
+    pub(super) fn is_pad_blocked_for(&self, limit: Duration) -> bool {
+        self.pad_blocked_for >= limit || self.way_back_blocked_for >= MAX_WAIT_ABOVE_RESTING
     }
 }

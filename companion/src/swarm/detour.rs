@@ -56,14 +56,14 @@ const ALL_STAND_S: u64 = 3;
 const TURN_CLAIM: Duration = Duration::from_secs(1);
 /// Time by which each blocked vehicle with a lower system id delays this one's claim, seconds.
 const TURN_DELAY_S: u64 = 2;
-/// Further delay of the next claim after each search that found no detour, seconds.
+/// Maximum pause from a search that found no detour to the next, seconds.
 const DETOUR_RETRY_S: u64 = 10;
 /// Time for which a vehicle waits while all others stand, after which it counts as blocked: the
 /// vehicle that it waits for has found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(15);
 /// Number of failed searches, and detours without progress, after which a vehicle seeks no further
 /// detour; one search fewer is enough if they failed in one place over [`GIVE_UP_AFTER_S`].
-const MAX_DETOUR_SEARCHES: u8 = 4;
+const MAX_DETOUR_SEARCHES: u8 = 3;
 /// Time since the first failed search in one place after which one search fewer is enough, s.
 const GIVE_UP_AFTER_S: u64 = 60;
 /// Time without progress on a detour, or under a stop by the safety filter, that counts as a block.
@@ -473,10 +473,10 @@ impl Detours {
     ) -> bool {
         let wait_s = ALL_STAND_S
             + TURN_DELAY_S * view.neighbours.blocked_count_before(view.config.system_id)
-            + DETOUR_RETRY_S * u64::from(self.failures);
+            + Self::search_pause_s(view) * u64::from(self.failures);
         // In a coverage mission vehicles take no turns.
         self.blocked
-            && self.may_search_again(view.now)
+            && self.may_search_again(Self::search_pause_s(view), view.now)
             && view.config.lost_vehicle_down_s.is_none()
             && view.neighbours.are_all_standing(view.now)
             && self

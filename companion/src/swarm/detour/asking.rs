@@ -8,7 +8,9 @@ use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 
 use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_MARGIN_M};
 use super::path_kind::{DetourPurpose, PathKind};
-use super::{DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER};
+use super::{
+    DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER, TURN_DELAY_S,
+};
 use crate::guidance::evade;
 use crate::mission::State;
 use crate::swarm::view::DetourView;
@@ -34,6 +36,15 @@ pub(crate) enum RetryOutlook {
 }
 
 impl Detours {
+    /// Pause after a search that found no detour, seconds: each blocked vehicle has its turn in it.
+    /// While all vehicles stand, nothing else changes what the next search finds.
+    pub(super) fn search_pause_s<const V: usize, const W: usize, const G: usize>(
+        view: &DetourView<'_, V, W, G>,
+    ) -> u64 {
+        let blocked = view.neighbours.blocked_count_before(u8::MAX);
+        (TURN_DELAY_S * (blocked + 2)).min(DETOUR_RETRY_S)
+    }
+
     /// Whether a blocked vehicle in a coverage mission is no longer held by a gate or by the safety
     /// filter: what blocked its path has come down.
     pub(super) fn is_freed_over_area<const V: usize, const W: usize, const G: usize>(
@@ -102,10 +113,10 @@ impl Detours {
         self.request_read
     }
 
-    /// Whether the last failed search is long enough ago for the next one. A delay by the number of
+    /// Whether the last failed search was at least `pause_s` seconds ago. A delay by the number of
     /// failures is not enough: that number stops growing while a silent vehicle comes down.
-    pub(super) fn may_search_again(&self, now: Instant) -> bool {
-        now - self.failed_at >= Duration::from_secs(DETOUR_RETRY_S)
+    pub(super) fn may_search_again(&self, pause_s: u64, now: Instant) -> bool {
+        now - self.failed_at >= Duration::from_secs(pause_s)
     }
 
     /// Where the requested path begins: at the reference, or for a landing aside where the setpoint

@@ -287,9 +287,10 @@ fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
             now = now + Duration::from_millis(1_000 + u64::from(rng.next_u32() % 29_000));
             detours.note_failure(along_m, RetryOutlook::Settles, now);
             let after = |ms: u64| now + Duration::from_millis(ms);
-            let pause_ms = 1000 * DETOUR_RETRY_S;
-            assert!(!detours.may_search_again(after(pause_ms - 1)), "searches without a pause");
-            assert!(detours.may_search_again(after(pause_ms)));
+            let pause_s = TURN_DELAY_S * (2 + u64::from(rng.next_u32() % 6));
+            let before = after(1000 * pause_s - 1);
+            assert!(!detours.may_search_again(pause_s, before), "searches without a pause");
+            assert!(detours.may_search_again(pause_s, after(1000 * pause_s)));
             assert!(!detours.has_given_up(), "that vehicle may yet leave more room");
         }
         let (mut asked, outlook) =

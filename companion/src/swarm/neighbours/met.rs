@@ -353,13 +353,13 @@ impl<const V: usize> Neighbours<V> {
     ) {
         let (motion, dead) = (&mut met.motion, met.lost);
         let placed_s = motion.age_s;
-        // If positions get lost but an intent is fresh, its first point, the neighbour's setpoint,
-        // stands for the position.
-        let told_at =
+        // If only an intent is fresh, its first point, the setpoint, stands for the position.
+        let heard_at =
             contact.intent_at.filter(|_| placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
-        let told_s =
-            told_at.map(|at| (now - at).as_secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
-        let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
+        let heard_s = heard_at
+            .map(|at| (now - at).as_secs_f32())
+            .filter(|heard_s| *heard_s < MAX_HEIGHT_AGE_S);
+        let (by_intent, age_s) = (heard_s.is_some(), heard_s.unwrap_or(placed_s));
         // Silent for `down_after`, or grounded without a position of its own, the neighbour lies on
         // the ground below; before that it rests in the zone that detours stay clear of.
         let down = placed_for >= self.down_after
@@ -368,8 +368,7 @@ impl<const V: usize> Neighbours<V> {
         if let Some(first) = contact.points.first().filter(|_| by_intent) {
             motion.position = *first;
         }
-        // A neighbour silent in its climb may have reached the climb's top, and gone a little
-        // further.
+        // A neighbour silent in its climb may have flown to the climb's top, or just above it.
         let top = if age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
         let mut highest_m = contact.ground_m;
         if lies {
