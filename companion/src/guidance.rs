@@ -7,13 +7,13 @@
 //! smoother's clock, so the raw point stays where it is. Once the setpoint stands, the raw point is
 //! set back to it, and the flight continues by a straight leg to where the phase was left.
 
+mod acknowledged_path;
 mod brakes;
 pub(crate) mod evade;
 mod fence;
 pub(crate) mod filter;
 mod follower;
 mod hold;
-mod known_way;
 mod lag;
 pub(crate) mod limits;
 mod motion;
@@ -172,7 +172,7 @@ pub struct Guidance {
     /// Whether the vehicle flies back along its path, to the path's start.
     pub returning: bool,
     /// The part of its path that the other vehicles have acknowledged.
-    known_way: known_way::KnownWay,
+    acknowledged_path: acknowledged_path::AcknowledgedPath,
     evade_search: EvadeSearch,
     /// Whether the vehicle keeps out of the column below a vehicle that descends.
     pub evading: bool,
@@ -238,7 +238,7 @@ impl Guidance {
             followed_place: Point::zeros(),
             reported_m: f32::NEG_INFINITY,
             returning: false,
-            known_way: known_way::KnownWay::of_new_path(Instant::ZERO),
+            acknowledged_path: acknowledged_path::AcknowledgedPath::of_new_path(Instant::ZERO),
             evade_search: EvadeSearch::default(),
             evading: false,
             wait_distance_m: f32::INFINITY,
@@ -271,7 +271,7 @@ impl Guidance {
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
         (self.on_path, self.returning, self.ends_away_from_goal) = (false, false, false);
-        self.known_way = known_way::KnownWay::of_new_path(Instant::ZERO);
+        self.acknowledged_path = acknowledged_path::AcknowledgedPath::of_new_path(Instant::ZERO);
         self.reported_m = f32::NEG_INFINITY;
         self.advice = NO_ADVICE_YET;
         self.gates_open = 0;

@@ -36,9 +36,9 @@ pub(crate) enum Timer {
     DivisionDue,
     /// From then on a vehicle on the ground that cannot make a commitment leaves its share to
     /// others.
-    LeaveUnstarted,
+    LeaveWithoutCommitment,
     /// From then on the vehicle no longer waits above its pad for missing vehicles.
-    ComeDown,
+    StopWaitingForMissing,
     /// From then on "EKF origin # km away" may be sent again.
     OriginReport,
 }

@@ -5,21 +5,21 @@
 //! |---|---|
 //! | margin to walls, beyond the hull | tracking + estimate + gust |
 //! | separation of two paths | safety distance + 2 (tracking + estimate) |
-//! | separation to parked vehicle | safety distance + [`STRAY_BESIDE_PARKED_M`] + estimate + gust |
+//! | separation to parked vehicle | safety distance + [`PARKED_DEVIATION_M`] + estimate + gust |
 //! | tracking | [`companion::margins::TRACKING_M`] |
 //! | estimate, `rtk` | part of the tracking: at most 0.1 m |
 //! | estimate, `recorded`, PX4 | 0.65 m |
 //! | estimate, `recorded`, ArduPilot | 0.12 m: the greatest recorded error |
 //! | height | `rtk` 0.15 m; `recorded` PX4 1.1 m, ArduPilot 0.3 m: a lower camera shows less |
-//! | gust | [`STRAY_PER_GUST_S`] × `gust_mps`: how far gusts push a vehicle off its path |
-//! | touchdown, PX4 | 0.5 m + [`STRAY_PER_GUST_S`] × `gust_mps` |
+//! | gust | [`DEVIATION_PER_GUST_S`] × `gust_mps`: how far gusts push a vehicle off its path |
+//! | touchdown, PX4 | 0.5 m + [`DEVIATION_PER_GUST_S`] × `gust_mps` |
 //! | usable footprint | from the lowest height, less 2 × margin, along lanes also less 2 × delay |
 //!
 //! - Tracking is the deviation of a vehicle's estimated position from its path; estimate is the
 //!   error of the estimated position. Two vehicles in the air may deviate towards each other. A
 //!   parked vehicle does not move, but it stands off its pad by the error of its estimate at
 //!   touchdown.
-//! - The default margin and [`PAIR_STRAY_M`] were measured with the estimator `rtk`.
+//! - The default margin and [`PAIR_DEVIATION_M`] were measured with the estimator `rtk`.
 //! - With `recorded` a PX4 reports an accuracy of 0.2 m: 0.65 m is three times that and a reserve.
 //!   Its errors were up to 0.75 m horizontally and 1.1 m in height, rarely, and not together with a
 //!   tracking error.
@@ -36,17 +36,17 @@ use crate::scenario::{Simulation, Vehicle};
 
 /// Sum of the deviations of two vehicles from their paths, which the default separation adds to the
 /// safety distance, metres.
-pub const PAIR_STRAY_M: f32 = 0.5;
-/// As [`PAIR_STRAY_M`], for coverage missions, metres: greater, since there is room, and for
+pub const PAIR_DEVIATION_M: f32 = 0.5;
+/// As [`PAIR_DEVIATION_M`], for coverage missions, metres: greater, since there is room, and for
 /// receivers without RTK.
-pub const PAIR_STRAY_OVER_FIELDS_M: f32 = 2.4;
+pub const PAIR_DEVIATION_COVERAGE_M: f32 = 2.4;
 /// Deviation of a flying vehicle from its path that is added to the separation from a parked
 /// vehicle, metres.
-pub const STRAY_BESIDE_PARKED_M: f32 = 0.25;
+pub const PARKED_DEVIATION_M: f32 = 0.25;
 /// Further deviation of one vehicle per m/s of peak gust, seconds. Gusts do not push two vehicles
 /// towards each other at the same time, so it is added only for one vehicle beside a parked one or
 /// a wall.
-pub const STRAY_PER_GUST_S: f32 = 0.05;
+pub const DEVIATION_PER_GUST_S: f32 = 0.05;
 
 /// Greatest horizontal distance of a position estimate from the truth, beyond the part that the
 /// tracking margin covers, metres.
@@ -81,7 +81,7 @@ pub fn required_distances(
     errors.sort_by(|a, b| b.total_cmp(a));
     let worst = |k: usize| errors.get(k).copied().unwrap_or(0.0);
     RequiredDistances {
-        margin_m: worst(0) + STRAY_PER_GUST_S * simulation.gust_mps,
+        margin_m: worst(0) + DEVIATION_PER_GUST_S * simulation.gust_mps,
         separation_m: safety_distance_m + worst(0) + worst(1),
     }
 }
@@ -110,7 +110,7 @@ pub fn min_pad_distance_m(
 /// controller, which carries it on once the companion stops holding it.
 fn touchdown_extra_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
     match autopilot {
-        AutopilotKind::Px4 => 0.5 + STRAY_PER_GUST_S * gust_mps,
+        AutopilotKind::Px4 => 0.5 + DEVIATION_PER_GUST_S * gust_mps,
         AutopilotKind::Ardupilot => 0.0,
     }
 }
@@ -128,7 +128,7 @@ pub fn max_height_error_m(estimator: EstimatorErrors, autopilot: AutopilotKind) 
 /// `height_m` above ground: they may be taken beside their waypoints, from lower, and late. The
 /// footprint stays at least as large as the spacings: a smaller one would be refused as leaving
 /// gaps.
-pub fn usable_footprint(
+pub fn with_usable_footprint(
     spacing: &Spacing,
     height_m: f32,
     cruise_mps: f32,
@@ -161,7 +161,7 @@ pub fn parked_separation_m(
     let estimates =
         vehicles.iter().map(|v| max_estimate_error_m(simulation.estimator, v.personality));
     safety_distance_m
-        + STRAY_BESIDE_PARKED_M
-        + STRAY_PER_GUST_S * simulation.gust_mps
+        + PARKED_DEVIATION_M
+        + DEVIATION_PER_GUST_S * simulation.gust_mps
         + estimates.fold(0.0, f32::max)
 }

@@ -40,7 +40,7 @@ pub struct FtpClient {
     link: Box<dyn Link>,
     framer: Framer,
     began: Clock,
-    beat_at: Clock,
+    next_heartbeat_at: Clock,
     frames: u8,
     own_system: u8,
     system: Option<u8>,
@@ -78,7 +78,7 @@ impl FtpClient {
             link,
             framer: Framer::new(),
             began: now,
-            beat_at: now,
+            next_heartbeat_at: now,
             frames: 0,
             own_system: DEFAULT_SYSTEM_ID,
             system,
@@ -106,8 +106,8 @@ impl FtpClient {
     /// The frames that have arrived from the companion; waits a moment if no bytes have arrived.
     /// Also sends a HEARTBEAT each second, so that autopilots forward messages to this client.
     fn receive_frames(&mut self) -> anyhow::Result<Vec<Frame>> {
-        if self.link.now() >= self.beat_at {
-            self.beat_at += HEARTBEAT_EVERY;
+        if self.link.now() >= self.next_heartbeat_at {
+            self.next_heartbeat_at += HEARTBEAT_EVERY;
             let beat = HEARTBEAT_DATA {
                 mavtype: MavType::MAV_TYPE_GCS,
                 autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,

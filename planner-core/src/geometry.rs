@@ -35,7 +35,7 @@ pub(crate) fn clamp_to(value: f32, low: f32, high: f32) -> f32 {
 /// `value` limited to 0..=1; 0 if it is NaN. Takes two instructions on a board; `f32::clamp`, which
 /// returns NaN for NaN, takes seven.
 #[inline]
-pub(crate) fn clamp_share(value: f32) -> f32 {
+pub(crate) fn clamp_to_unit(value: f32) -> f32 {
     let value = if value > 0.0 { value } else { 0.0 };
     if value < 1.0 { value } else { 1.0 }
 }
@@ -44,7 +44,7 @@ pub(crate) fn clamp_share(value: f32) -> f32 {
 pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> f32 {
     let (d1, d2, r) = (p.1 - p.0, q.1 - q.0, p.0 - q.0);
     let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
-    let share = |n: f32, d: f32| if d > 0.0 { clamp_share(n / d) } else { 0.0 };
+    let share = |n: f32, d: f32| if d > 0.0 { clamp_to_unit(n / d) } else { 0.0 };
     let (b, c) = (d1.dot(&d2), d1.dot(&r));
     let s = share(b * f - c * e, a * e - b * b);
     let t = share(b * s + f, e);
@@ -60,6 +60,6 @@ pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> 
 pub(crate) fn point_distance_sq(p: (&Point, &Point), q: &Point) -> f32 {
     let (d, r) = (p.1 - p.0, p.0 - q);
     let a = d.norm_squared();
-    let s = if a > 0.0 { clamp_share(-d.dot(&r) / a) } else { 0.0 };
+    let s = if a > 0.0 { clamp_to_unit(-d.dot(&r) / a) } else { 0.0 };
     (r + d * s).norm_squared()
 }

@@ -89,7 +89,7 @@ pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
         let (targets, row) = (&targets[wanted.clone()], &mut row[wanted]);
         let passable =
             |_: u16, edge: &HalfEdge| view.has_clearance(edge, vehicle.required_clearance_m);
-        search::dijkstra_row(view, i as u16, targets, passable, &mut ws.search, row)
+        search::path_lengths_to(view, i as u16, targets, passable, &mut ws.search, row)
             .map_err(|e| PlanError::Search(vehicle.id, e))?;
     }
     Ok(())

@@ -205,16 +205,16 @@ pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
     mut found: impl FnMut(Edge, f32) -> Result<(), PrmError>,
 ) -> Result<(), PrmError> {
     config.check()?;
-    let mut sight = NodeVisibility::new(grid, config);
+    let mut visibility = NodeVisibility::new(grid, config);
     for place in range.start..range.end.min(workspace.len()) {
-        sight.set_node(workspace.point(place));
+        visibility.set_node(workspace.point(place));
         let edge = |other: usize| {
             let (a, b) = (workspace.node(place), workspace.node(other));
             Edge { a: a.min(b), b: a.max(b) }
         };
         workspace.for_each_in_range(place, config, |places| {
             let hint = |other| hint(edge(other));
-            sight.for_each_visible(workspace, places, hint, |other, room_m| {
+            visibility.for_each_visible(workspace, places, hint, |other, room_m| {
                 found(edge(other), room_m)
             })
         })?;

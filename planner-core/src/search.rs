@@ -73,7 +73,7 @@ impl<const N: usize> SearchWorkspace<N> {
 
     /// Writes the nodes of the shortest path from the last search's source to `node`, both
     /// included. Only reads the search's parents, so it may be called for every target of a
-    /// [`dijkstra_row`].
+    /// [`path_lengths_to`].
     pub fn path_to<const P: usize>(
         &self,
         node: u16,
@@ -262,7 +262,7 @@ pub fn dijkstra_all<const N: usize>(
 /// For up to 32 targets it is an A* to each target in turn: nodes settled for one target stay
 /// settled, since their distances are final, and only the heap is reordered by the heuristic of the
 /// next target. For more targets it is Dijkstra's algorithm.
-pub fn dijkstra_row<const N: usize>(
+pub fn path_lengths_to<const N: usize>(
     graph: &impl Graph,
     from: u16,
     targets: &[u16],
@@ -325,7 +325,7 @@ pub fn cost_matrix<const N: usize>(
     let from_goals = goals.len() as f32 * (between + starts_across);
     if from_starts <= from_goals {
         for (&start, row) in starts.iter().zip(out.chunks_mut(goals.len())) {
-            dijkstra_row(graph, start, goals, &passable, ws, row)?;
+            path_lengths_to(graph, start, goals, &passable, ws, row)?;
         }
         return Ok(());
     }

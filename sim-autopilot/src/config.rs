@@ -10,7 +10,7 @@ use crate::{AutopilotKind, EstimatorErrors};
 impl AutopilotKind {
     /// Factor on the airframe's drag. ArduCopter's factor is fitted to recorded flights of its
     /// simulated quadrotor.
-    pub(super) fn drag_share(self) -> f32 {
+    pub(super) fn drag_factor(self) -> f32 {
         match self {
             Self::Px4 => 1.0,
             Self::Ardupilot => 0.4,
@@ -18,7 +18,7 @@ impl AutopilotKind {
     }
 
     /// Factor on the acceleration that wind causes.
-    pub(super) fn wind_share(self) -> f32 {
+    pub(super) fn wind_factor(self) -> f32 {
         match self {
             Self::Px4 => 1.0,
             Self::Ardupilot => 0.2,

@@ -7,7 +7,7 @@ use super::params::Params;
 use super::platform::{ControlDemand, Platform, SensorReadings};
 use super::port::Sender;
 use super::px4::{self, Px4};
-use super::status::FirmwareStatus;
+use super::status::AutopilotStatus;
 use super::telemetry;
 use super::vehicle::Gains;
 use super::wire::PayloadReader;
@@ -91,7 +91,7 @@ impl Firmware {
         }
     }
 
-    pub(super) fn status(&self, platform: &Platform, sensors: &SensorReadings) -> FirmwareStatus {
+    pub(super) fn status(&self, platform: &Platform, sensors: &SensorReadings) -> AutopilotStatus {
         match self {
             Self::Px4(px4) => px4.status(platform, sensors),
             Self::Copter(copter) => copter.status(sensors),

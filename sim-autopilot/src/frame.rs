@@ -26,7 +26,7 @@ const V2_HEADER: usize = 10;
 const FLAG_SIGNED: u8 = 1;
 /// COMPONENT_INFORMATION, the only message whose CRC_EXTRA is 0; the crate returns 0 for unknown
 /// ids too.
-const SEED_ZERO: u32 = 395;
+const ZERO_CRC_EXTRA_ID: u32 = 395;
 
 /// A received frame whose checksum is correct.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,7 +70,7 @@ impl Frame {
 
     /// Appends this frame to `out` as a MAVLink 2 frame with the same sender and sequence number.
     pub fn write(&self, out: &mut Vec<u8>) {
-        if let Some(seed) = crc_seed(self.message_id) {
+        if let Some(seed) = crc_extra(self.message_id) {
             let sender = (self.system, self.component, self.sequence);
             write_raw(sender, self.message_id, seed, &self.payload[..self.len], out);
         }
@@ -78,9 +78,9 @@ impl Frame {
 }
 
 /// CRC_EXTRA of a message id; `None` if the dialect does not know the id.
-pub fn crc_seed(message_id: u32) -> Option<u8> {
+pub fn crc_extra(message_id: u32) -> Option<u8> {
     let seed = MavMessage::extra_crc(message_id);
-    (seed != 0 || message_id == SEED_ZERO).then_some(seed)
+    (seed != 0 || message_id == ZERO_CRC_EXTRA_ID).then_some(seed)
 }
 
 /// Appends a message to `out` as a MAVLink 2 frame. `sender` is system id, component id and
@@ -166,7 +166,7 @@ fn parse_front(bytes: &[u8]) -> ParseStatus {
     if bytes.len() < header {
         return ParseStatus::Partial;
     }
-    let Some(seed) = crc_seed(message_id(bytes)) else { return ParseStatus::Noise };
+    let Some(seed) = crc_extra(message_id(bytes)) else { return ParseStatus::Noise };
     let end = header + usize::from(bytes[1]);
     let Some(&[low, high]) = bytes.get(end..end + 2) else { return ParseStatus::Partial };
     if calculate_crc(&bytes[1..end], seed) == u16::from_le_bytes([low, high]) {

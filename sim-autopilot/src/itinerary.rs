@@ -231,10 +231,10 @@ impl Platform {
                     && off.z.abs() <= REACHED_HEIGHT_M
                     && turned
                 {
-                    progress.inside_us.get_or_insert(sensors.now_us);
+                    progress.arrived_us.get_or_insert(sensors.now_us);
                 }
-                let stayed = progress.inside_us.is_some() && since(progress.inside_us) >= stay_s;
-                !landed && (stayed || progress.inside_us.is_some() && stay_s.is_nan())
+                let stayed = progress.arrived_us.is_some() && since(progress.arrived_us) >= stay_s;
+                !landed && (stayed || progress.arrived_us.is_some() && stay_s.is_nan())
             }
             MissionLeg::Land { .. } | MissionLeg::Return => false,
         }

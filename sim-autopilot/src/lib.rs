@@ -210,7 +210,7 @@ impl Autopilot {
         if order.lift {
             let gains = self.firmware.gains();
             let mut velocity = sensors.velocity;
-            velocity.z += order.demand.height_rate_share * (sensors.height_rate - velocity.z);
+            velocity.z += order.demand.height_rate_weight * (sensors.height_rate - velocity.z);
             platform.vehicle.control(&order.demand, gains, &sensors.position, &velocity, dt_s);
         }
         platform.last_demand = armed.then_some(order.demand);

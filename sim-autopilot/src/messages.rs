@@ -48,7 +48,7 @@ const RECORDED: [(u32, u8, &[u8]); 5] = [
 /// Sends message `id` of [`RECORDED`].
 pub(super) fn send_recorded(id: u32, port: &mut Port) {
     if let Some(&(_, seed, payload)) = RECORDED.iter().find(|message| message.0 == id) {
-        port.send_seeded(id, seed, payload);
+        port.send_with_crc_extra(id, seed, payload);
     }
 }
 

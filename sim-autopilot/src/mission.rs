@@ -53,7 +53,7 @@ pub(super) struct MissionProgress {
     /// Number of the current item; the number of items when all are completed.
     pub current: u16,
     pub(super) since_us: Option<u64>,
-    pub(super) inside_us: Option<u64>,
+    pub(super) arrived_us: Option<u64>,
 }
 
 impl MissionProgress {
@@ -64,7 +64,7 @@ impl MissionProgress {
 
     /// The current item starts from its beginning when the mission is continued.
     pub(super) fn restart_item(&mut self) {
-        (self.since_us, self.inside_us) = (None, None);
+        (self.since_us, self.arrived_us) = (None, None);
     }
 }
 

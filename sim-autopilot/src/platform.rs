@@ -105,8 +105,8 @@ pub struct Platform {
 impl Platform {
     pub(super) fn new(config: &Config, streams: &[(u32, u32)]) -> Self {
         let mut limits = config.vehicle;
-        limits.drag_per_s *= config.autopilot.drag_share();
-        limits.wind_per_s *= config.autopilot.wind_share();
+        limits.drag_per_s *= config.autopilot.drag_factor();
+        limits.wind_per_s *= config.autopilot.wind_factor();
         let mut vehicle = Vehicle::new(limits, config.start);
         vehicle.set_heading(config.heading_rad);
         let start = config.start.cast::<f64>();

@@ -187,13 +187,13 @@ impl Port {
     /// Queues a message with an encoded payload, for contents that the crate's types cannot hold.
     /// An id that the dialect does not know is ignored.
     pub fn send_raw(&mut self, id: u32, payload: &[u8]) {
-        if let Some(seed) = frame::crc_seed(id) {
-            self.send_seeded(id, seed, payload);
+        if let Some(seed) = frame::crc_extra(id) {
+            self.send_with_crc_extra(id, seed, payload);
         }
     }
 
     /// Queues a message that the dialect does not know; `seed` is its CRC_EXTRA.
-    pub fn send_seeded(&mut self, id: u32, seed: u8, payload: &[u8]) {
+    pub fn send_with_crc_extra(&mut self, id: u32, seed: u8, payload: &[u8]) {
         if self.reserve_frame() {
             let sender = self.next_sender();
             frame::write_raw(sender, id, seed, payload, &mut self.queue);

@@ -5,7 +5,7 @@ use core::cell::OnceCell;
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
 
-use super::status::FirmwareStatus;
+use super::status::AutopilotStatus;
 use crate::AutopilotKind;
 
 /// The state of one step from which telemetry messages are made.
@@ -18,7 +18,7 @@ pub struct Snapshot {
     /// MAVLink system id.
     pub system_id: u8,
     /// State of the autopilot's mode logic.
-    pub status: FirmwareStatus,
+    pub status: AutopilotStatus,
     /// Whether the motors are armed.
     pub armed: bool,
     /// Mission: number of the current item, and number of items.

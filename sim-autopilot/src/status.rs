@@ -4,7 +4,7 @@ use crate::AutopilotKind;
 
 /// State of the autopilot in one step, for telemetry.
 #[derive(Clone, Copy, Debug)]
-pub struct FirmwareStatus {
+pub struct AutopilotStatus {
     /// Which autopilot it is.
     pub autopilot: AutopilotKind,
     /// `custom_mode` of HEARTBEAT.

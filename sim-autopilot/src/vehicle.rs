@@ -123,7 +123,7 @@ pub struct Demand {
     pub thrust_min: f32,
     /// Weight (0 to 1) of the height's rate of change in the climb rate that is controlled; the
     /// rest is the estimated velocity.
-    pub height_rate_share: f32,
+    pub height_rate_weight: f32,
 }
 
 /// Gains and limits of the controller, read from the parameters named.
@@ -403,7 +403,7 @@ mod tests {
             descend_max: 1.5,
             lift_off: f32::NAN,
             thrust_min: 0.15,
-            height_rate_share: 0.0,
+            height_rate_weight: 0.0,
         }
     }
 

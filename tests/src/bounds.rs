@@ -48,7 +48,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("roadmap::write_with_landmarks, 300", "the same and two searches"),
     ("search::astar", "n · log n + h: each node settled once"),
     ("search::dijkstra_all", "n · log n + h"),
-    ("search::dijkstra_row, 32 targets", "n · log n + h, and n a target"),
+    ("search::path_lengths_to, 32 targets", "n · log n + h, and n a target"),
     ("search::cost_matrix, 32 × 32", "v rows"),
     ("search::SearchWorkspace::path_to", "w"),
     ("search::RoadmapWithLengths::new, 300", "h"),

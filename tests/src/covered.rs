@@ -82,7 +82,7 @@ pub fn fly_on(
 pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Result<Flight> {
     let plan = mission.plan()?;
     let mut flight = swarm::fly(mission, &plan, "fly", false, &Progress::hidden())?;
-    if let Some(places) = flown::places_in_place_of_pictures(&mission.scenario, &flight.tracks)? {
+    if let Some(places) = flown::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
         flight.pictures = places;
     }
     pictures.iter_mut().for_each(|picture| picture.t_s = 0.0);

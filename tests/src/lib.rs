@@ -2,10 +2,10 @@
 
 pub mod areas;
 pub mod board;
+pub mod board_failure;
 pub mod bounds;
 pub mod costs;
 pub mod covered;
-pub mod downfall;
 pub mod edge;
 pub mod fidelity;
 pub mod hills;

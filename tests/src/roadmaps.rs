@@ -21,7 +21,7 @@ use planner_core::roadmap::{
 use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleConfig};
 use planner_core::search::{
-    SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, dijkstra_row,
+    SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, path_lengths_to,
 };
 
 use crate::hostile::{Bytes, Entropy};
@@ -371,7 +371,7 @@ fn searches_are_right(
     bounded(1);
 
     let mut row = [0.0; 2];
-    dijkstra_row(view, from[0], &to, passable, ws, &mut row).expect("the nodes exist");
+    path_lengths_to(view, from[0], &to, passable, ws, &mut row).expect("the nodes exist");
     bounded(1);
     let mut matrix = [0.0; 4];
     cost_matrix(view, &from, &to, passable, ws, &mut matrix).expect("the nodes exist");

@@ -21,7 +21,7 @@ use planner_core::flight::Path;
 use planner_core::frames::geodetic_to_enu;
 use sim_autopilot::{Autopilot, Config};
 
-use crate::downfall::{self, Downfall};
+use crate::board_failure::{self, BoardFailure};
 
 const STEP: Duration = Duration::from_millis(4);
 /// Longest wait for an event, vehicle's time: a megabyte of garbage takes 100 s.
@@ -149,7 +149,7 @@ impl Vehicle {
     }
 
     /// Makes the board fail now; it restarts by itself.
-    pub fn bring_down(&mut self, how: Downfall) {
+    pub fn bring_down(&mut self, how: BoardFailure) {
         how.inflict(&mut self.board, &self.program);
         self.starts();
         // Until the board has restarted, nothing is received from it.
@@ -164,12 +164,12 @@ impl Vehicle {
 
     /// Makes the board's planner raise a fault whenever it plans, until the next restart.
     pub fn break_planner(&mut self) {
-        downfall::break_planner(&mut self.board, &self.program);
+        board_failure::break_planner(&mut self.board, &self.program);
     }
 
     /// Makes the board's planner take `time` longer for each plan, until the next restart.
     pub fn slow_planner(&mut self, time: Duration) {
-        downfall::slow_planner(&mut self.board, &self.program, time);
+        board_failure::slow_planner(&mut self.board, &self.program, time);
     }
 
     /// The board has restarted: its time begins at 0.

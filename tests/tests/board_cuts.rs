@@ -22,7 +22,7 @@ use companion::Link as Port;
 use companion::link::frame::{self, Header};
 use companion::storage::store::File;
 use flockmate_tests::board;
-use flockmate_tests::downfall::reset;
+use flockmate_tests::board_failure::reset;
 use host_sim::boards::{EmulatedBoard, PortBytes};
 use host_sim::link::Link;
 use host_sim::upload::{FtpClient, crc32};

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use companion::storage::store::File;
 use companion::{Link as Port, State};
 use flockmate_tests::board;
-use flockmate_tests::downfall::{self, Downfall};
+use flockmate_tests::board_failure::{self, BoardFailure};
 use flockmate_tests::vehicle::{Heard, Vehicle, ahead, mission};
 use host_sim::link::Link;
 use host_sim::mission::Mission;
@@ -81,7 +81,7 @@ const LATE_US: u64 = 100;
 /// Returns a line about it; `None` if the mission was over before.
 fn reset_in_flight(
     vehicle: &mut Vehicle,
-    how: Downfall,
+    how: BoardFailure,
     brakes: bool,
     rng: &mut Pcg32,
 ) -> Option<String> {
@@ -156,8 +156,8 @@ fn reset_again_and_again(
         let brakes = (flights + seed).is_multiple_of(2);
         let mission = missions[usize::from(brakes)];
         let mut vehicle = Vehicle::new(program, mission, mission, rng.next_u64());
-        // The autopilots alternate, so each meets every downfall.
-        let how = Downfall::ALL[(lines.len() / 2 + seed as usize) % Downfall::ALL.len()];
+        // The autopilots alternate, so each meets every failure.
+        let how = BoardFailure::ALL[(lines.len() / 2 + seed as usize) % BoardFailure::ALL.len()];
         let outcome = reset_in_flight(&mut vehicle, how, brakes, &mut rng);
         lines.extend(outcome.map(|line| {
             format!("seed {seed}, {}: {line}", if brakes { "ArduCopter" } else { "PX4" })
@@ -449,7 +449,7 @@ fn a_setpoint_that_is_held_up_is_reported_with_its_gap() {
     let Some(program) = board::program("flockmate") else { return };
     for held_up in HELD_UP {
         let (mut vehicle, _) = demo_on_its_way(&program);
-        downfall::block(&mut vehicle.board, held_up);
+        board_failure::block(&mut vehicle.board, held_up);
         vehicle.until("over", is_over);
         let (_, gap_ms) = reported(&mut vehicle);
         // The board counts whole milliseconds.

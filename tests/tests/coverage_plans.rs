@@ -8,7 +8,7 @@ use companion::time::Instant;
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::{self, Picture};
 use host_sim::coverage::export::{self, MissionItem};
-use host_sim::coverage::flight::{FlightPoint, PointAction};
+use host_sim::coverage::flight::{FlightPoint, WaypointAction};
 use host_sim::scenario;
 use host_sim::scenario::coverage::Method;
 use planner_core::Point;
@@ -222,7 +222,7 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
         let items = export::flight_items(&planned, sortie, points);
         let photos = fly(&planned, points, &items, personality);
         let wanted: Vec<&FlightPoint> =
-            points.iter().filter(|s| matches!(s.action, PointAction::Photo(_))).collect();
+            points.iter().filter(|s| matches!(s.action, WaypointAction::Photo(_))).collect();
         assert!(wanted.len() > 10);
         let lanes = 1 + wanted.windows(2).filter(|pair| pair[0].lane != pair[1].lane).count();
         let label = format!("{personality:?}, {trigger}: {} of {}", photos.len(), wanted.len());

@@ -6,7 +6,7 @@ use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::hills::Hills;
 use flockmate_tests::shared_data;
 use host_sim::coverage::check::{CoverageFindings, check_plan};
-use host_sim::coverage::flight::{FlightPoint, PointAction};
+use host_sim::coverage::flight::{FlightPoint, WaypointAction};
 use host_sim::coverage::{CoveragePlan, heights};
 use host_sim::margins;
 use host_sim::scenario::{self, Scenario};
@@ -92,7 +92,7 @@ fn hidden(planned: &CoveragePlan<'_>, points: &[&FlightPoint], places: usize) ->
     let (area, along) = (planned.area_settings, planned.tracks.lane_direction());
     let pictures: Vec<Point> = points
         .iter()
-        .filter(|point| matches!(point.action, PointAction::Photo(_)))
+        .filter(|point| matches!(point.action, WaypointAction::Photo(_)))
         .map(|point| point.position)
         .collect();
     let mut random = Pcg32::seed_from_u64(pictures.len() as u64);

@@ -210,7 +210,7 @@ impl Requests {
             self.request_next_limit(kind, now, timers, links);
         }
         let lost = !silent && telemetry.position_age(now) > POSITION_STREAM_TIMEOUT;
-        let tunes = lost
+        let limits_reset = lost
             && timers.is_due(Timer::Streams, now)
             && self.begin_requesting_streams(telemetry, s, timers, links);
         let doubts = telemetry.is_origin_doubtful();
@@ -241,7 +241,7 @@ impl Requests {
         } else {
             self.request_for_state(telemetry, s, timers, links);
         }
-        tunes
+        limits_reset
     }
 
     /// Requests the change of mode, take-off or disarming that the mission state waits for.

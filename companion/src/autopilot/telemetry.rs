@@ -136,8 +136,8 @@ pub struct Telemetry {
     pub ekf_origin: Option<Geodetic>,
     /// EKF origin with which the vehicle was armed, kept while it stays armed; `None` while
     /// disarmed.
-    last_armed_origin: Option<Geodetic>,
-    /// Since when, while armed, only EKF origins other than `last_armed_origin` were received.
+    armed_origin: Option<Geodetic>,
+    /// Since when, while armed, only EKF origins other than `armed_origin` were received.
     origin_doubtful_since: Option<Instant>,
     /// Whether the EKF origin moved while armed.
     pub(crate) origin_moved: bool,
@@ -365,7 +365,7 @@ impl Telemetry {
             return TelemetryChange::None;
         }
         if self.armed
-            && let Some(flown) = self.last_armed_origin
+            && let Some(flown) = self.armed_origin
         {
             if flown != origin {
                 let since = *self.origin_doubtful_since.get_or_insert(now);
@@ -399,14 +399,13 @@ impl Telemetry {
     /// origin that has moved, so that it is requested again.
     fn update_origin_trust(&mut self) {
         if self.armed {
-            self.last_armed_origin = self.last_armed_origin.or(self.ekf_origin);
+            self.armed_origin = self.armed_origin.or(self.ekf_origin);
             return;
         }
         if self.origin_moved {
             (self.ekf_origin, self.position_at, self.position_read_at) = (None, None, None);
         }
-        (self.last_armed_origin, self.origin_doubtful_since, self.origin_moved) =
-            (None, None, false);
+        (self.armed_origin, self.origin_doubtful_since, self.origin_moved) = (None, None, false);
     }
 
     fn handle_position(

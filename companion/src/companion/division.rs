@@ -55,8 +55,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.neighbours.fleet().is_none() {
             return;
         }
-        if !self.lacks_promise() {
-            self.timers.set(Timer::LeaveUnstarted, now + CANNOT_START_MOST);
+        if !self.cannot_commit() {
+            self.timers.set(Timer::LeaveWithoutCommitment, now + CANNOT_START_MOST);
         }
         if self.mission.state() != State::Dividing {
             self.timers.set(Timer::DivisionDue, now);
@@ -68,9 +68,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(fleet) = self.neighbours.fleet() else { return };
         let (home_m, around) = (self.last_descent_start_m(), self.detours.is_beside_plan());
         if !fleet.is_any_missing() {
-            self.timers.set(Timer::ComeDown, now + WAIT_FOR_MISSING_MOST);
+            self.timers.set(Timer::StopWaitingForMissing, now + WAIT_FOR_MISSING_MOST);
         }
-        let misses = fleet.is_any_missing() && !self.timers.is_due(Timer::ComeDown, now);
+        let misses =
+            fleet.is_any_missing() && !self.timers.is_due(Timer::StopWaitingForMissing, now);
         // Only a vehicle that still takes part waits above its pad.
         let waits = fleet.takes_part() && (fleet.is_dividing() || misses);
         let halt_m = match self.division_hold_m() {
@@ -109,7 +110,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             _ => {
                 (off_plan && !beside)
-                    || (self.lacks_promise() && self.timers.is_due(Timer::LeaveUnstarted, self.now))
+                    || (self.cannot_commit()
+                        && self.timers.is_due(Timer::LeaveWithoutCommitment, self.now))
             }
         };
         let on_pad = matches!(state, Ready | Scheduled | PadReplanning);
@@ -158,7 +160,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// could not divide the area. Either it is ready or started and no majority hears it; or
     /// another vehicle takes part, and this one has no autopilot, position or plan, is away from
     /// its pad, or hears another plan.
-    fn lacks_promise(&self) -> bool {
+    fn cannot_commit(&self) -> bool {
         use State::*;
         let Some(fleet) = self.neighbours.fleet() else { return false };
         let lacks = match self.mission.state() {

@@ -104,7 +104,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             out_of_range: self.neighbours.are_all_out_of_range(),
             neighbour_heard: self.is_linked(),
             excluded: self.is_excluded(),
-            more_is_done: self.mission.photographed().is_outdated(),
+            left_out_set_changed: self.mission.photographed().is_outdated(),
             plans_differ: self.hears_another_plan(),
             holds_to_divide: self.is_holding_for_division(),
             division_ready: self.mission.is_division_plan_ready(),
@@ -136,7 +136,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             may_fly_beside: standing
                 && (self.is_undivided() || self.detours.is_beside_plan())
                 && self.detours.may_detour_over_area(&view),
-            around_flown: follow
+            detour_flown: follow
                 && self.detours.leads_back()
                 && self.guidance.is_at_end(scene)
                 && standing,

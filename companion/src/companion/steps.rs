@@ -210,7 +210,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     if fleet.has_reported_leaving() {
                         // The vehicle takes part again: it leaves its share at the earliest after
                         // this time, since others have to hear it first.
-                        self.timers.set(Timer::LeaveUnstarted, now + CANNOT_START_MOST);
+                        self.timers.set(Timer::LeaveWithoutCommitment, now + CANNOT_START_MOST);
                     }
                     fleet.begin_flight(now);
                     self.detours.begin_flight();

@@ -28,8 +28,8 @@ impl Guidance {
     /// Notes that another vehicle has acknowledged the intent sent at `sent_at`, whose points lead
     /// to `ends_m` along the path.
     pub(crate) fn note_reported_way(&mut self, sent_at: Instant, ends_m: f32) {
-        if sent_at > self.known_way.since {
-            self.known_way.to_m = ends_m;
+        if sent_at > self.acknowledged_path.since {
+            self.acknowledged_path.to_m = ends_m;
         }
     }
 
@@ -53,7 +53,7 @@ impl Guidance {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
         if neighbours.linked_within(now, LINKED_WITHIN) {
-            self.known_way.from_m =
+            self.acknowledged_path.from_m =
                 along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
         }
         let (alone, follows) = (state == State::Alone, state == State::Follow);
@@ -82,7 +82,7 @@ impl Guidance {
             EvadeTarget::Back(to_m) => (Some(to_m.min(wait_m)), false),
             EvadeTarget::Nowhere => (None, !alone),
         };
-        let from_m = self.known_way.from_m;
+        let from_m = self.acknowledged_path.from_m;
         let to_m = to_m.filter(|to_m| !alone || *to_m >= from_m).or(beyond.then_some(lands_m));
         self.evading = to_m.is_some();
         if let Some(to_m) = to_m {
@@ -98,7 +98,11 @@ impl Guidance {
     /// coverage mission, and where the radio's range is known, so that others expect it further on.
     fn expected_up_to_m<const V: usize>(&self, alone: bool, neighbours: &Neighbours<V>) -> f32 {
         let expected = alone && neighbours.fleet().is_none() && !neighbours.knows_range();
-        if expected { self.known_way.from_m.max(self.known_way.to_m) } else { f32::INFINITY }
+        if expected {
+            self.acknowledged_path.from_m.max(self.acknowledged_path.to_m)
+        } else {
+            f32::INFINITY
+        }
     }
 
     /// Since when the vehicle has been below one that descends, unable to leave along its path.

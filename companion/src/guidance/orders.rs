@@ -1,7 +1,7 @@
 //! Commands of the mission to guidance: hold, begin the climb or a path, resume or reverse the
 //! path, lead a landing down.
 
-use super::known_way::KnownWay;
+use super::acknowledged_path::AcknowledgedPath;
 use super::nearest::nearest_arc_length_m;
 use super::phase::Phase;
 use super::smoother::TICK_S;
@@ -56,7 +56,7 @@ impl Guidance {
     pub fn start_following(&mut self, now: Instant) {
         self.on_path = true;
         self.evade_search.reset();
-        self.known_way.from_m = f32::INFINITY;
+        self.acknowledged_path.from_m = f32::INFINITY;
         self.progress_m = self.tracker.along_m;
         self.progress_at = now;
     }
@@ -71,7 +71,7 @@ impl Guidance {
         self.guides_landing = false;
         self.reported_m = f32::NEG_INFINITY;
         self.gates_open = 0;
-        self.known_way = KnownWay::of_new_path(now);
+        self.acknowledged_path = AcknowledgedPath::of_new_path(now);
         // What hindered the vehicle on the other path does not count on this one.
         self.filter.reset();
         self.start_following(now);

@@ -60,10 +60,10 @@ pub enum Guard {
     Outside,
     /// MISSION_START, but the estimate's error bound does not fit into the margin at cruise speed,
     /// and the state has lasted for the limit: time for the first report of the accuracy.
-    StartVague,
+    StartImprecise,
     /// The estimate's error bound has not fitted into the margin, even at crawl speed, for longer
     /// than the limit.
-    EstimateVague,
+    EstimateImprecise,
     /// The EKF origin moved while the motors were armed.
     OriginMoved,
     /// The vehicle may take off: departure is due, and advice and safety filter leave it room.
@@ -155,12 +155,12 @@ pub enum Guard {
     BlockedOverField,
     /// In a coverage mission: the path has been blocked for the limit, and the vehicle may fly
     /// around the obstacle and back to its path.
-    AroundOverField,
+    MayDetourOverField,
     /// The vehicle stands at the end of its detour, back on its path.
-    AroundFlown,
-    /// As [`Guard::AroundFlown`], and the rest of the vehicle's own plan has come.
+    DetourFlown,
+    /// As [`Guard::DetourFlown`], and the rest of the vehicle's own plan has come.
     OwnPlanReady,
-    /// As [`Guard::AroundFlown`], but the rest of the vehicle's own plan could not be planned.
+    /// As [`Guard::DetourFlown`], but the rest of the vehicle's own plan could not be planned.
     OwnPlanLost,
     /// In a coverage mission: the safety filter has made the vehicle yield for the limit, and a
     /// path home can be planned.
@@ -225,7 +225,7 @@ pub enum Guard {
     /// this vehicle.
     NeighboursSilent,
     /// The vehicle may fly on unheard: its next gate is open, or none is left.
-    WayFree,
+    MayFlyUnheard,
     /// All others were last heard near the edge of the radio range, and the state has lasted for
     /// the limit.
     OutOfRange,
@@ -251,14 +251,14 @@ pub enum Guard {
     NoWayOn,
     /// For longer than the limit the vehicle has waited below one that lands, without a place along
     /// its path to evade to.
-    Underneath,
+    BelowLandingVehicle,
     /// Setpoint and vehicle stand.
     Standing,
     /// Others have divided this vehicle's share of the area, or count this vehicle as lost.
     Excluded,
     /// The waypoints that this vehicle's plan is to leave out have changed since the plan was
     /// requested.
-    MoreIsDone,
+    LeftOutSetChanged,
     /// In a coverage mission: the limit has passed since 1 s before the end of the lease.
     LeaseLost,
     /// The division has not become binding within the limit, nor within a minute after the last
@@ -301,8 +301,8 @@ impl Guard {
             Self::RoadmapBad => i.roadmap_bad,
             Self::StartCommanded => i.start && !i.imprecise && i.has_goal,
             Self::StartAgain => i.start,
-            Self::AroundOverField => i.blocked && i.may_fly_beside && i.blocked_for >= limit,
-            Self::AroundFlown => i.around_flown,
+            Self::MayDetourOverField => i.blocked && i.may_fly_beside && i.blocked_for >= limit,
+            Self::DetourFlown => i.detour_flown,
             Self::OwnPlanReady => i.own_plan_ready,
             Self::OwnPlanLost => i.own_plan_lost,
             Self::StartOverField => i.start && i.area,
@@ -315,8 +315,8 @@ impl Guard {
             Self::AwayFromPad => i.position_age < MAX_POSITION_AGE && !i.at_pad,
             Self::ChargeLow => i.battery_low,
             Self::Outside => i.outside,
-            Self::StartVague => i.start && i.imprecise && i.in_state >= limit,
-            Self::EstimateVague => i.imprecise_for > limit,
+            Self::StartImprecise => i.start && i.imprecise && i.in_state >= limit,
+            Self::EstimateImprecise => i.imprecise_for > limit,
             Self::OriginMoved => i.origin_moved,
             Self::GatesOpen => i.gates_open,
             Self::Elapsed => i.in_state >= limit,
@@ -397,7 +397,7 @@ impl Guard {
             Self::NotDivided => i.in_state >= limit && i.division_overdue,
             Self::PausedBeforeLiftOff => i.pause && i.is_before_lift_off(),
             Self::BarredBeforeLiftOff => i.hindered_for >= limit && i.is_before_lift_off(),
-            Self::WayFree => i.way_free,
+            Self::MayFlyUnheard => i.way_free,
             Self::OutOfRange => i.out_of_range && i.in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,
             Self::OnGround => {
@@ -410,10 +410,10 @@ impl Guard {
             Self::DetourFailed => i.plan_failed,
             Self::NoWayAround => i.no_way_around && i.room_below,
             Self::NoWayOn => i.no_way_around && i.can_turn_back,
-            Self::Underneath => i.time_below_landing > limit,
+            Self::BelowLandingVehicle => i.time_below_landing > limit,
             Self::Standing => i.standing,
             Self::Excluded => i.excluded,
-            Self::MoreIsDone => i.more_is_done,
+            Self::LeftOutSetChanged => i.left_out_set_changed,
             Self::PlansDiffer => i.plans_differ && i.in_state >= limit,
             Self::HoldsToDivide => i.holds_to_divide,
             Self::DivisionReady => i.division_ready,

@@ -42,7 +42,7 @@ pub struct GuardInputs {
     pub excluded: bool,
     /// Whether the waypoints that this vehicle's plan is to leave out have changed since the plan
     /// was requested.
-    pub more_is_done: bool,
+    pub left_out_set_changed: bool,
     /// Whether a neighbour that follows another plan of this mission was heard lately.
     pub plans_differ: bool,
     /// Whether this vehicle stands at its commitment: where it is to wait for the division under
@@ -100,7 +100,7 @@ pub struct GuardInputs {
     /// path.
     pub may_fly_beside: bool,
     /// Whether this vehicle stands at the end of its detour, back on its path.
-    pub around_flown: bool,
+    pub detour_flown: bool,
     /// Whether the rest of its own plan has come to this vehicle, back on its path after a detour.
     pub own_plan_ready: bool,
     /// Whether the rest of its own plan could not be planned for this vehicle, back on its path.

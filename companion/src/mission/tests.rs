@@ -193,11 +193,11 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::ReserveEnds => (i.area, i.armed) = (true, false),
         G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
         G::StartArmed => (i.start, i.has_goal, i.at_pad) = (true, true, true),
-        G::StartVague => {
+        G::StartImprecise => {
             (i.start, i.has_goal, i.at_pad, i.armed) = (true, true, true, false);
             (i.imprecise, i.in_state) = (true, long);
         }
-        G::EstimateVague => i.imprecise_for = long,
+        G::EstimateImprecise => i.imprecise_for = long,
         G::OriginMoved => i.origin_moved = true,
         G::GatesOpen => i.gates_open = true,
         G::StartBatteryLow => {
@@ -247,8 +247,8 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::ReturnCommanded => i.turn_back = true,
         G::ReturnOverField => (i.turn_back, i.can_fly_home) = (true, true),
         G::BlockedOverField => (i.blocked, i.can_fly_home, i.blocked_for) = (true, true, long),
-        G::AroundOverField => (i.blocked, i.may_fly_beside, i.blocked_for) = (true, true, long),
-        G::AroundFlown => i.around_flown = true,
+        G::MayDetourOverField => (i.blocked, i.may_fly_beside, i.blocked_for) = (true, true, long),
+        G::DetourFlown => i.detour_flown = true,
         G::OwnPlanReady => i.own_plan_ready = true,
         G::OwnPlanLost => i.own_plan_lost = true,
         G::YieldedOverField => (i.yielded_for, i.hindered_for, i.can_fly_home) = (long, long, true),
@@ -274,7 +274,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::LandingPlaceReached => i.landing_place_reached = true,
         G::ColumnBlocked => (i.column_blocked_for, i.in_state) = (long, long),
         G::Yielded => (i.yielded_for, i.hindered_for) = (long, long),
-        G::WayFree => i.way_free = true,
+        G::MayFlyUnheard => i.way_free = true,
         G::OutOfRange => (i.out_of_range, i.in_state) = (true, long),
         G::Hindered => i.hindered_for = long,
         G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
@@ -294,10 +294,10 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::DetourFailed => i.plan_failed = true,
         G::NoWayAround => (i.no_way_around, i.room_below) = (true, true),
         G::NoWayOn => (i.no_way_around, i.can_turn_back) = (true, true),
-        G::Underneath => i.time_below_landing = long,
+        G::BelowLandingVehicle => i.time_below_landing = long,
         G::Standing => i.standing = true,
         G::Excluded => i.excluded = true,
-        G::MoreIsDone => i.more_is_done = true,
+        G::LeftOutSetChanged => i.left_out_set_changed = true,
         G::PlansDiffer => (i.plans_differ, i.in_state) = (true, long),
         G::HoldsToDivide => i.holds_to_divide = true,
         G::DivisionReady => i.division_ready = true,

@@ -388,14 +388,14 @@ pub fn plan_flights<
         known = 1;
     }
     for inputs in losses.skip(known as usize - 1) {
-        let mut fates: Vec<VehicleStatus, K> = Vec::new();
+        let mut statuses: Vec<VehicleStatus, K> = Vec::new();
         for pad in &pads {
             let rank = pads.iter().filter(|other| other.id < pad.id).count();
             let input = inputs.get(rank).ok_or(CoverageError::Vehicles)?;
             let fate = VehicleStatus { alive: input.alive, along_m: input.along_m() };
-            fates.push(fate).map_err(|_| CoverageError::Vehicles)?;
+            statuses.push(fate).map_err(|_| CoverageError::Vehicles)?;
         }
-        let loss = Loss { work: &whole, flight_inputs: &flight_inputs, fates: &fates };
+        let loss = Loss { work: &whole, flight_inputs: &flight_inputs, statuses: &statuses };
         losses::redivide_work(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
     }
     ws.planned = Planned { plan_crc: out.crc, ..wanted };

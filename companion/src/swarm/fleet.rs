@@ -82,7 +82,7 @@ pub struct MemberReception {
 struct FleetMember {
     entry: RosterReportEntry,
     /// Whether the member has a part: it was alive when the last division became binding.
-    in_roster: bool,
+    has_part: bool,
     /// When the member was last heard, by this vehicle or by one that this vehicle hears.
     heard_at: Instant,
     /// Whether this vehicle itself lately heard the member.
@@ -93,7 +93,7 @@ struct FleetMember {
 
 impl FleetMember {
     fn takes_part(&self) -> bool {
-        self.in_roster && self.entry.status == MemberStatus::Alive
+        self.has_part && self.entry.status == MemberStatus::Alive
     }
 }
 
@@ -138,7 +138,7 @@ pub struct Fleet<const V: usize> {
 impl<const V: usize> Fleet<V> {
     /// A fleet of `count` vehicles (at most `V`), as known to the vehicle of rank `own`.
     pub fn new(own: usize, count: usize, limits: FleetTimeouts) -> Self {
-        let member = FleetMember { in_roster: true, ..FleetMember::default() };
+        let member = FleetMember { has_part: true, ..FleetMember::default() };
         Self {
             own: own as u8,
             members: core::iter::repeat_n(member, count.min(V)).collect(),
@@ -192,7 +192,7 @@ impl<const V: usize> Fleet<V> {
         self.previous_inputs.clear();
         for member in &mut self.members {
             member.entry = entry_in_division(&member.entry, false);
-            (member.in_roster, member.hash) = (true, 0);
+            (member.has_part, member.hash) = (true, 0);
         }
     }
 
@@ -200,7 +200,7 @@ impl<const V: usize> Fleet<V> {
     /// the plan that this vehicle holds. When each other one was heard last stays known: otherwise
     /// all would count as lost.
     fn rejoin(&mut self, incarnation: u8) {
-        let fresh = FleetMember { in_roster: true, ..FleetMember::default() };
+        let fresh = FleetMember { has_part: true, ..FleetMember::default() };
         for member in &mut self.members {
             *member = FleetMember { heard_at: member.heard_at, ..fresh };
         }
@@ -246,7 +246,7 @@ impl<const V: usize> Fleet<V> {
             }
             member.heard_itself = lately;
             let (silence, bit) = (now - member.heard_at, 1 << rank.min(31));
-            if silence >= MISSED_AFTER && member.in_roster {
+            if silence >= MISSED_AFTER && member.has_part {
                 let falls = member.entry.status <= MemberStatus::Lost;
                 let down_at = member.heard_at + self.limits.down;
                 self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
@@ -327,7 +327,7 @@ impl<const V: usize> Fleet<V> {
             MemberStatus::Lost | MemberStatus::Left => true,
             MemberStatus::Finished => false,
         };
-        let asked = self.members.iter().any(|m| m.in_roster && asks(m));
+        let asked = self.members.iter().any(|m| m.has_part && asks(m));
         self.is_alive(usize::from(self.own)) && !self.idle && !self.divisions.is_full() && asked
     }
 
@@ -344,14 +344,14 @@ impl<const V: usize> Fleet<V> {
             MemberStatus::Lost => now - m.heard_at >= self.limits.silent,
             MemberStatus::Left | MemberStatus::Finished => true,
         };
-        if !self.has_lease(now) || !self.members.iter().filter(|m| m.in_roster).all(known) {
+        if !self.has_lease(now) || !self.members.iter().filter(|m| m.has_part).all(known) {
             self.withdraw_inputs();
             self.division_inputs.clear();
             return;
         }
         // A vehicle that has no part since an earlier division gets none in this one.
         let input = |m: &FleetMember| {
-            if m.in_roster { DivisionInput::from_entry(&m.entry) } else { DivisionInput::default() }
+            if m.has_part { DivisionInput::from_entry(&m.entry) } else { DivisionInput::default() }
         };
         if !self.members.iter().map(input).eq(self.division_inputs.iter().copied()) {
             self.withdraw_inputs();
@@ -404,7 +404,7 @@ impl<const V: usize> Fleet<V> {
             m.entry.status != MemberStatus::Lost || now - m.heard_at >= self.limits.down
         };
         self.hash != 0
-            && self.members.iter().filter(|m| m.in_roster).all(is_down)
+            && self.members.iter().filter(|m| m.has_part).all(is_down)
             && (0..self.members.len()).filter(|rank| self.is_alive(*rank)).all(agrees)
             && self.is_majority(|rank, _| self.is_alive(rank))
     }
@@ -416,7 +416,7 @@ impl<const V: usize> Fleet<V> {
         (self.hash, self.previous_hash) = (0, 0);
         self.previous_inputs.clear();
         for (member, input) in self.members.iter_mut().zip(&inputs) {
-            member.in_roster &= input.alive;
+            member.has_part &= input.alive;
             member.hash = 0;
             member.entry = entry_in_division(&member.entry, !input.alive);
         }
@@ -428,7 +428,7 @@ impl<const V: usize> Fleet<V> {
     /// limit are cut to that limit, and which others are in flight or were never heard is
     /// forgotten: that matters only before a start. Fleets that will act alike become equal, so a
     /// search recognises a state that it has visited.
-    pub fn move_to_clock(&mut self, now: Instant, then: Instant) {
+    pub fn normalise_for_search(&mut self, now: Instant, then: Instant) {
         let FleetTimeouts { lease, silent, down, .. } = self.limits;
         let moved = |at: Instant, most: Duration| {
             let age = (now - at).min(most);
@@ -438,7 +438,7 @@ impl<const V: usize> Fleet<V> {
         (self.introduced, self.down_at, self.any_missing) = (u32::MAX, Instant::ZERO, false);
         self.lease_at = moved(self.lease_at, Duration::from_micros(2 * lease.as_micros()));
         for member in &mut self.members {
-            let counts = member.in_roster && member.entry.status <= MemberStatus::Lost;
+            let counts = member.has_part && member.entry.status <= MemberStatus::Lost;
             member.heard_at = if counts { moved(member.heard_at, silent.max(down)) } else { then };
         }
     }

@@ -172,7 +172,7 @@ impl<const V: usize> Neighbours<V> {
             place_on_points: PlaceOnPoints::Unknown,
             extent_m: 0.0,
             points_reach: PointsReach::OPEN,
-            unheard_way_m: -1.0,
+            points_length_m: -1.0,
             may_come_down: false,
             gates_open_up_to_m: f32::NEG_INFINITY,
             unheard_delay_s: 0,
@@ -327,7 +327,7 @@ impl<const V: usize> Neighbours<V> {
         contact.points.clone_from(&intent.points);
         let most = intent.points.len().saturating_sub(1) as u8;
         contact.unheard_point_count = intent.unheard_point_count.min(most);
-        contact.unheard_way_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
+        contact.points_length_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
         contact.extent_m = fpu::sqrtf(contact.points_for_now().iter().fold(0.0, most));

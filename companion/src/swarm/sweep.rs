@@ -22,7 +22,7 @@ pub struct IncrementalScan {
 
 impl IncrementalScan {
     /// Continues the scan. `visit` calls back with each zone of a source; a zone costs `each` of
-    /// `budget`, a source 1. Returns `Some(true)` at the first zone for which `is_in_the_way`
+    /// `budget`, a source 1. Returns `Some(true)` at the first zone for which `meets_condition`
     /// holds, `Some(false)` when it holds for no zone of all `sources`; the next call begins a new
     /// scan. Returns `None` when the budget, of at least `each`, is spent. The scan restarts where
     /// the number of sources changes.
@@ -32,7 +32,7 @@ impl IncrementalScan {
         budget: &mut u16,
         each: u16,
         visit: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
-        is_in_the_way: impl Fn(&KeepOutZone) -> bool,
+        meets_condition: impl Fn(&KeepOutZone) -> bool,
     ) -> Option<bool> {
         let sources = sources as u16;
         if self.sources != sources {
@@ -46,7 +46,7 @@ impl IncrementalScan {
                 if visited == things && !found && *budget >= each {
                     *budget -= each;
                     things += 1;
-                    found = is_in_the_way(&keep_off);
+                    found = meets_condition(&keep_off);
                 }
                 visited += 1;
             });

@@ -205,8 +205,8 @@ fn measure_division(
     // The first vehicle is lost; all others go on from halfway along their paths.
     let fate =
         |k: usize| VehicleStatus { alive: k > 0, along_m: 0.5 * out.flights[k].path.length_m() };
-    let fates: Vec<VehicleStatus, VEHICLES> = (0..case.count).map(fate).collect();
-    let loss = Loss { work: &work, flight_inputs: &flight_inputs, fates: &fates };
+    let statuses: Vec<VehicleStatus, VEHICLES> = (0..case.count).map(fate).collect();
+    let loss = Loss { work: &work, flight_inputs: &flight_inputs, statuses: &statuses };
     meter
         .call(again_name, bytes, || {
             losses::redivide_work(&loss, losses, pack, schedule, routes, out)

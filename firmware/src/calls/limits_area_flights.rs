@@ -297,18 +297,20 @@ fn call_divisions(
         for hit in
             [VehicleStatus { along_m: hard, ..fate }, VehicleStatus { along_m: hard, ..lost }]
         {
-            for fates in
+            for statuses in
                 [&[fate, hit, fate][..], &[hit; VEHICLES], &[lost, hit, lost], &[hit, fate], &[]]
             {
                 memory.losses.start_plan(good.tracks, good.transit, &[]).expect("nothing is done");
                 flights::plan_flights(good, routes, &FLIGHT_INPUTS, memory.schedule, memory.out)
                     .expect("as before");
                 let mut routes = routes.clone();
-                let loss = Loss { work: good, flight_inputs: &FLIGHT_INPUTS, fates };
+                let loss = Loss { work: good, flight_inputs: &FLIGHT_INPUTS, statuses };
                 let divided = call_redivide(to, &loss, memory, &mut routes);
-                assert!(fates.len() == VEHICLES || divided == Err(CoverageError::Vehicles.into()));
+                assert!(
+                    statuses.len() == VEHICLES || divided == Err(CoverageError::Vehicles.into())
+                );
                 let setting = Err(CoverageError::SettingOutOfRange("along_m").into());
-                assert!(fates.len() != VEHICLES || hard >= 0.0 || divided == setting);
+                assert!(statuses.len() != VEHICLES || hard >= 0.0 || divided == setting);
                 to.add_count(routes.routes.len());
                 // The same loss again: waypoints that are already done must not be divided again.
                 let _ = call_redivide(to, &loss, memory, &mut routes);
@@ -332,7 +334,7 @@ fn call_redivide(
     let divided = to.call("losses::redivide_work", || {
         losses::redivide_work(loss, losses, pack, schedule, routes, out)
     });
-    assert!(divided.is_err() || is_finite(out), "{:?}", loss.fates);
+    assert!(divided.is_err() || is_finite(out), "{:?}", loss.statuses);
     to.add_bool(divided.is_ok());
     divided
 }

@@ -210,12 +210,12 @@ pub(super) fn call_searches(
             .call("search::dijkstra_all", || search::dijkstra_all(view, a, any_edge_passable, ws));
         assert_eq!(all.is_ok(), usize::from(a) < view.node_count());
         let mut row = [0.0; 2];
-        let answer = to.call("search::dijkstra_row", || {
-            search::dijkstra_row(view, a, &[b, 0], any_edge_passable, ws, &mut row)
+        let answer = to.call("search::path_lengths_to", || {
+            search::path_lengths_to(view, a, &[b, 0], any_edge_passable, ws, &mut row)
         });
         assert_eq!(answer.is_ok(), there);
         assert_eq!(
-            search::dijkstra_row(view, a, &[b, 0], any_edge_passable, ws, &mut row[..1]),
+            search::path_lengths_to(view, a, &[b, 0], any_edge_passable, ws, &mut row[..1]),
             Err(SearchError::OutputLength)
         );
         let mut costs = [0.0; 4];

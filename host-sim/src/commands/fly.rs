@@ -25,7 +25,7 @@ use crate::swarm::gateway::Gateway;
 use crate::swarm::{self, Flight};
 
 /// The demo's scenario, compiled into the program so that no file is needed.
-const DEMO: &str = include_str!("../../scenarios/demo.toml");
+const DEMO_SCENARIO: &str = include_str!("../../scenarios/demo.toml");
 
 /// The board that QEMU emulates.
 const EMULATED_BOARD: &str = "qemu";
@@ -174,7 +174,8 @@ fn set_emulated_boards(
 /// # Errors
 /// The output cannot be written.
 pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
-    let scenario = scenario::parse(DEMO, "demo.toml").context("the demo's own scenario")?;
+    let scenario =
+        scenario::parse(DEMO_SCENARIO, "demo.toml").context("the demo's own scenario")?;
     plan_and_fly(scenario, "demo", &args.out, &FlightDisplay::default(), None)
 }
 
@@ -247,7 +248,7 @@ fn plan_and_fly(
         }
         None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
-    if let Some(places) = flown::places_in_place_of_pictures(&mission.scenario, &flight.tracks)? {
+    if let Some(places) = flown::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
         flight.pictures = places;
     }
     if let Some(kept) = &kept {

@@ -12,7 +12,7 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
 pub use super::flight::TimedFlight;
-use super::flight::{FlightPoint, PointAction};
+use super::flight::{FlightPoint, WaypointAction};
 use super::heights::{self, HeightFindings};
 pub use super::taken::Picture;
 use super::{CoveragePlan, SortieFlight, taken};
@@ -107,7 +107,7 @@ pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>])
     let taken = |flight: &TimedFlight<'_>| {
         let vehicle = Some(flight.vehicle);
         let points = flight.points.iter().zip(flight.times_s);
-        let photos = points.filter(|(point, _)| matches!(point.action, PointAction::Photo(_)));
+        let photos = points.filter(|(point, _)| matches!(point.action, WaypointAction::Photo(_)));
         let taken =
             photos.map(|(point, &t_s)| Picture { vehicle, t_s, position: point.position, heading });
         taken.collect::<Vec<_>>()
@@ -118,7 +118,7 @@ pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>])
 /// Checks pictures that were taken in a flight, by the true position of the camera. [`taken`]
 /// counts waypoints without a picture and those flown twice.
 pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> CoverageFindings {
-    let (left, twice) = taken::count_left_and_twice(planned, &pictures);
+    let (left, twice) = taken::count_missed_and_repeated(planned, &pictures);
     let mut findings = CoverageFindings {
         photos: pictures.len() as u64,
         missed_waypoints: left,
@@ -144,7 +144,7 @@ fn count_waypoints(
     let mut times = vec![0u32; planned.tracks.waypoint_count() as usize];
     for flight in flights {
         let photos = flight.points.iter().filter_map(|point| match point.action {
-            PointAction::Photo(number) => Some(number),
+            WaypointAction::Photo(number) => Some(number),
             _ => None,
         });
         let numbers: Vec<u32> = photos.collect();

@@ -13,7 +13,7 @@ use planner_core::coverage::pack::Route;
 use planner_core::frames::Geodetic;
 use serde_json::{Value, json};
 
-use super::flight::{FlightPoint, PointAction, course_deg};
+use super::flight::{FlightPoint, WaypointAction, course_deg};
 use super::sorties::Sortie;
 use super::{CoveragePlan, SortieFlight};
 use crate::scenario::AutopilotKind;
@@ -127,10 +127,10 @@ pub fn flight_items(
         let begins = point.lane.is_some() && lane_at(index.checked_sub(1)) != point.lane;
         let ends = point.lane.is_some() && lane_at(Some(index + 1)) != point.lane;
         match (point.action, planned.area_settings.trigger) {
-            (PointAction::Pad, _) => {
+            (WaypointAction::Pad, _) => {
                 items.push(MissionItem::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4]));
             }
-            (PointAction::Photo(_), Trigger::Waypoint) => {
+            (WaypointAction::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));
                 items.push(MissionItem::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
                 // Parameter 5 of DO_DIGICAM_CONTROL, 1, takes a picture; its slot is `place[0]`.
@@ -138,14 +138,14 @@ pub fn flight_items(
                     last.place[0] = 1.0;
                 }
             }
-            (PointAction::Photo(_), trigger) => {
+            (WaypointAction::Photo(_), trigger) => {
                 if begins || ends {
                     items.push(waypoint(index));
                 }
                 if trigger == Trigger::Distance && begins && !ends {
                     let mut later =
                         points[index + 1..].iter().take_while(|next| next.lane == point.lane);
-                    let next = later.find(|next| matches!(next.action, PointAction::Photo(_)));
+                    let next = later.find(|next| matches!(next.action, WaypointAction::Photo(_)));
                     let step = next.map_or(planned.area_settings.spacing.waypoint_m, |next| {
                         (next.position - point.position).xy().norm()
                     });
@@ -163,7 +163,7 @@ pub fn flight_items(
                     ));
                 }
             }
-            (PointAction::Transit | PointAction::Lane, _) => items.push(waypoint(index)),
+            (WaypointAction::Transit | WaypointAction::Lane, _) => items.push(waypoint(index)),
         }
     }
     items
@@ -261,10 +261,10 @@ pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Stri
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         for (order, (point, time)) in points.iter().zip(times).enumerate() {
             let (act, number) = match point.action {
-                PointAction::Pad => ("pad", String::new()),
-                PointAction::Transit => ("transit", String::new()),
-                PointAction::Lane => ("lane", String::new()),
-                PointAction::Photo(number) => ("photo", number.to_string()),
+                WaypointAction::Pad => ("pad", String::new()),
+                WaypointAction::Transit => ("transit", String::new()),
+                WaypointAction::Lane => ("lane", String::new()),
+                WaypointAction::Photo(number) => ("photo", number.to_string()),
             };
             let p = point.position;
             let place = planned.geodetic(&p);
@@ -304,9 +304,9 @@ pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Val
         }
     }
     for (sortie, points, _) in flights {
-        let photos = points
-            .iter()
-            .filter(|point| matches!(point.action, PointAction::Photo(_) | PointAction::Lane));
+        let photos = points.iter().filter(|point| {
+            matches!(point.action, WaypointAction::Photo(_) | WaypointAction::Lane)
+        });
         let places: Vec<Value> =
             photos.map(|point| place(point.position.x, point.position.y)).collect();
         let geometry = match places.as_slice() {

@@ -21,7 +21,7 @@ const SAME_PLACE_M: f32 = 0.01;
 
 /// Action of a vehicle at a point of its flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PointAction {
+pub enum WaypointAction {
     /// The vehicle stands on its pad.
     Pad,
     /// The vehicle passes at the height of its layer.
@@ -38,7 +38,7 @@ pub struct FlightPoint {
     /// Position, metres ENU.
     pub position: Point,
     /// Action at the point.
-    pub action: PointAction,
+    pub action: WaypointAction,
     /// Index of the lane that the point lies on; `None` outside lanes.
     pub lane: Option<u16>,
 }
@@ -63,28 +63,28 @@ pub fn route_points(planned: &CoveragePlan<'_>, route: &Route) -> Vec<FlightPoin
     let layer_m = heights.mission_m + f32::from(route.layer) * heights.layer_m;
     let at = |place: &Flat, height_m: f32| Point::new(place.x, place.y, height_m);
     let point =
-        |position: Point, act: PointAction| FlightPoint { position, action: act, lane: None };
+        |position: Point, act: WaypointAction| FlightPoint { position, action: act, lane: None };
     let (first, last) = route.end_waypoints();
     let ends = [first, last].map(|number| planned.tracks.waypoint(number).unwrap_or(vehicle.place));
     let mut points = vec![
-        point(pad, PointAction::Pad),
-        point(at(&vehicle.place, layer_m), PointAction::Transit),
+        point(pad, WaypointAction::Pad),
+        point(at(&vehicle.place, layer_m), WaypointAction::Transit),
     ];
     points.extend(
         corners_between(planned, &vehicle.place, &ends[0])
             .iter()
-            .map(|c| point(at(c, layer_m), PointAction::Transit)),
+            .map(|c| point(at(c, layer_m), WaypointAction::Transit)),
     );
-    points.push(point(at(&ends[0], layer_m), PointAction::Transit));
+    points.push(point(at(&ends[0], layer_m), WaypointAction::Transit));
     add_lane_points(planned, route, &mut points);
-    points.push(point(at(&ends[1], layer_m), PointAction::Transit));
+    points.push(point(at(&ends[1], layer_m), WaypointAction::Transit));
     points.extend(
         corners_between(planned, &ends[1], &vehicle.home)
             .iter()
-            .map(|c| point(at(c, layer_m), PointAction::Transit)),
+            .map(|c| point(at(c, layer_m), WaypointAction::Transit)),
     );
-    points.push(point(at(&vehicle.home, layer_m), PointAction::Transit));
-    points.push(point(Point::new(vehicle.home.x, vehicle.home.y, pad.z), PointAction::Pad));
+    points.push(point(at(&vehicle.home, layer_m), WaypointAction::Transit));
+    points.push(point(Point::new(vehicle.home.x, vehicle.home.y, pad.z), WaypointAction::Pad));
     points
 }
 
@@ -110,7 +110,7 @@ fn add_lane_points(planned: &CoveragePlan<'_>, route: &Route, points: &mut Vec<F
                 between.pop();
                 let point = |position: Point| FlightPoint {
                     position,
-                    action: PointAction::Lane,
+                    action: WaypointAction::Lane,
                     lane: None,
                 };
                 points.extend(between.into_iter().map(point));
@@ -169,7 +169,7 @@ fn add_picture_points(
             let corner = path[leg];
             // With trigger by waypoint the point of the picture already stands for this corner.
             if !by_waypoint || (along_m(&corner.xy()) - at_m).abs() > SAME_PLACE_M {
-                points.push(FlightPoint { position: corner, action: PointAction::Lane, lane });
+                points.push(FlightPoint { position: corner, action: WaypointAction::Lane, lane });
             }
         }
         let end = path[(leg + 1).min(path.len() - 1)];
@@ -181,7 +181,7 @@ fn add_picture_points(
         };
         let height_m = path[leg].z + (end.z - path[leg].z) * share;
         let position = Point::new(place.x, place.y, height_m);
-        points.push(FlightPoint { position, action: PointAction::Photo(*number), lane });
+        points.push(FlightPoint { position, action: WaypointAction::Photo(*number), lane });
     }
 }
 

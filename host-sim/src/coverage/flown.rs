@@ -29,7 +29,7 @@ pub struct FlightFindings {
 ///
 /// # Errors
 /// As [`CoveragePlan::new`].
-pub fn places_in_place_of_pictures(
+pub fn lane_points_as_pictures(
     scenario: &Scenario,
     tracks: &[Vec<(f32, Point)>],
 ) -> anyhow::Result<Option<Vec<Picture>>> {

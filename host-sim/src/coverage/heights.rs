@@ -4,7 +4,7 @@
 use planner_core::Point;
 
 use super::CoveragePlan;
-use super::flight::{FlightPoint, PointAction, TimedFlight};
+use super::flight::{FlightPoint, TimedFlight, WaypointAction};
 
 /// Greatest spacing of the height samples along a leg, metres; a quarter of a cell of the height
 /// map where that is less.
@@ -55,14 +55,14 @@ pub fn check_heights(
             planned.scenario.vehicles.iter().position(|vehicle| vehicle.id == flight.vehicle)?;
         let vehicle = &planned.vehicles[index];
         for leg in flight.points.windows(2) {
-            if leg.iter().any(|point| point.action == PointAction::Pad) {
+            if leg.iter().any(|point| point.action == WaypointAction::Pad) {
                 continue;
             }
             let (from, to) = (leg[0].position, leg[1].position);
             let [least_m, most_m] = height_range_above_ground(planned, &from, &to, sample_m);
             findings.too_low +=
                 u64::from(least_m < planned.area_settings.height_m - HEIGHT_ROUNDING_M);
-            if leg.iter().any(|point| point.action == PointAction::Transit) {
+            if leg.iter().any(|point| point.action == WaypointAction::Transit) {
                 continue;
             }
             findings.least_m = findings.least_m.min(least_m);
@@ -98,5 +98,5 @@ fn height_range_above_ground(
 /// Whether a point is at the height of the lanes: on a lane or on the way from one lane to the
 /// next, not on a transit in a layer.
 pub fn is_at_lane_height(point: &FlightPoint) -> bool {
-    matches!(point.action, PointAction::Photo(_) | PointAction::Lane)
+    matches!(point.action, WaypointAction::Photo(_) | WaypointAction::Lane)
 }

@@ -14,7 +14,9 @@ use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::voxel::Outside;
 
-use self::polygon::{Polygon, bounding_box, contains, convex_hull, moved_out, with_fewer_corners};
+use self::polygon::{
+    Polygon, bounding_box, contains, convex_hull, offset_outward, simplified_outward,
+};
 use crate::capacity::BOARD_CORNERS;
 use crate::map::{ClearanceField, OccupancyMap, Unknown, VoxelMap};
 
@@ -63,8 +65,8 @@ impl Obstacles {
     /// The obstacles of a map: its occupied cells without those that count as ground.
     pub fn new(map: &OccupancyMap, unknown: Unknown, clearance_m: f32) -> Self {
         let mut map = VoxelMap {
-            seen_obstacle_words: None,
-            never_sample_words: None,
+            occupied_words: None,
+            no_node_words: None,
             outside: Outside::Free,
             ..map.voxel_map(unknown)
         };
@@ -183,7 +185,7 @@ struct Columns {
     /// Columns with an obstacle that reaches up to where vehicles fly.
     blocked: Vec<bool>,
     /// Columns whose middle is nearer to a blocked one than the clearance.
-    grown: Vec<bool>,
+    inflated: Vec<bool>,
 }
 
 /// Indices of a column, east and north.
@@ -197,14 +199,14 @@ impl Columns {
         let low = [0, 1].map(|axis| f64::from(map.shape.min[axis]) - around as f64 * cell_m);
         let free = vec![false; size[0] * size[1]];
         let mut columns =
-            Self { size, low, cell_m, clearance_m, blocked: free.clone(), grown: free };
+            Self { size, low, cell_m, clearance_m, blocked: free.clone(), inflated: free };
         for cell in occupied_cells(map) {
             let at = columns.index([0, 1].map(|axis| cell[axis] as usize + around));
             let centre = map.shape.center(cell);
             let top_m = centre.z + map.shape.resolution_m / 2.0;
             columns.blocked[at] = columns.blocked[at] || top_m > floor_m;
         }
-        columns.grow(around);
+        columns.inflate(around);
         columns
     }
 
@@ -224,14 +226,14 @@ impl Columns {
         near(j, tall).flat_map(move |j| near(i, wide).map(move |i| [i, j]))
     }
 
-    /// Marks the grown columns, which lie at most `around` columns from a blocked one.
-    fn grow(&mut self, around: usize) {
+    /// Marks the inflated columns, which lie at most `around` columns from a blocked one.
+    fn inflate(&mut self, around: usize) {
         let gap_m = |apart: isize| (apart.unsigned_abs() as f64 - 0.5).max(0.0) * self.cell_m;
         let reach = around as isize;
         let steps = (-reach..=reach).flat_map(|j| (-reach..=reach).map(move |i| [i, j]));
         let near: Vec<[isize; 2]> =
             steps.filter(|[i, j]| gap_m(*i).hypot(gap_m(*j)) <= self.clearance_m).collect();
-        self.grown.clone_from(&self.blocked);
+        self.inflated.clone_from(&self.blocked);
         for column in self.all() {
             // Only from columns at the edge of a blocked region: all columns around the others are
             // blocked.
@@ -242,14 +244,14 @@ impl Columns {
             for [i, j] in &near {
                 let to = [column[0].wrapping_add_signed(*i), column[1].wrapping_add_signed(*j)];
                 let at = self.index(to);
-                self.grown[at] = true;
+                self.inflated[at] = true;
             }
         }
     }
 
-    /// The blocked columns, in parts whose grown columns touch.
+    /// The blocked columns, in parts whose inflated columns touch.
     fn parts(&self) -> Vec<Vec<Column>> {
-        let mut left = self.grown.clone();
+        let mut left = self.inflated.clone();
         let mut parts = Vec::new();
         for first in self.all() {
             if !std::mem::take(&mut left[self.index(first)]) {
@@ -282,9 +284,9 @@ impl Columns {
         let hull = convex_hull(corners.collect());
         let inner = match outline.boxes {
             true => bounding_box(&hull),
-            false => with_fewer_corners(hull, MAX_ZONE_CORNERS),
+            false => simplified_outward(hull, MAX_ZONE_CORNERS),
         };
-        let zone = moved_out(&inner, self.clearance_m + ROUNDING_M);
+        let zone = offset_outward(&inner, self.clearance_m + ROUNDING_M);
         if self.free_share(&zone) <= outline.free_share {
             return vec![zone];
         }
@@ -304,7 +306,7 @@ impl Columns {
         [before, after].iter().flat_map(|half| self.zones_around(half, outline)).collect()
     }
 
-    /// Share of a zone that could be flown over: its columns that are not grown.
+    /// Share of a zone that could be flown over: its columns that are not inflated.
     fn free_share(&self, zone: &Polygon) -> f64 {
         let box_of = bounding_box(zone);
         let [from, to] = [box_of[0], box_of[2]].map(|corner| {
@@ -312,7 +314,7 @@ impl Columns {
         });
         let is_grown = |column: [isize; 2]| {
             let inside = (0..2).all(|a| column[a] >= 0 && column[a] < self.size[a] as isize);
-            inside && self.grown[self.index(column.map(|index| index as usize))]
+            inside && self.inflated[self.index(column.map(|index| index as usize))]
         };
         let (mut all, mut free) = (0.0, 0.0);
         for column in (from[1]..=to[1]).flat_map(|j| (from[0]..=to[0]).map(move |i| [i, j])) {

@@ -10,7 +10,7 @@ use planner_core::flight::{Flight as PathFlight, Task, WaypointRange};
 use super::CoveragePlan;
 use super::SortieFlight;
 use super::check::{self, Picture};
-use super::flight::{FlightPoint, PointAction};
+use super::flight::{FlightPoint, WaypointAction};
 use crate::capacity::WAYPOINTS;
 use crate::mission::{Mission, SwarmPlan};
 use crate::report::{CoverageLayers, Division, Footprint, Part, WaypointTransfer};
@@ -24,7 +24,7 @@ type WaypointOwners = BTreeMap<u32, u8>;
 pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> CoverageLayers {
     let mut parts: Vec<Part> = Vec::new();
     for (sortie, points, _) in flights {
-        let photos = |point: &&FlightPoint| matches!(point.action, PointAction::Photo(_));
+        let photos = |point: &&FlightPoint| matches!(point.action, WaypointAction::Photo(_));
         let photos: Vec<&FlightPoint> = points.iter().filter(photos).collect();
         let lanes = photos.chunk_by(|a, b| a.lane == b.lane);
         let lanes = lanes.flat_map(|lane| [lane[0].position, lane[lane.len() - 1].position]);

@@ -111,12 +111,12 @@ fn min_distance_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coverage::flight::PointAction;
+    use crate::coverage::flight::WaypointAction;
 
     fn flight(places: &[[f32; 3]]) -> (Vec<FlightPoint>, Vec<f32>) {
         let point = |p: &[f32; 3]| FlightPoint {
             position: Point::from(*p),
-            action: PointAction::Lane,
+            action: WaypointAction::Lane,
             lane: None,
         };
         let points: Vec<FlightPoint> = places.iter().map(point).collect();

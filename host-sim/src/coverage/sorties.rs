@@ -19,7 +19,7 @@ use planner_core::coverage::pack::Route;
 use sim_autopilot::VehicleLimits;
 
 use super::CoveragePlan;
-use super::flight::PointAction;
+use super::flight::WaypointAction;
 pub use super::planned::Sortie;
 use crate::scenario;
 
@@ -70,7 +70,7 @@ fn terrain_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
         up_m if up_m > 0.0 => up_m / vehicle.climb_mps,
         down_m => -down_m / vehicle.descend_mps,
     });
-    let corners = points.iter().filter(|point| point.action == PointAction::Lane).count() as f32;
+    let corners = points.iter().filter(|point| point.action == WaypointAction::Lane).count() as f32;
     ups.sum::<f32>() + corners * vehicle.cruise_mps / PLANNED_ACCEL_MPS2
 }
 

@@ -65,15 +65,15 @@ impl Tolerance {
     }
 
     /// Greatest distance along the lane between a waypoint and its picture, metres;
-    /// [`margins::usable_footprint`] plans with as much, or with less if all vehicles are slower
-    /// than the mission's cruise speed.
+    /// [`margins::with_usable_footprint`] plans with as much, or with less if all vehicles are
+    /// slower than the mission's cruise speed.
     pub fn max_along_m(&self) -> f32 {
         self.cross_track_m + self.late_m
     }
 }
 
 /// Number of waypoints without a picture, and number of waypoints flown more than once.
-pub fn count_left_and_twice(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> (u64, u64) {
+pub fn count_missed_and_repeated(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> (u64, u64) {
     let tolerance = Tolerance::of_plan(planned);
     let lanes = planned.tracks.lanes();
     let left: u64 =
@@ -155,8 +155,8 @@ mod tests {
     use crate::scenario;
     use crate::scenario::coverage::Method;
 
-    /// [`count_left_and_twice`] with one picture at each waypoint (5 m apart) of a plan of at least
-    /// three lanes, after `change` has changed the pictures.
+    /// [`count_missed_and_repeated`] with one picture at each waypoint (5 m apart) of a plan of at
+    /// least three lanes, after `change` has changed the pictures.
     fn counted(change: impl Fn(&mut Vec<Picture>)) -> (u64, u64) {
         let text = "[area]\npolygon = [[0, 0], [60, 0], [60, 30], [0, 30]]\nheight_m = 20.0\nlane_m = 10.0\n\
                     waypoint_m = 5.0\ncamera = { fov_deg = 73.7, aspect = 1.5 }\n[mission]\ncruise_mps = 5.0\n\
@@ -173,7 +173,7 @@ mod tests {
         };
         let mut pictures: Vec<Picture> = waypoints.map(picture).collect();
         change(&mut pictures);
-        count_left_and_twice(&planned, &pictures)
+        count_missed_and_repeated(&planned, &pictures)
     }
 
     #[test]

@@ -253,8 +253,8 @@ impl OccupancyMap {
         VoxelMap {
             shape: self.shape,
             obstacle_words: words,
-            seen_obstacle_words: seen,
-            never_sample_words: never_sample,
+            occupied_words: seen,
+            no_node_words: never_sample,
             outside,
         }
     }

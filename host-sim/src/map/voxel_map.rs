@@ -12,9 +12,9 @@ pub struct VoxelMap {
     pub obstacle_words: Vec<u64>,
     /// Bits of the occupied cells alone, if unknown cells are obstacles too; `None` if
     /// `obstacle_words` holds no unknown cells.
-    pub seen_obstacle_words: Option<Vec<u64>>,
+    pub occupied_words: Option<Vec<u64>>,
     /// Bits of the cells in which no roadmap node may lie, if these are more than the obstacles.
-    pub never_sample_words: Option<Vec<u64>>,
+    pub no_node_words: Option<Vec<u64>>,
     /// Whether the space beyond the map's faces is an obstacle.
     pub outside: Outside,
 }
@@ -28,7 +28,7 @@ impl VoxelMap {
 
     /// The bit grid of cells in which no roadmap node may lie; space beyond the map counts as such.
     pub fn never_sample_grid(&self) -> VoxelGrid<'_> {
-        let words = self.never_sample_words.as_deref().unwrap_or(&self.obstacle_words);
+        let words = self.no_node_words.as_deref().unwrap_or(&self.obstacle_words);
         VoxelGrid::new(self.shape, Outside::Blocked, words)
             .expect("the words were made for the shape")
     }
@@ -61,14 +61,14 @@ impl VoxelMap {
                 }
             }
         }
-        Self { never_sample_words: Some(words), ..self.clone() }
+        Self { no_node_words: Some(words), ..self.clone() }
     }
 
     /// Whether a cell is an obstacle only because it is unknown. Panics for a cell outside the
     /// grid.
     pub fn is_unknown(&self, cell: [u32; 3]) -> bool {
         let (word, mask) = self.shape.word_and_mask(cell);
-        self.seen_obstacle_words
+        self.occupied_words
             .as_ref()
             .is_some_and(|seen| self.obstacle_words[word] & !seen[word] & mask != 0)
     }

@@ -21,7 +21,7 @@ const COMMAND_EVERY_US: u64 = 1_000_000;
 /// others, microseconds.
 const START_WITHOUT_REST_US: u64 = 90_000_000;
 /// Time for which a command to one vehicle is repeated, microseconds: some messages are lost.
-const ORDER_REPEATED_FOR_US: u64 = 10_000_000;
+const COMMAND_REPEATED_FOR_US: u64 = 10_000_000;
 
 /// What the operator commands one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,7 +106,7 @@ impl GroundStation {
     /// Sets the command for one vehicle, repeated for 10 s; it replaces the vehicle's earlier one.
     pub fn set_command(&mut self, now_us: u64, vehicle: usize, order: OperatorCommand) {
         self.orders.retain(|&(of, ..)| of != vehicle);
-        self.orders.push((vehicle, order, now_us + ORDER_REPEATED_FOR_US));
+        self.orders.push((vehicle, order, now_us + COMMAND_REPEATED_FOR_US));
     }
 
     /// Reports a spherical obstacle to all vehicles, each second from now on.

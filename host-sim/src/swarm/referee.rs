@@ -150,7 +150,7 @@ impl<'a> Referee<'a> {
             too_near: vec![false; vehicles.len() * vehicles.len()],
             touching: vec![false; vehicles.len() * vehicles.len()],
             recorded_s: f64::NEG_INFINITY,
-            window: NOTHING,
+            window: EMPTY_SAMPLE,
             retracts_ended_deadlocks: false,
             obstacles: Vec::new(),
             wall_contacts: 0,
@@ -177,7 +177,7 @@ impl<'a> Referee<'a> {
         if t_s - self.recorded_s >= RECORD_EVERY_S - 1e-6 {
             self.recorded_s = t_s;
             self.samples.push(Sample { t_s: t_s as f32, ..self.window });
-            self.window = NOTHING;
+            self.window = EMPTY_SAMPLE;
             for (vehicle, now) in self.vehicles.iter_mut().zip(seen) {
                 vehicle.track.push((t_s as f32, now.position));
             }
@@ -397,7 +397,7 @@ fn no_progress() -> String {
 
 /// Greatest clearance to an obstacle that is measured exactly, metres.
 const MAX_MEASURED_CLEARANCE_M: f32 = 3.0;
-const NOTHING: Sample =
+const EMPTY_SAMPLE: Sample =
     Sample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };
 
 #[cfg(test)]

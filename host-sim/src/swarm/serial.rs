@@ -22,7 +22,7 @@ pub struct SerialConfig {
 }
 
 /// Share of bytes lost, or of writes damaged, above which the link is named as a cause of failure.
-const EXPLAINING_SHARE: f64 = 0.02;
+const MIN_REPORTED_SHARE: f64 = 0.02;
 /// The usual baud rates, bits per second.
 const BAUDS: [u64; 8] = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];
 
@@ -68,7 +68,7 @@ impl SerialLink {
     pub fn describe_fault(&self, lasted_s: f64) -> Option<String> {
         let share = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
         let lost = share(self.overrun, self.offered);
-        if lost > EXPLAINING_SHARE {
+        if lost > MIN_REPORTED_SHARE {
             let offered = (self.offered as f64 / lasted_s.max(1e-3)) as u64;
             let enough =
                 BAUDS.iter().find(|baud| *baud / 10 > offered).unwrap_or(&BAUDS[BAUDS.len() - 1]);
@@ -81,14 +81,14 @@ impl SerialLink {
             ));
         }
         let damaged = share(self.writes_damaged, self.writes_sent);
-        (damaged > EXPLAINING_SHARE).then(|| {
+        (damaged > MIN_REPORTED_SHARE).then(|| {
             format!(
                 "its serial link damaged {:.0} % of what it carried, and damaged messages are dropped: {} of its bytes \
                  change; a simulation.serial_corruption of {:.0e} damages less than {:.0} %",
                 100.0 * damaged,
                 self.config.corruption as f32,
-                self.config.corruption * EXPLAINING_SHARE / damaged,
-                100.0 * EXPLAINING_SHARE
+                self.config.corruption * MIN_REPORTED_SHARE / damaged,
+                100.0 * MIN_REPORTED_SHARE
             )
         })
     }

@@ -15,7 +15,7 @@ pub struct HeightGrid {
     heights_m: Vec<f32>,
     /// The file's own height at the centre of each cell, in the same order; empty if the same as
     /// `heights_m`.
-    middles_m: Vec<f32>,
+    centre_heights_m: Vec<f32>,
 }
 
 /// Greatest height in the cells of a box, and whether any cell has none.
@@ -49,7 +49,7 @@ impl HeightGrid {
             cell_m,
             size,
             heights_m: vec![f32::NAN; size[0] * size[1]],
-            middles_m: Vec::new(),
+            centre_heights_m: Vec::new(),
         })
     }
 
@@ -95,7 +95,7 @@ impl HeightGrid {
     /// place. `None` where there is no height, and outside the grid.
     pub fn height_at(&self, place: &Flat) -> Option<f32> {
         let [column, row] = self.cell_of(place)?;
-        match self.middles_m.get(row * self.size[0] + column) {
+        match self.centre_heights_m.get(row * self.size[0] + column) {
             Some(height_m) => (!height_m.is_nan()).then_some(*height_m),
             None => self.cell_height([column, row]),
         }
@@ -104,7 +104,7 @@ impl HeightGrid {
     /// Keeps the heights so far as those at the cells' centres; cells may then be raised above
     /// them.
     pub(super) fn keep_centre_heights(&mut self) {
-        self.middles_m.clone_from(&self.heights_m);
+        self.centre_heights_m.clone_from(&self.heights_m);
     }
 
     /// Greatest height in the cells that a box touches, and whether any of these has none.
@@ -140,7 +140,7 @@ impl HeightGrid {
 
     /// The grid with heights above `zero_m`, a height above the present zero, metres.
     pub fn relative_to(mut self, zero_m: f64) -> Self {
-        for height_m in self.heights_m.iter_mut().chain(&mut self.middles_m) {
+        for height_m in self.heights_m.iter_mut().chain(&mut self.centre_heights_m) {
             *height_m = (f64::from(*height_m) - zero_m) as f32;
         }
         self

@@ -28,7 +28,7 @@ const MAX_PLACES: usize = 320;
 const CORNERS_PER_END: usize = 8;
 /// Distance of the corners from the zone's axis, as a multiple of its radius: the line between two
 /// neighbouring corners still stays outside the radius.
-const CORNER_RADIUS_SHARE: f32 = 1.09;
+const CORNER_RADIUS_FACTOR: f32 = 1.09;
 /// Distance added to the corners' distance from the axis, against rounding, metres.
 const CORNER_ROUNDING_M: f32 = 0.05;
 /// Points nearer than this count as one, metres.
@@ -258,7 +258,7 @@ impl VisibilityGraph {
             if beside_m > obstacle.radius_m {
                 continue;
             }
-            let far_m = obstacle.radius_m * CORNER_RADIUS_SHARE + CORNER_ROUNDING_M;
+            let far_m = obstacle.radius_m * CORNER_RADIUS_FACTOR + CORNER_ROUNDING_M;
             let twice = (obstacle.from - obstacle.to).xy().length() > SAME_CORNER_M;
             let ends = [Some(obstacle.from), twice.then_some(obstacle.to)];
             for end in ends.into_iter().flatten() {

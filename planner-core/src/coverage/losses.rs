@@ -108,7 +108,7 @@ pub struct Loss<'a, const L: usize, const N: usize> {
     /// Pads and settings with which the flights before the loss were planned.
     pub flight_inputs: &'a FlightInputs<'a>,
     /// Status of each vehicle, in the order of [`Work::vehicles`].
-    pub fates: &'a [VehicleStatus],
+    pub statuses: &'a [VehicleStatus],
 }
 
 /// Reason why there is no division.
@@ -139,7 +139,7 @@ impl From<PlanError> for Error {
 ///
 /// # Errors
 /// Those of [`divide::remaining_lanes`], [`pack::binpat`] and [`flights::plan_flights`];
-/// [`CoverageError::Vehicles`] if fates, routes and vehicles are inconsistent;
+/// [`CoverageError::Vehicles`] if statuses, routes and vehicles are inconsistent;
 /// [`CoverageError::SettingOutOfRange`] for an `along_m` that is NaN or negative.
 pub fn redivide_work<
     const L: usize,
@@ -155,26 +155,26 @@ pub fn redivide_work<
     routes: &mut Plan<K>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), Error> {
-    let Loss { work, flight_inputs, fates } = *loss;
-    let known = |route: &Route| usize::from(route.vehicle) < fates.len();
-    if fates.len() != work.vehicles.len()
-        || flight_inputs.pads.len() != fates.len()
-        || out.flights.len() != fates.len()
+    let Loss { work, flight_inputs, statuses } = *loss;
+    let known = |route: &Route| usize::from(route.vehicle) < statuses.len();
+    if statuses.len() != work.vehicles.len()
+        || flight_inputs.pads.len() != statuses.len()
+        || out.flights.len() != statuses.len()
         || !routes.routes.iter().all(known)
     {
         return Err(CoverageError::Vehicles.into());
     }
-    if !fates.iter().all(|fate| fate.along_m >= 0.0) {
+    if !statuses.iter().all(|fate| fate.along_m >= 0.0) {
         return Err(CoverageError::SettingOutOfRange("along_m").into());
     }
-    add_done_waypoints(fates, ws, out)?;
+    add_done_waypoints(statuses, ws, out)?;
     set_start_places(loss, ws, out)?;
-    for route in routes.routes.iter().filter(|route| !fates[usize::from(route.vehicle)].alive) {
+    for route in routes.routes.iter().filter(|route| !statuses[usize::from(route.vehicle)].alive) {
         ws.held_layers |= layer_bit(route.layer);
     }
     routes.routes.clear();
     match divide::remaining_lanes(work.tracks, ws.done.ranges(), work.transit, &mut ws.remaining) {
-        Ok(()) => divide_among_survivors(work, fates, ws, pack, routes)?,
+        Ok(()) => divide_among_survivors(work, statuses, ws, pack, routes)?,
         Err(CoverageError::NothingToCover) => {}
         Err(error) => return Err(error.into()),
     }
@@ -225,11 +225,11 @@ const fn layer_bit(layer: u8) -> u64 {
 
 /// Adds the waypoints that each vehicle has photographed, or promised to photograph, to `ws.done`.
 fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: usize>(
-    fates: &[VehicleStatus],
+    statuses: &[VehicleStatus],
     ws: &mut Workspace<L, K>,
     before: &SwarmPlan<V, W>,
 ) -> Result<(), CoverageError> {
-    for (fate, flight) in fates.iter().zip(&before.flights) {
+    for (fate, flight) in statuses.iter().zip(&before.flights) {
         let Task::Photograph(photographs) = &flight.task else { continue };
         let taken = photographs.taken_count(&flight.path, fate.along_m);
         let sure = fate.alive || fate.along_m.is_infinite();
@@ -255,12 +255,12 @@ fn set_start_places<
     ws: &mut Workspace<L, K>,
     before: &SwarmPlan<V, W>,
 ) -> Result<(), CoverageError> {
-    let Loss { work, flight_inputs, fates } = *loss;
+    let Loss { work, flight_inputs, statuses } = *loss;
     ws.vehicles.clear();
     ws.pads.clear();
     for (index, (vehicle, pad)) in work.vehicles.iter().zip(flight_inputs.pads).enumerate() {
         let (mut vehicle, mut pad) = (*vehicle, *pad);
-        let (fate, flight) = (&fates[index], &before.flights[index]);
+        let (fate, flight) = (&statuses[index], &before.flights[index]);
         pad.airborne =
             fate.alive && (fate.along_m > 0.0 || flight.climb_m == 0.0) && flight.task.leaves_pad();
         if pad.airborne {
@@ -277,12 +277,13 @@ fn set_start_places<
 /// Divides the remaining lanes among the vehicles that continue.
 fn divide_among_survivors<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    fates: &[VehicleStatus],
+    statuses: &[VehicleStatus],
     ws: &mut Workspace<L, K>,
     pack: &mut PackWorkspace<K>,
     routes: &mut Plan<K>,
 ) -> Result<(), CoverageError> {
-    let living = || fates.iter().enumerate().filter(|(_, fate)| fate.alive).map(|(index, _)| index);
+    let living =
+        || statuses.iter().enumerate().filter(|(_, fate)| fate.alive).map(|(index, _)| index);
     let mut survivors: Vec<Vehicle, K> = living().map(|index| ws.vehicles[index]).collect();
     if survivors.iter().all(|vehicle| vehicle.weight == 0.0) {
         survivors.iter_mut().for_each(|vehicle| vehicle.weight = 1.0);

@@ -32,7 +32,7 @@ pub(super) fn order_lanes<const N: usize>(
     looks: u32,
 ) {
     if lanes.windows(2).all(|pair| pair[0].strip < pair[1].strip) {
-        let first = usize::from(!should_reverse_first(lanes));
+        let first = usize::from(!is_first_lane_reversed(lanes));
         for lane in lanes.iter_mut().skip(first).step_by(2) {
             lane.reverse();
         }
@@ -52,7 +52,7 @@ pub(super) fn order_lanes<const N: usize>(
 
 /// Whether lanes in consecutive strips, flown back and forth, have shorter links if the first one
 /// is reversed.
-fn should_reverse_first(lanes: &[Lane]) -> bool {
+fn is_first_lane_reversed(lanes: &[Lane]) -> bool {
     let mut gain_m = 0.0;
     for (i, pair) in lanes.windows(2).enumerate() {
         let longer_m = (pair[1].to - pair[0].to).length() - (pair[1].from - pair[0].from).length();

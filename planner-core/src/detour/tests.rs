@@ -84,7 +84,7 @@ fn a_goal_that_something_lies_below_is_blocked() {
 }
 
 #[test]
-fn who_is_too_near_already_may_leave_but_come_no_nearer() {
+fn a_vehicle_that_is_too_near_may_leave_but_come_no_nearer() {
     let behind = at(Point::new(1.0, 0.0, 5.0), 1.5);
     assert!(planned(&request(), &[behind]).is_ok());
     let ahead = at(Point::new(3.0, 0.0, 5.0), 1.5);
@@ -127,7 +127,7 @@ fn aside_is_the_nearest_node_that_nobody_lands_on() {
 }
 
 #[test]
-fn aside_does_not_lead_up_to_who_lands() {
+fn aside_does_not_lead_up_to_a_vehicle_that_lands() {
     let aside =
         DetourRequest { aside: true, leg: [NODES[2], NODES[2]], here: NODES[2], ..request() };
     // The nodes on the floor are taken by others: only the shaft is left, down which another

@@ -46,13 +46,13 @@ impl ForbiddenDifferences<'_> {
 
     /// Computes the take-off times of vehicles that are scheduled in this `order`, each as early as
     /// those before it allow. Returns the order's cost in seconds: last landing time plus weighted
-    /// mean landing time. `looks` is the number of comparisons left.
+    /// mean landing time. `comparisons_left` bounds the further comparisons.
     fn departure_times(
         &self,
         order: &[u16],
         lasts_s: &[f32],
         departs_s: &mut [f32],
-        looks: &mut u32,
+        comparisons_left: &mut u32,
     ) -> f32 {
         let (mut makespan_s, mut sum_s) = (0.0, 0.0);
         for (place, &i) in order.iter().enumerate() {
@@ -68,7 +68,7 @@ impl ForbiddenDifferences<'_> {
                         depart_s = departs_s[usize::from(j)] + to;
                     }
                 }
-                *looks = looks.saturating_sub(place as u32);
+                *comparisons_left = comparisons_left.saturating_sub(place as u32);
                 if depart_s == before_s {
                     break;
                 }
@@ -119,26 +119,28 @@ pub(super) fn improve_departure_order<
     };
     sort::sort_by(&mut order, by_departure);
     let pairs = (order.len() * order.len()) as u32;
-    let mut looks = if count <= BOARD_VEHICLES {
+    let mut comparisons_left = if count <= BOARD_VEHICLES {
         MAX_COMPARISONS
     } else {
         MAX_COMPARISONS.max(COMPARISONS_PER_PAIR * pairs)
     };
     let mut departs_s = lasts_s.clone();
-    let mut best = differences.departure_times(&order, &lasts_s, &mut departs_s, &mut looks);
+    let mut best =
+        differences.departure_times(&order, &lasts_s, &mut departs_s, &mut comparisons_left);
     let mut rng = Pcg32::seed_from_u64(order.len() as u64);
     let mut below = |bound: usize| ((u64::from(rng.next_u32()) * bound as u64) >> 32) as usize;
-    while looks > 0 {
+    while comparisons_left > 0 {
         let (from, to) = (below(order.len()), below(order.len()));
         move_element(&mut order, from, to);
-        let cost = differences.departure_times(&order, &lasts_s, &mut departs_s, &mut looks);
+        let cost =
+            differences.departure_times(&order, &lasts_s, &mut departs_s, &mut comparisons_left);
         if cost <= best {
             best = cost;
         } else {
             move_element(&mut order, to, from);
         }
         // Each iteration counts, so that moves to the same place end the search as well.
-        looks = looks.saturating_sub(1);
+        comparisons_left = comparisons_left.saturating_sub(1);
     }
     let makespan_s = |flights: &[Flight<W>]| {
         flights.iter().zip(&lasts_s).map(|(f, lasts_s)| f.depart_s + lasts_s).fold(0.0, fmaxf)

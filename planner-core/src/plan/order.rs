@@ -30,7 +30,7 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
     let mut order: Vec<u16, V> = Vec::new();
-    let mut straight: Vec<f32, V> = Vec::new();
+    let mut shortest_m: Vec<f32, V> = Vec::new();
     for (i, flight) in out.flights.iter().enumerate() {
         let mut nodes: Vec<u16, W> = Vec::new();
         let length = match flight.task.goal() {
@@ -43,7 +43,7 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
             None => f32::INFINITY,
         };
         // Cannot overflow: each has one entry per flight.
-        let _ = (order.push(i as u16), straight.push(length));
+        let _ = (order.push(i as u16), shortest_m.push(length));
     }
     let mut failed = Ok(());
     for first in [InitialOrder::Longest, InitialOrder::Shortest] {
@@ -55,12 +55,12 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
                 [a, b].map(|i| out.flights[i].task.leaves_pad()),
                 (out.flights[b].id, out.flights[a].id),
             );
-            let longer = straight[b].total_cmp(&straight[a]);
+            let longer = shortest_m[b].total_cmp(&shortest_m[a]);
             let longer = if first == InitialOrder::Longest { longer } else { longer.reverse() };
             goals[0].cmp(&goals[1]).then(longer).then(ids.0.cmp(&ids.1))
         });
-        let rush = HeadStart { count: 0, head_start_s: 0.0, handover_s };
-        failed = schedule_with_reordering(view, request, (&mut order, rush), ws, out);
+        let head_start = HeadStart { count: 0, head_start_s: 0.0, handover_s };
+        failed = schedule_with_reordering(view, request, (&mut order, head_start), ws, out);
         if failed.is_ok() {
             break;
         }
@@ -80,14 +80,14 @@ enum InitialOrder {
 fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    (order, mut rush): (&mut Vec<u16, V>, HeadStart),
+    (order, mut head_start): (&mut Vec<u16, V>, HeadStart),
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
     let mut failed = Ok(());
     let reorderings = order.len().min(MAX_REORDERINGS);
     for round in 0..=reorderings + MAX_HEAD_STARTS {
-        let Err((place, error)) = schedule_round(view, request, order, &rush, ws, out) else {
+        let Err((place, error)) = schedule_round(view, request, order, &head_start, ws, out) else {
             return Ok(());
         };
         failed = Err(error);
@@ -100,8 +100,8 @@ fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, cons
                 .count();
             let _ = order.insert(front, blocked);
         } else {
-            rush.count = rush.count.max(order.len() + 1 - place);
-            rush.head_start_s += HEAD_START_S;
+            head_start.count = head_start.count.max(order.len() + 1 - place);
+            head_start.head_start_s += HEAD_START_S;
             let _ = order.push(blocked);
         }
     }
@@ -144,7 +144,7 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     order: &[u16],
-    rush: &HeadStart,
+    head_start: &HeadStart,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), (usize, PlanError)> {
@@ -154,9 +154,15 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
             continue;
         }
         let (before, waiting) = (&order[..place], &order[place + 1..]);
-        let not_before_s = if place + rush.count < order.len() { rush.head_start_s } else { 0.0 };
-        let turn =
-            SchedulingTurn { index, before, waiting, not_before_s, handover_s: rush.handover_s };
+        let not_before_s =
+            if place + head_start.count < order.len() { head_start.head_start_s } else { 0.0 };
+        let turn = SchedulingTurn {
+            index,
+            before,
+            waiting,
+            not_before_s,
+            handover_s: head_start.handover_s,
+        };
         let waits = plan_with_pad_wait(view, request, &turn, ws, out);
         let flight = match waits.map_err(|error| (place, error))? {
             Some(flight) => flight,

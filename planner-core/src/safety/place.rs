@@ -4,7 +4,7 @@
 use fpu::sqrtf;
 
 use crate::Point;
-use crate::geometry::{Length, clamp_share};
+use crate::geometry::{Length, clamp_to_unit};
 use crate::track::{LEAD_PER_SPEED_S, WALKING_SPEED_MPS};
 
 /// Greatest distance from its reported path points at which a vehicle at walking speed counts as
@@ -128,7 +128,7 @@ fn nearest_point_on_leg(position: &Point, from: &Point, to: &Point) -> Point {
     let leg = to - from;
     let length_sq = leg.norm_squared();
     let share = if length_sq > 0.0 { (position - from).dot(&leg) / length_sq } else { 0.0 };
-    from + leg * clamp_share(share)
+    from + leg * clamp_to_unit(share)
 }
 
 /// Bounds of how far a neighbour's points lead it, as straight distances from its position:

@@ -413,7 +413,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(2000))]
         /// A flight that is left out as too far away has no segment in conflict.
         #[test]
-        fn who_is_far_is_in_no_conflict(
+        fn a_vehicle_that_is_far_is_in_no_conflict(
             own in points(),
             mut other in points(),
             apart in (-150.0f32..150.0, -150.0f32..150.0),

@@ -100,9 +100,9 @@ proptest! {
         let with_lengths = RoadmapWithLengths::new(view, &mut lengths).unwrap();
         let mut quick = vec![f32::NAN; nodes.len()];
         for &from in &all {
-            dijkstra_row(&with_lengths, from, &all, passable, &mut ws, &mut quick).unwrap();
+            path_lengths_to(&with_lengths, from, &all, passable, &mut ws, &mut quick).unwrap();
             let mut row = vec![f32::NAN; nodes.len()];
-            dijkstra_row(&view, from, &all, passable, &mut ws, &mut row).unwrap();
+            path_lengths_to(&view, from, &all, passable, &mut ws, &mut row).unwrap();
             for &to in &all {
                 let best = expected[usize::from(from)][usize::from(to)];
                 prop_assert!(close(f64::from(row[usize::from(to)]), best));
@@ -169,7 +169,7 @@ fn a_search_that_cannot_answer_says_why() {
     assert_eq!(find(0, 5), Err(SearchError::BadNode(5)));
     let mut row = [0.0; 2];
     let mut fill =
-        |targets: &[u16]| dijkstra_row(&view, 0, targets, |_, _| true, &mut ws, &mut row);
+        |targets: &[u16]| path_lengths_to(&view, 0, targets, |_, _| true, &mut ws, &mut row);
     assert_eq!(fill(&[1, 5]), Err(SearchError::BadNode(5)));
     assert_eq!(fill(&[1]), Err(SearchError::OutputLength));
     assert_eq!(fill(&[4, 1]), Ok(()));
@@ -185,11 +185,11 @@ fn a_row_without_targets_searches_nothing_and_repeated_targets_are_all_filled() 
     let view = RoadmapView::parse(&bytes).unwrap();
     let mut ws = SearchWorkspace::<8>::new();
     assert_eq!(
-        dijkstra_row(&view, 0, &[], |_, _| panic!("an edge was asked"), &mut ws, &mut []),
+        path_lengths_to(&view, 0, &[], |_, _| panic!("an edge was asked"), &mut ws, &mut []),
         Ok(())
     );
     let mut row = [0.0; 3];
-    assert_eq!(dijkstra_row(&view, 0, &[1, 0, 1], |_, _| true, &mut ws, &mut row), Ok(()));
+    assert_eq!(path_lengths_to(&view, 0, &[1, 0, 1], |_, _| true, &mut ws, &mut row), Ok(()));
     assert_eq!(row, [4.0, 0.0, 4.0]);
 }
 

@@ -66,7 +66,7 @@ impl Copter {
             heading: goal.heading,
             heading_rate: goal.heading_rate,
             lift_off: self.lift_off_acceleration(sensors.now_us),
-            ..tuning.empty_demand()
+            ..tuning.default_demand()
         }
     }
 

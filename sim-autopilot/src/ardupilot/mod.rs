@@ -35,7 +35,7 @@ use self::setpoint::Goal;
 use super::params::Params;
 use super::platform::{ControlDemand, IntegralAction, Platform, SensorReadings};
 use super::port::Sender;
-use super::status::FirmwareStatus;
+use super::status::AutopilotStatus;
 use super::vehicle::VehicleLimits;
 use super::wire::PayloadReader;
 use crate::AutopilotKind;
@@ -210,11 +210,11 @@ impl Copter {
     }
 
     /// State that telemetry reports.
-    pub fn status(&self, sensors: &SensorReadings) -> FirmwareStatus {
+    pub fn status(&self, sensors: &SensorReadings) -> AutopilotStatus {
         let now_us = sensors.now_us;
         let known = self.position_known(now_us);
         let sticks = matches!(self.mode, Mode::Stabilize | Mode::AltHold);
-        FirmwareStatus {
+        AutopilotStatus {
             autopilot: AutopilotKind::Ardupilot,
             custom_mode: self.mode.number(),
             intended_mode: self.mode.number(),
@@ -377,7 +377,7 @@ impl Copter {
         ControlDemand {
             lift: false,
             integral: IntegralAction::Clear,
-            demand: self.tuning.empty_demand(),
+            demand: self.tuning.default_demand(),
         }
     }
 

@@ -114,7 +114,7 @@ pub struct Tuning {
 
 impl Tuning {
     /// A demand without position, velocity or heading.
-    pub(super) fn empty_demand(&self) -> Demand {
+    pub(super) fn default_demand(&self) -> Demand {
         Demand {
             position: NONE,
             velocity: NONE,
@@ -127,7 +127,7 @@ impl Tuning {
             descend_max: 1.5 * self.speed_down.max(self.stick_sink),
             lift_off: f32::NAN,
             thrust_min: 0.15,
-            height_rate_share: 0.0,
+            height_rate_weight: 0.0,
         }
     }
 

@@ -10,7 +10,7 @@ use super::*;
 
 /// Any message id, known to the dialect or not, with any sender and payload.
 fn any_frame() -> impl Strategy<Value = (u32, (u8, u8, u8), Vec<u8>)> {
-    let known: Vec<u32> = (0..=u32::from(u16::MAX)).filter(|&id| crc_seed(id).is_some()).collect();
+    let known: Vec<u32> = (0..=u32::from(u16::MAX)).filter(|&id| crc_extra(id).is_some()).collect();
     // Half of the bytes are zero, as at the end of many payloads.
     let byte = prop_oneof![Just(0_u8), any::<u8>()];
     (prop_oneof![0_u32..260, select(known)], any::<(u8, u8, u8)>(), vec(byte, 0..=255))
@@ -18,7 +18,7 @@ fn any_frame() -> impl Strategy<Value = (u32, (u8, u8, u8), Vec<u8>)> {
 
 fn written((id, sender, payload): &(u32, (u8, u8, u8), Vec<u8>)) -> Vec<u8> {
     let mut out = Vec::new();
-    if let Some(seed) = crc_seed(*id) {
+    if let Some(seed) = crc_extra(*id) {
         write_raw(*sender, *id, seed, payload, &mut out);
     }
     out
@@ -37,7 +37,7 @@ proptest! {
         let header = other::Header { system: *system, component: *component, sequence: *sequence };
         let mut theirs = [0; other::MAX_FRAME_LEN];
         let seed = other::extra_crc(*id);
-        prop_assert_eq!(seed, super::crc_seed(*id));
+        prop_assert_eq!(seed, super::crc_extra(*id));
         let len = seed.map_or(0, |seed| other::encode_raw(header, *id, seed, payload, &mut theirs));
         prop_assert_eq!(&ours[..], &theirs[..len]);
         let read = all(&mut Framer::default(), 0, &theirs[..len]);
@@ -99,7 +99,7 @@ proptest! {
 
 #[test]
 fn version_1_and_signed_frames_are_read() {
-    let seed = crc_seed(0).unwrap();
+    let seed = crc_extra(0).unwrap();
     let mut first = vec![V1_START, 9, 7, 3, 1, 0, 0, 0, 0, 0, 2, 12, 1, 3, 3];
     first.extend(calculate_crc(&first[1..], seed).to_le_bytes());
     let mut signed = vec![V2_START, 1, FLAG_SIGNED, 0, 8, 3, 1, 0, 0, 0, 5];

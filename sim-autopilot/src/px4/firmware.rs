@@ -10,7 +10,7 @@ use crate::itinerary::MissionLeg;
 use crate::params::Params;
 use crate::platform::{ControlDemand, Platform, SensorReadings};
 use crate::port::Sender;
-use crate::status::FirmwareStatus;
+use crate::status::AutopilotStatus;
 use crate::vehicle::VehicleLimits;
 use crate::wire::PayloadReader;
 
@@ -107,9 +107,9 @@ impl Px4 {
     }
 
     /// State that telemetry reports.
-    pub fn status(&self, platform: &Platform, sensors: &SensorReadings) -> FirmwareStatus {
+    pub fn status(&self, platform: &Platform, sensors: &SensorReadings) -> AutopilotStatus {
         let (system_status, flags) = self.commander.heartbeat(platform.time_us, &self.tuning);
-        FirmwareStatus {
+        AutopilotStatus {
             autopilot: AutopilotKind::Px4,
             custom_mode: self.commander.mode().custom_mode(),
             intended_mode: self.commander.intended_mode().custom_mode(),

@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::glide::{self, SmoothedApproach};
 use super::params::Tuning;
-use super::{CRAWL_SHARE, Commander, Mode, ReturnLeg, SensorReadings};
+use super::{CRAWL_FACTOR, Commander, Mode, ReturnLeg, SensorReadings};
 use crate::itinerary::{MissionLeg, interpolate_height};
 use crate::shaping::JerkLimitedRate;
 use crate::vehicle::Demand;
@@ -60,7 +60,7 @@ impl Commander {
             speed_max: self.cruise.unwrap_or(tuning.cruise).min(tuning.speed_max),
             climb_max: tuning.auto_up.min(tuning.climb_max),
             descend_max: tuning.auto_down.min(tuning.descend_max),
-            ..tuning.empty_demand()
+            ..tuning.default_demand()
         };
         match self.mode() {
             Mode::Offboard => match self.setpoint {
@@ -70,7 +70,7 @@ impl Commander {
                     acceleration: s.acceleration,
                     heading: s.heading,
                     heading_rate: s.heading_rate,
-                    ..tuning.empty_demand()
+                    ..tuning.default_demand()
                 },
                 None => held,
             },
@@ -182,7 +182,7 @@ impl Commander {
         let mut sink =
             MAX_LAND_MPS.min(tuning.land_speed + share * (tuning.auto_down - tuning.land_speed));
         if sensors.distance - sensors.velocity.z * GROUND_DISTANCE_LAG_S < tuning.land_crawl_below {
-            sink = CRAWL_SHARE * tuning.land_crawl_speed;
+            sink = CRAWL_FACTOR * tuning.land_crawl_speed;
         }
         let descent = match &mut self.descent {
             Some((at_us, ramp)) => {
@@ -204,7 +204,7 @@ impl Commander {
             acceleration: Point::new(f32::NAN, f32::NAN, -descent.derivative),
             // The rate of change of the height has less bias than the estimated velocity
             // (`z_deriv`).
-            height_rate_share: (descent.rate.abs() / tuning.land_speed.max(0.01)).min(1.0),
+            height_rate_weight: (descent.rate.abs() / tuning.land_speed.max(0.01)).min(1.0),
             ..held
         }
     }
@@ -255,7 +255,7 @@ fn with_vertical(across: Demand, up: &Demand) -> Demand {
         position: both(across.position, up.position.z),
         velocity: both(across.velocity, up.velocity.z),
         acceleration: both(across.acceleration, up.acceleration.z),
-        height_rate_share: up.height_rate_share,
+        height_rate_weight: up.height_rate_weight,
         ..across
     }
 }

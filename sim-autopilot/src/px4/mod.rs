@@ -44,7 +44,7 @@ const IN_AIR_SHARE: f32 = 0.31;
 const MIN_LAND_RATE_MPS: f32 = 0.275;
 /// Factor on `MPC_LAND_CRWL` that gives the descent rate seen in recordings: 0.22 m/s at a
 /// parameter of 0.3 m/s.
-const CRAWL_SHARE: f32 = 0.75;
+const CRAWL_FACTOR: f32 = 0.75;
 /// Delay of the land detector beyond `LNDMC_TRIG_TIME`, by its filters, seconds.
 const LAND_FILTER_S: f32 = 0.5;
 /// Delay of automatic disarming beyond `COM_DISARM_LAND`, seconds: 2.2 to 2.4 s after ON_GROUND in
@@ -350,7 +350,7 @@ impl Commander {
                 self.landed = true;
                 self.landed_us = now;
             }
-            let demand = tuning.empty_demand();
+            let demand = tuning.default_demand();
             return ControlDemand { lift: false, integral: IntegralAction::Clear, demand };
         }
         let mut demand = self.demand(sensors, tuning);
@@ -385,8 +385,8 @@ impl Commander {
             }
             FlightPhase::Flying => {
                 // Outside Offboard the crawl is simulated slower than PX4 commands it
-                // (`CRAWL_SHARE`).
-                let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_SHARE };
+                // (`CRAWL_FACTOR`).
+                let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_FACTOR };
                 self.detect_landing(
                     sensors,
                     -demand.velocity.z >= share * MIN_LAND_RATE_MPS,

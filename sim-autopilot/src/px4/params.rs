@@ -158,7 +158,7 @@ pub struct Tuning {
 impl Tuning {
     /// A demand without position, velocity or heading, with the speed limits of manual and Offboard
     /// flight.
-    pub(super) fn empty_demand(&self) -> Demand {
+    pub(super) fn default_demand(&self) -> Demand {
         Demand {
             position: NONE,
             velocity: NONE,
@@ -171,7 +171,7 @@ impl Tuning {
             lift_off: f32::NAN,
             // MPC_THR_MIN 0.12 divided by a hover thrust of 0.49.
             thrust_min: 0.245,
-            height_rate_share: 0.0,
+            height_rate_weight: 0.0,
         }
     }
 

@@ -261,7 +261,7 @@ impl FleetModel {
         if lands || (hovered && self.planted != Planted::LeaseIgnored) {
             vehicle.flight = Flight::Down;
         }
-        vehicle.fleet.move_to_clock(now, NOW);
+        vehicle.fleet.normalise_for_search(now, NOW);
         let waypoint = self.path(&vehicle).0;
         let waypoint =
             waypoint.get(usize::from(vehicle.along)).filter(|_| vehicle.along < self.end(&vehicle));

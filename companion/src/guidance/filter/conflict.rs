@@ -109,8 +109,8 @@ impl Guidance {
         let mut next = 0;
         while let Some((i, contact, dead)) = neighbours.next_within(next, now, &reach) {
             next = i + 1;
-            let mut met = contact.as_heard(dead, now);
-            neighbours.add_silence(contact, now, &mut met);
+            let mut met = contact.filter_neighbour(dead, now);
+            neighbours.apply_silence(contact, now, &mut met);
             let by_gates = met.on_plan && on_plan;
             if met.out_of_range && (by_gates || lands) {
                 // Out of radio range the neighbour is where its gates let it be: away from here.
@@ -133,8 +133,8 @@ impl Guidance {
                 met.motion.points_reach = PointsReach::OPEN;
                 met.motion.rests_within_m = 0.0;
             }
-            if follows && contact.is_leased() && !(by_gates || met.lost) {
-                contact.follow_unheard(&mut met.motion, bounds);
+            if follows && contact.flies_all_points_unheard() && !(by_gates || met.lost) {
+                contact.limit_to_points(&mut met.motion, bounds);
             }
             let ahead_s =
                 if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
@@ -149,8 +149,10 @@ impl Guidance {
             let lies = met.motion.grounded || met.lost || (deaf && silent);
             // The end of its path in a coverage mission is above its pad; by then it has sought a
             // place aside in vain.
-            let at_end =
-                || contact.is_leased() && scene.plan.is_some_and(|p| self.has_reached_end(&p.path));
+            let at_end = || {
+                contact.flies_all_points_unheard()
+                    && scene.plan.is_some_and(|p| self.has_reached_end(&p.path))
+            };
             let rests = lies && held >= LATE_LANDING_AFTER && (last_place || at_end());
             let lands_late = lands && (rests || (met.stranger && held >= MAX_STOP_FOR_STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {

@@ -56,14 +56,14 @@ const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 /// failed, and how many succeeded.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct AreaDetourSearches {
-    missed_at: Option<Instant>,
+    failed_at: Option<Instant>,
     found: u8,
 }
 
 impl AreaDetourSearches {
     /// Notes that a search found no detour.
     pub(crate) fn note_failure(&mut self, now: Instant) {
-        self.missed_at = Some(now);
+        self.failed_at = Some(now);
     }
 
     /// Notes that a detour has come.
@@ -74,7 +74,7 @@ impl AreaDetourSearches {
     /// Whether a detour may be sought now: not within [`DETOUR_RETRY`] of a failure, and
     /// [`MAX_DETOURS`] times at most.
     pub(super) fn may_seek(&self, now: Instant) -> bool {
-        self.found < MAX_DETOURS && self.missed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
+        self.found < MAX_DETOURS && self.failed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
     }
 }
 
@@ -106,7 +106,7 @@ fn zones_of_source<const V: usize, const W: usize, const G: usize>(
 ) {
     let apart_m = view.config.safety_distance_m + DETOUR_MARGIN_M;
     match source.checked_sub(view.neighbours.len()) {
-        None => view.neighbours.places_of(source, view.now, [apart_m; 2], visit),
+        None => view.neighbours.zones_of(source, view.now, [apart_m; 2], visit),
         Some(i) => {
             let beside_m = apart_m + view.neighbours.pair_position_error_m();
             view.neighbours.landing_column(i, view.now, beside_m, |column| {

@@ -20,7 +20,7 @@ pub(crate) struct HomewardSearch {
     /// Since when the vehicle has been stopping to seek a path home; `None` if it does not.
     seeks_since: Option<Instant>,
     /// When a search for the path home last failed.
-    missed_at: Option<Instant>,
+    failed_at: Option<Instant>,
     attempts: u8,
 }
 
@@ -38,7 +38,7 @@ impl HomewardSearch {
 
     /// Notes that no path home was found.
     pub(crate) fn note_failure(&mut self, now: Instant) {
-        self.missed_at = Some(now);
+        self.failed_at = Some(now);
     }
 
     /// Whether the vehicle has turned home and has no path home yet.
@@ -54,7 +54,7 @@ impl HomewardSearch {
     /// Whether the shell may be asked for the path home now: not within [`RETURN_RETRY`] of the
     /// last failure.
     pub(crate) fn may_request(&self, now: Instant) -> bool {
-        self.is_seeking() && self.missed_at.is_none_or(|at| now - at >= RETURN_RETRY)
+        self.is_seeking() && self.failed_at.is_none_or(|at| now - at >= RETURN_RETRY)
     }
 
     /// Whether the vehicle can turn home: it is on its path in a coverage mission, and has turned

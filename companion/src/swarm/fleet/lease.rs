@@ -16,7 +16,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Ranks of the vehicles that take part, or were lost, as bits.
     pub(super) fn counted_ranks(&self) -> u32 {
-        let counts = |m: &FleetMember| m.in_roster && m.entry.status <= MemberStatus::Lost;
+        let counts = |m: &FleetMember| m.has_part && m.entry.status <= MemberStatus::Lost;
         let ranks = self.members.iter().enumerate();
         ranks.filter(|(_, m)| counts(m)).fold(0, |bits, (rank, _)| bits | 1 << rank.min(31))
     }
@@ -26,7 +26,7 @@ impl<const V: usize> Fleet<V> {
     pub(super) fn is_majority(&self, among: impl Fn(usize, &FleetMember) -> bool) -> bool {
         let (mut all, mut these, mut lowest) = (0, 0, false);
         for (rank, member) in self.members.iter().enumerate() {
-            if member.in_roster && member.entry.status <= MemberStatus::Lost {
+            if member.has_part && member.entry.status <= MemberStatus::Lost {
                 let is_among = among(rank, member);
                 lowest |= is_among && all == 0;
                 all += 1;
@@ -95,8 +95,7 @@ impl<const V: usize> Fleet<V> {
 
     pub(super) fn count_silent_as_lost(&mut self, now: Instant) {
         let silent = self.limits.silent;
-        for member in self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= silent)
-        {
+        for member in self.members.iter_mut().filter(|m| m.has_part && now - m.heard_at >= silent) {
             member.entry.status = member.entry.status.max(MemberStatus::Lost);
         }
     }

@@ -68,9 +68,9 @@ pub(super) const MAX_COLUMN_M: f32 = 60.0;
 pub(super) const MAY_LAND_AFTER: Duration = Duration::from_secs(3);
 /// Distance by which the wind carries a vehicle aside that falls with its motors off, for each
 /// metre of height: it falls at 10 m/s, and gusts of 3 m/s push it at half of that.
-pub(super) const FALL_DRIFT_SHARE: f32 = 0.15;
-/// Time for which a vehicle that falls flies on at the speed at which it was last heard, seconds: a
-/// second until it falls, and what its fall leaves of its speed.
+pub(super) const FALL_DRIFT_PER_HEIGHT: f32 = 0.15;
+/// Time for which a falling vehicle is taken to fly on at its last heard speed, seconds: one second
+/// until it falls, and one for the way that it makes while drag slows it.
 pub(super) const FALL_CARRY_S: f32 = 2.0;
 /// Greatest speed at which a falling vehicle is assumed to fly on, m/s, whatever it reported.
 pub(super) const MAX_FALL_CARRY_MPS: f32 = 20.0;

@@ -61,7 +61,7 @@ pub(crate) struct NeighbourEntry {
     /// Length of the polyline from the neighbour's position through all its points, metres: in a
     /// coverage mission it flies all of it unheard, as far as its lease allows. −1 in other
     /// missions.
-    pub(super) unheard_way_m: f32,
+    pub(super) points_length_m: f32,
     /// Whether the neighbour may come down from where it is; and the height of the ground below it,
     /// ENU up, metres, NaN if it never reported any.
     pub(super) may_come_down: bool,
@@ -94,8 +94,8 @@ pub(crate) struct NeighbourEntry {
 
 impl NeighbourEntry {
     /// Whether the neighbour flies to the last of its points even unheard: in a coverage mission.
-    pub(crate) fn is_leased(&self) -> bool {
-        self.unheard_way_m >= 0.0
+    pub(crate) fn flies_all_points_unheard(&self) -> bool {
+        self.points_length_m >= 0.0
     }
 
     /// The neighbour's points up to where it will stop for now.
@@ -244,7 +244,7 @@ impl NeighbourEntry {
     }
 
     /// Whether the neighbour may land without avoiding others: off the plan, or unheard.
-    pub(super) fn may_land_unseen(&self, now: Instant) -> bool {
+    pub(super) fn may_land_without_avoiding(&self, now: Instant) -> bool {
         let silent = !self.heard_within(now, MAY_LAND_AFTER)
             && !self.is_reported_out_of_range(now)
             && !self.flies_plan_unheard();
@@ -298,7 +298,7 @@ impl NeighbourEntry {
     /// Depth of the column below a place on its path, metres: in a coverage mission to the ground.
     pub(super) fn column_depth_m(&self, place: &Point) -> f32 {
         // NaN, a ground never reported, counts as none.
-        if self.is_leased() {
+        if self.flies_all_points_unheard() {
             libm::fmaxf(MAX_COLUMN_M, place.z - self.ground_m)
         } else {
             MAX_COLUMN_M
@@ -320,7 +320,7 @@ impl NeighbourEntry {
     /// messages and of those by which it learns that no vehicle hears it.
     pub(super) fn unheard_distance_m(&self) -> f32 {
         // The slack keeps rounding from cutting off the last corner.
-        libm::fmaxf(self.unheard_way_m + LEGS_ROUNDING_M, self.unheard_stop_m())
+        libm::fmaxf(self.points_length_m + LEGS_ROUNDING_M, self.unheard_stop_m())
     }
 
     /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
@@ -335,7 +335,7 @@ impl NeighbourEntry {
 
     /// Whether the neighbour, silent in a coverage mission, may fly on by lease or autopilot.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
-        self.is_leased()
+        self.flies_all_points_unheard()
             && self.is_under_way()
             && !self.reports(OUT_OF_PLAN)
             && !self.heard_within(now, MAY_LAND_AFTER)
@@ -345,8 +345,9 @@ impl NeighbourEntry {
     /// from its position to where its speed carried it, and the distance beside it, metres.
     #[inline(never)]
     pub(super) fn fall(&self, now: Instant) -> Option<([Point; 2], f32)> {
-        let silent =
-            self.is_leased() && self.is_under_way() && !self.heard_within(now, MAY_LAND_AFTER);
+        let silent = self.flies_all_points_unheard()
+            && self.is_under_way()
+            && !self.heard_within(now, MAY_LAND_AFTER);
         let (here, velocity) = (self.state.position, self.state.velocity);
         let fast_mps = velocity.xy().norm().max(MAX_FALL_CARRY_MPS);
         let carried = Point::new(velocity.x, velocity.y, 0.0)
@@ -359,7 +360,7 @@ impl NeighbourEntry {
     pub(super) fn fall_aside_m(&self) -> f32 {
         let high_m = self.state.position.z - self.ground_m;
         // NaN, a ground never reported, counts as none.
-        if high_m > 0.0 { FALL_DRIFT_SHARE * high_m.min(MAX_FALL_M) } else { 0.0 }
+        if high_m > 0.0 { FALL_DRIFT_PER_HEIGHT * high_m.min(MAX_FALL_M) } else { 0.0 }
     }
 
     /// Whether the neighbour may still fly to its pad, and that is within `apart_m` of the vertical

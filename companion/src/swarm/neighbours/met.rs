@@ -65,17 +65,17 @@ impl NeighbourEntry {
         let place = PlaceOnPoints::find(&at.position, points, &at.velocity);
         self.points_reach = PointsReach::new(&at.position, points, &place, self.extent_m);
         self.place_on_points = place;
-        if self.is_leased() {
+        if self.flies_all_points_unheard() {
             let mut at = self.state.position;
             let legs = self.points.iter().map(|next| next - core::mem::replace(&mut at, *next));
-            self.unheard_way_m = legs.map(|leg| fpu::sqrtf(leg.norm_squared())).sum();
+            self.points_length_m = legs.map(|leg| fpu::sqrtf(leg.norm_squared())).sum();
         }
     }
 
     /// Whether the neighbour counts as dead, if it may come within reach; `None` if it stays out of
     /// reach wherever it can be, or has no position. Most are far away: this test needs no
     /// reachable set. Never `None` for a neighbour that is within reach after
-    /// [`Neighbours::add_silence`].
+    /// [`Neighbours::apply_silence`].
     #[inline(always)]
     fn dead_if_within_reach(
         &self,
@@ -151,8 +151,8 @@ impl NeighbourEntry {
             let age_s = if may_fly_on { silent_s } else { age.as_secs_f32().min(silent_s) };
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
-        let flies_on = self.is_leased() && !(reach.on_plan && self.on_plan());
-        if reach.lands && self.is_leased() {
+        let flies_on = self.flies_all_points_unheard() && !(reach.on_plan && self.on_plan());
+        if reach.lands && self.flies_all_points_unheard() {
             reaches(FALL_CARRY_S * self.speed_mps + self.fall_aside_m());
         }
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
@@ -166,7 +166,11 @@ impl NeighbourEntry {
         let reported = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
         if let Some(first) = self.points.first().filter(|_| reported) {
             away_sq = away_sq.min(reach.own.distance_from_box(first).xy().norm_squared());
-            reaches(if self.is_leased() { self.unheard_distance_m() } else { self.extent_m });
+            reaches(if self.flies_all_points_unheard() {
+                self.unheard_distance_m()
+            } else {
+                self.extent_m
+            });
         }
         most_m += reach.within_m;
         away_sq >= most_m * most_m
@@ -192,9 +196,9 @@ impl NeighbourEntry {
     }
 
     /// The neighbour for the safety filter, as its last reports describe it, `dead` or not. If its
-    /// position is old, [`Neighbours::add_silence`] has to follow.
+    /// position is old, [`Neighbours::apply_silence`] has to follow.
     #[inline(always)]
-    pub(crate) fn as_heard(&self, dead: bool, now: Instant) -> FilterNeighbour<'_> {
+    pub(crate) fn filter_neighbour(&self, dead: bool, now: Instant) -> FilterNeighbour<'_> {
         let grounded = self.reports(GROUNDED | LANDED);
         let comes_down = !grounded && self.has_column();
         FilterNeighbour {
@@ -225,7 +229,7 @@ impl NeighbourEntry {
 
     /// In a coverage mission: for a neighbour silent for longer than a stop takes, replaces the
     /// ball around its last position by the part of its points that it may have flown since.
-    pub(crate) fn follow_unheard<'a>(
+    pub(crate) fn limit_to_points<'a>(
         &'a self,
         heard: &mut NeighbourMotion<'a>,
         bounds: &MotionBounds,
@@ -326,11 +330,11 @@ impl<const V: usize> Neighbours<V> {
         contact.may_fly_on_unheard(self.down_after, now, reach)
     }
 
-    /// Changes `met`, made by [`NeighbourEntry::as_heard`], if the neighbour's position is older
-    /// than [`MAX_HEIGHT_AGE`]. A call of its own: a board takes long to copy what one call would
-    /// return.
+    /// Changes `met`, made by [`NeighbourEntry::filter_neighbour`], if the neighbour's position is
+    /// older than [`MAX_HEIGHT_AGE`]. A call of its own: a board takes long to copy what one call
+    /// would return.
     #[inline(always)]
-    pub(crate) fn add_silence<'a>(
+    pub(crate) fn apply_silence<'a>(
         &'a self,
         contact: &'a NeighbourEntry,
         now: Instant,

@@ -78,12 +78,12 @@ impl<const V: usize> Neighbours<V> {
         apart: [f32; 2],
         mut visit: impl FnMut(KeepOutZone),
     ) {
-        (0..self.roster_count).for_each(|i| self.places_of(i, now, apart, &mut visit));
+        (0..self.roster_count).for_each(|i| self.zones_of(i, now, apart, &mut visit));
     }
 
     /// Calls `visit` with the keep-out zones of neighbour `i` of the roster where it stands or
     /// rests: of radius `lying_m` if it is on the ground, else `apart_m`.
-    pub(crate) fn places_of(
+    pub(crate) fn zones_of(
         &self,
         i: usize,
         now: Instant,
@@ -154,7 +154,8 @@ impl<const V: usize> Neighbours<V> {
         apart_m: f32,
         mut visit: impl FnMut(KeepOutZone),
     ) {
-        let landing = |c: &&NeighbourEntry| c.position_at.is_some() && c.may_land_unseen(now);
+        let landing =
+            |c: &&NeighbourEntry| c.position_at.is_some() && c.may_land_without_avoiding(now);
         if let Some(contact) = self.contacts.get(i).filter(landing) {
             contact.landing_columns(
                 now,
@@ -191,7 +192,7 @@ impl<const V: usize> Neighbours<V> {
             }
             // A vehicle in the air comes down at its pad; off its plan perhaps also below its
             // place, or at the end of its points.
-            if contact.is_leased() && contact.is_under_way() {
+            if contact.flies_all_points_unheard() && contact.is_under_way() {
                 contact.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
                 if !contact.reports(ON_PLAN) {
                     bar([from; 2], 0.0);

@@ -351,7 +351,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let beside_m = [0.3, 3.0][rng.next_u32() as usize % 2];
         let from = contact.state.position + near(rng, beside_m);
         contact.points = (0..rng.next_u32() % 9).map(|_| from + near(rng, 3.0)).collect();
-        contact.unheard_way_m = [0.0, -1.0][rng.next_u32() as usize % 2];
+        contact.points_length_m = [0.0, -1.0][rng.next_u32() as usize % 2];
         contact.unheard_point_count =
             (rng.next_u32() % 9).min(contact.points.len().saturating_sub(1) as u32) as u8;
         let first = contact.points.first().copied().unwrap_or_default();
@@ -387,8 +387,8 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             lands,
         };
         let dead = table.contacts[1].rests_silently(now - placed_at, now);
-        let mut met = table.contacts[1].as_heard(dead, now);
-        table.add_silence(&table.contacts[1], now, &mut met);
+        let mut met = table.contacts[1].filter_neighbour(dead, now);
+        table.apply_silence(&table.contacts[1], now, &mut met);
         if met.on_plan && reach.on_plan {
             met.motion.delay_s = 0.0;
         }
@@ -403,9 +403,9 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             met.motion.rests_within_m = 0.0;
         }
         let by_gates = met.on_plan && reach.on_plan;
-        let leased = table.contacts[1].is_leased();
+        let leased = table.contacts[1].flies_all_points_unheard();
         if leased && !(lands || by_gates || met.lost || reach.hears_nobody) {
-            table.contacts[1].follow_unheard(&mut met.motion, &bounds);
+            table.contacts[1].limit_to_points(&mut met.motion, &bounds);
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
         let reach_m = reach.within_m + met.motion.reach_m(&bounds, ahead_s);

@@ -147,8 +147,8 @@ fn measure_searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Pla
     let _ = meter.call("search::dijkstra_all", bytes, || {
         search::dijkstra_all(view, starts[0], passable, search)
     });
-    let _ = meter.call("search::dijkstra_row, 32 targets", bytes, || {
-        search::dijkstra_row(view, starts[0], &goals, passable, search, &mut row)
+    let _ = meter.call("search::path_lengths_to, 32 targets", bytes, || {
+        search::path_lengths_to(view, starts[0], &goals, passable, search, &mut row)
     });
     let mut costs = [[0.0; VEHICLES]; VEHICLES];
     let _ = meter.call("search::cost_matrix, 32 × 32", bytes, || {

@@ -21,7 +21,7 @@ const UNLOCK: u32 = 0x1ACC_E551;
 /// timeout.
 const RELOAD_COUNTS: u32 = WATCHDOG_TIMEOUT_US / 2 * 25;
 /// Value of CTRL: NMI when the timer has run down once, reset when twice.
-const ENABLED: u32 = 0b11;
+const INTERRUPT_AND_RESET: u32 = 0b11;
 
 /// NMI handler: half of the timeout is over. Does nothing; the reset comes after the other half.
 #[exception]
@@ -53,7 +53,7 @@ impl Watchdog {
     pub(super) fn start(&mut self) {
         Register::new(WATCHDOG, LOCK).write(UNLOCK);
         Register::new(WATCHDOG, LOAD).write(RELOAD_COUNTS);
-        Register::new(WATCHDOG, CTRL).write(ENABLED);
+        Register::new(WATCHDOG, CTRL).write(INTERRUPT_AND_RESET);
         note_fed();
     }
 

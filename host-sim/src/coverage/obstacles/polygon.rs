@@ -49,7 +49,7 @@ pub(super) fn bounding_box(points: &Polygon) -> Polygon {
 /// A polygon of at most `most` corners (five or more) around a convex one. While it has more, it
 /// drops the edge that thereby adds the least area, and extends the two neighbouring edges until
 /// they meet.
-pub(super) fn with_fewer_corners(mut polygon: Polygon, most: usize) -> Polygon {
+pub(super) fn simplified_outward(mut polygon: Polygon, most: usize) -> Polygon {
     while polygon.len() > most {
         let n = polygon.len();
         let added = |i: usize| {
@@ -72,7 +72,7 @@ pub(super) fn with_fewer_corners(mut polygon: Polygon, most: usize) -> Polygon {
 }
 
 /// A convex polygon with every edge moved out by `by_m`.
-pub(super) fn moved_out(polygon: &Polygon, by_m: f64) -> Polygon {
+pub(super) fn offset_outward(polygon: &Polygon, by_m: f64) -> Polygon {
     let n = polygon.len();
     let outward = |i: usize| {
         let edge = minus(&polygon[(i + 1) % n], &polygon[i % n]);
@@ -111,9 +111,9 @@ mod tests {
             })
             .collect();
         let hull = convex_hull(circle.clone());
-        let few = with_fewer_corners(hull.clone(), 8);
+        let few = simplified_outward(hull.clone(), 8);
         assert!(hull.len() > 20 && few.len() == 8, "{} {}", hull.len(), few.len());
-        let near = |polygon: &Polygon| moved_out(polygon, 1e-9);
+        let near = |polygon: &Polygon| offset_outward(polygon, 1e-9);
         assert!(circle.iter().all(|point| contains(&near(&hull), point)));
         assert!(hull.iter().all(|point| contains(&near(&few), point)));
         assert!(area(&few) < 1.1 * area(&hull), "{} {}", area(&few), area(&hull));
@@ -122,7 +122,7 @@ mod tests {
     #[test]
     fn a_box_moved_out_is_a_box() {
         let square = bounding_box(&vec![[1.0, 2.0], [4.0, 0.0]]);
-        assert_eq!(moved_out(&square, 0.5), bounding_box(&vec![[0.5, -0.5], [4.5, 2.5]]));
+        assert_eq!(offset_outward(&square, 0.5), bounding_box(&vec![[0.5, -0.5], [4.5, 2.5]]));
         assert!((area(&square) - 6.0).abs() < 1e-12);
     }
 }

@@ -57,7 +57,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
     folder: &Path,
 ) -> Result<Scenario> {
     let Common { seed, deconfliction, simulation, estimator_span } =
-        read_common(text, root, (margins::PAIR_STRAY_OVER_FIELDS_M, DEFAULT_AREA_TIME_LIMIT_S))?;
+        read_common(text, root, (margins::PAIR_DEVIATION_COVERAGE_M, DEFAULT_AREA_TIME_LIMIT_S))?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
     let map = MapBesideArea::from_root(root, folder)?;
     let origin = map.as_ref().and_then(MapBesideArea::origin);
@@ -67,7 +67,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
     let mut vehicles =
         read_vehicles(&root.required("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
     // These keys are unsupported in missions with goals, but not here.
-    unsupported.retain(|error| !FLOWN_KEYS.iter().any(|key| error.why.ends_with(key)));
+    unsupported.retain(|error| !COVERAGE_VEHICLE_KEYS.iter().any(|key| error.why.ends_with(key)));
     let formation = read_unsupported(root, "formation", &mut unsupported)?;
     let mission = root.get("mission").map(|v| v.table()).transpose()?;
     let mission = mission.unwrap_or_else(|| empty_table(text, "mission"));
@@ -88,7 +88,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
-    area.usable = margins::usable_footprint(
+    area.usable = margins::with_usable_footprint(
         &area.spacing,
         area.height_m,
         mission.cruise_mps,
@@ -130,7 +130,7 @@ fn goal_keys_beside_area(text: Text<'_>, mission: &Table<'_>) -> Vec<ScenarioErr
 /// Keys of `[mission]` that only missions with goals support.
 const GOAL_KEYS: [&str; 3] = ["objective", "goals", "goals_file"];
 /// Keys of a vehicle that only coverage missions support.
-const FLOWN_KEYS: [&str; 4] = ["endurance_s", "weight", "climb_mps", "descend_mps"];
+const COVERAGE_VEHICLE_KEYS: [&str; 4] = ["endurance_s", "weight", "climb_mps", "descend_mps"];
 
 /// Refuses pads less than `apart_m` apart horizontally: no vehicle may climb through another one.
 fn check_pads(

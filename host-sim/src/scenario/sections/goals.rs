@@ -30,7 +30,7 @@ pub(in crate::scenario) fn goals_mission(
 ) -> Result<Scenario> {
     let mut unsupported = Vec::new();
     let Common { seed, deconfliction, simulation, estimator_span } =
-        read_common(text, root, (margins::PAIR_STRAY_M, DEFAULT_TIME_LIMIT_S))?;
+        read_common(text, root, (margins::PAIR_DEVIATION_M, DEFAULT_TIME_LIMIT_S))?;
     let map_table =
         root.required("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
     let (map, has_origin) = read_map(&map_table, folder)?;

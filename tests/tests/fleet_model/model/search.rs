@@ -30,7 +30,7 @@ impl Model for FleetModel {
                     &OwnReport { airborne: true, ..OwnReport::default() },
                     |_| heard,
                 );
-                vehicle.fleet.move_to_clock(NOW, NOW);
+                vehicle.fleet.normalise_for_search(NOW, NOW);
                 *number = self.number(known, vehicle);
             }
             vehicles

@@ -17,7 +17,7 @@ const STACK_LEFT: u32 = 8;
 /// End of the name of a function of `core` that only panics, at the location that it gets.
 const PANICS: &str = "panic_const_div_by_zero";
 /// File name in that location, which the panic message shows.
-const PLACE: &[u8] = b"downfall.rs";
+const PLACE: &[u8] = b"board_failure.rs";
 const LINE: u32 = 7;
 /// End of the name of the firmware's function that computes a plan.
 const PLANS: &str = "Planner4plan";
@@ -41,7 +41,7 @@ const COUNT_NS: u64 = 4;
 
 /// How a board is made to fail.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Downfall {
+pub enum BoardFailure {
     /// A reset by software, as by the reset key.
     Reset,
     /// A fault: a jump to an address without memory.
@@ -54,7 +54,7 @@ pub enum Downfall {
     Overflow,
 }
 
-impl Downfall {
+impl BoardFailure {
     /// Every kind of failure.
     pub const ALL: [Self; 5] = [Self::Reset, Self::Fault, Self::Panic, Self::Hang, Self::Overflow];
 
@@ -63,7 +63,7 @@ impl Downfall {
         match self {
             Self::Reset | Self::Hang => "Restarted: watchdog, reset key or brown-out",
             Self::Fault => "Restarted: fault at 0xf0000000",
-            Self::Panic => "Restarted: panic at downfall.rs:7",
+            Self::Panic => "Restarted: panic at board_failure.rs:7",
             Self::Overflow => "Restarted: stack overflow",
         }
     }
@@ -97,7 +97,7 @@ impl Downfall {
 /// The board does not restart.
 pub fn reset(board: &mut EmulatedBoard) {
     // No function of the program is needed for a reset.
-    Downfall::Reset.inflict(board, Path::new(""));
+    BoardFailure::Reset.inflict(board, Path::new(""));
 }
 
 /// Keeps the board busy for `time`, so that none of its tasks runs.

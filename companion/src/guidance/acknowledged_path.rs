@@ -6,7 +6,7 @@ use crate::time::Instant;
 /// Part of a vehicle's path that others know by the intents that they acknowledged, metres along
 /// it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct KnownWay {
+pub(super) struct AcknowledgedPath {
     /// Place where the others surely heard the vehicle last; ∞ where they heard it nowhere on this
     /// path.
     pub from_m: f32,
@@ -17,7 +17,7 @@ pub(super) struct KnownWay {
     pub since: Instant,
 }
 
-impl KnownWay {
+impl AcknowledgedPath {
     /// For a path that begins now, of which others know nothing.
     pub const fn of_new_path(now: Instant) -> Self {
         Self { from_m: f32::INFINITY, to_m: f32::NEG_INFINITY, since: now }
