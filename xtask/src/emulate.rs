@@ -38,10 +38,10 @@ pub struct Args {
 }
 
 impl Default for Args {
-    /// The flight that CI runs, by the `host-sim` that its tests were built with.
+    /// The flight that CI runs, by the `host-sim` that its tests were built with, if they were.
     fn default() -> Self {
         let target = target_dir();
-        let host_sim = Some(target.join("debug/host-sim"));
+        let host_sim = Some(target.join("debug/host-sim")).filter(|built| built.is_file());
         Self { vehicles: 3, out: target.join("emulate"), host_sim }
     }
 }

@@ -73,10 +73,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
         let (over_field, sought_home) =
             (self.detours.home.can_turn(&view), self.detours.home.seeking_for(now));
-        let sways =
-            self.config.lost_vehicle_down_s.is_some() && self.guidance.lead_m(t) < MAX_SWAY_M;
+        let sways = area && self.guidance.lead_m(t) < MAX_SWAY_M;
         let sways_for = if sways { MAX_SWAY_OVER_AREA } else { Duration::default() };
         let unfollowed_for = self.guidance.unfollowed_for(now).saturating_sub(sways_for);
+        let (at_end, homeward) = (self.guidance.is_at_end(scene), self.is_homeward());
+        let hears_nobody = self.neighbours.hears_nobody(now);
+        let blocked_for = self.detours.blocked_for(now);
         // A vehicle that something holds cannot fly home or aside: it can only land.
         let can_leave = unfollowed_for < UNFOLLOWED_MOST;
         GuardInputs {
@@ -88,16 +90,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 State::Follow => now - self.guidance.last_progress_at(),
                 // Where the vehicle can still fly home, its standstill at a gate before the block
                 // does not count.
-                State::Blocked if over_field && sought_home.is_none() => {
-                    self.detours.blocked_for(now)
-                }
-                State::Blocked => {
-                    (now - self.guidance.last_progress_at()).max(self.detours.blocked_for(now))
-                }
+                State::Blocked if over_field && sought_home.is_none() => blocked_for,
+                State::Blocked => (now - self.guidance.last_progress_at()).max(blocked_for),
                 _ => Duration::default(),
             },
             unfollowed_for,
-            blocked_for: self.detours.blocked_for(now),
+            blocked_for,
             neighbour_age: self.neighbour_age(),
             division_overdue: self.timers.is_due(Timer::DivisionDue, now),
             way_free: self.is_flying_unheard(),
@@ -127,19 +125,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     < MIN_PAUSE_HEIGHT_M.min(self.mission.climb_m() / 2.0),
             resume: self.mission.pending().resume,
             land: self.mission.pending().land,
-            turn_back: self.mission.pending().turn_back
-                && !self.guidance.returning
-                && !self.detours.is_homeward(),
+            turn_back: self.mission.pending().turn_back && !homeward,
             area,
             can_fly_home: over_field,
             descends: self.guidance.is_descending(),
             may_fly_beside: standing
                 && (self.is_undivided() || self.detours.is_beside_plan())
                 && self.detours.may_detour_over_area(&view),
-            detour_flown: follow
-                && self.detours.leads_back()
-                && self.guidance.is_at_end(scene)
-                && standing,
+            detour_flown: follow && self.detours.leads_back() && at_end && standing,
             own_plan_ready: self.detours.is_own_plan_ready(),
             own_plan_lost: self.detours.is_own_plan_lost(),
             homeward: self.detours.is_homeward(),
@@ -180,7 +173,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             path_done: follow
                 && (self.guidance.is_path_done(scene, now)
                     || (self.guidance.is_descending() && on_ground)),
-            flies_back: self.is_homeward(),
+            flies_back: homeward,
             at_goal: self.guidance.is_at_goal(scene) && !self.detours.is_homeward(),
             near_path: match (beneath, self.mission.state()) {
                 // Resuming a take-off or a landing does not depend on a place along the path.
@@ -200,22 +193,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             can_turn_back: can_leave
                 && self.guidance.along_m() >= 0.0
                 && !self.guidance.returning
-                && (self.config.lost_vehicle_down_s.is_none() || self.detours.home.is_seeking())
-                && !self.neighbours.hears_nobody(now),
+                && (!area || self.detours.home.is_seeking())
+                && !hears_nobody,
             can_fly_on_back: can_leave
                 && self.guidance.returning
-                && !self.guidance.is_at_end(scene)
-                && self.config.lost_vehicle_down_s.is_none()
-                && !self.neighbours.hears_nobody(now),
+                && !at_end
+                && !area
+                && !hears_nobody,
             pad_blocked_for: self.pad_blocked_for(),
             way_back_blocked_for: self.way_back_blocked_for(),
             can_land_aside: can_leave && self.detours.can_land_aside(&view),
             seeks_landing: self.detours.seeks_landing(),
             lands_aside: self.detours.seeks_landing() || self.detours.lands_at_end(),
-            landing_place_reached: follow
-                && self.detours.lands_at_end()
-                && self.guidance.is_at_end(scene)
-                && standing,
+            landing_place_reached: follow && self.detours.lands_at_end() && at_end && standing,
             yielded_for: self.counted_hindrance(self.guidance.filter.yielded_for(now)),
             hindered_for: self.counted_hindrance(self.guidance.filter.hindered_for(now)),
             room_below,
