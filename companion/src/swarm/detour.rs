@@ -471,17 +471,18 @@ impl Detours {
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
+        // In a coverage mission vehicles take no turns.
+        if !self.blocked || view.config.lost_vehicle_down_s.is_some() {
+            return false;
+        }
+        let Some(at) = self.all_standing_since else { return false };
+        let pause_s = Self::search_pause_s(view);
         let wait_s = ALL_STAND_S
             + TURN_DELAY_S * view.neighbours.blocked_count_before(view.config.system_id)
-            + Self::search_pause_s(view) * u64::from(self.failures);
-        // In a coverage mission vehicles take no turns.
-        self.blocked
-            && self.may_search_again(Self::search_pause_s(view), view.now)
-            && view.config.lost_vehicle_down_s.is_none()
+            + pause_s * u64::from(self.failures);
+        self.may_search_again(pause_s, view.now)
             && view.neighbours.are_all_standing(view.now)
-            && self
-                .all_standing_since
-                .is_some_and(|at| view.now - at >= Duration::from_secs(wait_s))
+            && view.now - at >= Duration::from_secs(wait_s)
     }
 
     /// Whether this vehicle may begin its detour: it has claimed the turn, and all others wait.
