@@ -92,7 +92,7 @@ fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     }
     let arguments: Vec<String> =
         std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
-    let help = help_of(&arguments);
+    let help = help_command_for(&arguments);
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         bail!("no command given\nhint: `{help}` lists them");
     }
@@ -109,7 +109,7 @@ fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
 }
 
 /// The `--help` command line of the innermost subcommand that the arguments name.
-fn help_of(arguments: &[String]) -> String {
+fn help_command_for(arguments: &[String]) -> String {
     let mut command = &Cli::command();
     let mut line = command.get_name().to_owned();
     for argument in arguments.iter().skip(1) {

@@ -48,7 +48,7 @@ impl Default for Args {
 
 /// Builds firmware and host-sim and flies. An error if the mission is not completed cleanly or
 /// setpoints come too late. Returns the deepest stack use of all boards, bytes.
-pub fn run_emulate(args: &Args) -> Result<usize> {
+pub fn fly_for_stack_use(args: &Args) -> Result<usize> {
     install::install_missing(install::EMULATOR)?;
     let firmware = bare_metal::build(Board::Qemu)?.folder.join("flockmate");
     let host_sim = match &args.host_sim {

@@ -42,7 +42,7 @@ fn main() -> ExitCode {
         Command::Test(args) => test::run(&args),
         Command::Bench(args) => bench::run_bench(&args),
         Command::Build(args) => build::run(&args),
-        Command::Emulate(args) => emulate::run_emulate(&args).map(drop),
+        Command::Emulate(args) => emulate::fly_for_stack_use(&args).map(drop),
         Command::Size(args) => size::run(&args),
         Command::Structure => structure::run(),
         Command::Flash(args) => flash::run_flash(&args),

@@ -28,7 +28,7 @@ pub struct Args {
 
 /// Flies emulated boards for the stack, then builds the firmware for the board and prints its rows.
 pub fn run(args: &Args) -> Result<()> {
-    let stack = emulate::run_emulate(&emulate::Args::default())?;
+    let stack = emulate::fly_for_stack_use(&emulate::Args::default())?;
     let rows = rows(args.board, stack)?;
     if let Some(out) = &args.out {
         let row = |(name, ours, theirs): &Row| {

@@ -69,7 +69,7 @@ fn steps(args: &Args) -> Result<()> {
     if args.quick {
         return Ok(());
     }
-    let stack = step("emulated flight", || emulate::run_emulate(&emulate::Args::default()))?;
+    let stack = step("emulated flight", || emulate::fly_for_stack_use(&emulate::Args::default()))?;
     step("sizes", || {
         Board::ALL.into_iter().try_for_each(|board| size::rows(board, stack).map(drop))
     })

@@ -31,7 +31,7 @@ const HEADER_LEN: usize = 18;
 const ENTRY_LEN: usize = 5;
 /// Bits of the number of committed divisions.
 const DIVISIONS: u8 = 15;
-const HEARS_FLIGHT: u8 = 1 << 6;
+const HEARS_VEHICLE_IN_FLIGHT: u8 = 1 << 6;
 const IN_FLIGHT: u8 = 1 << 7;
 /// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
 pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_ENTRIES * ENTRY_LEN;
@@ -113,7 +113,7 @@ impl RosterReport {
         let count = self.entries.len() as u8;
         let Self { system_id, first, plan, .. } = *self;
         let divisions = self.divisions & DIVISIONS
-            | if self.hears_flight { HEARS_FLIGHT } else { 0 }
+            | if self.hears_flight { HEARS_VEHICLE_IN_FLIGHT } else { 0 }
             | if self.in_flight { IN_FLIGHT } else { 0 };
         body[..6].copy_from_slice(&[VERSION, system_id, divisions, first, count, plan]);
         body[6..10].copy_from_slice(&self.mission_crc.to_le_bytes());
@@ -166,7 +166,7 @@ impl RosterReport {
             system_id: sender,
             divisions: body[2] & DIVISIONS,
             in_flight: body[2] & IN_FLIGHT != 0,
-            hears_flight: body[2] & HEARS_FLIGHT != 0,
+            hears_flight: body[2] & HEARS_VEHICLE_IN_FLIGHT != 0,
             first: body[3],
             plan: body[5],
             mission_crc: word(6),
