@@ -56,6 +56,8 @@ const AT_GOAL: &str = "At the goal: landing";
 /// and more so that passages are found.
 const ROOM_AT_FENCE_M: f32 = 1.5;
 const FLIES_BACK: &str = "No way around, no room below: flying back";
+/// Where another vehicle landed on the only way, one that waits on its pad stays there.
+const STAYS: &str = "PadReplanning → Scheduled: No way around yet";
 const AT_FENCE: &str = "Geofence reached: landing";
 /// Not a fault of the scenario: a geofence that the paths of some vehicles leave.
 const GEOFENCE: &str = "geofence";
@@ -87,7 +89,7 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'late-plan'\nduration_s = 40", then: GoesOn, says: &["Plan is late: asked again"] },
     Case { script: "kind = 'obstacle'\nradius_m = 0.4\nposition = AHEAD", then: GoesOn, says: &["Flying around", AT_GOAL] },
     // Detours stay inside the fence too: past a vehicle that has landed at it there may be no path.
-    Case { script: GEOFENCE, then: Out, says: &[AT_FENCE, "No way around: landing", FLIES_BACK] },
+    Case { script: GEOFENCE, then: Out, says: &[AT_FENCE, "No way around: landing", FLIES_BACK, STAYS] },
     Case { script: "kind = 'pause-order'\nduration_s = 8", then: GoesOn, says: &["Resumed"] },
     Case { script: "kind = 'return-order'", then: Out, says: &["Flying back to the start", "Landing on the pad", CANCELLED] },
     Case { script: "kind = 'land-order'", then: Out, says: &["Landing as commanded", CANCELLED] },

@@ -31,7 +31,7 @@ use planner_core::flight::{Gate, PROGRESS_ERROR_M};
 use rayon::prelude::*;
 
 /// Number of plans searched for each number of vehicles, each with a gate that matters.
-const PLANS: usize = 1000;
+const PLANS: usize = 600;
 /// Per so many plans one must be found in which a vehicle is stuck if gates open only beyond their
 /// progress.
 const PLANS_FOR_ONE_STUCK: usize = 20;

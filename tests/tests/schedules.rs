@@ -17,7 +17,7 @@ use planner_core::schedule::ScheduleError;
 use rayon::prelude::*;
 
 /// Number of swarms unless `FLOCKMATE_SCHEDULES` sets another.
-const SWARMS: u64 = 300;
+const SWARMS: u64 = 200;
 /// Flight of the fastest vehicle in one step, metres.
 const STEP_M: f32 = 0.3;
 
