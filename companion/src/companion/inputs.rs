@@ -80,11 +80,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let blocked_for = self.detours.blocked_for(now);
         // A vehicle that something holds cannot fly home or aside: it can only land.
         let can_leave = unfollowed_for < UNFOLLOWED_MOST;
-        let leads_back = match self.guidance.returning {
-            true => !at_end && !area,
-            false => self.guidance.along_m() >= 0.0 && (!area || self.detours.home.is_seeking()),
-        };
-        let can_fly_back = can_leave && leads_back && !self.neighbours.hears_nobody(now);
         GuardInputs {
             in_state: self.mission.time_in_state(now),
             heartbeat_age: t.heartbeat_age(now),
@@ -194,8 +189,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             others_fly: self.neighbours.does_another_fly_its_part(now, MISSED_AFTER),
             column_clear_for: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
-            can_turn_back: can_fly_back && !self.guidance.returning,
-            can_fly_on_back: can_fly_back && self.guidance.returning,
+            can_turn_back: can_leave
+                && self.guidance.along_m() >= 0.0
+                && !self.guidance.returning
+                && (!area || self.detours.home.is_seeking())
+                && !self.neighbours.hears_nobody(now),
             pad_blocked_for: self.pad_blocked_for(),
             way_back_blocked_for: self.way_back_blocked_for(),
             can_land_aside: can_leave && self.detours.can_land_aside(&view),
@@ -288,7 +286,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn way_back_blocked_for(&self) -> Duration {
         match self.mission.state() == State::Follow && self.is_homeward() {
             true if self.config.lost_vehicle_down_s.is_none() => {
-                self.guidance.filter.blocked_for_good_for(self.now)
+                self.counted_hindrance(self.guidance.filter.blocked_for_good_for(self.now))
             }
             _ => Duration::default(),
         }

@@ -297,7 +297,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             _ => {
                 let climbs =
                     matches!(self.mission.uninterrupted_state(), State::TakeOff | State::Climb);
-                self.guidance.end_guided_landing();
                 if let Some(plan) = self.mission.plan() {
                     self.guidance.resume_flight(plan, climbs, &position, now);
                 }

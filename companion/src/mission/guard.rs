@@ -185,9 +185,6 @@ pub enum Guard {
     /// The column below was occupied for the limit (5 s by a vehicle that rests for good), and the
     /// vehicle can turn back along its path to the pad.
     NoRoomToLand,
-    /// The column below was occupied for the limit (5 s by a vehicle that rests for good) although
-    /// the vehicle is on its way back to the pad: that way may be free by now.
-    NoRoomOnWayBack,
     /// Before take-off: the column above the pad has been occupied for the limit.
     ColumnBlocked,
     /// In a coverage mission, on the pad without a part of the area: the vehicle will not get a
@@ -374,9 +371,6 @@ impl Guard {
             }
             Self::LandingBlocked => i.column_blocked_for > Duration::default() && !i.must_land,
             Self::NoRoomToLand => i.is_landing_blocked_for(limit) && i.offboard && i.can_turn_back,
-            Self::NoRoomOnWayBack => {
-                i.is_landing_blocked_for(limit) && i.offboard && i.can_fly_on_back
-            }
             Self::NoRoomHere => i.is_landing_blocked_for(limit) && i.offboard && i.can_land_aside,
             Self::PadTaken => i.is_pad_blocked_for(limit) && i.can_land_aside,
             Self::NoPlaceAside => i.seeks_landing && (i.plan_failed || i.in_state >= limit),

@@ -181,9 +181,6 @@ pub struct GuardInputs {
     /// Whether the vehicle can turn back along the path flown so far: it is on that path and does
     /// not fly back yet. In a coverage mission only while it seeks a path home.
     pub can_turn_back: bool,
-    /// Whether the vehicle flies back along its path, is not at the end of that, and can fly on. In
-    /// a coverage mission never: there it seeks its way home.
-    pub can_fly_on_back: bool,
     /// Time for which the last leg of this vehicle has been blocked: on its way home the descent to
     /// its pad by any vehicle; the way home before that, and the descent at the end of a coverage
     /// path, by a vehicle that rests for good.

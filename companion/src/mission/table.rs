@@ -309,7 +309,6 @@ pub static TABLE: &[TransitionRow] = &[
     info_row(&[LandingHeld],         G::LandingClear,    secs(1),    Land,        A::RequestLandMode,   "Clear below: landing"),
     warning_row(&[LandingHeld],      G::BatteryCritical, AT_ONCE,    Land,        A::RequestLandMode,   "Battery critical: landing"),
     warning_row(&[LandingHeld],      G::NoRoomToLand,    secs(20),   Follow,      A::TurnBack,          "No room to land: flying back to the start"),
-    warning_row(&[LandingHeld],      G::NoRoomOnWayBack, secs(20),   Follow,      A::Rejoin,            "No room to land: flying on to the start"),
     warning_row(&[LandingHeld],      G::NoRoomHere,      secs(20),   Replanning,  A::RequestLanding,    "No room to land: seeking a place aside"),
     warning_row(&[LandingHeld],      G::Elapsed,         secs(25),   LandingHeld, A::HoldOver,          "Vehicle still below: landing waits"),
     info_row(&[Land],                G::OnGround,        AT_ONCE,    Disarm,      A::RequestDisarming,  ""),

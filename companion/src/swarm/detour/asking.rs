@@ -36,13 +36,14 @@ pub(crate) enum RetryOutlook {
 }
 
 impl Detours {
-    /// Pause after a search that found no detour, seconds: each blocked vehicle has its turn in it.
-    /// While all vehicles stand, nothing else changes what the next search finds.
+    /// Pause after a search that found no detour, seconds: each blocked vehicle has its turn in it,
+    /// and before the third search a vehicle that waits counts as blocked (`DEAD_END_AFTER`), and
+    /// may leave. While all stand, nothing else changes what the next search finds.
     pub(super) fn search_pause_s<const V: usize, const W: usize, const G: usize>(
         view: &DetourView<'_, V, W, G>,
     ) -> u64 {
         let blocked = view.neighbours.blocked_count_before(u8::MAX);
-        (TURN_DELAY_S * (blocked + 2)).min(DETOUR_RETRY_S)
+        (TURN_DELAY_S * (blocked + 4)).min(DETOUR_RETRY_S)
     }
 
     /// Whether a blocked vehicle in a coverage mission is no longer held by a gate or by the safety

@@ -101,17 +101,6 @@ pub(super) fn wait_for_room(scenes: &mut Scenes) {
     };
     scenes.play(held(), nowhere_for_long, Aborted, 30.0);
     scenes.play(held(), |b| b.battery = 5, Aborted, 30.0);
-    let barred_on_its_way_back = |b: &mut Bench| {
-        b.run_until(Follow, 25.0);
-        b.answer_detour = Some(Err(PlanFailure::Unreachable));
-        b.neighbour = stands(Point::new(b.enu.x - 1.0, b.enu.y, 0.0), OUT_OF_PLAN);
-        b.run_until(LandingHeld, 30.0);
-        b.run_until(Follow, 25.0);
-        b.neighbour = on_pad(OUT_OF_PLAN);
-        b.run_until(Land, 60.0);
-        assert!((b.enu - START).xy().norm() < 0.5, "flies back to its pad: {:?}", b.enu);
-    };
-    scenes.play(held(), barred_on_its_way_back, Aborted, 30.0);
 }
 
 /// There is no room above its pad, but a place aside.
