@@ -28,7 +28,7 @@ mod setpoint;
 mod smoother;
 mod waypoints;
 
-use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, OwnVehicle};
+use planner_core::deconflict::{self, Advice, DeconflictConfig, OwnVehicle};
 use planner_core::flight::Path;
 use planner_core::track::{self, ReferenceState, TrackConfig};
 use planner_core::{Length, Point};
@@ -119,6 +119,8 @@ pub struct Guidance {
     deconflict: DeconflictConfig,
     /// Speed of the mission's fastest vehicle, m/s.
     fastest_mps: f32,
+    /// Greatest horizontal distance from its start at which the vehicle takes off, metres.
+    start_tolerance_m: f32,
     /// Share of the nominal speed that the error bound of the position estimate allows; 0 stops.
     pub estimate_speed_share: f32,
     /// The smoother, which makes setpoints of raw points.
@@ -144,11 +146,12 @@ pub struct Guidance {
     /// Number of gates of the plan, from the first on, that have opened; they stay open.
     gates_open: usize,
     on_path: bool,
+    /// Whether it lands where a pilot, the autopilot or a lost position left it, off its path.
+    lands_off_path: bool,
     lead_m: f32,
     /// Arc length of the setpoint along the path, metres.
     pub(crate) setpoint_m: f32,
-    /// Arc length along the path where the vehicle will stop by advice or braking, metres, whether
-    /// or not the safety filter stops it before.
+    /// Arc length where the vehicle will stop by advice or braking, without the filter, metres.
     pub(crate) stops_at_m: f32,
     /// The safety filter.
     pub(crate) filter: SafetyFilter,
@@ -209,6 +212,7 @@ impl Guidance {
             leg_track,
             deconflict,
             fastest_mps,
+            start_tolerance_m: config.start_tolerance_m,
             estimate_speed_share: 1.0,
             smoother,
             phase: Phase::Hold,
@@ -223,6 +227,7 @@ impl Guidance {
             advice: NO_ADVICE_YET,
             gates_open: 0,
             on_path: false,
+            lands_off_path: false,
             lead_m: LEG_LEAD_M,
             setpoint_m: 0.0,
             stops_at_m: f32::NEG_INFINITY,
@@ -261,6 +266,7 @@ impl Guidance {
         let Self { track, leg_track, deconflict, fastest_mps, .. } = Self::new(config, autopilot);
         (self.track, self.leg_track) = (track, leg_track);
         (self.deconflict, self.fastest_mps) = (deconflict, fastest_mps);
+        self.start_tolerance_m = config.start_tolerance_m;
         self.smoother.set_limits(MotionLimits::new(config, autopilot), config.geofence);
     }
 
@@ -479,16 +485,6 @@ impl Guidance {
         let blocker = self.filter.blocker();
         self.filter = before;
         blocker
-    }
-
-    /// Whether the vehicle flies by Algorithm 2 as the paper prints it, without our tracker.
-    fn is_algorithm2(&self) -> bool {
-        self.deconflict.method == Method::Algorithm2
-    }
-
-    /// Whether the vehicle is in the descent from the end of its path, or of a guided landing.
-    pub(crate) fn is_descending(&self) -> bool {
-        self.phase == Phase::Descent
     }
 
     /// When the reference last advanced along the path by 0.25 m.

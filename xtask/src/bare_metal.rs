@@ -151,9 +151,9 @@ pub fn build(board: Board) -> Result<Built> {
         cargo.args(["-Zbuild-std=core,alloc", "-Zbuild-std-features=compiler-builtins-mem"]);
         cargo
     };
-    // With this threshold opt-level 2 (below) inlines as much as 3: building a roadmap takes no
-    // longer.
-    flags += &format!("-Ctarget-cpu={} -Cllvm-args=-inline-threshold=275", board.cpu());
+    // With this threshold opt-level 2 (below) inlines nearly as much as 3: a control step takes no
+    // more instructions. With 275 it takes 0.5 % fewer and 1 % more flash.
+    flags += &format!("-Ctarget-cpu={} -Cllvm-args=-inline-threshold=260", board.cpu());
     building
         .args(arguments)
         .arg(board.name())

@@ -78,8 +78,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let unfollowed_for = self.guidance.unfollowed_for(now).saturating_sub(sways_for);
         let (at_end, homeward) = (self.guidance.is_at_end(scene), self.is_homeward());
         let blocked_for = self.detours.blocked_for(now);
-        // A vehicle that something holds cannot fly home or aside: it can only land.
-        let can_leave = unfollowed_for < UNFOLLOWED_MOST;
+        // A vehicle that something holds, or whose EKF origin moved, cannot fly home or aside: it
+        // can only land.
+        let can_leave = unfollowed_for < UNFOLLOWED_MOST && !t.origin_moved;
+        // A landing that is held began on the path, or where something else moved the vehicle.
+        let joins =
+            self.mission.state() != State::LandingHeld || self.guidance.can_join_path(scene);
         GuardInputs {
             in_state: self.mission.time_in_state(now),
             heartbeat_age: t.heartbeat_age(now),
@@ -175,8 +179,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             flies_back: homeward,
             at_goal: self.guidance.is_at_goal(scene) && !self.detours.is_homeward(),
             near_path: match (beneath, self.mission.state()) {
-                // Resuming a take-off or a landing does not depend on a place along the path.
-                (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
+                (State::TakeOff | State::Climb, State::PilotReturned | State::PositionLost) => {
+                    self.guidance.is_near_start(scene)
+                }
+                // Resuming a landing does not depend on a place along the path.
+                (State::Land, State::PilotReturned | State::PositionLost)
+                    if self.mission.interrupted_state() == State::Land =>
+                {
+                    true
+                }
                 (_, State::PilotReturned) => self.guidance.is_near_path(scene, REJOIN_WINDOW_M),
                 (_, State::PositionLost) => self.guidance.is_near_path(scene, LOST_WINDOW_M),
                 _ => false,
@@ -190,13 +201,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             column_clear_for: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
             can_turn_back: can_leave
+                && joins
                 && self.guidance.along_m() >= 0.0
                 && !self.guidance.returning
                 && (!area || self.detours.home.is_seeking())
                 && !self.neighbours.hears_nobody(now),
             pad_blocked_for: self.pad_blocked_for(),
             way_back_blocked_for: self.way_back_blocked_for(),
-            can_land_aside: can_leave && self.detours.can_land_aside(&view),
+            // Over an area the search checks the way from where the vehicle is.
+            can_land_aside: can_leave && (joins || area) && self.detours.can_land_aside(&view),
             seeks_landing: self.detours.seeks_landing(),
             lands_aside: self.detours.seeks_landing() || self.detours.lands_at_end(),
             landing_place_reached: follow && self.detours.lands_at_end() && at_end && standing,

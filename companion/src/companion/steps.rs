@@ -283,8 +283,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | Disarm => {
                 self.guidance.cancel_evasion();
             }
+            LandingHeld => self.guidance.hold_at(position),
             // Off the path the reference may be behind a wall, so the vehicle holds where it is.
-            _ => self.guidance.hold_at(position),
+            _ => self.guidance.hold_off_path(position),
         }
     }
 

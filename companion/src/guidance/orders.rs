@@ -54,7 +54,7 @@ impl Guidance {
 
     /// Puts the flight on its path: the reference advances from the arc length that it has.
     pub fn start_following(&mut self, now: Instant) {
-        self.on_path = true;
+        (self.on_path, self.lands_off_path) = (true, false);
         self.evade_search.reset();
         self.acknowledged_path.from_m = f32::INFINITY;
         self.progress_m = self.tracker.along_m;
@@ -132,6 +132,13 @@ impl Guidance {
     pub(crate) fn begin_guided_landing(&mut self, now: Instant) {
         self.cancel_evasion();
         (self.guides_landing, self.progress_at) = (true, now);
+    }
+
+    /// Holds as [`Self::hold_at`] for a landing that does not begin on the path: no straight way
+    /// from there to the path is known to be free of walls.
+    pub(crate) fn hold_off_path(&mut self, point: Point) {
+        self.hold_at(point);
+        self.lands_off_path = true;
     }
 
     /// Whether setpoints lead a landing.

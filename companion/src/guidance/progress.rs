@@ -1,7 +1,8 @@
 //! Progress of the vehicle along its flight: climb, path and descent, and which of them are done.
 
-use planner_core::Length;
+use planner_core::deconflict::Method;
 use planner_core::flight::{Path, VehiclePlan};
+use planner_core::{Length, Point};
 
 use super::motion::clamp_to;
 use super::{
@@ -229,14 +230,6 @@ impl Guidance {
         let Some(plan) = scene.plan else { return false };
         let position = &scene.telemetry.position;
         let along_m = plan.path.project(position, self.tracker.along_m, window_m);
-        if let (true, Some(first)) = (self.tracker.along_m <= 0.0, plan.path.waypoints().first()) {
-            // Above its pad, on the way up.
-            let away = position - first.position;
-            if (-plan.climb_m - ARRIVED_M..0.0).contains(&away.z) && away.xy().length() < ARRIVED_M
-            {
-                return true;
-            }
-        }
         if let (Phase::Descent, Some(last)) = (self.phase, plan.path.waypoints().last()) {
             let away = position - last.position;
             if (-plan.descent_m - ARRIVED_M..ARRIVED_M).contains(&away.z)
@@ -248,11 +241,93 @@ impl Guidance {
         if (along_m - self.tracker.along_m).abs() > window_m - WINDOW_EDGE_M {
             return false;
         }
-        let leg = plan.path.waypoints().iter().find(|w| w.along_m >= along_m && w.along_m > 0.0);
-        let (Some(leg), Some(nearest)) = (leg, plan.path.point_at(along_m)) else { return false };
-        // The hull fits where it is, and within the clearance around the path's nearest point: with
-        // d² ≤ c² − r² it then fits everywhere on the straight way between both.
-        let free_m2 = leg.clearance_m * leg.clearance_m - self.track.radius_m * self.track.radius_m;
-        (nearest - position).norm_squared() <= free_m2
+        plan.path.point_at(along_m).is_some_and(|nearest| {
+            (nearest - position).norm_squared() <= self.free_around_sq(&plan.path, along_m)
+        })
+    }
+
+    /// Square of the distance from the path's point at `along_m` up to which the straight way to it
+    /// is free of walls, m²: the hull fits where the vehicle is, and within the clearance c around
+    /// that point. With d² ≤ c² − r² it then fits everywhere between both.
+    fn free_around_sq<const W: usize>(&self, path: &Path<W>, along_m: f32) -> f32 {
+        let leg = path.waypoints().iter().find(|w| w.along_m >= along_m && w.along_m > 0.0);
+        let (clearance_m, radius_m) = (leg.map_or(0.0, |w| w.clearance_m), self.track.radius_m);
+        clearance_m * clearance_m - radius_m * radius_m
+    }
+
+    /// Whether the vehicle may resume its take-off or climb: it is no farther beside its start than
+    /// it may take off there, and not above the climb.
+    pub fn is_near_start<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> bool {
+        let start = scene.plan.and_then(|plan| plan.path.waypoints().first());
+        start.is_some_and(|start| {
+            let away = scene.telemetry.position - start.position;
+            away.z < ARRIVED_M && self.is_within_start_tolerance(&away)
+        })
+    }
+
+    fn is_within_start_tolerance(&self, away: &Point) -> bool {
+        away.xy().length() < self.start_tolerance_m.max(ARRIVED_M)
+    }
+
+    /// Where the straight leg by which the vehicle joins its path leads from `place`: to its place
+    /// along the path, or first straight up, from the column in which it came down. `None` if the
+    /// way to the path is not known to be free of walls.
+    // Not inlined: it has two callers, and in each it would take a board's flash.
+    #[inline(never)]
+    pub(super) fn join_target<const W: usize>(
+        &self,
+        path: &Path<W>,
+        place: Point,
+    ) -> Option<Point> {
+        let along_m = self.tracker.along_m;
+        let at = path.point_at(along_m)?;
+        let away = place - at;
+        let free_sq = self.free_around_sq(path, along_m).max(ARRIVED_M * ARRIVED_M);
+        if self.is_algorithm2() || away.norm_squared() <= free_sq {
+            return Some(at);
+        }
+        let beside = away.xy().norm_squared() <= free_sq
+            || (along_m <= 0.0 && self.is_within_start_tolerance(&away));
+        match beside && !self.lands_off_path && away.z < CLIMBED_M {
+            true if away.z < -CLIMBED_M => Some(Point::new(place.x, place.y, at.z)),
+            true => Some(at),
+            false => None,
+        }
+    }
+
+    /// Whether the setpoint is within the clearance around its place along the path.
+    pub(crate) fn is_within_clearance<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> bool {
+        let (place, along_m) = (self.smoother.position(), self.tracker.along_m);
+        scene.plan.is_some_and(|plan| {
+            plan.path.point_at(along_m).is_some_and(|at| {
+                (place - at).norm_squared() <= self.free_around_sq(&plan.path, along_m)
+            })
+        })
+    }
+
+    /// Whether the straight way from the setpoint to its place along the path is known to be free
+    /// of walls.
+    pub(crate) fn can_join_path<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> bool {
+        let place = self.smoother.position();
+        scene.plan.is_some_and(|plan| self.join_target(&plan.path, place).is_some())
+    }
+
+    /// Whether the vehicle flies by Algorithm 2 as the paper prints it, without our tracker.
+    pub(super) fn is_algorithm2(&self) -> bool {
+        self.deconflict.method == Method::Algorithm2
+    }
+
+    /// Whether the vehicle is in the descent from the end of its path, or of a guided landing.
+    pub(crate) fn is_descending(&self) -> bool {
+        self.phase == Phase::Descent
     }
 }

@@ -47,6 +47,8 @@ impl Guidance {
         let target = match self.phase {
             Phase::Hold => return raw,
             Phase::Climb => path.point_at(0.0).map(|start| Point::new(raw.x, raw.y, start.z)),
+            // Without a free way the setpoint stays where it is.
+            Phase::Join if self.leg.is_none() => self.join_target(path, raw),
             Phase::Join => path.point_at(self.tracker.along_m),
             Phase::Descent => path.point_at(path.length_m()).map(|end| {
                 let down_m = if self.climbing_back {

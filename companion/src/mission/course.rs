@@ -122,6 +122,11 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.interrupted.uninterrupted_state(self.state)
     }
 
+    /// The state to which the mission returns from the current one.
+    pub(crate) fn interrupted_state(&self) -> State {
+        self.interrupted.target(self.state)
+    }
+
     /// Commands of the operator that have not been carried out yet.
     pub(crate) fn pending(&self) -> &PendingCommands {
         &self.pending

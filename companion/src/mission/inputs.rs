@@ -178,8 +178,9 @@ pub struct GuardInputs {
     /// Time for which the column below this vehicle, or before take-off above its pad, has been
     /// free of other vehicles.
     pub column_clear_for: Duration,
-    /// Whether the vehicle can turn back along the path flown so far: it is on that path and does
-    /// not fly back yet. In a coverage mission only while it seeks a path home.
+    /// Whether the vehicle can turn back along the path flown so far: it is on that path, or the
+    /// way there is known to be free of walls, and it does not fly back yet. In a coverage mission
+    /// only while it seeks a path home.
     pub can_turn_back: bool,
     /// Time for which the last leg of this vehicle has been blocked: on its way home the descent to
     /// its pad by any vehicle; the way home before that, and the descent at the end of a coverage
@@ -188,7 +189,7 @@ pub struct GuardInputs {
     /// Time for which a vehicle that rests for good has barred the way back to its pad; over an
     /// area, where that one may only be silent, zero.
     pub way_back_blocked_for: Duration,
-    /// Whether a place aside to land at may be sought.
+    /// Whether a place aside to land at may be sought, from the path or over an area.
     pub can_land_aside: bool,
     /// Whether a place aside to land at is being sought.
     pub seeks_landing: bool,

@@ -31,7 +31,7 @@ pub const MAX_ORDER_CHANGES: u32 = 2000;
 /// Most rings of an area that a companion plans.
 pub const MAX_RINGS: usize = 128;
 /// Clearance that every leg in a coverage mission is planned with, metres: there are no walls.
-const OPEN_FIELD_CLEARANCE_M: f32 = 10.0;
+pub(crate) const OPEN_FIELD_CLEARANCE_M: f32 = 10.0;
 
 /// Memory of the planner for areas of at most `X` vertices, `L` lanes and `K` vehicles.
 pub struct Workspace<const X: usize, const L: usize, const K: usize> {

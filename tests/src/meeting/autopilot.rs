@@ -95,6 +95,8 @@ pub struct Autopilot {
     lost: bool,
     /// Velocity that the pilot commands, ENU m/s.
     pub pilot: Point,
+    /// Whether its pilot took over at any time.
+    pub was_piloted: bool,
     target: Option<Target>,
     takeoff_z: Option<f32>,
     airborne: bool,
@@ -140,6 +142,7 @@ impl Autopilot {
             on_loss: Failsafe::Land,
             lost: false,
             pilot: Point::zeros(),
+            was_piloted: false,
             target: None,
             takeoff_z: None,
             airborne: false,
@@ -181,7 +184,7 @@ impl Autopilot {
     /// The pilot takes over by the mode switch, and flies with `velocity`.
     pub fn take_over(&mut self, velocity: Point) {
         self.enter(if self.kind == AutopilotKind::Px4 { PX4_POSITION } else { ARDUPILOT_LOITER });
-        self.pilot = velocity;
+        (self.pilot, self.was_piloted) = (velocity, true);
     }
 
     /// The pilot switches back to Offboard or Guided; PX4 accepts that only while setpoints arrive.

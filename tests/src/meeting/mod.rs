@@ -38,6 +38,10 @@ const AFTERMATH_S: f32 = 3.0;
 /// Horizontal distance beyond the safety distance within which a vehicle counts as above another
 /// one, metres.
 const LANDING_DRIFT_M: f32 = 1.0;
+/// Distance from its path beyond which a vehicle is off it, metres.
+const OFF_PATH_M: f32 = 1.2;
+/// Step in which the distance from the path is computed, metres.
+const PATH_STEP_M: f32 = 0.1;
 const STEP_MS: u64 = 25;
 
 struct World<'a> {
@@ -328,9 +332,9 @@ impl<'a> World<'a> {
         }
     }
 
-    /// Whether a vehicle can neither move away nor land, since something holds it above another
-    /// one.
-    fn is_caught_above_another(&self, i: usize) -> bool {
+    /// Whether a vehicle can neither move away nor land: it is above another one, and something
+    /// holds it, or its pilot left it so far from its path that a wall may stand between.
+    fn is_held_above_another(&self, i: usize) -> bool {
         let own = &self.members[i];
         let place = own.autopilot.position;
         let below = |other: &Member| {
@@ -338,26 +342,34 @@ impl<'a> World<'a> {
             away.z > 0.0 && away.xy().norm() < scene::SAFETY_M + LANDING_DRIFT_M
         };
         let others = self.members.iter().enumerate().filter(|(j, _)| *j != i);
-        own.autopilot.is_caught()
+        (own.autopilot.is_caught() || self.was_left_off_path(i))
             && own.companion.state() == State::LandingHeld
             && others.into_iter().any(|(_, other)| below(other))
+    }
+
+    /// Whether its pilot flew a vehicle that is now off its path.
+    fn was_left_off_path(&self, i: usize) -> bool {
+        let (autopilot, path) = (&self.members[i].autopilot, &self.scene.vehicles[i].plan.path);
+        let steps = (path.length_m() / PATH_STEP_M).ceil() as usize;
+        let away = |step| Some(path.point_at(step as f32 * PATH_STEP_M)? - autopilot.position);
+        autopilot.was_piloted && (0..=steps).filter_map(away).all(|away| away.norm() > OFF_PATH_M)
     }
 
     fn outcome(self, oracle: Oracle, ended_s: f32) -> Outcome {
         let scene = self.scene;
         let mut setpoints = SetpointStats::default();
         let mut unfit = Vec::new();
-        let mut stuck = Vec::new();
+        let (mut stuck, mut held) = (Vec::new(), 0);
         let mut arrived = 0;
         for (i, member) in self.members.iter().enumerate() {
             setpoints.merge(&member.autopilot.check.stats);
             unfit.extend(
                 member.autopilot.check.faults.iter().map(|(at_s, what)| (i, *at_s, what.clone())),
             );
-            if (member.autopilot.armed || member.autopilot.is_airborne())
-                && !self.is_caught_above_another(i)
-            {
-                stuck.push((i, member.companion.state()));
+            match member.autopilot.armed || member.autopilot.is_airborne() {
+                true if self.is_held_above_another(i) => held += 1,
+                true => stuck.push((i, member.companion.state())),
+                false => {}
             }
             let goal = landing(&scene.vehicles[i].plan);
             arrived += usize::from(
@@ -374,6 +386,7 @@ impl<'a> World<'a> {
             touches: oracle.touches,
             unforeseen: oracle.unforeseen,
             stuck,
+            held,
             least_m: oracle.least_m,
             ended_s,
             setpoints,

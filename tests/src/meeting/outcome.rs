@@ -27,6 +27,9 @@ pub struct Outcome {
     pub unforeseen: usize,
     /// Indices of the vehicles not on the ground at the end, and their companions' states.
     pub stuck: Vec<(usize, State)>,
+    /// Number of vehicles held above another one by what catches them, or where their pilot left
+    /// them.
+    pub held: usize,
     /// Smallest distance of two vehicles, metres.
     pub least_m: f32,
     /// When the meeting ended, seconds.
@@ -101,6 +104,8 @@ pub struct Summary {
     pub unforeseen: usize,
     /// Meetings with a vehicle that had not landed at the end.
     pub stuck: [usize; 2],
+    /// Meetings with a vehicle that waits above another one where its pilot left it.
+    pub held: usize,
     /// Number of vehicles, and of those that landed at their goals.
     pub arrived: (usize, usize),
 }
@@ -117,6 +122,7 @@ pub fn summary(outcomes: &[Outcome]) -> Summary {
         sum.touches[at] += usize::from(!outcome.touches.is_empty());
         sum.unforeseen += usize::from(outcome.unforeseen > 0);
         sum.stuck[at] += usize::from(!outcome.stuck.is_empty());
+        sum.held += usize::from(outcome.held > 0);
         sum.arrived.0 += outcome.vehicles;
         sum.arrived.1 += outcome.arrived;
     }
@@ -147,6 +153,7 @@ impl std::fmt::Display for Summary {
                 self.stuck[at]
             )?;
         }
+        writeln!(f, "{} with one that waits above another where its pilot left it", self.held)?;
         writeln!(f, "{} with a touch of a vehicle that was carried off unheard", self.unforeseen)?;
         write!(f, "{} of {} vehicles landed at their goals", self.arrived.1, self.arrived.0)
     }

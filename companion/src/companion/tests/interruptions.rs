@@ -15,6 +15,7 @@ use crate::link::intent::{GROUNDED, ON_PLAN, OUT_OF_PLAN};
 use crate::testing::fake_autopilot::*;
 use planner_core::Point;
 
+mod carried;
 mod false_ground;
 mod random;
 mod reported_ground;

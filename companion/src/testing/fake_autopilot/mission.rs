@@ -9,6 +9,7 @@ use planner_core::flight::{
 use planner_core::frames::Geodetic;
 
 use super::Plan;
+use crate::planner::coverage::OPEN_FIELD_CLEARANCE_M;
 use crate::{Config, RosterEntry};
 
 pub(crate) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
@@ -63,7 +64,7 @@ pub(crate) fn field_plan() -> Plan {
         Point::new(START.x, START.y, GOAL.z),
         START,
     ] {
-        path.push(point, 1.2).unwrap();
+        path.push(point, OPEN_FIELD_CLEARANCE_M).unwrap();
     }
     let mut photographs = PicturePlan::new(2.0, HeadingMode::Ahead, Trigger::Distance);
     // A single picture, so that the stretch gives no heading.

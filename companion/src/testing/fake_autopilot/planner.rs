@@ -11,6 +11,7 @@ use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 use planner_core::flight::{Path, VehiclePlan};
 
 use super::{Bench, GOAL, Plan, plan};
+use crate::planner::coverage::OPEN_FIELD_CLEARANCE_M;
 use crate::{Duration, Instant, PlanFailure, PlanKind};
 
 /// An answer whose plan is made and that is sent when `due`.
@@ -111,9 +112,9 @@ impl Bench {
         }
         let held_m = f32::from(held_dm) / 10.0;
         let mut path = Path::new();
-        path.push(plan.path.point_at(held_m).expect("a path"), 1.2).unwrap();
+        path.push(plan.path.point_at(held_m).expect("a path"), OPEN_FIELD_CLEARANCE_M).unwrap();
         for waypoint in plan.path.waypoints().iter().filter(|w| w.along_m > held_m) {
-            path.push(waypoint.position, 1.2).unwrap();
+            path.push(waypoint.position, waypoint.clearance_m).unwrap();
         }
         (plan.path, plan.climb_m, plan.plan_crc) = (path, 0.0, plan.plan_crc + 1);
         Some(Ok(plan))

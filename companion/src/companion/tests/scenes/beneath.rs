@@ -15,6 +15,7 @@ use super::State::*;
 use super::*;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::intent::{Intent, WAITING};
+use crate::planner::coverage::OPEN_FIELD_CLEARANCE_M;
 
 /// Number of random falls for each state of the vehicle below.
 const FALLS: u64 = if cfg!(debug_assertions) { 10 } else { 40 };
@@ -144,10 +145,10 @@ impl Faller {
 }
 
 /// A path that rises and then turns a corner.
-fn path(last_m: f32) -> Path<WAYPOINTS> {
+fn path(last_m: f32, clearance_m: f32) -> Path<WAYPOINTS> {
     let mut path = Path::new();
     for (x, y, z) in [(8.0, 12.0, 1.5), (22.0, 12.0, 4.0), (22.0, 12.0 + last_m, 4.0)] {
-        path.push(Point::new(x, y, z), 1.2).unwrap();
+        path.push(Point::new(x, y, z), clearance_m).unwrap();
     }
     path
 }
@@ -155,13 +156,14 @@ fn path(last_m: f32) -> Path<WAYPOINTS> {
 /// A vehicle that has flown a few metres and holds its place in this state.
 fn holding(state: State, over_area: bool, faller: &mut Faller) -> Bench {
     let mut config = two_vehicles();
-    let mut wanted = VehiclePlan { path: path(faller.real(1.0, 6.0)), descent_m: 4.0, ..plan() };
+    let mut wanted =
+        VehiclePlan { path: path(faller.real(1.0, 6.0), 1.2), descent_m: 4.0, ..plan() };
     let flown_m = faller.real(5.0, 9.0);
     if over_area {
         config.lost_vehicle_down_s = Some(60.0);
-        let mut out = path(6.0);
+        let mut out = path(6.0, OPEN_FIELD_CLEARANCE_M);
         for point in [Point::new(8.0, 18.0, 4.0), Point::new(8.0, 12.0, 4.0), START] {
-            out.push(point, 1.2).unwrap();
+            out.push(point, OPEN_FIELD_CLEARANCE_M).unwrap();
         }
         wanted = VehiclePlan { path: out, ..field_plan() };
     }
