@@ -146,6 +146,8 @@ pub struct Guidance {
     /// Number of gates of the plan, from the first on, that have opened; they stay open.
     gates_open: usize,
     on_path: bool,
+    /// Whether its path is the one that begins above its pad, not a detour or the way back.
+    from_pad: bool,
     /// Whether it lands where a pilot, the autopilot or a lost position left it, off its path.
     lands_off_path: bool,
     lead_m: f32,
@@ -227,6 +229,7 @@ impl Guidance {
             advice: NO_ADVICE_YET,
             gates_open: 0,
             on_path: false,
+            from_pad: false,
             lands_off_path: false,
             lead_m: LEG_LEAD_M,
             setpoint_m: 0.0,

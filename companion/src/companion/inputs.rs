@@ -208,6 +208,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.neighbours.hears_nobody(now),
             pad_blocked_for: self.pad_blocked_for(),
             way_back_blocked_for: self.way_back_blocked_for(),
+            path_barred: follow && self.guidance.is_path_barred(scene),
             // Over an area the search checks the way from where the vehicle is.
             can_land_aside: can_leave && (joins || area) && self.detours.can_land_aside(&view),
             seeks_landing: self.detours.seeks_landing(),

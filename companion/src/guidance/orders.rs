@@ -46,6 +46,7 @@ impl Guidance {
     /// setpoint.
     pub fn begin_climb(&mut self, position: &Point) {
         self.reset();
+        self.from_pad = true;
         self.phase = Phase::Climb;
         if !self.smoother.has_setpoint() {
             self.smoother.begin_at(*position, self.unsent_s);
@@ -64,7 +65,7 @@ impl Guidance {
     /// Begins another path at its start; the setpoint stands there, or near it.
     pub fn begin_path(&mut self, now: Instant) {
         (self.tracker, self.setpoint_m) = (ReferenceState::default(), 0.0);
-        self.phase = Phase::Path;
+        (self.phase, self.from_pad) = (Phase::Path, false);
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
         self.ends_away_from_goal = false;
@@ -171,13 +172,14 @@ impl Guidance {
         let below = path.point_at(path.length_m()).is_some_and(|end| {
             end.z > place.z && (end - place).xy().norm_squared() < ARRIVED_M * ARRIVED_M
         });
-        if self.raw_point_at_rest
-            && self.phase != Phase::Climb
-            && !(self.phase == Phase::Descent && below)
-        {
+        if self.raw_point_at_rest && !(self.phase == Phase::Descent && below) {
             self.phase = Phase::Path;
-            self.tracker.along_m =
-                nearest_arc_length_m(path, &place, self.tracker.along_m, REJOIN_WINDOW_M);
+            let along_m = self.tracker.along_m;
+            self.tracker.along_m = nearest_arc_length_m(path, &place, along_m, REJOIN_WINDOW_M);
+            if self.join_target(path, place).is_none() {
+                // On its way from its pad, or up its column, to a place that is not the nearest.
+                self.tracker.along_m = along_m;
+            }
             self.setpoint_m = self.tracker.along_m;
         }
         self.start_following(now);

@@ -20,6 +20,9 @@ const LAG_WINDOW_ABOVE_MPS: f32 = 2.0;
 /// the setpoint's curve follows the reference by up to 1.2 s, and the vehicle that curve by 0.4 s.
 const LAG_WINDOW_S: f32 = 1.0;
 
+/// Distance within which a setpoint is on the path, metres.
+const ON_PATH_M: f32 = 0.1;
+
 impl Guidance {
     /// Place along the plan's path up to which this vehicle flies while unheard, through gates that
     /// are open or open after a short wait, metres; and the seconds by which those gates delay it
@@ -269,12 +272,13 @@ impl Guidance {
     }
 
     fn is_within_start_tolerance(&self, away: &Point) -> bool {
-        away.xy().length() < self.start_tolerance_m.max(ARRIVED_M)
+        away.xy().length() < self.start_tolerance_m + ARRIVED_M
     }
 
     /// Where the straight leg by which the vehicle joins its path leads from `place`: to its place
-    /// along the path, or first straight up, from the column in which it came down. `None` if the
-    /// way to the path is not known to be free of walls.
+    /// along the path, or first straight up, from above its pad or from the column in which it came
+    /// down. `None` if the way to the path is not known to be free of walls; by Algorithm 2 it is
+    /// never checked.
     // Not inlined: it has two callers, and in each it would take a board's flash.
     #[inline(never)]
     pub(super) fn join_target<const W: usize>(
@@ -285,12 +289,13 @@ impl Guidance {
         let along_m = self.tracker.along_m;
         let at = path.point_at(along_m)?;
         let away = place - at;
-        let free_sq = self.free_around_sq(path, along_m).max(ARRIVED_M * ARRIVED_M);
+        let arrived_sq = ARRIVED_M * ARRIVED_M;
+        let free_sq = self.free_around_sq(path, along_m).max(arrived_sq);
         if self.is_algorithm2() || away.norm_squared() <= free_sq {
             return Some(at);
         }
-        let beside = away.xy().norm_squared() <= free_sq
-            || (along_m <= 0.0 && self.is_within_start_tolerance(&away));
+        let beside = away.xy().norm_squared() <= arrived_sq
+            || (self.from_pad && along_m <= 0.0 && self.is_within_start_tolerance(&away));
         match beside && !self.lands_off_path && away.z < CLIMBED_M {
             true if away.z < -CLIMBED_M => Some(Point::new(place.x, place.y, at.z)),
             true => Some(at),
@@ -298,17 +303,13 @@ impl Guidance {
         }
     }
 
-    /// Whether the setpoint is within the clearance around its place along the path.
-    pub(crate) fn is_within_clearance<const W: usize, const G: usize>(
+    /// Whether the setpoint is on the path.
+    pub(crate) fn is_setpoint_on_path<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
-        let (place, along_m) = (self.smoother.position(), self.tracker.along_m);
-        scene.plan.is_some_and(|plan| {
-            plan.path.point_at(along_m).is_some_and(|at| {
-                (place - at).norm_squared() <= self.free_around_sq(&plan.path, along_m)
-            })
-        })
+        let on = scene.plan.and_then(|plan| plan.path.point_at(self.setpoint_m));
+        on.is_some_and(|on| (on - self.smoother.position()).norm_squared() < ON_PATH_M * ON_PATH_M)
     }
 
     /// Whether the straight way from the setpoint to its place along the path is known to be free
@@ -319,6 +320,14 @@ impl Guidance {
     ) -> bool {
         let place = self.smoother.position();
         scene.plan.is_some_and(|plan| self.join_target(&plan.path, place).is_some())
+    }
+
+    /// Whether the vehicle is to join its path, but cannot.
+    pub(crate) fn is_path_barred<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) -> bool {
+        self.phase == Phase::Join && self.leg.is_none() && !self.can_join_path(scene)
     }
 
     /// Whether the vehicle flies by Algorithm 2 as the paper prints it, without our tracker.

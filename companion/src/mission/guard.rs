@@ -125,6 +125,9 @@ pub enum Guard {
     /// For the limit the vehicle has not reached its setpoint, nor has the setpoint moved on:
     /// something holds the vehicle, or carries it away.
     Unfollowed,
+    /// The vehicle is off its path, no way to it is known to be free of walls, and the state has
+    /// lasted for the limit.
+    PathBarred,
     /// DO_PAUSE_CONTINUE 0 (pause).
     PauseCommanded,
     /// DO_PAUSE_CONTINUE 1 (resume).
@@ -348,6 +351,7 @@ impl Guard {
             Self::PathDone => i.path_done,
             Self::Stalled => i.stalled_for >= limit,
             Self::Unfollowed => i.unfollowed_for >= limit,
+            Self::PathBarred => i.path_barred && i.in_state >= limit,
             Self::PauseCommanded => i.pause && !i.lifting_off,
             Self::ResumeCommanded => i.resume,
             Self::BackOnPath => i.position_age < MAX_POSITION_AGE && i.near_path,

@@ -189,6 +189,8 @@ pub struct GuardInputs {
     /// Time for which a vehicle that rests for good has barred the way back to its pad; over an
     /// area, where that one may only be silent, zero.
     pub way_back_blocked_for: Duration,
+    /// Whether the vehicle is to join its path, but no way there is known to be free of walls.
+    pub path_barred: bool,
     /// Whether a place aside to land at may be sought, from the path or over an area.
     pub can_land_aside: bool,
     /// Whether a place aside to land at is being sought.

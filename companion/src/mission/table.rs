@@ -254,6 +254,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Follow, Blocked],  G::HinderedOverField, secs(90), Blocked,     A::TurnHome,          "Vehicle on the path: planning the way home"),
     warning_row(&[Follow, Blocked],  G::Yielded,         secs(60),   Stopping,    A::BrakeOnPath,       "Yielded for 60 s: landing"),
     warning_row(&[Follow, Blocked],  G::Hindered,        secs(90),   Stopping,    A::BrakeOnPath,       "Vehicle on the path for 90 s: landing"),
+    warning_row(&[Follow],           G::PathBarred,      secs(5),    Land,        A::RequestLandMode,   "No free way to the path: landing"),
     info_row(&[Follow],              G::BackAtStart,     AT_ONCE,    Land,        A::RequestLandMode,   "Back at the start: landing"),
     info_row(&[Follow],              G::PathDone,        AT_ONCE,    Land,        A::RequestLandMode,   "At the goal: landing"),
     info_row(&[Follow, Blocked],     G::HoldsToDivide,   AT_ONCE,    Dividing,    A::BrakeOnPath,       "Area is divided again: waits"),

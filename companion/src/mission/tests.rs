@@ -238,6 +238,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::BackAtStart => (i.path_done, i.flies_back) = (true, true),
         G::PathDone => i.path_done = true,
         G::Unfollowed => i.unfollowed_for = long,
+        G::PathBarred => (i.path_barred, i.in_state) = (true, long),
         G::Stalled => i.stalled_for = long,
         G::PauseCommanded => i.pause = true,
         G::ResumeCommanded => i.resume = true,

@@ -95,8 +95,8 @@ pub struct Autopilot {
     lost: bool,
     /// Velocity that the pilot commands, ENU m/s.
     pub pilot: Point,
-    /// Whether its pilot took over at any time.
-    pub was_piloted: bool,
+    /// Where its pilot gave the vehicle back last; `None` if nowhere.
+    pub left_at: Option<Point>,
     target: Option<Target>,
     takeoff_z: Option<f32>,
     airborne: bool,
@@ -142,7 +142,7 @@ impl Autopilot {
             on_loss: Failsafe::Land,
             lost: false,
             pilot: Point::zeros(),
-            was_piloted: false,
+            left_at: None,
             target: None,
             takeoff_z: None,
             airborne: false,
@@ -184,12 +184,13 @@ impl Autopilot {
     /// The pilot takes over by the mode switch, and flies with `velocity`.
     pub fn take_over(&mut self, velocity: Point) {
         self.enter(if self.kind == AutopilotKind::Px4 { PX4_POSITION } else { ARDUPILOT_LOITER });
-        (self.pilot, self.was_piloted) = (velocity, true);
+        self.pilot = velocity;
     }
 
     /// The pilot switches back to Offboard or Guided; PX4 accepts that only while setpoints arrive.
     pub fn give_back(&mut self, now: Instant) {
         if self.kind == AutopilotKind::ArduPilot || self.age_s(now) < 0.5 {
+            self.left_at = Some(self.position);
             self.enter(self.kind.setpoint_mode());
         }
     }

@@ -40,6 +40,8 @@ const AFTERMATH_S: f32 = 3.0;
 const LANDING_DRIFT_M: f32 = 1.0;
 /// Distance from its path beyond which a vehicle is off it, metres.
 const OFF_PATH_M: f32 = 1.2;
+/// Horizontal distance within which a vehicle is still where its pilot left it, metres.
+const LEFT_THERE_M: f32 = 1.0;
 /// Step in which the distance from the path is computed, metres.
 const PATH_STEP_M: f32 = 0.1;
 const STEP_MS: u64 = 25;
@@ -347,12 +349,13 @@ impl<'a> World<'a> {
             && others.into_iter().any(|(_, other)| below(other))
     }
 
-    /// Whether its pilot flew a vehicle that is now off its path.
+    /// Whether a vehicle is where its pilot left it, off its path.
     fn was_left_off_path(&self, i: usize) -> bool {
         let (autopilot, path) = (&self.members[i].autopilot, &self.scene.vehicles[i].plan.path);
         let steps = (path.length_m() / PATH_STEP_M).ceil() as usize;
         let away = |step| Some(path.point_at(step as f32 * PATH_STEP_M)? - autopilot.position);
-        autopilot.was_piloted && (0..=steps).filter_map(away).all(|away| away.norm() > OFF_PATH_M)
+        autopilot.left_at.is_some_and(|at| (at - autopilot.position).xy().norm() < LEFT_THERE_M)
+            && (0..=steps).filter_map(away).all(|away| away.norm() > OFF_PATH_M)
     }
 
     fn outcome(self, oracle: Oracle, ended_s: f32) -> Outcome {

@@ -122,14 +122,14 @@ impl Detours {
 
     /// Where the requested path begins: at the reference, or for a landing aside where the setpoint
     /// stands. A vehicle that is held far from its reference may not be able to fly there first.
-    /// But from outside the path's clearance only a search over an area checks the way.
+    /// But from beside the path only a search over an area checks the way.
     pub(crate) fn start_of_detour<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> Option<Point> {
         let guidance = view.guidance;
         let checked =
-            view.config.lost_vehicle_down_s.is_some() || guidance.is_within_clearance(&view.scene);
+            view.config.lost_vehicle_down_s.is_some() || guidance.is_setpoint_on_path(&view.scene);
         match checked && self.seeks_landing() && guidance.is_setpoint_still() {
             true => Some(guidance.setpoint_position()),
             false => view.mission.plan()?.path.point_at(guidance.along_m()),

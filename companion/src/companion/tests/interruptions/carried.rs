@@ -5,12 +5,23 @@ use rand_core::Rng;
 use rand_pcg::Pcg32;
 
 use super::*;
+use crate::PlanFailure;
 use crate::link::intent::FLYING;
 
-/// Farthest that a setpoint may be from where the vehicle was left, metres.
-const MAX_SETPOINT_AWAY_M: f32 = 1.0;
+/// Farthest that a setpoint may be from where the vehicle was left, horizontally and upwards,
+/// metres.
+const MAX_SETPOINT_AWAY_M: f32 = 0.6;
+/// Distance from places 0.1 m apart on its path beyond which no way there is known to be free,
+/// metres: the clearance of its legs is 1.2 m.
+const OFF_PATH_M: f32 = 1.25;
+/// Horizontal distance from its start up to which a vehicle may fly there, metres: the default
+/// `FLK_START_TOL`, and what counts as arrived.
+const NEAR_START_M: f32 = 2.35;
+/// Horizontal distance from its path up to which a vehicle that landed is in the column that it
+/// came down, metres.
+const COLUMN_M: f32 = 0.35;
 /// Number of random flights.
-const FLIGHTS: u64 = if cfg!(debug_assertions) { 100 } else { 1000 };
+const FLIGHTS: u64 = if cfg!(debug_assertions) { 150 } else { 1000 };
 
 struct Draw(Pcg32);
 
@@ -32,7 +43,8 @@ fn carry(b: &mut Bench, by: Point) {
     }
 }
 
-/// A bench that is flown until a random time, and commanded to do something or nothing.
+/// A bench that is flown until a random time, perhaps on a detour, and commanded to do something
+/// or nothing.
 fn flown(draw: &mut Draw) -> Bench {
     let kind = draw.one(&[AutopilotKind::Px4, AutopilotKind::ArduPilot]);
     let mut b = match kind {
@@ -48,23 +60,48 @@ fn flown(draw: &mut Draw) -> Bench {
         b.tick();
     }
     b.run(draw.real(0.0, 10.0));
+    if draw.one(&[true, false, false]) {
+        // Something lies on its path: it flies a detour from here.
+        b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
+        b.run(draw.real(0.0, 12.0));
+    }
     b.never_lands = true;
-    if let Some(order) = draw.one(&[None, Some(pause as fn(&mut Bench) -> _), Some(land)]) {
-        order(&mut b);
-        b.run(draw.real(0.0, 5.0));
+    let back = |b: &mut Bench| order(b, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0);
+    for order in [None, Some(pause as fn(&mut Bench) -> _), Some(land), Some(back)] {
+        if let (Some(order), true) = (order, draw.one(&[true, false, false])) {
+            order(&mut b);
+            b.run(draw.real(0.0, 5.0));
+        }
     }
     b
 }
 
+/// Whether a vehicle at `place`, which lands unaided if `lands`, may fly to its path.
+fn may_join(b: &Bench, place: &Point, lands: bool) -> bool {
+    let Some(plan) = b.companion.mission.plan() else { return false };
+    let length_m = plan.path.length_m();
+    let along = (0..=(length_m * 10.0) as usize).map(|step| step as f32 / 10.0).chain([length_m]);
+    let path = || along.clone().filter_map(|along_m| plan.path.point_at(along_m));
+    let near_start = (place - START).xy().norm() < NEAR_START_M;
+    let in_column = lands && path().any(|at| (at - place).xy().norm() < COLUMN_M);
+    // Below the end of its path it descends in any case.
+    let in_descent =
+        plan.path.point_at(length_m).is_some_and(|end| (end - place).xy().norm() < COLUMN_M);
+    near_start || in_column || in_descent || path().any(|at| (at - place).norm() < OFF_PATH_M)
+}
+
 #[test]
 fn a_carried_vehicle_never_flies_to_its_path() {
-    let mut held = 0;
+    let (mut held, mut off_path) = (0, 0);
     for seed in 0..FLIGHTS {
         let mut draw = Draw(Pcg32::new(seed, 1));
         let mut b = flown(&mut draw);
-        let by = Point::new(draw.real(-1.0, 1.0), draw.real(3.0, 6.0), draw.real(0.2, 2.0));
-        let sticks = b.state() == State::Land && b.mode == b.kind.land_mode();
-        if sticks && draw.one(&[true, false]) {
+        let by = Point::new(draw.real(-1.0, 1.0), draw.real(-6.0, 6.0), draw.real(-2.0, 2.0));
+        let by = by * draw.one(&[0.2, 0.5, 1.0, 1.0]);
+        let by = Point::new(by.x, by.y, by.z.max(0.5 - b.enu.z));
+        let sticks =
+            b.state() == State::Land && b.mode == b.kind.land_mode() && draw.one(&[true, false]);
+        if sticks {
             // The autopilot lets its pilot's sticks move a vehicle that lands.
             carry(&mut b, by);
         } else {
@@ -78,8 +115,10 @@ fn a_carried_vehicle_never_flies_to_its_path() {
             b.run_until(State::PilotReturned, 3.0);
         }
         b.neighbour = Some((b.enu - Point::new(0.8, 0.0, 2.2), FLYING | ON_PLAN, 0.0, 5));
+        b.answer_detour = draw.one(&[Some(Ok(())), Some(Err(PlanFailure::Unreachable))]);
         b.run(1.0);
         let (left_at, sent) = (b.enu, b.setpoints.len());
+        let may_join = may_join(&b, &left_at, sticks);
         for _ in 0..draw.one(&[1, 2, 5, 9]) {
             match draw.one(&[0, 1, 2, 3, 4, 5]) {
                 0 => _ = land(&mut b),
@@ -93,9 +132,14 @@ fn a_carried_vehicle_never_flies_to_its_path() {
         resume(&mut b);
         b.run(40.0);
         held += usize::from(b.texts.iter().any(|text| text == "Vehicle below: landing stopped"));
-        let away = |at: &Point| (at - left_at).xy().norm();
+        if may_join {
+            continue;
+        }
+        off_path += 1;
+        let away = |at: &Point| (at - left_at).xy().norm().max(at.z - left_at.z);
         let most_m = b.setpoints[sent..].iter().map(|s| away(&s.1)).fold(0.0, f32::max);
         assert!(most_m < MAX_SETPOINT_AWAY_M, "flight {seed}: {most_m} m: {:?}", b.texts);
+        assert_ne!(b.state(), State::Follow, "flight {seed} waits for nothing: {:?}", b.texts);
     }
-    assert!(held > FLIGHTS as usize / 2, "held {held}");
+    assert!(held > FLIGHTS as usize / 4 && off_path > FLIGHTS as usize / 4, "{held}, {off_path}");
 }

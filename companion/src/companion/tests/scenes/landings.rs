@@ -18,9 +18,14 @@ fn held_by(b: &mut Bench, neighbour: Neighbour) {
 /// A vehicle in the middle of its path whose landing is held, since another one is below.
 fn held() -> Bench {
     let mut bench = accompanied(Follow, 2.0);
-    let below = bench.enu + Point::new(1.0, 0.0, -2.5);
-    held_by(&mut bench, flies(below, ON_PLAN));
+    let below = beside_the_column(&bench);
+    held_by(&mut bench, below);
     bench
+}
+
+/// Another vehicle in the air, beside the column below this one.
+pub(super) fn beside_the_column(b: &Bench) -> Neighbour {
+    flies(b.enu + Point::new(1.0, 0.0, -2.5), ON_PLAN)
 }
 
 /// Another vehicle so near the pad that there is no room to land on it.

@@ -47,6 +47,30 @@ pub(super) fn returns(scenes: &mut Scenes) {
         resumed(b);
     };
     scenes.play(piloted(), flown_off_the_path, Aborted, 30.0);
+    // Over an area: as far from its path as no leg's clearance reaches, it is ordered back.
+    let ordered_home = |b: &mut Bench| {
+        for _ in 0..60 {
+            b.enu.y += 0.3;
+            b.run(0.1);
+        }
+        gives_back(b);
+        b.run(2.0);
+        b.neighbour = landings::beside_the_column(b);
+        land(b);
+        b.answer_detour = None;
+        b.run_until(Replanning, 60.0);
+        b.answer_detour = Some(Ok(()));
+        back(b);
+        b.run_until(Follow, 20.0);
+        let place = b.enu;
+        b.run_until(Land, 10.0);
+        assert!((b.enu - place).norm() < 0.5, "{place:?} {:?}", b.enu);
+        b.neighbour = on_pad(ON_PLAN);
+    };
+    let mut over_an_area = losses::over_a_field(Follow);
+    pilot_takes(&mut over_an_area);
+    over_an_area.run_until(PilotControl, 3.0);
+    scenes.play(over_an_area, ordered_home, Aborted, 60.0);
     scenes.play(returned(), |b| b.run(901.0), PilotReturned, 1.0);
     scenes.play(returned(), pilot_takes, PilotControl, 2.0);
     scenes.play(returned(), land, Land, 1.0);
