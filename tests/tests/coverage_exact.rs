@@ -184,6 +184,7 @@ fn tried(seed: u64, shape: Shape) -> Option<Tried> {
         vehicles: &vehicles,
         heights: planned.area_settings.heights,
         unit: TrackUnit::Waypoint,
+        following: planned.terrain_following,
     };
     let mut plan = Plan::<{ host_sim::coverage::MAX_VEHICLES }>::new();
     divide_by_method(&work, Method::Exact, &mut plan).ok()?;

@@ -7,7 +7,7 @@ use flockmate_tests::hills::Hills;
 use flockmate_tests::shared_data;
 use host_sim::coverage::check::{CoverageFindings, check_plan};
 use host_sim::coverage::flight::{FlightPoint, WaypointAction};
-use host_sim::coverage::{CoveragePlan, heights};
+use host_sim::coverage::{CoveragePlan, SortieFlight, heights};
 use host_sim::margins;
 use host_sim::scenario::{self, Scenario};
 use host_sim::terrain::HeightGrid;
@@ -116,6 +116,35 @@ fn hidden(planned: &CoveragePlan<'_>, points: &[&FlightPoint], places: usize) ->
     hidden.count()
 }
 
+/// Checks that a route's cost is the time of its flight, but for what the cost leaves out: the
+/// way from the layer to the height of the highest pictures and back (as in the paper), what lies
+/// between the lanes' lowest and highest heights, and the height of the pad.
+fn check_cost(planned: &CoveragePlan<'_>, flight: &SortieFlight) -> Result<(), String> {
+    let (sortie, points, times_s) = flight;
+    let (area, route) = (planned.area_settings, &sortie.route);
+    let vehicle = &planned.vehicles[usize::from(route.vehicle)];
+    let vertical_s = |up_m: f32| match up_m > 0.0 {
+        true => up_m / vehicle.climb_mps,
+        false => -up_m / vehicle.descend_mps,
+    };
+    let there_and_back_s = |height_m: f32| vertical_s(height_m) + vertical_s(-height_m);
+    let along_lanes_s: f32 = points
+        .windows(2)
+        .filter(|pair| pair.iter().all(heights::is_at_lane_height))
+        .map(|pair| vertical_s(pair[1].position.z - pair[0].position.z))
+        .sum();
+    let pad_m = points[0].position.z;
+    let left_out_s = there_and_back_s(f32::from(route.layer) * area.heights.layer_m)
+        + along_lanes_s
+        - there_and_back_s(pad_m).copysign(pad_m);
+    let flown_s = times_s[times_s.len() - 1] - times_s[0];
+    let most_s = there_and_back_s(area.terrain.as_ref().unwrap().tolerance_m) + 0.01 * flown_s;
+    match (flown_s - left_out_s - route.cost_s).abs() <= most_s {
+        true => Ok(()),
+        false => Err(format!("flown in {flown_s} s, {left_out_s} s left out: {route:?}")),
+    }
+}
+
 /// Checks a plan; the error says what is wrong.
 fn judge(scenario: &Scenario, looks: usize) -> Result<CoverageFindings, String> {
     let method = scenario.area.as_ref().unwrap().method;
@@ -135,6 +164,9 @@ fn judge(scenario: &Scenario, looks: usize) -> Result<CoverageFindings, String> 
         .flat_map(|(_, points, _)| points)
         .filter(|s| heights::is_at_lane_height(s))
         .collect();
+    for flight in &flights {
+        check_cost(&planned, flight)?;
+    }
     let hidden = hidden(&planned, &low, 500);
     if hidden > 0 {
         return Err(format!("{hidden} of 500 places are hidden by their own height"));

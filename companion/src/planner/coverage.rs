@@ -351,8 +351,15 @@ pub fn plan_flights<
         }
     }
     let (tracks, transit) = (&ws.tracks, &transit);
-    let whole =
-        Work { tracks, transit, vehicles: &vehicles, heights: header.heights, unit: header.unit };
+    let following = request.terrain_following(&vehicles)?;
+    let whole = Work {
+        tracks,
+        transit,
+        vehicles: &vehicles,
+        heights: header.heights,
+        unit: header.unit,
+        following,
+    };
     let along = tracks.lane_direction();
     let look = match header.heading {
         HeadingRule::Sweep => HeadingMode::Fixed(libm::atan2f(along.y, along.x)),
@@ -370,7 +377,7 @@ pub fn plan_flights<
         max_gates: gates_most,
         photographed: &[],
         held_layers: 0,
-        following: request.terrain_following(&vehicles)?,
+        following,
     };
     if known == 0 {
         let (left, done) = ws.losses.start_plan(tracks, transit, request.photographed)?;

@@ -84,7 +84,7 @@ fn work_on<'a, const L: usize, const N: usize>(
     transit: &'a Transit<'a, N>,
     vehicles: &'a [Vehicle],
 ) -> Work<'a, L, N> {
-    Work { tracks, transit, vehicles, heights: HEIGHTS, unit: TrackUnit::Waypoint }
+    Work { tracks, transit, vehicles, heights: HEIGHTS, unit: TrackUnit::Waypoint, following: None }
 }
 
 fn vehicles(count: usize) -> Vec<Vehicle, VEHICLES> {

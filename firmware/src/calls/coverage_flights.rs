@@ -190,6 +190,7 @@ fn measure_division(
         vehicles: &vehicles,
         heights: HEIGHTS,
         unit: TrackUnit::Waypoint,
+        following: None,
     };
     losses.start_plan(tracks, &transit, &[]).expect("nothing is done");
     pack::binpat(&work, pack, routes).expect("routes");

@@ -95,7 +95,14 @@ pub(super) fn call_area_flights(
 }
 
 fn division_work<'a>(tracks: &'a Lanes, transit: &'a ZoneTransit<'a>) -> Work<'a, LANES, CORNERS> {
-    Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint }
+    Work {
+        tracks,
+        transit,
+        vehicles: &FLEET,
+        heights: HEIGHTS,
+        unit: TrackUnit::Waypoint,
+        following: None,
+    }
 }
 
 /// Whether all waypoints of all flights have finite coordinates.

@@ -322,6 +322,15 @@ fn fleets_with_hard_number(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
     ]
 }
 
+/// All of the path, for the whole fleet.
+fn whole_work<'a>(
+    tracks: &'a Tracks<LANES>,
+    transit: &'a ZoneTransit<'_>,
+) -> Work<'a, LANES, CORNERS> {
+    let unit = TrackUnit::Waypoint;
+    Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit, following: None }
+}
+
 fn call_packing(
     to: &mut Results<'_, impl Listener>,
     transit: &ZoneTransit<'_>,
@@ -331,8 +340,7 @@ fn call_packing(
     *plan = to.call("pack::Plan::new", Plan::new);
     let ws = &mut powell.pack;
     *ws = to.call("pack::PackWorkspace::new", PackWorkspace::new);
-    let good =
-        Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+    let good = whole_work(tracks, transit);
     let pack = |to: &mut Results<'_, _>,
                 work: &Work<'_, LANES, CORNERS>,
                 ws: &mut _,
@@ -415,8 +423,7 @@ fn call_share_searches(
 ) {
     let CoverageMemory { tracks, powell: ws, plan, .. } = lent;
     *ws = to.call("powell::Workspace::new", powell::Workspace::new);
-    let good =
-        Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: TrackUnit::Waypoint };
+    let good = whole_work(tracks, transit);
     let mut ways_m = [0.0; 512];
     let mut reaches = [0; 1024];
     let mut states = [(0, 0); 1 << (2 * VEHICLES)];

@@ -93,6 +93,7 @@ impl<'a> CoveragePlan<'a> {
         let began = Instant::now();
         let tracks = build_tracks(wanted, &area, &transit, search_steps).map_err(failed)?;
         let lanes = began.elapsed().as_secs_f64();
+        let following = terrain_following(wanted)?;
         let began = Instant::now();
         let work = Work {
             tracks: &tracks,
@@ -104,13 +105,13 @@ impl<'a> CoveragePlan<'a> {
             } else {
                 TrackUnit::Waypoint
             },
+            following,
         };
         let mut plan = Plan::new();
         let shares = divide_by_method(&work, method, &mut plan).map_err(failed)?;
         let routes = began.elapsed().as_secs_f64();
         let lower_bound_s = lower_bound_s(&work).map_err(failed)?;
         let seconds = [lanes, ways, routes];
-        let following = terrain_following(wanted)?;
         let mut planned = Self {
             scenario,
             area_settings: wanted,

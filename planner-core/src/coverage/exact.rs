@@ -104,12 +104,17 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
     }
 
     /// Whether vehicle `v` can photograph waypoints `from` to `end` − 1, transits included, with at
-    /// most `most_m` metres of flight over ground.
+    /// most `most_m` metres of flight over ground; the way down to lower ground counts as so many.
     fn is_within_length(&self, v: usize, from: usize, end: usize, most_m: f32) -> bool {
         let to = &self.ws.ways_m[2 * v * self.waypoints..][..self.waypoints];
         let home = &self.ws.ways_m[(2 * v + 1) * self.waypoints..][..self.waypoints];
         let along = |i: usize| self.work.tracks.distance_to_waypoint_m(i as u32);
-        let transit = libm::fminf(to[from] + home[end - 1], to[end - 1] + home[from]);
+        let (forward_s, backward_s) = self.work.route_sink_times_s(v, from as u32, end as u32);
+        let cruise_mps = self.work.vehicles[v].cruise_mps;
+        let transit = libm::fminf(
+            to[from] + home[end - 1] + forward_s * cruise_mps,
+            to[end - 1] + home[from] + backward_s * cruise_mps,
+        );
         along(end - 1) - along(from) + transit <= most_m
     }
 

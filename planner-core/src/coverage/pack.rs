@@ -7,12 +7,16 @@
 //! rest. Bins are assigned to vehicles by linear sum assignment of transit lengths: from the
 //! vehicle's place to the first waypoint and from the last one home, in the shorter of both
 //! directions. The route that takes longest gets the lowest transit layer, and so on. Climb and
-//! descent take `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (paper CPP eq. 4).
+//! descent take `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (paper CPP eq. 4). Above terrain h_m is
+//! the highest picture height, and a vehicle comes down further to its first waypoint, and up from
+//! its last one.
 //!
 //! Δh, the height of the layer above picture height, is at least one layer spacing, so a vehicle in
 //! transit is never at the height at which others photograph.
 //!
 //! Cost for K vehicles and n lanes: K · log n steps, K² transits, one assignment (K³).
+
+mod vertical;
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -21,6 +25,7 @@ use super::tracks::Tracks;
 use super::transit::Transit;
 use super::{CoverageError, Flat};
 use crate::assignment::{AssignmentWorkspace, assign};
+use crate::field::follow::TerrainFollowing;
 
 /// A vehicle as packing sees it: ends of its transits, speeds, weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +91,7 @@ pub struct Route {
     pub ground_m: f32,
     /// `ground_m` with climb and descent, metres.
     pub cost_m: f32,
-    /// C_k: `ground_m` at cruise speed plus H_d, seconds.
+    /// C_k: `ground_m` at cruise speed, H_d, and the way down to and up from lower ground, seconds.
     pub cost_s: f32,
 }
 
@@ -180,6 +185,8 @@ pub struct Work<'a, const L: usize, const N: usize> {
     pub heights: Heights,
     /// What a track is: a lane or a waypoint.
     pub unit: TrackUnit,
+    /// The surface that the vehicles follow above terrain; `None` above level ground.
+    pub following: Option<TerrainFollowing<'a>>,
 }
 
 impl<const L: usize, const N: usize> Work<'_, L, N> {
@@ -219,12 +226,6 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         Ok(())
     }
 
-    /// H_d: time that a vehicle takes to climb to a layer and to descend from it, seconds.
-    pub fn altitude_delay_s(&self, vehicle: &Vehicle, layer: u8) -> f32 {
-        let top_m = self.heights.mission_m + f32::from(layer) * self.heights.layer_m;
-        top_m / vehicle.climb_mps + top_m / vehicle.descend_mps
-    }
-
     /// The ends of the part of the path with waypoints `first` to `end` − 1.
     #[inline(never)]
     pub(super) fn route_ends(&self, first: u32, end: u32) -> RouteEnds {
@@ -238,7 +239,7 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
     }
 
     /// Length over ground of a vehicle's flight along a route with these ends, metres, and the
-    /// direction in which it is shorter.
+    /// direction in which it takes less time.
     #[inline(never)]
     pub(super) fn ground_distance_m(
         &self,
@@ -257,7 +258,9 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         } else {
             transit_m(&ends.last, &ends.first)
         };
-        match backward < forward {
+        let (forward_s, backward_s) = self.sink_times_s(vehicle, ends);
+        match backward + backward_s * vehicle.cruise_mps < forward + forward_s * vehicle.cruise_mps
+        {
             true => (backward + ends.inside_m, RouteDirection::Backward),
             false => (forward + ends.inside_m, RouteDirection::Forward),
         }
@@ -483,8 +486,12 @@ pub(super) fn set_costs<const L: usize, const N: usize, const K: usize>(
     for route in &mut plan.routes {
         let vehicle = &work.vehicles[usize::from(route.vehicle)];
         let top_m = work.heights.mission_m + f32::from(route.layer) * work.heights.layer_m;
-        route.cost_m = route.ground_m + 2.0 * top_m;
-        route.cost_s =
-            route.ground_m / vehicle.cruise_mps + work.altitude_delay_s(vehicle, route.layer);
+        let ends = work.route_ends(route.first, route.end);
+        let sink_s = work.sink_times_s(vehicle, &ends);
+        route.cost_m =
+            route.ground_m + 2.0 * top_m + work.sink_m(&ends.first) + work.sink_m(&ends.last);
+        route.cost_s = route.ground_m / vehicle.cruise_mps
+            + work.altitude_delay_s(vehicle, route.layer)
+            + if route.heading == RouteDirection::Forward { sink_s.0 } else { sink_s.1 };
     }
 }

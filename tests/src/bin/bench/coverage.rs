@@ -242,7 +242,7 @@ fn work<'a>(
     vehicles: &'a [Vehicle],
 ) -> Work<'a, LANES, 8> {
     let heights = Heights { mission_m: 35.0, layer_m: 5.0 };
-    Work { tracks, transit, vehicles, heights, unit: TrackUnit::Waypoint }
+    Work { tracks, transit, vehicles, heights, unit: TrackUnit::Waypoint, following: None }
 }
 
 fn ours_us(vehicles: usize) -> [f64; 2] {
