@@ -35,7 +35,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 /// Longest mission file that the board can read, bytes.
 const MISSION_LEN: usize = mission_file::MAX_BYTES;
 /// Origin of the mission frame on a board without a mission.
-const UNKNOWN_PLACE: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
+const UNKNOWN_ORIGIN: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
 /// STATUSTEXT of a board whose system id is known but is not in the mission's roster.
 const NOT_IN_MISSION: &str = "This system id is not in the mission: no plan";
 
@@ -136,7 +136,7 @@ async fn planner_and_flash_task(
     let refused = refused.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
     let config = own
         .and_then(Result::ok)
-        .unwrap_or_else(|| Config::new(system_id, Point::zeros(), UNKNOWN_PLACE));
+        .unwrap_or_else(|| Config::new(system_id, Point::zeros(), UNKNOWN_ORIGIN));
     // Neither the stack nor the task's own memory has room for a companion that is then moved, so
     // it is built in its static. `expect` would format the error with the name in it, which takes 3
     // kB of flash.

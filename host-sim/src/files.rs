@@ -80,7 +80,7 @@ impl ResultFiles {
         fs::create_dir_all(dir)
             .with_context(|| format!("cannot make a directory: {}", quoted_path(dir)))?;
         for name in names {
-            results.target_path(name)?;
+            results.output_path(name)?;
         }
         results.temporary_file()?;
         Ok(results)
@@ -101,7 +101,7 @@ impl ResultFiles {
 
     /// Path that a result of this name is written to: the target of a symbolic link, else the name
     /// inside the directory. Fails if an existing file there cannot be written.
-    fn target_path(&self, name: &str) -> anyhow::Result<PathBuf> {
+    fn output_path(&self, name: &str) -> anyhow::Result<PathBuf> {
         let path = self.dir.join(name);
         let cannot = || format!("cannot write: {}", quoted_path(&path));
         match fs::canonicalize(&path) {
@@ -133,7 +133,7 @@ impl ResultFiles {
     /// # Errors
     /// The file cannot be written.
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
-        let target = self.target_path(name)?;
+        let target = self.output_path(name)?;
         let mut file = self.temporary_file()?;
         let written = file.write_all(bytes).and_then(|()| file.flush());
         written.with_context(|| format!("cannot write: {}", quoted_path(&target)))?;

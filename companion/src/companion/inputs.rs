@@ -331,7 +331,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.is_on_detour();
         let ranged = self.config.radio_range_m < REACHES_ALL_M;
         // A vehicle slowed by a parameter or by its autopilot is not where the others predict it to
-        // be. In a coverage mission its lease states how far it flies, not this rule.
+        // be. In a coverage mission this rule does not apply: the lease limits how long it flies.
         let keeps_pace = self.guidance.cruise_mps() >= self.config.slowest_mps;
         ranged
             && keeps_pace

@@ -9,9 +9,9 @@
 //! It comes no nearer to a vehicle behind it than [`TRAILING_VEHICLE_MARGIN_M`] beyond the safety
 //! distance.
 //!
-//! ENU metres. Cost: [`MAX_SEARCH_COST`] a step. A search takes one step for the column of one
-//! neighbour and a dozen steps for the most columns that there can be; in theory six steps for each
-//! place, if each place is inside another column.
+//! ENU metres. Cost: [`MAX_SEARCH_COST`] a control step. A search takes one control step for the
+//! column of one neighbour and a dozen for the most columns that there can be; in theory six for
+//! each place that is compared, if each is inside another column.
 
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::KeepOutZone;

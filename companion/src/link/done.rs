@@ -128,7 +128,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn padded(report: &PhotographedReport) -> [u8; 255] {
+    fn encoded(report: &PhotographedReport) -> [u8; 255] {
         let (mut out, mut padded) = ([0; MAX_LEN], [0; 255]);
         let len = report.encode(&mut out);
         padded[..len].copy_from_slice(&out[..len]);
@@ -153,10 +153,10 @@ mod tests {
                 is_left_out_by_plan: plan,
                 ranges,
             };
-            prop_assert_eq!(PhotographedReport::decode(&padded(&report), 9), Some(report.clone()));
-            prop_assert_eq!(PhotographedReport::decode(&padded(&report), 8), None);
+            prop_assert_eq!(PhotographedReport::decode(&encoded(&report), 9), Some(report.clone()));
+            prop_assert_eq!(PhotographedReport::decode(&encoded(&report), 8), None);
             for (at, value) in [(0, 0), (4, 9), (5, 2), (9, 20)] {
-                let mut bad = padded(&report);
+                let mut bad = encoded(&report);
                 bad[at] = value;
                 prop_assert_eq!(PhotographedReport::decode(&bad, 9), None);
             }

@@ -148,8 +148,8 @@ pub struct GuardInputs {
     /// Whether the landing detector reports flight; always true for an autopilot that takes off
     /// without a command.
     pub lifted_off: bool,
-    /// Whether the vehicle may take off: its departure is due, advice and safety filter leave it
-    /// room, the battery's charge is known, and it is heard.
+    /// Whether the vehicle may take off: its departure is due, gates and safety filter let it go,
+    /// the battery's charge is known, and another vehicle hears it.
     pub gates_open: bool,
     /// Whether, in the state `Climb`, setpoint and vehicle are at the start of the path; false in
     /// all other states.

@@ -358,8 +358,8 @@ impl Detours {
         Some(ScanResult { clear_at: (!in_the_way).then_some(began) })
     }
 
-    /// Decides whether the vehicle is blocked, since when all others have stood, and whether this
-    /// one claims the turn.
+    /// Decides whether the vehicle is blocked, since when no other one has moved, and whether this
+    /// one claims to search for a detour next.
     fn update_blocked<const V: usize, const W: usize, const G: usize>(
         &mut self,
         view: &DetourView<'_, V, W, G>,

@@ -124,7 +124,7 @@ impl<const V: usize> Neighbours<V> {
     /// where the radio may not reach: then its silence is no failure.
     pub(crate) fn are_all_out_of_range(&self) -> bool {
         let beyond = |c: &NeighbourEntry| {
-            c.at_range_edge || c.position_at.is_none() || c.reports(LANDED | OUT_OF_PLAN)
+            c.at_range_edge || c.position_at.is_none() || c.reports_any(LANDED | OUT_OF_PLAN)
         };
         self.knows_range() && self.contacts[..self.roster_count].iter().all(beyond)
     }
@@ -311,13 +311,13 @@ impl<const V: usize> Neighbours<V> {
         contact.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
         (contact.heard_at, contact.intent_at) = (Some(now), Some(now));
         contact.flags = intent.flags;
-        if contact.reports(GROUNDED)
-            && !contact.reports(LANDED | OUT_OF_PLAN)
+        if contact.reports_any(GROUNDED)
+            && !contact.reports_any(LANDED | OUT_OF_PLAN)
             && contact.position_at.is_some()
         {
             contact.pad = Some(contact.state.position);
         }
-        let out = contact.reports(OUT_OF_PLAN) && contact.position_at.is_some();
+        let out = contact.reports_any(OUT_OF_PLAN) && contact.position_at.is_some();
         contact.out_since = contact.out_since.or(Some(now)).filter(|_| out);
         // From rank 32 on there is no bit: this vehicle counts as heard by the neighbour.
         if rank >= 32 || intent.heard_bits & (1 << rank) != 0 {
@@ -362,7 +362,7 @@ impl<const V: usize> Neighbours<V> {
                 progress_m,
                 grounded: contact.state.grounded || dead,
                 out_of_plan: contact.out_since.is_some_and(|since| since <= self.clear_at) || dead,
-                detours: contact.reports(ON_DETOUR),
+                detours: contact.reports_any(ON_DETOUR),
                 ..contact.state
             };
             // Cannot overflow: there are as many slots as contacts.

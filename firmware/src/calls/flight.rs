@@ -109,8 +109,8 @@ fn has_silent_far_away(seed: u64) -> bool {
     seed % 8 == 2
 }
 
-/// Random vector from this vehicle to a neighbour. In every other hard flight it is at least 4 m
-/// long: the neighbour is beside the path, so that the filter checks the path to its end.
+/// Random vector from this vehicle to a neighbour. In half of the flights that are made to be hard
+/// it is at least 4 m long: no neighbour is on the path, so the filter checks it to its end.
 fn offset_to_neighbour(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
     let at = random_point(rng, reach_m);
     if seed.is_multiple_of(4) { at + at * (MIN_BESIDE_M / at.norm().max(0.1)) } else { at }
@@ -178,7 +178,7 @@ pub fn measure_flight<M: Meter>(
 ///
 /// # Panics
 /// The companion does not take off, so the script is wrong.
-pub fn measure_filter<M: Meter>(
+pub fn measure_safety_filter<M: Meter>(
     seed: u64,
     plan: &VehiclePlan<WAYPOINTS, GATES>,
     companion: &mut BoardCompanion,

@@ -448,6 +448,6 @@ fn finish_with_return<const N: usize, const W: usize>(
         depart_s: 0.0,
         segment_m: MAX_TIMED_SEGMENT_M,
     };
-    flight.fit_segment_length();
+    flight.choose_segment_length();
     Ok(flight)
 }

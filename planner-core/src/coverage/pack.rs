@@ -340,8 +340,9 @@ pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
     Ok(())
 }
 
-/// CBinPack: sets `ends[k]` to the number of the last waypoint of bin `k` plus one. Bin `k` is
-/// filled by `shares[k]`.
+/// CBinPack of paper CPP: cuts the path into consecutive bins. Bin `k` gets the fraction
+/// `shares[k]` / Σ `shares` of the path's length; `ends[k]` becomes the number of its last waypoint
+/// plus one.
 pub fn cbinpack<const L: usize>(
     tracks: &Tracks<L>,
     unit: TrackUnit,

@@ -27,7 +27,6 @@ pub struct Transit<'a, const N: usize> {
     between_m: [[f32; N]; N],
 }
 
-/// The memory of a [`Transit`], before its area is set.
 impl<const N: usize> Transit<'_, N> {
     /// Creates an empty graph; [`Transit::set_area`] sets its area.
     pub const fn empty() -> Self {

@@ -199,7 +199,7 @@ fn plan_with_pad_wait<const N: usize, const V: usize, const W: usize, const P: u
             request.schedule.cruise_mps,
         );
         let mut flight = Flight { path, depart_s: 0.0, ..flight.clone() };
-        flight.fit_segment_length();
+        flight.choose_segment_length();
         let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
         let cfg = &request.schedule;
         let from_s = (not_before_s, handover_s);
@@ -240,7 +240,7 @@ fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P:
             match sipp::find_route(view, &route, passable, scheduled, &mut ws.sipp, &mut flight) {
                 // Searched again with the longer timed segments that the flight needs.
                 Ok(()) if flight.segment_count() > MAX_TIMED_SEGMENTS => {
-                    flight.fit_segment_length();
+                    flight.choose_segment_length();
                     continue;
                 }
                 Ok(()) => {}

@@ -214,8 +214,8 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         if t < 0.999 && self.is_obstacle(at(t)) {
             return RayClass::Blocked;
         }
-        // The segment leaves the box, but the cell behind is free or not certain. The part up to
-        // the first face ahead, less the probe depth and the clearance, is certainly clear.
+        // The cell beyond the face by which the segment leaves the box is free, or may be. Up to
+        // that face, less the probe depth and the clearance, the segment is certainly clear.
         let near =
             [0, 1, 2].map(|axis| leave[axis] - (PROBE_DEPTH_CELLS + view.inset) / d[axis].abs());
         let known = near[0].min(near[1]).min(near[2]).clamp(0.0, 1.0);

@@ -401,7 +401,7 @@ mod tests {
             depart_s: 0.0,
             segment_m: crate::schedule::MAX_TIMED_SEGMENT_M,
         };
-        flight.fit_segment_length();
+        flight.choose_segment_length();
         flight
     }
 

@@ -42,7 +42,7 @@ pub(super) struct TimedSegment {
 impl<const W: usize> Flight<W> {
     /// Sets `segment_m` to the shortest of [`MAX_TIMED_SEGMENT_M`], twice that, four times that …
     /// with which the flight has at most [`MAX_TIMED_SEGMENTS`] timed segments.
-    pub(crate) fn fit_segment_length(&mut self) {
+    pub(crate) fn choose_segment_length(&mut self) {
         self.segment_m = MAX_TIMED_SEGMENT_M;
         for _ in 0..MAX_SEGMENT_DOUBLINGS {
             // Each leg's number of segments is rounded up, so the path's length alone may show that

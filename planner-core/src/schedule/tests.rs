@@ -83,7 +83,7 @@ fn field_flight(id: u8, corners: &[(f32, f32, f32)], level: bool, climb_m: f32) 
     }
     path.set_times_at_speed(climb_m / CFG.vertical_mps, CFG.cruise_mps);
     let mut flight = Flight { climb_m, descent_m: climb_m, path, ..flight(id, &[(0.0, 0.0)]) };
-    flight.fit_segment_length();
+    flight.choose_segment_length();
     flight
 }
 

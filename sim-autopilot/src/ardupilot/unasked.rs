@@ -7,7 +7,7 @@ use crate::platform::Platform;
 const PARAM_VALUE: u32 = 22;
 const HOME_POSITION: u32 = 242;
 /// Period at which ArduCopter updates STAT_RUNTIME and sends it, microseconds.
-const RUNTIME_EVERY_US: u64 = 30_000_000;
+const STAT_RUNTIME_EVERY_US: u64 = 30_000_000;
 /// Value of MAV_PARAM_TYPE_INT32.
 const INT32: u8 = 6;
 
@@ -31,7 +31,7 @@ impl Copter {
             self.reported_origin_and_position[1] = true;
             platform.send_text(6, "EKF3 IMU0 is using GPS");
         }
-        if now_us >= self.runtime_us + RUNTIME_EVERY_US {
+        if now_us >= self.runtime_us + STAT_RUNTIME_EVERY_US {
             self.runtime_us = now_us;
             self.send_runtime_param(platform, (now_us / 1_000_000) as f32);
         }

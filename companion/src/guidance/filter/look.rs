@@ -185,7 +185,7 @@ impl Guidance {
                 .point_at(0.0)
                 .map_or(ground_m, |from| ground_m.min(from.z - plan.climb_m));
         }
-        // On the path between pad and goal the ground may be lower than at either.
+        // A landing between pad and goal may end on ground that is lower than at either.
         let lands = matches!(state, State::Land | State::LandingHeld);
         let between = lands && self.on_path && !self.has_reached_end(&plan.path);
         if between { ground_m - GROUND_BELOW_PAD_M } else { ground_m }

@@ -129,7 +129,7 @@ impl NeighbourEntry {
 
     /// Whether the neighbour follows the shared plan, as last heard.
     pub(super) fn on_plan(&self) -> bool {
-        self.state.progress_m.is_some() && !self.reports(ON_DETOUR | OUT_OF_PLAN)
+        self.state.progress_m.is_some() && !self.reports_any(ON_DETOUR | OUT_OF_PLAN)
     }
 
     /// Time that the neighbour may fly on unheard, through open gates, seconds.
@@ -161,7 +161,7 @@ impl NeighbourEntry {
         let after_s = RECKONED_AFTER_S + f32::from(self.unheard_delay_s);
         let silent_s = (now - known_at).as_secs_f32() - after_s;
         let beyond = self.at_range_edge || self.position_at.is_none();
-        if silent_s <= 0.0 || !beyond || self.reports(ON_DETOUR | OUT_OF_PLAN) {
+        if silent_s <= 0.0 || !beyond || self.reports_any(ON_DETOUR | OUT_OF_PLAN) {
             return Some(known_m);
         }
         let reckoned_m = known_m + self.assumed_speed_mps * silent_s;
@@ -174,7 +174,8 @@ impl NeighbourEntry {
     /// Seconds until the neighbour has surely passed `until_m`, heard or not; `None` where its
     /// gates may stop it before.
     pub(super) fn time_until_passed_s(&self, until_m: f32, now: Instant) -> Option<f32> {
-        let known_m = self.progress_m(now).filter(|_| !self.reports(ON_DETOUR | OUT_OF_PLAN))?;
+        let known_m =
+            self.progress_m(now).filter(|_| !self.reports_any(ON_DETOUR | OUT_OF_PLAN))?;
         let known_at = self.intent_at.max(self.relayed_at)?;
         let fly_s = (until_m - known_m) / self.assumed_speed_mps;
         let after_s =
@@ -183,12 +184,12 @@ impl NeighbourEntry {
             .then(|| libm::fmaxf(fly_s + after_s, 0.0))
     }
 
-    pub(super) fn reports(&self, flag: u8) -> bool {
-        self.flags & flag != 0
+    pub(super) fn reports_any(&self, flags: u8) -> bool {
+        self.flags & flags != 0
     }
 
     pub(super) fn is_out_of_plan(&self, now: Instant) -> bool {
-        self.reports(OUT_OF_PLAN) || self.is_dead(now)
+        self.reports_any(OUT_OF_PLAN) || self.is_dead(now)
     }
 
     /// The part of a reported progress that is believed, metres: no more than the vehicle can have
@@ -213,22 +214,24 @@ impl NeighbourEntry {
 
     /// Whether the neighbour is on the ground: reported, or dead and silent for `down_after`.
     pub(super) fn is_on_ground(&self, now: Instant, down: Duration) -> bool {
-        self.reports(GROUNDED)
-            || (!self.reports(OUT_OF_PLAN) && self.is_dead(now) && !self.heard_within(now, down))
+        self.reports_any(GROUNDED)
+            || (!self.reports_any(OUT_OF_PLAN)
+                && self.is_dead(now)
+                && !self.heard_within(now, down))
     }
 
     /// Whether the neighbour is out of the plan, or lately reported that it stands until another
     /// vehicle moves, or lands after its detour.
     pub(super) fn is_waiting(&self, now: Instant) -> bool {
         self.is_out_of_plan(now)
-            || (self.reports(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
+            || (self.reports_any(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
             || self.is_landing_after_detour(now)
     }
 
     /// Whether the neighbour descends straight down at the end of a detour.
     pub(super) fn is_landing_after_detour(&self, now: Instant) -> bool {
-        self.reports(ON_DETOUR)
-            && !self.reports(GROUNDED)
+        self.reports_any(ON_DETOUR)
+            && !self.reports_any(GROUNDED)
             && self.may_come_down
             && self.points_for_now().last().is_some_and(|low| low.z < self.state.position.z)
             && self.state.velocity.xy().norm_squared() < MAX_HOVER_MPS * MAX_HOVER_MPS
@@ -237,7 +240,7 @@ impl NeighbourEntry {
 
     /// Whether the neighbour claims the turn to fly a detour: blocked, hovering, not waiting.
     pub(super) fn claims_turn(&self, now: Instant) -> bool {
-        self.reports(BLOCKED)
+        self.reports_any(BLOCKED)
             && !self.is_waiting(now)
             && self.heard_within(now, HEARD_WITHIN)
             && self.state.velocity.length() < MAX_HOVER_MPS
@@ -249,9 +252,9 @@ impl NeighbourEntry {
             && !self.is_reported_out_of_range(now)
             && !self.flies_plan_unheard();
         self.rank != STRANGER_RANK
-            && !self.reports(GROUNDED | LANDED)
+            && !self.reports_any(GROUNDED | LANDED)
             && !self.is_out_of_plan(now)
-            && (silent || (self.state.progress_m.is_none() && !self.reports(ON_DETOUR)))
+            && (silent || (self.state.progress_m.is_none() && !self.reports_any(ON_DETOUR)))
     }
 
     /// Calls `visit` with the columns, of radius `apart_m`, in which the neighbour may come down;
@@ -310,7 +313,7 @@ impl NeighbourEntry {
         let (top, here) = (self.points_for_now().last()?, self.state.position);
         let beside = (top - here).xy().norm_squared();
         let climbs = self.may_come_down
-            && !self.reports(LANDED | OUT_OF_PLAN)
+            && !self.reports_any(LANDED | OUT_OF_PLAN)
             && beside < CLIMB_BESIDE_M * CLIMB_BESIDE_M;
         (climbs && top.z > here.z + CLIMB_TOP_M).then_some(top.z)
     }
@@ -330,14 +333,14 @@ impl NeighbourEntry {
 
     /// Whether the neighbour was in the air, or about to take off, when it was last heard.
     pub(super) fn is_under_way(&self) -> bool {
-        !self.reports(GROUNDED | LANDED) || self.unheard_point_count > 0
+        !self.reports_any(GROUNDED | LANDED) || self.unheard_point_count > 0
     }
 
     /// Whether the neighbour, silent in a coverage mission, may fly on by lease or autopilot.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
         self.flies_all_points_unheard()
             && self.is_under_way()
-            && !self.reports(OUT_OF_PLAN)
+            && !self.reports_any(OUT_OF_PLAN)
             && !self.heard_within(now, MAY_LAND_AFTER)
     }
 
@@ -418,7 +421,7 @@ impl NeighbourEntry {
             return self.ground_m;
         };
         let away = self.pad.is_some_and(|pad| (pad - place).xy().length() > OVER_PAD_M);
-        let below_m = if away && !self.reports(ON_DETOUR | OUT_OF_PLAN) && !self.may_come_down {
+        let below_m = if away && !self.reports_any(ON_DETOUR | OUT_OF_PLAN) && !self.may_come_down {
             ground.height_m / 2.0
         } else {
             0.0
@@ -444,13 +447,13 @@ impl NeighbourEntry {
             let to = from - Point::new(0.0, 0.0, self.column_depth_m(&from));
             KeepOutZone { from, to, radius_m: apart_m + VAGUE_POSITION_M, kind: nature }
         };
-        if self.reports(GROUNDED) && self.reports(OUT_OF_PLAN) && self.lacks_position() {
+        if self.reports_any(GROUNDED) && self.reports_any(OUT_OF_PLAN) && self.lacks_position() {
             visit(column(here, ZoneKind::Grounded));
-        } else if self.reports(GROUNDED)
-            && (self.reports(OUT_OF_PLAN | WAITING | LANDED) || !self.is_dead(now))
+        } else if self.reports_any(GROUNDED)
+            && (self.reports_any(OUT_OF_PLAN | WAITING | LANDED) || !self.is_dead(now))
         {
             visit(place(apart_m));
-        } else if self.reports(OUT_OF_PLAN)
+        } else if self.reports_any(OUT_OF_PLAN)
             && (field.is_none() || self.heard_within(now, COLUMN_KEPT_FOR))
         {
             let below = column(here, ZoneKind::Static);

@@ -75,7 +75,8 @@ impl<const V: usize> Neighbours<V> {
     /// Whether another vehicle that takes part is in flight, heard within `missed_after`.
     pub(crate) fn does_another_take_part(&self, now: Instant, missed_after: Duration) -> bool {
         let heard = |c: &NeighbourEntry| c.heard_at.is_some_and(|at| now - at < missed_after);
-        let flies = |c: &&NeighbourEntry| heard(c) && !c.reports(GROUNDED | LANDED | OUT_OF_PLAN);
+        let flies =
+            |c: &&NeighbourEntry| heard(c) && !c.reports_any(GROUNDED | LANDED | OUT_OF_PLAN);
         let mut others = self.contacts[..self.roster_count].iter().filter(flies);
         self.fleet.as_ref().is_some_and(|fleet| others.any(|c| fleet.is_alive(usize::from(c.rank))))
     }

@@ -106,7 +106,7 @@ impl NeighbourEntry {
             place_on_points: PlaceOnPoints::Unknown,
             points_reach: self.points_reach,
             rests_within_m: 0.0,
-            grounded: self.reports(GROUNDED | LANDED),
+            grounded: self.reports_any(GROUNDED | LANDED),
             column_to_m: None,
         };
         let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
@@ -127,7 +127,7 @@ impl NeighbourEntry {
         reach: &ReachQuery<'_>,
     ) -> bool {
         let must_have_landed = reach.holds_lease && !self.heard_within(now, down);
-        reach.hears_nobody && (!must_have_landed || self.reports(OUT_OF_PLAN))
+        reach.hears_nobody && (!must_have_landed || self.reports_any(OUT_OF_PLAN))
     }
 
     /// Whether a neighbour whose position is older than [`MAX_HEIGHT_AGE`] stays out of reach, seen
@@ -179,7 +179,7 @@ impl NeighbourEntry {
     /// Whether the neighbour may come down from where it is, so that the column below it counts.
     #[inline]
     fn has_column(&self) -> bool {
-        self.may_come_down || self.reports(OUT_OF_PLAN) || self.ground_m.is_nan()
+        self.may_come_down || self.reports_any(OUT_OF_PLAN) || self.ground_m.is_nan()
     }
 
     /// Height of the lower end of the neighbour's column, ENU metres: the ground below it or, where
@@ -199,7 +199,7 @@ impl NeighbourEntry {
     /// position is old, [`Neighbours::apply_silence`] has to follow.
     #[inline(always)]
     pub(crate) fn filter_neighbour(&self, dead: bool, now: Instant) -> FilterNeighbour<'_> {
-        let grounded = self.reports(GROUNDED | LANDED);
+        let grounded = self.reports_any(GROUNDED | LANDED);
         let comes_down = !grounded && self.has_column();
         FilterNeighbour {
             id: self.id,
@@ -208,7 +208,7 @@ impl NeighbourEntry {
             out_of_range: false,
             shares_plan: self.shares_plan,
             lost: dead,
-            waits: self.reports(WAITING) && self.heard_within(now, HEARD_WITHIN),
+            waits: self.reports_any(WAITING) && self.heard_within(now, HEARD_WITHIN),
             stands: grounded || now - self.moved_at >= STANDS_AFTER,
             motion: NeighbourMotion {
                 position: self.state.position,
@@ -271,7 +271,7 @@ impl NeighbourEntry {
     /// Whether the neighbour follows the plan out of radio range, as others relay or by its last
     /// position.
     fn is_out_of_range(&self, now: Instant) -> bool {
-        let silent = !self.reports(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
+        let silent = !self.reports_any(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
         let unheard = silent && self.at_range_edge && self.on_plan();
         let flies_on = || self.flies_plan_unheard() || self.heard_within(now, UNHEARD_WAIT);
         self.is_reported_out_of_range(now) || (unheard && flies_on())
@@ -293,7 +293,7 @@ impl<const V: usize> Neighbours<V> {
     #[inline(never)]
     pub(crate) fn missed_beside(&self, pad: &Point, apart_m: f32, now: Instant) -> Option<u8> {
         let missed = |c: &&NeighbourEntry| {
-            let flies = !c.reports(GROUNDED | LANDED | OUT_OF_PLAN) && !c.at_range_edge;
+            let flies = !c.reports_any(GROUNDED | LANDED | OUT_OF_PLAN) && !c.at_range_edge;
             let beside = (c.state.position - pad).xy().norm_squared() < apart_m * apart_m;
             let lately =
                 |at: Instant| now - at > UNHEARD_BEFORE_ARMING && now - at < MAY_LAND_AFTER;
@@ -367,8 +367,8 @@ impl<const V: usize> Neighbours<V> {
         // Silent for `down_after`, or grounded without a position of its own, the neighbour lies on
         // the ground below; before that it rests in the zone that detours stay clear of.
         let down = placed_for >= self.down_after
-            || (contact.reports(GROUNDED) && contact.lacks_position());
-        let lies = down && (dead || contact.reports(GROUNDED)) && !contact.ground_m.is_nan();
+            || (contact.reports_any(GROUNDED) && contact.lacks_position());
+        let lies = down && (dead || contact.reports_any(GROUNDED)) && !contact.ground_m.is_nan();
         if let Some(first) = contact.points.first().filter(|_| by_intent) {
             motion.position = *first;
         }

@@ -114,7 +114,7 @@ impl<const V: usize> Neighbours<V> {
         visit: &mut dyn FnMut(KeepOutZone),
     ) {
         let kind = ZoneKind::Static;
-        if contact.reports(GROUNDED | LANDED | OUT_OF_PLAN)
+        if contact.reports_any(GROUNDED | LANDED | OUT_OF_PLAN)
             || contact.is_on_ground(now, self.down_after)
             || contact.flies_plan_unheard()
         {
@@ -194,7 +194,7 @@ impl<const V: usize> Neighbours<V> {
             // place, or at the end of its points.
             if contact.flies_all_points_unheard() && contact.is_under_way() {
                 contact.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
-                if !contact.reports(ON_PLAN) {
+                if !contact.reports_any(ON_PLAN) {
                     bar([from; 2], 0.0);
                     contact.points.last().into_iter().for_each(|end| bar([*end; 2], 0.0));
                 }

@@ -160,7 +160,7 @@ impl NeighbourEntry {
     }
 
     /// The neighbour's report as it is to be relayed; `None` if the neighbour is off the plan.
-    fn relayed_progress(&self, now: Instant) -> Option<RelayedProgress> {
+    fn progress_to_relay(&self, now: Instant) -> Option<RelayedProgress> {
         let progress_m = self.progress_m(now)?;
         let age = (now - self.intent_at.max(self.relayed_at)?).as_micros().div_ceil(AGE_TICK_US);
         let age = age.min(u64::from(u8::MAX)) as u8;
@@ -189,7 +189,7 @@ impl<const V: usize> Neighbours<V> {
         let mut next = self.relay_next;
         let turn = roster[first..].iter().chain(&roster[..first]);
         for contact in turn.filter(|c| c.rank < 32 && missed(c)) {
-            let Some(item) = contact.relayed_progress(now) else { continue };
+            let Some(item) = contact.progress_to_relay(now) else { continue };
             if relay.items.push(item).is_err() {
                 next = contact.rank;
                 break;

@@ -12,7 +12,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn are_all_down(&self, now: Instant) -> bool {
         self.contacts[..self.roster_count]
             .iter()
-            .all(|c| c.reports(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down_after))
+            .all(|c| c.reports_any(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down_after))
     }
 
     /// Whether a vehicle of the roster counts as dead, but may still be in the air: silent for less
@@ -34,7 +34,7 @@ impl<const V: usize> Neighbours<V> {
     /// roster.
     pub(crate) fn is_at_rest(&self, id: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
-            self.contacts[at].reports(LANDED) || self.contacts[at].is_out_of_plan(now)
+            self.contacts[at].reports_any(LANDED) || self.contacts[at].is_out_of_plan(now)
         })
     }
 
@@ -42,7 +42,8 @@ impl<const V: usize> Neighbours<V> {
     /// having flown.
     pub(crate) fn is_not_started(&self, id: u8) -> bool {
         let waits = |c: &NeighbourEntry| {
-            c.heard_at.is_none() || (c.reports(GROUNDED) && !c.reports(LANDED | OUT_OF_PLAN))
+            c.heard_at.is_none()
+                || (c.reports_any(GROUNDED) && !c.reports_any(LANDED | OUT_OF_PLAN))
         };
         self.roster_index(id).is_some_and(|at| waits(&self.contacts[at]))
     }
@@ -65,13 +66,13 @@ impl<const V: usize> Neighbours<V> {
 
     /// Number of vehicles with a lower system id than `id` that report a blocked path.
     pub fn blocked_count_before(&self, id: u8) -> u64 {
-        self.contacts.iter().filter(|c| c.id < id && c.reports(BLOCKED)).count() as u64
+        self.contacts.iter().filter(|c| c.id < id && c.reports_any(BLOCKED)).count() as u64
     }
 
     /// Whether every other vehicle of the roster last reported that it has landed or is out of the
     /// plan; true where there is none.
     pub fn are_all_at_rest(&self) -> bool {
-        self.contacts[..self.roster_count].iter().all(|c| c.reports(LANDED | OUT_OF_PLAN))
+        self.contacts[..self.roster_count].iter().all(|c| c.reports_any(LANDED | OUT_OF_PLAN))
     }
 }
 
@@ -79,6 +80,8 @@ impl NeighbourEntry {
     /// Whether the neighbour counts as dead, but may still be in the air: silent for less than
     /// `down`, it last reported itself neither on the ground nor out of the plan.
     fn comes_down_unheard(&self, now: Instant, down: Duration) -> bool {
-        !self.reports(GROUNDED | OUT_OF_PLAN) && self.is_dead(now) && self.heard_within(now, down)
+        !self.reports_any(GROUNDED | OUT_OF_PLAN)
+            && self.is_dead(now)
+            && self.heard_within(now, down)
     }
 }

@@ -60,7 +60,7 @@ fn main() -> ! {
     companion_calls::measure_companion_calls(&mut meter);
     measure_flights(&mut meter);
     measure_area_flights(&mut meter);
-    measure_filter(&mut meter);
+    measure_safety_filter(&mut meter);
     for (name, bytes, count) in &meter.rows {
         println!("call {count} {bytes} {name}");
     }
@@ -105,10 +105,10 @@ fn measure_area_flights(meter: &mut Instructions) {
 
 /// Counts the instructions of the safety filter alone.
 #[inline(never)]
-fn measure_filter(meter: &mut Instructions) {
+fn measure_safety_filter(meter: &mut Instructions) {
     for seed in 0..FILTER_FLIGHTS {
         let plan = flight::random_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");
-        flight::measure_filter(seed, &plan, &mut companion, meter);
+        flight::measure_safety_filter(seed, &plan, &mut companion, meter);
     }
 }

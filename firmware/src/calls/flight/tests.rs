@@ -26,7 +26,7 @@ fn the_filter_is_counted_in_flight() {
     for seed in 0..10 {
         let plan = random_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(config()).expect("the settings are good");
-        measure_filter(seed, &plan, &mut companion, &mut meter);
+        measure_safety_filter(seed, &plan, &mut companion, &mut meter);
     }
     assert_eq!(meter.filtered, 10 * FILTER_ROUNDS);
 }

@@ -14,7 +14,7 @@ use self::errors::{area_hint, describe_area_error, faulty_ring, file_hint, overl
 use self::spacing::{read_camera, read_spacing};
 use super::checks::{VehicleSpans, check_margins};
 use super::obstacles::{Flown, MapBesideArea};
-use super::terrain::TerrainFile;
+use super::terrain::UnreadTerrain;
 use super::{
     Common, DEFAULT_ORIGIN, empty_table, fence_and_ground_stations, read_common, read_faults,
     read_geodetic, read_unsupported, read_vehicles, unsupported_error,
@@ -200,7 +200,7 @@ fn read_area(
     table: &Table<'_>,
     folder: &Path,
     origin: Option<Geodetic>,
-) -> Result<(Area, Option<TerrainFile>)> {
+) -> Result<(Area, Option<UnreadTerrain>)> {
     let (polygons, coordinates, source) = read_polygons(table, folder)?;
     let given = table.get("origin").map(|v| read_geodetic(&v)).transpose()?.or(origin);
     let first = polygons.outers[0][0];
@@ -208,7 +208,7 @@ fn read_area(
         Coordinates::Wgs84 => Geodetic { lat_deg: first[1], lon_deg: first[0], alt_m: 0.0 },
         Coordinates::Metres => DEFAULT_ORIGIN,
     });
-    let terrain = TerrainFile::from_table(table, folder, coordinates == Coordinates::Metres)?;
+    let terrain = UnreadTerrain::from_table(table, folder, coordinates == Coordinates::Metres)?;
     if let (Some(terrain), None) = (&terrain, given) {
         origin.alt_m = terrain.altitude_m(table.text, &origin)?;
     }

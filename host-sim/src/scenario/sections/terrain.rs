@@ -22,14 +22,14 @@ const MAX_PAD_HEIGHT_ERROR_M: f32 = 5.0;
 const AROUND_LANES_M: f32 = 5.0;
 
 /// The file of heights that `[area]` names, not yet read.
-pub(super) struct TerrainFile {
+pub(super) struct UnreadTerrain {
     path: PathBuf,
     span: Span,
     tolerance_m: f32,
     metres: bool,
 }
 
-impl TerrainFile {
+impl UnreadTerrain {
     /// The file of heights that `[area]` names, if any; `metres`: the area's coordinates are
     /// metres.
     pub(super) fn from_table(
