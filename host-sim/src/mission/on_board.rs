@@ -35,9 +35,9 @@ impl Mission {
     /// Plans with the capacities of a board: `None` if the plan's CRC equals that of `plan`, else a
     /// text that says why not.
     fn plan_limit_exceeded(&self, plan: &SwarmPlan, board: &BoardCapacity) -> Option<String> {
-        const BOARD: BoardCapacity = NUCLEO_H743;
-        let planned = if board.nodes == BOARD.nodes {
-            self.plan_crc_on_board::<{ BOARD.nodes }, { BOARD.vehicles }, { BOARD.timed_segments }>(
+        const H743: BoardCapacity = NUCLEO_H743;
+        let planned = if board.nodes == H743.nodes {
+            self.plan_crc_on_board::<{ H743.nodes }, { H743.vehicles }, { H743.timed_segments }>(
                 board,
             )
         } else {

@@ -11,7 +11,7 @@ use crate::track::{LEAD_PER_SPEED_S, WALKING_SPEED_MPS};
 /// flying along them, metres: real vehicles lag by up to 0.5 m and deviate by 0.4 m.
 pub const OFF_REPORTED_PATH_M: f32 = 0.9;
 /// Addition to [`OFF_REPORTED_PATH_M`] behind the first reported point, which is the vehicle's
-/// setpoint, for each m/s above [`WALKING_SPEED_MPS`], seconds: the setpoint may lead the vehicle
+/// setpoint, for each m/s above walking speed (2 m/s), seconds: the setpoint may lead the vehicle
 /// by that much more.
 pub const OFF_REPORTED_PATH_S: f32 = LEAD_PER_SPEED_S;
 /// Greatest distance behind its first reported point, the setpoint, at which a vehicle at this
