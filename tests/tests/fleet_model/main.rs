@@ -46,6 +46,17 @@ fn searches_all() -> bool {
     number("FLOCKMATE_MODEL", 0) >= 4
 }
 
+/// Two vehicles of four are lost, while any partition changes twice: alone, since it takes long.
+#[test]
+fn four_vehicles_with_two_losses_and_two_changes() {
+    match number("FLOCKMATE_MODEL", 0) {
+        5 => search_right(4, Radio::Parts(1), 2, None),
+        6 => search_right(4, Radio::Parts(2), 1, None),
+        7.. => search_right(4, Radio::Parts(2), 2, None),
+        _ => {}
+    }
+}
+
 #[test]
 fn two_vehicles_with_any_messages_lost() {
     for slow in [None, Some(0), Some(1)] {
