@@ -18,8 +18,17 @@ use anyhow::{Result, ensure};
 use self::sources::Tree;
 
 /// Folders of the crates that are checked.
-const CRATES: [&str; 8] =
-    ["fpu", "planner-core", "companion", "sim-autopilot", "host-sim", "firmware", "tests", "xtask"];
+const CRATES: [&str; 9] = [
+    "fpu",
+    "lock-step",
+    "planner-core",
+    "companion",
+    "sim-autopilot",
+    "host-sim",
+    "firmware",
+    "tests",
+    "xtask",
+];
 
 /// Prints every import cycle and every struct, function, file or line beyond the limits. An error
 /// if one of them has no listed reason, or if docs/margins.md does not match the sources.
