@@ -146,7 +146,7 @@ pub struct Guidance {
     /// Number of gates of the plan, from the first on, that have opened; they stay open.
     gates_open: usize,
     on_path: bool,
-    /// Whether its path is the one that begins above its pad, not a detour or the way back.
+    /// Whether its path begins above its pad, so that it may join it from where it took off.
     from_pad: bool,
     /// Whether it lands where a pilot, the autopilot or a lost position left it, off its path.
     lands_off_path: bool,

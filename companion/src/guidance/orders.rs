@@ -64,8 +64,10 @@ impl Guidance {
 
     /// Begins another path at its start; the setpoint stands there, or near it.
     pub fn begin_path(&mut self, now: Instant) {
+        // A path that begins before the first one is joined begins at the same place.
+        self.from_pad &= self.tracker.along_m <= 0.0;
         (self.tracker, self.setpoint_m) = (ReferenceState::default(), 0.0);
-        (self.phase, self.from_pad) = (Phase::Path, false);
+        self.phase = Phase::Path;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
         self.ends_away_from_goal = false;

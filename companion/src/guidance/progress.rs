@@ -253,7 +253,10 @@ impl Guidance {
     /// is free of walls, m²: the hull fits where the vehicle is, and within the clearance c around
     /// that point. With d² ≤ c² − r² it then fits everywhere between both.
     fn free_around_sq<const W: usize>(&self, path: &Path<W>, along_m: f32) -> f32 {
-        let leg = path.waypoints().iter().find(|w| w.along_m >= along_m && w.along_m > 0.0);
+        let mut waypoints = path.waypoints().iter();
+        let leg = waypoints.find(|w| w.along_m >= along_m && w.along_m > 0.0);
+        // A path back from before its first leg has one point.
+        let leg = leg.or(path.waypoints().last());
         let (clearance_m, radius_m) = (leg.map_or(0.0, |w| w.clearance_m), self.track.radius_m);
         clearance_m * clearance_m - radius_m * radius_m
     }

@@ -43,14 +43,14 @@ fn carry(b: &mut Bench, by: Point) {
     }
 }
 
-/// A bench that is flown until a random time, perhaps on a detour, and commanded to do something
-/// or nothing.
-fn flown(draw: &mut Draw) -> Bench {
+/// A bench before its start, `beside` its pad, with another vehicle on the ground.
+fn ready(draw: &mut Draw, beside: Point) -> Bench {
     let kind = draw.one(&[AutopilotKind::Px4, AutopilotKind::ArduPilot]);
     let mut b = match kind {
         AutopilotKind::Px4 => Bench::new(two_vehicles()),
         AutopilotKind::ArduPilot => Bench::ardupilot(two_vehicles()),
     };
+    b.enu += beside;
     b.spool = Duration::from_millis(2000);
     b.neighbour = Some((Point::new(8.0, 20.0, 0.0), ON_PLAN | GROUNDED, 0.0, 5));
     b.run_until(State::Ready, 6.0);
@@ -59,6 +59,13 @@ fn flown(draw: &mut Draw) -> Bench {
     while b.on_ground() {
         b.tick();
     }
+    b
+}
+
+/// A bench that is flown until a random time, perhaps on a detour, and commanded to do something
+/// or nothing.
+fn flown(draw: &mut Draw) -> Bench {
+    let mut b = ready(draw, Point::zeros());
     b.run(draw.real(0.0, 10.0));
     if draw.one(&[true, false, false]) {
         // Something lies on its path: it flies a detour from here.
@@ -142,4 +149,38 @@ fn a_carried_vehicle_never_flies_to_its_path() {
         assert_ne!(b.state(), State::Follow, "flight {seed} waits for nothing: {:?}", b.texts);
     }
     assert!(held > FLIGHTS as usize / 4 && off_path > FLIGHTS as usize / 4, "{held}, {off_path}");
+}
+
+/// One that took off beside its start joins its path, the way back or a detour from there, whatever
+/// interrupts it first.
+#[test]
+fn a_vehicle_that_took_off_beside_its_start_joins_its_path() {
+    for seed in 0..FLIGHTS / 2 {
+        let mut draw = Draw(Pcg32::new(seed, 2));
+        let (angle, away_m) = (draw.real(-3.1, 3.1), draw.real(0.0, 1.9));
+        let beside = Point::new(libm::cosf(angle), libm::sinf(angle), 0.0) * away_m;
+        let mut b = ready(&mut draw, beside);
+        b.run(draw.real(0.0, 4.0));
+        for _ in 0..draw.one(&[1, 2, 4]) {
+            let over = b.enu - Point::new(0.8, 0.0, b.enu.z.min(2.2));
+            b.neighbour = draw.one(&[
+                b.neighbour,
+                Some((over, FLYING | ON_PLAN, 0.0, 5)),
+                Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5)),
+            ]);
+            match draw.one(&[0, 1, 2, 3, 4]) {
+                0 => _ = land(&mut b),
+                1 => _ = pause(&mut b),
+                2 => _ = order(&mut b, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
+                _ => _ = resume(&mut b),
+            }
+            b.run(draw.real(0.1, 25.0));
+        }
+        resume(&mut b);
+        b.neighbour = Some((Point::new(8.0, 20.0, 0.0), ON_PLAN | GROUNDED, 0.0, 5));
+        b.run(200.0);
+        let barred = b.texts.iter().any(|text| text == "No free way to the path: landing");
+        assert!(!barred, "flight {seed}: {:?}", b.texts);
+        assert_ne!(b.state(), State::Follow, "flight {seed} waits for nothing: {:?}", b.texts);
+    }
 }
