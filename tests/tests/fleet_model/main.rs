@@ -13,7 +13,7 @@
 //! - Nothing is left out: from every state, if all messages arrive from then on and some vehicle
 //!   flies on, all is photographed in the end, and the fleet comes to rest.
 //!
-//! Planted errors must be found. `FLOCKMATE_MODEL=4` searches more; see `docs/safety.md`.
+//! Planted errors must be found. `FLOCKMATE_MODEL=4` to `7` search more; see `docs/safety.md`.
 
 mod links;
 mod model;
@@ -46,7 +46,8 @@ fn searches_all() -> bool {
     number("FLOCKMATE_MODEL", 0) >= 4
 }
 
-/// Two vehicles of four are lost, while any partition changes twice: alone, since it takes long.
+/// Of four vehicles up to two are lost, while any partition changes up to twice: run alone, since
+/// that takes minutes and gigabytes.
 #[test]
 fn four_vehicles_with_two_losses_and_two_changes() {
     match number("FLOCKMATE_MODEL", 0) {
