@@ -20,9 +20,6 @@ const LAG_WINDOW_ABOVE_MPS: f32 = 2.0;
 /// the setpoint's curve follows the reference by up to 1.2 s, and the vehicle that curve by 0.4 s.
 const LAG_WINDOW_S: f32 = 1.0;
 
-/// Distance within which a setpoint is on the path, metres.
-const ON_PATH_M: f32 = 0.1;
-
 impl Guidance {
     /// Place along the plan's path up to which this vehicle flies while unheard, through gates that
     /// are open or open after a short wait, metres; and the seconds by which those gates delay it
@@ -306,13 +303,13 @@ impl Guidance {
         }
     }
 
-    /// Whether the setpoint is on the path.
-    pub(crate) fn is_setpoint_on_path<const W: usize, const G: usize>(
+    /// Distance of the setpoint from its place along the path, metres; ∞ without a path.
+    pub(crate) fn setpoint_off_path_m<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
-    ) -> bool {
+    ) -> f32 {
         let on = scene.plan.and_then(|plan| plan.path.point_at(self.setpoint_m));
-        on.is_some_and(|on| (on - self.smoother.position()).norm_squared() < ON_PATH_M * ON_PATH_M)
+        on.map_or(f32::INFINITY, |on| (on - self.smoother.position()).length())
     }
 
     /// Whether the straight way from the setpoint to its place along the path is known to be free

@@ -7,16 +7,14 @@
 //! rest. Bins are assigned to vehicles by linear sum assignment of transit lengths: from the
 //! vehicle's place to the first waypoint and from the last one home, in the shorter of both
 //! directions. The route that takes longest gets the lowest transit layer, and so on. Climb and
-//! descent take `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (paper CPP eq. 4). Above terrain h_m is
-//! the highest picture height, and a vehicle comes down further to its first waypoint, and up from
-//! its last one.
+//! descent take `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (paper CPP eq. 4).
 //!
-//! Δh, the height of the layer above picture height, is at least one layer spacing, so a vehicle in
-//! transit is never at the height at which others photograph.
+//! Δh, from picture height to the layer, is at least one layer spacing, so a vehicle in transit is
+//! never at the height at which others photograph.
 //!
 //! Cost for K vehicles and n lanes: K · log n steps, K² transits, one assignment (K³).
 
-mod vertical;
+mod sink;
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -156,9 +154,7 @@ impl<const K: usize> PackWorkspace<K> {
             shares: [0.0; K],
         }
     }
-}
 
-impl<const K: usize> PackWorkspace<K> {
     /// The shares of the path by which the bins were filled last, one per vehicle; only their
     /// ratios count.
     pub fn shares(&self) -> &[f32; K] {
@@ -224,6 +220,12 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
             return Err(CoverageError::SettingOutOfRange("weight"));
         }
         Ok(())
+    }
+
+    /// H_d: time that a vehicle takes to climb to a layer and to descend from it, seconds.
+    pub fn altitude_delay_s(&self, vehicle: &Vehicle, layer: u8) -> f32 {
+        let top_m = self.heights.mission_m + f32::from(layer) * self.heights.layer_m;
+        top_m / vehicle.climb_mps + top_m / vehicle.descend_mps
     }
 
     /// The ends of the part of the path with waypoints `first` to `end` − 1.

@@ -1,5 +1,5 @@
 //! Finds files of too many lines, and lines of too many characters. rustfmt breaks lines, but not
-//! in macros that it cannot parse, attributes and comments.
+//! in macros that it cannot parse, attributes and comments. Checks the length of ARCHITECTURE.md.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,6 +11,8 @@ use proc_macro2::{Delimiter, LineColumn, TokenStream, TokenTree};
 const LINES: usize = 500;
 /// Most characters of a line, as in `rustfmt.toml`.
 const WIDTH: usize = 100;
+/// Most bytes of the map of the code, `ARCHITECTURE.md`.
+const MAP_BYTES: usize = 18_000;
 /// Folders that are not searched: they hold no sources of ours.
 const OTHERS: [&str; 2] = ["target", ".git"];
 
@@ -31,6 +33,10 @@ pub fn beyond() -> Result<Vec<(String, Option<&'static str>)>> {
         for what in beyond_in(&text).with_context(|| name.clone())? {
             found.push((format!("{name}{what}"), exception.map(|(_, reason)| *reason)));
         }
+    }
+    let map_bytes = fs::read("ARCHITECTURE.md").context("ARCHITECTURE.md")?.len();
+    if map_bytes > MAP_BYTES {
+        found.push((format!("ARCHITECTURE.md has {map_bytes} bytes, more than {MAP_BYTES}"), None));
     }
     Ok(found)
 }

@@ -3,8 +3,9 @@
 //!
 //! Cost: a request lists every known keep-out zone.
 
-use planner_core::Point;
 use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
+use planner_core::flight::Waypoint;
+use planner_core::{Length, Point};
 
 use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_MARGIN_M};
 use super::path_kind::{DetourPurpose, PathKind};
@@ -23,6 +24,8 @@ const SIDESTEP_RETRY_S: u64 = 30;
 const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
 /// Distance along the path up to which two failed searches count as in one place, metres.
 const SAME_SEARCH_PLACE_M: f32 = 1.0;
+/// Distance within which a setpoint is on its path, metres.
+const ON_PATH_M: f32 = 0.1;
 
 /// Whether a search that found no detour may succeed later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +36,17 @@ pub(crate) enum RetryOutlook {
     Open,
     /// No other vehicle will move any more.
     Closed,
+}
+
+/// Ends of the leg on which the reference is: the one ahead, then the one behind.
+fn leg_ahead<'a, const V: usize, const W: usize, const G: usize>(
+    view: &DetourView<'a, V, W, G>,
+) -> Option<[&'a Waypoint; 2]> {
+    let points = view.mission.plan()?.path.waypoints();
+    let along_m = view.guidance.along_m();
+    let last = points.len().saturating_sub(1);
+    let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(last);
+    Some([points.get(next)?, points.get(next.saturating_sub(1))?])
 }
 
 impl Detours {
@@ -122,14 +136,16 @@ impl Detours {
 
     /// Where the requested path begins: at the reference, or for a landing aside where the setpoint
     /// stands. A vehicle that is held far from its reference may not be able to fly there first.
-    /// But from beside the path only a search over an area checks the way.
+    /// But outside the tube around the path that leaves the required clearance, only a search over
+    /// an area checks the way.
     pub(crate) fn start_of_detour<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> Option<Point> {
-        let guidance = view.guidance;
-        let checked =
-            view.config.lost_vehicle_down_s.is_some() || guidance.is_setpoint_on_path(&view.scene);
+        let (guidance, config) = (view.guidance, view.config);
+        let spare_m = leg_ahead(view)?[0].clearance_m - config.required_clearance_m;
+        let checked = config.lost_vehicle_down_s.is_some()
+            || guidance.setpoint_off_path_m(&view.scene) <= spare_m.max(ON_PATH_M);
         match checked && self.seeks_landing() && guidance.is_setpoint_still() {
             true => Some(guidance.setpoint_position()),
             false => view.mission.plan()?.path.point_at(guidance.along_m()),
@@ -144,14 +160,8 @@ impl Detours {
         mut visit: impl FnMut(KeepOutZone),
     ) -> Option<DetourRequest> {
         let (sought, plan) = (self.sought?, view.mission.plan()?);
-        let points = plan.path.waypoints();
         let along_m = view.guidance.along_m();
-        let next = points
-            .iter()
-            .position(|w| w.along_m > along_m)
-            .unwrap_or(points.len().saturating_sub(1));
-        let ahead = points.get(next)?;
-        let behind = points.get(next.saturating_sub(1))?;
+        let [ahead, behind] = leg_ahead(view)?;
         let apart_m = view.config.safety_distance_m;
         self.obstacles.all().iter().for_each(|obstacle| visit(*obstacle));
         match view.config.lost_vehicle_down_s {
@@ -193,11 +203,16 @@ impl Detours {
                 None => return None,
             },
         };
+        let here = self.start_of_detour(view)?;
+        let off_m = plan.path.point_at(along_m).map_or(0.0, |on| (on - here).length());
+        let over_area = view.config.lost_vehicle_down_s.is_some();
+        // From beside the leg the first way to its end has that much less room.
+        let off_m = if over_area || off_m <= ON_PATH_M { 0.0 } else { off_m };
         Some(DetourRequest {
             aside: sought.is_aside(),
-            here: self.start_of_detour(view)?,
+            here,
             leg: [ahead.position, behind.position],
-            leg_clearance_m: ahead.clearance_m,
+            leg_clearance_m: ahead.clearance_m - off_m,
             goal,
             descent_m,
             required_clearance_m: view.config.required_clearance_m,

@@ -1,4 +1,5 @@
-//! What climbs and descents cost: to a layer, and above terrain down to the pictures and up again.
+//! Above terrain, [`Heights::mission_m`] is the highest height of pictures: a vehicle comes down
+//! further to its first waypoint, and goes up from its last one.
 
 use libm::fmaxf;
 
@@ -9,12 +10,6 @@ use crate::coverage::Flat;
 use crate::field::follow::TerrainFollowing;
 
 impl<const L: usize, const N: usize> Work<'_, L, N> {
-    /// H_d: time that a vehicle takes to climb to a layer and to descend from it, seconds.
-    pub fn altitude_delay_s(&self, vehicle: &Vehicle, layer: u8) -> f32 {
-        let top_m = self.heights.mission_m + f32::from(layer) * self.heights.layer_m;
-        top_m / vehicle.climb_mps + top_m / vehicle.descend_mps
-    }
-
     /// How far below [`Heights::mission_m`] pictures are taken at `place`, metres: 0 above level
     /// ground.
     #[inline(never)]
