@@ -160,7 +160,7 @@ pub struct Guidance {
     /// Whether the vehicle reports that it holds its place, so that others may pass.
     pub(crate) hold: Hold,
     /// Whether the hold has begun or ended, so that an intent is to be sent at once.
-    pub(crate) hold_changed: bool,
+    hold_changed: bool,
     /// Whether the leg of the descent leads back up.
     climbing_back: bool,
     /// Whether setpoints lead a landing straight down, before the autopilot's landing.

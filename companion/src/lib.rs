@@ -69,11 +69,7 @@ mod timers;
 pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
 pub use events::{Event, Link, PlanKind, PlanRequests};
+pub use link::frame::{AUTOPILOT_COMPONENT, COMPANION_COMPONENT};
 pub use mission::State;
 pub use mission::photographed::MAX_PHOTOGRAPHED_RANGES;
 pub use time::{Duration, Instant};
-
-/// Our component id, `MAV_COMP_ID_ONBOARD_COMPUTER`.
-pub const COMPANION_COMPONENT: u8 = 191;
-/// The autopilot's component id, `MAV_COMP_ID_AUTOPILOT1`.
-pub const AUTOPILOT_COMPONENT: u8 = 1;

@@ -19,7 +19,7 @@ use crate::config::Config;
 use crate::events::Link;
 use crate::link::Links;
 use crate::link::answer_limits::{AnswerKind, SenderKind};
-use crate::link::frame::Frame;
+use crate::link::frame::{COMPANION_COMPONENT, Frame};
 use crate::link::outbox::Outgoing;
 use crate::storage::store::{self, ErasePermission, FlashFault, FlashRequest, Store};
 use crate::time::Instant;
@@ -132,7 +132,7 @@ impl Services {
 
     /// Handles a frame of one of the services; returns whether it was one.
     pub(crate) fn handle_frame(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) -> bool {
-        let (p, own) = (heard.frame.padded_payload(), (heard.own, crate::COMPANION_COMPONENT));
+        let (p, own) = (heard.frame.padded_payload(), (heard.own, COMPANION_COMPONENT));
         if heard.sender_ids() == own {
             return false;
         }
@@ -177,7 +177,7 @@ impl Services {
         };
         match found {
             Some(index) => self.send_parameter(heard, index, links),
-            None if p[3] == crate::COMPANION_COMPONENT => {
+            None if p[3] == COMPANION_COMPONENT => {
                 let why = MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST;
                 refuse_parameter(heard, index, &p[4..20], why, links);
             }
@@ -231,7 +231,7 @@ impl Services {
             self.send_parameter(heard, index, links);
         }
         if let Err(why) = result
-            && p[5] == crate::COMPANION_COMPONENT
+            && p[5] == COMPANION_COMPONENT
         {
             refuse_parameter(heard, -1, &p[6..22], why, links);
         }
@@ -256,7 +256,7 @@ fn refuse_parameter(
 fn answer_timesync(heard: &ReceivedFrame<'_>, links: &mut Links) {
     let p = heard.frame.padded_payload();
     let to_our_system =
-        (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == crate::COMPANION_COMPONENT);
+        (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == COMPANION_COMPONENT);
     let request =
         heard.frame.decode::<TIMESYNC_DATA>().filter(|request| request.tc1 == 0 && to_our_system);
     if let Some(request) = request {

@@ -118,8 +118,7 @@ impl Platform {
         landed: bool,
     ) -> Option<MissionLeg> {
         let first = self.first_item();
-        let progress = &mut self.missions.progress;
-        progress.current = progress.current.max(first);
+        self.missions.progress.begin_no_earlier_than(first);
         while let Some(item) =
             self.missions.items().get(usize::from(self.missions.progress.current)).copied()
         {

@@ -62,6 +62,11 @@ impl MissionProgress {
         Self { current, ..Self::default() }
     }
 
+    /// Skips the items before `first`.
+    pub(super) fn begin_no_earlier_than(&mut self, first: u16) {
+        self.current = self.current.max(first);
+    }
+
     /// The current item starts from its beginning when the mission is continued.
     pub(super) fn restart_item(&mut self) {
         (self.since_us, self.arrived_us) = (None, None);

@@ -10,7 +10,7 @@ use crate::autopilot::limits::AutopilotLimits;
 use crate::autopilot::telemetry::{Ack, Telemetry};
 use crate::events::Link;
 use crate::link::Links;
-use crate::link::frame::Frame;
+use crate::link::frame::{COMPANION_COMPONENT, Frame};
 use crate::link::outbox::Outgoing;
 use crate::mission::State;
 use crate::time::{Duration, Instant};
@@ -315,7 +315,7 @@ impl Requests {
         now: Instant,
         links: &mut Links,
     ) {
-        if ack.to != (0, 0) && ack.to != (own, crate::COMPANION_COMPONENT) {
+        if ack.to != (0, 0) && ack.to != (own, COMPANION_COMPONENT) {
             return;
         }
         if let Some((text, numbers)) = self.handshake.handle_ack(state, ack, now) {

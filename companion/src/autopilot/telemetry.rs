@@ -150,8 +150,8 @@ pub struct Telemetry {
     pub position: Point,
     /// Velocity in the mission frame, ENU m/s.
     pub velocity: Point,
-    /// The last COMMAND_ACK, until the caller takes it.
-    pub(crate) ack: Option<Ack>,
+    /// The last COMMAND_ACK, until it is taken.
+    ack: Option<Ack>,
     /// When each stream of [`AutopilotKind::streams`] that is on was last received, in that order;
     /// `Instant::ZERO` for never.
     streams: [Instant; MAX_STREAMS],
@@ -328,6 +328,11 @@ impl Telemetry {
             },
             _ => TelemetryChange::None,
         }
+    }
+
+    /// The last COMMAND_ACK, if it has not been taken yet.
+    pub(crate) fn take_ack(&mut self) -> Option<Ack> {
+        self.ack.take()
     }
 
     /// Time since a stream's message was last received; the greatest duration if it never was.

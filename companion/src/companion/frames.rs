@@ -13,7 +13,7 @@ use crate::events::Link;
 use crate::link::answer_limits::{AnswerKind, SenderKind};
 use crate::link::commands::{self, ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED};
 use crate::link::done::PhotographedReport;
-use crate::link::frame::Frame;
+use crate::link::frame::{AUTOPILOT_COMPONENT, COMPANION_COMPONENT, Frame};
 use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
 use crate::link::roster::RosterReport;
@@ -54,9 +54,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         match link {
             Link::Autopilot => {
-                if frame.system != self.config.system_id
-                    || frame.component != crate::AUTOPILOT_COMPONENT
-                {
+                if frame.system != self.config.system_id || frame.component != AUTOPILOT_COMPONENT {
                     return false;
                 }
                 if frame.message_id == PARAM_VALUE_DATA::ID {
@@ -67,7 +65,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     return false;
                 }
                 let change = self.telemetry.handle_frame(self.now, &self.config.origin, frame);
-                if let Some(ack) = self.telemetry.ack.take() {
+                if let Some(ack) = self.telemetry.take_ack() {
                     self.requests.handle_ack(
                         &ack,
                         own,
@@ -117,7 +115,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if !relevant
             || id == self.config.system_id
             || id == 0
-            || frame.component != crate::COMPANION_COMPONENT
+            || frame.component != COMPANION_COMPONENT
         {
             return;
         }

@@ -152,7 +152,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // first.
         if self.mission.state() == State::Replanning {
             self.guidance.begin_path(self.now);
-            self.guidance.ends_away_from_goal = self.detours.ends_away_from_goal();
+            if self.detours.ends_away_from_goal() {
+                self.guidance.note_end_away_from_goal();
+            }
         }
     }
 

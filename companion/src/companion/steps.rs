@@ -38,7 +38,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         {
             self.links.send_text(true, "Setpoint out of limits: holding");
         }
-        if core::mem::take(&mut self.guidance.hold_changed) {
+        if self.guidance.take_hold_changed() {
             self.links.set_due(Link::Swarm, OnDemandMessage::Intent, true);
         }
         self.step_division();
@@ -128,7 +128,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 config.radius_m,
             ),
         };
-        let before = core::mem::replace(&mut self.guidance.estimate_speed_share, pace);
+        let before = self.guidance.set_estimate_speed_share(pace);
         self.mission.note_estimate_usable(pace > 0.0, now);
         let kind = |pace: f32| if pace >= 1.0 { 2 } else { u8::from(pace > 0.0) };
         if kind(before) == kind(pace) || !self.mission.state().streams_setpoints() {
@@ -241,8 +241,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::RequestDetourBackToPath => self.request_detour_back_to_path(),
             Action::TurnHome => {
                 self.guidance.cancel_evasion();
-                self.detours.give_up_plan();
-                self.detours.home.begin(now);
+                self.detours.begin_way_home(now);
             }
             Action::RequestDetourAside => {
                 self.guidance.cancel_evasion();
@@ -259,8 +258,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::BrakeOnPath => self.guidance.cancel_evasion(),
             Action::Rejoin => self.resume_interrupted_state(from, to),
             Action::TurnBack => {
-                self.detours.home.cancel();
-                self.detours.give_up_plan();
+                self.detours.begin_way_back();
                 let along_m = self.guidance.progress_m(from, &self.guidance_inputs());
                 let guidance = &mut self.guidance;
                 self.mission.reverse_path(along_m, |path| guidance.reverse_path(path, now));

@@ -11,7 +11,7 @@ use planner_core::{Point, frames};
 use super::Companion;
 use crate::events::Link;
 use crate::guidance::Setpoint;
-use crate::link::frame;
+use crate::link::frame::{self, AUTOPILOT_COMPONENT};
 use crate::link::intent::{self, Intent};
 use crate::link::roster;
 use crate::link::{OnDemandMessage, done};
@@ -55,9 +55,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let mut payload = [0; 133];
             let len = self.own_intent().encode(&mut payload);
             let header = self.links.intent_header(system, self.reported_points_end_m(), self.now);
-            if self.guidance.hold.is_reported() {
-                self.guidance.hold.note_reported(self.now);
-            }
+            self.guidance.note_intent_sent(self.now);
             return encode_tunnel(header, &payload[..len], out);
         }
         if link == Link::Swarm
@@ -185,7 +183,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 None => mask,
             }),
             target_system: self.config.system_id,
-            target_component: crate::AUTOPILOT_COMPONENT,
+            target_component: AUTOPILOT_COMPONENT,
             coordinate_frame: MavFrame::MAV_FRAME_LOCAL_NED,
             ..SET_POSITION_TARGET_LOCAL_NED_DATA::default()
         })

@@ -80,6 +80,30 @@ impl Guidance {
         self.start_following(now);
     }
 
+    /// Notes that the path just begun ends aside or back on the plan's path: no descent begins at
+    /// its end.
+    pub(crate) fn note_end_away_from_goal(&mut self) {
+        self.ends_away_from_goal = true;
+    }
+
+    /// Sets the share of the nominal speed that the error bound of the position estimate allows; 0
+    /// stops. Returns the share before.
+    pub(crate) fn set_estimate_speed_share(&mut self, share: f32) -> f32 {
+        core::mem::replace(&mut self.estimate_speed_share, share)
+    }
+
+    /// Whether the hold has begun or ended since the last call.
+    pub(crate) fn take_hold_changed(&mut self) -> bool {
+        core::mem::take(&mut self.hold_changed)
+    }
+
+    /// Notes that an intent was sent: it reports the hold, if there is one.
+    pub(crate) fn note_intent_sent(&mut self, now: Instant) {
+        if self.hold.is_reported() {
+            self.hold.note_reported(now);
+        }
+    }
+
     /// Begins another path, at the place `along_m` metres along it; the setpoint stands there.
     pub(crate) fn begin_path_at(&mut self, along_m: f32, now: Instant) {
         self.begin_path(now);

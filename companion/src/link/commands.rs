@@ -8,7 +8,7 @@
 //! answered only if it names this system id: a broadcast acts on every vehicle, and none answers.
 //! An unknown command to all components belongs to another component and stays unanswered.
 
-use crate::link::frame::Frame;
+use crate::link::frame::{COMPANION_COMPONENT, Frame};
 use crate::mission::{Guard, GuardInputs, MAX_POSITION_AGE, State, has_row_for};
 use crate::time::{Duration, Instant};
 
@@ -110,8 +110,8 @@ pub fn read_command(frame: &Frame, system: u8) -> Option<Command> {
     // target component.
     let (target_system, target_component) = (p[30], p[31]);
     let for_system = target_system == 0 || target_system == system;
-    let for_component = target_component == 0 || target_component == crate::COMPANION_COMPONENT;
-    let own_echo = frame.system == system && frame.component == crate::COMPANION_COMPONENT;
+    let for_component = target_component == 0 || target_component == COMPANION_COMPONENT;
+    let own_echo = frame.system == system && frame.component == COMPANION_COMPONENT;
     if !for_system || !for_component || own_echo {
         return None;
     }
@@ -126,7 +126,7 @@ pub fn read_command(frame: &Frame, system: u8) -> Option<Command> {
         .then(|| (whole(16), whole(20), float(24))),
         from: (frame.system, frame.component),
         to_our_system: target_system == system,
-        to_our_component: target_component == crate::COMPANION_COMPONENT,
+        to_our_component: target_component == COMPANION_COMPONENT,
     })
 }
 

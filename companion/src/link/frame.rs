@@ -23,6 +23,10 @@ use mavlink::{MavlinkVersion, Message, MessageData};
 
 use crate::time::{Duration, Instant};
 
+/// Our component id, `MAV_COMP_ID_ONBOARD_COMPUTER`.
+pub const COMPANION_COMPONENT: u8 = 191;
+/// The autopilot's component id, `MAV_COMP_ID_AUTOPILOT1`.
+pub const AUTOPILOT_COMPONENT: u8 = 1;
 /// Time after its first byte was received at which an incomplete frame is dropped.
 pub const PARTIAL_LIFETIME: Duration = Duration::from_millis(100);
 /// Longest frame without its signature, bytes: 10 of header, 255 of payload, 2 of CRC.

@@ -11,7 +11,7 @@ use mavlink::dialects::ardupilotmega::{
     PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
 };
 
-use crate::link::frame::{self, Header};
+use crate::link::frame::{self, AUTOPILOT_COMPONENT, COMPANION_COMPONENT, Header};
 
 /// Most messages in a link's queue.
 pub const QUEUE_DEPTH: usize = 32;
@@ -132,7 +132,7 @@ impl Outbox {
     pub fn next_header(&mut self, system: u8) -> Header {
         let sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);
-        Header { system, component: crate::COMPANION_COMPONENT, sequence }
+        Header { system, component: COMPANION_COMPONENT, sequence }
     }
 
     /// Removes the first queued message and writes it as a frame. Returns its length, 0 if the
@@ -146,7 +146,7 @@ impl Outbox {
             param2,
             param3,
             target_system: system,
-            target_component: crate::AUTOPILOT_COMPONENT,
+            target_component: AUTOPILOT_COMPONENT,
             ..COMMAND_LONG_DATA::default()
         };
         let long = match message {
@@ -175,7 +175,7 @@ impl Outbox {
                 let read = PARAM_REQUEST_READ_DATA {
                     param_index: -1,
                     target_system: system,
-                    target_component: crate::AUTOPILOT_COMPONENT,
+                    target_component: AUTOPILOT_COMPONENT,
                     param_id: name.into(),
                 };
                 return frame::encode(header, &read, out);
@@ -184,7 +184,7 @@ impl Outbox {
                 let set = PARAM_SET_DATA {
                     param_value,
                     target_system: system,
-                    target_component: crate::AUTOPILOT_COMPONENT,
+                    target_component: AUTOPILOT_COMPONENT,
                     param_id: name.into(),
                     param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
                 };

@@ -16,9 +16,9 @@ const UNBARRED_AFTER: Duration = Duration::from_secs(5);
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Waits {
     /// The wait for another vehicle that has not started.
-    pub(crate) report: WaitReport,
+    pub(super) report: WaitReport,
     /// How long the start of this vehicle has been barred.
-    pub(crate) barred_start: BarredStart,
+    pub(super) barred_start: BarredStart,
 }
 
 /// System id of the vehicle that this one waits for, 0 for none, and since when: since the wait

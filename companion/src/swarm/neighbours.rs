@@ -9,7 +9,7 @@
 mod bounds;
 mod contact;
 mod division;
-mod met;
+pub(crate) mod met;
 mod places;
 mod reach;
 pub(crate) mod relay;
@@ -27,7 +27,6 @@ use planner_core::{Length, Point};
 pub(crate) use self::bounds::MAX_HOVER_MPS;
 use self::bounds::*;
 use self::contact::NeighbourEntry;
-pub(crate) use self::met::{FilterNeighbour, ReachQuery};
 use crate::autopilot::telemetry::SequenceFilter;
 use crate::config::{Ground, REACHES_ALL_M, RosterEntry};
 use crate::link::echo::{IntentEcho, MessageDelay};

@@ -8,13 +8,13 @@ use crate::itinerary::MissionLeg;
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Auto {
     /// Whether the vehicle may take off (`auto_armed`).
-    pub may_lift: bool,
+    pub(super) may_lift: bool,
     /// Leg of the mission that is flown now.
-    pub leg: Option<MissionLeg>,
+    pub(super) leg: Option<MissionLeg>,
     /// Start of that leg, ENU metres.
-    pub from: Point,
+    pub(super) from: Point,
     /// Point at which the vehicle holds while no leg moves it, ENU metres.
-    pub stay: Option<Point>,
+    pub(super) stay: Option<Point>,
     /// Heading of the last leg, radians clockwise from north.
-    pub heading: Option<f32>,
+    pub(super) heading: Option<f32>,
 }

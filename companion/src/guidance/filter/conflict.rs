@@ -2,14 +2,15 @@
 //! first.
 
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{self, MotionBounds, OwnSet, PointsReach, REACTION_S, ReachableSet};
+use planner_core::safety::{self, MotionBounds, OwnSet, REACTION_S, ReachableSet};
 use planner_core::{Length, Point};
 
 use super::super::{Guidance, GuidanceInputs, Phase};
 use super::{FilterConflict, MAX_STOP_FOR_STRANGER};
 use crate::autopilot::telemetry::Telemetry;
 use crate::mission::State;
-use crate::swarm::neighbours::{FilterNeighbour, Neighbours, ReachQuery};
+use crate::swarm::neighbours::Neighbours;
+use crate::swarm::neighbours::met::{FilterNeighbour, ReachQuery};
 use crate::time::{Duration, Instant};
 
 /// Flight time along the other vehicle's points that has to be free before a vehicle that yields
@@ -118,23 +119,21 @@ impl Guidance {
             }
             if by_gates {
                 // Gates keep two vehicles on the plan apart, whatever the delay of their messages.
-                met.motion.delay_s = 0.0;
+                met.ignore_delay();
             }
             if met.lost && !(lands || deaf) && neighbours.may_fly_on_unheard(contact, now, &reach) {
                 // Where no neighbour is heard this vehicle's receiver may have failed: the others
                 // are not lost, they fly on.
-                (met.motion.age_s, met.motion.grounded) = (bounds.silent_s, false);
+                met.fly_on_for(bounds.silent_s);
             }
             let silent = met.lost || met.motion.age_s > safety::FRESH_S;
             if (lands || deaf) && silent {
                 // A landing, and the flight aside before it, does not wait for where a silent
                 // vehicle may fly, only for where it may have stopped.
-                (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
-                met.motion.points_reach = PointsReach::OPEN;
-                met.motion.rests_within_m = 0.0;
+                met.stop_at_last_position();
             }
             if follows && contact.flies_all_points_unheard() && !(by_gates || met.lost) {
-                contact.limit_to_points(&mut met.motion, bounds);
+                met.limit_to_points(contact, bounds);
             }
             let ahead_s =
                 if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };

@@ -19,21 +19,21 @@ pub(super) const RECORD_MAGIC: [u8; 4] = *b"FLKR";
 #[derive(Clone, Debug)]
 pub struct Journal {
     /// Condition of each half.
-    pub halves: [AreaCondition; 2],
+    pub(super) halves: [AreaCondition; 2],
     /// The sealed half whose records count; `None` if there is none.
-    pub active: Option<usize>,
+    pub(super) active: Option<usize>,
     /// Offset of the next record in the storage bank; the half's end if it takes no more.
-    pub end: u32,
+    pub(super) end: u32,
     /// Range of the mission file in the storage bank; `None` if there is none.
-    pub mission: Option<Range<u32>>,
+    pub(super) mission: Option<Range<u32>>,
     /// CRC-32 of the mission file, as in its record.
-    pub mission_crc: u32,
+    pub(super) mission_crc: u32,
     /// Whether the mission file was removed and no record says so yet.
-    pub removed: bool,
+    pub(super) removed: bool,
     /// The compaction under way: the other half is being filled.
-    pub compacting: Option<Compaction>,
+    pub(super) compacting: Option<Compaction>,
     /// Failed attempts in a row to write a record or a half.
-    pub failures: u8,
+    pub(super) failures: u8,
 }
 
 impl Default for Journal {

@@ -23,15 +23,15 @@ pub(super) const MAX_JOURNAL_TRIES: u8 = 4;
 /// A record of the journal that is being written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JournalRecord {
-    pub kind: RecordKind,
+    pub(super) kind: RecordKind,
     /// Offset of the record's head in the storage bank.
-    pub at: u32,
-    pub len: u32,
-    pub crc: u32,
-    pub source: RecordSource,
-    pub step: RecordStep,
-    pub done: u32,
-    pub sum: u32,
+    pub(super) at: u32,
+    pub(super) len: u32,
+    pub(super) crc: u32,
+    pub(super) source: RecordSource,
+    pub(super) step: RecordStep,
+    pub(super) done: u32,
+    pub(super) sum: u32,
 }
 
 impl JournalRecord {
@@ -60,10 +60,10 @@ pub enum RecordStep {
 /// Compaction: the journal's other half is being filled with copies of the records that count.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Compaction {
-    pub half: usize,
-    pub at: u32,
+    pub(super) half: usize,
+    pub(super) at: u32,
     /// Next record to be copied: 0 parameters, 1 photographed waypoints, 2 mission, 3 the half's
     /// seal.
-    pub step: u8,
-    pub mission: Option<Range<u32>>,
+    pub(super) step: u8,
+    pub(super) mission: Option<Range<u32>>,
 }

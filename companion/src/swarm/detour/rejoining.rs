@@ -5,7 +5,7 @@
 use super::path_kind::{DetourPurpose, PathKind, RejoinPlace, RejoinPlaces};
 use super::{Detours, beside};
 use crate::swarm::view::DetourView;
-use crate::time::Duration;
+use crate::time::{Duration, Instant};
 
 /// Time for which a vehicle aside waits until the place where it left its path is free, seconds:
 /// less than the time after which it flies home.
@@ -89,6 +89,18 @@ impl Detours {
     /// Gives up rejoining the plan's path: a vehicle beside it is from now on astray.
     pub(crate) fn give_up_plan(&mut self) {
         self.path_kind = self.path_kind.without_rejoin();
+    }
+
+    /// The vehicle turns home: it seeks a path there and gives up the plan's.
+    pub(crate) fn begin_way_home(&mut self, now: Instant) {
+        self.give_up_plan();
+        self.home.begin(now);
+    }
+
+    /// The vehicle flies back the way that it came: it seeks no path home and gives up the plan's.
+    pub(crate) fn begin_way_back(&mut self) {
+        self.give_up_plan();
+        self.home.cancel();
     }
 
     /// Makes the plan's path the one flown, if it has come again from the shell.

@@ -35,6 +35,30 @@ pub(crate) struct FilterNeighbour<'a> {
     pub(crate) before_climb: Option<Point>,
 }
 
+impl<'a> FilterNeighbour<'a> {
+    /// The delay of the neighbour's messages no longer counts.
+    pub(crate) fn ignore_delay(&mut self) {
+        self.motion.delay_s = 0.0;
+    }
+
+    /// The neighbour counts as one that has flown on, unheard, for `age_s` seconds.
+    pub(crate) fn fly_on_for(&mut self, age_s: f32) {
+        (self.motion.age_s, self.motion.grounded) = (age_s, false);
+    }
+
+    /// The neighbour counts as one that stands where it was last heard.
+    pub(crate) fn stop_at_last_position(&mut self) {
+        (self.motion.age_s, self.motion.speed_mps, self.motion.points) = (0.0, 0.0, &[]);
+        self.motion.points_reach = PointsReach::OPEN;
+        self.motion.rests_within_m = 0.0;
+    }
+
+    /// The neighbour, `contact`, flies no further than along the points that it reported.
+    pub(crate) fn limit_to_points(&mut self, contact: &'a NeighbourEntry, bounds: &MotionBounds) {
+        contact.limit_to_points(&mut self.motion, bounds);
+    }
+}
+
 /// Inputs of the first, cheap comparison of this vehicle with each neighbour.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReachQuery<'a> {
@@ -229,11 +253,7 @@ impl NeighbourEntry {
 
     /// In a coverage mission: for a neighbour silent for longer than a stop takes, replaces the
     /// ball around its last position by the part of its points that it may have flown since.
-    pub(crate) fn limit_to_points<'a>(
-        &'a self,
-        heard: &mut NeighbourMotion<'a>,
-        bounds: &MotionBounds,
-    ) {
+    fn limit_to_points<'a>(&'a self, heard: &mut NeighbourMotion<'a>, bounds: &MotionBounds) {
         let stopped_s = bounds.silent_s + 2.0 * heard.delay_s;
         let follows =
             !heard.points.is_empty() && matches!(self.place_on_points, PlaceOnPoints::On { .. });

@@ -4,6 +4,7 @@ use planner_core::safety::{Braking, Legs, MotionBounds, OwnSet, ReachableSet};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
+use super::met::ReachQuery;
 use super::*;
 use crate::link::intent::BLOCKED;
 
@@ -405,7 +406,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let by_gates = met.on_plan && reach.on_plan;
         let leased = table.contacts[1].flies_all_points_unheard();
         if leased && !(lands || by_gates || met.lost || reach.hears_nobody) {
-            table.contacts[1].limit_to_points(&mut met.motion, &bounds);
+            met.limit_to_points(&table.contacts[1], &bounds);
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
         let reach_m = reach.within_m + met.motion.reach_m(&bounds, ahead_s);

@@ -56,6 +56,11 @@ impl Meeting {
         }
     }
 
+    /// Drops the cases whose name does not contain `part`.
+    pub fn keep_cases_named(&mut self, part: &str) {
+        self.cases.retain(|(name, _)| name.contains(part));
+    }
+
     /// Whether more than twenty vehicles meet.
     pub fn is_large(&self) -> bool {
         self.vehicles.len() > 20

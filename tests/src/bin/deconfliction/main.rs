@@ -120,7 +120,7 @@ fn main() -> Result<()> {
     );
     let mut rows = Vec::new();
     for mut meeting in cases::all(dir)? {
-        meeting.cases.retain(|(name, _)| name.contains(&args.only));
+        meeting.keep_cases_named(&args.only);
         if meeting.cases.is_empty() || (args.small && meeting.is_large()) {
             continue;
         }
