@@ -305,8 +305,7 @@ impl Guidance {
         let position = scene.telemetry.position;
         self.unsent_s += dt_s;
         let advised_at_m = self.tracker.along_m;
-        let asks =
-            matches!(state, State::Scheduled | State::Follow | State::Blocked | State::Replanning);
+        let asks = state == State::Scheduled || state.follows_path();
         if let Some(plan) = scene.plan.filter(|_| asks) {
             let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
             let own = OwnVehicle {
@@ -349,9 +348,8 @@ impl Guidance {
             return true;
         }
         let kind = scene.telemetry.kind();
-        let taken =
-            matches!(state, State::PilotControl | State::Land | State::LandingHeld | State::Disarm)
-                && scene.telemetry.custom_mode != kind.setpoint_mode();
+        let taken = (state.lands() || matches!(state, State::PilotControl | State::Disarm))
+            && scene.telemetry.custom_mode != kind.setpoint_mode();
         self.position_unknown |= !known || state == State::PositionLost;
         let flies = scene.telemetry.on_ground == Some(false);
         let taken_before = core::mem::replace(&mut self.autopilot_took_over, taken);
@@ -380,10 +378,7 @@ impl Guidance {
             state == State::Follow && self.phase == Phase::Descent && self.filter.climbs_back(now);
         let turns = self.phase == Phase::Descent && self.leg.is_some() && up != self.climbing_back;
         let leads = self.update_guided_landing(state, scene, now);
-        let goes = known
-            && !turns
-            && (leads || matches!(state, State::Climb | State::Follow))
-            && (!urgent || up);
+        let goes = known && !turns && (leads || state.advances()) && (!urgent || up);
         let mut advice = if state == State::Follow { self.advice } else { Advice::FREE };
         advice.speed_scale = advice.speed_scale.min(self.filter.speed_scale(now));
         let path = scene.plan.map(|plan| &plan.path);
@@ -426,9 +421,7 @@ impl Guidance {
                 Some(plan) if moves => {
                     self.next_raw_point(state, scene, plan, &advice, neighbours, now, &mut blocked)
                 }
-                _ if matches!(state, State::Streaming | State::Engaging | State::Arming)
-                    && known =>
-                {
+                _ if state.prepares_take_off() && known => {
                     let away = position - self.smoother.raw_point();
                     let most = MAX_PAD_DRIFT_MPS * TICK_S;
                     let share = most / away.length().max(most);

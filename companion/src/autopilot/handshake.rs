@@ -76,7 +76,7 @@ impl Handshake {
         } else if !on_ground || t.position.z > self.disarmed_z_m + RISEN_M {
             self.flown = true;
         }
-        if matches!(state, State::Aborted | State::Done) && on_ground && !t.armed {
+        if state.is_over() && on_ground && !t.armed {
             self.in_own_mode = false;
         }
     }

@@ -129,9 +129,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             status: standing,
             waits: self.is_not_started(),
             // By the state: an autopilot may report the ground in flight.
-            airborne: !(self.is_not_started()
-                || ON_PAD.contains(&state)
-                || matches!(state, Done | Aborted)),
+            airborne: !(self.is_not_started() || ON_PAD.contains(&state) || state.is_over()),
             division: self.mission.division_count(),
             progress_dm: if flies {
                 (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16
@@ -175,8 +173,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether this vehicle is on its pad and was not started: it may take part as a new vehicle.
     pub(super) fn is_not_started(&self) -> bool {
-        use State::*;
-        matches!(self.mission.state(), WaitAutopilot | WaitPosition | Planning | Ready)
+        self.mission.state().is_before_start()
     }
 
     /// Whether this vehicle resumes, or could resume, its part after it reported that it leaves:
@@ -241,8 +238,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Task::Photograph(photographs) = &plan.task else { return None };
         let along_m = self.guidance.along_m();
         // A vehicle whose path is blocked promises to hold where it is.
-        let promise_s =
-            if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { COMMITMENT_S };
+        let promise_s = if self.mission.state().is_blocked() { 0.0 } else { COMMITMENT_S };
         let ahead_m = along_m + promise_s * self.config.cruise_mps;
         let gates_m = self.guidance.gates_open_up_to_m(&self.guidance_inputs());
         // The vehicle that it stops for may stay there: it promises no place beyond that stop.

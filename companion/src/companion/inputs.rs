@@ -141,7 +141,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             homeward: self.detours.is_homeward(),
             seeking_home_for: sought_home,
             stands_to_return: standing && self.detours.home.may_request(now),
-            in_climb: matches!(beneath, State::TakeOff | State::Climb),
+            in_climb: beneath.takes_off(),
             armed: t.armed,
             armed_unseen: handshake.is_armed_bit_overdue(now),
             arming_unrequested: handshake.is_arming_unrequested(),

@@ -41,7 +41,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether this vehicle has taken off and not finished, so that it may photograph further
     /// waypoints.
     fn has_left_pad(&self) -> bool {
-        !self.plans_with_others() && !matches!(self.mission.state(), State::Done | State::Aborted)
+        !self.plans_with_others() && !self.mission.state().is_over()
     }
 
     /// Notes, stores and reports the photographed waypoints, at 1 Hz. Those of its own path are

@@ -127,7 +127,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// for this request: an answer that comes before the shell has read the request belongs to an
     /// older one and is ignored.
     pub fn detour_request(&mut self, visit: impl FnMut(KeepOutZone)) -> Option<DetourRequest> {
-        let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);
+        let replans = self.mission.state().waits_for_detour();
         self.detours.note_request_read();
         if replans { self.detours.detour_request(&self.detour_view(), visit) } else { None }
     }

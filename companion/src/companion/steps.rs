@@ -170,7 +170,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.requests.reset_for_state(from, to);
         self.run_action(from, to, row);
         // Leaving a replanning state ends the search for a detour.
-        if matches!(from, State::Replanning | State::PadReplanning) {
+        if from.waits_for_detour() {
             self.detours.cancel_request();
         }
         if to == State::Follow {
@@ -294,8 +294,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             State::TakeOff => self.timers.set(Timer::Request, now),
             State::Land => self.request_landing(from),
             _ => {
-                let climbs =
-                    matches!(self.mission.uninterrupted_state(), State::TakeOff | State::Climb);
+                let climbs = self.mission.uninterrupted_state().takes_off();
                 if let Some(plan) = self.mission.plan() {
                     self.guidance.resume_flight(plan, climbs, &position, now);
                 }
@@ -303,7 +302,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     // Counts as blocked until the next scan has checked the path.
                     self.detours.assume_blocked();
                 }
-                if !matches!(to, State::Climb | State::Follow) {
+                if !to.advances() {
                     self.guidance.cancel_evasion();
                 }
             }

@@ -239,26 +239,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             state => !self.telemetry.armed || (!state.is_on_path() && view.is_on_ground()),
         };
         let on_plan = !self.guidance.returning
-            && matches!(
-                self.mission.state(),
-                Ready
-                    | Scheduled
-                    | PadReplanning
-                    | Streaming
-                    | Engaging
-                    | Arming
-                    | TakeOff
-                    | Climb
-                    | Follow
-                    | Blocked
-                    | Replanning
-                    | Dividing
-                    | Paused
-            )
+            && self.mission.state().is_on_plan()
             // In `Alone` a vehicle that may fly on unheard waits for its gates, so it still follows
             // the plan.
             || self.mission.state() == Alone && self.may_fly_unheard()
-            || matches!(self.mission.state(), Land | LandingHeld | Disarm | Done)
+            || (self.mission.state().lands() || self.mission.state().has_landed())
                 && self.guidance.is_at_goal(&self.guidance_inputs());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
         let out = self.detours.is_out_of_plan(&view);
@@ -276,8 +261,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// False while a pilot or a failsafe flies it: nothing then keeps it from coming down on
     /// others.
     fn is_detouring(&self) -> bool {
-        use State::*;
-        !matches!(self.mission.state(), Failsafe | PilotControl | PilotReturned | Aborted)
+        let state = self.mission.state();
+        !(state.is_flown_by_another() || state == State::Aborted)
             && (self.detours.is_on_detour()
                 || self.detours.has_left_plan()
                 || self.guidance.evading)

@@ -76,7 +76,7 @@ impl Guidance {
         let length_m = path.length_m();
         let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
         let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
-        if matches!(state, State::Disarm | State::Done) && self.has_reached_end(path) {
+        if state.has_landed() && self.has_reached_end(path) {
             // As if one metre below the ground, so that every gate that waits for this flight
             // opens.
             return length_m + plan.descent_m + 1.0;

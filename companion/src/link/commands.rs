@@ -286,7 +286,7 @@ pub fn apply_command(
             if state == PilotReturned && inputs.position_age >= MAX_POSITION_AGE {
                 return Some(TEMPORARILY_REJECTED);
             }
-            let taken = matches!(state, PilotControl | PilotReturned | Failsafe);
+            let taken = state.is_flown_by_another();
             if pending.pause && !taken && !has_row_for(state, Guard::ResumeCommanded) {
                 pending.pause = false;
                 return Some(ACCEPTED);

@@ -225,8 +225,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         if to == State::PilotControl && from != State::PilotReturned {
             self.pilot_since = now;
         }
-        let ends = matches!(to, State::Aborted | State::Done)
-            || matches!(row.action, Action::ForgetStart | Action::CancelStart);
+        let ends = to.is_over() || matches!(row.action, Action::ForgetStart | Action::CancelStart);
         self.pending.clear_carried_out(row.guard, to, ends);
         (from, to)
     }

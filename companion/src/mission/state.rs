@@ -137,8 +137,82 @@ impl State {
     /// Whether a vehicle in this state flies on along its coverage path while its lease lasts, even
     /// if no other vehicle hears it, or is about to: it prepares its take-off or climbs.
     pub(crate) fn flies_on_lease(self) -> bool {
+        self.is_on_path() || self.prepares_take_off() || self.takes_off()
+    }
+
+    /// Whether the vehicle was not started yet.
+    pub(crate) fn is_before_start(self) -> bool {
         use State::*;
-        self.is_on_path() || matches!(self, Streaming | Engaging | Arming | TakeOff | Climb)
+        matches!(self, WaitAutopilot | WaitPosition | Planning | Ready)
+    }
+
+    /// Whether the vehicle has been started and waits on its pad, disarmed.
+    pub(crate) fn waits_on_pad(self) -> bool {
+        matches!(self, Self::Scheduled | Self::PadReplanning)
+    }
+
+    /// Whether the autopilot is being brought to fly: setpoints, mode, arming.
+    pub(crate) fn prepares_take_off(self) -> bool {
+        matches!(self, Self::Streaming | Self::Engaging | Self::Arming)
+    }
+
+    /// Whether the vehicle rises from its pad to the start of its path.
+    pub(crate) fn takes_off(self) -> bool {
+        matches!(self, Self::TakeOff | Self::Climb)
+    }
+
+    /// Whether the setpoint advances: up the climb, or along the path.
+    pub(crate) fn advances(self) -> bool {
+        matches!(self, Self::Climb | Self::Follow)
+    }
+
+    /// Whether the vehicle follows its path, or would if nothing blocked it.
+    pub(crate) fn follows_path(self) -> bool {
+        self == Self::Follow || self.is_blocked()
+    }
+
+    /// Whether the vehicle stands on its path because something blocks it.
+    pub(crate) fn is_blocked(self) -> bool {
+        matches!(self, Self::Blocked | Self::Replanning)
+    }
+
+    /// Whether the shell was asked for a path other than the plan's.
+    pub(crate) fn waits_for_detour(self) -> bool {
+        matches!(self, Self::Replanning | Self::PadReplanning)
+    }
+
+    /// Whether the vehicle lands, or would if the column below were free.
+    pub(crate) fn lands(self) -> bool {
+        matches!(self, Self::Land | Self::LandingHeld)
+    }
+
+    /// Whether the vehicle is on the ground after its flight.
+    pub(crate) fn has_landed(self) -> bool {
+        matches!(self, Self::Disarm | Self::Done)
+    }
+
+    /// Whether the mission has ended, well or not.
+    pub(crate) fn is_over(self) -> bool {
+        matches!(self, Self::Done | Self::Aborted)
+    }
+
+    /// Whether somebody else flies the vehicle, or did and has not given it back.
+    pub(crate) fn is_flown_by_another(self) -> bool {
+        matches!(self, Self::PilotControl | Self::PilotReturned | Self::Failsafe)
+    }
+
+    /// Whether a vehicle in this state follows the plan that all share, and its gates.
+    pub(crate) fn is_on_plan(self) -> bool {
+        use State::*;
+        match self {
+            Ready | Follow | Paused | Dividing => true,
+            _ => {
+                self.waits_on_pad()
+                    || self.prepares_take_off()
+                    || self.takes_off()
+                    || self.is_blocked()
+            }
+        }
     }
 
     /// Whether a vehicle in this state is on its path, flying or holding: once it holds, only its

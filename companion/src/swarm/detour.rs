@@ -324,8 +324,8 @@ impl Detours {
         self.left_plan |= view.config.roster.len() > 1
             && self.is_out_of_plan(view)
             && view.mission.plan().is_some();
-        let on_ground = matches!(view.mission.state(), State::Scheduled | State::PadReplanning);
-        let stopped = matches!(view.mission.state(), State::Blocked | State::Replanning);
+        let on_ground = view.mission.state().waits_on_pad();
+        let stopped = view.mission.state().is_blocked();
         if !on_ground && !stopped && view.mission.state() != State::Follow {
             (self.blocked, self.obstructed) = (false, false);
             (self.all_standing_since, self.claimed_since, self.blocked_here) = (None, None, None);
@@ -369,7 +369,7 @@ impl Detours {
             && view.mission.state() != State::Scheduled
             && now - view.guidance.last_progress_at() > STUCK_AFTER;
         // A vehicle that stands at the end of a path aside may have swayed back a little.
-        let stands = matches!(view.mission.state(), State::Blocked | State::Replanning);
+        let stands = view.mission.state().is_blocked();
         let near_m = if stands { SWAY_ASIDE_M } else { 0.0 };
         let length_m = view.mission.plan().map_or(0.0, |plan| plan.path.length_m());
         let at_end = view.guidance.along_m() >= length_m - near_m;

@@ -83,7 +83,7 @@ impl Guidance {
     ) -> Option<FilterConflict> {
         let safety_m = self.deconflict.safety_distance_m;
         let place = scene.telemetry.position;
-        let lands = matches!(state, State::Land | State::LandingHeld);
+        let lands = state.lands();
         let hears_nobody = neighbours.hears_nobody(now);
         // Hearing nobody, the vehicle flies on only to a landing place aside.
         let deaf = hears_nobody && (lands || (self.on_path && self.ends_away_from_goal));
@@ -213,7 +213,7 @@ impl Guidance {
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
-        !self.returning && !scene.is_on_detour && !matches!(state, State::Land | State::LandingHeld)
+        !self.returning && !scene.is_on_detour && !state.lands()
     }
 
     /// Whether this vehicle lets the neighbour `met` go first: a vehicle on the plan goes before

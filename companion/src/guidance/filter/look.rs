@@ -35,9 +35,8 @@ impl Guidance {
         let position = &scene.telemetry.position;
         let ground_m = || self.landing_height_m(state, scene, plan);
         let top_m = || plan.path.point_at(0.0).map_or(position.z, |p| p.z);
-        let on_pad =
-            matches!(state, State::Scheduled | State::Streaming | State::Engaging | State::Arming);
-        let whole_column = on_pad || matches!(state, State::Land | State::LandingHeld);
+        let on_pad = state == State::Scheduled || state.prepares_take_off();
+        let whole_column = on_pad || state.lands();
         let way = match state {
             _ if on_pad => FlightDirection::Vertical { to_m: top_m(), speed_mps: 0.0 },
             State::Land | State::LandingHeld => {
@@ -186,7 +185,7 @@ impl Guidance {
                 .map_or(ground_m, |from| ground_m.min(from.z - plan.climb_m));
         }
         // A landing between pad and goal may end on ground that is lower than at either.
-        let lands = matches!(state, State::Land | State::LandingHeld);
+        let lands = state.lands();
         let between = lands && self.on_path && !self.has_reached_end(&plan.path);
         if between { ground_m - GROUND_BELOW_PAD_M } else { ground_m }
     }
@@ -229,7 +228,7 @@ impl Guidance {
             };
             plan.gates.iter().any(|gate| gate.id == id && near(gate.at_m))
         };
-        if matches!(state, State::Follow | State::Blocked | State::Replanning)
+        if state.follows_path()
             && id != 0
             && self.advice.stop_within_m.min(self.wait_distance_m) < STANDSTILL_WITHIN_M
             && !scene.plan.is_some_and(gate)
