@@ -297,7 +297,7 @@ impl Detours {
                     || !view.guidance.filter.column_clear()
                     || view.neighbours.silence_duration(now, view.mission.started_at())
                         >= UNHEARD_ON_PAD_AFTER
-                    || (held && view.guidance.advice.stop_within_m <= 0.05)
+                    || (held && !view.guidance.advice.lets_depart())
             }
             State::Follow => held && stands,
             State::Climb => {
