@@ -40,7 +40,7 @@ pub(crate) struct ReceivedFrame<'a> {
 
 impl ReceivedFrame<'_> {
     /// System id and component id of the sender.
-    fn sender_ids(&self) -> (u8, u8) {
+    pub(crate) fn sender_ids(&self) -> (u8, u8) {
         (self.frame.system, self.frame.component)
     }
 

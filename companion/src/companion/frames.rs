@@ -2,8 +2,9 @@
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA,
-    PARAM_VALUE_DATA, TUNNEL_DATA,
+    AUTOPILOT_VERSION_DATA, COMMAND_INT_DATA, COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA,
+    HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, PARAM_REQUEST_LIST_DATA, PARAM_REQUEST_READ_DATA,
+    PARAM_SET_DATA, PARAM_VALUE_DATA, TIMESYNC_DATA, TUNNEL_DATA,
 };
 
 use super::{Companion, REPORT_EVERY};
@@ -18,132 +19,154 @@ use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
 use crate::link::roster::RosterReport;
 use crate::link::{OnDemandMessage, rate_limit};
-use crate::services::ReceivedFrame;
+use crate::services::{ReceivedFrame, ftp};
 use crate::swarm::neighbours::relay::Relay;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Handles a received frame. Returns whether the mission table has to be evaluated now.
+    /// Handles a received frame: passes it to the part that its message is for. Returns whether the
+    /// mission table has to be evaluated now.
     pub(super) fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
         let own = self.config.system_id;
         let sender =
             SenderKind::from_system_id(link, frame.system, own, &self.config.ground_stations);
-        if let Some(command) = commands::read_command(frame, self.config.system_id) {
-            if sender != SenderKind::GroundStation && command.needs_authority() {
-                self.reject_command(link, sender, &command);
-                return false;
-            }
-            let now = self.now;
-            let (result, relevant) = match self.links.previous_answer(frame, now) {
-                Some(result) => (result, false),
-                None => {
-                    let result = self.handle_command(link, sender, &command);
-                    self.links.remember_answer(frame, result, now);
-                    (result, true)
-                }
-            };
-            if let Some(result) = result {
-                let ack = Outgoing::Ack { command: command.command, result, to: command.from };
-                self.links.queue_answer(self.now, link, sender, AnswerKind::Ack, ack);
-            }
-            return relevant;
-        }
         let heard = ReceivedFrame { link, sender, frame, now: self.now, own };
-        if self.services.handle_frame(&heard, &mut self.links) {
-            return false;
-        }
-        match link {
-            Link::Autopilot => {
-                if frame.system != self.config.system_id || frame.component != AUTOPILOT_COMPONENT {
-                    return false;
-                }
-                if frame.message_id == PARAM_VALUE_DATA::ID {
-                    let changed = self.requests.handle_param_value(&self.telemetry, frame);
-                    if changed && !self.mission.state().streams_setpoints() {
-                        self.guidance.set_limits(&self.config, self.requests.limits());
-                    }
-                    return false;
-                }
-                let change = self.telemetry.handle_frame(self.now, &self.config.origin, frame);
-                if let Some(ack) = self.telemetry.take_ack() {
-                    self.requests.handle_ack(
-                        &ack,
-                        own,
-                        self.mission.state(),
-                        self.now,
-                        &mut self.links,
-                    );
-                    self.mission.handle_ack(&ack, &mut self.links);
-                }
-                self.requests.update_mode_and_landed(self.mission.state(), &self.telemetry);
-                if change == TelemetryChange::OriginDoubted {
-                    self.timers.set_no_later(Timer::Origin, self.now + ORIGIN_RETRY_EVERY);
-                    return self.telemetry.origin_moved;
-                }
-                if let TelemetryChange::OriginFar(km) = change {
-                    if self.timers.take_due(Timer::OriginReport, self.now, REPORT_EVERY) {
-                        self.links.send_text_with_numbers(
-                            true,
-                            "EKF origin # km away: not used",
-                            [km, 0],
-                        );
-                    }
-                    return true;
-                }
-                if change == TelemetryChange::OriginLost {
-                    self.timers.set(Timer::Origin, self.now);
-                    // After a restart of the autopilot its telemetry streams have to be requested
-                    // again. The timer keeps a position that jumps again and again from flooding
-                    // the link.
-                    if self.timers.is_due(Timer::Streams, self.now) {
-                        self.request_streams();
-                    }
-                }
-                change == TelemetryChange::Updated
-                    && frame.message_id != LOCAL_POSITION_NED_DATA::ID
-            }
-            Link::Swarm => {
+        match frame.message_id {
+            GLOBAL_POSITION_INT_DATA::ID | TUNNEL_DATA::ID if link == Link::Swarm => {
                 self.handle_neighbour_frame(frame);
                 false
             }
+            COMMAND_LONG_DATA::ID | COMMAND_INT_DATA::ID => {
+                match commands::read_command(frame, own) {
+                    Some(command) => self.handle_command_frame(&heard, &command),
+                    None => self.handle_autopilot_frame(&heard),
+                }
+            }
+            ftp::MESSAGE_ID
+            | PARAM_REQUEST_LIST_DATA::ID
+            | PARAM_REQUEST_READ_DATA::ID
+            | PARAM_SET_DATA::ID
+            | TIMESYNC_DATA::ID => {
+                !self.services.handle_frame(&heard, &mut self.links)
+                    && self.handle_autopilot_frame(&heard)
+            }
+            PARAM_VALUE_DATA::ID => {
+                if self.is_from_autopilot(&heard) {
+                    self.handle_autopilot_parameter(frame);
+                }
+                false
+            }
+            _ => self.handle_autopilot_frame(&heard),
         }
     }
 
+    /// Handles a command of anybody, and answers it. Returns whether the mission table has to be
+    /// evaluated now.
+    fn handle_command_frame(&mut self, heard: &ReceivedFrame<'_>, command: &Command) -> bool {
+        let ReceivedFrame { link, sender, frame, now, .. } = *heard;
+        if sender != SenderKind::GroundStation && command.needs_authority() {
+            self.reject_command(link, sender, command);
+            return false;
+        }
+        let (result, relevant) = match self.links.previous_answer(frame, now) {
+            Some(result) => (result, false),
+            None => {
+                let result = self.handle_command(link, sender, command);
+                self.links.remember_answer(frame, result, now);
+                (result, true)
+            }
+        };
+        if let Some(result) = result {
+            let ack = Outgoing::Ack { command: command.command, result, to: command.from };
+            self.links.queue_answer(now, link, sender, AnswerKind::Ack, ack);
+        }
+        relevant
+    }
+
+    fn is_from_autopilot(&self, heard: &ReceivedFrame<'_>) -> bool {
+        heard.link == Link::Autopilot && heard.sender_ids() == (heard.own, AUTOPILOT_COMPONENT)
+    }
+
+    /// Handles a parameter of this vehicle's autopilot: its limits may follow from it.
+    fn handle_autopilot_parameter(&mut self, frame: &Frame) {
+        let changed = self.requests.handle_param_value(&self.telemetry, frame);
+        if changed && !self.mission.state().streams_setpoints() {
+            self.guidance.set_limits(&self.config, self.requests.limits());
+        }
+    }
+
+    /// Handles a frame of this vehicle's autopilot; any other frame changes nothing. Returns whether
+    /// the mission table has to be evaluated now.
+    fn handle_autopilot_frame(&mut self, heard: &ReceivedFrame<'_>) -> bool {
+        if !self.is_from_autopilot(heard) {
+            return false;
+        }
+        let (frame, now) = (heard.frame, self.now);
+        let change = self.telemetry.handle_frame(now, &self.config.origin, frame);
+        if let Some(ack) = self.telemetry.take_ack() {
+            let state = self.mission.state();
+            self.requests.handle_ack(&ack, heard.own, state, now, &mut self.links);
+            self.mission.handle_ack(&ack, &mut self.links);
+        }
+        self.requests.update_mode_and_landed(self.mission.state(), &self.telemetry);
+        match change {
+            TelemetryChange::OriginDoubted => {
+                self.timers.set_no_later(Timer::Origin, now + ORIGIN_RETRY_EVERY);
+                self.telemetry.origin_moved
+            }
+            TelemetryChange::OriginFar(km) => {
+                if self.timers.take_due(Timer::OriginReport, now, REPORT_EVERY) {
+                    let text = "EKF origin # km away: not used";
+                    self.links.send_text_with_numbers(true, text, [km, 0]);
+                }
+                true
+            }
+            TelemetryChange::OriginLost => {
+                self.timers.set(Timer::Origin, now);
+                // After a restart of the autopilot its telemetry streams have to be requested
+                // again. The timer keeps a position that jumps again and again from flooding the
+                // link.
+                if self.timers.is_due(Timer::Streams, now) {
+                    self.request_streams();
+                }
+                false
+            }
+            TelemetryChange::Updated => frame.message_id != LOCAL_POSITION_NED_DATA::ID,
+            TelemetryChange::None => false,
+        }
+    }
+
+    /// Handles a position or a private message of another companion.
     pub(super) fn handle_neighbour_frame(&mut self, frame: &Frame) {
-        let relevant = matches!(frame.message_id, TUNNEL_DATA::ID | GLOBAL_POSITION_INT_DATA::ID);
         let id = frame.system;
-        if !relevant
-            || id == self.config.system_id
-            || id == 0
-            || frame.component != COMPANION_COMPONENT
-        {
+        if id == self.config.system_id || id == 0 || frame.component != COMPANION_COMPONENT {
             return;
         }
         // Only a frame that decodes updates the sender's sequence number.
         if frame.message_id == TUNNEL_DATA::ID {
-            if let Some(relay) = Relay::decode(frame.padded_payload(), id) {
-                let ours = self.mission.plan().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
-                if ours && relay.mission_crc == self.config.mission_crc {
-                    self.neighbours.handle_relay(self.now, id, &relay);
-                }
-                return;
-            }
-            if let Some(roster) = RosterReport::decode(frame.padded_payload(), id) {
-                if roster.mission_crc == self.config.mission_crc {
-                    let waits = self.is_not_started();
-                    self.neighbours.handle_roster(id, &roster, waits);
-                }
-                return;
-            }
-            if let Some(report) = PhotographedReport::decode(frame.padded_payload(), id) {
-                self.handle_done_report(&report);
-                return;
-            }
-            if let Some(intent) = Intent::decode(frame.padded_payload(), id) {
-                self.handle_intent(id, frame.sequence, &intent);
-            }
+            self.handle_tunnel(frame);
         } else if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
             self.neighbours.handle_position(self.now, &self.config.origin, id, &data);
+        }
+    }
+
+    /// Handles a private message of another companion, by its payload's kind.
+    fn handle_tunnel(&mut self, frame: &Frame) {
+        let (payload, id) = (frame.padded_payload(), frame.system);
+        if let Some(relay) = Relay::decode(payload, id) {
+            let ours = self.mission.plan().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
+            if ours && relay.mission_crc == self.config.mission_crc {
+                self.neighbours.handle_relay(self.now, id, &relay);
+            }
+        } else if let Some(roster) = RosterReport::decode(payload, id) {
+            if roster.mission_crc == self.config.mission_crc {
+                let waits = self.is_not_started();
+                self.neighbours.handle_roster(id, &roster, waits);
+            }
+        } else if let Some(report) = PhotographedReport::decode(payload, id) {
+            self.handle_done_report(&report);
+        } else if let Some(intent) = Intent::decode(payload, id) {
+            self.handle_intent(id, frame.sequence, &intent);
         }
     }
 
