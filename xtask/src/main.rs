@@ -9,6 +9,7 @@ mod emulate;
 mod flash;
 mod host_tests;
 mod install;
+mod licences;
 mod shell;
 mod size;
 mod structure;
@@ -31,8 +32,10 @@ enum Command {
     Emulate(emulate::Args),
     /// Shows how much of a board's memory the firmware takes.
     Size(size::Args),
-    /// Checks the sources for import cycles, large structs and long functions.
+    /// Checks the sources: import cycles, foreign writes, sizes, lines.
     Structure,
+    /// Checks the licences of all dependencies against `deny.toml`.
+    Licences,
     /// Writes the firmware to a board behind a debug probe.
     Flash(flash::Args),
 }
@@ -45,6 +48,7 @@ fn main() -> ExitCode {
         Command::Emulate(args) => emulate::fly_for_stack_use(&args).map(drop),
         Command::Size(args) => size::run(&args),
         Command::Structure => structure::run(),
+        Command::Licences => licences::check(),
         Command::Flash(args) => flash::run_flash(&args),
     };
     match done {

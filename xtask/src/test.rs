@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use crate::bare_metal::{self, Board, Built};
 use crate::host_tests::{self, Environment, Program};
 use crate::shell::{self, cargo};
-use crate::{emulate, install, size, structure};
+use crate::{emulate, install, licences, size, structure};
 
 /// Arguments of `test`.
 #[derive(clap::Args)]
@@ -30,6 +30,7 @@ fn host() -> Result<Vec<Program>> {
         shell::run(doc.args(["-p", "companion"]).env("RUSTDOCFLAGS", "-D warnings"))
     })?;
     step("structure", structure::run)?;
+    step("licences", licences::check)?;
     step("host tests' build", host_tests::build)
 }
 
