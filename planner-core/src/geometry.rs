@@ -1,8 +1,10 @@
-//! Lengths of vectors (metres), squared distances between segments and points (m²), and clamping.
+//! Points, lengths of vectors (metres), squared distances between segments and points (m²), and
+//! clamping.
 
 use nalgebra::{Vector2, Vector3};
 
-use crate::Point;
+/// A point or vector in the mission frame: east, north, up, in metres.
+pub type Point = Vector3<f32>;
 
 /// Length of a vector by [`fpu::sqrtf`]: the same bits as nalgebra's `norm`, in a third of its
 /// instructions on a board.

@@ -51,10 +51,7 @@ mod sort;
 pub mod track;
 pub mod voxel;
 
-pub use geometry::Length;
-
-/// A point or vector in the mission frame: east, north, up, in metres.
-pub type Point = nalgebra::Vector3<f32>;
+pub use geometry::{Length, Point};
 
 /// A setting outside its allowed range; holds the setting's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

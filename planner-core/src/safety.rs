@@ -19,12 +19,11 @@
 
 mod own;
 mod place;
-
-use fpu::sqrtf;
-use heapless::Vec;
+mod set;
 
 pub use self::own::{Legs, OwnSet};
 pub use self::place::{OFF_REPORTED_PATH_M, OFF_REPORTED_PATH_S, PlaceOnPoints, PointsReach};
+pub use self::set::ReachableSet;
 use crate::{ConfigError, Point, all_positive};
 
 /// Time from a decision of the filter to the first motion that follows it, seconds: two setpoint
@@ -36,9 +35,6 @@ pub const MAX_LAG_S: f32 = 0.25;
 /// Age up to which the last report of a neighbour is fresh, seconds; after that the neighbour is
 /// stale.
 pub const FRESH_S: f32 = 1.0;
-/// Most points of a reachable set: the vehicle's position and the eight path points that it
-/// reports.
-const MAX_SET_POINTS: usize = 9;
 
 /// Limits by which a vehicle stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,114 +51,6 @@ impl Braking {
     pub fn stop_m(&self, speed_mps: f32) -> f32 {
         let ramp_s = self.accel_mps2 / self.jerk_mps3;
         0.5 * speed_mps * (speed_mps / self.accel_mps2 + ramp_s)
-    }
-}
-
-/// Places where a vehicle can be: all within `widened_by_m` of a polyline and of a vertical column
-/// that may stand below its first point.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ReachableSet {
-    points: Vec<Point, MAX_SET_POINTS>,
-    /// Lower end of the column; `None` if there is no column.
-    foot: Option<Point>,
-    /// Distance from polyline and column up to which the vehicle can be, metres.
-    pub widened_by_m: f32,
-}
-
-impl ReachableSet {
-    /// A set of one point.
-    #[inline]
-    pub fn at(place: Point) -> Self {
-        let mut points = Vec::new();
-        // Cannot overflow: it is the first of nine.
-        let _ = points.push(place);
-        Self { points, foot: None, widened_by_m: 0.0 }
-    }
-
-    /// Appends a straight leg to a point. Returns false, and appends nothing, if the set is full.
-    fn push(&mut self, to: Point) -> bool {
-        self.points.push(to).is_ok()
-    }
-
-    /// The set from `place` along the points `ahead`, for `length_m` from the first of them. The
-    /// set ends where the points end.
-    #[inline]
-    pub fn along(place: Point, ahead: impl Iterator<Item = Point>, length_m: f32) -> Self {
-        let mut set = Self::at(place);
-        set.extend_along(ahead, length_m);
-        set
-    }
-
-    /// Extends a set of one point in place as [`Self::along`] does: copying a set that
-    /// [`Self::along`] returns takes long on a board.
-    #[inline]
-    pub fn extend_along(&mut self, ahead: impl Iterator<Item = Point>, length_m: f32) {
-        let (mut left_m, mut last) = (length_m, None);
-        for point in ahead {
-            let Some(from) = last.replace(point) else {
-                self.push(point);
-                continue;
-            };
-            let leg: Point = point - from;
-            let leg_m = sqrtf(leg.norm_squared());
-            let end = if leg_m > left_m { from + leg * (left_m / leg_m) } else { point };
-            if !self.push(end) {
-                // There is no room for more corners: the vehicle may be anywhere within the
-                // remaining length.
-                self.widened_by_m = left_m.max(0.0);
-                return;
-            }
-            left_m -= leg_m;
-            if left_m <= 0.0 {
-                return;
-            }
-        }
-    }
-
-    /// The set from `place` vertically up or down to the height `to_m`, metres up in the mission
-    /// frame.
-    pub fn vertical(place: Point, to_m: f32) -> Self {
-        let mut set = Self::at(place);
-        set.push(Point::new(place.x, place.y, to_m));
-        set
-    }
-
-    /// Adds the column below the first point down to the height `to_m`; no column if `to_m` is
-    /// `None` or not below the point.
-    fn add_column(&mut self, to_m: Option<f32>) {
-        let first = self.points[0];
-        self.foot = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
-    }
-
-    /// Legs of the set, at least one, and the column.
-    #[inline]
-    fn segments(&self) -> Segments<'_> {
-        let first = &self.points[0];
-        let next = if self.points.len() > 1 { &self.points[1..] } else { &self.points[..] };
-        Segments {
-            from: first,
-            next: next.iter(),
-            column: self.foot.as_ref().map(|foot| (first, foot)),
-        }
-    }
-}
-
-/// Iterator of [`ReachableSet::segments`]: the legs from point to point, then the column.
-struct Segments<'a> {
-    from: &'a Point,
-    next: core::slice::Iter<'a, Point>,
-    column: Option<(&'a Point, &'a Point)>,
-}
-
-impl<'a> Iterator for Segments<'a> {
-    type Item = (&'a Point, &'a Point);
-
-    #[inline]
-    fn next(&mut self) -> Option<Self::Item> {
-        match self.next.next() {
-            Some(to) => Some((core::mem::replace(&mut self.from, to), to)),
-            None => self.column.take(),
-        }
     }
 }
 

@@ -306,7 +306,7 @@ fn max_usize(a: usize, b: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::flight::tests::corner_path;
+    use crate::flight::path::tests::corner_path;
 
     #[test]
     fn a_stop_that_is_advised_too_late_is_as_long_as_flown() {

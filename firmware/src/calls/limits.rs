@@ -238,7 +238,7 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
 }
 
 fn call_paths(to: &mut Results<'_, impl Listener>) {
-    let mut path: Path<4> = to.call("flight::Path::new", Path::new);
+    let mut path: Path<4> = to.call("path::Path::new", Path::new);
     let track = TrackConfig::default();
     assert!(
         track::advance(&track, &path, &mut ReferenceState::default(), &Advice::FREE, 0.05)
@@ -248,28 +248,27 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
     for round in 0..3 {
         for p in extreme_points() {
             let before = path.waypoints().len();
-            let pushed = to.call("flight::Path::push", || path.push(p, p.x));
+            let pushed = to.call("path::Path::push", || path.push(p, p.x));
             assert!(pushed.is_ok() || path.waypoints().len() == before);
             assert!(pushed.is_err() || p.iter().all(|c| c.is_finite()));
         }
         let _ = path.push(Point::new(round as f32, 0.0, 1.0), 1.0);
-        let length_m = to.call("flight::Path::length_m", || path.length_m());
+        let length_m = to.call("path::Path::length_m", || path.length_m());
         assert!(length_m.is_finite() && length_m >= 0.0, "{length_m}");
         for (i, &hard) in HARD_NUMBERS.iter().enumerate() {
             let other = HARD_NUMBERS[(i * 5 + round) % HARD_NUMBERS.len()];
-            to.call("flight::Path::set_times_at_speed", || path.set_times_at_speed(hard, other));
-            to.call("flight::Path::set_last_times", || path.set_last_times(hard, other));
-            to.call("flight::Path::set_times_by_leg", || {
+            to.call("path::Path::set_times_at_speed", || path.set_times_at_speed(hard, other));
+            to.call("path::Path::set_last_times", || path.set_last_times(hard, other));
+            to.call("path::Path::set_times_by_leg", || {
                 path.set_times_by_leg(hard, |from, to| (to - from).norm() * other);
             });
             let at = to
-                .call("flight::Path::point_at", || path.point_at(hard))
+                .call("path::Path::point_at", || path.point_at(hard))
                 .expect("a path with waypoints");
-            let count = to.call("flight::Path::points_from", || {
-                path.points_from(hard, other).take(20).count()
-            });
+            let count = to
+                .call("path::Path::points_from", || path.points_from(hard, other).take(20).count());
             assert_eq!(count, 20);
-            let along_m = to.call("flight::Path::project", || path.project(&at, hard, other));
+            let along_m = to.call("path::Path::project", || path.project(&at, hard, other));
             to.add(along_m);
             call_tracking(to, &path, hard, other);
         }
@@ -278,7 +277,7 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
         path = Path::new();
         let _ = path.push(Point::zeros(), 1.0);
     }
-    assert!(!to.call("flight::Path::waypoints", || path.waypoints().is_empty()));
+    assert!(!to.call("path::Path::waypoints", || path.waypoints().is_empty()));
 }
 
 /// Calls of the reference along a path, with extreme advice, time steps and limits.
@@ -316,7 +315,7 @@ fn call_tracking(to: &mut Results<'_, impl Listener>, path: &Path<4>, hard: f32,
 /// Calls of the pictures along a path, with extreme spacings.
 fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
     let last =
-        to.call("flight::Path::last_index", || path.last_index()).expect("a path with waypoints");
+        to.call("path::Path::last_index", || path.last_index()).expect("a path with waypoints");
     let waypoints = WaypointRange {
         first: PicturePlan::MAX_AREA_WAYPOINTS - 1,
         end: PicturePlan::MAX_AREA_WAYPOINTS,
@@ -450,14 +449,14 @@ fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
         let ahead: Vec<Point, 12> =
             extreme_points().chain(extreme_points()).skip(i).take(12).collect();
         let own = [
-            to.call("safety::ReachableSet::at", || ReachableSet::at(p)),
-            to.call("safety::ReachableSet::along", || {
+            to.call("set::ReachableSet::at", || ReachableSet::at(p)),
+            to.call("set::ReachableSet::along", || {
                 ReachableSet::along(p, ahead.iter().copied(), hard)
             }),
-            to.call("safety::ReachableSet::vertical", || ReachableSet::vertical(p, hard)),
+            to.call("set::ReachableSet::vertical", || ReachableSet::vertical(p, hard)),
         ];
         let mut further = own[0].clone();
-        to.call("safety::ReachableSet::extend_along", || {
+        to.call("set::ReachableSet::extend_along", || {
             further.extend_along(ahead.iter().copied(), hard);
         });
         for bounds in [bounds, sane] {

@@ -53,7 +53,7 @@ pub(super) fn call_roadmap_files(
 ) -> usize {
     let all = [0, 1, 7, u32::MAX as usize / 4, usize::MAX / 8, usize::MAX];
     for i in 0..all.len() * all.len() {
-        let len = to.call("write::encoded_len", || {
+        let len = to.call("format::encoded_len", || {
             roadmap::encoded_len(all[i % 6], all[i / 6], all[(i * 7) % 6])
         });
         assert!(len.is_none_or(|len| len <= u32::MAX as usize));
@@ -114,11 +114,11 @@ pub(super) fn call_roadmap_files(
         .expect("a good roadmap");
     let mut head = [0; roadmap::HEADER_LEN];
     head.copy_from_slice(&file[..roadmap::HEADER_LEN]);
-    assert_eq!(to.call("roadmap::declared_len", || roadmap::declared_len(&head)), Ok(len));
+    assert_eq!(to.call("format::declared_len", || roadmap::declared_len(&head)), Ok(len));
     for at in 0..head.len() {
         let mut head = head;
         head[at] ^= 0xff;
-        let answer = to.call("roadmap::declared_len", || roadmap::declared_len(&head));
+        let answer = to.call("format::declared_len", || roadmap::declared_len(&head));
         assert!(answer == Ok(len) || answer.is_err());
     }
     for cut in 0..len {
@@ -132,28 +132,28 @@ pub(super) fn call_roadmap_files(
 pub(super) const NODE_INDICES: [u16; 6] = [0, 1, 5, 6, 8, u16::MAX];
 
 pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &RoadmapView<'_>) {
-    let nodes = to.call("roadmap::RoadmapView::node_count", || view.node_count());
-    let half_edges = to.call("roadmap::RoadmapView::half_edge_count", || view.half_edge_count());
+    let nodes = to.call("view::RoadmapView::node_count", || view.node_count());
+    let half_edges = to.call("view::RoadmapView::half_edge_count", || view.half_edge_count());
     assert_eq!((nodes, half_edges), (6, 18));
-    let bytes = to.call("roadmap::RoadmapView::byte_len", || view.byte_len());
+    let bytes = to.call("view::RoadmapView::byte_len", || view.byte_len());
     to.add_count(bytes);
-    assert!(to.call("roadmap::RoadmapView::has_landmarks", || view.has_landmarks()));
-    assert_eq!(to.call("roadmap::RoadmapView::header", || *view.header()), HEADER);
-    assert_eq!(to.call("roadmap::RoadmapView::origin", || *view.origin()), HEADER.origin);
-    let crc = to.call("roadmap::RoadmapView::crc", || view.crc());
+    assert!(to.call("view::RoadmapView::has_landmarks", || view.has_landmarks()));
+    assert_eq!(to.call("view::RoadmapView::header", || *view.header()), HEADER);
+    assert_eq!(to.call("view::RoadmapView::origin", || *view.origin()), HEADER.origin);
+    let crc = to.call("view::RoadmapView::crc", || view.crc());
     to.add_count(crc as usize);
     for i in 0..NODE_INDICES.len() * NODE_INDICES.len() {
         let (a, b) = (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
         let there = usize::from(a.max(b)) < nodes;
-        let place = to.call("roadmap::RoadmapView::node", || view.node(a));
+        let place = to.call("view::RoadmapView::node", || view.node(a));
         assert_eq!(place.iter().all(|c| c.is_finite()), usize::from(a) < nodes);
-        let length_m = to.call("roadmap::RoadmapView::distance_m", || view.distance_m(a, b));
+        let length_m = to.call("view::RoadmapView::distance_m", || view.distance_m(a, b));
         assert_eq!(length_m.is_finite(), there);
-        let edge = to.call("roadmap::RoadmapView::edge_between", || view.edge_between(a, b));
+        let edge = to.call("view::RoadmapView::edge_between", || view.edge_between(a, b));
         assert!(there || edge.is_none());
         let ground_m = to.call("ground::RoadmapView::ground_m", || view.ground_m(a));
         assert_eq!(ground_m, (a < 5).then_some(0.0));
-        let degree = to.call("roadmap::RoadmapView::half_edges", || view.half_edges(a).count());
+        let degree = to.call("view::RoadmapView::half_edges", || view.half_edges(a).count());
         assert!(usize::from(a) < nodes || degree == 0);
         to.add_count(degree);
     }
@@ -166,7 +166,7 @@ pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &Roa
     let edge = view.edge_between(0, 4).expect("an edge");
     for hard in HARD_NUMBERS {
         let clears =
-            to.call("roadmap::RoadmapView::has_clearance", || view.has_clearance(&edge, hard));
+            to.call("view::RoadmapView::has_clearance", || view.has_clearance(&edge, hard));
         assert_eq!(clears, hard < 1.0, "{hard}");
     }
 }

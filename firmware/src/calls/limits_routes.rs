@@ -62,7 +62,7 @@ pub fn call_all(to: &mut Results<'_, impl Listener>, lent: &mut RouteWorkspaces)
     let len = graph::call_roadmap_files(to, &mut lent.ws.search, &mut lent.file);
     let mut sums = [to.sum(); 8];
     let view = to
-        .call("roadmap::RoadmapView::parse", || RoadmapView::parse(&lent.file[..len]))
+        .call("view::RoadmapView::parse", || RoadmapView::parse(&lent.file[..len]))
         .expect("just written");
     graph::call_roadmap_views(to, &view);
     sums[1] = to.sum();

@@ -1,6 +1,7 @@
 //! Where along its path a vehicle takes pictures, and how they are triggered.
 
-use super::{Path, PathError, Waypoint, WaypointRange};
+use super::done::WaypointRange;
+use super::path::{Path, PathError, Waypoint};
 use crate::Length;
 
 /// Tolerance of arc lengths: a picture this far ahead of the vehicle counts as reached, metres.

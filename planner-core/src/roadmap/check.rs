@@ -1,9 +1,10 @@
 //! The checks of a roadmap file's content: rows in order, each edge stored from both ends within
 //! the header's limits, and distances to landmarks that are those of shortest paths.
 
-use super::{
-    LANDMARKS, MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, RoadmapView, has_valid_coordinates,
+use super::format::{
+    LANDMARKS, MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, has_valid_coordinates,
 };
+use super::view::RoadmapView;
 
 impl RoadmapView<'_> {
     /// Checks row offsets, coordinates, targets, opposite half-edges, clearances and lengths.

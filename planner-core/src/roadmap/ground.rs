@@ -9,7 +9,8 @@
 
 use libm::{fmaxf, fminf};
 
-use super::{MAX_LANDMARK_DISTANCE_M, RoadmapError, RoadmapView};
+use super::format::{MAX_LANDMARK_DISTANCE_M, RoadmapError};
+use super::view::RoadmapView;
 use crate::Point;
 
 /// Horizontal distance within which nodes count for the ground below a point, metres.

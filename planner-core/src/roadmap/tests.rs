@@ -4,7 +4,11 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
+use super::format::{HEIGHT_LEN, LANDMARKS_LEN, WORD_LEN};
 use super::*;
+use crate::Point;
+use crate::file::{CRC32, FileError};
+use crate::frames::Geodetic;
 use crate::search::SearchWorkspace;
 
 pub(crate) fn header(starts: u16, goals: u16) -> RoadmapHeader {

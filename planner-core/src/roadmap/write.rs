@@ -1,11 +1,12 @@
 //! Writes a roadmap into the caller's buffer, without other memory: rows are counted, filled and
 //! sorted in place.
 
-use super::{
+use super::format::{
     HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_LANDMARK_DISTANCE_M, MAX_NODES,
-    NODE_LEN, RoadmapError, RoadmapHeader, RoadmapView, VERSION, VERSION_WITHOUT_HEIGHTS, WORD_LEN,
-    decode_target, has_valid_coordinates, millimetres_down,
+    NODE_LEN, RoadmapError, RoadmapHeader, VERSION, VERSION_WITHOUT_HEIGHTS, WORD_LEN,
+    decode_target, encoded_len, has_valid_coordinates, millimetres_down,
 };
+use super::view::RoadmapView;
 use crate::Point;
 use crate::file::{CRC32, FileError};
 use crate::search::{SearchWorkspace, shortest_path_tree};
@@ -20,16 +21,6 @@ pub struct Edge {
     /// Distance from the edge to the nearest obstacle, metres; stored rounded down to a millimetre,
     /// at most [`RoadmapHeader::max_clearance_m`].
     pub clearance_m: f32,
-}
-
-/// Length of a roadmap file in bytes, or `None` if it exceeds the file's 32-bit length. `columns`
-/// is how many numbers are stored per node besides its position and row offset: 0, or [`LANDMARKS`]
-/// for [`write_with_landmarks`], and one more with heights.
-pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> {
-    let a_node = columns.checked_add(4)?;
-    let words = nodes.checked_mul(a_node)?.checked_add(2)?.checked_add(edges.checked_mul(2)?)?;
-    let bytes = words.checked_mul(WORD_LEN)?.checked_add(HEADER_LEN)?;
-    u32::try_from(bytes).ok().map(|_| bytes)
 }
 
 /// Writes a roadmap without landmarks and returns its length in bytes. O(nodes + edges · log

@@ -7,7 +7,7 @@
 use fpu::sqrtf;
 use heapless::Vec;
 
-use super::{MAX_SET_POINTS, ReachableSet};
+use super::set::{MAX_SET_POINTS, ReachableSet};
 use crate::Point;
 use crate::geometry::{point_distance_sq, segments_distance_sq};
 

@@ -3,9 +3,9 @@
 mod happenings;
 mod passing;
 mod types;
+mod vehicles;
 mod ways;
 
-use companion::autopilot::AutopilotKind;
 use planner_core::Point;
 use planner_core::flight::Flight;
 use planner_core::schedule::{self, ScheduleWorkspace};
@@ -16,8 +16,9 @@ pub use self::types::{
     CLIMB_MPS, CRUISE_MPS, GATES, LIMIT_S, Lie, MeetingEvent, PLATFORM_M, Plan, SAFETY_M, SCHEDULE,
     START_S, Scene, TimedEvent, VEHICLES, Vehicle, WAYPOINTS,
 };
-use self::ways::{KINDS, Shape, fits, flight, pads, way};
-use super::autopilot::{Catch, Failsafe};
+use self::vehicles::vehicle;
+use self::ways::{KINDS, Shape, fits, flight, way};
+use super::autopilot::Catch;
 use super::dice::Dice;
 
 /// Latest departure of a vehicle, seconds.
@@ -132,34 +133,4 @@ fn liar(count: usize, dice: &mut Dice) -> (usize, Lie) {
         _ => Lie::Points(dice.direction() * dice.real(0.5, 3.0)),
     };
     (dice.below(count), lie)
-}
-
-fn vehicle(
-    flights: &[Flight<WAYPOINTS>],
-    i: usize,
-    on_plan: bool,
-    workspace: &mut ScheduleWorkspace,
-    dice: &mut Dice,
-) -> Vehicle {
-    let flight = &flights[i];
-    let mut plan = Plan {
-        task: flight.task,
-        path: flight.path.clone(),
-        climb_m: flight.climb_m,
-        descent_m: flight.descent_m,
-        depart_s: flight.depart_s,
-        gates: heapless::Vec::new(),
-        plan_crc: if on_plan { 5 } else { 100 + i as u32 },
-    };
-    if on_plan {
-        schedule::gates(&SCHEDULE, flights, i, workspace, &mut plan.gates).expect("few gates");
-    }
-    Vehicle {
-        id: flight.id,
-        kind: if dice.chance(0.6) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot },
-        pad: pads(flight)[0],
-        plan,
-        phase: dice.bits() % 40,
-        on_loss: if dice.chance(0.5) { Failsafe::Land } else { Failsafe::Return },
-    }
 }

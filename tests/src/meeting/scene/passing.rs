@@ -5,7 +5,7 @@ use planner_core::flight::Flight;
 use planner_core::schedule::{self, ScheduleWorkspace};
 
 use super::types::{LIMIT_S, MeetingEvent, SCHEDULE, START_S, Scene, TimedEvent, WAYPOINTS};
-use super::vehicle;
+use super::vehicles::vehicle;
 use super::ways::{Way, at_height, flight};
 use crate::meeting::dice::Dice;
 
