@@ -12,7 +12,7 @@ use heapless::Vec;
 
 pub use self::done::{WaypointRange, WaypointSet};
 pub use self::path::{Path, PathError, Waypoint};
-pub use self::photographs::{HeadingMode, PicturePlan, PictureStretch, Trigger};
+pub use self::photographs::{HeadingMode, PicturePlan, PictureStretch, Trigger, WaypointOrder};
 
 /// Most metres by which the progress that a standing vehicle reports may be behind its reference.
 pub const PROGRESS_ERROR_M: f32 = 0.25;

@@ -111,12 +111,19 @@ pub struct Flight {
     sent: [u32; 2],
     second_at: Instant,
     report: Report,
-    /// Whether the vehicle photographs an area, so that the fleet divides the work of a lost
-    /// vehicle.
-    over_area: bool,
+    mission: Mission,
 }
 
-fn plan(over_area: bool) -> Plan16 {
+/// What the vehicle under attack has to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Mission {
+    /// It flies to a goal.
+    Goal,
+    /// It photographs an area, so that the fleet divides the work of a lost vehicle.
+    Area,
+}
+
+fn plan(mission: Mission) -> Plan16 {
     let mut path = Path::new();
     for point in
         [Point::new(8.0, 12.0, 3.0), Point::new(20.0, 12.0, 3.0), Point::new(20.0, 30.0, 6.0)]
@@ -128,7 +135,10 @@ fn plan(over_area: bool) -> Plan16 {
     photographs
         .add_stretch(1, 1, flight::WaypointRange { first: 0, end: 1 })
         .expect("room for one");
-    let task = if over_area { Task::Photograph(photographs) } else { Task::Goto(0) };
+    let task = match mission {
+        Mission::Goal => Task::Goto(0),
+        Mission::Area => Task::Photograph(photographs),
+    };
     Plan16 { task, path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
 }
 
@@ -139,12 +149,12 @@ pub const PHASES: usize = 8;
 
 impl Flight {
     /// A vehicle on its pad, just switched on.
-    fn new(kind: AutopilotKind, over_area: bool) -> Self {
+    fn new(kind: AutopilotKind, mission: Mission) -> Self {
         let start = Point::new(8.0, 12.0, 3.0);
         let mut config: Config<4> = Config::new(ID, start, ORIGIN);
         config.mission_crc = 0xC0FFEE;
         config.geofence = Some(FENCE);
-        config.lost_vehicle_down_s = over_area.then_some(60.0);
+        config.lost_vehicle_down_s = (mission == Mission::Area).then_some(60.0);
         let other = RosterEntry { system_id: NEIGHBOUR, start: Point::new(8.0, 30.0, 3.0) };
         config.roster.push(other).expect("room for two");
         let limits = Limits { speed_mps: SPEED_MPS, fence: Some(FENCE) };
@@ -171,7 +181,7 @@ impl Flight {
             sent: [0; 2],
             second_at: Instant::ZERO,
             report: Report::default(),
-            over_area,
+            mission,
         }
     }
 
@@ -180,7 +190,8 @@ impl Flight {
     pub fn at_phase(phase: usize) -> Self {
         let kind =
             if phase.is_multiple_of(2) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
-        let mut flight = Self::new(kind, phase >= PHASES);
+        let mission = if phase >= PHASES { Mission::Area } else { Mission::Goal };
+        let mut flight = Self::new(kind, mission);
         let phase = phase % PHASES;
         flight.run(3.0);
         if phase < 2 {
@@ -316,7 +327,7 @@ impl Flight {
                 let answer = if self.companion.detour_request(|_| {}).is_some() {
                     Err(companion::PlanFailure::Unreachable)
                 } else {
-                    Ok(plan(self.over_area))
+                    Ok(plan(self.mission))
                 };
                 self.companion.handle_plan(
                     self.now,

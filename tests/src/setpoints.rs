@@ -243,15 +243,17 @@ impl SetpointCheck {
         stats.speed_mps = stats.speed_mps.max(velocity.norm());
         stats.mismatch_mps = stats.mismatch_mps.max((sent - velocity).norm());
         next.velocity = Some(velocity);
-        self.take_change(before, next, jumps);
+        let too_jerky = self.take_change(before, next);
+        if let Some(what) = too_jerky.filter(|_| !jumps) {
+            self.fault(at_s, what);
+        }
     }
 
-    /// Checks acceleration and jerk, from this setpoint and up to three before it.
-    fn take_change(&mut self, before: &Last, next: &mut Last, jumps: bool) {
+    /// Checks acceleration and jerk, from this setpoint and up to three before it. Returns what the
+    /// jerk is if it is too large.
+    fn take_change(&mut self, before: &Last, next: &mut Last) -> Option<String> {
         let (dt_s, stats) = (next.dt_s[0], &mut self.stats);
-        let (Some(velocity), Some(velocity_before)) = (next.velocity, before.velocity) else {
-            return;
-        };
+        let (velocity, velocity_before) = (next.velocity?, before.velocity?);
         let accel = (velocity - velocity_before) / (0.5 * (dt_s + before.dt_s[0]));
         next.accel = Some(accel);
         stats.accel_mps2 = stats.accel_mps2.max(accel.norm());
@@ -272,11 +274,10 @@ impl SetpointCheck {
             // A thousandth more for the rounding of the sums.
             if jerk_mps3 > most_mps3 * 1.001 {
                 stats.jerky += 1;
-                if !jumps {
-                    self.fault(next.at_s, format!("{jerk_mps3:.1} m/s³ of {most_mps3}"));
-                }
+                return Some(format!("{jerk_mps3:.1} m/s³ of {most_mps3}"));
             }
         }
+        None
     }
 }
 

@@ -141,9 +141,20 @@ impl Vehicle {
         self.folder.path().join("log")
     }
 
-    /// Plugs in, or pulls out, the cable of a port: without it no byte passes.
-    pub fn plug(&mut self, port: Port, plugged: bool) {
-        self.plugged[port as usize] = plugged;
+    /// Plugs in the cable of a port.
+    pub fn plug_in(&mut self, port: Port) {
+        self.plugged[port as usize] = true;
+        self.begin_stream(port);
+    }
+
+    /// Pulls out the cable of a port: without it no byte passes.
+    pub fn pull_out(&mut self, port: Port) {
+        self.plugged[port as usize] = false;
+        self.begin_stream(port);
+    }
+
+    /// Frames from this port begin anew.
+    fn begin_stream(&mut self, port: Port) {
         self.framers[port as usize] = Framer::new();
         self.heard.last[port as usize] = None;
     }

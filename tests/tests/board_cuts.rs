@@ -79,26 +79,33 @@ enum Cut {
 /// A board that its clients share, one after the other.
 type Shared = Arc<Mutex<EmulatedBoard>>;
 
+/// The autopilot beside a board.
+#[derive(Clone, Copy, PartialEq)]
+enum Autopilot {
+    None,
+    Disarmed,
+    Armed,
+}
+
 /// A client's link to a board's companion. It also plays an autopilot that sends heartbeats.
 struct Line {
     board: Shared,
     began: Instant,
     received: Vec<u8>,
     sent: Vec<PortBytes>,
-    /// Whether the autopilot is armed; `None`: there is no autopilot.
-    armed: Option<bool>,
+    autopilot: Autopilot,
     beat_at_us: u64,
     cut: Arc<Mutex<Cut>>,
 }
 
 impl Line {
-    fn new(board: &Shared, armed: Option<bool>, cut: &Arc<Mutex<Cut>>) -> Box<Self> {
+    fn new(board: &Shared, autopilot: Autopilot, cut: &Arc<Mutex<Cut>>) -> Box<Self> {
         Box::new(Self {
             board: Arc::clone(board),
             began: Instant::now(),
             received: Vec::new(),
             sent: Vec::new(),
-            armed,
+            autopilot,
             beat_at_us: 0,
             cut: Arc::clone(cut),
         })
@@ -113,7 +120,8 @@ impl Line {
         self.sent.push(PortBytes { port: Port::Autopilot, at_us, bytes: bytes.to_owned() });
     }
 
-    fn beat(&mut self, armed: bool) {
+    fn beat(&mut self) {
+        let armed = self.autopilot == Autopilot::Armed;
         let flags = MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED;
         let beat = HEARTBEAT_DATA {
             mavtype: MavType::MAV_TYPE_QUADROTOR,
@@ -136,11 +144,9 @@ impl Link for Line {
         if matches!(*self.cut.lock().unwrap(), Cut::At(at_us) if now_us >= at_us) {
             return Err(ErrorKind::ConnectionAborted.into());
         }
-        if let Some(armed) = self.armed
-            && now_us >= self.beat_at_us
-        {
+        if self.autopilot != Autopilot::None && now_us >= self.beat_at_us {
             self.beat_at_us = now_us + BEAT_US;
-            self.beat(armed);
+            self.beat();
         }
         let length = self.received.len().min(buffer.len());
         buffer[..length].copy_from_slice(&self.received[..length]);
@@ -208,13 +214,13 @@ fn roadmap(nodes: u32, shift_m: f32) -> Vec<u8> {
 }
 
 /// A client of a board, whose connection is cut as `cut` says.
-fn client(board: &Shared, armed: Option<bool>, cut: &Arc<Mutex<Cut>>) -> FtpClient {
-    FtpClient::new(Line::new(board, armed, cut), None)
+fn client(board: &Shared, autopilot: Autopilot, cut: &Arc<Mutex<Cut>>) -> FtpClient {
+    FtpClient::new(Line::new(board, autopilot, cut), None)
 }
 
 /// A client that has found the companion, and is never cut.
-fn uncut(board: &Shared, armed: Option<bool>) -> FtpClient {
-    let mut client = client(board, armed, &Arc::new(Mutex::new(Cut::Never)));
+fn uncut(board: &Shared, autopilot: Autopilot) -> FtpClient {
+    let mut client = client(board, autopilot, &Arc::new(Mutex::new(Cut::Never)));
     client.wait_for_companion().expect("the board is there");
     client
 }
@@ -272,7 +278,7 @@ fn cut_upload(board: &Shared, file: &[u8], part: Part, rng: &mut Pcg32) -> bool 
         Part::Taking => Cut::AfterBytes(bytes),
         Part::Sealing => Cut::Never,
     }));
-    let mut client = client(board, Some(false), &cut);
+    let mut client = client(board, Autopilot::Disarmed, &cut);
     let all = file.len() as u64;
     let sealing = |arrived| {
         if part == Part::Sealing && arrived == all {
@@ -282,14 +288,14 @@ fn cut_upload(board: &Shared, file: &[u8], part: Part, rng: &mut Pcg32) -> bool 
     client.wait_for_companion().and_then(|_| client.upload(File::Roadmap, file, sealing)).is_ok()
 }
 
-/// Stops a board; with `moves_on` it first runs the board until a word is torn (while sealing: the
-/// seal). Returns the torn words.
-fn stop(board: &Shared, part: Part, moves_on: bool, rng: &mut Pcg32) -> Vec<usize> {
+/// Stops a board once a word is torn (while sealing: the seal), at the latest after running it
+/// `most` times for a moment. Returns the torn words.
+fn stop(board: &Shared, part: Part, most: usize, rng: &mut Pcg32) -> Vec<usize> {
     let mut board = board.lock().unwrap();
-    for _ in 0..LOOKS {
+    for _ in 0..most {
         let torn = board.torn_flash_words().expect("a board");
         let found = torn.first().is_some_and(|word| part != Part::Sealing || word % SLOT == SEAL);
-        if found || !moves_on {
+        if found {
             return torn;
         }
         let until_us = board.now_us() + u64::from(rng.next_u32() % MOVE_US);
@@ -311,7 +317,7 @@ fn cut_again_and_again(program: &Path, cuts: usize, seed: u64) -> Tally {
     let mut tally = Tally::default();
     let file = roadmap(20, seed as f32);
     let mut old = crc32(&file);
-    let first = || uncut(&board, Some(false)).upload(File::Roadmap, &file, |_| ()).is_ok();
+    let first = || uncut(&board, Autopilot::Disarmed).upload(File::Roadmap, &file, |_| ()).is_ok();
     assert!((0..TRIES).any(|_| first()), "no upload is possible");
     reset(&mut board.lock().unwrap());
     for cut in 0..cuts {
@@ -319,10 +325,12 @@ fn cut_again_and_again(program: &Path, cuts: usize, seed: u64) -> Tally {
         let new = crc32(&file);
         let part = [Part::Erasing, Part::Taking, Part::Sealing][rng.next_u32() as usize % 3];
         let whole = cut_upload(&board, &file, part, &mut rng);
-        let torn = stop(&board, part, cut % 2 == 0, &mut rng);
+        let torn = stop(&board, part, if cut % 2 == 0 { LOOKS } else { 0 }, &mut rng);
         reset(&mut board.lock().unwrap());
         tally.note_torn(&torn);
-        let now = uncut(&board, Some(false)).remote_crc(File::Roadmap).expect("it holds a roadmap");
+        let now = uncut(&board, Autopilot::Disarmed)
+            .remote_crc(File::Roadmap)
+            .expect("it holds a roadmap");
         assert!(
             now == new || now == old && !whole,
             "seed {seed}, cut {cut}: the board holds {now:08x}, old is {old:08x}, new {new:08x}; torn: {torn:?}"
@@ -363,7 +371,7 @@ fn an_armed_board_erases_nothing() {
         let until_us = board.now_us() + time_us;
         board.run_grant(until_us, &[]).expect("a board");
     };
-    let mut client = uncut(&board, Some(true));
+    let mut client = uncut(&board, Autopilot::Armed);
     for _ in 0..3 {
         let refused = client.upload(File::Roadmap, &file, |_| ()).expect_err("it is armed");
         assert!(format!("{refused:#}").contains("the companion protects its file"), "{refused:#}");
@@ -383,5 +391,5 @@ fn an_armed_board_erases_nothing() {
     }
     let erased_us = board.lock().unwrap().now_us();
     assert!(erased_us > ALONE_AFTER_US, "erased after {erased_us} µs");
-    uncut(&board, None).upload(File::Roadmap, &file, |_| ()).expect("nothing is armed");
+    uncut(&board, Autopilot::None).upload(File::Roadmap, &file, |_| ()).expect("nothing is armed");
 }

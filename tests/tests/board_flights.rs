@@ -12,6 +12,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, scope};
 use std::time::{Duration, Instant};
 
+use companion::autopilot::AutopilotKind;
 use companion::storage::store::File;
 use companion::{Link as Port, State};
 use flockmate_tests::board;
@@ -82,7 +83,7 @@ const LATE_US: u64 = 100;
 fn reset_in_flight(
     vehicle: &mut Vehicle,
     how: BoardFailure,
-    brakes: bool,
+    kind: AutopilotKind,
     rng: &mut Pcg32,
 ) -> Option<String> {
     vehicle.start();
@@ -109,10 +110,11 @@ fn reset_in_flight(
         if flies {
             in_air = passed;
         }
-        !armed || brakes && passed > 2 * FINDS && flies
+        // ArduCopter brakes and hovers until its pilot lands it.
+        let hovers = kind == AutopilotKind::ArduPilot && passed > 2 * FINDS && flies;
+        !armed || hovers
     });
     if vehicle.autopilot.true_state().armed {
-        // ArduCopter brakes and hovers until its pilot lands it.
         vehicle.autopilot.set_pilot_mode(ardupilot::Mode::Land.number());
         vehicle.until("landed", |vehicle| !vehicle.autopilot.true_state().armed);
     }
@@ -153,15 +155,16 @@ fn reset_again_and_again(
     let mut lines = Vec::new();
     let mut flights = 0;
     while lines.len() < resets {
-        let brakes = (flights + seed).is_multiple_of(2);
-        let mission = missions[usize::from(brakes)];
+        let (kind, name, mission) = if (flights + seed).is_multiple_of(2) {
+            (AutopilotKind::ArduPilot, "ArduCopter", missions[1])
+        } else {
+            (AutopilotKind::Px4, "PX4", missions[0])
+        };
         let mut vehicle = Vehicle::new(program, mission, mission, rng.next_u64());
         // The autopilots alternate, so each meets every failure.
         let how = BoardFailure::ALL[(lines.len() / 2 + seed as usize) % BoardFailure::ALL.len()];
-        let outcome = reset_in_flight(&mut vehicle, how, brakes, &mut rng);
-        lines.extend(outcome.map(|line| {
-            format!("seed {seed}, {}: {line}", if brakes { "ArduCopter" } else { "PX4" })
-        }));
+        let outcome = reset_in_flight(&mut vehicle, how, kind, &mut rng);
+        lines.extend(outcome.map(|line| format!("seed {seed}, {name}: {line}")));
         flights += 1;
         assert!(flights < 10 + 4 * resets as u64, "most flights end before they are reset");
     }
@@ -208,21 +211,21 @@ fn cables_are_pulled_and_put_back_without_a_restart() {
     // is ready again. The last report counts.
     let last = |vehicle: &Vehicle, text| vehicle.heard.texts.iter().rposition(|said| said == text);
     let heard = |vehicle: &Vehicle| last(vehicle, FOUND) > last(vehicle, SILENT);
-    vehicle.plug(Port::Autopilot, false);
+    vehicle.pull_out(Port::Autopilot);
     vehicle.until(SILENT, |vehicle| !heard(vehicle));
-    vehicle.plug(Port::Autopilot, true);
+    vehicle.plug_in(Port::Autopilot);
     vehicle.until(FOUND, |vehicle| heard(vehicle));
     vehicle.start();
     vehicle.until("on its way", |vehicle| vehicle.heard.state == State::Follow || is_over(vehicle));
     vehicle.run(Duration::from_secs(1));
     // In flight: the autopilot's cable for less than its timeout, the radio's for any time.
-    vehicle.plug(Port::Autopilot, false);
+    vehicle.pull_out(Port::Autopilot);
     vehicle.run(Duration::from_millis(500));
-    vehicle.plug(Port::Autopilot, true);
+    vehicle.plug_in(Port::Autopilot);
     vehicle.run(Duration::from_secs(1));
-    vehicle.plug(Port::Swarm, false);
+    vehicle.pull_out(Port::Swarm);
     vehicle.run(Duration::from_secs(2));
-    vehicle.plug(Port::Swarm, true);
+    vehicle.plug_in(Port::Swarm);
     vehicle.until("over", is_over);
     let heard = &vehicle.heard;
     println!("{:?}", heard.texts);

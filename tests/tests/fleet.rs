@@ -72,16 +72,17 @@ impl Vehicle {
         (&self.part[..self.part.len().min(self.most)], self.part.len() > self.most)
     }
 
-    /// Flies a vehicle that has photographed its part (`done`) home along its path, and down.
-    fn fly_home(&mut self, done: bool) {
-        if self.home_s > 0.0
-            || (done && !self.fleet.is_dividing() && self.fleet.division_count() == self.division)
-        {
-            self.home_s += STEP_S;
-            self.down |= self.home_s >= HOME_S;
-            if self.home_s < HOME_S + DESCENT_S {
-                self.along_dm = self.along_dm.saturating_add(5);
-            }
+    /// Whether a vehicle that has photographed its part has no other one to expect.
+    fn may_fly_home(&self) -> bool {
+        !self.fleet.is_dividing() && self.fleet.division_count() == self.division
+    }
+
+    /// Flies home along its path, and down.
+    fn fly_home(&mut self) {
+        self.home_s += STEP_S;
+        self.down |= self.home_s >= HOME_S;
+        if self.home_s < HOME_S + DESCENT_S {
+            self.along_dm = self.along_dm.saturating_add(5);
         }
     }
 }
@@ -205,8 +206,9 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             let length = path.len();
             let (done, asks) = (at >= length, goes_on && at + 5 >= length);
             // In the other fleets each vehicle waits at the end of its part.
-            if (seed / 2).is_multiple_of(2) {
-                vehicle.fly_home(done);
+            let flies_home = vehicle.home_s > 0.0 || done && vehicle.may_fly_home();
+            if (seed / 2).is_multiple_of(2) && flies_home {
+                vehicle.fly_home();
             }
             let ends = vehicle.left_by || vehicle.down || vehicle.fleet.is_excluded();
             let standing = match (ends, done && !goes_on) {

@@ -28,10 +28,8 @@ fn report(outcomes: &[Outcome]) {
 
 #[test]
 fn nobody_is_stopped_who_passes_at_the_scheduled_separation() {
-    let outcomes: Vec<Outcome> = (0..PASSINGS)
-        .into_par_iter()
-        .map(|seed| meeting::fly(&scene::passing(seed), false))
-        .collect();
+    let outcomes: Vec<Outcome> =
+        (0..PASSINGS).into_par_iter().map(|seed| meeting::fly(&scene::passing(seed))).collect();
     report(&outcomes);
     let stops: u32 = outcomes.iter().map(|outcome| outcome.filter_stops).sum();
     println!("{stops} stops by the safety filter in {PASSINGS} passings");
@@ -62,7 +60,7 @@ fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
                 .happenings
                 .iter()
                 .any(|happening| happening.what == MeetingEvent::Caught(Catch::Wind));
-            (windy, meeting::fly(&scene, false))
+            (windy, meeting::fly(&scene))
         })
         .collect();
     // A vehicle that the wind carries off may be carried into others.
@@ -72,7 +70,7 @@ fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
     };
     if let Some((_, bad)) = outcomes.iter().find(bad) {
         println!("{}", meeting::line(bad));
-        meeting::fly(&scene::caught(bad.seed), true)
+        meeting::fly_traced(&scene::caught(bad.seed))
             .trace
             .iter()
             .for_each(|line| println!("{line}"));
@@ -93,10 +91,8 @@ const NOT_LANDED_ONCE: [u64; 14] =
 
 #[test]
 fn nobody_stays_in_the_air_where_a_wait_once_had_no_end() {
-    let outcomes: Vec<Outcome> = NOT_LANDED_ONCE
-        .into_par_iter()
-        .map(|seed| meeting::fly(&scene::scene(seed), false))
-        .collect();
+    let outcomes: Vec<Outcome> =
+        NOT_LANDED_ONCE.into_par_iter().map(|seed| meeting::fly(&scene::scene(seed))).collect();
     let bad: Vec<_> = outcomes.iter().filter(|one| one.is_bad()).map(meeting::line).collect();
     assert!(bad.is_empty(), "{bad:#?}");
 }
@@ -110,10 +106,8 @@ const BLOCKED_MOST: u32 = 15;
 
 #[test]
 fn companions_that_meet_at_random_keep_apart() {
-    let outcomes: Vec<Outcome> = (1..=MEETINGS)
-        .into_par_iter()
-        .map(|seed| meeting::fly(&scene::scene(seed), false))
-        .collect();
+    let outcomes: Vec<Outcome> =
+        (1..=MEETINGS).into_par_iter().map(|seed| meeting::fly(&scene::scene(seed))).collect();
     report(&outcomes);
     let sum = meeting::summary(&outcomes);
     // Among 10 000 meetings some failures are left: `docs/safety.md`.

@@ -70,6 +70,13 @@ enum Obeys {
     NotAtGate,
 }
 
+/// Which of the reports that a vehicle may have sent the others go by.
+#[derive(Clone, Copy)]
+enum Reports {
+    Highest,
+    Lowest,
+}
+
 struct Model {
     courses: Vec<Course>,
     obeys: Obeys,
@@ -139,9 +146,8 @@ impl Model {
         Self { courses, obeys, near }
     }
 
-    /// Whether vehicle `i` may continue from its stretch, if reports are as high as possible
-    /// (`most`) or as low as possible.
-    fn goes_on(&self, state: &State, i: usize, most: bool) -> bool {
+    /// Whether vehicle `i` may continue from its stretch.
+    fn goes_on(&self, state: &State, i: usize, reports: Reports) -> bool {
         let course = &self.courses[i];
         if state[i] >= course.last() {
             return false;
@@ -152,16 +158,16 @@ impl Model {
                 return true;
             }
             let (k, landed) = (usize::from(at), at == other.last());
-            let reported_m = match (k, most) {
+            let reported_m = match (k, reports) {
                 (0, _) => other.marks[0],
                 _ if landed => other.marks[k] + 1.0,
                 // The other vehicle may be anywhere on its stretch: some report is this high, but
                 // none is beyond the ground ...
-                (_, true) => {
+                (_, Reports::Highest) => {
                     (other.marks[k] + PROGRESS_ERROR_M).min(other.marks[usize::from(other.last())])
                 }
                 // ... and once it stands at the end of the stretch, no report is lower than this.
-                (_, false) => other.marks[k + 1] - PROGRESS_ERROR_M,
+                (_, Reports::Lowest) => other.marks[k + 1] - PROGRESS_ERROR_M,
             };
             match self.obeys {
                 Obeys::Right => reported_m >= until_m - ROUNDING_M,
@@ -172,13 +178,13 @@ impl Model {
     }
 
     /// The stretch that each vehicle reaches if it goes as far as it may, but no further than
-    /// `until`; `most` as in [`Self::goes_on`]. Vehicles may begin out of the plan.
-    fn furthest(&self, begin: State, until: State, most: bool) -> State {
+    /// `until`. Vehicles may begin out of the plan.
+    fn furthest(&self, begin: State, until: State, reports: Reports) -> State {
         let mut state = begin;
         loop {
             let before = state;
             for i in 0..self.courses.len() {
-                while state[i] < until[i] && self.goes_on(&state, i, most) {
+                while state[i] < until[i] && self.goes_on(&state, i, reports) {
                     state[i] += 1;
                 }
             }
@@ -197,7 +203,7 @@ impl Model {
             self.near[i][j].iter().any(|&(at, other)| {
                 let mut until = begin;
                 (until[i], until[j]) = (at, other);
-                self.furthest(begin, until, true) == until
+                self.furthest(begin, until, Reports::Highest) == until
             })
         })
     }
@@ -206,7 +212,7 @@ impl Model {
     fn sticks(&self) -> bool {
         let last = |i: usize| self.courses.get(i).map_or(0, Course::last);
         let ends = std::array::from_fn(last);
-        self.furthest([0; 4], ends, false) != ends
+        self.furthest([0; 4], ends, Reports::Lowest) != ends
     }
 
     fn search(&self) -> Outcome {
@@ -222,7 +228,7 @@ impl Model {
                     }
                 }
                 ends &= state[i] >= self.courses[i].last();
-                moves |= self.goes_on(&state, i, false);
+                moves |= self.goes_on(&state, i, Reports::Lowest);
             }
             if !ends && !moves {
                 return Outcome::Deadlock;
@@ -235,7 +241,7 @@ impl Model {
                         open.push_back(next);
                     }
                 };
-                if self.goes_on(&state, i, true) {
+                if self.goes_on(&state, i, Reports::Highest) {
                     reach(state[i] + 1);
                 }
                 if state[i] < self.courses[i].last() {

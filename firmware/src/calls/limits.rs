@@ -7,7 +7,9 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, OwnVehicle};
-use planner_core::flight::{HeadingMode, Path, PicturePlan, Task, Trigger, WaypointRange};
+use planner_core::flight::{
+    HeadingMode, Path, PicturePlan, Task, Trigger, WaypointOrder, WaypointRange,
+};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::prm::{self, Config, PrmError, Sampling};
 use planner_core::safety::{
@@ -332,7 +334,9 @@ fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
             assert_eq!(marked.is_ok(), from <= until && until < PicturePlan::MAX_PATH_WAYPOINTS);
         }
         let plan = to.call("photographs::PicturePlan::with_area", || {
-            plan.with_area(u32::MAX, spacing_m > 0.0)
+            let order =
+                if spacing_m > 0.0 { WaypointOrder::Falling } else { WaypointOrder::Rising };
+            plan.with_area(u32::MAX, order)
         });
         assert_eq!(
             to.call("photographs::PicturePlan::area_waypoint_count", || plan.area_waypoint_count()),

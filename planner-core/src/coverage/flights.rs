@@ -16,7 +16,7 @@ use super::lanes::Lane;
 use super::pack::{Plan, Route, RouteDirection, Vehicle, Work};
 use crate::field::follow::TerrainFollowing;
 use crate::flight::{
-    Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointRange,
+    Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointOrder, WaypointRange,
 };
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{
@@ -365,7 +365,8 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
         .fold(0, u32::saturating_add);
     let area = work.tracks.waypoint_count().saturating_add(done);
     let backward = route.heading == RouteDirection::Backward;
-    let mut photographs = PicturePlan::new(waypoint_m, look, trigger).with_area(area, backward);
+    let order = if backward { WaypointOrder::Falling } else { WaypointOrder::Rising };
+    let mut photographs = PicturePlan::new(waypoint_m, look, trigger).with_area(area, order);
     let mission_m = work.heights.mission_m;
     let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
     let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);

@@ -28,6 +28,15 @@ pub enum Trigger {
     None,
 }
 
+/// Order of the area's waypoint numbers along a path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WaypointOrder {
+    /// The numbers rise.
+    Rising,
+    /// The numbers fall: the path follows the lanes backwards.
+    Falling,
+}
+
 /// A stretch of a path along which pictures are taken: one at each end, and between them more at
 /// equal distances over ground. Arc lengths in metres. Where one picture is enough, both ends are
 /// the same.
@@ -136,9 +145,8 @@ pub struct PicturePlan {
     numbers: [u16; Self::MAX_STRETCHES],
     /// For each stretch, in order, the number of its pictures.
     counts: [u16; Self::MAX_STRETCHES],
-    /// Whether the area's waypoint numbers fall along the path, which then follows the lanes
-    /// backwards.
-    backward: bool,
+    /// Order of the area's waypoint numbers along the path.
+    order: WaypointOrder,
     /// Number of waypoints of the whole area; 0 if not set by [`Self::with_area`].
     area: u32,
     /// Greatest distance over ground between neighbouring pictures, metres.
@@ -168,7 +176,7 @@ impl PicturePlan {
             ends: 0,
             numbers,
             counts,
-            backward: false,
+            order: WaypointOrder::Rising,
             area: 0,
             spacing_m,
             heading_mode: look,
@@ -177,10 +185,9 @@ impl PicturePlan {
         }
     }
 
-    /// The same plan for an area of `area` waypoints, whose numbers rise along the path, or fall if
-    /// `backward`.
-    pub const fn with_area(self, area: u32, backward: bool) -> Self {
-        Self { area, backward, ..self }
+    /// The same plan for an area of `area` waypoints, whose numbers along the path have this order.
+    pub const fn with_area(self, area: u32, order: WaypointOrder) -> Self {
+        Self { area, order, ..self }
     }
 
     /// Number of waypoints of the whole area; 0 if not set by [`Self::with_area`].
@@ -285,12 +292,15 @@ impl PicturePlan {
         path: &Path<W>,
         pictures: WaypointRange,
     ) -> impl Iterator<Item = WaypointRange> {
-        let (mut before, backward) = (0u32, self.backward);
+        let (mut before, order) = (0u32, self.order);
         self.corners_and_counts(path).zip(self.numbers).filter_map(move |((_, count), number)| {
             let within = |picture: u32| picture.saturating_sub(before).min(count);
             let (from, to) = (within(pictures.first), within(pictures.end));
             before = before.saturating_add(count);
-            let skipped = if backward { count - to } else { from };
+            let skipped = match order {
+                WaypointOrder::Rising => from,
+                WaypointOrder::Falling => count - to,
+            };
             let first = u32::from(number).saturating_add(skipped);
             (from < to).then(|| WaypointRange { first, end: first.saturating_add(to - from) })
         })
@@ -377,11 +387,12 @@ mod tests {
 
     #[test]
     fn pictures_have_the_numbers_of_their_waypoints_both_ways() {
-        for (backward, [part, whole]) in
-            [(false, [(30, 33), (30, 35)]), (true, [(32, 35), (30, 35)])]
-        {
-            let mut photographs = PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance)
-                .with_area(50, backward);
+        for (order, [part, whole]) in [
+            (WaypointOrder::Rising, [(30, 33), (30, 35)]),
+            (WaypointOrder::Falling, [(32, 35), (30, 35)]),
+        ] {
+            let mut photographs =
+                PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance).with_area(50, order);
             mark_three(&mut photographs);
             let path = path();
             let shown = |first, end| -> std::vec::Vec<_> {

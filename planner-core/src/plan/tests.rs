@@ -53,15 +53,22 @@ fn open_roadmap(terminals: &[Point], starts: usize, nodes: usize, seed: u64) -> 
     bytes
 }
 
-fn tasks(count: usize, labelled: bool) -> StdVec<VehicleTask> {
+fn tasks(count: usize) -> StdVec<VehicleTask> {
     (0..count)
         .map(|i| VehicleTask {
             id: i as u8 + 1,
             required_clearance_m: 0.8,
             climb_m: HEIGHT_M,
-            goal: labelled.then_some(i as u16),
+            goal: None,
         })
         .collect()
+}
+
+/// Tasks of vehicles that each have a goal of their own.
+fn labelled_tasks(count: usize) -> StdVec<VehicleTask> {
+    let mut tasks = tasks(count);
+    tasks.iter_mut().zip(0..).for_each(|(task, goal)| task.goal = Some(goal));
+    tasks
 }
 
 fn plan(
@@ -119,13 +126,13 @@ proptest! {
         // A terminal in a corner may have no node within reach, or none that leads to the others.
         let connected = connected(&view);
         prop_assume!((0..20).all(|terminal| connected.contains(&terminal)));
-        let mode =
+        let (tasks, mode) =
             if labelled {
-                GoalMode::Labelled
+                (labelled_tasks(10), GoalMode::Labelled)
             } else {
-                GoalMode::Unlabelled(Objective::TotalDistance)
+                (tasks(10), GoalMode::Unlabelled(Objective::TotalDistance))
             };
-        let plan = plan(&bytes, &tasks(10, labelled), 10, mode).unwrap();
+        let plan = plan(&bytes, &tasks, 10, mode).unwrap();
         prop_assert!(plan.flights.iter().all(|f| f.task.leaves_pad()));
         let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 40_000);
         prop_assert!(
@@ -177,7 +184,7 @@ fn head_on_in_a_corridor_one_steps_into_the_side_room() {
         [8.0, 14.0, 16.0, 22.0].into_iter().flat_map(|at| depths.map(|depth| (at, depth)))
     {
         let bytes = corridor(30.0, side_at_m, depth_m);
-        let plan = plan(&bytes, &tasks(2, true), 2, GoalMode::Labelled).unwrap();
+        let plan = plan(&bytes, &labelled_tasks(2), 2, GoalMode::Labelled).unwrap();
         let aside = |f: &Flight<64>| f.path.waypoints().iter().any(|w| w.position.y > 2.0);
         assert!(plan.flights.iter().any(aside), "side room at {side_at_m}, {depth_m} deep");
         let waits =
@@ -203,7 +210,7 @@ fn antipodal_swaps_over_a_circle_are_planned() {
         (0..10).map(place).chain((0..10).map(|i| place(i + 5))).collect();
     for seed in 0..4 {
         let bytes = open_roadmap(&terminals, 10, 400, seed);
-        let plan = plan(&bytes, &tasks(10, true), 10, GoalMode::Labelled).unwrap();
+        let plan = plan(&bytes, &labelled_tasks(10), 10, GoalMode::Labelled).unwrap();
         let apart = checker::fly(&SCHEDULE, &plan.flights, &[1.5; 10], 40_000);
         assert!(
             apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3),
@@ -218,12 +225,11 @@ fn unlabelled_is_no_longer_than_labelled_and_makespan_no_later() {
         let bytes = open_roadmap(&spread(16, seed), 8, 300, seed);
         let longest =
             |p: &SwarmPlan<16, 64>| p.flights.iter().map(|f| f.path.length_m()).fold(0.0, f32::max);
-        let labelled = plan(&bytes, &tasks(8, true), 8, GoalMode::Labelled).unwrap();
+        let labelled = plan(&bytes, &labelled_tasks(8), 8, GoalMode::Labelled).unwrap();
         let total =
-            plan(&bytes, &tasks(8, false), 8, GoalMode::Unlabelled(Objective::TotalDistance))
-                .unwrap();
+            plan(&bytes, &tasks(8), 8, GoalMode::Unlabelled(Objective::TotalDistance)).unwrap();
         let makespan =
-            plan(&bytes, &tasks(8, false), 8, GoalMode::Unlabelled(Objective::Makespan)).unwrap();
+            plan(&bytes, &tasks(8), 8, GoalMode::Unlabelled(Objective::Makespan)).unwrap();
         // Detours around pads and landing places may lengthen a path a little.
         assert!(total.total_m() <= labelled.total_m() * 1.05, "seed {seed}");
         assert!(longest(&makespan) <= longest(&total) * 1.05, "seed {seed}");
@@ -235,8 +241,7 @@ fn a_vehicle_without_a_goal_stays_and_a_goal_without_a_way_is_left() {
     let mut terminals = spread(5, 3);
     terminals.push(Point::new(500.0, 500.0, HEIGHT_M)); // out of reach
     let bytes = open_roadmap(&terminals, 4, 300, 3);
-    let plan =
-        plan(&bytes, &tasks(4, false), 2, GoalMode::Unlabelled(Objective::TotalDistance)).unwrap();
+    let plan = plan(&bytes, &tasks(4), 2, GoalMode::Unlabelled(Objective::TotalDistance)).unwrap();
     let flying: StdVec<_> = plan.flights.iter().filter_map(|f| f.task.goal()).collect();
     assert_eq!(flying, [0], "one goal in reach, one vehicle flies to it");
     checker::fly(&SCHEDULE, &plan.flights, &[1.0; 4], 10_000).unwrap();
@@ -247,9 +252,9 @@ fn the_same_request_gives_the_same_plan_and_another_gives_another_crc() {
     let terminals = spread(8, 5);
     let bytes = open_roadmap(&terminals, 4, 200, 5);
     let mode = GoalMode::Unlabelled(Objective::TotalDistance);
-    let first = plan(&bytes, &tasks(4, false), 4, mode).unwrap();
-    assert_eq!(first, plan(&bytes, &tasks(4, false), 4, mode).unwrap());
-    let other = plan(&open_roadmap(&terminals, 4, 200, 6), &tasks(4, false), 4, mode).unwrap();
+    let first = plan(&bytes, &tasks(4), 4, mode).unwrap();
+    assert_eq!(first, plan(&bytes, &tasks(4), 4, mode).unwrap());
+    let other = plan(&open_roadmap(&terminals, 4, 200, 6), &tasks(4), 4, mode).unwrap();
     assert_ne!(first.crc, other.crc);
 }
 
@@ -257,11 +262,11 @@ fn the_same_request_gives_the_same_plan_and_another_gives_another_crc() {
 fn wrong_requests_are_refused_by_name() {
     let bytes = open_roadmap(&spread(4, 7), 2, 50, 7);
     let unlabelled = GoalMode::Unlabelled(Objective::TotalDistance);
-    assert_eq!(plan(&bytes, &tasks(3, false), 2, unlabelled).unwrap_err(), PlanError::Terminals);
-    let mut twice = tasks(2, false);
+    assert_eq!(plan(&bytes, &tasks(3), 2, unlabelled).unwrap_err(), PlanError::Terminals);
+    let mut twice = tasks(2);
     twice[1].id = 1;
     assert_eq!(plan(&bytes, &twice, 2, unlabelled).unwrap_err(), PlanError::SameId(1));
-    let mut labelled = tasks(2, true);
+    let mut labelled = labelled_tasks(2);
     labelled[1].goal = Some(9);
     assert_eq!(plan(&bytes, &labelled, 2, GoalMode::Labelled).unwrap_err(), PlanError::BadGoal(2));
 }
@@ -307,7 +312,7 @@ fn queue(
     };
     let mut bytes = std::vec![0; roadmap::encoded_len(nodes.len(), edges.len(), 0).unwrap()];
     roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
-    (bytes, tasks(vehicles, true))
+    (bytes, labelled_tasks(vehicles))
 }
 
 /// Whether every vehicle's plan fits `G` gates, and the result of planning with that limit.

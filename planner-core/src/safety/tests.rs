@@ -215,9 +215,8 @@ impl Flier {
         ReachableSet::along(place, ahead, length_m)
     }
 
-    fn step(&mut self, stop: bool, dt_s: f32) {
-        let accel = if stop { -1.5 } else { 1.5 };
-        self.speed_mps = (self.speed_mps + accel * dt_s).clamp(0.0, 2.0);
+    fn step(&mut self, accel_mps2: f32, dt_s: f32) {
+        self.speed_mps = (self.speed_mps + accel_mps2 * dt_s).clamp(0.0, 2.0);
         self.along_m += self.speed_mps * dt_s;
         if self.at(self.along_m).1 == self.path.len() {
             self.speed_mps = 0.0;
@@ -282,7 +281,7 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
                 )
             });
             for (flier, stop) in fliers.iter_mut().zip(stop) {
-                flier.step(stop, 0.05);
+                flier.step(if stop { -1.5 } else { 1.5 }, 0.05);
                 stops += u32::from(stop);
             }
             let apart_m =

@@ -255,7 +255,7 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
         let for_ever = TimedSegment {
             from_s: f32::NEG_INFINITY,
             to_s: f32::INFINITY,
-            ..stationary_segment(place, true)
+            ..parked_segment(place)
         };
         ws.pieces.push(for_ever).map_err(|_| ScheduleError::SegmentsFull)?;
     }
@@ -274,9 +274,9 @@ fn conflicting_segments<'s>(
     cells.candidates_near(pieces, own, apart_m).filter(|q| is_conflict(cfg, own, q))
 }
 
-/// Timed segment of a vehicle that stays at a point; the caller sets the times.
-fn stationary_segment(at: Point, parked: bool) -> TimedSegment {
-    TimedSegment { from: at, to: at, from_m: 0.0, to_m: 0.0, from_s: 0.0, to_s: 0.0, parked }
+/// Timed segment of a vehicle that is parked at a point; the caller sets the times.
+fn parked_segment(at: Point) -> TimedSegment {
+    TimedSegment { from: at, to: at, from_m: 0.0, to_m: 0.0, from_s: 0.0, to_s: 0.0, parked: true }
 }
 
 impl<const N: usize, const P: usize> SippWorkspace<N, P> {
@@ -293,7 +293,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         if self.first[usize::from(node)] != 0 {
             return;
         }
-        let hover = stationary_segment(view.node(node), false);
+        let hover = TimedSegment { parked: false, ..parked_segment(view.node(node)) };
         self.forbidden.clear();
         for q in conflicting_segments(&self.cells, &self.pieces, cfg, &hover) {
             add_forbidden_interval(&mut self.forbidden, q.from_s, q.to_s);
@@ -324,7 +324,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     /// The latest take-off, seconds, before another vehicle needs the space of the pad.
     fn leave_pad_by_s(&self, cfg: &ScheduleConfig, pad: Point, up: &Leg, piece_m: f32) -> f32 {
         // Held from −∞, so that it is not in conflict with another vehicle's pad.
-        let on_pad = TimedSegment { from_s: f32::NEG_INFINITY, ..stationary_segment(pad, true) };
+        let on_pad = TimedSegment { from_s: f32::NEG_INFINITY, ..parked_segment(pad) };
         // The pad is held until the vehicle has flown the first timed segment of its climb.
         let off_pad_s = fmaxf(up.first_segment(piece_m).1, MIN_PAD_HOLD_S) + self.handover_s;
         let needed_s =
@@ -342,7 +342,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         let ground = goal - Point::new(0.0, 0.0, descent_m);
         // The landing place is held from the beginning of the descent, so the descent begins only
         // when other vehicles have left that place.
-        let standing = stationary_segment(ground, true);
+        let standing = parked_segment(ground);
         let after_s = self
             .conflicting_segments(cfg, &standing)
             .map(|q| q.to_s)

@@ -75,11 +75,11 @@ proptest! {
     }
 }
 
-/// A flight over a field: all at one height, or corners at that height and others between.
-fn field_flight(id: u8, corners: &[(f32, f32, f32)], level: bool, climb_m: f32) -> Flight<8> {
+/// A flight over a field.
+fn field_flight(id: u8, corners: &[Point], climb_m: f32) -> Flight<8> {
     let mut path = Path::new();
-    for &(x, y, z) in corners {
-        path.push(Point::new(x, y, if level || z < 50.0 { 30.0 } else { z }), 1.0).unwrap();
+    for corner in corners {
+        path.push(*corner, 1.0).unwrap();
     }
     path.set_times_at_speed(climb_m / CFG.vertical_mps, CFG.cruise_mps);
     let mut flight = Flight { climb_m, descent_m: climb_m, path, ..flight(id, &[(0.0, 0.0)]) };
@@ -87,8 +87,16 @@ fn field_flight(id: u8, corners: &[(f32, f32, f32)], level: bool, climb_m: f32) 
     flight
 }
 
-fn field_corners() -> impl Strategy<Value = std::vec::Vec<(f32, f32, f32)>> {
-    proptest::collection::vec((-120.0f32..120.0, -120.0f32..120.0, 25.0f32..60.0), 1..8)
+/// The corners of a path over a field: all at one height, or corners at that height and others
+/// between; and the height of the climb, metres.
+fn field_paths() -> impl Strategy<Value = (std::vec::Vec<Point>, f32)> {
+    let corners =
+        proptest::collection::vec((-120.0f32..120.0, -120.0f32..120.0, 25.0f32..60.0), 1..8);
+    (corners, any::<bool>(), 0.0f32..40.0).prop_map(|(corners, level, climb_m)| {
+        let height_m = |z: f32| if level || z < 50.0 { 30.0 } else { z };
+        let corners = corners.into_iter().map(|(x, y, z)| Point::new(x, y, height_m(z)));
+        (corners.collect(), climb_m)
+    })
 }
 
 proptest! {
@@ -97,12 +105,12 @@ proptest! {
     /// has more gates for the other than segments in conflict.
     #[test]
     fn departures_are_those_of_all_segments(
-        own in (field_corners(), any::<bool>(), 0.0f32..40.0),
-        other in (field_corners(), any::<bool>(), 0.0f32..40.0),
+        own in field_paths(),
+        other in field_paths(),
         (handover_s, depart_s) in (0.0f32..3.0, 0.0f32..60.0),
     ) {
-        let own = field_flight(1, &own.0, own.1, own.2);
-        let other = Flight { depart_s, ..field_flight(2, &other.0, other.1, other.2) };
+        let own = field_flight(1, &own.0, own.1);
+        let other = Flight { depart_s, ..field_flight(2, &other.0, other.1) };
         let mut ws = ScheduleWorkspace::new();
         let mut most = [0; 2];
         let departure = departure_with_conflict_counts(

@@ -57,11 +57,22 @@ fn brute_force(
     d
 }
 
-fn encode_either(nodes: &[Point], edges: &[Edge], landmarks: bool) -> StdVec<u8> {
+/// Whether a roadmap stores distances to landmarks.
+#[derive(Clone, Copy, Debug)]
+enum Landmarks {
+    Stored,
+    None,
+}
+
+fn landmarks() -> impl Strategy<Value = Landmarks> {
+    any::<bool>().prop_map(|stored| if stored { Landmarks::Stored } else { Landmarks::None })
+}
+
+fn encode_either(nodes: &[Point], edges: &[Edge], landmarks: Landmarks) -> StdVec<u8> {
     let any_length = RoadmapHeader { edge_min_m: 0.0, ..header(1, 1) };
     match landmarks {
-        true => encode_with_landmarks(&any_length, nodes, edges),
-        false => encode(&any_length, nodes, edges),
+        Landmarks::Stored => encode_with_landmarks(&any_length, nodes, edges),
+        Landmarks::None => encode(&any_length, nodes, edges),
     }
 }
 
@@ -88,7 +99,10 @@ fn close(a: f64, b: f64) -> bool {
 
 proptest! {
     #[test]
-    fn astar_and_dijkstra_equal_brute_force((nodes, edges) in graphs(), landmarks: bool) {
+    fn astar_and_dijkstra_equal_brute_force(
+        (nodes, edges) in graphs(),
+        landmarks in landmarks(),
+    ) {
         let bytes = encode_either(&nodes, &edges, landmarks);
         let view = RoadmapView::parse(&bytes).unwrap();
         let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, REQUIRED_M);
@@ -200,7 +214,7 @@ proptest! {
         picks in proptest::collection::vec(any::<u16>(), 1..9),
         split in any::<proptest::sample::Index>(),
         one_way in 0u16..4,
-        landmarks: bool,
+        landmarks in landmarks(),
     ) {
         let bytes = encode_either(&nodes, &edges, landmarks);
         let view = RoadmapView::parse(&bytes).unwrap();

@@ -12,7 +12,7 @@ use planner_core::Point;
 use planner_core::frames;
 
 use super::entropy::Entropy;
-use super::{Flight, ID, NEIGHBOUR, ORIGIN, intent};
+use super::{Flight, ID, Mission, NEIGHBOUR, ORIGIN, intent};
 
 impl Flight {
     /// Forges one frame of one of `messages`, and gives it to the companion on one of `links`.
@@ -49,7 +49,7 @@ impl Flight {
     /// its length.
     fn fill(&self, id: u32, payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
         if id == TUNNEL_DATA::ID && how & 3 != 0 {
-            return match self.over_area && how & 3 == 1 {
+            return match self.mission == Mission::Area && how & 3 == 1 {
                 true => fill_roster(payload, entropy, how),
                 false => self.fill_intent(payload, entropy, how),
             };

@@ -54,50 +54,59 @@ struct World<'a> {
     trace: Option<Vec<String>>,
 }
 
-/// Simulates a meeting; with `traced` the outcome has a log of what happened.
-pub fn fly(scene: &Scene, traced: bool) -> Outcome {
-    let mut world = World::new(scene, traced);
-    let mut oracle = Oracle::new(scene.vehicles.len());
-    let mut next = 0;
-    let mut rested_s = 0.0;
-    let steps = ((scene::START_S + scene.limit_s) / STEP_S) as usize;
-    let mut ended_s = 0.0;
-    for step in 0..steps {
-        let now_s = step as f32 * STEP_S;
-        world.now = Instant::from_millis(step as u64 * STEP_MS);
-        while let Some(happening) = scene.happenings.get(next).filter(|h| h.at_s <= now_s) {
-            world.happens(happening.vehicle, happening.what);
-            next += 1;
-        }
-        world.step();
-        let seen: Vec<_> = world.members.iter().map(|member| member.seen(now_s)).collect();
-        let heard = |a: usize, b: usize| world.members[a].heard[b].clone();
-        oracle.observe(&seen, heard, |place| floor_z(&scene.vehicles, place), step % 2 == 0);
-        if traced && step % 20 == 0 {
-            world.trace_places(now_s);
-        }
-        ended_s = now_s;
-        let rest = next == scene.happenings.len()
-            && now_s > scene::START_S + 5.0
-            && world.members.iter().all(Member::rests);
-        rested_s = if rest { rested_s + STEP_S } else { 0.0 };
-        if rested_s > AFTERMATH_S {
-            break;
-        }
-    }
-    oracle.finish();
-    world.outcome(oracle, ended_s)
+/// Simulates a meeting.
+pub fn fly(scene: &Scene) -> Outcome {
+    World::new(scene).fly()
+}
+
+/// Simulates a meeting; the outcome has a log of what happened.
+pub fn fly_traced(scene: &Scene) -> Outcome {
+    World { trace: Some(Vec::new()), ..World::new(scene) }.fly()
 }
 
 impl<'a> World<'a> {
-    fn new(scene: &'a Scene, traced: bool) -> Self {
+    fn new(scene: &'a Scene) -> Self {
         Self {
             scene,
             members: (0..scene.vehicles.len()).map(|i| Member::new(scene, i)).collect(),
             now: Instant::ZERO,
             dice: Dice::new(scene.seed ^ 0x5EED),
-            trace: traced.then(Vec::new),
+            trace: None,
         }
+    }
+
+    fn fly(mut self) -> Outcome {
+        let scene = self.scene;
+        let mut oracle = Oracle::new(scene.vehicles.len());
+        let mut next = 0;
+        let mut rested_s = 0.0;
+        let steps = ((scene::START_S + scene.limit_s) / STEP_S) as usize;
+        let mut ended_s = 0.0;
+        for step in 0..steps {
+            let now_s = step as f32 * STEP_S;
+            self.now = Instant::from_millis(step as u64 * STEP_MS);
+            while let Some(happening) = scene.happenings.get(next).filter(|h| h.at_s <= now_s) {
+                self.happens(happening.vehicle, happening.what);
+                next += 1;
+            }
+            self.step();
+            let seen: Vec<_> = self.members.iter().map(|member| member.seen(now_s)).collect();
+            let heard = |a: usize, b: usize| self.members[a].heard[b].clone();
+            oracle.observe(&seen, heard, |place| floor_z(&scene.vehicles, place));
+            if self.trace.is_some() && step % 20 == 0 {
+                self.trace_places(now_s);
+            }
+            ended_s = now_s;
+            let rest = next == scene.happenings.len()
+                && now_s > scene::START_S + 5.0
+                && self.members.iter().all(Member::rests);
+            rested_s = if rest { rested_s + STEP_S } else { 0.0 };
+            if rested_s > AFTERMATH_S {
+                break;
+            }
+        }
+        oracle.finish();
+        self.outcome(oracle, ended_s)
     }
 
     fn say(&mut self, vehicle: usize, what: &str) {

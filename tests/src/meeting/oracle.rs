@@ -122,13 +122,17 @@ pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Reachabl
     Some(set)
 }
 
+/// Where a vehicle that lands can be.
+fn landing_set(position: Point, floor_z: f32) -> ReachableSet {
+    let floor = Point::new(position.x, position.y, floor_z.min(position.z));
+    ReachableSet { segments: vec![(position, position), (position, floor)], radius_m: 0.0 }
+}
+
 /// Where a vehicle that begins to stop now can be.
-pub fn own_set(position: Point, velocity: Point, lands: bool, floor_z: f32) -> ReachableSet {
+fn stopping_set(position: Point, velocity: Point) -> ReachableSet {
     let speed = velocity.norm();
     let mut segments = vec![(position, position)];
-    if lands {
-        segments.push((position, Point::new(position.x, position.y, floor_z.min(position.z))));
-    } else if speed > 1e-3 {
+    if speed > 1e-3 {
         segments.push((position, position + velocity * (reach(speed, 0.1 + LAG_S) / speed)));
     }
     ReachableSet { segments, radius_m: 0.0 }
@@ -240,14 +244,13 @@ impl Oracle {
         }
     }
 
-    /// Judges one step; `heard(a, b)` is what vehicle a received from b. Sets are judged only with
-    /// `judge_sets`.
+    /// Judges one step; `heard(a, b)` is what vehicle a received from b. Sets are judged at every
+    /// second step.
     pub fn observe(
         &mut self,
         seen: &[VehicleState],
         heard: impl Fn(usize, usize) -> Heard,
         floor_z: impl Fn(&Point) -> f32,
-        judge_sets: bool,
     ) {
         let step = self.tracks[0].len();
         self.tracks.iter_mut().zip(seen).for_each(|(track, seen)| track.push(*seen));
@@ -257,7 +260,7 @@ impl Oracle {
                 if a == b {
                     continue;
                 }
-                if judge_sets && seen[a].airborne && seen[a].own {
+                if step.is_multiple_of(2) && seen[a].airborne && seen[a].own {
                     self.judge_sets(step, now_s, (a, b), &seen[a], &heard(a, b), &floor_z);
                 }
                 if a < b {
@@ -290,7 +293,11 @@ impl Oracle {
             return;
         }
         let Some(theirs) = neighbour_set(heard, now_s, floor_z(&position)) else { return };
-        let ours = own_set(own.position, own.velocity, own.lands, floor_z(&own.position));
+        let ours = if own.lands {
+            landing_set(own.position, floor_z(&own.position))
+        } else {
+            stopping_set(own.position, own.velocity)
+        };
         if ours.distance(&theirs) < SAFETY_M {
             let approach = &mut self.approaches[a * self.count + b];
             match approach {

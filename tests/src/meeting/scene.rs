@@ -16,7 +16,7 @@ pub use self::types::{
     CLIMB_MPS, CRUISE_MPS, GATES, LIMIT_S, Lie, MeetingEvent, PLATFORM_M, Plan, SAFETY_M, SCHEDULE,
     START_S, Scene, TimedEvent, VEHICLES, Vehicle, WAYPOINTS,
 };
-use self::vehicles::vehicle;
+use self::vehicles::{common_plan, own_plan, vehicle};
 use self::ways::{KINDS, Shape, fits, flight, way};
 use super::autopilot::Catch;
 use super::dice::Dice;
@@ -112,8 +112,11 @@ fn drawn(seed: u64, draw: u64) -> Option<Scene> {
     if flights.len() < 2 {
         return None;
     }
-    let vehicles =
-        (0..flights.len()).map(|i| vehicle(&flights, i, on_plan, &mut workspace, &mut dice));
+    let vehicles = (0..flights.len()).map(|i| {
+        let plan =
+            if on_plan { common_plan(&flights, i, &mut workspace) } else { own_plan(&flights, i) };
+        vehicle(&flights[i], plan, &mut dice)
+    });
     let vehicles: Vec<_> = vehicles.collect();
     let happenings = happenings(&vehicles, &mut dice);
     let delay = if dice.chance(0.5) { dice.real(0.0, 0.15) } else { dice.real(0.0, 0.9) };

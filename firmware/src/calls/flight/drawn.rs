@@ -4,7 +4,7 @@ use companion::{Config, RosterEntry};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::flight::{
-    Gate, HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointRange,
+    Gate, HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointOrder, WaypointRange,
 };
 use rand_pcg::Pcg32;
 
@@ -85,7 +85,7 @@ pub fn random_area_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     let mut plan = random_plan(rng);
     let mut photographs =
         PicturePlan::new(PICTURE_SPACING_M, HeadingMode::Ahead, Trigger::Distance)
-            .with_area(TOTAL_PICTURES, false);
+            .with_area(TOTAL_PICTURES, WaypointOrder::Rising);
     for (lane, from) in (1..plan.path.waypoints().len() - 1).step_by(2).enumerate() {
         let first = PICTURES_PER_LANE * lane as u32;
         photographs

@@ -11,9 +11,9 @@ use crate::detour::ZoneKind;
 const OVER: Point = Point::new(5.0, 5.0, 12.0);
 const LAYER_M: f32 = 40.0;
 
-fn request(here: Point, aside: bool) -> DetourRequest {
+fn request(here: Point) -> DetourRequest {
     DetourRequest {
-        aside,
+        aside: false,
         here,
         leg: [here, here],
         leg_clearance_m: 10.0,
@@ -109,7 +109,7 @@ fn length_m(points: &[Point]) -> f32 {
 #[test]
 fn the_way_home_is_straight_in_its_layer_where_nothing_is_there() {
     let here = Point::new(300.0, 200.0, 25.0);
-    let (way, _) = planned(&[], &request(here, false), &[]).unwrap();
+    let (way, _) = planned(&[], &request(here), &[]).unwrap();
     let up = |place: Point| Point::new(place.x, place.y, LAYER_M);
     assert_eq!(way, Ok(StdVec::from([here, up(here), up(OVER), OVER])));
 }
@@ -118,24 +118,23 @@ fn the_way_home_is_straight_in_its_layer_where_nothing_is_there() {
 fn where_the_layer_is_barred_above_it_flies_at_its_own_height() {
     let here = Point::new(300.0, 200.0, 25.0);
     let lid = column(here.xy(), 32.0, 40.0, 3.0);
-    let (way, _) = planned(&[], &request(here, false), &[lid]).unwrap();
+    let (way, _) = planned(&[], &request(here), &[lid]).unwrap();
     assert_eq!(way, Ok(StdVec::from([here, Point::new(OVER.x, OVER.y, 25.0), OVER])));
 }
 
 #[test]
 fn a_pad_below_somebody_is_no_home_and_nobody_flies_through_a_ring_of_columns() {
     let here = Point::new(300.0, 200.0, 25.0);
-    let (way, _) =
-        planned(&[], &request(here, false), &[column(OVER.xy(), 0.0, 20.0, 3.0)]).unwrap();
+    let (way, _) = planned(&[], &request(here), &[column(OVER.xy(), 0.0, 20.0, 3.0)]).unwrap();
     assert_eq!(way, Err(DetourError::GoalBlocked));
     let around = |i: usize| {
         let angle = core::f32::consts::TAU * i as f32 / 16.0;
         column(here.xy() + Flat::new(cosf(angle), sinf(angle)) * 10.0, 0.0, 100.0, 3.0)
     };
     let ring: StdVec<_> = (0..16).map(around).collect();
-    let (way, _) = planned(&[], &request(here, false), &ring).unwrap();
+    let (way, _) = planned(&[], &request(here), &ring).unwrap();
     assert_eq!(way, Err(DetourError::Search(SearchError::NoPath)));
-    let (way, _) = planned(&[], &request(here, true), &ring).unwrap();
+    let (way, _) = planned(&[], &DetourRequest { aside: true, ..request(here) }, &ring).unwrap();
     assert!(way.is_ok(), "inside the ring there is room to stand aside");
 }
 
@@ -144,10 +143,10 @@ fn what_is_no_number_is_refused() {
     let here = Point::new(300.0, 200.0, 25.0);
     let bad = [f32::NAN, f32::INFINITY].map(|layer_m| Goal::Home { over: OVER, layer_m });
     for goal in bad {
-        let (way, _) = planned(&[], &DetourRequest { goal, ..request(here, false) }, &[]).unwrap();
+        let (way, _) = planned(&[], &DetourRequest { goal, ..request(here) }, &[]).unwrap();
         assert!(matches!(way, Err(DetourError::Config(_))));
     }
-    let node = DetourRequest { goal: Goal::Node(0), ..request(here, false) };
+    let node = DetourRequest { goal: Goal::Node(0), ..request(here) };
     assert!(planned(&[], &node, &[]).unwrap().0.is_err());
 }
 
@@ -168,7 +167,7 @@ proptest! {
         room_m in 0f32..40.0,
     ) {
         let here = Point::new(here.0, here.1, here.2);
-        let request = request(here, aside);
+        let request = DetourRequest { aside, ..request(here) };
         let thing = |&(x, y, low_m, high_m, radius_m, lands): &(f32, f32, f32, f32, f32, bool)| {
             KeepOutZone {
                 kind: if lands { ZoneKind::Descending } else { ZoneKind::Static },

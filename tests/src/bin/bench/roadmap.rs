@@ -83,9 +83,9 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
         whole.extend(two.install(|| (0..REPEATS).map(|_| planned()).collect::<Result<Vec<_>>>())?);
         for repeat in 0..REPEATS {
             let seed = (1000 + round * REPEATS + repeat) as u64;
-            let by_two = two.install(|| ours.build(seed, true))?;
+            let by_two = two.install(|| ours.build(seed, Threads::All))?;
             let built_by_two = ours.bytes.clone();
-            let by_one = ours.build(seed, false)?;
+            let by_one = ours.build(seed, Threads::One)?;
             ensure!(
                 ours.bytes == built_by_two,
                 "seed {seed}: two cores built another roadmap than one"
@@ -246,6 +246,13 @@ fn run(peer: &Path, files: &[std::path::PathBuf]) -> Result<Theirs> {
     Ok(serde_json::from_str(line)?)
 }
 
+/// Threads that build a roadmap.
+#[derive(Clone, Copy)]
+enum Threads {
+    All,
+    One,
+}
+
 struct Ours<'a> {
     grid: &'a VoxelGrid<'a>,
     terminals: &'a [Point],
@@ -273,8 +280,8 @@ impl<'a> Ours<'a> {
         }
     }
 
-    /// Builds the roadmap file once, on all threads or on one; returns the milliseconds it took.
-    fn build(&mut self, seed: u64, threads: bool) -> Result<f64> {
+    /// Builds the roadmap file once; returns the milliseconds it took.
+    fn build(&mut self, seed: u64, threads: Threads) -> Result<f64> {
         let config = Config {
             nodes: NODES,
             edge_min_m: EDGE_MIN_M,
@@ -291,18 +298,21 @@ impl<'a> Ours<'a> {
         prm::sample_nodes(self.grid, None, self.terminals, &config, &mut self.nodes)
             .map_err(named)?;
         let edge = |e: Edge| roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
-        if threads {
-            let edges =
-                host_sim::roadmap::connect(self.grid, &self.nodes, &config, &mut self.workspace)
+        let (grid, nodes) = (self.grid, &self.nodes);
+        match threads {
+            Threads::All => {
+                let edges = host_sim::roadmap::connect(grid, nodes, &config, &mut self.workspace)
                     .map_err(named)?;
-            self.edges = edges.into_iter().map(edge).collect();
-        } else {
-            self.workspace.build_index(&self.nodes, &config).map_err(named)?;
-            prm::connect_range(self.grid, &self.workspace, &config, 0..self.nodes.len(), |e| {
-                self.edges.push(edge(e));
-                Ok(())
-            })
-            .map_err(named)?;
+                self.edges = edges.into_iter().map(edge).collect();
+            }
+            Threads::One => {
+                self.workspace.build_index(nodes, &config).map_err(named)?;
+                prm::connect_range(grid, &self.workspace, &config, 0..nodes.len(), |e| {
+                    self.edges.push(edge(e));
+                    Ok(())
+                })
+                .map_err(named)?;
+            }
         }
         let header = RoadmapHeader {
             origin: Geodetic::default(),

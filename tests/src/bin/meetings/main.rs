@@ -53,7 +53,7 @@ fn trace(scene: &scene::Scene) {
             plan.gates
         );
     }
-    let outcome = meeting::fly(scene, true);
+    let outcome = meeting::fly_traced(scene);
     outcome.trace.iter().for_each(|line| println!("{line}"));
     println!("{}", meeting::line(&outcome));
     outcome.unfit.iter().for_each(|(i, at_s, what)| println!("  {}: {at_s:.2} s: {what}", i + 1));
@@ -74,7 +74,7 @@ fn main() {
         .into_par_iter()
         .map(draw)
         .filter(|scene| args.kind.as_deref().is_none_or(|kind| scene.kind == kind))
-        .map(|scene| meeting::fly(&scene, false))
+        .map(|scene| meeting::fly(&scene))
         .collect();
     let took_s = began.elapsed().as_secs_f64();
     for outcome in outcomes.iter().filter(|outcome| outcome.is_bad()) {

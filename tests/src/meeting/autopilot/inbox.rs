@@ -98,19 +98,26 @@ impl Autopilot {
         }
     }
 
-    fn arm_or_disarm(&mut self, now: Instant, arm: bool) -> MavResult {
-        if arm == self.armed {
-            return MavResult::MAV_RESULT_ACCEPTED;
+    fn arm(&mut self, now: Instant) -> MavResult {
+        if !self.armed {
+            self.armed = true;
+            self.armings += 1;
+            (self.armed_at, self.grounded_since, self.lifted_at) = (now, None, None);
         }
-        if !arm && self.airborne {
+        MavResult::MAV_RESULT_ACCEPTED
+    }
+
+    fn disarm(&mut self, now: Instant) -> MavResult {
+        if self.armed && self.airborne {
             return match self.kind {
                 AutopilotKind::Px4 => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
                 AutopilotKind::ArduPilot => MavResult::MAV_RESULT_FAILED,
             };
         }
-        self.armed = arm;
-        self.armings += u32::from(arm);
-        (self.armed_at, self.grounded_since, self.lifted_at) = (now, None, None);
+        if self.armed {
+            self.armed = false;
+            (self.armed_at, self.grounded_since, self.lifted_at) = (now, None, None);
+        }
         MavResult::MAV_RESULT_ACCEPTED
     }
 
@@ -143,7 +150,7 @@ impl Autopilot {
                 self.landing_commanded = true;
             }
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => {
-                result = self.arm_or_disarm(now, data.param1 == 1.0);
+                result = if data.param1 == 1.0 { self.arm(now) } else { self.disarm(now) };
             }
             MavCmd::MAV_CMD_NAV_TAKEOFF => {
                 if self.armed && self.mode == self.kind.setpoint_mode() {

@@ -5,7 +5,7 @@ use planner_core::flight::Flight;
 use planner_core::schedule::{self, ScheduleWorkspace};
 
 use super::types::{LIMIT_S, MeetingEvent, SCHEDULE, START_S, Scene, TimedEvent, WAYPOINTS};
-use super::vehicles::vehicle;
+use super::vehicles::{common_plan, vehicle};
 use super::ways::{Way, at_height, flight};
 use crate::meeting::dice::Dice;
 
@@ -60,7 +60,9 @@ pub fn passing(seed: u64) -> Scene {
     };
     let mut workspace = Box::new(ScheduleWorkspace::new());
     let flights = scheduled([first, second], &mut workspace);
-    let vehicles = (0..2).map(|i| vehicle(&flights, i, true, &mut workspace, &mut dice)).collect();
+    let vehicles = (0..2)
+        .map(|i| vehicle(&flights[i], common_plan(&flights, i, &mut workspace), &mut dice))
+        .collect();
     let start = |vehicle| TimedEvent { at_s: START_S, vehicle, what: MeetingEvent::Start };
     Scene {
         seed,

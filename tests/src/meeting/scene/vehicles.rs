@@ -1,4 +1,4 @@
-//! The vehicle that flies a flight of a scene.
+//! A vehicle of a scene and its plan.
 
 use companion::autopilot::AutopilotKind;
 use planner_core::flight::Flight;
@@ -9,27 +9,33 @@ use super::ways::pads;
 use crate::meeting::autopilot::Failsafe;
 use crate::meeting::dice::Dice;
 
-/// Vehicle `i` of a scene with these flights.
-pub(super) fn vehicle(
+/// The plan of vehicle `i` of vehicles that fly one common plan.
+pub(super) fn common_plan(
     flights: &[Flight<WAYPOINTS>],
     i: usize,
-    on_plan: bool,
     workspace: &mut ScheduleWorkspace,
-    dice: &mut Dice,
-) -> Vehicle {
+) -> Plan {
+    let mut plan = Plan { plan_crc: 5, ..own_plan(flights, i) };
+    schedule::gates(&SCHEDULE, flights, i, workspace, &mut plan.gates).expect("few gates");
+    plan
+}
+
+/// The plan of vehicle `i` of vehicles that know nothing of each other's plans.
+pub(super) fn own_plan(flights: &[Flight<WAYPOINTS>], i: usize) -> Plan {
     let flight = &flights[i];
-    let mut plan = Plan {
+    Plan {
         task: flight.task,
         path: flight.path.clone(),
         climb_m: flight.climb_m,
         descent_m: flight.descent_m,
         depart_s: flight.depart_s,
         gates: heapless::Vec::new(),
-        plan_crc: if on_plan { 5 } else { 100 + i as u32 },
-    };
-    if on_plan {
-        schedule::gates(&SCHEDULE, flights, i, workspace, &mut plan.gates).expect("few gates");
+        plan_crc: 100 + i as u32,
     }
+}
+
+/// The vehicle that flies this flight by this plan.
+pub(super) fn vehicle(flight: &Flight<WAYPOINTS>, plan: Plan, dice: &mut Dice) -> Vehicle {
     Vehicle {
         id: flight.id,
         kind: if dice.chance(0.6) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot },
