@@ -11,7 +11,7 @@ use planner_core::assignment::{self, AssignmentWorkspace};
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, OwnVehicle};
 use planner_core::flight::{Gate, Path};
 use planner_core::plan::{GoalMode, Objective, PlanRequest, VehicleTask};
-use planner_core::prm::{Config, Sampling};
+use planner_core::prm::{PrmConfig, Sampling};
 use planner_core::roadmap::{Edge, HalfEdge, RoadmapView};
 use planner_core::schedule::ScheduleConfig;
 use planner_core::search::{self, SearchWorkspace};
@@ -281,7 +281,7 @@ pub fn random_point(rng: &mut Pcg32, reach_m: f32) -> Point {
 }
 
 /// Settings of the roadmap that is built on board: 2300 nodes in paper P3D's building.
-pub const ROADMAP_CONFIG: Config = Config {
+pub const ROADMAP_CONFIG: PrmConfig = PrmConfig {
     nodes: 2300,
     edge_min_m: 0.5,
     edge_max_m: 8.0,

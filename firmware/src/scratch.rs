@@ -10,11 +10,11 @@ use core::mem::{ManuallyDrop, MaybeUninit};
 
 use companion::planner::coverage;
 use planner_core::Point;
-use planner_core::coverage::pack::Plan;
+use planner_core::coverage::pack::RoutePlan;
 use planner_core::coverage::tracks::{self, Tracks};
 use planner_core::coverage::{losses, powell};
 use planner_core::plan::PlanWorkspace;
-use planner_core::prm::{self, Config, PrmError};
+use planner_core::prm::{self, PrmConfig, PrmError};
 use planner_core::roadmap::Edge;
 use planner_core::schedule::ScheduleWorkspace;
 use planner_core::voxel::VoxelGrid;
@@ -151,11 +151,11 @@ pub struct CoverageBenchWorkspace {
     /// Workspace for computing lanes.
     pub build: tracks::LaneWorkspace<AREA_VERTICES>,
     /// Workspace for dividing lanes among vehicles.
-    pub powell: powell::Workspace<VEHICLES>,
+    pub powell: powell::PowellWorkspace<VEHICLES>,
     /// Each vehicle's route over its lanes.
-    pub plan: Plan<VEHICLES>,
+    pub plan: RoutePlan<VEHICLES>,
     /// Workspace for lost vehicles and the lanes left after them.
-    pub losses: losses::Workspace<LANES, VEHICLES>,
+    pub losses: losses::LossesWorkspace<LANES, VEHICLES>,
     /// Workspace for scheduling the flights.
     pub schedule: ScheduleWorkspace,
 }
@@ -167,9 +167,9 @@ impl CoverageBenchWorkspace {
             tracks: Tracks::new(),
             left: Tracks::new(),
             build: tracks::LaneWorkspace::new(),
-            powell: powell::Workspace::new(),
-            plan: Plan::new(),
-            losses: losses::Workspace::new(),
+            powell: powell::PowellWorkspace::new(),
+            plan: RoutePlan::new(),
+            losses: losses::LossesWorkspace::new(),
             schedule: ScheduleWorkspace::new(),
         }
     }
@@ -200,7 +200,7 @@ impl RoadmapBuilder {
         &mut self,
         grid: &VoxelGrid<'_>,
         terminals: &[Point],
-        config: &Config,
+        config: &PrmConfig,
     ) -> Result<(), PrmError> {
         self.sample_nodes(grid, terminals, config)?;
         self.build_index(config)?;
@@ -215,7 +215,7 @@ impl RoadmapBuilder {
         &mut self,
         grid: &VoxelGrid<'_>,
         terminals: &[Point],
-        config: &Config,
+        config: &PrmConfig,
     ) -> Result<(), PrmError> {
         self.edge_count = 0;
         self.node_count = prm::sample_nodes(grid, None, terminals, config, &mut self.nodes)?;
@@ -226,7 +226,7 @@ impl RoadmapBuilder {
     ///
     /// # Errors
     /// As [`Self::build`].
-    pub fn build_index(&mut self, config: &Config) -> Result<(), PrmError> {
+    pub fn build_index(&mut self, config: &PrmConfig) -> Result<(), PrmError> {
         self.index.build_index(&self.nodes[..self.node_count], config)
     }
 
@@ -234,7 +234,11 @@ impl RoadmapBuilder {
     ///
     /// # Errors
     /// As [`Self::build`].
-    pub fn connect_nodes(&mut self, grid: &VoxelGrid<'_>, config: &Config) -> Result<(), PrmError> {
+    pub fn connect_nodes(
+        &mut self,
+        grid: &VoxelGrid<'_>,
+        config: &PrmConfig,
+    ) -> Result<(), PrmError> {
         let Self { node_count, index, edges, edge_count, .. } = self;
         *edge_count = 0;
         prm::connect_range(grid, index, config, 0..*node_count, |edge| {

@@ -16,7 +16,7 @@ use std::time::Instant;
 use anyhow::{anyhow, bail};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
-use planner_core::prm::{self, Config, NodeIndex, PrmError};
+use planner_core::prm::{self, NodeIndex, PrmConfig, PrmError};
 use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapError, RoadmapHeader};
 use planner_core::search::SearchWorkspace;
 use planner_core::voxel::{GridShape, VoxelGrid};
@@ -68,7 +68,7 @@ pub struct BuildTimes {
 pub fn build(
     map: &VoxelMap,
     terminals: &[Point],
-    config: &Config,
+    config: &PrmConfig,
 ) -> anyhow::Result<(Roadmap, BuildTimes)> {
     let grid = map.grid();
     let sampled = || {
@@ -97,7 +97,7 @@ pub fn build(
 pub fn add_passages(
     map: &VoxelMap,
     roadmap: &mut Roadmap,
-    config: &Config,
+    config: &PrmConfig,
     wanted: &[passages::WantedConnection],
 ) -> anyhow::Result<usize> {
     let (grid, tree) = (map.grid(), BoxTree::new(&map.grid()));
@@ -131,7 +131,11 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
 }
 
 /// The nodes of a roadmap: the terminals, then `config.nodes` random free ones.
-pub fn sample(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Result<Vec<Point>> {
+pub fn sample(
+    map: &VoxelMap,
+    terminals: &[Point],
+    config: &PrmConfig,
+) -> anyhow::Result<Vec<Point>> {
     let total = terminals.len() + config.nodes;
     if total > ROADMAP_NODES {
         bail!("the roadmap would have {total} nodes: this build plans on at most {ROADMAP_NODES}");
@@ -147,9 +151,9 @@ pub fn sample(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::R
 pub fn connect<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
-    config: &Config,
+    config: &PrmConfig,
     workspace: &mut NodeIndex<NODES, CUBES>,
-) -> Result<Vec<prm::Edge>, PrmError> {
+) -> Result<Vec<prm::PrmEdge>, PrmError> {
     workspace.build_index(nodes, config)?;
     map_nodes_in_parallel(nodes.len(), |range, edges| {
         prm::connect_range(grid, workspace, config, range, |edge| {
@@ -167,7 +171,7 @@ pub fn connect_with_clearances<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     tree: &BoxTree,
     nodes: &[Point],
-    config: &Config,
+    config: &PrmConfig,
     workspace: &mut NodeIndex<NODES, CUBES>,
 ) -> Result<Vec<Edge>, PrmError> {
     workspace.build_index(nodes, config)?;
@@ -176,12 +180,12 @@ pub fn connect_with_clearances<const NODES: usize, const CUBES: usize>(
         .par_iter()
         .map(|node| tree.clearance_m(node, node, MAX_STORED_CLEARANCE_M, 0.0))
         .collect();
-    let ends = |edge: prm::Edge| (usize::from(edge.a), usize::from(edge.b));
-    let most_m = |edge: prm::Edge| {
+    let ends = |edge: prm::PrmEdge| (usize::from(edge.a), usize::from(edge.b));
+    let most_m = |edge: prm::PrmEdge| {
         let (a, b) = ends(edge);
         around[a].min(around[b])
     };
-    let clearance_m = |edge: prm::Edge, enough_m: f32| {
+    let clearance_m = |edge: prm::PrmEdge, enough_m: f32| {
         let (a, b) = ends(edge);
         tree.clearance_m(&nodes[a], &nodes[b], most_m(edge), enough_m)
     };
@@ -254,7 +258,7 @@ impl Roadmap {
 }
 
 /// The header of the file of a roadmap that was built with `config`.
-pub fn header(config: &Config, origin: Geodetic, starts: u16, goals: u16) -> RoadmapHeader {
+pub fn header(config: &PrmConfig, origin: Geodetic, starts: u16, goals: u16) -> RoadmapHeader {
     RoadmapHeader {
         origin,
         edge_min_m: config.edge_min_m,
@@ -304,7 +308,7 @@ mod tests {
     #[test]
     fn any_number_of_threads_gives_the_same_edges() {
         let map = building_map(1, 0.5).unwrap().voxel_map(Unknown::Blocked);
-        let config = Config {
+        let config = PrmConfig {
             nodes: 500,
             edge_min_m: 0.5,
             edge_max_m: 8.0,
@@ -314,7 +318,7 @@ mod tests {
         };
         let nodes = sample(&map, &[], &config).unwrap();
         let mut workspace = Box::new(NodeIndex::<512, 4096>::new());
-        let mut alone = vec![prm::Edge::default(); 20_000];
+        let mut alone = vec![prm::PrmEdge::default(); 20_000];
         let count = prm::connect(&map.grid(), &nodes, &config, &mut workspace, &mut alone).unwrap();
         assert!(count > 500);
         for threads in [1, 2, 5] {

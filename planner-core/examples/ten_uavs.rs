@@ -21,12 +21,12 @@ fn main() {
     let terminals: Vec<Point> = row(4.0).chain(row(36.0)).collect();
     let (nodes, seed, sampling) = (400, 1, prm::Sampling::Uniform);
     let (edge_min_m, edge_max_m, clearance_m, max_clearance_m) = (0.5, 8.0, 0.8, 4.0);
-    let build = prm::Config { nodes, edge_min_m, edge_max_m, clearance_m, seed, sampling };
+    let build = prm::PrmConfig { nodes, edge_min_m, edge_max_m, clearance_m, seed, sampling };
     let mut points = vec![Point::zeros(); terminals.len() + nodes];
     prm::sample_nodes(&grid, None, &terminals, &build, &mut points).expect("the hall is free");
     let (mut edges, clear) = (Vec::new(), prm::edge_clearance);
-    let connected = prm::connect_all_pairs(&grid, &points, &build, |prm::Edge { a, b }| {
-        let measured = clear(&grid, &points, prm::Edge { a, b }, max_clearance_m);
+    let connected = prm::connect_all_pairs(&grid, &points, &build, |prm::PrmEdge { a, b }| {
+        let measured = clear(&grid, &points, prm::PrmEdge { a, b }, max_clearance_m);
         edges.push(Edge { a, b, clearance_m: measured.expect("two nodes") });
     });
     connected.expect("the settings are sound");

@@ -13,7 +13,7 @@ use heapless::Vec;
 use libm::{fmaxf, fminf};
 
 use crate::flight::{Gate, Path};
-use crate::{ConfigError, Length, Point, all_positive};
+use crate::{Length, Point, SettingError, all_positive};
 
 /// Rule by which vehicles are kept apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub struct DeconflictConfig {
 
 impl DeconflictConfig {
     /// Checks that all numbers are positive and finite; the error names the first that is not.
-    pub fn check(&self) -> Result<(), ConfigError> {
+    pub fn check(&self) -> Result<(), SettingError> {
         all_positive(&[
             ("safety_distance_m", self.safety_distance_m),
             ("cruise_mps", self.cruise_mps),

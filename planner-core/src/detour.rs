@@ -22,7 +22,7 @@ use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::geometry::segments_distance_sq;
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::search::{self, SearchError, SearchWorkspace};
-use crate::{ConfigError, Length, Point};
+use crate::{Length, Point, SettingError};
 
 /// Sway of a hovering vehicle, metres: flying deeper into a zone by less than this is allowed.
 const HOVER_SWAY_M: f32 = 0.05;
@@ -63,7 +63,7 @@ pub enum ZoneKind {
 impl KeepOutZone {
     /// Checks that both ends of the zone's axis are finite, and that its radius is finite and not
     /// negative; the error names the first that is not.
-    pub fn check(&self) -> Result<(), ConfigError> {
+    pub fn check(&self) -> Result<(), SettingError> {
         check_finite("from", &self.from)?;
         check_finite("to", &self.to)?;
         check_not_negative("radius_m", self.radius_m)
@@ -137,12 +137,12 @@ impl KeepOutZone {
 }
 
 /// Bounding box of a zone, radius included, by which most legs are ruled out quickly.
-struct BoundingBox {
+struct ZoneBox {
     low: Point,
     high: Point,
 }
 
-impl BoundingBox {
+impl ZoneBox {
     fn of_zone(of: &KeepOutZone) -> Self {
         let (from, to) = (&of.from, &of.to);
         let radius = Point::repeat(of.radius_m);
@@ -191,7 +191,7 @@ pub fn is_path_blocked<const W: usize>(
     let Some((begun, waypoints)) = waypoints.split_first() else { return false };
     let place = if along_m > begun.along_m { path.point_at(along_m) } else { Some(begun.position) };
     let mut from = place.unwrap_or(first.position);
-    let room = BoundingBox::of_zone(&obstacle);
+    let room = ZoneBox::of_zone(&obstacle);
     let mut beside = room.outcode(&from);
     let mut from_m = fmaxf(along_m, begun.along_m);
     let mut touches = |to: Point| {
@@ -271,7 +271,7 @@ impl DetourRequest {
 
     /// Checks that all positions are finite, and that height and clearances are finite and not
     /// negative; the error names the first that is not.
-    pub fn check(&self) -> Result<(), ConfigError> {
+    pub fn check(&self) -> Result<(), SettingError> {
         check_finite("here", &self.here)?;
         check_finite("leg", &self.leg[0])?;
         check_finite("leg", &self.leg[1])?;
@@ -289,19 +289,19 @@ impl DetourRequest {
     }
 }
 
-fn check_finite(name: &'static str, place: &Point) -> Result<(), ConfigError> {
-    if place.iter().all(|c| c.is_finite()) { Ok(()) } else { Err(ConfigError(name)) }
+fn check_finite(name: &'static str, place: &Point) -> Result<(), SettingError> {
+    if place.iter().all(|c| c.is_finite()) { Ok(()) } else { Err(SettingError(name)) }
 }
 
-fn check_not_negative(name: &'static str, number: f32) -> Result<(), ConfigError> {
-    if number >= 0.0 && number.is_finite() { Ok(()) } else { Err(ConfigError(name)) }
+fn check_not_negative(name: &'static str, number: f32) -> Result<(), SettingError> {
+    if number >= 0.0 && number.is_finite() { Ok(()) } else { Err(SettingError(name)) }
 }
 
 /// Reason why no detour was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DetourError {
     /// A number of the request or of a keep-out zone is out of range.
-    Config(ConfigError),
+    Config(SettingError),
     /// The search of the roadmap found no path.
     Search(SearchError),
     /// The path has too many waypoints, or a coordinate that is not finite.

@@ -55,12 +55,12 @@ pub use geometry::{Length, Point};
 
 /// A setting outside its allowed range; holds the setting's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ConfigError(pub &'static str);
+pub struct SettingError(pub &'static str);
 
 /// Returns an error with the name of the first setting that is not a positive, finite number.
-pub(crate) fn all_positive(settings: &[(&'static str, f32)]) -> Result<(), ConfigError> {
+pub(crate) fn all_positive(settings: &[(&'static str, f32)]) -> Result<(), SettingError> {
     match settings.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-        Some((name, _)) => Err(ConfigError(name)),
+        Some((name, _)) => Err(SettingError(name)),
         None => Ok(()),
     }
 }

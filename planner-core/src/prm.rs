@@ -28,7 +28,7 @@ use rand_pcg::Pcg32;
 
 use self::config::LengthRange;
 pub use self::config::{
-    Config, Edge, PrmError, Sampling, TRIES_PER_BRIDGE, TRIES_PER_NODE, squared_length,
+    PrmConfig, PrmEdge, PrmError, Sampling, TRIES_PER_BRIDGE, TRIES_PER_NODE, squared_length,
 };
 use self::free_box::NodeVisibility;
 pub use self::neighbours::NodeIndex;
@@ -47,7 +47,7 @@ pub fn sample_nodes(
     grid: &VoxelGrid<'_>,
     never_sample: Option<&VoxelGrid<'_>>,
     terminals: &[Point],
-    config: &Config,
+    config: &PrmConfig,
     nodes: &mut [Point],
 ) -> Result<usize, PrmError> {
     config.check()?;
@@ -88,7 +88,7 @@ pub fn sample_nodes(
 
 /// Whether a point is farther than the edges' clearance from every obstacle; with clearance 0,
 /// whether its cell is free.
-fn point_has_clearance(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool {
+fn point_has_clearance(grid: &VoxelGrid<'_>, config: &PrmConfig, p: &Point) -> bool {
     match config.clearance_m > 0.0 {
         true => segment_is_clear(grid, p, p, config.clearance_m),
         false => !grid.is_blocked_at(p),
@@ -98,7 +98,7 @@ fn point_has_clearance(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool
 /// The bridge test: whether `p` plus and `p` minus a random offset are both inside the grid and
 /// without clearance. `draw`, a point of the unit cube, gives the offset: on each axis at most
 /// twice the clearance, or an eighth of the longest edge where that is more.
-fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Point) -> bool {
+fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &PrmConfig, p: &Point, draw: Point) -> bool {
     let reach_m = (2.0 * config.clearance_m).max(config.edge_max_m / 8.0);
     let offset = (draw - Point::new(0.5, 0.5, 0.5)) * (2.0 * reach_m);
     [p + offset, p - offset]
@@ -115,7 +115,7 @@ struct SampleSequence {
 }
 
 impl SampleSequence {
-    fn new(config: &Config) -> Self {
+    fn new(config: &PrmConfig) -> Self {
         let mut rng = Pcg32::seed_from_u64(config.seed);
         let shift = uniform(&mut rng);
         // The generator is seeded again, so that uniform points do not depend on the draw of
@@ -164,9 +164,9 @@ fn radical_inverse(mut index: u32, base: u32) -> f32 {
 pub fn connect<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
-    config: &Config,
+    config: &PrmConfig,
     workspace: &mut NodeIndex<NODES, CUBES>,
-    edges: &mut [Edge],
+    edges: &mut [PrmEdge],
 ) -> Result<usize, PrmError> {
     workspace.build_index(nodes, config)?;
     let mut count = 0;
@@ -185,9 +185,9 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
 pub fn connect_range<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     workspace: &NodeIndex<NODES, CUBES>,
-    config: &Config,
+    config: &PrmConfig,
     range: Range<usize>,
-    mut found: impl FnMut(Edge) -> Result<(), PrmError>,
+    mut found: impl FnMut(PrmEdge) -> Result<(), PrmError>,
 ) -> Result<(), PrmError> {
     connect_range_with(grid, workspace, config, range, |_| None, |edge, _| found(edge))
 }
@@ -199,10 +199,10 @@ pub fn connect_range<const NODES: usize, const CUBES: usize>(
 pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     workspace: &NodeIndex<NODES, CUBES>,
-    config: &Config,
+    config: &PrmConfig,
     range: Range<usize>,
-    hint: impl Fn(Edge) -> Option<bool>,
-    mut found: impl FnMut(Edge, f32) -> Result<(), PrmError>,
+    hint: impl Fn(PrmEdge) -> Option<bool>,
+    mut found: impl FnMut(PrmEdge, f32) -> Result<(), PrmError>,
 ) -> Result<(), PrmError> {
     config.check()?;
     let mut visibility = NodeVisibility::new(grid, config);
@@ -210,7 +210,7 @@ pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
         visibility.set_node(workspace.point(place));
         let edge = |other: usize| {
             let (a, b) = (workspace.node(place), workspace.node(other));
-            Edge { a: a.min(b), b: a.max(b) }
+            PrmEdge { a: a.min(b), b: a.max(b) }
         };
         workspace.for_each_in_range(place, config, |places| {
             let hint = |other| hint(edge(other));
@@ -227,8 +227,8 @@ pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
 pub fn connect_all_pairs(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
-    config: &Config,
-    mut found: impl FnMut(Edge),
+    config: &PrmConfig,
+    mut found: impl FnMut(PrmEdge),
 ) -> Result<(), PrmError> {
     config.check()?;
     if nodes.len() > usize::from(u16::MAX) {
@@ -240,7 +240,7 @@ pub fn connect_all_pairs(
             if lengths.contains(squared_length((*a).into(), (*b).into()))
                 && segment_is_clear(grid, a, b, config.clearance_m)
             {
-                found(Edge { a: k as u16, b: l as u16 });
+                found(PrmEdge { a: k as u16, b: l as u16 });
             }
         }
     }
@@ -252,7 +252,7 @@ pub fn connect_all_pairs(
 pub fn edge_clearance(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
-    edge: Edge,
+    edge: PrmEdge,
     max_m: f32,
 ) -> Option<f32> {
     let (a, b) = (nodes.get(usize::from(edge.a))?, nodes.get(usize::from(edge.b))?);

@@ -24,7 +24,7 @@ mod set;
 pub use self::own::{Legs, OwnSet};
 pub use self::place::{OFF_REPORTED_PATH_M, OFF_REPORTED_PATH_S, PlaceOnPoints, PointsReach};
 pub use self::set::ReachableSet;
-use crate::{ConfigError, Point, all_positive};
+use crate::{Point, SettingError, all_positive};
 
 /// Time from a decision of the filter to the first motion that follows it, seconds: two setpoint
 /// periods.
@@ -98,7 +98,7 @@ pub struct MotionBounds {
 
 impl MotionBounds {
     /// Checks that all numbers are positive and finite; the error names the first that is not.
-    pub fn check(&self) -> Result<(), ConfigError> {
+    pub fn check(&self) -> Result<(), SettingError> {
         all_positive(&[
             ("accel_mps2", self.braking.accel_mps2),
             ("jerk_mps3", self.braking.jerk_mps3),

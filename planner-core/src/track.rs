@@ -14,7 +14,7 @@ use libm::{fabsf, fmaxf, fminf};
 
 use crate::deconflict::Advice;
 use crate::flight::{Path, Waypoint};
-use crate::{ConfigError, Point, all_positive};
+use crate::{Point, SettingError, all_positive};
 
 /// Limits of speed, acceleration and deviation for [`advance`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +51,7 @@ pub struct TrackConfig {
 impl TrackConfig {
     /// Checks that all numbers are positive and finite, and `deviation_min_m` is at most
     /// `deviation_max_m`; the error names the first that is not.
-    pub fn check(&self) -> Result<(), ConfigError> {
+    pub fn check(&self) -> Result<(), SettingError> {
         all_positive(&[
             ("cruise_mps", self.cruise_mps),
             ("climb_mps", self.climb_mps),
@@ -65,7 +65,7 @@ impl TrackConfig {
             ("lead_max_m", self.lead_max_m),
         ])?;
         if self.deviation_min_m > self.deviation_max_m {
-            return Err(ConfigError("deviation_max_m"));
+            return Err(SettingError("deviation_max_m"));
         }
         Ok(())
     }

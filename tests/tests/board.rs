@@ -16,7 +16,7 @@ use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 use planner_core::plan::{self, PlanWorkspace, SwarmPlan};
-use planner_core::prm::{self, Config};
+use planner_core::prm::{self, PrmConfig};
 
 /// Most instructions permitted, by the name that `measure` prints.
 const LIMITS: [(&str, u64); 4] = [
@@ -50,7 +50,7 @@ fn the_board_computes_what_the_host_computes() {
     }
     assert!(lines.contains(&format!("plan {:08x}", swarm_crc(&mission))), "{}", lines.join("\n"));
     for (name, clearance_m) in [("build", 0.0), ("build-with-clearance", cases::CLEARANCE_M)] {
-        let config = Config { clearance_m, ..cases::ROADMAP_CONFIG };
+        let config = PrmConfig { clearance_m, ..cases::ROADMAP_CONFIG };
         let line = format!("{name} {}", built(&map.grid(), &config));
         assert!(lines.contains(&line), "the host has {line:?}, the board\n{}", lines.join("\n"));
     }
@@ -105,13 +105,13 @@ fn swarm_crc(mission: &Mission) -> u32 {
 }
 
 /// The values that `measure` prints for a roadmap built on board, computed on the host.
-fn built(grid: &planner_core::voxel::VoxelGrid<'_>, config: &Config) -> String {
+fn built(grid: &planner_core::voxel::VoxelGrid<'_>, config: &PrmConfig) -> String {
     let mut nodes = vec![planner_core::Point::zeros(); config.nodes];
     prm::sample_nodes(grid, None, &[], config, &mut nodes).expect("free space");
     let mut index = Box::new(prm::NodeIndex::<4096, 8192>::new());
-    let mut edges = vec![prm::Edge::default(); 1 << 15];
+    let mut edges = vec![prm::PrmEdge::default(); 1 << 15];
     let count = prm::connect(grid, &nodes, config, &mut index, &mut edges).expect("it connects");
-    let edge = |e: &prm::Edge| planner_core::roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
+    let edge = |e: &prm::PrmEdge| planner_core::roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
     let edges: Vec<_> = edges[..count].iter().map(edge).collect();
     format!("{} {} {:08x}", nodes.len(), edges.len(), cases::roadmap_crc(&nodes, &edges))
 }

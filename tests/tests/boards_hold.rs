@@ -9,7 +9,7 @@ use host_sim::map::{self, Occupancy, OccupancyMap, Unknown, VoxelMap};
 use host_sim::roadmap::{self, Roadmap};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
-use planner_core::prm::{Config, Sampling};
+use planner_core::prm::{PrmConfig, Sampling};
 use planner_core::roadmap::RoadmapView;
 use planner_core::search::{SearchWorkspace, dijkstra_all};
 use planner_core::voxel::GridShape;
@@ -21,8 +21,8 @@ const SOURCES: u16 = 40;
 const MEDIAN: f32 = 1.03;
 const MOST: f32 = 1.15;
 
-fn config(nodes: usize) -> Config {
-    Config {
+fn config(nodes: usize) -> PrmConfig {
+    PrmConfig {
         nodes,
         edge_min_m: 0.5,
         edge_max_m: 8.0,
@@ -32,7 +32,7 @@ fn config(nodes: usize) -> Config {
     }
 }
 
-fn file(roadmap: &Roadmap, config: &Config) -> Vec<u8> {
+fn file(roadmap: &Roadmap, config: &PrmConfig) -> Vec<u8> {
     roadmap::encode(roadmap, &roadmap::header(config, Geodetic::default(), 0, 0))
         .expect("it is a roadmap")
 }
@@ -91,7 +91,7 @@ fn paths_stay_short(name: &str, all: &RoadmapView<'_>, kept: &RoadmapView<'_>) {
 }
 
 /// Builds a roadmap, cuts it down for a board and checks that its paths stay short.
-fn holds(name: &str, map: &VoxelMap, config: Config, board: &BoardCapacity) {
+fn holds(name: &str, map: &VoxelMap, config: PrmConfig, board: &BoardCapacity) {
     let began = Instant::now();
     let (all, parts) = roadmap::build(map, &[], &config).expect("there is free space");
     let built = began.elapsed();
@@ -124,7 +124,7 @@ fn scanned_maps_fit_and_paths_stay_short() {
             map::load(path.to_str().unwrap(), resolution_m).unwrap().voxel_map(Unknown::Blocked);
         // The method of cutting down was chosen with the first seed.
         for seed in 1..=seeds {
-            holds(name, &map, Config { seed, ..config(2300) }, &BOARDS[0]);
+            holds(name, &map, PrmConfig { seed, ..config(2300) }, &BOARDS[0]);
         }
     }
 }

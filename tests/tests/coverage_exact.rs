@@ -8,7 +8,7 @@ use host_sim::progress::Progress;
 use host_sim::scenario;
 use host_sim::scenario::coverage::Method;
 use planner_core::coverage::Flat;
-use planner_core::coverage::pack::{Plan, RouteDirection, TrackUnit, Vehicle, Work};
+use planner_core::coverage::pack::{RouteDirection, RoutePlan, TrackUnit, Vehicle, Work};
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -186,7 +186,7 @@ fn tried(seed: u64, shape: Shape) -> Option<Tried> {
         unit: TrackUnit::Waypoint,
         following: planned.terrain_following,
     };
-    let mut plan = Plan::<{ host_sim::coverage::MAX_VEHICLES }>::new();
+    let mut plan = RoutePlan::<{ host_sim::coverage::MAX_VEHICLES }>::new();
     divide_by_method(&work, Method::Exact, &mut plan).ok()?;
     let lengths = Lengths::new(&planned, &vehicles);
     let all: Vec<usize> = (0..vehicles.len()).collect();

@@ -15,7 +15,7 @@ use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::Path;
 use planner_core::frames::Geodetic;
-use planner_core::prm::{Config, Sampling};
+use planner_core::prm::{PrmConfig, Sampling};
 use planner_core::roadmap::{LANDMARKS, RoadmapView, encoded_len, write_with_landmarks};
 use planner_core::search::{SearchWorkspace, astar};
 
@@ -43,7 +43,7 @@ struct Files {
 }
 
 fn files(map: &VoxelMap, clearance_m: f32) -> Files {
-    let config = Config {
+    let config = PrmConfig {
         nodes: 2300,
         edge_min_m: 0.5,
         edge_max_m: 8.0,

@@ -4,7 +4,7 @@
 use flockmate_tests::shared_data;
 use host_sim::map::{self, BoxTree, Unknown, VoxelMap};
 use host_sim::roadmap::{self, MAX_STORED_CLEARANCE_M};
-use planner_core::prm::{self, Config, NodeIndex, Sampling};
+use planner_core::prm::{self, NodeIndex, PrmConfig, Sampling};
 
 const SEEDS: u64 = 20;
 
@@ -18,7 +18,7 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
     let grid = map.grid();
     let tree = BoxTree::new(&grid);
     for seed in 1..=SEEDS {
-        let config = Config {
+        let config = PrmConfig {
             nodes,
             edge_min_m: 0.5,
             edge_max_m: 8.0,
@@ -30,7 +30,7 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
         let joined =
             roadmap::connect_with_clearances(&grid, &tree, &nodes, &config, &mut workspace)
                 .expect("it joins");
-        let mut indexed: Vec<_> = joined.iter().map(|e| prm::Edge { a: e.a, b: e.b }).collect();
+        let mut indexed: Vec<_> = joined.iter().map(|e| prm::PrmEdge { a: e.a, b: e.b }).collect();
         let mut all_pairs = Vec::new();
         prm::connect_all_pairs(&map.grid(), &nodes, &config, |edge| all_pairs.push(edge))
             .expect("it connects");
@@ -39,7 +39,7 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
         assert!(indexed == all_pairs, "{name}, clearance {clearance_m} m, seed {seed}");
         if seed == 1 {
             for edge in &joined {
-                let ends = prm::Edge { a: edge.a, b: edge.b };
+                let ends = prm::PrmEdge { a: edge.a, b: edge.b };
                 let by_cells_m = prm::edge_clearance(&grid, &nodes, ends, MAX_STORED_CLEARANCE_M)
                     .expect("they are nodes");
                 let apart_m = (by_cells_m - edge.clearance_m).abs();

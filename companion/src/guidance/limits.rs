@@ -4,7 +4,7 @@ use libm::{fmaxf, fminf};
 use planner_core::deconflict::DeconflictConfig;
 use planner_core::safety::{Braking, MotionBounds};
 use planner_core::track::TrackConfig;
-use planner_core::{ConfigError, Point};
+use planner_core::{Point, SettingError};
 
 use crate::autopilot::limits::{AutopilotLimits, Limit};
 use crate::config::Config;
@@ -143,7 +143,7 @@ impl Settings {
     }
 
     /// Whether planner-core accepts these limits, and the safety filter's that follow from them.
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+    pub(crate) fn check(&self) -> Result<(), SettingError> {
         self.track.check()?;
         self.leg_track.check()?;
         self.deconflict.check()?;

@@ -7,7 +7,7 @@ use heapless::Vec;
 use planner_core::coverage::area::{Area, AreaError, Ring};
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
 use planner_core::coverage::losses::{self, Loss, VehicleStatus};
-use planner_core::coverage::pack::{self, PackWorkspace, Plan, Vehicle, Work};
+use planner_core::coverage::pack::{self, PackWorkspace, RoutePlan, Vehicle, Work};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat, around};
@@ -40,8 +40,8 @@ pub struct Workspace<const X: usize, const L: usize, const K: usize> {
     strips: tracks::LaneWorkspace<X>,
     tracks: Tracks<L>,
     pack: PackWorkspace<K>,
-    routes: Plan<K>,
-    losses: losses::Workspace<L, K>,
+    routes: RoutePlan<K>,
+    losses: losses::LossesWorkspace<L, K>,
     planned: Planned,
 }
 
@@ -70,8 +70,8 @@ impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
             strips: tracks::LaneWorkspace::new(),
             tracks: Tracks::new(),
             pack: PackWorkspace::new(),
-            routes: Plan::new(),
-            losses: losses::Workspace::new(),
+            routes: RoutePlan::new(),
+            losses: losses::LossesWorkspace::new(),
             planned: Planned::NOTHING,
         }
     }
@@ -82,7 +82,7 @@ impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
     }
 
     /// The routes of the last plan.
-    pub fn routes(&self) -> &Plan<K> {
+    pub fn routes(&self) -> &RoutePlan<K> {
         &self.routes
     }
 }
@@ -116,11 +116,11 @@ impl From<PlanError> for Error {
     }
 }
 
-impl From<losses::Error> for Error {
-    fn from(error: losses::Error) -> Self {
+impl From<losses::LossesError> for Error {
+    fn from(error: losses::LossesError) -> Self {
         match error {
-            losses::Error::Coverage(error) => Self::Coverage(error),
-            losses::Error::Plan(error) => Self::Plan(error),
+            losses::LossesError::Coverage(error) => Self::Coverage(error),
+            losses::LossesError::Plan(error) => Self::Plan(error),
         }
     }
 }

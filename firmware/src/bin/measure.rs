@@ -14,7 +14,7 @@ use firmware::scratch::{Planner, WorkspaceOverlay};
 use heapless::Vec;
 use planner_core::deconflict::Method;
 use planner_core::plan::{self, Goals, SwarmPlan};
-use planner_core::prm::Config;
+use planner_core::prm::PrmConfig;
 use planner_core::roadmap::{HalfEdge, RoadmapView};
 use planner_core::search::{self, SearchWorkspace};
 use rand_core::SeedableRng;
@@ -122,7 +122,7 @@ fn measure_build(scratch: &mut WorkspaceOverlay, clearance_m: f32) {
     let (head, words) = memory::measurement_map();
     let grid = cases::voxel_map(&head, words);
     let builder = scratch.builder();
-    let config = Config { clearance_m, ..cases::ROADMAP_CONFIG };
+    let config = PrmConfig { clearance_m, ..cases::ROADMAP_CONFIG };
     let name = if clearance_m > 0.0 { "build-with-clearance" } else { "build" };
     print_instructions(name, || builder.build(&grid, &[], &config)).expect("a roadmap");
     let (nodes, edges) = (builder.nodes(), builder.edges());

@@ -8,7 +8,7 @@ use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::bound::lower_bound_s;
 use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
-use planner_core::coverage::pack::{self, Heights, Plan, TrackUnit, Vehicle, Work};
+use planner_core::coverage::pack::{self, Heights, RoutePlan, TrackUnit, Vehicle, Work};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{Flat, around, powell, sweep};
@@ -46,7 +46,7 @@ impl Checksum {
         }
     }
 
-    fn add_plan(&mut self, plan: &Plan<VEHICLES>) {
+    fn add_plan(&mut self, plan: &RoutePlan<VEHICLES>) {
         for route in &plan.routes {
             let numbers =
                 [u32::from(route.vehicle), route.first, route.end, u32::from(route.layer)];
@@ -162,7 +162,7 @@ fn measure_plans(
     sum.add_plan(plan);
 }
 
-fn flown_ranges(plan: &Plan<VEHICLES>, count: u32) -> Vec<WaypointRange, VEHICLES> {
+fn flown_ranges(plan: &RoutePlan<VEHICLES>, count: u32) -> Vec<WaypointRange, VEHICLES> {
     let mut done: Vec<WaypointRange, VEHICLES> = plan
         .routes
         .iter()
@@ -173,7 +173,7 @@ fn flown_ranges(plan: &Plan<VEHICLES>, count: u32) -> Vec<WaypointRange, VEHICLE
 }
 
 /// The lanes of the first ten waypoints of each route.
-fn flown_lanes(tracks: &Tracks<LANES>, plan: &Plan<VEHICLES>) -> Vec<WaypointRange, VEHICLES> {
+fn flown_lanes(tracks: &Tracks<LANES>, plan: &RoutePlan<VEHICLES>) -> Vec<WaypointRange, VEHICLES> {
     // Widened to whole lanes: no lane is cut in two, so the rest fits the capacity.
     let whole = |range: WaypointRange| {
         let lane = |number: u32| &tracks.lanes()[tracks.lane_of(number)];

@@ -11,7 +11,7 @@ use planner_core::flight::{
     HeadingMode, Path, PicturePlan, Task, Trigger, WaypointOrder, WaypointRange,
 };
 use planner_core::frames::{self, Geodetic, Projection};
-use planner_core::prm::{self, Config, PrmError, Sampling};
+use planner_core::prm::{self, PrmConfig, PrmError, Sampling};
 use planner_core::safety::{
     Braking, Legs, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, PointsReach, ReachableSet,
 };
@@ -162,7 +162,7 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
     let grid = VoxelGrid::new(SHAPE, Outside::Blocked, &WORDS).expect("a good grid");
     let solid = VoxelGrid::new(GridShape { dims: [4; 3], ..SHAPE }, Outside::Blocked, &[u64::MAX])
         .expect("it is");
-    let good = Config {
+    let good = PrmConfig {
         nodes: 6,
         edge_min_m: 0.1,
         edge_max_m: 2.0,
@@ -175,17 +175,17 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
     assert!(to.call("neighbours::NodeIndex::is_empty", || index.is_empty()));
     for hard in HARD_NUMBERS {
         for config in [
-            Config { edge_min_m: hard, ..good },
-            Config { edge_max_m: hard, ..good },
-            Config { clearance_m: hard, ..good },
-            Config { nodes: hard as usize, ..good },
+            PrmConfig { edge_min_m: hard, ..good },
+            PrmConfig { edge_max_m: hard, ..good },
+            PrmConfig { clearance_m: hard, ..good },
+            PrmConfig { nodes: hard as usize, ..good },
         ] {
-            let checked = to.call("config::Config::check", || config.check());
+            let checked = to.call("config::PrmConfig::check", || config.check());
             let sampled = to.call("prm::sample_nodes", || {
                 prm::sample_nodes(&grid, Some(&grid), &[], &config, &mut nodes)
             });
             assert!(checked.is_ok() || sampled == Err(checked.unwrap_err()));
-            let mut edges = [prm::Edge { a: 0, b: 0 }; 4];
+            let mut edges = [prm::PrmEdge { a: 0, b: 0 }; 4];
             let joined = to.call("prm::connect", || {
                 prm::connect(&grid, &nodes[..6], &config, &mut index, &mut edges)
             });
@@ -220,7 +220,7 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
                 })
             });
             to.add_bool(found.is_ok());
-            let full = |_: prm::Edge, _: f32| Err(PrmError::RoadmapFull);
+            let full = |_: prm::PrmEdge, _: f32| Err(PrmError::RoadmapFull);
             let found = to.call("prm::connect_range_with", || {
                 prm::connect_range_with(&grid, &index, &good, range, |_| None, full)
             });
@@ -231,7 +231,7 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
         let pair = [p, Point::new(1.0, 1.0, 1.0)];
         for (a, b) in [(0, 1), (0, 0), (0, 2), (u16::MAX, 0)] {
             let clearance_m = to.call("prm::edge_clearance", || {
-                prm::edge_clearance(&grid, &pair, prm::Edge { a, b }, p.y)
+                prm::edge_clearance(&grid, &pair, prm::PrmEdge { a, b }, p.y)
             });
             assert_eq!(clearance_m.is_some(), a.max(b) < 2);
             to.add(clearance_m.unwrap_or(-1.0));

@@ -5,7 +5,7 @@ use planner_core::Point;
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
 use planner_core::coverage::losses::{self, Loss, VehicleStatus};
 use planner_core::coverage::pack::{
-    Heights, PackWorkspace, Plan, Route, RouteDirection, TrackUnit, Vehicle, Work,
+    Heights, PackWorkspace, Route, RouteDirection, RoutePlan, TrackUnit, Vehicle, Work,
 };
 use planner_core::coverage::{CoverageError, Flat, around};
 use planner_core::detour::{DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
@@ -29,14 +29,15 @@ type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 /// A closure that plans the flights of given routes by `flights::plan_flights`, and checks the
 /// result.
-type PlanCall<'p> = dyn FnMut(&AreaWork<'_>, &Plan<VEHICLES>, &FlightInputs<'_>) -> Planned + 'p;
+type PlanCall<'p> =
+    dyn FnMut(&AreaWork<'_>, &RoutePlan<VEHICLES>, &FlightInputs<'_>) -> Planned + 'p;
 type AreaWork<'w> = Work<'w, LANES, CORNERS>;
 type Planned = Result<(), PlanError>;
 
 /// Memory that is lent to the calls.
 pub(super) struct FlightWorkspaces {
     area: coverage::CoverageMemory,
-    losses: losses::Workspace<LANES, VEHICLES>,
+    losses: losses::LossesWorkspace<LANES, VEHICLES>,
     out: Flights,
     own: VehiclePlan<WAYPOINTS, GATES>,
 }
@@ -46,7 +47,7 @@ impl FlightWorkspaces {
     pub(super) const fn new() -> Self {
         Self {
             area: coverage::CoverageMemory::new(),
-            losses: losses::Workspace::new(),
+            losses: losses::LossesWorkspace::new(),
             out: SwarmPlan::new(),
             own: VehiclePlan::new(),
         }
@@ -114,12 +115,12 @@ fn is_finite(out: &Flights) -> bool {
 fn call_flight_plans(
     to: &mut Results<'_, impl Listener>,
     good: &Work<'_, LANES, CORNERS>,
-    routes: &Plan<VEHICLES>,
+    routes: &RoutePlan<VEHICLES>,
     ws: &mut ScheduleWorkspace,
     out: &mut Flights,
 ) {
     let mut plan = |work: &Work<'_, LANES, CORNERS>,
-                    routes: &Plan<VEHICLES>,
+                    routes: &RoutePlan<VEHICLES>,
                     flight_inputs: &FlightInputs<'_>| {
         let result = to.call("flights::plan_flights", || {
             flights::plan_flights(work, routes, flight_inputs, ws, out)
@@ -182,7 +183,7 @@ fn call_flight_plans(
 fn call_hard_vehicles(
     plan: &mut PlanCall<'_>,
     good: &Work<'_, LANES, CORNERS>,
-    routes: &Plan<VEHICLES>,
+    routes: &RoutePlan<VEHICLES>,
     hard: f32,
 ) {
     let vehicle = FLEET[1];
@@ -215,7 +216,7 @@ fn call_hard_vehicles(
 fn unusual_routes(
     plan: &mut PlanCall<'_>,
     good: &Work<'_, LANES, CORNERS>,
-    routes: &Plan<VEHICLES>,
+    routes: &RoutePlan<VEHICLES>,
 ) {
     let first = routes.routes[0];
     let count = good.tracks.waypoint_count();
@@ -239,15 +240,18 @@ fn unusual_routes(
         airborne: true,
         ..pad
     });
-    assert_eq!(plan(good, &Plan::new(), &FlightInputs { pads: &aloft, ..FLIGHT_INPUTS }), Ok(()));
-    assert_eq!(plan(good, &Plan::new(), &FLIGHT_INPUTS), Ok(()));
+    assert_eq!(
+        plan(good, &RoutePlan::new(), &FlightInputs { pads: &aloft, ..FLIGHT_INPUTS }),
+        Ok(())
+    );
+    assert_eq!(plan(good, &RoutePlan::new(), &FLIGHT_INPUTS), Ok(()));
 }
 
 /// Plans flights above a height field, with extreme settings for terrain following.
 fn call_field_plans(
     plan: &mut PlanCall<'_>,
     good: &Work<'_, LANES, CORNERS>,
-    routes: &Plan<VEHICLES>,
+    routes: &RoutePlan<VEHICLES>,
 ) {
     let mut file = [0; 64];
     let field = uneven_field(&mut file);
@@ -273,7 +277,7 @@ fn uneven_field(file: &mut [u8]) -> FieldView<'_> {
 }
 
 struct BorrowedWorkspaces<'m> {
-    losses: &'m mut losses::Workspace<LANES, VEHICLES>,
+    losses: &'m mut losses::LossesWorkspace<LANES, VEHICLES>,
     pack: &'m mut PackWorkspace<VEHICLES>,
     schedule: &'m mut ScheduleWorkspace,
     out: &'m mut Flights,
@@ -282,20 +286,20 @@ struct BorrowedWorkspaces<'m> {
 fn call_divisions(
     to: &mut Results<'_, impl Listener>,
     good: &Work<'_, LANES, CORNERS>,
-    routes: &Plan<VEHICLES>,
+    routes: &RoutePlan<VEHICLES>,
     memory: &mut BorrowedWorkspaces<'_>,
 ) {
-    *memory.losses = to.call("losses::Workspace::new", losses::Workspace::new);
+    *memory.losses = to.call("losses::LossesWorkspace::new", losses::LossesWorkspace::new);
     let all = good.tracks.waypoint_count();
     for (first, end) in
         [(0, 0), (1, 3), (all, all), (3, 1), (0, u32::MAX), (u32::MAX, u32::MAX), (0, all)]
     {
         let done = [WaypointRange { first, end }];
-        let begun = to.call("losses::Workspace::start_plan", || {
+        let begun = to.call("losses::LossesWorkspace::start_plan", || {
             memory.losses.start_plan(good.tracks, good.transit, &done).is_ok()
         });
         to.add_bool(begun);
-        let done = to.call("losses::Workspace::done", || memory.losses.done().len());
+        let done = to.call("losses::LossesWorkspace::done", || memory.losses.done().len());
         assert!(done <= 1);
     }
     let fate = VehicleStatus { alive: true, along_m: 60.0 };
@@ -335,8 +339,8 @@ fn call_redivide(
     to: &mut Results<'_, impl Listener>,
     loss: &Loss<'_, LANES, CORNERS>,
     memory: &mut BorrowedWorkspaces<'_>,
-    routes: &mut Plan<VEHICLES>,
-) -> Result<(), losses::Error> {
+    routes: &mut RoutePlan<VEHICLES>,
+) -> Result<(), losses::LossesError> {
     let BorrowedWorkspaces { losses, pack, schedule, out } = memory;
     let divided = to.call("losses::redivide_work", || {
         losses::redivide_work(loss, losses, pack, schedule, routes, out)

@@ -4,7 +4,7 @@ use heapless::Vec;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::footprint::Spacing;
 use planner_core::coverage::pack::{
-    self, Heights, PackWorkspace, Plan, Route, RouteDirection, TrackUnit, Vehicle, Work,
+    self, Heights, PackWorkspace, Route, RouteDirection, RoutePlan, TrackUnit, Vehicle, Work,
 };
 use planner_core::coverage::powell::{self, powell};
 use planner_core::coverage::tracks::{self, Lane, LanePattern, Tracks};
@@ -61,8 +61,8 @@ pub(super) struct CoverageMemory {
     pub(super) tracks: Lanes,
     left: Lanes,
     build: tracks::LaneWorkspace<VERTICES>,
-    pub(super) powell: powell::Workspace<VEHICLES>,
-    pub(super) plan: Plan<VEHICLES>,
+    pub(super) powell: powell::PowellWorkspace<VEHICLES>,
+    pub(super) plan: RoutePlan<VEHICLES>,
 }
 
 impl CoverageMemory {
@@ -72,8 +72,8 @@ impl CoverageMemory {
             tracks: Tracks::new(),
             left: Tracks::new(),
             build: tracks::LaneWorkspace::new(),
-            powell: powell::Workspace::new(),
-            plan: Plan::new(),
+            powell: powell::PowellWorkspace::new(),
+            plan: RoutePlan::new(),
         }
     }
 }
@@ -337,14 +337,14 @@ fn call_packing(
     lent: &mut CoverageMemory,
 ) {
     let CoverageMemory { tracks, powell, plan, .. } = lent;
-    *plan = to.call("pack::Plan::new", Plan::new);
+    *plan = to.call("pack::RoutePlan::new", RoutePlan::new);
     let ws = &mut powell.pack;
     *ws = to.call("pack::PackWorkspace::new", PackWorkspace::new);
     let good = whole_work(tracks, transit);
     let pack = |to: &mut Results<'_, _>,
                 work: &Work<'_, LANES, CORNERS>,
                 ws: &mut _,
-                plan: &mut Plan<_>| {
+                plan: &mut RoutePlan<_>| {
         let checked = to.call("pack::Work::check", || work.check::<VEHICLES>());
         let packed = to.call("pack::binpat", || pack::binpat(work, ws, plan));
         assert!(checked.is_ok() || packed == checked);
@@ -356,7 +356,7 @@ fn call_packing(
                 to.call("pack::Work::altitude_delay_s", || work.altitude_delay_s(vehicle, u8::MAX));
             to.add(delay_s);
         }
-        let max_s = to.call("pack::Plan::max_cost_s", || plan.max_cost_s());
+        let max_s = to.call("pack::RoutePlan::max_cost_s", || plan.max_cost_s());
         to.add(max_s);
         for route in &plan.routes {
             let mut waypoints = to.call("pack::Route::waypoints", || route.waypoints());
@@ -400,7 +400,7 @@ fn call_packing_by_shares(
     work: &Work<'_, LANES, CORNERS>,
     hard: f32,
     ws: &mut PackWorkspace<VEHICLES>,
-    plan: &mut Plan<VEHICLES>,
+    plan: &mut RoutePlan<VEHICLES>,
 ) {
     let (tracks, unit) = (work.tracks, work.unit);
     for shares in [&[hard; VEHICLES][..], &[1.0, hard, 0.0], &[hard], &[]] {
@@ -422,7 +422,7 @@ fn call_share_searches(
     lent: &mut CoverageMemory,
 ) {
     let CoverageMemory { tracks, powell: ws, plan, .. } = lent;
-    *ws = to.call("powell::Workspace::new", powell::Workspace::new);
+    *ws = to.call("powell::PowellWorkspace::new", powell::PowellWorkspace::new);
     let good = whole_work(tracks, transit);
     let mut ways_m = [0.0; 512];
     let mut reaches = [0; 1024];
@@ -441,7 +441,7 @@ fn call_share_searches(
                 to.add_bool(found.is_ok());
                 to.add(plan.max_cost_s());
             }
-            let mut memory = exact::Workspace {
+            let mut memory = exact::ExactWorkspace {
                 ways_m: &mut ways_m,
                 reaches: &mut reaches,
                 states: &mut states,
@@ -456,13 +456,13 @@ fn call_share_searches(
     }
     for vehicles in [0, VEHICLES, exact::MAX_EXACT_VEHICLES, usize::MAX] {
         for waypoints in [0, 1, usize::MAX] {
-            let lengths = to.call("exact::Workspace::required_lengths", || {
-                exact::Workspace::required_lengths(vehicles, waypoints)
+            let lengths = to.call("exact::ExactWorkspace::required_lengths", || {
+                exact::ExactWorkspace::required_lengths(vehicles, waypoints)
             });
             assert!(lengths[2] <= 1 << (2 * exact::MAX_EXACT_VEHICLES));
         }
     }
-    let mut small = exact::Workspace { ways_m: &mut [], reaches: &mut [], states: &mut [] };
+    let mut small = exact::ExactWorkspace { ways_m: &mut [], reaches: &mut [], states: &mut [] };
     assert_eq!(
         exact::plan_exact(&good, &mut small, &mut ws.pack, plan),
         Err(CoverageError::WorkspaceTooSmall)

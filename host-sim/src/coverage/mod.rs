@@ -25,7 +25,7 @@ use planner_core::Point;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::bound::lower_bound_s;
 use planner_core::coverage::pack::{
-    PackWorkspace, Plan, Route, TrackUnit, Vehicle, Work, binpat, binpat_by_shares,
+    PackWorkspace, Route, RoutePlan, TrackUnit, Vehicle, Work, binpat, binpat_by_shares,
 };
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
@@ -107,7 +107,7 @@ impl<'a> CoveragePlan<'a> {
             },
             following,
         };
-        let mut plan = Plan::new();
+        let mut plan = RoutePlan::new();
         let shares = divide_by_method(&work, method, &mut plan).map_err(failed)?;
         let routes = began.elapsed().as_secs_f64();
         let lower_bound_s = lower_bound_s(&work).map_err(failed)?;
@@ -403,7 +403,7 @@ const MIN_SHARE_M: f32 = 1e-3;
 pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     method: Method,
-    plan: &mut Plan<K>,
+    plan: &mut RoutePlan<K>,
 ) -> Result<Option<Vec<f32>>, CoverageError> {
     let own = || Some(work.vehicles.iter().map(|vehicle| vehicle.weight).collect());
     match method {
@@ -411,17 +411,17 @@ pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
             binpat(work, &mut PackWorkspace::<K>::new(), plan).map(|()| own())
         }
         Method::PowellBinpat => {
-            let mut ws = powell::Workspace::<K>::new();
+            let mut ws = powell::PowellWorkspace::<K>::new();
             powell::powell(work, &powell::PowellConfig::USUAL, &mut ws, plan)?;
             Ok(Some(ws.pack.shares()[..work.vehicles.len()].to_vec()))
         }
         Method::Exact => {
             let count = work.tracks.waypoint_count() as usize;
             let [ways, reaches, states] =
-                exact::Workspace::required_lengths(work.vehicles.len(), count);
+                exact::ExactWorkspace::required_lengths(work.vehicles.len(), count);
             let (mut ways_m, mut reaches) = (vec![0.0; ways], vec![0; reaches]);
             let mut states = vec![(0, 0); states];
-            let mut ws = exact::Workspace {
+            let mut ws = exact::ExactWorkspace {
                 ways_m: &mut ways_m,
                 reaches: &mut reaches,
                 states: &mut states,
@@ -437,7 +437,7 @@ pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
 /// take longer: companions plan by shares alone, so they cannot fly the exact plan.
 fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    exact: &mut Plan<K>,
+    exact: &mut RoutePlan<K>,
 ) -> Result<Option<Vec<f32>>, CoverageError> {
     let mut shares = vec![0.0; work.vehicles.len()];
     let mut packed_m = 0.0;
@@ -448,7 +448,7 @@ fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
         *share = (end_m - packed_m).max(MIN_SHARE_M);
         packed_m = end_m;
     }
-    let mut plan = Plan::new();
+    let mut plan = RoutePlan::new();
     binpat_by_shares(work, &shares, &mut PackWorkspace::<K>::new(), &mut plan)?;
     let alike = plan
         .routes

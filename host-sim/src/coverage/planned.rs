@@ -1,7 +1,7 @@
 //! A planned coverage mission and its sorties.
 
 use planner_core::coverage::area::Area;
-use planner_core::coverage::pack::{Plan, Route, Vehicle};
+use planner_core::coverage::pack::{Route, RoutePlan, Vehicle};
 use planner_core::coverage::tracks::Tracks;
 use planner_core::coverage::transit::Transit;
 use planner_core::field::follow::TerrainFollowing;
@@ -59,7 +59,7 @@ pub struct CoveragePlan<'a> {
     /// Shortest ways around no-fly zones.
     pub transit: Box<Transit<'a, MAX_CORNERS>>,
     /// Routes of the vehicles that fly, in the order of the path.
-    pub plan: Plan<MAX_VEHICLES>,
+    pub plan: RoutePlan<MAX_VEHICLES>,
     /// The shares (W in paper CPP) by which companions divide the path into these routes, one for
     /// each vehicle; `None` if no shares give this plan.
     pub shares: Option<Vec<f32>>,

@@ -5,7 +5,7 @@ use std::time::Instant;
 use anyhow::bail;
 use planner_core::Point;
 use planner_core::plan::VehicleTask;
-use planner_core::prm::Config;
+use planner_core::prm::PrmConfig;
 use planner_core::roadmap::{MAX_EDGE_M, RoadmapHeader};
 use planner_core::schedule::ScheduleConfig;
 use planner_core::segment::segment_is_clear;
@@ -203,7 +203,7 @@ pub(super) fn build_roadmap(
     let fence = scenario.mission.geofence.as_ref();
     let fenced = fence.map(|f| map.with_nodes_inside(&(f.min + room), &(f.max - room)));
     let map = fenced.as_ref().unwrap_or(map);
-    let config = Config {
+    let config = PrmConfig {
         nodes: settings.nodes as usize,
         edge_min_m,
         edge_max_m,

@@ -14,7 +14,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
 use planner_core::Point;
-use planner_core::prm::Config;
+use planner_core::prm::PrmConfig;
 use planner_core::roadmap::Edge;
 use planner_core::voxel::GridShape;
 
@@ -45,7 +45,7 @@ pub fn missing_passage_nodes(
     tree: &BoxTree,
     nodes: &[Point],
     edges: &[Edge],
-    config: &Config,
+    config: &PrmConfig,
     wanted: &[WantedConnection],
 ) -> Vec<Point> {
     let mut wanted = wanted.to_vec();
@@ -219,7 +219,7 @@ impl<'a> CellSearch<'a> {
 fn fewest_corners(
     tree: &BoxTree,
     way: &[Point],
-    config: &Config,
+    config: &PrmConfig,
     required_m: f32,
 ) -> Option<Vec<Point>> {
     let last = way.len() - 1;

@@ -1,7 +1,7 @@
 //! Passages: rooms behind narrow doors are joined, by clear edges, and what is walled off stays so.
 
 use super::passages::{ConnectedComponents, WantedConnection};
-use super::{Config, Roadmap, add_passages, build};
+use super::{PrmConfig, Roadmap, add_passages, build};
 use crate::map::occupancy::{OccupancyMap, Unknown};
 use crate::map::{Occupancy, VoxelMap};
 use planner_core::Point;
@@ -43,7 +43,7 @@ fn rooms_behind_narrow_doors_are_joined() {
         let count = 2 + rng.next_u32() % 4;
         let map = rooms(&mut rng, count);
         let ends = [Point::new(1.0, 1.0, 1.0), Point::new(3.0 * count as f32 - 1.0, 3.0, 1.0)];
-        let config = Config {
+        let config = PrmConfig {
             nodes: 60,
             edge_min_m: 0.2,
             edge_max_m: 2.5,
@@ -78,7 +78,7 @@ fn what_is_walled_off_stays_so() {
     let mut rng = Pcg32::seed_from_u64(4);
     let map = rooms(&mut rng, 2);
     let ends = [Point::new(1.0, 1.0, 1.0), Point::new(5.0, 3.0, 1.0)];
-    let config = Config {
+    let config = PrmConfig {
         nodes: 60,
         edge_min_m: 0.2,
         edge_max_m: 2.5,

@@ -10,15 +10,15 @@
 //! Cost: a few dozen rounds of Σ C(K, m)² · (K − m)² steps, m to K, and K² · n for the pointers.
 
 use super::CoverageError;
-use super::pack::{PackWorkspace, Plan, Route, Work, binpat, set_costs};
+use super::pack::{PackWorkspace, Route, RoutePlan, Work, binpat, set_costs};
 
 /// Most vehicles of an exact division.
 pub const MAX_EXACT_VEHICLES: usize = 10;
 /// Relative resolution to which the least T is found.
 pub const TIME_RESOLUTION: f32 = 1e-5;
 
-/// Memory that the caller lends, with lengths from [`Workspace::required_lengths`].
-pub struct Workspace<'a> {
+/// Memory that the caller lends, with lengths from [`ExactWorkspace::required_lengths`].
+pub struct ExactWorkspace<'a> {
     /// Transit lengths, metres: for each vehicle to every waypoint, and from every waypoint home.
     pub ways_m: &'a mut [f32],
     /// For each vehicle, layer and first waypoint, the number after the last waypoint that the
@@ -29,7 +29,7 @@ pub struct Workspace<'a> {
     pub states: &'a mut [(u32, u16)],
 }
 
-impl Workspace<'_> {
+impl ExactWorkspace<'_> {
     /// Lengths of the three slices for these numbers of vehicles and waypoints; `usize::MAX`
     /// instead of an overflow.
     pub fn required_lengths(vehicles: usize, waypoints: usize) -> [usize; 3] {
@@ -46,16 +46,16 @@ impl Workspace<'_> {
 /// [`CoverageError::WorkspaceTooSmall`].
 pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    ws: &mut Workspace<'_>,
+    ws: &mut ExactWorkspace<'_>,
     pack: &mut PackWorkspace<K>,
-    out: &mut Plan<K>,
+    out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
     work.check::<K>()?;
     let (count, waypoints) = (work.vehicles.len(), work.tracks.waypoint_count() as usize);
     if count > MAX_EXACT_VEHICLES {
         return Err(CoverageError::Vehicles);
     }
-    let [ways, reaches, states] = Workspace::required_lengths(count, waypoints);
+    let [ways, reaches, states] = ExactWorkspace::required_lengths(count, waypoints);
     if ws.ways_m.len() < ways || ws.reaches.len() < reaches || ws.states.len() < states {
         return Err(CoverageError::WorkspaceTooSmall);
     }
@@ -81,7 +81,7 @@ pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
 
 struct DivisionTable<'t, 'w, 'm, const L: usize, const N: usize> {
     work: &'t Work<'w, L, N>,
-    ws: &'t mut Workspace<'m>,
+    ws: &'t mut ExactWorkspace<'m>,
     count: usize,
     waypoints: usize,
 }
@@ -165,7 +165,7 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
     }
 
     /// Writes the plan that leads to the state of [`Self::complete_state`].
-    fn write_plan<const K: usize>(&self, out: &mut Plan<K>) {
+    fn write_plan<const K: usize>(&self, out: &mut RoutePlan<K>) {
         let Some(mut state) = self.complete_state() else { return };
         let (count, sets) = (self.count, 1usize << self.count);
         let stride = self.waypoints + 1;

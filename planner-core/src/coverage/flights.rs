@@ -13,7 +13,7 @@ use heapless::Vec;
 use self::builder::{FlightPathBuilder, point_at_height};
 use super::divide;
 use super::lanes::Lane;
-use super::pack::{Plan, Route, RouteDirection, Vehicle, Work};
+use super::pack::{Route, RouteDirection, RoutePlan, Vehicle, Work};
 use crate::field::follow::TerrainFollowing;
 use crate::flight::{
     Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointOrder, WaypointRange,
@@ -99,7 +99,7 @@ pub fn plan_flights<
     const W: usize,
 >(
     work: &Work<'_, L, N>,
-    routes: &Plan<K>,
+    routes: &RoutePlan<K>,
     inputs: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,

@@ -5,12 +5,12 @@ use heapless::Vec;
 use super::CoverageError;
 
 /// Lower and upper end of an interval.
-pub(super) type Span = [f32; 2];
+pub(super) type Interval = [f32; 2];
 
 /// A set of real numbers, of at most `N` intervals.
 #[derive(Default)]
 pub(super) struct Intervals<const N: usize> {
-    spans: Vec<Span, N>,
+    spans: Vec<Interval, N>,
 }
 
 impl<const N: usize> Intervals<N> {
@@ -22,12 +22,12 @@ impl<const N: usize> Intervals<N> {
         self.spans.clear();
     }
 
-    pub(super) fn spans(&self) -> &[Span] {
+    pub(super) fn spans(&self) -> &[Interval] {
         &self.spans
     }
 
     /// Adds an interval to the set.
-    pub(super) fn add(&mut self, [from, to]: Span) -> Result<(), CoverageError> {
+    pub(super) fn add(&mut self, [from, to]: Interval) -> Result<(), CoverageError> {
         // Intervals that the new one touches are consecutive; they are merged with it.
         let first = self.spans.partition_point(|span| span[1] < from);
         let after = self.spans.partition_point(|span| span[0] <= to);
@@ -54,7 +54,7 @@ impl<const N: usize> Intervals<N> {
     }
 
     /// Removes the interior of an interval from the set; the interval's end points stay.
-    pub(super) fn remove(&mut self, [from, to]: Span) -> Result<(), CoverageError> {
+    pub(super) fn remove(&mut self, [from, to]: Interval) -> Result<(), CoverageError> {
         let mut i = self.spans.partition_point(|span| span[1] <= from);
         while i < self.spans.len() && self.spans[i][0] < to {
             let [low, high] = self.spans[i];

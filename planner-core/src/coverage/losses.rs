@@ -11,7 +11,7 @@ use heapless::Vec;
 use super::divide;
 use super::flights::{self, FlightInputs, Pad};
 use super::lanes::Tracks;
-use super::pack::{self, PackWorkspace, Plan, Route, Vehicle, Work};
+use super::pack::{self, PackWorkspace, Route, RoutePlan, Vehicle, Work};
 use super::transit::Transit;
 use super::{CoverageError, Flat};
 use crate::flight::{Task, WaypointRange, WaypointSet};
@@ -36,17 +36,17 @@ pub struct VehicleStatus {
 }
 
 /// Memory of divisions, for areas of at most `L` lanes and fleets of at most `K` vehicles.
-pub struct Workspace<const L: usize, const K: usize> {
+pub struct LossesWorkspace<const L: usize, const K: usize> {
     done: WaypointSet<MAX_DONE_RANGES>,
     remaining: Tracks<L>,
     vehicles: Vec<Vehicle, K>,
     pads: Vec<Pad, K>,
-    rest: Plan<K>,
+    rest: RoutePlan<K>,
     /// Transit layers of lost vehicles, which may be flying home in them: bit `i` is layer `i`.
     held_layers: u64,
 }
 
-impl<const L: usize, const K: usize> Workspace<L, K> {
+impl<const L: usize, const K: usize> LossesWorkspace<L, K> {
     /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         Self {
@@ -54,7 +54,7 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
             remaining: Tracks::new(),
             vehicles: Vec::new(),
             pads: Vec::new(),
-            rest: Plan::new(),
+            rest: RoutePlan::new(),
             held_layers: 0,
         }
     }
@@ -94,7 +94,7 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
     }
 }
 
-impl<const L: usize, const K: usize> Default for Workspace<L, K> {
+impl<const L: usize, const K: usize> Default for LossesWorkspace<L, K> {
     fn default() -> Self {
         Self::new()
     }
@@ -113,20 +113,20 @@ pub struct Loss<'a, const L: usize, const N: usize> {
 
 /// Reason why there is no division.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Error {
+pub enum LossesError {
     /// Lanes or routes could not be computed.
     Coverage(CoverageError),
     /// The flights could not be planned.
     Plan(PlanError),
 }
 
-impl From<CoverageError> for Error {
+impl From<CoverageError> for LossesError {
     fn from(error: CoverageError) -> Self {
         Self::Coverage(error)
     }
 }
 
-impl From<PlanError> for Error {
+impl From<PlanError> for LossesError {
     fn from(error: PlanError) -> Self {
         Self::Plan(error)
     }
@@ -149,12 +149,12 @@ pub fn redivide_work<
     const W: usize,
 >(
     loss: &Loss<'_, L, N>,
-    ws: &mut Workspace<L, K>,
+    ws: &mut LossesWorkspace<L, K>,
     pack: &mut PackWorkspace<K>,
     schedule: &mut ScheduleWorkspace,
-    routes: &mut Plan<K>,
+    routes: &mut RoutePlan<K>,
     out: &mut SwarmPlan<V, W>,
-) -> Result<(), Error> {
+) -> Result<(), LossesError> {
     let Loss { work, flight_inputs, statuses } = *loss;
     let known = |route: &Route| usize::from(route.vehicle) < statuses.len();
     if statuses.len() != work.vehicles.len()
@@ -201,7 +201,7 @@ pub fn redivide_work<
 /// Gives each route the vehicle of the next one, and the last that of the first.
 fn exchange_routes<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    routes: &mut Plan<K>,
+    routes: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
     let Some(mut vehicle) = routes.routes.first().map(|route| route.vehicle) else { return Ok(()) };
     for route in routes.routes.iter_mut().rev() {
@@ -226,7 +226,7 @@ const fn layer_bit(layer: u8) -> u64 {
 /// Adds the waypoints that each vehicle has photographed, or promised to photograph, to `ws.done`.
 fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: usize>(
     statuses: &[VehicleStatus],
-    ws: &mut Workspace<L, K>,
+    ws: &mut LossesWorkspace<L, K>,
     before: &SwarmPlan<V, W>,
 ) -> Result<(), CoverageError> {
     for (fate, flight) in statuses.iter().zip(&before.flights) {
@@ -252,7 +252,7 @@ fn set_start_places<
     const W: usize,
 >(
     loss: &Loss<'_, L, N>,
-    ws: &mut Workspace<L, K>,
+    ws: &mut LossesWorkspace<L, K>,
     before: &SwarmPlan<V, W>,
 ) -> Result<(), CoverageError> {
     let Loss { work, flight_inputs, statuses } = *loss;
@@ -278,9 +278,9 @@ fn set_start_places<
 fn divide_among_survivors<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     statuses: &[VehicleStatus],
-    ws: &mut Workspace<L, K>,
+    ws: &mut LossesWorkspace<L, K>,
     pack: &mut PackWorkspace<K>,
-    routes: &mut Plan<K>,
+    routes: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
     let living =
         || statuses.iter().enumerate().filter(|(_, fate)| fate.alive).map(|(index, _)| index);

@@ -116,12 +116,12 @@ impl Route {
 /// The division of a path: at most one route per vehicle, in the order of the path. A vehicle
 /// without a route stays on the ground.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Plan<const K: usize> {
+pub struct RoutePlan<const K: usize> {
     /// The routes, in the order of the path.
     pub routes: Vec<Route, K>,
 }
 
-impl<const K: usize> Plan<K> {
+impl<const K: usize> RoutePlan<K> {
     /// Creates a plan without routes.
     pub const fn new() -> Self {
         Self { routes: Vec::new() }
@@ -283,7 +283,7 @@ pub(super) struct RouteEnds {
 pub fn binpat<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     ws: &mut PackWorkspace<K>,
-    out: &mut Plan<K>,
+    out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
     work.check::<K>()?;
     for (share, vehicle) in ws.shares.iter_mut().zip(work.vehicles) {
@@ -307,7 +307,7 @@ pub fn binpat_by_shares<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     shares: &[f32],
     ws: &mut PackWorkspace<K>,
-    out: &mut Plan<K>,
+    out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
     work.check::<K>()?;
     let sound = |share: &f32| *share >= 0.0 && share.is_finite();
@@ -333,7 +333,7 @@ pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     bins: BinEligibility,
     ws: &mut PackWorkspace<K>,
-    out: &mut Plan<K>,
+    out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
     let count = work.vehicles.len();
     cbinpack(work.tracks, work.unit, &ws.shares[..count], &mut ws.ends[..count]);
@@ -414,7 +414,7 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     bins: BinEligibility,
     ws: &mut PackWorkspace<K>,
-    out: &mut Plan<K>,
+    out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
     let count = work.vehicles.len();
     out.routes.clear();
@@ -466,7 +466,7 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
 /// longest, and so on; then sets the costs.
 pub(super) fn set_layers<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    plan: &mut Plan<K>,
+    plan: &mut RoutePlan<K>,
 ) {
     let seconds =
         |route: &Route| route.ground_m / work.vehicles[usize::from(route.vehicle)].cruise_mps;
@@ -484,7 +484,7 @@ pub(super) fn set_layers<const L: usize, const N: usize, const K: usize>(
 /// Computes the costs of routes whose layers are set.
 pub(super) fn set_costs<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    plan: &mut Plan<K>,
+    plan: &mut RoutePlan<K>,
 ) {
     for route in &mut plan.routes {
         let vehicle = &work.vehicles[usize::from(route.vehicle)];

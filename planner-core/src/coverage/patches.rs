@@ -11,7 +11,7 @@ use libm::{fmaxf, fminf};
 
 use super::CoverageError;
 use super::area::RingKind;
-use super::intervals::Span;
+use super::intervals::Interval;
 use super::lanes::Tracks;
 use super::strips::{Sets, Strips, WIDTH_ROUNDING};
 use super::transit::ZONE_CLEARANCE_M;
@@ -51,7 +51,7 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
 fn lay_missing_lanes_of<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     (strip, border): (u16, f32),
-    span: Span,
+    span: Interval,
     ws: &mut Sets<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
@@ -71,7 +71,7 @@ fn lay_missing_lanes_of<const L: usize, const V: usize>(
 }
 
 /// Lines along the middle of an eighth and beside it, half an eighth apart, nearest first.
-fn lines_beside(strips: &Strips<'_>, span: Span) -> impl Iterator<Item = f32> {
+fn lines_beside(strips: &Strips<'_>, span: Interval) -> impl Iterator<Item = f32> {
     let (middle, half) = (strips.centre_line(span), (span[1] - span[0]) / 2.0);
     let side = move |k: u32| if k.is_multiple_of(2) { half } else { -half };
     (0..=2 * STRIP_PARTS).map(move |k| middle + side(k) * k.div_ceil(2) as f32)
@@ -79,7 +79,7 @@ fn lines_beside(strips: &Strips<'_>, span: Span) -> impl Iterator<Item = f32> {
 
 /// Whether images along the line `v` show the whole band from `low` to `high` across the lanes, and
 /// a little more.
-fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
+fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Interval) -> bool {
     let spacing = strips.pattern.spacing;
     let across = spacing.footprint.across_m;
     let spare = fmaxf(across - strips.strip_width_m, 0.0) / 2.0;
@@ -91,7 +91,7 @@ fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
 
 /// Whether a no-fly zone, or its clearance, reaches into the band from `low` to `high` across the
 /// lanes.
-fn overlaps_no_fly_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
+fn overlaps_no_fly_zone(strips: &Strips<'_>, [low, high]: Interval) -> bool {
     strips.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly).any(|(_, ring)| {
         let (first, last) =
             ring.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(first, last), corner| {
@@ -105,7 +105,7 @@ fn overlaps_no_fly_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
 /// lanes, without what a no-fly zone covers.
 fn compute_uncovered<const L: usize, const V: usize>(
     strips: &Strips<'_>,
-    span: Span,
+    span: Interval,
     tracks: &Tracks<L>,
     ws: &mut Sets<V>,
 ) -> Result<(), CoverageError> {

@@ -12,7 +12,7 @@
 //! the result is never worse than BINPAT's.
 
 use super::CoverageError;
-use super::pack::{BinEligibility, PackWorkspace, Plan, Work, pack_routes};
+use super::pack::{BinEligibility, PackWorkspace, RoutePlan, Work, pack_routes};
 
 /// Settings of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -34,16 +34,16 @@ const STEP_HALVINGS: u32 = 7;
 const MIN_ROUND_GAIN: f32 = 1e-4;
 
 /// Memory of the search: shares, search directions, and the packings' workspace.
-pub struct Workspace<const K: usize> {
+pub struct PowellWorkspace<const K: usize> {
     /// Workspace of the packings.
     pub pack: PackWorkspace<K>,
     best: [f32; K],
     current: [f32; K],
     directions: [[f32; K]; K],
-    plan: Plan<K>,
+    plan: RoutePlan<K>,
 }
 
-impl<const K: usize> Workspace<K> {
+impl<const K: usize> PowellWorkspace<K> {
     /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         Self {
@@ -51,12 +51,12 @@ impl<const K: usize> Workspace<K> {
             best: [0.0; K],
             current: [0.0; K],
             directions: [[0.0; K]; K],
-            plan: Plan::new(),
+            plan: RoutePlan::new(),
         }
     }
 }
 
-impl<const K: usize> Default for Workspace<K> {
+impl<const K: usize> Default for PowellWorkspace<K> {
     fn default() -> Self {
         Self::new()
     }
@@ -69,8 +69,8 @@ impl<const K: usize> Default for Workspace<K> {
 pub fn powell<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     config: &PowellConfig,
-    ws: &mut Workspace<K>,
-    out: &mut Plan<K>,
+    ws: &mut PowellWorkspace<K>,
+    out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
     work.check::<K>()?;
     let count = work.vehicles.len();
@@ -121,8 +121,8 @@ struct ShareSearch<'s, 'w, const L: usize, const N: usize, const K: usize> {
     work: &'s Work<'w, L, N>,
     evaluations_left: u32,
     least_cost: f32,
-    ws: &'s mut Workspace<K>,
-    out: &'s mut Plan<K>,
+    ws: &'s mut PowellWorkspace<K>,
+    out: &'s mut RoutePlan<K>,
 }
 
 impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K> {

@@ -5,7 +5,7 @@ use heapless::Vec;
 use libm::{ceilf, fmaxf, fminf};
 
 use super::area::{Area, RingKind, edges_of};
-use super::intervals::{Intervals, Span};
+use super::intervals::{Interval, Intervals};
 use super::lanes::{Lane, LanePattern, Tracks};
 use super::sweep::LaneDirection;
 use super::transit::ZONE_CLEARANCE_M;
@@ -104,12 +104,12 @@ impl<'a> Strips<'a> {
     }
 
     /// Lower and upper border of a strip: coordinates `v` across the lanes.
-    pub(super) fn strip_borders(&self, strip: usize) -> Span {
+    pub(super) fn strip_borders(&self, strip: usize) -> Interval {
         let low = self.low + strip as f32 * self.strip_width_m;
         [low, low + self.strip_width_m]
     }
 
-    pub(super) fn centre_line(&self, [low, high]: Span) -> f32 {
+    pub(super) fn centre_line(&self, [low, high]: Interval) -> f32 {
         (low + high) / 2.0
     }
 
@@ -117,7 +117,7 @@ impl<'a> Strips<'a> {
     /// the two `v` of `span`.
     pub(super) fn compute_needed<const V: usize>(
         &self,
-        span: Span,
+        span: Interval,
         ws: &mut Sets<V>,
     ) -> Result<(), CoverageError> {
         ws.needed.clear();
@@ -126,7 +126,7 @@ impl<'a> Strips<'a> {
 
     /// `span` made slightly narrower: a ring that only touches a strip's border belongs to the
     /// neighbouring strip.
-    fn inset(&self, [low, high]: Span) -> Span {
+    fn inset(&self, [low, high]: Interval) -> Interval {
         let inset = self.strip_width_m * 1e-4;
         [low + inset, high - inset]
     }
@@ -136,7 +136,7 @@ impl<'a> Strips<'a> {
     /// between the lines.
     pub(super) fn subtract_no_fly_zones<const V: usize>(
         &self,
-        span: Span,
+        span: Interval,
         ws: &mut Sets<V>,
     ) -> Result<(), CoverageError> {
         let span = self.inset(span);
@@ -222,7 +222,7 @@ impl<'a> Strips<'a> {
         ws: &mut Sets<V>,
         out: &mut Tracks<L>,
     ) -> Result<(), CoverageError> {
-        let mut push = |[from, to]: Span| {
+        let mut push = |[from, to]: Interval| {
             let (from, to) = (Flat::new(from, v), Flat::new(to, v));
             let lane = Lane { from, to, first: 0, count: 0, start_m: 0.0, strip };
             out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)
@@ -258,7 +258,7 @@ impl<'a> Strips<'a> {
     /// First and last image of the lane that photographs `need` in its strip: from border to
     /// border, and further where a part would otherwise be beyond the first or last image. The
     /// first is greater than the last if one image between both shows all.
-    fn lane_extent(&self, need: &Span, borders: &[f32]) -> Span {
+    fn lane_extent(&self, need: &Interval, borders: &[f32]) -> Interval {
         let reach = self.picture_half_width();
         let inside = borders.iter().filter(|u| (need[0]..=need[1]).contains(u));
         inside.fold([need[0] + reach, need[1] - reach], |[from, to], u| {
@@ -308,7 +308,7 @@ fn line_crossings<const V: usize>(
 /// the line across to a border line crosses an edge first, at the same `u`.
 fn project_rings<const V: usize>(
     edges: impl Iterator<Item = (Flat, Flat)> + Clone,
-    [low, high]: Span,
+    [low, high]: Interval,
     crossings: &mut Vec<f32, V>,
     out: &mut Intervals<V>,
 ) -> Result<(), CoverageError> {
@@ -322,7 +322,7 @@ fn project_rings<const V: usize>(
 }
 
 /// Range of `u` of the part of an edge between the two `v`; `None` if there is no such part.
-fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
+fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Interval) -> Option<Interval> {
     if a.y > b.y {
         core::mem::swap(&mut a, &mut b);
     }
@@ -337,7 +337,7 @@ fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
 
 /// Range of `u` on the line `v` that is nearer than [`ZONE_CLEARANCE_M`] to an edge: within the
 /// circles around its ends and the lines beside it. `None` if there is none.
-fn range_near_edge((a, b): (Flat, Flat), v: f32) -> Option<Span> {
+fn range_near_edge((a, b): (Flat, Flat), v: f32) -> Option<Interval> {
     const CLEAR_M: f32 = ZONE_CLEARANCE_M;
     if fmaxf(a.y, b.y) < v - CLEAR_M || fminf(a.y, b.y) > v + CLEAR_M {
         return None;

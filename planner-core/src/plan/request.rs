@@ -1,6 +1,6 @@
 //! The request for a plan of the swarm, and the reasons why there is none.
 
-use crate::ConfigError;
+use crate::SettingError;
 use crate::assignment::AssignmentError;
 use crate::flight::PathError;
 use crate::schedule::{ScheduleConfig, ScheduleError};
@@ -89,7 +89,7 @@ pub enum PlanError {
     /// More than `V` vehicles or goals.
     SwarmFull,
     /// A setting of the schedule is out of range.
-    Config(ConfigError),
+    Config(SettingError),
     /// Height or required clearance of the vehicle with this id is negative, NaN or infinite.
     BadTask(u8),
     /// The height of the goal with this index above its ground is negative, NaN or infinite.

@@ -24,7 +24,7 @@ pub enum Sampling {
 
 /// Settings of the roadmap to build.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Config {
+pub struct PrmConfig {
     /// Number of random nodes; terminals are not counted.
     pub nodes: usize,
     /// Length of the shortest edge allowed, metres (Dmin).
@@ -60,14 +60,14 @@ pub enum PrmError {
 
 /// An edge between two nodes, `a < b`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Edge {
+pub struct PrmEdge {
     /// The lower index.
     pub a: u16,
     /// The higher index.
     pub b: u16,
 }
 
-impl Config {
+impl PrmConfig {
     /// Returns an error with the name of the first setting that is out of range.
     pub fn check(&self) -> Result<(), PrmError> {
         let good = |x: f32| x >= 0.0 && x.is_finite();
@@ -107,7 +107,7 @@ pub(super) struct LengthRange {
 }
 
 impl LengthRange {
-    pub(super) fn new(config: &Config) -> Self {
+    pub(super) fn new(config: &PrmConfig) -> Self {
         let min = config.edge_min_m * config.edge_min_m;
         Self { min: min.max(f32::MIN_POSITIVE), max: config.edge_max_m * config.edge_max_m }
     }

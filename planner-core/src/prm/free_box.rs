@@ -8,7 +8,7 @@
 //! box, "blocked" if a point of the segment is at least [`ROUNDING_CELLS`] cells inside an occupied
 //! cell. All other segments go to the exact check.
 
-use super::config::Config;
+use super::config::PrmConfig;
 use super::neighbours::NodeIndex;
 use crate::Point;
 use crate::segment::{
@@ -70,7 +70,7 @@ struct BoxView {
 }
 
 impl<'g, 'a> NodeVisibility<'g, 'a> {
-    pub(super) fn new(grid: &'g VoxelGrid<'a>, config: &Config) -> Self {
+    pub(super) fn new(grid: &'g VoxelGrid<'a>, config: &PrmConfig) -> Self {
         let resolution = grid.shape().resolution_m;
         Self {
             grid,

@@ -6,7 +6,7 @@
 //! cubes that are neighbours in x are neighbours in the sorted order, and a node's candidates are a
 //! few contiguous runs.
 
-use super::config::{Config, LengthRange, PrmError, squared_length};
+use super::config::{LengthRange, PrmConfig, PrmError, squared_length};
 use crate::Point;
 
 /// Candidate nodes whose distances are computed at once.
@@ -63,7 +63,7 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
     }
 
     /// Sorts the nodes into the index, replacing what it held. O(nodes + cubes).
-    pub fn build_index(&mut self, nodes: &[Point], config: &Config) -> Result<(), PrmError> {
+    pub fn build_index(&mut self, nodes: &[Point], config: &PrmConfig) -> Result<(), PrmError> {
         config.check()?;
         self.len = 0;
         if nodes.len() > NODES {
@@ -150,7 +150,7 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
     pub(super) fn for_each_in_range<E>(
         &self,
         place: usize,
-        config: &Config,
+        config: &PrmConfig,
         mut visit: impl FnMut(&[u16]) -> Result<(), E>,
     ) -> Result<(), E> {
         let lengths = LengthRange::new(config);

@@ -8,8 +8,8 @@ use std::vec::Vec;
 use super::*;
 use crate::voxel::{GridShape, Outside};
 
-fn config(seed: u64) -> Config {
-    Config {
+fn config(seed: u64) -> PrmConfig {
+    PrmConfig {
         nodes: 300,
         edge_min_m: 0.5,
         edge_max_m: 4.0,
@@ -51,9 +51,9 @@ fn rooms(rng: &mut Pcg32, resolution_m: f32) -> (GridShape, Vec<u64>) {
 }
 
 /// Checks edges: the same set as the all-pairs loop gives, none twice.
-fn check_edges(grid: &VoxelGrid<'_>, nodes: &[Point], config: &Config) -> usize {
+fn check_edges(grid: &VoxelGrid<'_>, nodes: &[Point], config: &PrmConfig) -> usize {
     let mut workspace = NodeIndex::<400, 600>::new();
-    let mut edges = vec![Edge::default(); 50_000];
+    let mut edges = vec![PrmEdge::default(); 50_000];
     let count = connect(grid, nodes, config, &mut workspace, &mut edges).unwrap();
     let mut split = Vec::new();
     for range in [0..97, 97..98, 98..nodes.len()] {
@@ -81,7 +81,7 @@ fn edges_are_those_of_all_pairs() {
         for outside in [Outside::Blocked, Outside::Free] {
             let grid = VoxelGrid::new(shape, outside, &words).unwrap();
             for clearance_m in [0.0, 0.3] {
-                let config = Config { clearance_m, ..config(seed) };
+                let config = PrmConfig { clearance_m, ..config(seed) };
                 let mut nodes = vec![Point::zeros(); 400];
                 let count = sample_nodes(&grid, None, &[], &config, &mut nodes).unwrap();
                 // Some nodes on cell corners, and two at one place.
@@ -134,7 +134,7 @@ fn rays_that_graze_a_wall_miss_no_cell_beside_them() {
                 shape.min + cells * shape.resolution_m
             })
             .collect();
-        let config = Config { edge_max_m: 6.0, ..config(seed) };
+        let config = PrmConfig { edge_max_m: 6.0, ..config(seed) };
         edges += check_edges(&grid, &nodes, &config);
         pairs += nodes.len() * (nodes.len() - 1) / 2;
     }
@@ -150,7 +150,7 @@ fn nodes_are_free_and_repeat_with_the_seed() {
     let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
     let terminals = [Point::new(0.1, 2.0, 1.1), Point::new(2.0, 3.0, 1.0)];
     for sampling in [Sampling::Uniform, Sampling::Halton] {
-        let config = Config { clearance_m: 0.2, sampling, ..config(5) };
+        let config = PrmConfig { clearance_m: 0.2, sampling, ..config(5) };
         let mut nodes = vec![Point::zeros(); 302];
         assert_eq!(sample_nodes(&grid, None, &terminals, &config, &mut nodes), Ok(302));
         assert_eq!(nodes[..2], terminals);
@@ -160,7 +160,8 @@ fn nodes_are_free_and_repeat_with_the_seed() {
         let mut again = vec![Point::zeros(); 302];
         sample_nodes(&grid, None, &terminals, &config, &mut again).unwrap();
         assert_eq!(nodes, again);
-        sample_nodes(&grid, None, &terminals, &Config { seed: 6, ..config }, &mut again).unwrap();
+        sample_nodes(&grid, None, &terminals, &PrmConfig { seed: 6, ..config }, &mut again)
+            .unwrap();
         assert_ne!(nodes, again);
         // Even: each eighth of the map holds its share within what 300 draws allow.
         let middle = (shape.min + shape.max()) / 2.0;
@@ -187,7 +188,7 @@ fn bridges_lie_in_doors() {
         }
         let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
         let count = |sampling| {
-            let config = Config { clearance_m: 0.3, nodes: 200, sampling, ..config(seed) };
+            let config = PrmConfig { clearance_m: 0.3, nodes: 200, sampling, ..config(seed) };
             let mut nodes = vec![Point::zeros(); 200];
             sample_nodes(&grid, None, &[], &config, &mut nodes).unwrap();
             assert!(nodes.iter().all(|p| segment_is_clear(&grid, p, p, 0.3)));
@@ -227,7 +228,7 @@ fn refusals_are_named() {
         sample_nodes(&full, None, &[inside], &good, &mut nodes),
         Err(PrmError::TooManyNodes)
     );
-    let few = Config { nodes: 10, ..good };
+    let few = PrmConfig { nodes: 10, ..good };
     assert_eq!(
         sample_nodes(&full, None, &[inside], &few, &mut nodes),
         Err(PrmError::TerminalBlocked(0))
@@ -243,17 +244,17 @@ fn refusals_are_named() {
         );
     }
     for (bad, name) in [
-        (Config { edge_min_m: f32::NAN, ..few }, "edge_min_m"),
-        (Config { edge_max_m: 0.4, ..few }, "edge_max_m"),
-        (Config { edge_max_m: f32::INFINITY, ..few }, "edge_max_m"),
-        (Config { clearance_m: -1.0, ..few }, "clearance_m"),
-        (Config { nodes: 70_000, ..few }, "nodes"),
+        (PrmConfig { edge_min_m: f32::NAN, ..few }, "edge_min_m"),
+        (PrmConfig { edge_max_m: 0.4, ..few }, "edge_max_m"),
+        (PrmConfig { edge_max_m: f32::INFINITY, ..few }, "edge_max_m"),
+        (PrmConfig { clearance_m: -1.0, ..few }, "clearance_m"),
+        (PrmConfig { nodes: 70_000, ..few }, "nodes"),
     ] {
         assert_eq!(sample_nodes(&empty, None, &[], &bad, &mut nodes), Err(PrmError::Config(name)));
     }
     let mut workspace = NodeIndex::<20, 8>::new();
     let count = sample_nodes(&empty, None, &[inside], &few, &mut nodes).unwrap();
-    let mut edges = [Edge::default(); 5];
+    let mut edges = [PrmEdge::default(); 5];
     assert_eq!(
         connect(&empty, &nodes[..count], &few, &mut workspace, &mut edges),
         Err(PrmError::RoadmapFull)
@@ -276,7 +277,7 @@ fn an_edge_knows_its_clearance() {
     let words = vec![0; shape.word_count()];
     let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
     let nodes = [Point::new(1.0, 2.0, 3.0), Point::new(4.0, 2.0, 3.0)];
-    assert_eq!(edge_clearance(&grid, &nodes, Edge { a: 0, b: 1 }, 4.0), Some(1.0));
-    assert_eq!(edge_clearance(&grid, &nodes, Edge { a: 0, b: 1 }, 0.5), Some(0.5));
-    assert_eq!(edge_clearance(&grid, &nodes, Edge { a: 0, b: 2 }, 0.5), None);
+    assert_eq!(edge_clearance(&grid, &nodes, PrmEdge { a: 0, b: 1 }, 4.0), Some(1.0));
+    assert_eq!(edge_clearance(&grid, &nodes, PrmEdge { a: 0, b: 1 }, 0.5), Some(0.5));
+    assert_eq!(edge_clearance(&grid, &nodes, PrmEdge { a: 0, b: 2 }, 0.5), None);
 }

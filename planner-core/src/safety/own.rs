@@ -25,18 +25,18 @@ fn sqrt_upper_bound(square: f32) -> f32 {
 }
 
 /// Memory for the legs of a set, which the caller lends to [`OwnSet::new`].
-pub type Legs<'a> = Vec<Leg<'a>, MAX_SET_POINTS>;
+pub type Legs<'a> = Vec<SetLeg<'a>, MAX_SET_POINTS>;
 
 /// A leg of the own set, with its midpoint and an upper bound of half its length.
 #[derive(Clone, Copy, Debug)]
-pub struct Leg<'a> {
+pub struct SetLeg<'a> {
     from: &'a Point,
     to: &'a Point,
     middle: Point,
     half_m: f32,
 }
 
-impl<'a> Leg<'a> {
+impl<'a> SetLeg<'a> {
     #[inline]
     fn new(from: &'a Point, to: &'a Point) -> Self {
         let half = (to - from) * 0.5;
@@ -45,7 +45,7 @@ impl<'a> Leg<'a> {
 
     /// Whether two legs are certainly at least `apart_m` from each other.
     #[inline]
-    fn is_apart(&self, other: &Leg<'_>, apart_m: f32) -> bool {
+    fn is_apart(&self, other: &SetLeg<'_>, apart_m: f32) -> bool {
         let most_m = self.half_m + other.half_m + apart_m;
         (self.middle - other.middle).norm_squared() >= most_m * most_m
     }
@@ -62,7 +62,7 @@ impl<'a> Leg<'a> {
 #[derive(Clone, Debug)]
 pub struct OwnSet<'a> {
     set: &'a ReachableSet,
-    legs: &'a [Leg<'a>],
+    legs: &'a [SetLeg<'a>],
     /// Centre of the bounding box, and half of its size.
     middle: Point,
     half: Point,
@@ -83,7 +83,7 @@ impl<'a> OwnSet<'a> {
         legs.clear();
         for (from, to) in set.segments().skip(usize::from(double)) {
             // Cannot overflow: there are at most as many legs as points.
-            let _ = legs.push(Leg::new(from, to));
+            let _ = legs.push(SetLeg::new(from, to));
             low = select_per_axis(&low, to, |a, b| a < b);
             high = select_per_axis(&high, to, |a, b| a > b);
         }
@@ -127,7 +127,7 @@ impl<'a> OwnSet<'a> {
             if self.is_outside(&(from + half), &half, wide_m) {
                 continue;
             }
-            let other = Leg::new(from, to);
+            let other = SetLeg::new(from, to);
             for leg in self.legs {
                 if !leg.is_apart(&other, wide_m) {
                     let apart_sq = segments_distance_sq((from, to), (leg.from, leg.to));
@@ -175,7 +175,7 @@ impl<'a> OwnSet<'a> {
         // the neighbour's present position either.
         let now_sq = (here - place).norm_squared();
         let nearer_m = sqrtf(now_sq.min(4.0 * most_m * most_m)) - APPROACH_ROUNDING_M;
-        let is_nearer = |leg: &Leg<'_>| {
+        let is_nearer = |leg: &SetLeg<'_>| {
             leg.may_come_within(place, nearer_m)
                 && point_distance_sq((leg.from, leg.to), place) < nearer_m * nearer_m
         };

@@ -15,7 +15,7 @@ use planner_core::detour::{self, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::{Flight, Path, Task, VehiclePlan};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::plan::{self, Goals, SwarmPlan};
-use planner_core::prm::{self, Config};
+use planner_core::prm::{self, PrmConfig};
 use planner_core::roadmap::{self, HalfEdge, RoadmapHeader, RoadmapView};
 use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{self, ScheduleWorkspace};
@@ -44,7 +44,7 @@ struct BenchMemory {
     plan: Plan,
     small: prm::NodeIndex<SMALL_ROADMAP_NODES, 1024>,
     nodes: [Point; SMALL_ROADMAP_NODES],
-    edges: [prm::Edge; 1024],
+    edges: [prm::PrmEdge; 1024],
     kept: Vec<roadmap::Edge, 1024>,
     file: [u8; 12 << 10],
     lengths: [f32; 2048],
@@ -55,7 +55,7 @@ static BENCH_MEMORY: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMe
     plan: Plan::new(),
     small: prm::NodeIndex::new(),
     nodes: [Point::new(0.0, 0.0, 0.0); SMALL_ROADMAP_NODES],
-    edges: [prm::Edge { a: 0, b: 0 }; 1024],
+    edges: [prm::PrmEdge { a: 0, b: 0 }; 1024],
     kept: Vec::new(),
     file: [0; 12 << 10],
     lengths: [0.0; 2048],
@@ -408,7 +408,7 @@ fn measure_segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
         });
         let nodes = [a, b];
         meter.call("prm::edge_clearance, to 2 m", 0, || {
-            prm::edge_clearance(grid, &nodes, prm::Edge { a: 0, b: 1 }, 2.0)
+            prm::edge_clearance(grid, &nodes, prm::PrmEdge { a: 0, b: 1 }, 2.0)
         });
     }
 }
@@ -438,7 +438,7 @@ fn measure_roadmap_builds(
             builder.connect_nodes(grid, &cases::ROADMAP_CONFIG)
         })
         .expect(good);
-    let wide = Config { clearance_m: cases::CLEARANCE_M, ..cases::ROADMAP_CONFIG };
+    let wide = PrmConfig { clearance_m: cases::CLEARANCE_M, ..cases::ROADMAP_CONFIG };
     meter
         .call("prm::sample_nodes, 2300, 0.8 m", 0, || builder.sample_nodes(grid, &[], &wide))
         .expect(good);
@@ -456,7 +456,7 @@ fn measure_host_calls(
     beside: &mut BenchMemory,
 ) {
     let BenchMemory { small, nodes, edges, kept, file, lengths, .. } = beside;
-    let config = Config { nodes: SMALL_ROADMAP_NODES, ..cases::ROADMAP_CONFIG };
+    let config = PrmConfig { nodes: SMALL_ROADMAP_NODES, ..cases::ROADMAP_CONFIG };
     let good = "the building has room";
     prm::sample_nodes(grid, None, &[], &config, nodes).expect(good);
     let count = meter

@@ -25,7 +25,7 @@ use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::pack::{
-    Heights, PackWorkspace, Plan, RouteDirection, TrackUnit, Vehicle, Work, binpat,
+    Heights, PackWorkspace, RouteDirection, RoutePlan, TrackUnit, Vehicle, Work, binpat,
 };
 use planner_core::coverage::powell;
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
@@ -171,7 +171,7 @@ struct CoverageBench {
     tracks: Box<Tracks<LANES>>,
     workspace: Box<tracks::LaneWorkspace<64>>,
     pack: Box<PackWorkspace<VEHICLES>>,
-    plan: Plan<VEHICLES>,
+    plan: RoutePlan<VEHICLES>,
     points: Vec<[f32; 3]>,
 }
 
@@ -189,7 +189,7 @@ impl CoverageBench {
             tracks: Box::default(),
             workspace: Box::default(),
             pack: Box::default(),
-            plan: Plan::new(),
+            plan: RoutePlan::new(),
             points: Vec::new(),
         }
     }
@@ -212,7 +212,7 @@ impl CoverageBench {
 }
 
 /// Writes every flight as points: start, up to its layer, the lanes, its layer, home.
-fn write_out(work: &Work<'_, LANES, 8>, plan: &Plan<VEHICLES>, points: &mut Vec<[f32; 3]>) {
+fn write_out(work: &Work<'_, LANES, 8>, plan: &RoutePlan<VEHICLES>, points: &mut Vec<[f32; 3]>) {
     points.clear();
     let Heights { mission_m, layer_m } = work.heights;
     for route in &plan.routes {
@@ -276,7 +276,7 @@ fn powell_us() -> f64 {
     let mut bench = CoverageBench::new(3);
     bench.plan();
     let transit = Transit::<8>::empty();
-    let mut ws: Box<powell::Workspace<VEHICLES>> = Box::default();
+    let mut ws: Box<powell::PowellWorkspace<VEHICLES>> = Box::default();
     let work = work(&bench.tracks, &transit, &bench.vehicles);
     median_us(|| {
         powell::powell(&work, &powell::PowellConfig::USUAL, &mut ws, &mut bench.plan)

@@ -29,7 +29,7 @@ use host_sim::result::Timing;
 use host_sim::scenario;
 use planner_core::Point;
 use planner_core::frames::Geodetic;
-use planner_core::prm::{self, Config, Edge, NodeIndex, Sampling, squared_length};
+use planner_core::prm::{self, NodeIndex, PrmConfig, PrmEdge, Sampling, squared_length};
 use planner_core::roadmap::{self, LANDMARKS, RoadmapHeader, RoadmapView};
 use planner_core::search::{RoadmapWithLengths, SearchWorkspace, astar, cost_matrix};
 use planner_core::voxel::VoxelGrid;
@@ -282,7 +282,7 @@ impl<'a> Ours<'a> {
 
     /// Builds the roadmap file once; returns the milliseconds it took.
     fn build(&mut self, seed: u64, threads: Threads) -> Result<f64> {
-        let config = Config {
+        let config = PrmConfig {
             nodes: NODES,
             edge_min_m: EDGE_MIN_M,
             edge_max_m: EDGE_MAX_M,
@@ -297,7 +297,7 @@ impl<'a> Ours<'a> {
         self.nodes = vec![Point::zeros(); self.terminals.len() + NODES];
         prm::sample_nodes(self.grid, None, self.terminals, &config, &mut self.nodes)
             .map_err(named)?;
-        let edge = |e: Edge| roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
+        let edge = |e: PrmEdge| roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
         let (grid, nodes) = (self.grid, &self.nodes);
         match threads {
             Threads::All => {
