@@ -16,6 +16,8 @@ const CHIP_SECTIONS: &str = r#"
 ASSERT(SIZEOF(.shell) > 0 && SIZEOF(.swarm_plan) > 0 && SIZEOF(.own_plan) > 0 && SIZEOF(.mission) > 0 && SIZEOF(.dma) > 0,
   "a part has lost its name, or its first value is not all zeros");
 "#;
+/// Arguments with which every program for a board is linked.
+const LINK_ARGUMENTS: [&str; 3] = ["--nmagic", "-Tboard-link.x", "-Tdefmt.x"];
 
 fn main() {
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
@@ -42,22 +44,24 @@ fn out() -> PathBuf {
 
 fn write(name: &str, bytes: &[u8]) {
     fs::write(out().join(name), bytes).expect("OUT_DIR can be written");
-    println!("cargo:rustc-link-search={}", out().display());
+    println!("cargo::rustc-link-search={}", out().display());
 }
 
 /// Cortex-m-rt's linker script includes `memory.x`. The linker first searches the directory in
 /// which it was started, the top of the checkout, whose `memory.x` is the default board's. So the
 /// script is copied, with the chosen board's map included instead and the checks appended.
 fn link(memory: &Path, checks: &[&str]) {
-    println!("cargo:rerun-if-changed={}", memory.display());
+    println!("cargo::rerun-if-changed={}", memory.display());
     write("board-memory.x", &fs::read(memory).expect("the board has a memory map"));
     let script = link_script().expect("cortex-m-rt is built before us: it declares what it links");
     let included = script.replace("INCLUDE memory.x", "INCLUDE board-memory.x");
     assert_ne!(script, included, "cortex-m-rt's link.x includes memory.x");
     write("board-link.x", (included + &checks.concat()).as_bytes());
-    println!("cargo:rustc-link-arg-bins=--nmagic");
-    println!("cargo:rustc-link-arg-bins=-Tboard-link.x");
-    println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
+    for argument in LINK_ARGUMENTS {
+        println!("cargo::rustc-link-arg-bins={argument}");
+    }
+    // For the build scripts of crates that depend on this one: `DEP_BOARD_LINK_ARGUMENTS`.
+    println!("cargo::metadata=arguments={}", LINK_ARGUMENTS.join(" "));
 }
 
 /// The `link.x` that cortex-m-rt's build script wrote last; all are alike.

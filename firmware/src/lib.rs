@@ -2,17 +2,15 @@
 //! on.
 //!
 //! The library holds what needs no board: the shell's tasks over any UART, the planner, the crash
-//! record, and the test cases that board and host compute alike. It is built and tested on the host
-//! too; only [`boards`] needs a board (a bare-metal target and a board's feature).
+//! record. It is built and tested on the host too; only [`boards`] needs a board (a bare-metal
+//! target and a board's feature).
 #![no_std]
 
 #[cfg(test)]
 extern crate std;
 
 pub mod boards;
-pub mod calls;
 pub mod capacity;
-pub mod cases;
 pub mod chips;
 pub mod flash;
 pub mod kept;

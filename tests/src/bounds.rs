@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use firmware::calls::{Meter, coverage, coverage_missions};
+use board_bench::calls::{Meter, coverage, coverage_missions};
 use firmware::scratch::WorkspaceOverlay;
 use host_sim::map::{Unknown, building};
 use host_sim::mission::Mission;

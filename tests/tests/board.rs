@@ -7,9 +7,9 @@
 
 use std::collections::HashMap;
 
-use firmware::calls::limits::{self, Listener, Results};
-use firmware::calls::limits_routes::{self, RouteWorkspaces};
-use firmware::cases::{self, Workspace};
+use board_bench::calls::limits::{self, Listener, Results};
+use board_bench::calls::limits_routes::{self, RouteWorkspaces};
+use board_bench::cases::{self, Workspace};
 use flockmate_tests::{board, workspace};
 use host_sim::map::{Unknown, building};
 use host_sim::mission::Mission;

@@ -4,13 +4,13 @@
 use std::fs;
 use std::path::Path;
 
-use firmware::calls::flight;
+use board_bench::calls::flight;
 use flockmate_tests::bounds::{self, BOUNDS};
 use flockmate_tests::{board, workspace};
 
 use self::public_functions::public_functions;
 
-#[path = "../../firmware/src/calls/public_functions.rs"]
+#[path = "../../board-bench/src/calls/public_functions.rs"]
 mod public_functions;
 
 /// Factor by which a count may exceed the table: another compiler's code may need more, and a

@@ -18,7 +18,7 @@ use anyhow::{Result, ensure};
 use self::sources::Tree;
 
 /// Folders of the crates that are checked.
-const CRATES: [&str; 9] = [
+const CRATES: [&str; 10] = [
     "fpu",
     "lock-step",
     "planner-core",
@@ -26,6 +26,7 @@ const CRATES: [&str; 9] = [
     "sim-autopilot",
     "host-sim",
     "firmware",
+    "board-bench",
     "tests",
     "xtask",
 ];

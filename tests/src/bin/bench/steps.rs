@@ -12,7 +12,7 @@ use std::hint::black_box;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use firmware::cases::{STEP_CASES, StepCase};
+use board_bench::cases::{STEP_CASES, StepCase};
 use planner_core::deconflict::{Advice, Method};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;

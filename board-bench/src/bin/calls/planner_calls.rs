@@ -1,11 +1,11 @@
 //! Counts the instructions of planner-core's public calls.
 
+use board_bench::calls::{Meter, coverage, coverage_missions, flight};
+use board_bench::cases::{self, StepCase, random_below, random_between, random_point};
 use firmware::boards::chosen::memory;
-use firmware::calls::{Meter, coverage, coverage_missions, flight};
 use firmware::capacity::{
     GATES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
 };
-use firmware::cases::{self, StepCase, random_below, random_between, random_point};
 use firmware::scratch::{Planner, WorkspaceOverlay};
 use heapless::Vec;
 use planner_core::Point;

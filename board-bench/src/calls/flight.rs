@@ -9,6 +9,7 @@ use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
 use companion::link::roster::{self, RosterReport, RosterReportEntry};
 use companion::{Duration, Event, Instant, Link, PlanFailure};
+use firmware::capacity::{BoardCompanion, GATES, VEHICLES, WAYPOINTS};
 use heapless::Vec;
 use planner_core::flight::{Task, VehiclePlan};
 use planner_core::frames::{self, Geodetic};
@@ -20,8 +21,6 @@ mod drawn;
 
 pub use self::drawn::{area_config, config, random_area_plan, random_path, random_plan};
 use super::Meter;
-use crate::capacity::BoardCompanion;
-use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::cases::{random_below, random_between, random_point};
 
 /// Origin of the mission frame, and EKF origin, of every flight.

@@ -5,6 +5,7 @@
 //! clock.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use firmware::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
@@ -18,8 +19,6 @@ use planner_core::search::{self, SearchWorkspace};
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
-
-use crate::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 
 /// Number of [`PlanCase`]s in which a test compares the board's results with the host's.
 pub const PLAN_CASES: u64 = 200;

@@ -6,10 +6,10 @@
 
 use core::hint::black_box;
 
+use board_bench::cases::{self, StepCase};
 use firmware::boards::chosen::{clock, memory};
 use firmware::boards::stack;
 use firmware::capacity::{ROADMAP_NODES, VEHICLES, WAYPOINTS};
-use firmware::cases::{self, StepCase};
 use firmware::scratch::{Planner, WorkspaceOverlay};
 use heapless::Vec;
 use planner_core::deconflict::Method;

@@ -9,6 +9,8 @@ use companion::storage::mission_file::{
     self, MAX_BYTES, MissionBlock, MissionHeader, MissionKind, MissionVehicle, MissionView,
 };
 use companion::swarm::fleet::{DivisionInput, DivisionInputs};
+use firmware::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
+use firmware::scratch;
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -23,8 +25,6 @@ use super::coverage_flights::{
     NO_FLY_ZONES, PAD_SPACING_M, SCHEDULE, WIDE_VERTICES, add_to_checksum, rings, spacing,
 };
 use super::{Meter, coverage_flights, flight};
-use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
-use crate::scratch;
 
 /// Most divisions of a mission that are measured.
 const DIVISIONS: usize = 3;

@@ -2,6 +2,8 @@
 //! division after a loss; whole plans are in [`super::coverage_missions`]. The results go into a
 //! checksum, by which a test compares board and host bit by bit.
 
+use firmware::capacity::{AREA_CORNERS, GATES, VEHICLES, WAYPOINTS};
+use firmware::scratch;
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -17,8 +19,6 @@ use planner_core::plan::SwarmPlan;
 use planner_core::schedule::ScheduleConfig;
 
 use super::Meter;
-use crate::capacity::{AREA_CORNERS, GATES, VEHICLES, WAYPOINTS};
-use crate::scratch;
 
 /// Flights of the largest swarm that the board holds.
 pub type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;

@@ -6,10 +6,10 @@
 
 use core::cell::Cell;
 
+use board_bench::calls::limits::{self, Listener, Results};
+use board_bench::calls::limits_routes::{self, RouteWorkspaces};
 use critical_section::Mutex;
 use firmware::boards::stack;
-use firmware::calls::limits::{self, Listener, Results};
-use firmware::calls::limits_routes::{self, RouteWorkspaces};
 use semihosting::println;
 use static_cell::ConstStaticCell;
 

@@ -1,6 +1,8 @@
 //! Counts the instructions of companion's public calls on the ground: files, parameters, commands,
 //! malformed frames.
 
+use board_bench::calls::{Meter, flight};
+use board_bench::cases;
 use companion::config::USUAL_GROUND_STATIONS;
 use companion::link::commands;
 use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
@@ -14,10 +16,8 @@ use companion::storage::store::{FlashFault, FlashRequest, MAX_READ, ReadFlash, S
 use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
-use firmware::calls::{Meter, flight};
 use firmware::capacity::BoardCompanion;
 use firmware::capacity::{GATES, VEHICLES};
-use firmware::cases;
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::deconflict::Method;

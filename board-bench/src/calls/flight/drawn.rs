@@ -1,6 +1,7 @@
 //! Random settings and plans of the measured flights.
 
 use companion::{Config, RosterEntry};
+use firmware::capacity::{GATES, VEHICLES, WAYPOINTS};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::flight::{
@@ -9,7 +10,6 @@ use planner_core::flight::{
 use rand_pcg::Pcg32;
 
 use super::{CRUISE_MPS, MISSION_CRC, ORIGIN, PLAN_CRC, SYSTEM};
-use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::cases::{random_below, random_between, random_point};
 
 /// Time after its last message until a lost vehicle is assumed on the ground, seconds.

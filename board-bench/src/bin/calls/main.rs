@@ -10,11 +10,11 @@ mod planner_calls;
 
 use core::hint::black_box;
 
+use board_bench::calls::{Meter, flight};
+use board_bench::cases;
 use firmware::boards::chosen::clock;
 use firmware::boards::stack;
-use firmware::calls::{Meter, flight};
 use firmware::capacity::BoardCompanion;
-use firmware::cases;
 use heapless::Vec;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;

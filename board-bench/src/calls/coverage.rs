@@ -2,6 +2,8 @@
 //! after a loss, and areas at a board's capacities. Their results go into a checksum, by which a
 //! test compares board and host bit by bit.
 
+use firmware::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
+use firmware::scratch::CoverageBenchWorkspace;
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::area::{Area, Ring, RingKind};
@@ -16,8 +18,6 @@ use planner_core::detour::{DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::{VehiclePlan, WaypointRange};
 
 use super::Meter;
-use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
-use crate::scratch::CoverageBenchWorkspace;
 
 /// Most changes of the lanes' order that the planner tries.
 pub const MAX_ORDER_CHANGES: u32 = companion::planner::coverage::MAX_ORDER_CHANGES;
