@@ -8,6 +8,7 @@ pub mod commands;
 pub mod coverage;
 pub mod files;
 pub mod flash;
+pub mod flown;
 pub mod link;
 pub mod map;
 pub mod margins;

@@ -28,11 +28,11 @@
 //! - Pictures are taken up to the margin beside their waypoints, and [`TRIGGER_DELAY_S`] after
 //!   passing them: the delay is the distance flown meanwhile.
 
+use companion::autopilot::AutopilotKind;
 use companion::margins::TRACKING_M;
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use sim_autopilot::{AutopilotKind, EstimatorErrors};
 
-use crate::scenario::{Simulation, Vehicle};
+use crate::scenario::{PositionErrors, Simulation, Vehicle};
 
 /// Sum of the deviations of two vehicles from their paths, which the default separation adds to the
 /// safety distance, metres.
@@ -50,11 +50,11 @@ pub const DEVIATION_PER_GUST_S: f32 = 0.05;
 
 /// Greatest horizontal distance of a position estimate from the truth, beyond the part that the
 /// tracking margin covers, metres.
-pub fn max_estimate_error_m(estimator: EstimatorErrors, autopilot: AutopilotKind) -> f32 {
+pub fn max_estimate_error_m(estimator: PositionErrors, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
-        (EstimatorErrors::Perfect | EstimatorErrors::Rtk, _) => 0.0,
-        (EstimatorErrors::Recorded, AutopilotKind::Px4) => 0.65,
-        (EstimatorErrors::Recorded, AutopilotKind::Ardupilot) => 0.12,
+        (PositionErrors::Perfect | PositionErrors::Rtk, _) => 0.0,
+        (PositionErrors::Recorded, AutopilotKind::Px4) => 0.65,
+        (PositionErrors::Recorded, AutopilotKind::ArduPilot) => 0.12,
     }
 }
 
@@ -111,16 +111,16 @@ pub fn min_pad_distance_m(
 fn touchdown_extra_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
     match autopilot {
         AutopilotKind::Px4 => 0.5 + DEVIATION_PER_GUST_S * gust_mps,
-        AutopilotKind::Ardupilot => 0.0,
+        AutopilotKind::ArduPilot => 0.0,
     }
 }
 
 /// Greatest height of a vehicle's estimate above its true height, metres.
-pub fn max_height_error_m(estimator: EstimatorErrors, autopilot: AutopilotKind) -> f32 {
+pub fn max_height_error_m(estimator: PositionErrors, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
-        (EstimatorErrors::Perfect | EstimatorErrors::Rtk, _) => 0.15,
-        (EstimatorErrors::Recorded, AutopilotKind::Px4) => 1.1,
-        (EstimatorErrors::Recorded, AutopilotKind::Ardupilot) => 0.3,
+        (PositionErrors::Perfect | PositionErrors::Rtk, _) => 0.15,
+        (PositionErrors::Recorded, AutopilotKind::Px4) => 1.1,
+        (PositionErrors::Recorded, AutopilotKind::ArduPilot) => 0.3,
     }
 }
 

@@ -6,14 +6,10 @@ use planner_core::Point;
 
 use crate::files::ResultFiles;
 use crate::mission::{Mission, SwarmPlan};
-use crate::report::{
-    self, Curve, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
-};
+use crate::report::{self, MapSurface, ReportData, RoadmapLines, VehicleTrack};
 use crate::result::{self, MissionResult, Timing};
 use crate::say;
 use crate::scenario::Scenario;
-use crate::swarm::Flight;
-use crate::swarm::referee::Sample;
 
 /// Report page of a plan that was not flown: map, roadmap and planned paths.
 pub fn planned_page(
@@ -53,46 +49,6 @@ pub fn planned_page(
         result: serde_json::to_value(result)?,
         ..ReportData::default()
     })
-}
-
-/// Report page of a flown mission: the page of its plan, with tracks, event log and plots of the
-/// smallest distances.
-pub fn flown_page(
-    mission: &Mission,
-    plan: &SwarmPlan,
-    flight: &Flight,
-) -> anyhow::Result<ReportData> {
-    let mut page = planned_page(mission, plan, &flight.result)?;
-    let flown = flight.tracks.iter().zip(&flight.lost_s);
-    for (vehicle, (track, lost_s)) in page.vehicles.iter_mut().zip(flown) {
-        vehicle.track = track.iter().map(|&(t_s, position)| TrackPoint { t_s, position }).collect();
-        vehicle.lost_s = *lost_s;
-    }
-    page.events = flight.log.clone();
-    let t_s: Vec<f32> = flight.samples.iter().map(|s| s.t_s).collect();
-    let plot = |title: &str, limit: Limit, value: fn(&Sample) -> f32| Plot {
-        title: title.to_owned(),
-        unit: "m".to_owned(),
-        limit: Some(limit),
-        curves: vec![Curve {
-            name: "smallest".to_owned(),
-            vehicle: None,
-            t_s: t_s.clone(),
-            values: flight.samples.iter().map(value).collect(),
-        }],
-    };
-    let safety = Limit {
-        value: mission.scenario.deconfliction.safety_distance_m,
-        label: "safety distance".to_owned(),
-    };
-    let largest_m = mission.scenario.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max);
-    let body = Limit { value: largest_m, label: "vehicle radius".to_owned() };
-    page.plots = vec![plot("Smallest separation", safety, |s| s.separation_m)];
-    // A coverage mission has no walls, so no clearance to them is plotted.
-    if mission.scenario.area.is_none() {
-        page.plots.push(plot("Smallest wall clearance", body, |s| s.clearance_m));
-    }
-    Ok(page)
 }
 
 /// Files in `--out` of every command with a mission result: result, times, page.

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use host_sim::coverage::check::Picture;
-use host_sim::coverage::flown;
+use host_sim::flown::pictures;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::report::{Event, Level};
@@ -82,12 +82,12 @@ pub fn fly_on(
 pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Result<Flight> {
     let plan = mission.plan()?;
     let mut flight = swarm::fly(mission, &plan, "fly", false, &Progress::hidden())?;
-    if let Some(places) = flown::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
+    if let Some(places) = pictures::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
         flight.pictures = places;
     }
     pictures.iter_mut().for_each(|picture| picture.t_s = 0.0);
     pictures.append(&mut flight.pictures);
-    let judged = flown::judge_pictures(&mission.scenario, &plan, pictures.clone())?;
+    let judged = pictures::judge_pictures(&mission.scenario, &plan, pictures.clone())?;
     flight.result.complete &= judged.complete;
     flight.result.coverage = Some(judged.result);
     Ok(flight)

@@ -12,6 +12,7 @@ use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 use host_sim::swarm::board::reported_state;
+use host_sim::swarm::vehicles::simulated_kind;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, SET_POSITION_TARGET_LOCAL_NED_DATA, STATUSTEXT_DATA,
@@ -350,7 +351,7 @@ fn config(mission: &Mission) -> Config {
     let start: Point = geodetic_to_enu(&origin, &pad);
     Config {
         system_id: vehicle.id,
-        autopilot: vehicle.personality,
+        autopilot: simulated_kind(vehicle.personality),
         world_origin: origin,
         ekf_origin: pad,
         start,

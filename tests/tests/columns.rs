@@ -8,11 +8,11 @@ use flockmate_tests::shared_data;
 use host_sim::map::{self, Occupancy, OccupancyMap};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
-use host_sim::{scenario, shortage, swarm};
+use host_sim::scenario::{self, PositionErrors};
+use host_sim::{shortage, swarm};
 use planner_core::Point;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
-use sim_autopilot::EstimatorErrors;
 
 /// Horizontal error of `estimator = "rtk"`, metres.
 const RTK_ERROR_M: f32 = 0.1;
@@ -126,7 +126,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
         // only, with perfect estimates.
         let fits = case.margin_m >= RTK_ERROR_M;
         let (estimator, cruise_mps) =
-            if fits { (EstimatorErrors::Rtk, 1.0) } else { (EstimatorErrors::Perfect, 0.3) };
+            if fits { (PositionErrors::Rtk, 1.0) } else { (PositionErrors::Perfect, 0.3) };
         let mut rng = Pcg32::seed_from_u64(1);
         let (mut flown, mut walled_off, mut missed) = (0, 0, 0);
         let (mut contacts, mut refused, mut hints) = (0, 0, 0);

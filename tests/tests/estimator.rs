@@ -4,7 +4,7 @@
 use host_sim::margins;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
-use host_sim::scenario::{self, EstimatorErrors, Scenario, ScenarioError};
+use host_sim::scenario::{self, PositionErrors, Scenario, ScenarioError};
 use host_sim::swarm;
 
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
@@ -36,7 +36,7 @@ fn the_default_margin_and_separation_are_refused_with_the_metres_that_are_missin
     // A larger margin or a larger separation alone is not enough.
     assert!(demo(1, 0.9, 3.2).is_err() && demo(1, 0.85, 3.3).is_err());
     let scenario = demo(1, 0.9, 3.3).unwrap();
-    assert_eq!(scenario.simulation.estimator, EstimatorErrors::Recorded);
+    assert_eq!(scenario.simulation.estimator, PositionErrors::Recorded);
     let needed = margins::required_distances(&scenario.simulation, 1.5, &scenario.vehicles);
     assert!((needed.margin_m - 0.9).abs() < 1e-4 && (needed.separation_m - 3.3).abs() < 1e-4);
 }

@@ -9,9 +9,10 @@ use anyhow::{Context, bail, ensure};
 
 use super::load;
 use crate::capacity::BoardCapacity;
-use crate::coverage::kept::PictureStore;
-use crate::coverage::{CoveragePlan, flown, parts};
+use crate::coverage::CoveragePlan;
 use crate::files::ResultFiles;
+use crate::flown::kept::PictureStore;
+use crate::flown::{layers, page, pictures};
 use crate::link::LinkUrl;
 use crate::mission::{Mission, SwarmPlan};
 use crate::output;
@@ -248,7 +249,7 @@ fn plan_and_fly(
         }
         None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
-    if let Some(places) = flown::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
+    if let Some(places) = pictures::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
         flight.pictures = places;
     }
     if let Some(kept) = &kept {
@@ -256,7 +257,7 @@ fn plan_and_fly(
     }
     let pictures = std::mem::take(&mut flight.pictures);
     let judged = match &mission.scenario.area {
-        Some(_) => Some(flown::judge_pictures(&mission.scenario, &plan, pictures.clone())?),
+        Some(_) => Some(pictures::judge_pictures(&mission.scenario, &plan, pictures.clone())?),
         None => None,
     };
     if let Some(judged) = &judged {
@@ -266,12 +267,12 @@ fn plan_and_fly(
             kept.store_pictures(&pictures)?;
         }
     }
-    let mut page = output::flown_page(&mission, &plan, &flight)?;
+    let mut page = page::flown_page(&mission, &plan, &flight)?;
     if let Some(judged) = judged {
         page.outlines = judged.outlines;
         page.plots.insert(0, judged.plot);
         let planned = CoveragePlan::plan_as_companions(&mission.scenario)?;
-        page.coverage = Some(parts::flown_layers(&planned, &mission, &plan, &flight, pictures)?);
+        page.coverage = Some(layers::flown_layers(&planned, &mission, &plan, &flight, pictures)?);
     }
     mission.timing.simulated_s = flight.simulated_s;
     mission.timing.wall_s = began.elapsed().as_secs_f64();

@@ -198,7 +198,7 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[MissionItem]
     };
     let firmware = match vehicle.personality {
         AutopilotKind::Px4 => 12,
-        AutopilotKind::Ardupilot => 3,
+        AutopilotKind::ArduPilot => 3,
     };
     let speed = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
     json!({

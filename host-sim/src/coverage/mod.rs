@@ -6,9 +6,7 @@
 pub mod check;
 pub mod export;
 pub mod flight;
-pub mod flown;
 pub mod heights;
-pub mod kept;
 pub mod obstacles;
 pub mod page;
 pub mod parts;
@@ -191,7 +189,7 @@ impl<'a> CoveragePlan<'a> {
         for route in &self.plan.routes {
             let index = usize::from(route.vehicle);
             let vehicle = &self.scenario.vehicles[index];
-            let lasts_s = sorties::battery_hover_s(vehicle);
+            let lasts_s = vehicle.battery_hover_s();
             let too_long = |error: LaneTooLong| {
                 anyhow::anyhow!(
                     "battery too small: {}: vehicle {} would fly {:.0} s for lane {} alone; its battery lasts {lasts_s:.0} s, \

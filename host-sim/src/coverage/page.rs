@@ -98,7 +98,7 @@ fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> 
 }
 
 /// Outlines of the area, its holes and no-fly zones, at the height of the ground.
-pub(super) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<Outline> {
+pub(crate) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<Outline> {
     let kinds = [
         (RingKind::Outer, OutlineKind::Area),
         (RingKind::Hole, OutlineKind::Hole),
@@ -117,7 +117,7 @@ pub(super) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<Outline> {
 }
 
 /// Plot of the share of the area that pictures show, per cent, over time.
-pub(super) fn photographed_share_plot(findings: &CoverageFindings) -> Plot {
+pub(crate) fn photographed_share_plot(findings: &CoverageFindings) -> Plot {
     let mut cells = 0;
     let mut curve = Curve { name: "photographed".to_owned(), ..Curve::default() };
     for (time, new) in &findings.new_cells_over_time {

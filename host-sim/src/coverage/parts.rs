@@ -1,24 +1,10 @@
-//! Data for the report page: which vehicle photographs which waypoints, in the plan and after each
-//! new division.
-
-use std::collections::BTreeMap;
-
-use companion::swarm::fleet::DivisionInput;
-use planner_core::Point;
-use planner_core::flight::{Flight as PathFlight, Task, WaypointRange};
+//! Data for the report page: which vehicle photographs which waypoints in the plan.
 
 use super::CoveragePlan;
 use super::SortieFlight;
 use super::check::{self, Picture};
 use super::flight::{FlightPoint, WaypointAction};
-use crate::capacity::WAYPOINTS;
-use crate::mission::{Mission, SwarmPlan};
-use crate::report::{CoverageLayers, Division, Footprint, Part, WaypointTransfer};
-use crate::swarm::Flight as Flown;
-use crate::swarm::divisions::Division as Begun;
-
-/// Id of the vehicle that photographs a waypoint, by waypoint number.
-type WaypointOwners = BTreeMap<u32, u8>;
+use crate::report::{CoverageLayers, Division, Footprint, Part};
 
 /// Coverage data of the report page for a plan that was not flown.
 pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> CoverageLayers {
@@ -44,59 +30,8 @@ pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> C
     coverage_layers(planned, divisions, pictures)
 }
 
-/// Coverage data of the report page for a flight: the planned division, each later division, and
-/// the pictures taken.
-///
-/// # Errors
-/// A division that companions made cannot be planned here.
-pub fn flown_layers(
-    planned: &CoveragePlan<'_>,
-    mission: &Mission,
-    plan: &SwarmPlan,
-    flight: &Flown,
-    pictures: Vec<Picture>,
-) -> anyhow::Result<CoverageLayers> {
-    let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.id).collect();
-    ids.sort_unstable();
-    let mut shown: Vec<Division> = Vec::new();
-    let (mut before, mut gone, mut losses) =
-        (WaypointOwners::new(), Vec::new(), Vec::<&[DivisionInput]>::new());
-    let whole = Begun { t_s: 0.0, vehicle: 0, number: 0, inputs: Vec::new(), plan_crc: 0 };
-    for division in std::iter::once(&whole).chain(&flight.divisions) {
-        // Skipped: a division already shown, which another vehicle begins to fly later, or one
-        // whose inputs no vehicle reported, which cannot be planned here.
-        if usize::from(division.number) != shown.len()
-            || (division.number > 0 && division.inputs.is_empty())
-        {
-            continue;
-        }
-        losses.extend((division.number > 0).then_some(&division.inputs[..]));
-        let rest = match losses.is_empty() && flight.done.is_empty() {
-            true => None,
-            false => Some(mission.plan_remaining(&flight.done, losses.iter().copied())?),
-        };
-        let flights = rest.as_ref().map_or(&plan.flights, |rest| &rest.flights);
-        let own = waypoint_owners(flights);
-        let lost =
-            ids.iter().zip(&division.inputs).filter(|(_, input)| !input.alive).map(|(id, _)| *id);
-        let lost: Vec<u8> = lost.filter(|id| !gone.contains(id)).collect();
-        gone.extend(&lost);
-        shown.push(Division {
-            t_s: division.t_s,
-            lost,
-            parts: flights
-                .iter()
-                .filter(|flight| flight.task.leaves_pad())
-                .map(flight_part)
-                .collect(),
-            taken: reassigned_waypoints(&before, &own),
-        });
-        before = own;
-    }
-    Ok(coverage_layers(planned, shown, pictures))
-}
-
-fn coverage_layers(
+/// The layers of a plan or a flight, with the footprint of each picture on the ground.
+pub(crate) fn coverage_layers(
     planned: &CoveragePlan<'_>,
     divisions: Vec<Division>,
     mut pictures: Vec<Picture>,
@@ -110,44 +45,4 @@ fn coverage_layers(
     };
     let footprints = pictures.iter().zip(corners).map(footprint).collect();
     CoverageLayers { lane_m: planned.area_settings.spacing.lane_m, divisions, footprints }
-}
-
-fn flight_part(flight: &PathFlight<WAYPOINTS>) -> Part {
-    let path = &flight.path;
-    let (mut lanes, mut waypoints) = (Vec::<Point>::new(), 0);
-    if let Task::Photograph(photographs) = &flight.task {
-        waypoints = photographs.count(path);
-        for shots in photographs.stretches(path) {
-            lanes.extend([shots.from_m, shots.to_m].iter().filter_map(|at_m| path.point_at(*at_m)));
-        }
-    }
-    let places = path.waypoints().iter().map(|waypoint| waypoint.position);
-    Part { vehicle: flight.id, waypoints, path: places.collect(), lanes }
-}
-
-fn waypoint_owners(flights: &[PathFlight<WAYPOINTS>]) -> WaypointOwners {
-    let mut owners = WaypointOwners::new();
-    for flight in flights {
-        let Task::Photograph(photographs) = &flight.task else { continue };
-        for range in photographs
-            .waypoints_of_pictures(&flight.path, WaypointRange { first: 0, end: u32::MAX })
-        {
-            owners.extend((range.first..range.end).map(|number| (number, flight.id)));
-        }
-    }
-    owners
-}
-
-/// Counts the waypoints that went from one vehicle to another, for each pair of vehicles.
-fn reassigned_waypoints(before: &WaypointOwners, now: &WaypointOwners) -> Vec<WaypointTransfer> {
-    let mut counts = BTreeMap::<(u8, u8), u32>::new();
-    for (number, to) in now {
-        if let Some(from) = before.get(number).filter(|from| *from != to) {
-            *counts.entry((*from, *to)).or_default() += 1;
-        }
-    }
-    counts
-        .into_iter()
-        .map(|((from, to), waypoints)| WaypointTransfer { from, to, waypoints })
-        .collect()
 }

@@ -16,12 +16,10 @@
 
 use planner_core::coverage::flights::PLANNED_ACCEL_MPS2;
 use planner_core::coverage::pack::Route;
-use sim_autopilot::VehicleLimits;
 
 use super::CoveragePlan;
 use super::flight::WaypointAction;
 pub use super::planned::Sortie;
-use crate::scenario;
 
 /// Share of its battery charge that a vehicle may use before it lands (`FLK_BATT_LOW`).
 pub const USABLE_CHARGE: f32 = 0.85;
@@ -40,10 +38,9 @@ pub(super) fn whole_route_sortie(planned: &CoveragePlan<'_>, route: Route) -> So
     }
 }
 
-/// Time that a vehicle hovers on a full battery, seconds; the simulator's default where the
-/// scenario gives none.
-pub fn battery_hover_s(vehicle: &scenario::Vehicle) -> f32 {
-    vehicle.endurance_s.unwrap_or(VehicleLimits::default().endurance_s)
+/// Power that a vehicle is assumed to draw at `speed_mps`, as a multiple of its power in a hover.
+pub fn power_ratio_at_speed(speed_mps: f32) -> f32 {
+    1.0 + 0.004 * speed_mps * speed_mps
 }
 
 /// Time of a route from pad to pad, seconds: at cruise speed, from rest to rest on each horizontal

@@ -113,10 +113,10 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
         let index = usize::from(route.vehicle);
         let vehicle = &planned.scenario.vehicles[index];
         let cruise_mps = planned.vehicles[index].cruise_mps;
-        let beyond_hover = sim_autopilot::power_ratio_at_speed(cruise_mps) - 1.0;
+        let beyond_hover = sorties::power_ratio_at_speed(cruise_mps) - 1.0;
         let takes_s =
             sorties::route_duration_s(planned, route) + beyond_hover * route.ground_m / cruise_mps;
-        let lasts_s = sorties::battery_hover_s(vehicle);
+        let lasts_s = vehicle.battery_hover_s();
         if takes_s > USABLE_CHARGE * lasts_s {
             let hint = match planned.area_settings.batteries {
                 true => {

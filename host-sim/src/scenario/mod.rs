@@ -18,14 +18,14 @@ use std::path::{Path, PathBuf};
 
 use crate::files;
 use crate::quote::quoted_path;
+pub use companion::autopilot::AutopilotKind;
 pub use error::{Place, ScenarioError};
 pub use planner_core::deconflict::Method;
 pub use planner_core::prm::Sampling;
 pub(crate) use sections::DEFAULT_ORIGIN;
-pub use sim_autopilot::{AutopilotKind, EstimatorErrors};
 pub use types::{
     Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Mission, Mode,
-    Objective, Roadmap, Scenario, Simulation, Terminals, UnsupportedTable, Vehicle,
+    Objective, PositionErrors, Roadmap, Scenario, Simulation, Terminals, UnsupportedTable, Vehicle,
 };
 
 /// Reads a scenario file; paths in it are relative to its folder.

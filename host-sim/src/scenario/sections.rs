@@ -10,12 +10,12 @@ mod values;
 
 use std::path::Path;
 
+use companion::autopilot::AutopilotKind;
 use companion::config::{GROUND_STATIONS, USUAL_GROUND_STATIONS};
 use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 use planner_core::prm::Sampling;
 use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
-use sim_autopilot::AutopilotKind;
 use toml::de::DeTable;
 
 use self::checks::VehicleSpans;
@@ -339,7 +339,7 @@ fn read_vehicle(
     let personality = table.one_of(
         "personality",
         AutopilotKind::Px4,
-        &[("px4", AutopilotKind::Px4), ("ardupilot", AutopilotKind::Ardupilot)],
+        &[("px4", AutopilotKind::Px4), ("ardupilot", AutopilotKind::ArduPilot)],
     )?;
     let companion = match table.get("companion") {
         None => Companion::InProcess { flash: None },

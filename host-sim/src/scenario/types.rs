@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
+use companion::autopilot::AutopilotKind;
 use companion::config::GROUND_STATIONS;
 use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
 use planner_core::prm::Sampling;
-use sim_autopilot::{AutopilotKind, EstimatorErrors};
 
 use super::coverage::Area;
 use super::error::ScenarioError;
@@ -174,7 +174,7 @@ pub struct Vehicle {
     pub altitude_m: Option<f32>,
     /// Highest speed of the vehicle, m/s.
     pub speed_max_mps: f32,
-    /// Flight time on one battery, seconds (coverage).
+    /// Time in a hover on one battery, seconds; `None`: 1200 s.
     pub endurance_s: Option<f32>,
     /// Payload of the vehicle, kg (not supported yet).
     pub payload_kg: Option<f32>,
@@ -198,6 +198,8 @@ pub struct Vehicle {
 const DEFAULT_CLIMB_MPS: f32 = 3.0;
 /// Descent speed (V_d in paper CPP) if the vehicle gives none, m/s.
 const DEFAULT_DESCEND_MPS: f32 = 1.0;
+/// Time in a hover on one battery if the vehicle gives none, seconds.
+const DEFAULT_ENDURANCE_S: f32 = 1200.0;
 
 impl Vehicle {
     /// Speeds of climb and descent, m/s.
@@ -206,6 +208,11 @@ impl Vehicle {
             self.climb_mps.unwrap_or(DEFAULT_CLIMB_MPS),
             self.descend_mps.unwrap_or(DEFAULT_DESCEND_MPS),
         ]
+    }
+
+    /// Time that the vehicle hovers on a full battery, seconds.
+    pub fn battery_hover_s(&self) -> f32 {
+        self.endurance_s.unwrap_or(DEFAULT_ENDURANCE_S)
     }
 }
 
@@ -255,7 +262,7 @@ pub struct Simulation {
     /// Standard deviation of a random error of the position estimate, metres.
     pub position_noise_m: f32,
     /// Error model of the autopilots' position estimates.
-    pub estimator: EstimatorErrors,
+    pub estimator: PositionErrors,
     /// Baud rate of the serial links between companions and autopilots.
     pub serial_baud: u32,
     /// Probability that a byte on a serial link is corrupted.
@@ -268,6 +275,17 @@ pub struct Simulation {
     pub radio_range_m: f32,
     /// Simulated time after which the flight is given up, seconds.
     pub time_limit_s: f32,
+}
+
+/// Error model of the autopilots' position estimates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PositionErrors {
+    /// No error: the estimate is the true position. No scenario file can choose this.
+    Perfect,
+    /// Errors of a GPS receiver with fixed RTK: at most 0.1 m horizontally and 0.15 m in height.
+    Rtk,
+    /// Errors as in the recorded flights of this kind of autopilot.
+    Recorded,
 }
 
 /// One fault of `[[faults]]`.

@@ -13,7 +13,7 @@ use super::serial::SerialConfig;
 use crate::capacity::VEHICLES;
 use crate::flash::HostFlash;
 use crate::mission::{Mission, PLANNED_ACCEL_MPS2};
-use crate::scenario::{Companion, Vehicle};
+use crate::scenario::{AutopilotKind, Companion, PositionErrors, Vehicle};
 
 /// Radio range from which on a simulated radio counts as reaching every vehicle, metres.
 const UNLIMITED_RANGE_M: f32 = 500.0;
@@ -68,12 +68,12 @@ fn autopilot_config(mission: &Mission, vehicle: &Vehicle, climb_m: f32) -> autop
     let limits = autopilot::VehicleLimits {
         radius_m: vehicle.radius_m,
         speed_max_mps: vehicle.speed_max_mps,
-        endurance_s: vehicle.endurance_s.unwrap_or(autopilot::VehicleLimits::default().endurance_s),
+        endurance_s: vehicle.battery_hover_s(),
         ..autopilot::VehicleLimits::default()
     };
     let mut config = autopilot::Config {
         system_id: vehicle.id,
-        autopilot: vehicle.personality,
+        autopilot: simulated_kind(vehicle.personality),
         world_origin: scenario.map.origin,
         // The EKF origin is where the autopilot was switched on, unless the scenario says
         // otherwise: no two vehicles share it.
@@ -86,7 +86,7 @@ fn autopilot_config(mission: &Mission, vehicle: &Vehicle, climb_m: f32) -> autop
         wind: Point::new(settings.wind_mps, 0.0, 0.0),
         gust_mps: settings.gust_mps,
         position_noise_m: settings.position_noise_m,
-        estimator: settings.estimator,
+        estimator: estimator_errors(settings.estimator),
         seed: scenario.seed,
         ..autopilot::Config::default()
     };
@@ -95,6 +95,23 @@ fn autopilot_config(mission: &Mission, vehicle: &Vehicle, climb_m: f32) -> autop
         config.ekf_origin.alt_m += f64::from(config.height_error_m());
     }
     config
+}
+
+/// The simulated autopilot of a kind.
+pub fn simulated_kind(kind: AutopilotKind) -> autopilot::AutopilotKind {
+    match kind {
+        AutopilotKind::Px4 => autopilot::AutopilotKind::Px4,
+        AutopilotKind::ArduPilot => autopilot::AutopilotKind::Ardupilot,
+    }
+}
+
+/// The simulated autopilot's errors of a scenario's error model.
+fn estimator_errors(errors: PositionErrors) -> autopilot::EstimatorErrors {
+    match errors {
+        PositionErrors::Perfect => autopilot::EstimatorErrors::Perfect,
+        PositionErrors::Rtk => autopilot::EstimatorErrors::Rtk,
+        PositionErrors::Recorded => autopilot::EstimatorErrors::Recorded,
+    }
 }
 
 /// Settings of one vehicle's companion: those of the mission file, with the scenario's fence,
@@ -116,4 +133,18 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
     };
     let method = scenario.deconfliction.method;
     Ok(Config { accel_mps2: PLANNED_ACCEL_MPS2, method, geofence, radio_range_m, ..config })
+}
+
+#[cfg(test)]
+mod tests {
+    use sim_autopilot::power_ratio_at_speed;
+
+    use crate::coverage::sorties;
+
+    #[test]
+    fn plans_count_on_the_power_that_the_simulated_vehicle_draws() {
+        for speed_mps in (0..=240).map(|step| 0.125 * step as f32) {
+            assert_eq!(sorties::power_ratio_at_speed(speed_mps), power_ratio_at_speed(speed_mps));
+        }
+    }
 }

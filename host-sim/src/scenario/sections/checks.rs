@@ -1,11 +1,10 @@
 //! Checks between several tables of a scenario.
 
 use planner_core::Point;
-use sim_autopilot::EstimatorErrors;
 
 use crate::margins;
 use crate::scenario::reader::{Result, Span, Table, Text};
-use crate::scenario::{Deconfliction, Mission, Mode, Roadmap, Simulation, Vehicle};
+use crate::scenario::{Deconfliction, Mission, Mode, PositionErrors, Roadmap, Simulation, Vehicle};
 
 /// Where the keys of a vehicle stand in the scenario, for errors.
 pub(super) struct VehicleSpans {
@@ -24,7 +23,7 @@ pub(super) fn check_margins(
     simulation: &Simulation,
     vehicles: &[Vehicle],
 ) -> Result<()> {
-    if simulation.estimator != EstimatorErrors::Recorded {
+    if simulation.estimator != PositionErrors::Recorded {
         return Ok(());
     }
     let need = margins::required_distances(simulation, deconfliction.safety_distance_m, vehicles);

@@ -2,11 +2,12 @@
 
 use companion::config::SAFETY_DISTANCE_M;
 use planner_core::deconflict::Method;
-use sim_autopilot::EstimatorErrors;
 
 use super::values::{MAX_ID, read_point};
 use crate::scenario::reader::{Result, Table};
-use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
+use crate::scenario::types::{
+    Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, PositionErrors, Simulation,
+};
 
 /// Reads `[deconfliction]`. The default of `separation_m` is the safety distance plus `stray_m`, by
 /// which two vehicles together deviate from their paths, metres.
@@ -34,8 +35,8 @@ pub(super) fn read_simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulat
         position_noise_m: table.f32("position_noise_m", 0.0, 0.0..=100.0)?,
         estimator: table.one_of(
             "estimator",
-            EstimatorErrors::Rtk,
-            &[("rtk", EstimatorErrors::Rtk), ("recorded", EstimatorErrors::Recorded)],
+            PositionErrors::Rtk,
+            &[("rtk", PositionErrors::Rtk), ("recorded", PositionErrors::Recorded)],
         )?,
         serial_baud: table.integer_in_range("serial_baud", 921_600, 1200..=100_000_000)? as u32,
         serial_corruption: table.f32("serial_corruption", 0.0, 0.0..=1.0)?,

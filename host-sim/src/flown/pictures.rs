@@ -5,8 +5,8 @@ use planner_core::Point;
 use planner_core::flight::Trigger;
 use planner_core::plan::SwarmPlan;
 
-use super::check::{self, CoverageFindings, Picture};
-use super::{CoveragePlan, page, result};
+use crate::coverage::check::{self, CoverageFindings, Picture};
+use crate::coverage::{CoveragePlan, page, result};
 use crate::report::{Outline, Plot};
 use crate::result::CoverageResult;
 use crate::scenario::Scenario;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use planner_core::Point;
 
-use super::check::Picture;
+use crate::coverage::check::Picture;
 use crate::files::{self, ResultFiles};
 use crate::quote::quoted_path;
 
