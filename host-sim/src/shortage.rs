@@ -37,10 +37,9 @@ pub fn shortage_lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
     for &goal in left.goals.iter().take(MAX_GOAL_LINES) {
         lines.push(goal_line(&mut asked, usize::from(goal)));
     }
-    // A vehicle's line names a remedy only if no goal's line has named it.
-    let asks = left.goals.is_empty();
+    let remedy = if left.goals.is_empty() { Remedy::Untold } else { Remedy::Told };
     for &id in left.vehicles.iter().take(MAX_GOAL_LINES.max(lines.len()) - lines.len()) {
-        lines.push(vehicle_line(&mut asked, id, asks));
+        lines.push(vehicle_line(&mut asked, id, remedy));
     }
     if all > lines.len() {
         lines.push(format!("and {} more", all - lines.len()));
@@ -90,7 +89,14 @@ fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
     format!("{what}{place}: {why}")
 }
 
-fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, asks: bool) -> String {
+/// Whether a goal's line has named a remedy: then no vehicle's line names one.
+#[derive(Clone, Copy)]
+enum Remedy {
+    Told,
+    Untold,
+}
+
+fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, remedy: Remedy) -> String {
     let (mission, reach) = (asked.mission, &asked.reach);
     let vehicle = mission.tasks.iter().position(|task| task.id == id).unwrap_or_default();
     let at = &mission.scenario.vehicles[vehicle].start;
@@ -99,8 +105,10 @@ fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, asks: bool) -> String 
     let goals = mission.goals.len();
     let why = if !(0..goals).any(|goal| reach.are_connected(vehicle, goal)) {
         let goal = mission.tasks[vehicle].goal.map_or(0, usize::from);
-        let helps =
-            if asks { format!("; {}", remedy_text(asked, vehicle, goal)) } else { String::new() };
+        let helps = match remedy {
+            Remedy::Told => String::new(),
+            Remedy::Untold => format!("; {}", remedy_text(asked, vehicle, goal)),
+        };
         format!("no way in the roadmap leads from it to a goal{helps}")
     } else if goals < mission.tasks.len() {
         format!("{goals} goals are for at most {goals} of {} vehicles", mission.tasks.len())

@@ -52,7 +52,7 @@ fn a_serial_link_that_fails_a_mission_is_told_with_what_would_do() {
     let fly = |more: &str| {
         let mut mission = prepared(more);
         let plan = mission.plan().unwrap();
-        swarm::fly(&mission, &plan, "fly", false, &Progress::hidden()).unwrap()
+        swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden()).unwrap()
     };
     for (key, value, cause) in [
         ("serial_baud", "9600", "9600 baud carry 960"),

@@ -9,7 +9,7 @@ pub const UNSUPPORTED: u8 = 3;
 pub const FAILED: u8 = 4;
 
 /// Parameter 2 of COMPONENT_ARM_DISARM that arms or disarms without checks.
-pub const ARM_FORCE: f32 = 21_196.0;
+const ARM_FORCE: f32 = 21_196.0;
 /// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
 pub const CUSTOM_MODE: u8 = 1;
 pub const DO_SET_MODE: u16 = 176;
@@ -71,9 +71,44 @@ fn first_four(fields: &PayloadReader<'_>) -> [f32; 4] {
     [fields.f32(0), fields.f32(4), fields.f32(8), fields.f32(12)]
 }
 
-/// MAV_RESULT of a command: ACCEPTED if `done`, else TEMPORARILY_REJECTED.
-pub fn accepted_or_rejected(done: bool) -> u8 {
-    if done { ACCEPTED } else { TEMPORARILY_REJECTED }
+/// Whether a command was carried out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// It was.
+    Done,
+    /// It was not, and nothing changed.
+    Refused,
+}
+
+impl Outcome {
+    /// Whether the command was carried out.
+    pub fn is_done(self) -> bool {
+        self == Self::Done
+    }
+
+    /// MAV_RESULT of the command: ACCEPTED if it was carried out, else `refused`.
+    pub fn result_or(self, refused: u8) -> u8 {
+        match self {
+            Self::Done => ACCEPTED,
+            Self::Refused => refused,
+        }
+    }
+}
+
+/// How arming or disarming is commanded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Arming {
+    /// With its checks.
+    Checked,
+    /// Whatever the checks say.
+    Forced,
+}
+
+impl Arming {
+    /// As COMPONENT_ARM_DISARM commands it.
+    pub fn commanded_by(command: &Command) -> Self {
+        if command.param[1] == ARM_FORCE { Self::Forced } else { Self::Checked }
+    }
 }
 
 /// The message id that a float parameter holds; `None` outside 24 bits.

@@ -11,7 +11,7 @@ use super::status::AutopilotStatus;
 use super::telemetry;
 use super::vehicle::Gains;
 use super::wire::PayloadReader;
-use crate::AutopilotKind;
+use crate::{AutopilotKind, GpsFix};
 
 /// The autopilot software of one vehicle.
 #[derive(Clone, Debug)]
@@ -200,10 +200,10 @@ impl Firmware {
         }
     }
 
-    pub(super) fn set_position_ok(&mut self, ok: bool) {
+    pub(super) fn set_gps_fix(&mut self, fix: GpsFix) {
         match self {
-            Self::Px4(px4) => px4.commander.set_position_ok(ok),
-            Self::Copter(copter) => copter.set_position_ok(ok),
+            Self::Px4(px4) => px4.commander.set_gps_fix(fix),
+            Self::Copter(copter) => copter.set_gps_fix(fix),
         }
     }
 

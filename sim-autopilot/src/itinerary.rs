@@ -34,6 +34,13 @@ const REACHED_HEIGHT_M: f32 = 0.8;
 /// ArduCopter does not check the heading.
 const MAX_YAW_ERROR_RAD: f32 = 0.21;
 
+/// What the land detector reports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum LandedState {
+    OnGround,
+    InAir,
+}
+
 /// What the vehicle flies for one mission item.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum MissionLeg {
@@ -115,7 +122,7 @@ impl Platform {
     pub(super) fn fly_mission(
         &mut self,
         sensors: &SensorReadings,
-        landed: bool,
+        landed: LandedState,
     ) -> Option<MissionLeg> {
         let first = self.first_item();
         self.missions.progress.begin_no_earlier_than(first);
@@ -212,14 +219,20 @@ impl Platform {
         }
     }
 
-    fn is_leg_done(&mut self, leg: &MissionLeg, sensors: &SensorReadings, landed: bool) -> bool {
+    fn is_leg_done(
+        &mut self,
+        leg: &MissionLeg,
+        sensors: &SensorReadings,
+        landed: LandedState,
+    ) -> bool {
+        let in_air = landed == LandedState::InAir;
         let progress = &mut self.missions.progress;
         let since = |us: Option<u64>| {
             sensors.now_us.saturating_sub(us.unwrap_or(sensors.now_us)) as f32 * 1e-6
         };
         match *leg {
             MissionLeg::Wait(s) => since(progress.since_us) >= s,
-            MissionLeg::TakeOff { up } => !landed && sensors.position.z > up - REACHED_HEIGHT_M,
+            MissionLeg::TakeOff { up } => in_air && sensors.position.z > up - REACHED_HEIGHT_M,
             MissionLeg::To { at, heading, stay_s, reached_m } => {
                 let off = at - sensors.position;
                 // NaN: no heading to wait for.
@@ -233,7 +246,7 @@ impl Platform {
                     progress.arrived_us.get_or_insert(sensors.now_us);
                 }
                 let stayed = progress.arrived_us.is_some() && since(progress.arrived_us) >= stay_s;
-                !landed && (stayed || progress.arrived_us.is_some() && stay_s.is_nan())
+                in_air && (stayed || progress.arrived_us.is_some() && stay_s.is_nan())
             }
             MissionLeg::Land { .. } | MissionLeg::Return => false,
         }

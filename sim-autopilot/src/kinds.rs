@@ -1,4 +1,4 @@
-//! Kinds of autopilot and of estimator that a scenario can choose.
+//! Kinds of autopilot and of estimator that a scenario can choose, and whether GPS has a fix.
 
 /// The autopilot that is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -20,4 +20,13 @@ pub enum EstimatorErrors {
     Rtk,
     /// Errors as in the recorded flights of this kind of autopilot.
     Recorded,
+}
+
+/// Whether the GPS receiver has a fix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GpsFix {
+    /// No fix: no mode can control the position.
+    Lost,
+    /// A fix.
+    Held,
 }

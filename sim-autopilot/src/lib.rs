@@ -65,11 +65,12 @@ use planner_core::frames::{self, Geodetic};
 pub use self::camera::Photo;
 pub use self::config::{Config, ConfigError};
 use self::firmware::Firmware;
-pub use self::kinds::{AutopilotKind, EstimatorErrors};
+pub use self::kinds::{AutopilotKind, EstimatorErrors, GpsFix};
 use self::platform::{IntegralAction, Platform};
 use self::port::Port;
 pub use self::px4::Mode;
 use self::snapshot::Snapshot;
+use self::status::{AutopilotFlags, MotorState};
 pub use self::vehicle::{TrueState, VehicleLimits, power_ratio_at_speed};
 
 /// One simulated vehicle with its autopilot and MAVLink ports.
@@ -196,29 +197,25 @@ impl Autopilot {
     /// `ground_up_m` is the height of the ground below the vehicle in the mission frame, metres.
     pub fn step(&mut self, dt_s: f32, ground_up_m: f32) {
         self.platform.advance_time(dt_s, ground_up_m);
-        let was_armed = self.firmware.armed();
         let sensors = self.platform.sensors();
         let order = self.firmware.update(&mut self.platform, &sensors, dt_s);
         let (armed, landed) = (self.firmware.armed(), self.firmware.landed());
         let platform = &mut self.platform;
-        platform.vehicle.set_flags(armed, landed);
+        platform.vehicle.set_flags(AutopilotFlags { armed, landed });
         match order.integral {
             IntegralAction::Keep => {}
             IntegralAction::Clear => platform.vehicle.reset_integral(),
             IntegralAction::Match => platform.vehicle.match_integral_to_demand(),
         }
-        if order.lift {
+        if order.motors == MotorState::Lifting {
             let gains = self.firmware.gains();
             let mut velocity = sensors.velocity;
             velocity.z += order.demand.height_rate_weight * (sensors.height_rate - velocity.z);
             platform.vehicle.control(&order.demand, gains, &sensors.position, &velocity, dt_s);
         }
         platform.last_demand = armed.then_some(order.demand);
-        platform.vehicle.advance(order.lift, &platform.disturbance.wind, ground_up_m, dt_s);
+        platform.vehicle.advance(order.motors, &platform.disturbance.wind, ground_up_m, dt_s);
         platform.frame.recentre(platform.vehicle.position());
-        if was_armed && !armed {
-            platform.vehicle.set_flags(false, landed);
-        }
         platform.update_camera();
         self.transmit();
         if self.platform.reboot_us.is_some_and(|at_us| self.platform.time_us >= at_us) {
@@ -425,11 +422,10 @@ impl Autopilot {
         }
     }
 
-    /// Takes the GPS fix away (false) or restores it; without a fix no mode can control the
-    /// position.
-    pub fn set_gps_ok(&mut self, ok: bool) {
-        self.platform.gps_ok = ok;
-        self.firmware.set_position_ok(ok);
+    /// Takes the GPS fix away or restores it.
+    pub fn set_gps_fix(&mut self, fix: GpsFix) {
+        self.platform.gps_ok = fix == GpsFix::Held;
+        self.firmware.set_gps_fix(fix);
     }
 }
 

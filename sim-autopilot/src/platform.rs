@@ -4,13 +4,14 @@ use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
 use super::camera::{CameraTrigger, Photo};
-use super::command::{ACCEPTED, Command, DO_DIGICAM_CONTROL, message_id};
+use super::command::{ACCEPTED, Command, DO_DIGICAM_CONTROL, Outcome, message_id};
 use super::config::Config;
 use super::estimator::EstimateErrors;
 use super::geodesy::LocalFrame;
 use super::mission::Missions;
 use super::noise::{self, Disturbance};
 use super::port::{PendingAck, Port, Sender};
+use super::status::MotorState;
 use super::vehicle::{Demand, Vehicle};
 use super::wire::PayloadReader;
 use crate::AutopilotKind;
@@ -53,8 +54,8 @@ pub struct SensorReadings {
 /// Output of the mode logic in one step, for the vehicle's controller.
 #[derive(Clone, Copy, Debug)]
 pub struct ControlDemand {
-    /// Whether the motors carry weight; false while they idle or are off.
-    pub lift: bool,
+    /// Whether the motors carry weight.
+    pub motors: MotorState,
     /// What to do with the velocity controller's integral.
     pub integral: IntegralAction,
     /// Position, velocity and limits that the mode demands.
@@ -295,19 +296,19 @@ impl Platform {
         Some(Point::new(east, north, if command.z.is_finite() { enu.z } else { f32::NAN }))
     }
 
-    /// Executes DO_SET_HOME. Returns false if the commanded position is invalid.
-    pub(super) fn handle_set_home(&mut self, command: &Command) -> bool {
+    /// Executes DO_SET_HOME. Refused if the commanded position is invalid.
+    pub(super) fn handle_set_home(&mut self, command: &Command) -> Outcome {
         let [lat_deg, lon_deg] = command.place;
         let home = if command.param[0] == 1.0 {
             self.frame.geodetic_from_enu(self.vehicle.position())
         } else {
             Geodetic { lat_deg, lon_deg, alt_m: f64::from(command.z) }
         };
-        let valid = home.is_valid();
-        if valid {
-            self.set_fixed_home(home);
+        if !home.is_valid() {
+            return Outcome::Refused;
         }
-        valid
+        self.set_fixed_home(home);
+        Outcome::Done
     }
 
     /// Executes SET_MESSAGE_INTERVAL and returns the MAV_RESULT. An interval of 0 restores the

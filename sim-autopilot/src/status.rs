@@ -1,4 +1,4 @@
-//! State of the autopilot that telemetry reports.
+//! State of the autopilot that telemetry reports, and of the motors that it drives.
 
 use crate::AutopilotKind;
 
@@ -27,4 +27,22 @@ pub struct AutopilotStatus {
     pub origin_known: bool,
     /// Whether the estimator has a position.
     pub position_known: bool,
+}
+
+/// Whether the motors carry weight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotorState {
+    /// They idle or are off.
+    Idle,
+    /// They carry weight.
+    Lifting,
+}
+
+/// What the autopilot reports of itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct AutopilotFlags {
+    /// Whether it is armed.
+    pub armed: bool,
+    /// Whether its land detector reports the vehicle on the ground.
+    pub landed: bool,
 }

@@ -13,6 +13,8 @@
 use nalgebra::Vector3;
 use planner_core::Point;
 
+use crate::status::{AutopilotFlags, MotorState};
+
 /// Standard gravity, m/s².
 pub const GRAVITY: f32 = 9.806_65;
 /// Height above its resting position below which a vehicle counts as touching the ground, metres.
@@ -203,10 +205,10 @@ impl Vehicle {
         Point::new(self.thrust.x, self.thrust.y, self.thrust.z + GRAVITY)
     }
 
-    /// Records whether the autopilot is armed and reports landed.
-    pub fn set_flags(&mut self, armed: bool, landed: bool) {
-        self.state.armed = armed;
-        self.state.landed = landed;
+    /// Records what the autopilot reports.
+    pub fn set_flags(&mut self, flags: AutopilotFlags) {
+        self.state.armed = flags.armed;
+        self.state.landed = flags.landed;
     }
 
     /// Sets the heading of a vehicle at rest, radians clockwise from north.
@@ -310,9 +312,10 @@ impl Vehicle {
         self.state.heading_rad = wrap_pi(self.state.heading_rad + self.state.heading_rate * dt);
     }
 
-    /// Moves the body for one step of `dt` seconds. `lift` is false while the motors idle or are
-    /// off; `ground_up_m` is the height of the ground below the body, metres ENU.
-    pub fn advance(&mut self, lift: bool, wind: &Point, ground_up_m: f32, dt: f32) {
+    /// Moves the body for one step of `dt` seconds. `ground_up_m` is the height of the ground below
+    /// the body, metres ENU.
+    pub fn advance(&mut self, motors: MotorState, wind: &Point, ground_up_m: f32, dt: f32) {
+        let lift = motors == MotorState::Lifting;
         let rest = f64::from(ground_up_m + self.limits.radius_m);
         let clearance = (self.position.z - rest) as f32;
         let target = if lift { self.acceleration_setpoint } else { Point::new(0.0, 0.0, -GRAVITY) };
@@ -344,16 +347,17 @@ impl Vehicle {
         }
         self.state.acceleration = acceleration;
         self.state.position = self.position.cast::<f32>();
-        self.drain_battery(lift, dt);
+        self.drain_battery(motors, dt);
     }
 
     /// Discharges the battery. Power grows with the upward acceleration and slightly with speed;
     /// idle motors and electronics take 4 % of the hover power.
-    fn drain_battery(&mut self, lift: bool, dt: f32) {
-        let load = if lift {
-            power_ratio_at_speed(self.state.velocity.norm()) + 0.1 * self.thrust.z.max(0.0)
-        } else {
-            0.04
+    fn drain_battery(&mut self, motors: MotorState, dt: f32) {
+        let load = match motors {
+            MotorState::Lifting => {
+                power_ratio_at_speed(self.state.velocity.norm()) + 0.1 * self.thrust.z.max(0.0)
+            }
+            MotorState::Idle => 0.04,
         };
         self.state.battery = (self.state.battery - load * dt / self.limits.endurance_s).max(0.0);
     }
@@ -413,7 +417,7 @@ mod tests {
             let (p, v, before) =
                 (vehicle.state().position, vehicle.state().velocity, vehicle.thrust);
             vehicle.control(demand, &GAINS, &p, &v, DT);
-            vehicle.advance(true, &wind, 0.0, DT);
+            vehicle.advance(MotorState::Lifting, &wind, 0.0, DT);
             fastest = fastest.max(vehicle.state().velocity.norm());
             worst_jerk = worst_jerk.max((vehicle.thrust - before).norm() / DT);
         }
@@ -466,7 +470,7 @@ mod tests {
     fn it_falls_without_lift_and_rests_on_the_ground() {
         let mut v = airborne();
         for _ in 0..2000 {
-            v.advance(false, &Point::zeros(), 1.0, DT);
+            v.advance(MotorState::Idle, &Point::zeros(), 1.0, DT);
         }
         let radius = VehicleLimits::default().radius_m;
         assert_eq!(v.state().position.z, 1.0 + radius);
@@ -477,7 +481,7 @@ mod tests {
     fn a_parked_vehicle_is_not_blown_away() {
         let mut v = Vehicle::new(VehicleLimits::default(), Point::new(1.0, 2.0, 0.3));
         for _ in 0..500 {
-            v.advance(false, &Point::new(15.0, 0.0, 0.0), 0.0, DT);
+            v.advance(MotorState::Idle, &Point::new(15.0, 0.0, 0.0), 0.0, DT);
         }
         assert_eq!(v.state().position, Point::new(1.0, 2.0, 0.3));
     }

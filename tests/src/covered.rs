@@ -81,7 +81,7 @@ pub fn fly_on(
 /// As [`fly`].
 pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Result<Flight> {
     let plan = mission.plan()?;
-    let mut flight = swarm::fly(mission, &plan, "fly", false, &Progress::hidden())?;
+    let mut flight = swarm::fly(mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())?;
     if let Some(places) = pictures::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
         flight.pictures = places;
     }

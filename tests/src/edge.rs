@@ -74,7 +74,7 @@ impl Edge {
         scenario.simulation.time_limit_s = TIME_LIMIT_S;
         let mut mission = Mission::prepare(scenario, &Progress::hidden())?;
         let plan = mission.plan()?;
-        let flight = swarm::fly(&mission, &plan, "fly", false, &Progress::hidden())?;
+        let flight = swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())?;
         let leaves = leaves(&flight, range_m);
         Ok(Self { range_m, mission, plan, leaves, rng })
     }
@@ -97,7 +97,13 @@ impl Edge {
         let at_s = (left_s + self.rng.uniform(-3.0, 12.0)).max(1.0);
         let id = self.plan.flights[index].id;
         self.mission.scenario.faults = self.faults(script, at_s, id, index)?;
-        let flight = swarm::fly(&self.mission, &self.plan, "fly", false, &Progress::hidden())?;
+        let flight = swarm::fly(
+            &self.mission,
+            &self.plan,
+            "fly",
+            swarm::Pace::Fastest,
+            &Progress::hidden(),
+        )?;
         let what = format!("range {:.1} m, vehicle {id} at {at_s:.1} s, {script:?}", self.range_m);
         Ok(Some(Outcome { what, ..judge(&flight, id) }))
     }

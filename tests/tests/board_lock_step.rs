@@ -35,7 +35,8 @@ start = [13.0, 4.0, 3.5]
 /// A flight of three boards.
 fn fly(mission: &mut Mission) -> Flight {
     let plan = mission.plan().expect("there is a plan");
-    swarm::fly(mission, &plan, "fly", false, &Progress::on_terminal()).expect("the boards answer")
+    swarm::fly(mission, &plan, "fly", swarm::Pace::Fastest, &Progress::on_terminal())
+        .expect("the boards answer")
 }
 
 #[test]

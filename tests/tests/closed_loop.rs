@@ -34,7 +34,9 @@ fn fly(path: &Path, seed: Option<u64>) -> MissionResult {
     let mut mission =
         Mission::prepare(scenario, &Progress::hidden()).expect("the mission can be prepared");
     let plan = mission.plan().expect("the swarm can be planned");
-    swarm::fly(&mission, &plan, "fly", false, &Progress::hidden()).expect("it flies").result
+    swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())
+        .expect("it flies")
+        .result
 }
 
 fn scenario_path(name: &str) -> std::path::PathBuf {

@@ -196,9 +196,10 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 walled_off += 1;
                 continue;
             }
-            let result = swarm::fly(&mission, &plan, "fly", false, &Progress::hidden())
-                .expect("it flies")
-                .result;
+            let result =
+                swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())
+                    .expect("it flies")
+                    .result;
             contacts += result.safety.wall_contacts;
             flown += 1;
         }

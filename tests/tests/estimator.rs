@@ -51,7 +51,8 @@ fn the_demo_flies_clean_by_the_truth_at_the_margins_for_recorded_errors() {
         let mut mission =
             Mission::prepare(demo(seed, 0.9, 3.3).unwrap(), &Progress::hidden()).unwrap();
         let plan = mission.plan().unwrap();
-        let flight = swarm::fly(&mission, &plan, "fly", false, &Progress::hidden()).unwrap();
+        let flight =
+            swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden()).unwrap();
         let safety = &flight.result.safety;
         println!(
             "seed {seed}: complete {}, walls {:?} m, vehicles {:?} m, makespan {} s",

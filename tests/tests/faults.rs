@@ -141,7 +141,7 @@ fn prepare_inside(geofence: Option<Geofence>, seed: u64) -> (Mission, Box<SwarmP
 }
 
 fn fly(mission: &Mission, plan: &SwarmPlan) -> Flight {
-    swarm::fly(mission, plan, "fly", false, &Progress::on_terminal())
+    swarm::fly(mission, plan, "fly", swarm::Pace::Fastest, &Progress::on_terminal())
         .expect("the script can be played")
 }
 

@@ -16,7 +16,8 @@ fn half_the_demo_by_ardupilot_is_complete_and_clean() {
     }
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).unwrap();
     let plan = mission.plan().unwrap();
-    let flight = swarm::fly(&mission, &plan, "fly", false, &Progress::hidden()).unwrap();
+    let flight =
+        swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden()).unwrap();
     let result = &flight.result;
     let log: Vec<_> =
         flight.log.iter().map(|e| format!("{:.1} s {:?}: {}", e.t_s, e.vehicle, e.text)).collect();

@@ -85,11 +85,7 @@ pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     let has_survey = !polygons.outers.is_empty();
     let fences =
         file.geo_fence.polygons.into_iter().map(|f| (f.inclusion, longitude_first(&f.polygon)));
-    let circles = file
-        .geo_fence
-        .circles
-        .into_iter()
-        .map(|f| (f.inclusion, circle_polygon(&f.circle, f.inclusion)));
+    let circles = file.geo_fence.circles.into_iter().map(|f| (f.inclusion, circle_polygon(&f)));
     for (inclusion, ring) in fences.chain(circles) {
         match (inclusion, has_survey) {
             (false, _) => polygons.no_fly.push(ring),
@@ -106,10 +102,11 @@ fn longitude_first(ring: &[[f64; 2]]) -> RingXy {
 
 /// The polygon of a circular fence: inscribed in an inclusion fence, circumscribed about an
 /// exclusion fence, so that the polygon is never less strict than the circle.
-fn circle_polygon(circle: &Circle, inclusion: bool) -> RingXy {
+fn circle_polygon(fence: &FenceCircle) -> RingXy {
+    let circle = &fence.circle;
     let [lat, lon] = circle.center;
     let half = std::f64::consts::PI / CIRCLE_CORNERS as f64;
-    let radius = if inclusion { circle.radius } else { circle.radius / half.cos() };
+    let radius = if fence.inclusion { circle.radius } else { circle.radius / half.cos() };
     let corner = |i: usize| {
         let (sin, cos) = (2.0 * half * i as f64).sin_cos();
         let east = radius * cos / (M_PER_DEG * lat.to_radians().cos());

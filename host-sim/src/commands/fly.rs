@@ -23,7 +23,7 @@ use crate::say;
 use crate::scenario::{self, Companion, Scenario};
 use crate::swarm::faults;
 use crate::swarm::gateway::Gateway;
-use crate::swarm::{self, Flight};
+use crate::swarm::{self, Flight, Pace};
 
 /// The demo's scenario, compiled into the program so that no file is needed.
 const DEMO_SCENARIO: &str = include_str!("../../scenarios/demo.toml");
@@ -78,7 +78,7 @@ pub struct FlyArgs {
 /// How a running flight is shown: paced by the clock, and to which ground station.
 #[derive(Default)]
 struct FlightDisplay<'a> {
-    realtime: bool,
+    pace: Pace,
     qgc: Option<&'a LinkUrl>,
 }
 
@@ -103,7 +103,8 @@ pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
     if let Some(dir) = &args.flash {
         keep_flashes(&mut scenario, dir)?;
     }
-    let shown = FlightDisplay { realtime: args.realtime, qgc: args.qgc.as_ref() };
+    let pace = if args.realtime { Pace::RealTime } else { Pace::Fastest };
+    let shown = FlightDisplay { pace, qgc: args.qgc.as_ref() };
     plan_and_fly(scenario, "fly", &args.out, &shown, args.flash.as_deref())
 }
 
@@ -247,7 +248,7 @@ fn plan_and_fly(
         Some(gateway) => {
             swarm::fly_with_ground_station(&mission, &plan, command, gateway, &progress)?
         }
-        None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
+        None => swarm::fly(&mission, &plan, command, shown.pace, &progress)?,
     };
     if let Some(places) = pictures::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
         flight.pictures = places;

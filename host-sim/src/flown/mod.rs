@@ -1,5 +1,5 @@
-//! What was flown, judged and shown after the flight: pictures of a coverage mission, those kept from
-//! flight to flight, and the report page.
+//! What was flown, judged and shown after the flight: pictures of a coverage mission, those kept
+//! from flight to flight, and the report page.
 
 pub mod kept;
 pub mod layers;

@@ -36,13 +36,13 @@ pub(super) fn route_figures(
     let mut fig_8 = vec![route_map(
         "(a) area and UAVs".to_owned(),
         &CoveragePlan::new(convex, Method::Binpat)?,
-        false,
+        MapContent::Area,
     )];
     for ((method, name), letter) in three.iter().zip('b'..) {
         fig_8.push(route_map(
             format!("({letter}) {name}"),
             &CoveragePlan::new(convex, *method)?,
-            true,
+            MapContent::Routes,
         ));
     }
     let mut fig_9 = Vec::new();
@@ -51,7 +51,7 @@ pub(super) fn route_figures(
             fig_9.push(route_map(
                 format!("({letter}) {name}"),
                 &CoveragePlan::new(scenario, *method)?,
-                true,
+                MapContent::Routes,
             ));
         }
     }
@@ -60,7 +60,7 @@ pub(super) fn route_figures(
         fig_10.push(route_map(
             format!("({letter}) {name}"),
             &CoveragePlan::new(small, *method)?,
-            true,
+            MapContent::Routes,
         ));
     }
     let figure = |name: &str, caption: &str, panels| Figure {
@@ -87,15 +87,24 @@ pub(super) fn route_figures(
     ])
 }
 
-/// A map from above of the area and the UAVs; with `shown` also of the routes, and their costs.
-fn route_map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
+/// What a map from above shows.
+#[derive(Clone, Copy, PartialEq)]
+enum MapContent {
+    /// The area and the UAVs.
+    Area,
+    /// Also the routes, and their costs.
+    Routes,
+}
+
+/// A map from above.
+fn route_map(title: String, planned: &CoveragePlan<'_>, content: MapContent) -> Panel {
     let corners = planned.area_settings.rings_of(RingKind::Outer).flatten();
     let flights = planned.flights();
     let (mut costs, mut most_s) = (Vec::new(), 0.0f32);
     let vehicles = planned.scenario.vehicles.iter().enumerate();
     let route = |(index, vehicle): (usize, &crate::scenario::Vehicle)| {
         let own = flights.iter().find(|(sortie, _, _)| usize::from(sortie.route.vehicle) == index);
-        let own = own.filter(|_| shown);
+        let own = own.filter(|_| content == MapContent::Routes);
         let (cost_m, cost_s) =
             own.map_or((0.0, 0.0), |(sortie, _, _)| (sortie.route.cost_m, sortie.route.cost_s));
         costs.push(cost_m);
@@ -110,10 +119,11 @@ fn route_map(title: String, planned: &CoveragePlan<'_>, shown: bool) -> Panel {
     let all: Vec<String> = costs.iter().map(|cost_m| format!("{cost_m:.0}")).collect();
     Panel::Map(RouteMap {
         title,
-        note: if shown {
-            format!("{} m; at most {most_m:.1} m, {most_s:.1} s", all.join(", "))
-        } else {
-            String::new()
+        note: match content {
+            MapContent::Area => String::new(),
+            MapContent::Routes => {
+                format!("{} m; at most {most_m:.1} m, {most_s:.1} s", all.join(", "))
+            }
         },
         area: corners.map(|corner| Point::new(corner.x, corner.y, 0.0)).collect(),
         routes,

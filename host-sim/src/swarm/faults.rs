@@ -26,6 +26,7 @@
 
 use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
+use sim_autopilot::GpsFix;
 
 use super::ground_station::{GroundStation, OperatorCommand};
 use super::member::{Planner, SimulatedVehicle};
@@ -204,7 +205,7 @@ fn begin_fault(
         "origin-change" => {
             member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_CHANGE_M));
         }
-        "gps-loss" => member.autopilot.set_gps_ok(false),
+        "gps-loss" => member.autopilot.set_gps_fix(GpsFix::Lost),
         "battery-low" => member.autopilot.set_battery(BATTERY_LEFT),
         "pilot-takeover" => member.autopilot.take_over_by_pilot(),
         "pilot-return" => return_from_pilot(i, now_us, world),
@@ -231,7 +232,7 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
         "origin-change" => {
             member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_CHANGE_M));
         }
-        "gps-loss" => member.autopilot.set_gps_ok(true),
+        "gps-loss" => member.autopilot.set_gps_fix(GpsFix::Held),
         "pilot-takeover" => return_from_pilot(i, now_us, world),
         "late-plan" | "bad-roadmap" => member.planner = Planner::Sound,
         "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Resume),

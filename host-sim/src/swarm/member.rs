@@ -346,7 +346,7 @@ impl SimulatedVehicle {
                     log.push(report::Event { t_s, vehicle, level: Level::Info, text });
                 }
                 Event::StateChanged { from, to, text, warning } => {
-                    self.note_warning(from, to, text, warning);
+                    self.note_warning(from, to, Some(text).filter(|t| warning && !t.is_empty()));
                     log.push(self.log_entry(now_us, from, to, text));
                 }
             }
@@ -398,9 +398,9 @@ impl SimulatedVehicle {
         self.killed || now_us < self.boots_until_us
     }
 
-    fn note_warning(&mut self, from: State, to: State, text: &'static str, warning: bool) {
-        if warning && !text.is_empty() {
-            self.last_warning = Some(text);
+    fn note_warning(&mut self, from: State, to: State, warning: Option<&'static str>) {
+        if warning.is_some() {
+            self.last_warning = warning;
         } else if to == State::Follow || from == State::Aborted {
             self.last_warning = None;
         }

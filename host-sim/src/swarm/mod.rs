@@ -82,16 +82,26 @@ pub struct Flight {
     pub took_s: f64,
 }
 
-/// Simulates the flight of a planned mission, in real time if `realtime`. Each companion requests a
-/// plan and gets its vehicle's part of `plan`.
+/// How fast the simulation runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Pace {
+    /// As fast as the machine can; a board behind links still gets real time.
+    #[default]
+    Fastest,
+    /// At the speed of the clock.
+    RealTime,
+}
+
+/// Simulates the flight of a planned mission. Each companion requests a plan and gets its vehicle's
+/// part of `plan`.
 pub fn fly(
     mission: &Mission,
     plan: &SwarmPlan,
     command: &'static str,
-    realtime: bool,
+    pace: Pace,
     progress: &Progress,
 ) -> anyhow::Result<Flight> {
-    simulate(mission, plan, command, realtime, None, progress)
+    simulate(mission, plan, command, pace, None, progress)
 }
 
 /// As [`fly`], in real time, with a real ground station connected by `gateway`.
@@ -105,7 +115,7 @@ pub fn fly_with_ground_station(
     gateway: Gateway,
     progress: &Progress,
 ) -> anyhow::Result<Flight> {
-    simulate(mission, plan, command, true, Some(gateway), progress)
+    simulate(mission, plan, command, Pace::RealTime, Some(gateway), progress)
 }
 
 /// A simulation under way.
@@ -134,7 +144,7 @@ fn simulate(
     mission: &Mission,
     plan: &SwarmPlan,
     command: &'static str,
-    realtime: bool,
+    pace: Pace,
     gateway: Option<Gateway>,
     progress: &Progress,
 ) -> anyhow::Result<Flight> {
@@ -157,7 +167,7 @@ fn simulate(
         if run.t_s >= run.ends_at_s {
             break;
         }
-        if realtime || by_clock {
+        if pace == Pace::RealTime || by_clock {
             let due = Duration::from_micros(now_us) + put_off;
             put_off += began.elapsed().saturating_sub(due + MAX_CLOCK_LAG);
             std::thread::sleep(due.saturating_sub(began.elapsed()));

@@ -60,7 +60,7 @@ where
 {
     let mut reader = Reader::new(file).map_err(|error| malformed(&error))?;
     let (crs, unit_m) = coordinate_system(reader.header())?;
-    crs.check(frame.metres)?;
+    crs.check(frame.without_crs)?;
     let mut grid = empty_grid(reader.header(), &crs, frame)?;
     let mut points = PointDataBuilder::new().for_header(reader.header()).build();
     let most = reader.header().number_of_points();

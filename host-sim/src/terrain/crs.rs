@@ -7,6 +7,7 @@ use proj4rs::Proj;
 use proj4rs::transform::transform;
 
 use super::error::{TerrainError, WARP_HINT};
+use super::frame::WithoutCrs;
 
 /// Metres in an international foot.
 pub(super) const FOOT_M: f64 = 0.3048;
@@ -95,10 +96,10 @@ impl CoordinateSystem {
 }
 
 impl Crs {
-    /// Refuses a file without a coordinate system, unless the mission's own coordinates are metres.
-    pub(super) fn check(&self, metres: bool) -> Result<(), TerrainError> {
+    /// Refuses a file without a coordinate system, unless its coordinates are then metres.
+    pub(super) fn check(&self, without_crs: WithoutCrs) -> Result<(), TerrainError> {
         match self {
-            Self::Unstated if !metres => Err(TerrainError::Nowhere(
+            Self::Unstated if without_crs == WithoutCrs::Refused => Err(TerrainError::Nowhere(
                 "a .prj beside an .asc or gdal_translate -a_srs say it; in a mission with coordinates = \"metres\" its numbers \
                  are metres about the origin",
             )),

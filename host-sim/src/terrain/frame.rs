@@ -3,13 +3,22 @@
 use planner_core::coverage::Flat;
 use planner_core::frames::Geodetic;
 
+/// What a file's coordinates mean if it states no coordinate system.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum WithoutCrs {
+    /// Nothing: the file is refused.
+    Refused,
+    /// Metres from the origin, as the mission's own coordinates are.
+    Metres,
+}
+
 /// Mission frame and box in which heights are requested.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// Origin of the mission frame. Its altitude is not subtracted: heights stay above sea level.
     pub origin: &'a Geodetic,
-    /// Whether coordinates without a coordinate system are metres from the origin.
-    pub metres: bool,
+    /// What the file's coordinates mean if it states no coordinate system.
+    pub without_crs: WithoutCrs,
     /// The requested box, metres: its least and its greatest corner; some cells around it are read
     /// too. `None` requests the whole file.
     pub window: Option<[Flat; 2]>,

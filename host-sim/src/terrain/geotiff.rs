@@ -77,7 +77,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     let missing = decoder.find_tag(Tag::GdalNodata).map_err(malformed)?;
     let missing = missing.and_then(|value| value.into_string().ok());
     let missing: Option<f64> = missing.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok());
-    let (corner, cell) = georeference(&mut decoder, keys.is_pixel_point())?;
+    let (corner, cell) = georeference(&mut decoder, &keys)?;
     let value_m = |value: f64| match missing.is_some_and(|m| is_missing_value(value, m))
         || !value.is_finite()
     {
@@ -126,7 +126,7 @@ fn is_missing_value(value: f64, missing: f64) -> bool {
 /// Coordinates of the first cell's outer corner, and the sides of cells, in the file's units.
 fn georeference<R: Read + Seek>(
     decoder: &mut Decoder<R>,
-    points: bool,
+    keys: &GeoKeys,
 ) -> Result<([f64; 2], [f64; 2]), TerrainError> {
     let mut tag = |tag: Tag| -> Result<Option<Vec<f64>>, TerrainError> {
         let found = decoder.find_tag(tag).map_err(malformed)?;
@@ -155,7 +155,7 @@ fn georeference<R: Read + Seek>(
     {
         return Err(bad_file(&"its cells have no size or place"));
     }
-    if points {
+    if keys.is_pixel_point() {
         corner = [corner[0] - cell[0] / 2.0, corner[1] + cell[1] / 2.0];
     }
     Ok((corner, cell))

@@ -30,7 +30,7 @@ use std::path::Path;
 
 pub use self::error::TerrainError;
 pub use self::field::{FieldConfig, FieldError, encode_field};
-pub use self::frame::Frame;
+pub use self::frame::{Frame, WithoutCrs};
 pub use self::grid::{HeightGrid, Heights};
 pub use self::limits::{MAX_BYTES, MAX_CELLS};
 use crate::quote::quoted_path;

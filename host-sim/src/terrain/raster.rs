@@ -40,7 +40,7 @@ impl Raster {
     /// Resamples the heights to a grid in the mission frame, whose cells are about as large as the
     /// file's.
     pub(super) fn resampled(&self, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
-        self.crs.check(frame.metres)?;
+        self.crs.check(frame.without_crs)?;
         let origin = frame.origin;
         let window = match frame.window {
             Some(window) => window,

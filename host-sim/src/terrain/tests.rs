@@ -20,7 +20,7 @@ use super::*;
 pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 43.3, lon_deg: -2.9, alt_m: 0.0 };
 
 pub(super) fn anywhere(origin: &Geodetic) -> Frame<'_> {
-    Frame { origin, metres: false, window: None }
+    Frame { origin, without_crs: WithoutCrs::Refused, window: None }
 }
 
 /// A GeoTIFF of signed 16-bit heights with the GeoKeys `system`; `corner` is the north-western one,
@@ -80,7 +80,7 @@ proptest! {
         let (columns, count, cell) = (rows[0].len(), rows.len(), f32::from(cell));
         let corner = corner.map(|at| at as f32);
         let text = asc(columns, corner.map(f64::from), f64::from(cell), &rows);
-        let frame = Frame { origin: &ORIGIN, metres: true, window: None };
+        let frame = Frame { origin: &ORIGIN, without_crs: WithoutCrs::Metres, window: None };
         let raster = asc::parse(&text, Crs::Unstated).unwrap();
         let grid = raster.resampled(&frame).unwrap();
         prop_assert_eq!(grid.size(), [columns, count]);

@@ -2,6 +2,7 @@
 
 use super::Copter;
 use super::setpoint::Goal;
+use crate::command::{Arming, Outcome};
 use crate::platform::{Platform, SensorReadings};
 
 impl Copter {
@@ -22,14 +23,16 @@ impl Copter {
         &mut self,
         platform: &mut Platform,
         sensors: &SensorReadings,
-        force: bool,
-    ) -> bool {
+        arming: Arming,
+    ) -> Outcome {
         if self.armed {
-            return true;
+            return Outcome::Done;
         }
-        if !force && let Err(why) = self.check_arming(sensors) {
+        if arming == Arming::Checked
+            && let Err(why) = self.check_arming(sensors)
+        {
             platform.send_text(2, why);
-            return false;
+            return Outcome::Refused;
         }
         self.armed = true;
         self.since.armed_us = sensors.now_us;
@@ -38,13 +41,13 @@ impl Copter {
         platform.announce_origin();
         platform.set_home_here();
         platform.send_text(6, "Arming motors");
-        true
+        Outcome::Done
     }
 
-    /// Disarms. Refused (false) in the air, unless `force`.
-    pub(super) fn disarm(&mut self, platform: &mut Platform, force: bool) -> bool {
-        if self.armed && !self.landed && !force {
-            return false;
+    /// Disarms. Refused in the air, unless forced.
+    pub(super) fn disarm(&mut self, platform: &mut Platform, arming: Arming) -> Outcome {
+        if self.armed && !self.landed && arming == Arming::Checked {
+            return Outcome::Refused;
         }
         if self.armed {
             platform.send_text(6, "Disarming motors");
@@ -54,6 +57,6 @@ impl Copter {
         self.takeoff = None;
         self.failsafe = None;
         self.speed = None;
-        true
+        Outcome::Done
     }
 }

@@ -11,7 +11,8 @@ use planner_core::Point;
 use super::auto_state::Auto;
 use super::setpoint::Goal;
 use super::{Copter, Mode, ReturnLeg, TakeOff};
-use crate::itinerary::{MissionLeg, interpolate_height};
+use crate::command::Outcome;
+use crate::itinerary::{LandedState, MissionLeg, interpolate_height};
 use crate::platform::{Platform, SensorReadings};
 
 /// Distance within which the place of a landing is reached, metres.
@@ -29,13 +30,15 @@ impl Copter {
         platform.has_mission()
     }
 
-    /// Executes MISSION_START: enters AUTO and allows the take-off. False if AUTO cannot be
+    /// Executes MISSION_START: enters AUTO and allows the take-off. Refused if AUTO cannot be
     /// entered.
-    pub(super) fn start_mission(&mut self, platform: &mut Platform) -> bool {
-        let starts =
-            self.can_enter_auto(platform) && self.request_mode(Mode::Auto, &platform.sensors());
-        self.auto.may_lift |= starts && self.armed;
-        starts
+    pub(super) fn start_mission(&mut self, platform: &mut Platform) -> Outcome {
+        if !self.can_enter_auto(platform) {
+            return Outcome::Refused;
+        }
+        let started = self.request_mode(Mode::Auto, &platform.sensors());
+        self.auto.may_lift |= started.is_done() && self.armed;
+        started
     }
 
     /// Whether the vehicle descends to land in AUTO (landing item, or the end of a return item).
@@ -71,7 +74,8 @@ impl Copter {
         if self.landed && !self.auto.may_lift {
             return;
         }
-        let leg = platform.fly_mission(sensors, self.landed);
+        let landed = if self.landed { LandedState::OnGround } else { LandedState::InAir };
+        let leg = platform.fly_mission(sensors, landed);
         if let Some(speed) = platform.missions.speed.take() {
             self.speed = (speed > 0.0).then_some(speed);
         }

@@ -4,7 +4,7 @@
 use super::setpoint::Goal;
 use super::{Copter, Mode, STREAMS};
 use crate::command::{
-    ACCEPTED, ARM_FORCE, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
+    ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
     DO_SET_CAM_TRIGG_DIST, FAILED, UNSUPPORTED, message_id,
 };
 use crate::platform::Platform;
@@ -37,27 +37,27 @@ impl Copter {
         let result = match command.id {
             176 => self.change_mode(platform, command.param[0] as u8, command.param[1] as u32),
             400 if command.param[0] == 1.0 => {
-                accepted_or_failed(self.arm(platform, &sensors, command.param[1] == ARM_FORCE))
+                self.arm(platform, &sensors, Arming::commanded_by(command)).result_or(FAILED)
             }
             400 if command.param[0] == 0.0 => {
-                accepted_or_failed(self.disarm(platform, command.param[1] == ARM_FORCE))
+                self.disarm(platform, Arming::commanded_by(command)).result_or(FAILED)
             }
             DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => {
                 return platform.handle_camera_command(from, command);
             }
             // NAV_TAKEOFF's height counts from home.
-            22 => accepted_or_failed(self.take_off(sensors.home.z + command.z, &sensors)),
-            21 => accepted_or_failed(self.request_mode(Mode::Land, &sensors)),
-            20 => accepted_or_failed(self.request_mode(Mode::Rtl, &sensors)),
-            17 => accepted_or_failed(self.request_mode(Mode::Loiter, &sensors)),
+            22 => self.take_off(sensors.home.z + command.z, &sensors).result_or(FAILED),
+            21 => self.request_mode(Mode::Land, &sensors).result_or(FAILED),
+            20 => self.request_mode(Mode::Rtl, &sensors).result_or(FAILED),
+            17 => self.request_mode(Mode::Loiter, &sensors).result_or(FAILED),
             192 => self.reposition(platform, command),
             178 => {
                 self.speed = (command.param[1] > 0.0).then_some(command.param[1]);
                 ACCEPTED
             }
-            179 => accepted_or_failed(platform.handle_set_home(command)),
+            179 => platform.handle_set_home(command).result_or(FAILED),
             193 => FAILED,
-            300 => accepted_or_failed(self.start_mission(platform)),
+            300 => self.start_mission(platform).result_or(FAILED),
             245 => ACCEPTED,
             241 | 246 if self.armed => FAILED,
             241 => ACCEPTED,
@@ -101,8 +101,10 @@ impl Copter {
             return DENIED;
         }
         let runs = |mode: &Mode| *mode != Mode::Auto || self.can_enter_auto(platform);
-        let mode = Mode::from_number(number).filter(runs);
-        accepted_or_failed(mode.is_some_and(|mode| self.request_mode(mode, &platform.sensors())))
+        match Mode::from_number(number).filter(runs) {
+            Some(mode) => self.request_mode(mode, &platform.sensors()).result_or(FAILED),
+            None => FAILED,
+        }
     }
 
     /// Executes DO_REPOSITION: flies to a point in Guided. Returns the MAV_RESULT.
@@ -110,8 +112,8 @@ impl Copter {
         let sensors = platform.sensors();
         let Some(to) = platform.reposition_target(command) else { return DENIED };
         let changes_mode = command.param[1] as u32 & 1 != 0;
-        let guided =
-            self.mode == Mode::Guided || changes_mode && self.request_mode(Mode::Guided, &sensors);
+        let guided = self.mode == Mode::Guided
+            || changes_mode && self.request_mode(Mode::Guided, &sensors).is_done();
         if !guided || !to.iter().all(|x| x.is_finite()) {
             return if guided { DENIED } else { FAILED };
         }
@@ -135,8 +137,4 @@ pub(crate) fn handle_stream_request(
             platform.ports[from.port].set_interval(id, interval_us, now_us);
         }
     }
-}
-
-fn accepted_or_failed(done: bool) -> u8 {
-    if done { ACCEPTED } else { FAILED }
 }

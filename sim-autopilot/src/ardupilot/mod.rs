@@ -32,13 +32,14 @@ use self::auto_state::Auto;
 use self::params::Tuning;
 use self::reference::Reference;
 use self::setpoint::Goal;
+use super::command::{Arming, Outcome};
 use super::params::Params;
 use super::platform::{ControlDemand, IntegralAction, Platform, SensorReadings};
 use super::port::Sender;
-use super::status::AutopilotStatus;
-use super::vehicle::VehicleLimits;
+use super::status::{AutopilotStatus, MotorState};
+use super::vehicle::{Demand, VehicleLimits};
 use super::wire::PayloadReader;
-use crate::AutopilotKind;
+use crate::{AutopilotKind, GpsFix};
 
 /// Time from arming to lift-off if NAV_TAKEOFF comes at once, seconds: `MOT` arming delay 2 s,
 /// spool-up 0.5 s, and the throttle's slew to hover.
@@ -200,9 +201,9 @@ impl Copter {
         self.failsafe.is_some()
     }
 
-    /// Sets whether the estimator can have a position.
-    pub fn set_position_ok(&mut self, ok: bool) {
-        self.position_ok = ok;
+    /// Sets whether GPS has a fix, without which the estimator has no position.
+    pub fn set_gps_fix(&mut self, fix: GpsFix) {
+        self.position_ok = fix == GpsFix::Held;
     }
 
     fn position_known(&self, now_us: u64) -> bool {
@@ -288,13 +289,13 @@ impl Copter {
         }
     }
 
-    /// Enters the mode. Refused (false) while armed, if it needs a position and there is none.
-    fn request_mode(&mut self, mode: Mode, sensors: &SensorReadings) -> bool {
+    /// Enters the mode. Refused while armed, if it needs a position and there is none.
+    fn request_mode(&mut self, mode: Mode, sensors: &SensorReadings) -> Outcome {
         if self.armed && mode.needs_position() && !self.position_known(sensors.now_us) {
-            return false;
+            return Outcome::Refused;
         }
         self.force_mode(mode, sensors);
-        true
+        Outcome::Done
     }
 
     /// Enters the mode as a pilot's switch does, even if it cannot run; not if it is current.
@@ -316,16 +317,17 @@ impl Copter {
         self.leg = ReturnLeg::Climb { up: f32::NAN };
     }
 
-    /// Starts a take-off (NAV_TAKEOFF) to height `up` (mission frame); false if not possible.
-    fn take_off(&mut self, up: f32, sensors: &SensorReadings) -> bool {
+    /// Starts a take-off (NAV_TAKEOFF) to height `up` (mission frame). Refused if not possible.
+    fn take_off(&mut self, up: f32, sensors: &SensorReadings) -> Outcome {
         let possible =
             self.armed && self.landed && self.mode == Mode::Guided && up > sensors.position.z;
-        if possible {
-            let since_us = self.takeoff.map_or(sensors.now_us, |takeoff| takeoff.since_us);
-            self.takeoff = Some(TakeOff { since_us, up });
-            self.auto.may_lift = true;
+        if !possible {
+            return Outcome::Refused;
         }
-        possible
+        let since_us = self.takeoff.map_or(sensors.now_us, |takeoff| takeoff.since_us);
+        self.takeoff = Some(TakeOff { since_us, up });
+        self.auto.may_lift = true;
+        Outcome::Done
     }
 
     /// Advances one step: failsafes, timers, mission, land detector, and the demand of the mode.
@@ -362,20 +364,19 @@ impl Copter {
             return self.idle_command();
         }
         let demand = self.demand(sensors, dt_s);
-        let climbing = demand.velocity.z > 0.05;
-        self.detect_landing(sensors, climbing);
+        self.detect_landing(sensors, &demand);
         let integral = if core::mem::take(&mut self.controller_starts) {
             IntegralAction::Match
         } else {
             IntegralAction::Keep
         };
-        ControlDemand { lift: true, integral, demand }
+        ControlDemand { motors: MotorState::Lifting, integral, demand }
     }
 
     /// Output while the motors are off or idle.
     fn idle_command(&self) -> ControlDemand {
         ControlDemand {
-            lift: false,
+            motors: MotorState::Idle,
             integral: IntegralAction::Clear,
             demand: self.tuning.default_demand(),
         }
@@ -428,15 +429,16 @@ impl Copter {
             if landing && since(self.since.landed_us) >= micros_from_s(LAND_DISARM_S)
                 || delay > 0.0 && since(self.since.idle_us) >= micros_from_s(delay)
             {
-                self.disarm(platform, false);
+                self.disarm(platform, Arming::Checked);
             }
         }
         if sensors.battery <= 0.0 {
-            self.disarm(platform, true);
+            self.disarm(platform, Arming::Forced);
         }
     }
 
-    fn detect_landing(&mut self, sensors: &SensorReadings, climbing: bool) {
+    fn detect_landing(&mut self, sensors: &SensorReadings, demand: &Demand) {
+        let climbing = demand.velocity.z > 0.05;
         if !sensors.touching || climbing {
             self.since.touching_us = None;
             return;

@@ -5,9 +5,9 @@ use planner_core::frames::Geodetic;
 
 use super::{Mode, Px4};
 use crate::command::{
-    ACCEPTED, ARM_FORCE, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
-    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, PROTOCOL_VERSION, TEMPORARILY_REJECTED,
-    UNSUPPORTED, accepted_or_rejected, message_id,
+    ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
+    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, Outcome, PROTOCOL_VERSION, TEMPORARILY_REJECTED,
+    UNSUPPORTED, message_id,
 };
 use crate::platform::Platform;
 use crate::port::Sender;
@@ -37,18 +37,17 @@ impl Px4 {
             }
             400 => self.arm_or_disarm(platform, command),
             22 => self.take_off(platform, command),
-            21 => accepted_or_rejected(self.change_mode(platform, Mode::Land)),
-            20 => accepted_or_rejected(self.change_mode(platform, Mode::Return)),
-            17 => accepted_or_rejected(self.change_mode(platform, Mode::Hold)),
+            21 => self.change_mode(platform, Mode::Land).result_or(TEMPORARILY_REJECTED),
+            20 => self.change_mode(platform, Mode::Return).result_or(TEMPORARILY_REJECTED),
+            17 => self.change_mode(platform, Mode::Hold).result_or(TEMPORARILY_REJECTED),
             192 => self.reposition(platform, command),
             178 => {
                 self.commander.set_cruise(command.param[1]);
                 ACCEPTED
             }
-            179 if platform.handle_set_home(command) => ACCEPTED,
-            179 => DENIED,
+            179 => platform.handle_set_home(command).result_or(DENIED),
             193 if command.param[0] == 0.0 => {
-                accepted_or_rejected(self.change_mode(platform, Mode::Hold))
+                self.change_mode(platform, Mode::Hold).result_or(TEMPORARILY_REJECTED)
             }
             193 => TEMPORARILY_REJECTED,
             300 => self.start_mission(platform),
@@ -93,17 +92,17 @@ impl Px4 {
             || telemetry::PX4_STREAMS.iter().any(|stream| stream.0 == id)
     }
 
-    fn change_mode(&mut self, platform: &Platform, mode: Mode) -> bool {
+    fn change_mode(&mut self, platform: &Platform, mode: Mode) -> Outcome {
         let sensors = platform.sensors();
         self.commander.request_mode(mode, &sensors, &self.tuning)
     }
 
     fn arm_or_disarm(&mut self, platform: &mut Platform, command: &Command) -> u8 {
-        let force = command.param[1] == ARM_FORCE;
+        let arming = Arming::commanded_by(command);
         if command.param[0] == 1.0 {
-            accepted_or_rejected(self.arm(platform, force))
+            self.arm(platform, arming).result_or(TEMPORARILY_REJECTED)
         } else if command.param[0] == 0.0 {
-            accepted_or_rejected(self.commander.disarm(force))
+            self.commander.disarm(arming).result_or(TEMPORARILY_REJECTED)
         } else {
             UNSUPPORTED
         }
@@ -111,18 +110,19 @@ impl Px4 {
 
     /// Executes MISSION_START: enters AUTO.MISSION and arms. Returns the MAV_RESULT.
     fn start_mission(&mut self, platform: &mut Platform) -> u8 {
-        self.commander.set_mission_ready(platform.has_mission());
-        if !platform.has_mission() || !self.change_mode(platform, Mode::Mission) {
+        self.commander.note_mission(platform);
+        if !platform.has_mission() || self.change_mode(platform, Mode::Mission) == Outcome::Refused
+        {
             return DENIED;
         }
-        if self.arm(platform, false) { ACCEPTED } else { DENIED }
+        self.arm(platform, Arming::Checked).result_or(DENIED)
     }
 
-    fn arm(&mut self, platform: &mut Platform, force: bool) -> bool {
+    fn arm(&mut self, platform: &mut Platform, arming: Arming) -> Outcome {
         let sensors = platform.sensors();
         let was_armed = self.commander.armed();
-        let armed = self.commander.arm(&sensors, &self.tuning, force);
-        if armed && !was_armed {
+        let armed = self.commander.arm(&sensors, &self.tuning, arming);
+        if armed.is_done() && !was_armed {
             platform.set_home_here();
         }
         armed
@@ -140,19 +140,17 @@ impl Px4 {
             f32::NAN
         };
         let sensors = platform.sensors();
-        accepted_or_rejected(self.commander.takeoff(up, &sensors, &self.tuning))
+        self.commander.takeoff(up, &sensors, &self.tuning).result_or(TEMPORARILY_REJECTED)
     }
 
     fn reposition(&mut self, platform: &Platform, command: &Command) -> u8 {
         let Some(to) = platform.reposition_target(command) else { return DENIED };
         let sensors = platform.sensors();
         self.commander.set_cruise(command.param[0]);
-        accepted_or_rejected(self.commander.reposition(
-            &to,
-            command.param[3],
-            &sensors,
-            &self.tuning,
-        ))
+        let heading = command.param[3];
+        self.commander
+            .reposition(&to, heading, &sensors, &self.tuning)
+            .result_or(TEMPORARILY_REJECTED)
     }
 }
 

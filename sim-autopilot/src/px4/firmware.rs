@@ -5,8 +5,8 @@ use super::params::{self, Tuning};
 use super::setpoint;
 use super::{Commander, Mode};
 use crate::AutopilotKind;
-use crate::command::{DO_SET_MODE, accepted_or_rejected};
-use crate::itinerary::MissionLeg;
+use crate::command::{DO_SET_MODE, Outcome, TEMPORARILY_REJECTED};
+use crate::itinerary::{LandedState, MissionLeg};
 use crate::params::Params;
 use crate::platform::{ControlDemand, Platform, SensorReadings};
 use crate::port::Sender;
@@ -56,11 +56,13 @@ impl Px4 {
         platform: &mut Platform,
         sensors: &SensorReadings,
     ) -> ControlDemand {
-        self.commander.set_mission_ready(platform.has_mission());
+        self.commander.note_mission(platform);
         if let Some((from, mode)) = self.pending_mode.take() {
-            let changed =
-                mode.is_some_and(|mode| self.commander.request_mode(mode, sensors, &self.tuning));
-            platform.acknowledge(from, DO_SET_MODE, accepted_or_rejected(changed));
+            let changed = match mode {
+                Some(mode) => self.commander.request_mode(mode, sensors, &self.tuning),
+                None => Outcome::Refused,
+            };
+            platform.acknowledge(from, DO_SET_MODE, changed.result_or(TEMPORARILY_REJECTED));
         }
         self.fly_mission(platform, sensors);
         let failed = self.commander.in_failsafe();
@@ -89,7 +91,9 @@ impl Px4 {
             }
             return;
         }
-        let leg = platform.fly_mission(sensors, self.commander.landed());
+        let landed =
+            if self.commander.landed() { LandedState::OnGround } else { LandedState::InAir };
+        let leg = platform.fly_mission(sensors, landed);
         let mission = &mut self.commander.mission;
         if leg != mission.leg {
             mission.from = MissionLeg::leg_end(mission.leg, &sensors.position);

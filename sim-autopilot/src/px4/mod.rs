@@ -27,9 +27,13 @@ use self::glide::SmoothedApproach;
 pub use self::modes::Mode;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
+use super::command::{Arming, Outcome};
 use super::itinerary::MissionLeg;
-use super::platform::{ControlDemand, IntegralAction, SensorReadings};
+use super::platform::{ControlDemand, IntegralAction, Platform, SensorReadings};
 use super::shaping::JerkLimitedRate;
+use super::status::MotorState;
+use super::vehicle::Demand;
+use crate::GpsFix;
 
 /// Delay of the failsafe beyond `COM_OF_LOSS_T`, seconds: in recordings the failsafe started at
 /// most 1.23 s after the last setpoint, and gaps of 1.25 s started it.
@@ -203,14 +207,14 @@ impl Commander {
         (status, 1 | flags | if self.armed { 128 } else { 0 })
     }
 
-    /// Sets whether the estimator has a position.
-    pub fn set_position_ok(&mut self, ok: bool) {
-        self.position_ok = ok;
+    /// Sets whether GPS has a fix, without which the estimator has no position.
+    pub fn set_gps_fix(&mut self, fix: GpsFix) {
+        self.position_ok = fix == GpsFix::Held;
     }
 
-    /// Sets whether a mission is stored that AUTO.MISSION can fly.
-    pub fn set_mission_ready(&mut self, ready: bool) {
-        self.mission.ready = ready;
+    /// Notes whether a mission is stored that AUTO.MISSION can fly.
+    pub fn note_mission(&mut self, platform: &Platform) {
+        self.mission.ready = platform.has_mission();
     }
 
     /// Stores a valid setpoint and its time.
@@ -225,20 +229,19 @@ impl Commander {
         self.setpoint.is_some() && now_us.saturating_sub(self.setpoint_us) <= limit
     }
 
-    /// Arms if the mode can run and the checks pass, or if `force`. False means
-    /// TEMPORARILY_REJECTED.
-    pub fn arm(&mut self, sensors: &SensorReadings, tuning: &Tuning, force: bool) -> bool {
+    /// Arms if the mode can run and the checks pass, or if forced.
+    pub fn arm(&mut self, sensors: &SensorReadings, tuning: &Tuning, arming: Arming) -> Outcome {
         if self.armed {
-            return true;
+            return Outcome::Done;
         }
-        if !force && !self.is_armable(sensors, tuning) {
-            return false;
+        if arming == Arming::Checked && !self.is_armable(sensors, tuning) {
+            return Outcome::Refused;
         }
         self.armed = true;
         self.armed_us = sensors.now_us;
         self.flown_since_arming = !self.landed;
         self.enter_mode(self.intended_mode, sensors);
-        true
+        Outcome::Done
     }
 
     /// Whether the vehicle may be armed: the requested mode can run, there is a position, and the
@@ -254,10 +257,10 @@ impl Commander {
         runs && self.position_ok && sensors.battery >= tuning.battery_low
     }
 
-    /// Disarms. Refused (false) in the air, unless `force`.
-    pub fn disarm(&mut self, force: bool) -> bool {
-        if self.armed && !self.landed && !force {
-            return false;
+    /// Disarms. Refused in the air, unless forced.
+    pub fn disarm(&mut self, arming: Arming) -> Outcome {
+        if self.armed && !self.landed && arming == Arming::Checked {
+            return Outcome::Refused;
         }
         self.armed = false;
         self.failsafe = None;
@@ -266,22 +269,27 @@ impl Commander {
         if self.intended_mode.ends_with_flight() {
             self.intended_mode = self.after_disarm;
         }
-        true
+        Outcome::Done
     }
 
-    /// Enters the mode and returns true. While armed, a mode that cannot run is refused (false).
-    /// The second COMMAND_ACK of DO_SET_MODE carries the result.
-    pub fn request_mode(&mut self, mode: Mode, sensors: &SensorReadings, tuning: &Tuning) -> bool {
+    /// Enters the mode. While armed, a mode that cannot run is refused. The second COMMAND_ACK of
+    /// DO_SET_MODE carries the result.
+    pub fn request_mode(
+        &mut self,
+        mode: Mode,
+        sensors: &SensorReadings,
+        tuning: &Tuning,
+    ) -> Outcome {
         let runs = match mode {
             Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
             Mode::Mission => self.mission.ready,
             mode => !mode.needs_sticks(),
         };
         if self.armed && !runs {
-            return false;
+            return Outcome::Refused;
         }
         self.force_mode(mode, sensors);
-        true
+        Outcome::Done
     }
 
     /// Enters the mode as a pilot's switch does, even if it cannot run.
@@ -298,26 +306,26 @@ impl Commander {
     }
 
     /// Enters Takeoff to height `up` in the mission frame, metres; NaN: `MIS_TAKEOFF_ALT` above
-    /// home. False if the mode is refused.
-    pub fn takeoff(&mut self, up: f32, sensors: &SensorReadings, tuning: &Tuning) -> bool {
+    /// home.
+    pub fn takeoff(&mut self, up: f32, sensors: &SensorReadings, tuning: &Tuning) -> Outcome {
         let accepted = self.request_mode(Mode::Takeoff, sensors, tuning);
-        if accepted {
+        if accepted.is_done() {
             self.takeoff_up = if up.is_nan() { sensors.home.z + tuning.takeoff_height } else { up };
         }
         accepted
     }
 
     /// Enters Hold at point `to` (DO_REPOSITION), ENU metres; a NaN axis keeps the stopping point's
-    /// coordinate. False if disarmed or refused.
+    /// coordinate. Refused if disarmed.
     pub fn reposition(
         &mut self,
         to: &Point,
         heading: f32,
         sensors: &SensorReadings,
         tuning: &Tuning,
-    ) -> bool {
-        if !self.armed || !self.request_mode(Mode::Hold, sensors, tuning) {
-            return false;
+    ) -> Outcome {
+        if !self.armed || self.request_mode(Mode::Hold, sensors, tuning) == Outcome::Refused {
+            return Outcome::Refused;
         }
         for axis in 0..3 {
             if to[axis].is_finite() {
@@ -327,7 +335,7 @@ impl Commander {
         if heading.is_finite() {
             self.hold_heading = heading;
         }
-        true
+        Outcome::Done
     }
 
     /// Sets the cruise speed of the automatic modes (DO_CHANGE_SPEED), m/s; 0 or less: the
@@ -351,7 +359,11 @@ impl Commander {
                 self.landed_us = now;
             }
             let demand = tuning.default_demand();
-            return ControlDemand { lift: false, integral: IntegralAction::Clear, demand };
+            return ControlDemand {
+                motors: MotorState::Idle,
+                integral: IntegralAction::Clear,
+                demand,
+            };
         }
         let mut demand = self.demand(sensors, tuning);
         let wants_up = self.demands_lift_off(sensors, &demand);
@@ -384,17 +396,14 @@ impl Commander {
                 }
             }
             FlightPhase::Flying => {
-                // Outside Offboard the crawl is simulated slower than PX4 commands it
-                // (`CRAWL_FACTOR`).
-                let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_FACTOR };
-                self.detect_landing(
-                    sensors,
-                    -demand.velocity.z >= share * MIN_LAND_RATE_MPS,
-                    tuning,
-                );
+                self.detect_landing(sensors, &demand, tuning);
             }
         }
-        ControlDemand { lift: self.phase != FlightPhase::Ground, integral, demand }
+        let motors = match self.phase {
+            FlightPhase::Ground => MotorState::Idle,
+            FlightPhase::Ramp { .. } | FlightPhase::Flying => MotorState::Lifting,
+        };
+        ControlDemand { motors, integral, demand }
     }
 
     fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
@@ -409,7 +418,7 @@ impl Commander {
                 4 => Some(Mode::Land),
                 5 => Some(Mode::Hold),
                 6 | 7 => {
-                    self.disarm(true);
+                    self.disarm(Arming::Forced);
                     return;
                 }
                 // Position, Altitude and Manual (0 to 2) need a remote control, which is absent:
@@ -434,21 +443,24 @@ impl Commander {
         let idle = self.landed && self.phase == FlightPhase::Ground;
         if idle && !self.flown_since_arming && tuning.disarm_preflight_s > 0.0 {
             if since(self.armed_us) >= micros_from_s(tuning.disarm_preflight_s) {
-                self.disarm(false);
+                self.disarm(Arming::Checked);
             }
         } else if idle
             && self.flown_since_arming
             && tuning.disarm_land_s > 0.0
             && since(self.landed_us) >= micros_from_s(tuning.disarm_land_s + DISARM_REACTION_S)
         {
-            self.disarm(false);
+            self.disarm(Arming::Checked);
         }
         if sensors.battery <= 0.0 {
-            self.disarm(true);
+            self.disarm(Arming::Forced);
         }
     }
 
-    fn detect_landing(&mut self, sensors: &SensorReadings, wants_down: bool, tuning: &Tuning) {
+    fn detect_landing(&mut self, sensors: &SensorReadings, demand: &Demand, tuning: &Tuning) {
+        // Outside Offboard the crawl is simulated slower than PX4 commands it (`CRAWL_FACTOR`).
+        let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_FACTOR };
+        let wants_down = -demand.velocity.z >= share * MIN_LAND_RATE_MPS;
         if !sensors.touching || !wants_down {
             self.touching_us = None;
             return;

@@ -370,7 +370,7 @@ fn return_climbs_comes_home_and_lands() {
 #[test]
 fn without_a_position_it_lands_by_failsafe() {
     let mut bench = Bench::in_guided(5.0);
-    bench.autopilot.set_gps_ok(false);
+    bench.autopilot.set_gps_fix(GpsFix::Lost);
     bench.run(3.0);
     assert_eq!(bench.heartbeat(), (9, 0xD9, 5));
     bench.until(30.0, |a| !a.true_state().armed);

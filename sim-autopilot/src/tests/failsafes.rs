@@ -93,7 +93,7 @@ fn what_asks_for_nothing_counts_as_loss() {
 #[test]
 fn without_gps_it_lands_where_it_is() {
     let mut bench = Bench::hovering(5.0);
-    bench.autopilot.set_gps_ok(false);
+    bench.autopilot.set_gps_fix(GpsFix::Lost);
     bench.run(1.5);
     assert_eq!(bench.heartbeat(), (LAND, 157, 5));
     bench.until(30.0, |a| !a.true_state().armed);

@@ -27,6 +27,7 @@ use crate::scenario::coverage::{Area, HeadingRule, Method, ORIGIN_HINT, Trigger}
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text, Value};
 use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
+use crate::terrain::WithoutCrs;
 
 /// Time limit of a simulated flight in a coverage mission if the scenario gives none, seconds:
 /// longer than a battery lasts.
@@ -208,7 +209,11 @@ fn read_area(
         Coordinates::Wgs84 => Geodetic { lat_deg: first[1], lon_deg: first[0], alt_m: 0.0 },
         Coordinates::Metres => DEFAULT_ORIGIN,
     });
-    let terrain = UnreadTerrain::from_table(table, folder, coordinates == Coordinates::Metres)?;
+    let without_crs = match coordinates {
+        Coordinates::Wgs84 => WithoutCrs::Refused,
+        Coordinates::Metres => WithoutCrs::Metres,
+    };
+    let terrain = UnreadTerrain::from_table(table, folder, without_crs)?;
     if let (Some(terrain), None) = (&terrain, given) {
         origin.alt_m = terrain.altitude_m(table.text, &origin)?;
     }

@@ -14,7 +14,7 @@ use crate::scenario::coverage::{Area, Terrain};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text};
 use crate::scenario::{Mission, Simulation, Vehicle};
-use crate::terrain::{self, FieldConfig, FieldError, Frame, HeightGrid, TerrainError};
+use crate::terrain::{self, FieldConfig, FieldError, Frame, HeightGrid, TerrainError, WithoutCrs};
 
 /// Greatest difference between a start's given height and the ground below it, metres.
 const MAX_PAD_HEIGHT_ERROR_M: f32 = 5.0;
@@ -26,16 +26,15 @@ pub(super) struct UnreadTerrain {
     path: PathBuf,
     span: Span,
     tolerance_m: f32,
-    metres: bool,
+    without_crs: WithoutCrs,
 }
 
 impl UnreadTerrain {
-    /// The file of heights that `[area]` names, if any; `metres`: the area's coordinates are
-    /// metres.
+    /// The file of heights that `[area]` names, if any.
     pub(super) fn from_table(
         table: &Table<'_>,
         folder: &Path,
-        metres: bool,
+        without_crs: WithoutCrs,
     ) -> Result<Option<Self>> {
         let tolerance = table.get("terrain_tolerance_m");
         let Some(file) = table.get("terrain") else {
@@ -49,12 +48,12 @@ impl UnreadTerrain {
             path: folder.join(file.str()?),
             span: file.span.clone(),
             tolerance_m,
-            metres,
+            without_crs,
         }))
     }
 
     fn read(&self, text: Text<'_>, origin: &Geodetic, window: [Flat; 2]) -> Result<HeightGrid> {
-        let frame = Frame { origin, metres: self.metres, window: Some(window) };
+        let frame = Frame { origin, without_crs: self.without_crs, window: Some(window) };
         terrain::read(&self.path, &frame).map_err(|error| self.terrain_error(text, &error))
     }
 

@@ -7,11 +7,17 @@ use rand_pcg::Pcg32;
 
 use super::*;
 
+#[derive(Clone, Copy, PartialEq)]
+enum CloudFile {
+    Las,
+    Laz,
+}
+
 /// A small cloud in metres of UTM zone 30, compressed or not.
-fn returns(compressed: bool, format: u8) -> Vec<u8> {
+fn returns(file: CloudFile, format: u8) -> Vec<u8> {
     let mut builder = Builder::from((1, 4));
     builder.point_format = las::point::Format::new(format).unwrap();
-    builder.point_format.is_compressed = compressed;
+    builder.point_format.is_compressed = file == CloudFile::Laz;
     let axis = |offset| Transform { scale: 0.01, offset };
     builder.transforms = Vector { x: axis(500_000.0), y: axis(4_794_000.0), z: axis(0.0) };
     let directory: Vec<u8> = keys(1, 32630).iter().flat_map(|n| n.to_le_bytes()).collect();
@@ -22,7 +28,10 @@ fn returns(compressed: bool, format: u8) -> Vec<u8> {
         data: directory,
     });
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join(if compressed { "returns.laz" } else { "returns.las" });
+    let path = folder.path().join(match file {
+        CloudFile::Las => "returns.las",
+        CloudFile::Laz => "returns.laz",
+    });
     let mut writer = Writer::from_path(&path, builder.into_header().unwrap()).unwrap();
     for k in 0..400 {
         let (x, y) = (f64::from(k % 20), f64::from(k / 20));
@@ -66,13 +75,16 @@ fn decode_cloud(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
 
 fn decode_asc(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
     let text = String::from_utf8_lossy(bytes);
-    asc::parse(&text, Crs::Unstated)?.resampled(&Frame { metres: true, ..anywhere(&ORIGIN) })
+    asc::parse(&text, Crs::Unstated)?
+        .resampled(&Frame { without_crs: WithoutCrs::Metres, ..anywhere(&ORIGIN) })
 }
 
 #[test]
 fn a_cloud_is_the_same_compressed() {
-    let (plain, small) =
-        (decode_cloud(&returns(false, 3)).unwrap(), decode_cloud(&returns(true, 3)).unwrap());
+    let (plain, small) = (
+        decode_cloud(&returns(CloudFile::Las, 3)).unwrap(),
+        decode_cloud(&returns(CloudFile::Laz, 3)).unwrap(),
+    );
     assert_eq!(plain.range_m(), Some([plain.range_m().unwrap()[0], 57.0]));
     assert_eq!(plain.count(), small.count());
     assert_eq!(plain.range_m(), small.range_m());
@@ -87,9 +99,9 @@ fn damaged_files_end_in_an_error_or_in_heights() {
     type Decode = fn(&[u8]) -> Result<HeightGrid, TerrainError>;
     let files: [(&str, Vec<u8>, Decode); 5] = [
         ("tif", image, decode_tiff),
-        ("las", returns(false, 3), decode_cloud),
-        ("laz", returns(true, 3), decode_cloud),
-        ("laz in layers", returns(true, 6), decode_cloud),
+        ("las", returns(CloudFile::Las, 3), decode_cloud),
+        ("laz", returns(CloudFile::Laz, 3), decode_cloud),
+        ("laz in layers", returns(CloudFile::Laz, 6), decode_cloud),
         ("asc", grid.to_vec(), decode_asc),
     ];
     let tries =

@@ -37,7 +37,11 @@ fn bilbao_is_where_its_system_says() {
         let place = raster.crs.to_mission(&origin, [500_000.0, 4_796_000.0]).unwrap();
         assert!(place.norm() < 0.05, "{place}");
         let window = Some([Flat::repeat(-400.0), Flat::repeat(900.0)]);
-        let grid = super::read(&path, &Frame { origin: &origin, metres: false, window }).unwrap();
+        let grid = super::read(
+            &path,
+            &Frame { origin: &origin, without_crs: WithoutCrs::Refused, window },
+        )
+        .unwrap();
         let highest = grid.heights_in_box(&Flat::repeat(-300.0), &Flat::repeat(800.0));
         assert!(!highest.holes, "{name}");
         // Compared with the file's own cells in that box, whose sides are along the file's rows
@@ -162,12 +166,17 @@ fn clouds_without_returns_or_a_system_are_refused_by_name() {
     let error = super::read(&simple, &anywhere(&ORIGIN)).unwrap_err().to_string();
     assert!(error.contains("does not say where it is"), "{error}");
     // If the mission's coordinates are metres, the file's are taken for metres too.
-    let grid = super::read(&simple, &Frame { metres: true, ..anywhere(&ORIGIN) }).unwrap();
+    let grid =
+        super::read(&simple, &Frame { without_crs: WithoutCrs::Metres, ..anywhere(&ORIGIN) })
+            .unwrap();
     let range = grid.range_m().unwrap();
     assert!(range[0] >= 406.59 && (range[1] - 586.38).abs() < 0.01, "{range:?}");
     // The file's coordinates are far from any mission.
     let window = Some([Flat::repeat(-100.0), Flat::repeat(100.0)]);
-    let error =
-        super::read(&simple, &Frame { metres: true, window, ..anywhere(&ORIGIN) }).unwrap_err();
+    let error = super::read(
+        &simple,
+        &Frame { without_crs: WithoutCrs::Metres, window, ..anywhere(&ORIGIN) },
+    )
+    .unwrap_err();
     assert!(error.to_string().contains("lies elsewhere"), "{error}");
 }

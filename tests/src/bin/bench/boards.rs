@@ -21,7 +21,7 @@ pub fn run() -> Result<()> {
     let mut mission = Mission::prepare(demo, &progress)?;
     board::put_on_boards(&mut mission, &program, folder.path());
     let plan = mission.plan()?;
-    let fly = || swarm::fly(&mission, &plan, "fly", false, &progress);
+    let fly = || swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &progress);
     let alone = fly()?;
     let busy =
         || Command::new("sh").args(["-c", "while :; do :; done"]).stdin(Stdio::null()).spawn();

@@ -71,7 +71,7 @@ fn fly(text: &str, name: &str) -> Result<(f64, f64)> {
     mission.clearance_field();
     let planned_s = began.elapsed().as_secs_f64();
     let began = Instant::now();
-    let flight = swarm::fly(&mission, &plan, "bench", false, &Progress::hidden())?;
+    let flight = swarm::fly(&mission, &plan, "bench", swarm::Pace::Fastest, &Progress::hidden())?;
     let took_s = began.elapsed().as_secs_f64();
     let result = &flight.result;
     println!(

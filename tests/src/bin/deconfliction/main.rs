@@ -341,7 +341,7 @@ fn parsed(
 }
 
 fn fly(mission: &Mission, plan: &SwarmPlan) -> Result<swarm::Flight> {
-    swarm::fly(mission, plan, "fly", false, &Progress::hidden())
+    swarm::fly(mission, plan, "fly", swarm::Pace::Fastest, &Progress::hidden())
 }
 
 fn count(row: &mut Row, result: &MissionResult, alone: &MissionResult) {

@@ -149,5 +149,5 @@ fn fly(seed: u64, range_m: f32) -> Result<Flight> {
     parsed.simulation.radio_range_m = range_m;
     let mut mission = Mission::prepare(parsed, &Progress::hidden())?;
     let plan = mission.plan()?;
-    swarm::fly(&mission, &plan, "fly", false, &Progress::hidden())
+    swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())
 }
