@@ -6,7 +6,8 @@ use super::config::Config;
 use super::params::Params;
 use super::platform::{ControlDemand, Platform, SensorReadings};
 use super::port::Sender;
-use super::px4::{self, Px4};
+use super::px4;
+use super::px4::firmware::Px4;
 use super::status::AutopilotStatus;
 use super::telemetry;
 use super::vehicle::Gains;
@@ -143,7 +144,7 @@ impl Firmware {
         fields: &PayloadReader<'_>,
     ) {
         if let Self::Copter(_) = self {
-            ardupilot::handle_stream_request(platform, from, fields);
+            ardupilot::commands::handle_stream_request(platform, from, fields);
         }
     }
 

@@ -20,9 +20,10 @@ use companion::Link as Port;
 use lock_step::{COMMAND_LINE, FromBoard, HEAD, LONGEST, ToBoard};
 
 pub use self::bank::flash_bank_image;
-pub use self::probe::STACK_LEN;
 use crate::quote::quoted_path;
 
+/// Length of a board's stack, bytes.
+pub const STACK_LEN: usize = 88 << 10;
 /// Wall-clock time without an answer after which a board counts as hung.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 

@@ -9,7 +9,7 @@ use lock_step::ToBoard;
 use super::bank::{
     BANK_IMAGE_MARK, ERASED, FLASH_BANK2_ADDRESS, PROGRAMMED, TORN, WORD_MARKS_ADDRESS,
 };
-use super::{EmulatedBoard, GrantResult};
+use super::{EmulatedBoard, GrantResult, STACK_LEN};
 use crate::flash::HOST_FLASH_LAYOUT;
 use companion::storage::store::WORD;
 
@@ -17,8 +17,6 @@ use companion::storage::store::WORD;
 const MEMORY_CHUNK: usize = 32 << 10;
 /// Address of the stack in the memory map of the firmware for `qemu`.
 const STACK_ADDRESS: u32 = 0x2008_A000;
-/// Length of the stack, bytes.
-pub const STACK_LEN: usize = 88 << 10;
 /// Value with which the firmware fills the stack at its start; a byte that still has it was never
 /// used.
 const STACK_PAINT: u8 = 0xcc;

@@ -15,7 +15,7 @@
 mod arming;
 mod auto;
 mod auto_state;
-mod commands;
+pub(super) mod commands;
 mod flight;
 mod modes;
 pub mod params;
@@ -23,7 +23,6 @@ pub mod reference;
 pub mod setpoint;
 mod unasked;
 
-pub(super) use self::commands::handle_stream_request;
 pub use self::modes::Mode;
 
 use planner_core::Point;

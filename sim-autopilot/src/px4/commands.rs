@@ -3,7 +3,8 @@
 
 use planner_core::frames::Geodetic;
 
-use super::{Mode, Px4};
+use super::Mode;
+use super::firmware::Px4;
 use crate::command::{
     ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
     DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, Outcome, PROTOCOL_VERSION, TEMPORARILY_REJECTED,

@@ -18,11 +18,10 @@ pub mod params;
 pub mod setpoint;
 
 mod commands;
-mod firmware;
+pub mod firmware;
 
 use planner_core::Point;
 
-pub use self::firmware::Px4;
 use self::glide::SmoothedApproach;
 pub use self::modes::Mode;
 use self::params::Tuning;
