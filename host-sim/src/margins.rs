@@ -32,7 +32,7 @@ use companion::autopilot::AutopilotKind;
 use companion::margins::TRACKING_M;
 use planner_core::coverage::footprint::{Footprint, Spacing};
 
-use crate::scenario::{PositionErrors, Simulation, Vehicle};
+use crate::scenario::{PositionErrors, Simulation, VehicleSection};
 
 /// Sum of the deviations of two vehicles from their paths, which the default separation adds to the
 /// safety distance, metres.
@@ -72,7 +72,7 @@ pub struct RequiredDistances {
 pub fn required_distances(
     simulation: &Simulation,
     safety_distance_m: f32,
-    vehicles: &[Vehicle],
+    vehicles: &[VehicleSection],
 ) -> RequiredDistances {
     let mut errors: Vec<f32> = vehicles
         .iter()
@@ -95,9 +95,9 @@ pub const TRIGGER_DELAY_S: f32 = 0.15;
 pub fn min_pad_distance_m(
     simulation: &Simulation,
     safety_distance_m: f32,
-    vehicles: &[Vehicle],
+    vehicles: &[VehicleSection],
 ) -> f32 {
-    let own = |v: &Vehicle| {
+    let own = |v: &VehicleSection| {
         max_estimate_error_m(simulation.estimator, v.personality)
             + touchdown_extra_m(simulation.gust_mps, v.personality)
     };
@@ -133,7 +133,7 @@ pub fn with_usable_footprint(
     height_m: f32,
     cruise_mps: f32,
     simulation: &Simulation,
-    vehicles: &[Vehicle],
+    vehicles: &[VehicleSection],
 ) -> Spacing {
     let stray_m = required_distances(simulation, 0.0, vehicles).margin_m;
     let lower_m = vehicles
@@ -156,7 +156,7 @@ pub fn with_usable_footprint(
 pub fn parked_separation_m(
     simulation: &Simulation,
     safety_distance_m: f32,
-    vehicles: &[Vehicle],
+    vehicles: &[VehicleSection],
 ) -> f32 {
     let estimates =
         vehicles.iter().map(|v| max_estimate_error_m(simulation.estimator, v.personality));

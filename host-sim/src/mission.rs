@@ -21,7 +21,7 @@ use planner_core::schedule::ScheduleError;
 use planner_core::search::SearchWorkspace;
 
 use self::ready::schedule_config;
-pub use self::ready::{Mission, OwnPlan, PLANNED_ACCEL_MPS2, SwarmPlan, VERTICAL_MPS};
+pub use self::ready::{HostPlan, OwnPlan, PLANNED_ACCEL_MPS2, PreparedMission, VERTICAL_MPS};
 use crate::capacity::{
     BoardCapacity, GATES, HostCompanion, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
     on_heap,
@@ -33,7 +33,7 @@ use crate::result::{Left, Timing};
 use crate::roadmap::{self};
 use crate::scenario::Scenario;
 
-type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
+type HostPlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
 /// Length of the landing at each goal, metres: from the goal down to the hull centre of a vehicle
 /// that stands on the ground below it, computed for the largest radius of all vehicles.
@@ -51,7 +51,7 @@ fn descents_m(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::R
         .collect()
 }
 
-impl Mission {
+impl PreparedMission {
     /// Reads the map, builds the roadmap and encodes the mission file.
     ///
     /// # Errors
@@ -147,7 +147,7 @@ impl Mission {
     }
 
     /// Plans the whole swarm with the planner that companions use, and records the times it took.
-    pub fn plan(&mut self) -> anyhow::Result<Box<SwarmPlan>> {
+    pub fn plan(&mut self) -> anyhow::Result<Box<HostPlan>> {
         let begun = Instant::now();
         if self.scenario.area.is_some() {
             let plan = self.plan_coverage()?;
@@ -156,8 +156,8 @@ impl Mission {
         }
         let view = self.roadmap_view();
         let mission = self.mission_view();
-        let mut workspace = on_heap(PlanWorkspace::new);
-        let mut plan = on_heap(SwarmPlan::new);
+        let mut workspace = on_heap(HostPlanWorkspace::new);
+        let mut plan = on_heap(HostPlan::new);
         let (mut step_begun, mut search_s, mut assignment_s) = (Instant::now(), 0.0, 0.0);
         planner::plan_goals(&mission, &view, self.max_gates(), &mut workspace, &mut plan, |step| {
             let took_s =
@@ -237,7 +237,7 @@ impl Mission {
 
     /// Goals that no vehicle flies to, and vehicles that the plan leaves on their pads; both empty
     /// for a coverage mission.
-    pub fn unserved(&self, plan: &SwarmPlan) -> Left {
+    pub fn unserved(&self, plan: &HostPlan) -> Left {
         if self.scenario.area.is_some() {
             // In a coverage plan a vehicle that stays on its pad is no shortage: it would not
             // shorten the mission.
@@ -257,12 +257,12 @@ impl Mission {
     /// detour.
     pub fn answer_plan_request(
         &self,
-        plan: &SwarmPlan,
+        plan: &HostPlan,
         index: usize,
         wanted: PlanKind,
         companion: &mut HostCompanion,
     ) -> Result<Box<OwnPlan>, PlanFailure> {
-        let own = |plan: &SwarmPlan| self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity);
+        let own = |plan: &HostPlan| self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity);
         match wanted {
             PlanKind::Mission if companion.excluded_waypoints().is_empty() => own(plan),
             PlanKind::Mission | PlanKind::Division => {

@@ -5,7 +5,7 @@ use std::path::Path;
 use planner_core::Point;
 
 use crate::files::ResultFiles;
-use crate::mission::{Mission, SwarmPlan};
+use crate::mission::{HostPlan, PreparedMission};
 use crate::report::{self, MapSurface, ReportData, RoadmapLines, VehicleTrack};
 use crate::result::{self, MissionResult, Timing};
 use crate::say;
@@ -13,8 +13,8 @@ use crate::scenario::Scenario;
 
 /// Report page of a plan that was not flown: map, roadmap and planned paths.
 pub fn planned_page(
-    mission: &Mission,
-    plan: &SwarmPlan,
+    mission: &PreparedMission,
+    plan: &HostPlan,
     result: &MissionResult,
 ) -> anyhow::Result<ReportData> {
     let scenario = &mission.scenario;

@@ -37,7 +37,7 @@ const SAME_CLEARANCE_M: f32 = 2e-4;
 
 /// Nodes and edges, not yet encoded.
 #[derive(Clone, Debug)]
-pub struct Roadmap {
+pub struct BuiltRoadmap {
     /// Starts, goals, then sampled nodes.
     pub nodes: Vec<Point>,
     /// Edges with their clearances.
@@ -69,7 +69,7 @@ pub fn build(
     map: &VoxelMap,
     terminals: &[Point],
     config: &PrmConfig,
-) -> anyhow::Result<(Roadmap, BuildTimes)> {
+) -> anyhow::Result<(BuiltRoadmap, BuildTimes)> {
     let grid = map.grid();
     let sampled = || {
         let nodes = sample(map, terminals, config)?;
@@ -89,14 +89,14 @@ pub fn build(
         edges_s: joining.elapsed().as_secs_f64(),
         ..BuildTimes::default()
     };
-    Ok((Roadmap { nodes, edges, heights_m }, parts))
+    Ok((BuiltRoadmap { nodes, edges, heights_m }, parts))
 }
 
 /// Adds nodes in passages between starts and goals that random sampling missed, joins all nodes
 /// again, and returns how many were added. With 0 the roadmap is unchanged.
 pub fn add_passages(
     map: &VoxelMap,
-    roadmap: &mut Roadmap,
+    roadmap: &mut BuiltRoadmap,
     config: &PrmConfig,
     wanted: &[passages::WantedConnection],
 ) -> anyhow::Result<usize> {
@@ -233,7 +233,7 @@ fn rounding_m(shape: &GridShape) -> f32 {
     (1e-3 + longest * 16.0 * f32::EPSILON) * shape.resolution_m
 }
 
-impl Roadmap {
+impl BuiltRoadmap {
     /// The roadmap with at most as many edges as the board holds, chosen by [`cap::limit_edges`].
     ///
     /// # Errors
@@ -271,9 +271,9 @@ pub fn header(config: &PrmConfig, origin: Geodetic, starts: u16, goals: u16) -> 
 }
 
 /// The roadmap as the file that is uploaded to a board.
-pub fn encode(roadmap: &Roadmap, header: &RoadmapHeader) -> anyhow::Result<Vec<u8>> {
+pub fn encode(roadmap: &BuiltRoadmap, header: &RoadmapHeader) -> anyhow::Result<Vec<u8>> {
     let too_large = || anyhow!("{} edges do not fit a roadmap file", roadmap.edges.len());
-    let Roadmap { nodes, edges, heights_m } = roadmap;
+    let BuiltRoadmap { nodes, edges, heights_m } = roadmap;
     let length =
         roadmap::encoded_len(nodes.len(), edges.len(), NODE_COLUMNS).ok_or_else(too_large)?;
     let mut bytes = vec![0; length];

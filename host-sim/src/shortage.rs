@@ -14,7 +14,7 @@ use planner_core::roadmap::RoadmapView;
 use planner_core::segment::point_clearance;
 
 use crate::map::VoxelMap;
-use crate::mission::{Mission, SwarmPlan};
+use crate::mission::{HostPlan, PreparedMission};
 
 /// Step in which path widths are measured, metres.
 const WIDTH_STEP_M: f32 = 0.05;
@@ -25,7 +25,7 @@ const MAX_GOAL_LINES: usize = 8;
 
 /// One line for each goal without a vehicle and each vehicle without a goal: its position, the
 /// reason and what would help.
-pub fn shortage_lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
+pub fn shortage_lines(mission: &PreparedMission, plan: &HostPlan) -> Vec<String> {
     let left = mission.unserved(plan);
     let all = left.goals.len() + left.vehicles.len();
     if all == 0 {
@@ -49,7 +49,7 @@ pub fn shortage_lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
 
 /// The mission, and what was found about it so far.
 struct ShortageFindings<'a> {
-    mission: &'a Mission,
+    mission: &'a PreparedMission,
     reach: Reachability,
     /// By vehicle index: [`widest_path_clearances_m`] from its start to all goals, computed on
     /// demand.
@@ -119,7 +119,7 @@ fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, remedy: Remedy) -> Str
 }
 
 /// The vehicle with the smallest radius: it fits through the most passages.
-fn smallest_vehicle(mission: &Mission) -> usize {
+fn smallest_vehicle(mission: &PreparedMission) -> usize {
     let radius = |i: &usize| mission.scenario.vehicles[*i].radius_m;
     (0..mission.tasks.len()).min_by(|a, b| radius(a).total_cmp(&radius(b))).unwrap_or_default()
 }
@@ -173,7 +173,7 @@ struct Reachability {
 }
 
 impl Reachability {
-    fn new(mission: &Mission) -> Self {
+    fn new(mission: &PreparedMission) -> Self {
         let view = mission.roadmap_view();
         let vehicles = mission.tasks.len();
         let row = |vehicle: usize| {

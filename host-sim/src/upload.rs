@@ -17,7 +17,7 @@ use companion::{COMPANION_COMPONENT, Instant};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 
 use self::retransmission::Retransmission;
-use crate::link::Link;
+use crate::link::ByteLink;
 
 /// MAVLink system id of the client, unless [`FtpClient::from_ground_station`] sets another one.
 const DEFAULT_SYSTEM_ID: u8 = 255;
@@ -37,7 +37,7 @@ const ACK: u8 = 128;
 
 /// An FTP client on a link to a companion.
 pub struct FtpClient {
-    link: Box<dyn Link>,
+    link: Box<dyn ByteLink>,
     framer: Framer,
     began: Clock,
     next_heartbeat_at: Clock,
@@ -67,7 +67,7 @@ struct Answer {
 
 impl FtpClient {
     /// A client for the companion of the vehicle `system`; with `None` of the first one heard.
-    pub fn new(link: Box<dyn Link>, system: Option<u8>) -> Self {
+    pub fn new(link: Box<dyn ByteLink>, system: Option<u8>) -> Self {
         let now = link.now();
         // Sequence numbers begin at the clock's milliseconds, to differ from those of an earlier
         // client: a server takes an equal number for a repeated request.

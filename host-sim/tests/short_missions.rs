@@ -1,6 +1,6 @@
 //! Missions that fall short say why, where, and what would help; and what they say helps.
 
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::{scenario, shortage, swarm};
 
@@ -8,9 +8,9 @@ const DEMO: &str = include_str!("../scenarios/demo.toml");
 const LOBBY: &str = include_str!("../scenarios/lobby.toml");
 
 /// The lobby with more keys, prepared.
-fn prepared(more: &str) -> Mission {
+fn prepared(more: &str) -> PreparedMission {
     let scenario = scenario::parse(&format!("{LOBBY}\n{more}\n"), "lobby.toml").unwrap();
-    Mission::prepare(scenario, &Progress::hidden()).unwrap()
+    PreparedMission::prepare(scenario, &Progress::hidden()).unwrap()
 }
 
 fn reasons(more: &str) -> Vec<String> {
@@ -36,9 +36,11 @@ fn too_few_nodes_and_too_wide_a_margin_are_told_apart() {
     // No door of the demo's rooms leaves 1.5 m.
     let margin = DEMO.replace("safety_margin_m = 0.5", "safety_margin_m = 1.2");
     assert!(margin.contains("safety_margin_m = 1.2"));
-    let mut mission =
-        Mission::prepare(scenario::parse(&margin, "demo.toml").unwrap(), &Progress::hidden())
-            .unwrap();
+    let mut mission = PreparedMission::prepare(
+        scenario::parse(&margin, "demo.toml").unwrap(),
+        &Progress::hidden(),
+    )
+    .unwrap();
     let plan = mission.plan().unwrap();
     let wide = shortage::shortage_lines(&mission, &plan);
     assert!(wide.len() == 9 && wide[8] == "and 12 more", "{wide:?}");
@@ -76,8 +78,9 @@ fn a_serial_link_that_fails_a_mission_is_told_with_what_would_do() {
 /// P2D: no edge joins two terminals, and lengths are shares of the map.
 #[test]
 fn terminals_are_kept_apart_and_lengths_follow_the_map() {
-    let terminals = |mission: &Mission| mission.scenario.vehicles.len() + mission.goals.len();
-    let joined = |mission: &Mission| {
+    let terminals =
+        |mission: &PreparedMission| mission.scenario.vehicles.len() + mission.goals.len();
+    let joined = |mission: &PreparedMission| {
         let is_terminal = |node: u16| usize::from(node) < terminals(mission);
         mission
             .roadmap

@@ -15,11 +15,11 @@
 
 use planner_core::Point;
 
-use super::command::Command;
+use super::command::ReceivedCommand;
 use super::messages::to_mavlink_units;
 use super::port::Port;
 use super::snapshot::Snapshot;
-use crate::AutopilotKind;
+use crate::SimulatedKind;
 
 const CAMERA_FEEDBACK: u32 = 180;
 const CAMERA_IMAGE_CAPTURED: u32 = 263;
@@ -57,7 +57,7 @@ pub struct CameraTrigger {
 impl CameraTrigger {
     /// Executes DO_SET_CAM_TRIGG_DIST: parameter 1 is the distance in metres, 0 or less switches
     /// triggering off; parameter 3 requests one picture at once.
-    pub(super) fn handle_trigger_distance(&mut self, command: &Command) {
+    pub(super) fn handle_trigger_distance(&mut self, command: &ReceivedCommand) {
         let distance_m = command.param[0];
         self.distance_m = (distance_m > 0.0).then_some(distance_m);
         self.last = None;
@@ -65,7 +65,7 @@ impl CameraTrigger {
     }
 
     /// Executes DO_DIGICAM_CONTROL: 1 in parameter 5 requests a picture.
-    pub(super) fn handle_digicam_control(&mut self, command: &Command) {
+    pub(super) fn handle_digicam_control(&mut self, command: &ReceivedCommand) {
         self.picture_requested |= libm::roundf(command.param5) == 1.0;
     }
 
@@ -93,11 +93,11 @@ impl CameraTrigger {
     /// announces it. `estimate` is the estimated position, `None` without one.
     pub(super) fn update(
         &mut self,
-        personality: AutopilotKind,
+        personality: SimulatedKind,
         truth: Photo,
         estimate: Option<Point>,
     ) -> Option<u32> {
-        let px4 = personality == AutopilotKind::Px4;
+        let px4 = personality == SimulatedKind::Px4;
         let looks = truth.time_us >= self.next_poll_us;
         if looks {
             self.next_poll_us += TRIGGER_CHECK_EVERY_US[usize::from(!px4)];

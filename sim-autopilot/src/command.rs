@@ -19,7 +19,7 @@ pub const AUTOPILOT_VERSION: u32 = 148;
 pub const PROTOCOL_VERSION: u32 = 300;
 
 /// A received command.
-pub struct Command {
+pub struct ReceivedCommand {
     /// Number of the command (MAV_CMD).
     pub id: u16,
     /// Parameters 1 to 4.
@@ -34,7 +34,7 @@ pub struct Command {
     pub relative: bool,
 }
 
-impl Command {
+impl ReceivedCommand {
     /// Reads the payload of a COMMAND_LONG.
     pub fn from_command_long(fields: &PayloadReader<'_>) -> Self {
         let place = [f64::from(fields.f32(16)), f64::from(fields.f32(20))];
@@ -73,14 +73,14 @@ fn first_four(fields: &PayloadReader<'_>) -> [f32; 4] {
 
 /// Whether a command was carried out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
+pub enum CommandOutcome {
     /// It was.
     Done,
     /// It was not, and nothing changed.
     Refused,
 }
 
-impl Outcome {
+impl CommandOutcome {
     /// Whether the command was carried out.
     pub fn is_done(self) -> bool {
         self == Self::Done
@@ -106,7 +106,7 @@ pub enum Arming {
 
 impl Arming {
     /// As COMPONENT_ARM_DISARM commands it.
-    pub fn commanded_by(command: &Command) -> Self {
+    pub fn commanded_by(command: &ReceivedCommand) -> Self {
         if command.param[1] == ARM_FORCE { Self::Forced } else { Self::Checked }
     }
 }

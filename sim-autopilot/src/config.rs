@@ -5,9 +5,9 @@ use planner_core::frames::{Geodetic, Projection};
 
 use super::estimator::EstimateErrors;
 use super::vehicle::VehicleLimits;
-use crate::{AutopilotKind, EstimatorErrors};
+use crate::{EstimatorErrors, SimulatedKind};
 
-impl AutopilotKind {
+impl SimulatedKind {
     /// Factor on the airframe's drag. ArduCopter's factor is fitted to recorded flights of its
     /// simulated quadrotor.
     pub(super) fn drag_factor(self) -> f32 {
@@ -37,11 +37,11 @@ impl AutopilotKind {
 
 /// Configuration of a simulated autopilot.
 #[derive(Clone, Debug)]
-pub struct Config {
+pub struct AutopilotConfig {
     /// MAVLink system id, 1 to 255.
     pub system_id: u8,
     /// Which autopilot it simulates.
-    pub autopilot: AutopilotKind,
+    pub autopilot: SimulatedKind,
     /// Origin of the mission's ENU frame.
     pub world_origin: Geodetic,
     /// Origin of the autopilot's own local NED frame.
@@ -80,7 +80,7 @@ pub struct Config {
     pub forwards: bool,
 }
 
-impl Default for Config {
+impl Default for AutopilotConfig {
     /// PX4 as system 1, at rest on flat ground at the mission's origin, in still air, with a
     /// perfect estimate.
     fn default() -> Self {
@@ -88,7 +88,7 @@ impl Default for Config {
         let vehicle = VehicleLimits::default();
         Self {
             system_id: 1,
-            autopilot: AutopilotKind::Px4,
+            autopilot: SimulatedKind::Px4,
             world_origin: origin,
             ekf_origin: origin,
             home: None,
@@ -110,7 +110,7 @@ impl Default for Config {
     }
 }
 
-impl Config {
+impl AutopilotConfig {
     /// Seed of all random numbers of this vehicle: the configured seed mixed with the system id.
     pub(super) fn vehicle_seed(&self) -> u64 {
         self.seed ^ (u64::from(self.system_id) << 32)
@@ -123,9 +123,9 @@ impl Config {
     }
 }
 
-/// Reason why a [`Config`] is rejected.
+/// Reason why an [`AutopilotConfig`] is rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ConfigError {
+pub enum AutopilotConfigError {
     /// A position with a latitude, longitude or altitude out of range.
     #[error(
         "{0} is no place on earth: latitude within ±90°, longitude within ±180°, finite altitude"
@@ -143,22 +143,22 @@ pub enum ConfigError {
 }
 
 /// Checks a configuration; an error names the first invalid value.
-pub(super) fn check(config: &Config) -> Result<(), ConfigError> {
+pub(super) fn check(config: &AutopilotConfig) -> Result<(), AutopilotConfigError> {
     if config.system_id == 0 {
-        return Err(ConfigError::SystemId);
+        return Err(AutopilotConfigError::SystemId);
     }
     let home = config.home.unwrap_or(config.world_origin);
     for (name, place) in
         [("world origin", config.world_origin), ("EKF origin", config.ekf_origin), ("home", home)]
     {
         if !place.is_valid() {
-            return Err(ConfigError::Place(name));
+            return Err(AutopilotConfigError::Place(name));
         }
     }
     if !config.start.iter().chain(config.wind.iter()).all(|x| x.is_finite())
         || !config.heading_rad.is_finite()
     {
-        return Err(ConfigError::Number("start position, heading and wind"));
+        return Err(AutopilotConfigError::Number("start position, heading and wind"));
     }
     let v = &config.vehicle;
     let positive = [
@@ -178,7 +178,7 @@ pub(super) fn check(config: &Config) -> Result<(), ConfigError> {
         config.estimator_ready_s,
     ];
     if positive.iter().any(|x| !x.is_finite() || *x < 0.0) {
-        return Err(ConfigError::Number("every vehicle limit, gust and noise"));
+        return Err(AutopilotConfigError::Number("every vehicle limit, gust and noise"));
     }
     Ok(())
 }

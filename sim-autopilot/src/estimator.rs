@@ -19,7 +19,7 @@
 use planner_core::Point;
 
 use super::noise::{Gaussian, UPDATE_PERIOD_S};
-use crate::{AutopilotKind, EstimatorErrors};
+use crate::{EstimatorErrors, SimulatedKind};
 
 impl EstimatorErrors {
     /// Horizontal and vertical accuracy that ESTIMATOR_STATUS reports, metres. Recorded PX4s
@@ -50,7 +50,7 @@ impl ErrorModel {
 /// metres.
 fn error_models(
     estimator: EstimatorErrors,
-    autopilot: AutopilotKind,
+    autopilot: SimulatedKind,
 ) -> (ErrorModel, ErrorModel, [f32; 2]) {
     match (estimator, autopilot) {
         (EstimatorErrors::Perfect, _) => (ErrorModel::NONE, ErrorModel::NONE, [0.0, 0.0]),
@@ -59,12 +59,12 @@ fn error_models(
             ErrorModel { sigma_mps: 0.03, tau_s: 3.0, pull_s: 1.5, max_error_m: 0.15 },
             [0.0, 0.0],
         ),
-        (EstimatorErrors::Recorded, AutopilotKind::Px4) => (
+        (EstimatorErrors::Recorded, SimulatedKind::Px4) => (
             ErrorModel { sigma_mps: 0.23, tau_s: 3.5, pull_s: 0.75, max_error_m: 0.75 },
             ErrorModel { sigma_mps: 0.13, tau_s: 4.0, pull_s: 2.0, max_error_m: 0.7 },
             [-0.43, 0.34],
         ),
-        (EstimatorErrors::Recorded, AutopilotKind::Ardupilot) => (
+        (EstimatorErrors::Recorded, SimulatedKind::Ardupilot) => (
             ErrorModel { sigma_mps: 0.02, tau_s: 1.5, pull_s: 1.25, max_error_m: 0.11 },
             ErrorModel { sigma_mps: 0.005, tau_s: 6.0, pull_s: 6.0, max_error_m: 0.08 },
             [0.0, 0.0],
@@ -89,7 +89,7 @@ pub struct EstimateErrors {
 
 impl EstimateErrors {
     /// Stationary errors: the first values have the same distribution as later ones.
-    pub fn new(estimator: EstimatorErrors, autopilot: AutopilotKind, seed: u64) -> Self {
+    pub fn new(estimator: EstimatorErrors, autopilot: SimulatedKind, seed: u64) -> Self {
         let mut random = Gaussian::new(seed ^ 0x0E57_1A7E);
         let (across, up, height_m) = error_models(estimator, autopilot);
         // A random number within ±1.75 becomes a place in the range (0 to 1); larger ones, up to
@@ -149,7 +149,7 @@ mod tests {
         velocity: [f32; 2],
     }
 
-    fn flight(estimator: EstimatorErrors, autopilot: AutopilotKind, seed: u64) -> FlightErrors {
+    fn flight(estimator: EstimatorErrors, autopilot: SimulatedKind, seed: u64) -> FlightErrors {
         let mut errors = EstimateErrors::new(estimator, autopilot, seed);
         let (mut positions, mut across_v, mut up_v) = (Vec::new(), 0.0, 0.0);
         for _ in 0..3000 {
@@ -190,13 +190,13 @@ mod tests {
     fn the_model_s_errors_lie_in_the_ranges_of_the_recorded_flights() {
         let ranges = [
             (
-                AutopilotKind::Px4,
+                SimulatedKind::Px4,
                 [[0.13, 0.27], [0.26, 0.72], [0.20, 0.41], [0.38, 1.03]],
                 [[0.11, 0.51], [0.27, 1.09], [0.11, 0.57], [0.21, 1.42]],
                 [[0.14, 0.26], [0.10, 0.20]],
             ),
             (
-                AutopilotKind::Ardupilot,
+                SimulatedKind::Ardupilot,
                 [[0.02, 0.04], [0.03, 0.11], [0.01, 0.04], [0.03, 0.11]],
                 [[0.01, 0.03], [0.02, 0.08], [0.01, 0.04], [0.02, 0.08]],
                 [[0.015, 0.025], [0.0, 0.005]],
@@ -229,7 +229,7 @@ mod tests {
     #[test]
     fn rtk_stays_within_what_it_promises() {
         for seed in 0..200 {
-            for autopilot in [AutopilotKind::Px4, AutopilotKind::Ardupilot] {
+            for autopilot in [SimulatedKind::Px4, SimulatedKind::Ardupilot] {
                 let f = flight(EstimatorErrors::Rtk, autopilot, seed);
                 assert!(f.across[1] <= 0.1 && f.up[1] <= 0.15 && f.across[1] > 0.01);
             }
@@ -238,9 +238,9 @@ mod tests {
 
     #[test]
     fn the_same_seed_errs_alike_and_a_perfect_estimate_never() {
-        let run = |seed| flight(EstimatorErrors::Recorded, AutopilotKind::Px4, seed).across;
+        let run = |seed| flight(EstimatorErrors::Recorded, SimulatedKind::Px4, seed).across;
         assert_eq!(run(3), run(3));
         assert_ne!(run(3), run(4));
-        assert_eq!(flight(EstimatorErrors::Perfect, AutopilotKind::Px4, 3).across, [0.0; 4]);
+        assert_eq!(flight(EstimatorErrors::Perfect, SimulatedKind::Px4, 3).across, [0.0; 4]);
     }
 }

@@ -1,8 +1,8 @@
 //! Dispatches every call that depends on the kind of autopilot.
 
 use super::ardupilot::{self, Copter};
-use super::command::Command;
-use super::config::Config;
+use super::command::ReceivedCommand;
+use super::config::AutopilotConfig;
 use super::params::Params;
 use super::platform::{ControlDemand, Platform, SensorReadings};
 use super::port::Sender;
@@ -12,7 +12,7 @@ use super::status::AutopilotStatus;
 use super::telemetry;
 use super::vehicle::Gains;
 use super::wire::PayloadReader;
-use crate::{AutopilotKind, GpsFix};
+use crate::{GpsFix, SimulatedKind};
 
 /// The autopilot software of one vehicle.
 #[derive(Clone, Debug)]
@@ -24,10 +24,10 @@ pub enum Firmware {
 }
 
 impl Firmware {
-    pub(super) fn new(config: &Config) -> Self {
+    pub(super) fn new(config: &AutopilotConfig) -> Self {
         match config.autopilot {
-            AutopilotKind::Px4 => Self::Px4(Box::new(Px4::new(config.system_id, &config.vehicle))),
-            AutopilotKind::Ardupilot => Self::Copter(Box::new(Copter::new(
+            SimulatedKind::Px4 => Self::Px4(Box::new(Px4::new(config.system_id, &config.vehicle))),
+            SimulatedKind::Ardupilot => Self::Copter(Box::new(Copter::new(
                 config.system_id,
                 &config.vehicle,
                 config.estimator_ready_s,
@@ -36,10 +36,10 @@ impl Firmware {
     }
 
     /// Default telemetry streams: message id and interval in µs; 0: off until requested.
-    pub(super) fn streams(personality: AutopilotKind) -> &'static [(u32, u32)] {
+    pub(super) fn streams(personality: SimulatedKind) -> &'static [(u32, u32)] {
         match personality {
-            AutopilotKind::Px4 => &telemetry::PX4_STREAMS,
-            AutopilotKind::Ardupilot => &ardupilot::STREAMS,
+            SimulatedKind::Px4 => &telemetry::PX4_STREAMS,
+            SimulatedKind::Ardupilot => &ardupilot::STREAMS,
         }
     }
 
@@ -103,7 +103,7 @@ impl Firmware {
         &mut self,
         platform: &mut Platform,
         from: Sender,
-        command: &Command,
+        command: &ReceivedCommand,
     ) {
         match self {
             Self::Px4(px4) => px4.handle_command(platform, from, command),
@@ -212,10 +212,10 @@ impl Firmware {
     /// mode.
     pub(super) fn force_mode(&mut self, custom_mode: u32, sensors: &SensorReadings) -> bool {
         match self {
-            Self::Px4(px4) => px4::Mode::from_custom_mode(custom_mode)
+            Self::Px4(px4) => px4::Px4Mode::from_custom_mode(custom_mode)
                 .map(|mode| px4.commander.force_mode(mode, sensors))
                 .is_some(),
-            Self::Copter(copter) => ardupilot::Mode::from_number(custom_mode)
+            Self::Copter(copter) => ardupilot::CopterMode::from_number(custom_mode)
                 .map(|mode| copter.force_mode(mode, sensors))
                 .is_some(),
         }

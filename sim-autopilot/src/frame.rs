@@ -30,7 +30,7 @@ const ZERO_CRC_EXTRA_ID: u32 = 395;
 
 /// A received frame whose checksum is correct.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Frame {
+pub struct CheckedFrame {
     /// System id of the sender.
     pub system: u8,
     /// Component id of the sender.
@@ -44,7 +44,7 @@ pub struct Frame {
     payload: [u8; 255],
 }
 
-impl Frame {
+impl CheckedFrame {
     /// The payload, padded with the zeros that MAVLink 2 cuts from its end.
     pub fn padded_payload(&self) -> &[u8; 255] {
         &self.payload
@@ -123,16 +123,16 @@ enum ParseStatus {
 
 /// Finds frames in the bytes received at one port.
 #[derive(Clone, Debug, Default)]
-pub struct Framer {
+pub struct PortFramer {
     bytes: Vec<u8>,
     /// Time at which each byte arrived, microseconds since boot.
     came_us: Vec<u64>,
 }
 
-impl Framer {
+impl PortFramer {
     /// Adds all of `input`, received at `now_us`, to the buffer and returns the next whole frame in
     /// it; `None` if there is none.
-    pub fn next(&mut self, now_us: u64, input: &mut &[u8]) -> Option<Frame> {
+    pub fn next(&mut self, now_us: u64, input: &mut &[u8]) -> Option<CheckedFrame> {
         self.bytes.extend_from_slice(input);
         self.came_us.resize(self.bytes.len(), now_us);
         *input = &[];
@@ -142,7 +142,7 @@ impl Framer {
             let first_us = *self.came_us.first()?;
             match parse_front(&self.bytes) {
                 ParseStatus::Whole(total) => {
-                    let frame = Frame::from_bytes(&self.bytes[..total]);
+                    let frame = CheckedFrame::from_bytes(&self.bytes[..total]);
                     self.drop_first(total);
                     return Some(frame);
                 }

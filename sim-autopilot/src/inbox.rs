@@ -6,15 +6,15 @@
 
 use mavlink::dialects::ardupilotmega as dialect;
 
-use super::command::Command;
-use super::frame::Frame;
+use super::command::ReceivedCommand;
+use super::frame::CheckedFrame;
 use super::params::Encoding;
 use super::port::{AUTOPILOT_COMPONENT, Sender};
 use super::wire::PayloadReader;
 use super::{Autopilot, telemetry};
 
 impl Autopilot {
-    pub(super) fn handle_frame(&mut self, port: usize, frame: &Frame) {
+    pub(super) fn handle_frame(&mut self, port: usize, frame: &CheckedFrame) {
         let fields = PayloadReader::new(frame);
         let system_id = self.platform.config.system_id;
         let from = Sender { port, system: frame.system, component: frame.component };
@@ -48,10 +48,18 @@ impl Autopilot {
             39 | 73 if for_us(32, 33) => platform.handle_mission(from, frame.message_id, &fields),
             66 if for_us(2, 3) => firmware.handle_stream_request(platform, from, &fields),
             75 if for_us(30, 31) => {
-                firmware.handle_command(platform, from, &Command::from_command_int(&fields));
+                firmware.handle_command(
+                    platform,
+                    from,
+                    &ReceivedCommand::from_command_int(&fields),
+                );
             }
             76 if for_us(30, 31) => {
-                firmware.handle_command(platform, from, &Command::from_command_long(&fields));
+                firmware.handle_command(
+                    platform,
+                    from,
+                    &ReceivedCommand::from_command_long(&fields),
+                );
             }
             84 | 86 if for_us(50, 51) => {
                 firmware.handle_setpoint(platform, frame.message_id, &fields);

@@ -11,11 +11,11 @@
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
-use super::command::{Command, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST};
+use super::command::{DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST, ReceivedCommand};
 use super::mission::{MissionItem, MissionProgress};
 use super::platform::{Platform, SensorReadings};
 use super::vehicle::wrap_pi;
-use crate::AutopilotKind;
+use crate::SimulatedKind;
 
 const NAV_WAYPOINT: u16 = 16;
 const NAV_RETURN_TO_LAUNCH: u16 = 20;
@@ -102,7 +102,7 @@ fn item_command(item: &MissionItem) -> u16 {
 impl Platform {
     /// Number of the first item that is flown.
     fn first_item(&self) -> u16 {
-        u16::from(self.config.autopilot == AutopilotKind::Ardupilot)
+        u16::from(self.config.autopilot == SimulatedKind::Ardupilot)
     }
 
     /// Whether a mission with items to fly is stored.
@@ -206,7 +206,7 @@ impl Platform {
         match item_command(item) {
             DO_CHANGE_SPEED => self.missions.speed = Some(item_f32(item, 4)),
             id @ (DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST) => {
-                self.execute_camera_command(&Command {
+                self.execute_camera_command(&ReceivedCommand {
                     id,
                     param: [0, 4, 8, 12].map(|at| item_f32(item, at)),
                     param5: item_i32(item, 16) as f32,
@@ -238,7 +238,7 @@ impl Platform {
                 // NaN: no heading to wait for.
                 let turned = wrap_pi(heading - sensors.heading).abs() < MAX_YAW_ERROR_RAD;
                 let turned =
-                    turned || heading.is_nan() || self.config.autopilot == AutopilotKind::Ardupilot;
+                    turned || heading.is_nan() || self.config.autopilot == SimulatedKind::Ardupilot;
                 if libm::hypotf(off.x, off.y) <= reached_m
                     && off.z.abs() <= REACHED_HEIGHT_M
                     && turned

@@ -2,7 +2,7 @@
 
 /// The autopilot that is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum AutopilotKind {
+pub enum SimulatedKind {
     /// PX4 1.17, commanded in Offboard.
     #[default]
     Px4,

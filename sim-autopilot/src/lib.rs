@@ -11,9 +11,9 @@
 //! vehicle's own EKF origin, in its autopilot's projection ([`geodesy`]).
 //!
 //! ```
-//! use sim_autopilot::{Autopilot, Config};
+//! use sim_autopilot::{Autopilot, AutopilotConfig};
 //!
-//! let mut autopilot = Autopilot::new(&Config::default()).unwrap();
+//! let mut autopilot = Autopilot::new(&AutopilotConfig::default()).unwrap();
 //! let mut buffer = [0; 512];
 //! let mut bytes = 0;
 //! for _ in 0..250 {
@@ -63,12 +63,12 @@ use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
 pub use self::camera::Photo;
-pub use self::config::{Config, ConfigError};
+pub use self::config::{AutopilotConfig, AutopilotConfigError};
 use self::firmware::Firmware;
-pub use self::kinds::{AutopilotKind, EstimatorErrors, GpsFix};
+pub use self::kinds::{EstimatorErrors, GpsFix, SimulatedKind};
 use self::platform::{IntegralAction, Platform};
 use self::port::Port;
-pub use self::px4::Mode;
+pub use self::px4::Px4Mode;
 use self::snapshot::Snapshot;
 use self::status::{AutopilotFlags, MotorState};
 pub use self::vehicle::{TrueState, VehicleLimits, power_ratio_at_speed};
@@ -85,8 +85,8 @@ impl Autopilot {
     /// An autopilot that has just booted, its vehicle at rest and disarmed.
     ///
     /// # Errors
-    /// [`ConfigError`] where the configuration has an invalid value.
-    pub fn new(config: &Config) -> Result<Self, ConfigError> {
+    /// [`AutopilotConfigError`] where the configuration has an invalid value.
+    pub fn new(config: &AutopilotConfig) -> Result<Self, AutopilotConfigError> {
         config::check(config)?;
         let mut platform = Platform::new(config, Firmware::streams(config.autopilot));
         let mut firmware = Firmware::new(config);
@@ -113,8 +113,8 @@ impl Autopilot {
     /// Whether the simulated autopilot is in its Land mode.
     pub fn is_landing(&self) -> bool {
         let land = match self.platform.config.autopilot {
-            AutopilotKind::Px4 => Mode::Land.custom_mode(),
-            AutopilotKind::Ardupilot => ardupilot::Mode::Land.number(),
+            SimulatedKind::Px4 => Px4Mode::Land.custom_mode(),
+            SimulatedKind::Ardupilot => ardupilot::CopterMode::Land.number(),
         };
         self.custom_mode() == land
     }
@@ -351,16 +351,16 @@ impl Autopilot {
     /// is.
     pub fn take_over_by_pilot(&mut self) {
         self.set_pilot_mode(match self.platform.config.autopilot {
-            AutopilotKind::Px4 => Mode::Position.custom_mode(),
-            AutopilotKind::Ardupilot => ardupilot::Mode::Brake.number(),
+            SimulatedKind::Px4 => Px4Mode::Position.custom_mode(),
+            SimulatedKind::Ardupilot => ardupilot::CopterMode::Brake.number(),
         });
     }
 
     /// The pilot hands control back: mode Offboard in PX4, Guided in ArduCopter.
     pub fn return_from_pilot(&mut self) {
         self.set_pilot_mode(match self.platform.config.autopilot {
-            AutopilotKind::Px4 => Mode::Offboard.custom_mode(),
-            AutopilotKind::Ardupilot => ardupilot::Mode::Guided.number(),
+            SimulatedKind::Px4 => Px4Mode::Offboard.custom_mode(),
+            SimulatedKind::Ardupilot => ardupilot::CopterMode::Guided.number(),
         });
     }
 
@@ -405,7 +405,7 @@ impl Autopilot {
     /// under a ceiling: PX4's default is to climb and return. ArduCopter has no such parameter; it
     /// brakes.
     pub fn land_on_stream_loss(&mut self) {
-        if self.platform.config.autopilot == AutopilotKind::Px4 {
+        if self.platform.config.autopilot == SimulatedKind::Px4 {
             self.set_parameter("COM_OBL_RC_ACT", 4).expect("PX4 has this parameter");
         }
     }
@@ -414,11 +414,15 @@ impl Autopilot {
     ///
     /// # Errors
     /// The autopilot has no integer parameter of this name.
-    pub fn set_parameter(&mut self, name: &'static str, value: i32) -> Result<(), ConfigError> {
+    pub fn set_parameter(
+        &mut self,
+        name: &'static str,
+        value: i32,
+    ) -> Result<(), AutopilotConfigError> {
         if self.firmware.set_integer(name, value) {
             Ok(())
         } else {
-            Err(ConfigError::Parameter(name))
+            Err(AutopilotConfigError::Parameter(name))
         }
     }
 

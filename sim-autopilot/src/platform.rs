@@ -4,17 +4,17 @@ use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
 use super::camera::{CameraTrigger, Photo};
-use super::command::{ACCEPTED, Command, DO_DIGICAM_CONTROL, Outcome, message_id};
-use super::config::Config;
+use super::command::{ACCEPTED, CommandOutcome, DO_DIGICAM_CONTROL, ReceivedCommand, message_id};
+use super::config::AutopilotConfig;
 use super::estimator::EstimateErrors;
 use super::geodesy::LocalFrame;
 use super::mission::Missions;
 use super::noise::{self, Disturbance};
 use super::port::{PendingAck, Port, Sender};
 use super::status::MotorState;
-use super::vehicle::{Demand, Vehicle};
+use super::vehicle::{Demand, Multicopter};
 use super::wire::PayloadReader;
-use crate::AutopilotKind;
+use crate::SimulatedKind;
 
 const MESSAGE_INTERVAL: u32 = 244;
 const HOME_POSITION: u32 = 242;
@@ -78,10 +78,10 @@ pub enum IntegralAction {
 /// home, missions, camera.
 #[derive(Clone, Debug)]
 pub struct Platform {
-    pub(super) config: Config,
+    pub(super) config: AutopilotConfig,
     pub(super) time_us: u64,
     next_noise_us: u64,
-    pub(super) vehicle: Vehicle,
+    pub(super) vehicle: Multicopter,
     pub(super) disturbance: Disturbance,
     pub(super) errors: EstimateErrors,
     pub(super) position_offset: Point,
@@ -104,11 +104,11 @@ pub struct Platform {
 }
 
 impl Platform {
-    pub(super) fn new(config: &Config, streams: &[(u32, u32)]) -> Self {
+    pub(super) fn new(config: &AutopilotConfig, streams: &[(u32, u32)]) -> Self {
         let mut limits = config.vehicle;
         limits.drag_per_s *= config.autopilot.drag_factor();
         limits.wind_per_s *= config.autopilot.wind_factor();
-        let mut vehicle = Vehicle::new(limits, config.start);
+        let mut vehicle = Multicopter::new(limits, config.start);
         vehicle.set_heading(config.heading_rad);
         let start = config.start.cast::<f64>();
         let projection = config.autopilot.projection();
@@ -208,12 +208,12 @@ impl Platform {
 
     /// Executes DO_SET_CAM_TRIGG_DIST or DO_DIGICAM_CONTROL and queues its COMMAND_ACK. PX4 answers
     /// at the camera driver's next check.
-    pub(super) fn handle_camera_command(&mut self, from: Sender, command: &Command) {
+    pub(super) fn handle_camera_command(&mut self, from: Sender, command: &ReceivedCommand) {
         self.execute_camera_command(command);
         let soon_us = self.time_us + ANSWER_DELAY_US;
         let answer_us = match self.config.autopilot {
-            AutopilotKind::Px4 => self.camera.next_poll_us().max(soon_us),
-            AutopilotKind::Ardupilot => soon_us,
+            SimulatedKind::Px4 => self.camera.next_poll_us().max(soon_us),
+            SimulatedKind::Ardupilot => soon_us,
         };
         let ack =
             PendingAck { command: command.id, result: ACCEPTED, to: from.system_and_component() };
@@ -221,7 +221,7 @@ impl Platform {
     }
 
     /// Executes the same commands as `handle_camera_command`, but queues no COMMAND_ACK.
-    pub(super) fn execute_camera_command(&mut self, command: &Command) {
+    pub(super) fn execute_camera_command(&mut self, command: &ReceivedCommand) {
         if command.id == DO_DIGICAM_CONTROL {
             self.camera.handle_digicam_control(command);
         } else {
@@ -278,7 +278,7 @@ impl Platform {
 
     /// Target of DO_REPOSITION in ENU metres, NaN on axes that the command leaves out; `None` if
     /// latitude, longitude or altitude is invalid.
-    pub(super) fn reposition_target(&self, command: &Command) -> Option<Point> {
+    pub(super) fn reposition_target(&self, command: &ReceivedCommand) -> Option<Point> {
         let here = self.frame.geodetic_from_enu(self.vehicle.position());
         let [lat_deg, lon_deg] = command.place;
         let base = if command.relative { self.home.alt_m } else { 0.0 };
@@ -297,7 +297,7 @@ impl Platform {
     }
 
     /// Executes DO_SET_HOME. Refused if the commanded position is invalid.
-    pub(super) fn handle_set_home(&mut self, command: &Command) -> Outcome {
+    pub(super) fn handle_set_home(&mut self, command: &ReceivedCommand) -> CommandOutcome {
         let [lat_deg, lon_deg] = command.place;
         let home = if command.param[0] == 1.0 {
             self.frame.geodetic_from_enu(self.vehicle.position())
@@ -305,10 +305,10 @@ impl Platform {
             Geodetic { lat_deg, lon_deg, alt_m: f64::from(command.z) }
         };
         if !home.is_valid() {
-            return Outcome::Refused;
+            return CommandOutcome::Refused;
         }
         self.set_fixed_home(home);
-        Outcome::Done
+        CommandOutcome::Done
     }
 
     /// Executes SET_MESSAGE_INTERVAL and returns the MAV_RESULT. An interval of 0 restores the
@@ -317,7 +317,7 @@ impl Platform {
     pub(super) fn set_interval(
         &mut self,
         from: Sender,
-        command: &Command,
+        command: &ReceivedCommand,
         streams: &[(u32, u32)],
         refused: u8,
     ) -> u8 {

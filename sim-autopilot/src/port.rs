@@ -3,7 +3,7 @@
 
 use mavlink::MessageData;
 
-use super::frame::{self, Frame, Framer, MAX_FRAME_LEN};
+use super::frame::{self, CheckedFrame, MAX_FRAME_LEN, PortFramer};
 
 /// Component id of an autopilot (MAV_COMP_ID_AUTOPILOT1).
 pub const AUTOPILOT_COMPONENT: u8 = 1;
@@ -70,7 +70,7 @@ impl Sender {
 /// A MAVLink port: decodes received bytes and encodes messages to send, whatever the transport.
 #[derive(Clone, Debug)]
 pub struct Port {
-    framer: Framer,
+    framer: PortFramer,
     system_id: u8,
     sequence: u8,
     queue: Vec<u8>,
@@ -107,7 +107,7 @@ impl Port {
             })
             .collect();
         Self {
-            framer: Framer::default(),
+            framer: PortFramer::default(),
             system_id,
             sequence: 0,
             queue: Vec::new(),
@@ -133,7 +133,7 @@ impl Port {
 
     /// The next whole frame in the received bytes; takes bytes from `input`. `None` if no frame is
     /// complete.
-    pub fn next_frame(&mut self, now_us: u64, input: &mut &[u8]) -> Option<Frame> {
+    pub fn next_frame(&mut self, now_us: u64, input: &mut &[u8]) -> Option<CheckedFrame> {
         self.framer.next(now_us, input)
     }
 
@@ -170,7 +170,7 @@ impl Port {
     }
 
     /// Queues another sender's frame with its ids and sequence number unchanged.
-    pub fn forward_frame(&mut self, frame: &Frame) {
+    pub fn forward_frame(&mut self, frame: &CheckedFrame) {
         if self.reserve_frame() {
             frame.write(&mut self.queue);
         }

@@ -5,7 +5,7 @@
 //! forwarded to the ports that reach the target, a broadcast to all other ports at which any
 //! component was heard. A message for this autopilot alone is not forwarded.
 
-use super::frame::Frame;
+use super::frame::CheckedFrame;
 use super::port::{AUTOPILOT_COMPONENT, Port};
 
 /// Offset of the target system id in the payload of a message; the target component id follows it.
@@ -25,7 +25,12 @@ fn target_system_offset(message_id: u32) -> Option<usize> {
 }
 
 /// Forwards a frame that arrived at port `from` to the other ports that reach its target.
-pub fn forward_to_other_ports(ports: &mut [Port], from: usize, own_system: u8, frame: &Frame) {
+pub fn forward_to_other_ports(
+    ports: &mut [Port],
+    from: usize,
+    own_system: u8,
+    frame: &CheckedFrame,
+) {
     let sender = (frame.system, frame.component);
     if sender == (own_system, AUTOPILOT_COMPONENT) {
         return;

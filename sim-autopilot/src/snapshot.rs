@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
 
 use super::status::AutopilotStatus;
-use crate::AutopilotKind;
+use crate::SimulatedKind;
 
 /// The state of one step from which telemetry messages are made.
 #[derive(Clone, Debug)]
@@ -93,7 +93,7 @@ impl Snapshot {
     }
 
     pub(super) fn is_px4(&self) -> bool {
-        self.status.autopilot == AutopilotKind::Px4
+        self.status.autopilot == SimulatedKind::Px4
     }
 
     pub(super) fn boot_ms(&self) -> u32 {

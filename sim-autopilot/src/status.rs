@@ -1,12 +1,12 @@
 //! State of the autopilot that telemetry reports, and of the motors that it drives.
 
-use crate::AutopilotKind;
+use crate::SimulatedKind;
 
 /// State of the autopilot in one step, for telemetry.
 #[derive(Clone, Copy, Debug)]
 pub struct AutopilotStatus {
     /// Which autopilot it is.
-    pub autopilot: AutopilotKind,
+    pub autopilot: SimulatedKind,
     /// `custom_mode` of HEARTBEAT.
     pub custom_mode: u32,
     /// `custom_mode` of the mode that was last requested, even while a failsafe flies another.

@@ -36,10 +36,10 @@ struct Bench {
 
 impl Bench {
     fn new() -> Self {
-        Self::with(&Config::default())
+        Self::with(&AutopilotConfig::default())
     }
 
-    fn with(config: &Config) -> Self {
+    fn with(config: &AutopilotConfig) -> Self {
         Self {
             autopilot: Autopilot::new(config).unwrap(),
             framer: Framer::new(),
@@ -369,7 +369,7 @@ fn mpc_xy_vel_max_acts() {
 #[test]
 fn the_pilots_switch_wins_and_needs_no_stream() {
     let mut bench = Bench::hovering(5.0);
-    bench.autopilot.set_pilot_mode(Mode::Position);
+    bench.autopilot.set_pilot_mode(Px4Mode::Position);
     bench.run(3.0);
     assert_eq!(bench.heartbeat(), (0x0003_0000, 209, 4));
     assert!((bench.autopilot.true_state().position.z - 5.0).abs() < 0.2);
@@ -378,12 +378,12 @@ fn the_pilots_switch_wins_and_needs_no_stream() {
 #[test]
 fn the_same_seed_flies_the_same_flight_bit_for_bit() {
     let fly = |seed| {
-        let config = Config {
+        let config = AutopilotConfig {
             gust_mps: 1.0,
             wind: Point::new(3.0, 0.0, 0.0),
             position_noise_m: 0.2,
             seed,
-            ..Config::default()
+            ..AutopilotConfig::default()
         };
         let mut bench = Bench::with(&config);
         bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));

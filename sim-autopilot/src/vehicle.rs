@@ -147,7 +147,7 @@ pub struct Gains {
 
 /// One simulated airframe with its position controller and true state.
 #[derive(Clone, Debug)]
-pub struct Vehicle {
+pub struct Multicopter {
     limits: VehicleLimits,
     state: TrueState,
     position: Vector3<f64>,
@@ -159,7 +159,7 @@ pub struct Vehicle {
     pub acceleration_setpoint: Point,
 }
 
-impl Vehicle {
+impl Multicopter {
     /// A vehicle at rest at `position`, disarmed, with a full battery.
     pub fn new(limits: VehicleLimits, position: Point) -> Self {
         let state = TrueState {
@@ -411,7 +411,7 @@ mod tests {
         }
     }
 
-    fn fly(vehicle: &mut Vehicle, demand: &Demand, wind: Point, seconds: f32) -> (f32, f32) {
+    fn fly(vehicle: &mut Multicopter, demand: &Demand, wind: Point, seconds: f32) -> (f32, f32) {
         let (mut fastest, mut worst_jerk) = (0.0_f32, 0.0_f32);
         for _ in 0..(seconds / DT) as usize {
             let (p, v, before) =
@@ -424,8 +424,8 @@ mod tests {
         (fastest, worst_jerk)
     }
 
-    fn airborne() -> Vehicle {
-        Vehicle::new(VehicleLimits::default(), Point::new(0.0, 0.0, 5.0))
+    fn airborne() -> Multicopter {
+        Multicopter::new(VehicleLimits::default(), Point::new(0.0, 0.0, 5.0))
     }
 
     #[test]
@@ -479,7 +479,7 @@ mod tests {
 
     #[test]
     fn a_parked_vehicle_is_not_blown_away() {
-        let mut v = Vehicle::new(VehicleLimits::default(), Point::new(1.0, 2.0, 0.3));
+        let mut v = Multicopter::new(VehicleLimits::default(), Point::new(1.0, 2.0, 0.3));
         for _ in 0..500 {
             v.advance(MotorState::Idle, &Point::new(15.0, 0.0, 0.0), 0.0, DT);
         }

@@ -5,14 +5,14 @@
 //! fields are read at their byte offsets in wire order (sorted by size, extensions last). Zeros
 //! that MAVLink 2 cut from the payload's end read as zero.
 
-use super::frame::Frame;
+use super::frame::CheckedFrame;
 
 /// A payload padded with zeros to 255 bytes.
 pub struct PayloadReader<'a>(&'a [u8; 255]);
 
 impl<'a> PayloadReader<'a> {
     /// The payload of `frame`.
-    pub fn new(frame: &'a Frame) -> Self {
+    pub fn new(frame: &'a CheckedFrame) -> Self {
         Self(frame.padded_payload())
     }
 

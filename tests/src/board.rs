@@ -6,9 +6,9 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use host_sim::link::LinkUrl;
-use host_sim::mission::Mission;
-use host_sim::scenario::Companion;
-use host_sim::swarm::Flight;
+use host_sim::mission::PreparedMission;
+use host_sim::scenario::CompanionHost;
+use host_sim::swarm::SwarmFlight;
 use planner_core::voxel::VoxelGrid;
 
 use crate::{Guard, free_port, workspace};
@@ -122,10 +122,10 @@ pub fn start_by_wall_clock(program: &Path) -> (Guard, [LinkUrl; 2]) {
 }
 
 /// Gives every vehicle of a mission a board in lock step, which logs to a file in `folder`.
-pub fn put_on_boards(mission: &mut Mission, program: &Path, folder: &Path) {
+pub fn put_on_boards(mission: &mut PreparedMission, program: &Path, folder: &Path) {
     for vehicle in &mut mission.scenario.vehicles {
         let log = folder.join(format!("board-{}.defmt", vehicle.id));
-        vehicle.companion = Companion::Emulated { program: program.to_owned(), log };
+        vehicle.companion = CompanionHost::Emulated { program: program.to_owned(), log };
     }
 }
 
@@ -134,7 +134,7 @@ pub fn put_on_boards(mission: &mut Mission, program: &Path, folder: &Path) {
 ///
 /// # Panics
 /// The result cannot be written.
-pub fn record(flight: &Flight) -> String {
+pub fn record(flight: &SwarmFlight) -> String {
     let result = serde_json::to_string(&flight.result).expect("a result");
     let log: Vec<_> =
         flight.log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect();

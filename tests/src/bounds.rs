@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 use board_bench::calls::{Meter, coverage, coverage_missions};
 use firmware::scratch::WorkspaceOverlay;
 use host_sim::map::{Unknown, building};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 
@@ -206,7 +206,7 @@ impl Meter for Uncounted {
 /// any bit from those computed on the host.
 pub fn counted(program: &Path) -> Result<HashMap<String, CallCost>> {
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
-    let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
+    let mission = PreparedMission::prepare(scenario, &Progress::on_terminal())?;
     let map = building::building_map(building::DEFAULT_SEED, 0.5)?.voxel_map(Unknown::Blocked);
     let lines =
         board::measure(program, &mission.roadmap_or_field_file, &board::map_image(&map.grid()));

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use host_sim::coverage::CoveragePlan;
 use host_sim::scenario;
-use host_sim::scenario::coverage::Method;
+use host_sim::scenario::coverage::CoverageMethod;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -59,12 +59,12 @@ fn costs(seed: u64) -> Option<[f32; 4]> {
     let scenario = scenario::parse(&text, "random").ok()?;
     let cost =
         |method| CoveragePlan::new(&scenario, method).map(|planned| planned.plan.max_cost_s()).ok();
-    let bound_s = CoveragePlan::new(&scenario, Method::Binpat).ok()?.lower_bound_s;
+    let bound_s = CoveragePlan::new(&scenario, CoverageMethod::Binpat).ok()?.lower_bound_s;
     let costs = [
-        cost(Method::SimpleBinpat)?,
-        cost(Method::Binpat)?,
-        cost(Method::PowellBinpat)?,
-        cost(Method::Exact)?,
+        cost(CoverageMethod::SimpleBinpat)?,
+        cost(CoverageMethod::Binpat)?,
+        cost(CoverageMethod::PowellBinpat)?,
+        cost(CoverageMethod::Exact)?,
     ];
     assert!(
         costs.iter().all(|cost| *cost >= bound_s * 0.9999),

@@ -4,11 +4,11 @@ use std::fmt::Write as _;
 
 use host_sim::coverage::check::Picture;
 use host_sim::flown::pictures;
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
-use host_sim::report::{Event, Level};
+use host_sim::report::{Level, LogEvent};
 use host_sim::result::MissionResult;
-use host_sim::swarm::Flight;
+use host_sim::swarm::SwarmFlight;
 use host_sim::{scenario, swarm};
 
 /// Log texts that explain why a vehicle without a fault lands before its part is done: it was not
@@ -59,7 +59,7 @@ pub fn has_logged(log: &str, vehicle: u8, reasons: &[&str]) -> bool {
 ///
 /// # Errors
 /// Reason why it cannot be planned, flown or judged.
-pub fn fly(mission: &mut Mission) -> anyhow::Result<(MissionResult, Vec<Event>)> {
+pub fn fly(mission: &mut PreparedMission) -> anyhow::Result<(MissionResult, Vec<LogEvent>)> {
     fly_on(mission, &mut Vec::new())
 }
 
@@ -68,9 +68,9 @@ pub fn fly(mission: &mut Mission) -> anyhow::Result<(MissionResult, Vec<Event>)>
 /// # Errors
 /// As [`fly`].
 pub fn fly_on(
-    mission: &mut Mission,
+    mission: &mut PreparedMission,
     pictures: &mut Vec<Picture>,
-) -> anyhow::Result<(MissionResult, Vec<Event>)> {
+) -> anyhow::Result<(MissionResult, Vec<LogEvent>)> {
     let flight = flight(mission, pictures)?;
     Ok((flight.result, flight.log))
 }
@@ -79,7 +79,10 @@ pub fn fly_on(
 ///
 /// # Errors
 /// As [`fly`].
-pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Result<Flight> {
+pub fn flight(
+    mission: &mut PreparedMission,
+    pictures: &mut Vec<Picture>,
+) -> anyhow::Result<SwarmFlight> {
     let plan = mission.plan()?;
     let mut flight = swarm::fly(mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())?;
     if let Some(places) = pictures::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
@@ -100,13 +103,13 @@ pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Res
 pub fn fly_text(text: &str) -> Result<(MissionResult, String), String> {
     let said = |error: anyhow::Error| format!("{error:#}");
     let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
-    let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
+    let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).map_err(said)?;
     let (result, log) = fly(&mut mission).map_err(said)?;
     Ok((result, log_lines(&log)))
 }
 
 /// The log as text, `time vehicle text` a line: events with a reason (`:`) and errors only.
-pub fn log_lines(log: &[Event]) -> String {
+pub fn log_lines(log: &[LogEvent]) -> String {
     let mut lines = String::new();
     for event in log.iter().filter(|event| event.text.contains(':') || event.level == Level::Error)
     {

@@ -5,10 +5,10 @@
 //! these, from 3 s before to 12 s after, a random fault strikes that vehicle, and the flight is
 //! flown again. The referee, which sees the true motion, judges this second flight.
 
-use host_sim::mission::{Mission, SwarmPlan};
+use host_sim::mission::{HostPlan, PreparedMission};
 use host_sim::progress::Progress;
 use host_sim::scenario::{self, Fault};
-use host_sim::swarm::{self, Flight};
+use host_sim::swarm::{self, SwarmFlight};
 
 use crate::swarms::Random;
 use crate::vehicle::ahead;
@@ -35,8 +35,8 @@ pub const SCRIPTS: [&str; 9] = [
 pub struct Edge {
     /// Radio range of the mission, metres.
     pub range_m: f32,
-    mission: Mission,
-    plan: Box<SwarmPlan>,
+    mission: PreparedMission,
+    plan: Box<HostPlan>,
     /// Each time, seconds, at which a vehicle leaves the range of all others, and its index.
     leaves: Vec<(f32, usize)>,
     rng: Random,
@@ -72,7 +72,7 @@ impl Edge {
         let range_m = rng.uniform(4.0, 20.0);
         (scenario.seed, scenario.simulation.radio_range_m) = (seed, range_m);
         scenario.simulation.time_limit_s = TIME_LIMIT_S;
-        let mut mission = Mission::prepare(scenario, &Progress::hidden())?;
+        let mut mission = PreparedMission::prepare(scenario, &Progress::hidden())?;
         let plan = mission.plan()?;
         let flight = swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())?;
         let leaves = leaves(&flight, range_m);
@@ -117,7 +117,7 @@ impl Edge {
 }
 
 /// Each time at which a vehicle that moves leaves the range of all others, and its index.
-fn leaves(flight: &Flight, range_m: f32) -> Vec<(f32, usize)> {
+fn leaves(flight: &SwarmFlight, range_m: f32) -> Vec<(f32, usize)> {
     let tracks = &flight.tracks;
     let mut leaves = Vec::new();
     for (i, own) in tracks.iter().enumerate() {
@@ -137,7 +137,7 @@ fn leaves(flight: &Flight, range_m: f32) -> Vec<(f32, usize)> {
     leaves
 }
 
-fn judge(flight: &Flight, struck: u8) -> Outcome {
+fn judge(flight: &SwarmFlight, struck: u8) -> Outcome {
     let mut outcome = Outcome { deadlocks: flight.result.safety.deadlocks, ..Outcome::default() };
     for e in &flight.log {
         let text = format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text);

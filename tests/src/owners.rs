@@ -6,12 +6,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use companion::swarm::fleet::DivisionInput;
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::Picture;
-use host_sim::mission::{Mission, SwarmPlan};
+use host_sim::mission::{HostPlan, PreparedMission};
 use host_sim::progress::Progress;
-use host_sim::report::Event;
+use host_sim::report::LogEvent;
 use host_sim::result::MissionResult;
 use host_sim::scenario;
-use host_sim::swarm::Flight;
+use host_sim::swarm::SwarmFlight;
 use planner_core::flight::{Task, WaypointRange};
 
 use crate::covered;
@@ -36,7 +36,7 @@ pub struct Flown {
 pub fn fly(text: &str, struck: &[u8]) -> Result<Flown, String> {
     let said = |error: anyhow::Error| format!("{error:#}");
     let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
-    let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
+    let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).map_err(said)?;
     let mut pictures = Vec::new();
     let flight = covered::flight(&mut mission, &mut pictures).map_err(said)?;
     let plan = mission.plan().map_err(said)?;
@@ -50,8 +50,8 @@ pub fn fly(text: &str, struck: &[u8]) -> Result<Flown, String> {
 }
 
 /// Whether a picture was taken while its vehicle flew around an obstacle, by the vehicle's log.
-fn is_beside_path(log: &[Event], picture: &Picture) -> bool {
-    let own = |event: &&Event| {
+fn is_beside_path(log: &[LogEvent], picture: &Picture) -> bool {
+    let own = |event: &&LogEvent| {
         event.vehicle.is_some() && event.vehicle == picture.vehicle && event.t_s <= picture.t_s
     };
     let mut around = log.iter().filter(own).filter_map(|event| {
@@ -83,7 +83,11 @@ impl Owners {
     ///
     /// # Errors
     /// A division that cannot be planned here.
-    pub fn of(mission: &Mission, plan: &SwarmPlan, flight: &Flight) -> anyhow::Result<Self> {
+    pub fn of(
+        mission: &PreparedMission,
+        plan: &HostPlan,
+        flight: &SwarmFlight,
+    ) -> anyhow::Result<Self> {
         let mut owners = Self {
             plans: Vec::new(),
             flown: BTreeMap::new(),
@@ -146,7 +150,7 @@ impl Owners {
         self.gone.extend(ids.iter().zip(inputs).filter(|(_, own)| left(own)).map(|(id, _)| *id));
     }
 
-    fn add(&mut self, plan: &SwarmPlan) {
+    fn add(&mut self, plan: &HostPlan) {
         let mut owned = Owned::new();
         let mut all = BTreeMap::new();
         for flight in &plan.flights {

@@ -8,7 +8,7 @@ use companion::Link as Port;
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{COMPANION_COMPONENT, Instant, State};
 use host_sim::boards::{self, EmulatedBoard, PortBytes};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 use host_sim::swarm::board::reported_state;
@@ -20,7 +20,7 @@ use mavlink::dialects::ardupilotmega::{
 use planner_core::Point;
 use planner_core::flight::Path;
 use planner_core::frames::geodetic_to_enu;
-use sim_autopilot::{Autopilot, Config};
+use sim_autopilot::{Autopilot, AutopilotConfig};
 
 use crate::board_failure::{self, BoardFailure};
 
@@ -88,9 +88,9 @@ pub struct Vehicle {
 ///
 /// # Panics
 /// The scenario is invalid, or the mission cannot be prepared.
-pub fn mission(text: &str) -> Mission {
+pub fn mission(text: &str) -> PreparedMission {
     let scenario = scenario::parse(text, "vehicle.toml").expect("the scenario is good");
-    Mission::prepare(scenario, &Progress::on_terminal()).expect("it can be prepared")
+    PreparedMission::prepare(scenario, &Progress::on_terminal()).expect("it can be prepared")
 }
 
 /// The middle of the widest leg among those in the second half of a path.
@@ -110,7 +110,12 @@ impl Vehicle {
     ///
     /// # Panics
     /// The board does not start.
-    pub fn new(program: &path::Path, mission: &Mission, known: &Mission, seed: u64) -> Self {
+    pub fn new(
+        program: &path::Path,
+        mission: &PreparedMission,
+        known: &PreparedMission,
+        seed: u64,
+    ) -> Self {
         let folder = tempfile::tempdir().expect("a temporary directory");
         let mut board = EmulatedBoard::start(program, &folder.path().join("log")).expect("a board");
         let bank = boards::flash_bank_image(&known.roadmap_or_field_file, &known.mission_file)
@@ -345,17 +350,17 @@ impl Heard {
 }
 
 /// Settings of the simulated autopilot of a mission's first vehicle.
-fn config(mission: &Mission) -> Config {
+fn config(mission: &PreparedMission) -> AutopilotConfig {
     let (vehicle, origin) = (&mission.scenario.vehicles[0], mission.scenario.map.origin);
     let pad = mission.pad_position(0);
     let start: Point = geodetic_to_enu(&origin, &pad);
-    Config {
+    AutopilotConfig {
         system_id: vehicle.id,
         autopilot: simulated_kind(vehicle.personality),
         world_origin: origin,
         ekf_origin: pad,
         start,
         estimator_ready_s: READY_S,
-        ..Config::default()
+        ..AutopilotConfig::default()
     }
 }

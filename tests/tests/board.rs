@@ -12,7 +12,7 @@ use board_bench::calls::limits_routes::{self, RouteWorkspaces};
 use board_bench::cases::{self, Workspace};
 use flockmate_tests::{board, workspace};
 use host_sim::map::{Unknown, building};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 use planner_core::plan::{self, PlanWorkspace, SwarmPlan};
@@ -31,8 +31,8 @@ fn the_board_computes_what_the_host_computes() {
     let Some(program) = board::program("measure") else { return };
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))
         .expect("the demo is good");
-    let mission =
-        Mission::prepare(scenario, &Progress::on_terminal()).expect("the demo can be prepared");
+    let mission = PreparedMission::prepare(scenario, &Progress::on_terminal())
+        .expect("the demo can be prepared");
     let map = building::building_map(building::DEFAULT_SEED, 0.5)
         .expect("the building")
         .voxel_map(Unknown::Blocked);
@@ -94,7 +94,7 @@ fn at_its_limits_the_board_answers_as_the_host_does() {
 }
 
 /// CRC of the plan for the whole swarm.
-fn swarm_crc(mission: &Mission) -> u32 {
+fn swarm_crc(mission: &PreparedMission) -> u32 {
     let view = mission.roadmap_view();
     let (vehicles, descents_m) = (cases::vehicle_tasks(&view), cases::goal_descents(&view));
     let request = cases::plan_request(&vehicles, &descents_m);

@@ -5,8 +5,8 @@
 use flockmate_tests::hills::Hills;
 use flockmate_tests::vehicle::mission;
 use flockmate_tests::{board, covered};
-use host_sim::mission::Mission;
-use host_sim::swarm::Flight;
+use host_sim::mission::PreparedMission;
+use host_sim::swarm::SwarmFlight;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 
@@ -93,7 +93,7 @@ vehicle = 3
 
 /// Asserts that each vehicle of `left` flies one division, the same bits as the host plans from its
 /// inputs.
-fn divides_as_planned(mission: &Mission, flight: &Flight, left: [u8; 2]) {
+fn divides_as_planned(mission: &PreparedMission, flight: &SwarmFlight, left: [u8; 2]) {
     for vehicle in left {
         let reported: Vec<_> = flight.divisions.iter().filter(|d| d.vehicle == vehicle).collect();
         assert_eq!(reported.len(), 1, "vehicle {vehicle}: {:?}", flight.divisions);

@@ -24,7 +24,7 @@ use companion::storage::store::File;
 use flockmate_tests::board;
 use flockmate_tests::board_failure::reset;
 use host_sim::boards::{EmulatedBoard, PortBytes};
-use host_sim::link::Link;
+use host_sim::link::ByteLink;
 use host_sim::upload::{FtpClient, crc32};
 use mavlink::dialects::ardupilotmega::{
     HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType,
@@ -138,7 +138,7 @@ impl Line {
     }
 }
 
-impl Link for Line {
+impl ByteLink for Line {
     fn receive(&mut self, buffer: &mut [u8]) -> Result<usize> {
         let now_us = self.now_us();
         if matches!(*self.cut.lock().unwrap(), Cut::At(at_us) if now_us >= at_us) {

@@ -18,8 +18,8 @@ use companion::{Link as Port, State};
 use flockmate_tests::board;
 use flockmate_tests::board_failure::{self, BoardFailure};
 use flockmate_tests::vehicle::{Heard, Vehicle, ahead, mission};
-use host_sim::link::Link;
-use host_sim::mission::Mission;
+use host_sim::link::ByteLink;
+use host_sim::mission::PreparedMission;
 use host_sim::upload::FtpClient;
 use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavCmd, MavFrame};
 use planner_core::Point;
@@ -115,7 +115,7 @@ fn reset_in_flight(
         !armed || hovers
     });
     if vehicle.autopilot.true_state().armed {
-        vehicle.autopilot.set_pilot_mode(ardupilot::Mode::Land.number());
+        vehicle.autopilot.set_pilot_mode(ardupilot::CopterMode::Land.number());
         vehicle.until("landed", |vehicle| !vehicle.autopilot.true_state().armed);
     }
     vehicle.until_said(FOUND);
@@ -147,7 +147,7 @@ fn reset_in_flight(
 /// Brings a board down in `resets` flights. Returns a line about each.
 fn reset_again_and_again(
     program: &Path,
-    missions: [&Mission; 2],
+    missions: [&PreparedMission; 2],
     resets: usize,
     seed: u64,
 ) -> Vec<String> {
@@ -283,7 +283,7 @@ struct Radio {
     sent: Vec<u8>,
 }
 
-impl Link for Radio {
+impl ByteLink for Radio {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let length = self.heard.len().min(buffer.len());
         buffer[..length].copy_from_slice(&self.heard[..length]);

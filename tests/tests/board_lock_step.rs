@@ -6,9 +6,9 @@ use std::thread::{available_parallelism, scope};
 
 use flockmate_tests::board;
 use flockmate_tests::vehicle::mission;
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
-use host_sim::swarm::{self, Flight};
+use host_sim::swarm::{self, SwarmFlight};
 use host_sim::upload::FtpClient;
 
 /// Three vehicles in the lobby of the built-in building; two of them cross.
@@ -33,7 +33,7 @@ start = [13.0, 4.0, 3.5]
 "#;
 
 /// A flight of three boards.
-fn fly(mission: &mut Mission) -> Flight {
+fn fly(mission: &mut PreparedMission) -> SwarmFlight {
     let plan = mission.plan().expect("there is a plan");
     swarm::fly(mission, &plan, "fly", swarm::Pace::Fastest, &Progress::on_terminal())
         .expect("the boards answer")

@@ -6,7 +6,7 @@ use std::time::Instant;
 use flockmate_tests::shared_data;
 use host_sim::capacity::{BOARDS, BoardCapacity};
 use host_sim::map::{self, Occupancy, OccupancyMap, Unknown, VoxelMap};
-use host_sim::roadmap::{self, Roadmap};
+use host_sim::roadmap::{self, BuiltRoadmap};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 use planner_core::prm::{PrmConfig, Sampling};
@@ -32,7 +32,7 @@ fn config(nodes: usize) -> PrmConfig {
     }
 }
 
-fn file(roadmap: &Roadmap, config: &PrmConfig) -> Vec<u8> {
+fn file(roadmap: &BuiltRoadmap, config: &PrmConfig) -> Vec<u8> {
     roadmap::encode(roadmap, &roadmap::header(config, Geodetic::default(), 0, 0))
         .expect("it is a roadmap")
 }

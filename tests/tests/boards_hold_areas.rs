@@ -2,7 +2,7 @@
 
 use host_sim::capacity::{BOARD_CORNERS, BOARDS};
 use host_sim::coverage::CoveragePlan;
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 
@@ -35,7 +35,7 @@ fn field(area: &str, height_m: f64, vehicles: usize, south_m: f64) -> String {
 fn excess(text: &str) -> ([Option<String>; 3], usize) {
     let scenario = || scenario::parse(text, "area").expect("a good scenario");
     let lanes = CoveragePlan::plan_as_companions(&scenario()).expect("lanes").tracks.lanes().len();
-    let mut mission = Mission::prepare(scenario(), &Progress::hidden()).expect("an area");
+    let mut mission = PreparedMission::prepare(scenario(), &Progress::hidden()).expect("an area");
     let plan = mission.plan().expect("a plan");
     (BOARDS.each_ref().map(|board| mission.board_limit_exceeded(&plan, board)), lanes)
 }

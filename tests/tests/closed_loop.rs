@@ -8,7 +8,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use flockmate_tests::{Guard, autopilot, free_port, host_sim, shared_data, workspace};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
 use host_sim::{scenario, swarm};
@@ -31,8 +31,8 @@ fn assert_complete_and_clean(result: &MissionResult) {
 fn fly(path: &Path, seed: Option<u64>) -> MissionResult {
     let mut scenario = scenario::load(path).expect("the scenario is good");
     scenario.seed = seed.unwrap_or(scenario.seed);
-    let mut mission =
-        Mission::prepare(scenario, &Progress::hidden()).expect("the mission can be prepared");
+    let mut mission = PreparedMission::prepare(scenario, &Progress::hidden())
+        .expect("the mission can be prepared");
     let plan = mission.plan().expect("the swarm can be planned");
     swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())
         .expect("it flies")
@@ -97,9 +97,11 @@ fn four_vehicles_fly_the_manufacturing_hall() {
 #[test]
 fn companion_and_autopilot_fly_in_two_processes() {
     let path = scenario_path("host-sim/scenarios/demo.toml");
-    let mission =
-        Mission::prepare(scenario::load(&path).expect("the scenario is good"), &Progress::hidden())
-            .expect("the mission can be prepared");
+    let mission = PreparedMission::prepare(
+        scenario::load(&path).expect("the scenario is good"),
+        &Progress::hidden(),
+    )
+    .expect("the mission can be prepared");
     let pad = mission.pad_position(mission.index_of(7).expect("the demo has a vehicle 7"));
     let home = format!("{:.8},{:.8},{:.3}", pad.lat_deg, pad.lon_deg, pad.alt_m);
     let (_autopilot, addresses) =

@@ -6,7 +6,7 @@
 
 use flockmate_tests::shared_data;
 use host_sim::map::{self, Occupancy, OccupancyMap};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario::{self, PositionErrors};
 use host_sim::{shortage, swarm};
@@ -169,7 +169,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 );
                 let mut scenario = scenario::parse(&text, "columns.toml").expect("it is one");
                 scenario.simulation.estimator = estimator;
-                Mission::prepare(scenario, &Progress::hidden())
+                PreparedMission::prepare(scenario, &Progress::hidden())
             };
             for (start, goal) in [(&other, goal), (start, &other)] {
                 let error = prepare(start, goal, NODES[0])

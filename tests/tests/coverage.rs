@@ -6,9 +6,9 @@ use flockmate_tests::costs::Costs;
 use flockmate_tests::shared_data;
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::{CoverageFindings, check_plan};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
-use host_sim::scenario::coverage::Method;
+use host_sim::scenario::coverage::CoverageMethod;
 use host_sim::scenario::{self, Scenario};
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
@@ -19,14 +19,15 @@ fn areas() -> u64 {
     std::env::var("FLOCKMATE_AREAS").ok().and_then(|n| n.parse().ok()).unwrap_or(1000)
 }
 
-fn findings(scenario: &Scenario, method: Method) -> Result<CoverageFindings, String> {
+fn findings(scenario: &Scenario, method: CoverageMethod) -> Result<CoverageFindings, String> {
     let planned = CoveragePlan::new(scenario, method).map_err(|error| format!("{error:#}"))?;
     Ok(check_plan(&planned))
 }
 
 #[test]
 fn random_areas_are_covered() {
-    const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
+    const METHODS: [CoverageMethod; 3] =
+        [CoverageMethod::SimpleBinpat, CoverageMethod::Binpat, CoverageMethod::PowellBinpat];
     let outcome = |seed: u64| -> Result<bool, String> {
         let mut random = Pcg32::seed_from_u64(seed);
         let mut text = areas::scenario(&mut random, Shape::Any, 1 + (seed % 10) as usize);
@@ -88,7 +89,7 @@ fn fields_a_little_wider_than_their_lanes_are_covered() {
         );
         let scenario =
             scenario::parse(&text, "field").unwrap_or_else(|error| panic!("{error:#}\n{text}"));
-        let findings = findings(&scenario, Method::PowellBinpat)
+        let findings = findings(&scenario, CoverageMethod::PowellBinpat)
             .unwrap_or_else(|error| panic!("{error}\n{text}"));
         if !findings.is_clean() {
             wrong.push((case, more_m / lane_m, findings.covered_share));
@@ -137,7 +138,12 @@ fn real_areas_are_covered() {
             );
         }
         let scenario = scenario::parse(&text, name).unwrap_or_else(|error| panic!("{error}"));
-        for method in [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat, Method::Exact] {
+        for method in [
+            CoverageMethod::SimpleBinpat,
+            CoverageMethod::Binpat,
+            CoverageMethod::PowellBinpat,
+            CoverageMethod::Exact,
+        ] {
             let planned = CoveragePlan::new(&scenario, method)
                 .unwrap_or_else(|error| panic!("{name}: {error:#}"));
             let found = check_plan(&planned);
@@ -268,7 +274,7 @@ fn bad_areas_are_refused_by_name_or_covered() {
         );
         let planned = scenario::parse(&text, "bad").map_err(anyhow::Error::new);
         let found = match &planned {
-            Ok(scenario) => findings(scenario, Method::PowellBinpat),
+            Ok(scenario) => findings(scenario, CoverageMethod::PowellBinpat),
             Err(error) => Err(error.to_string()),
         };
         match found {
@@ -299,12 +305,12 @@ fn what_cannot_be_flown_is_refused_by_name() {
              start = [0, -10, 0]\n{more}\n"
         );
         let scenario = scenario::parse(&text, "asked").map_err(|error| error.to_string())?;
-        let planned = CoveragePlan::new(&scenario, Method::PowellBinpat)
+        let planned = CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)
             .map_err(|error| error.to_string())?;
         let longest_s = planned.sorties.iter().map(|sortie| sortie.flown_s).fold(0.0, f32::max);
         let costs_s = planned.max_cost_s();
         drop(planned);
-        Mission::prepare(scenario, &Progress::hidden())
+        PreparedMission::prepare(scenario, &Progress::hidden())
             .map_err(|error| format!("flown: {error}"))?;
         Ok::<_, String>((longest_s, costs_s))
     };
@@ -367,7 +373,9 @@ fn starts_above_a_ground_of_unknown_altitude_are_refused() {
     };
     let planned = |alt_m: f32| {
         let scenario = scenario::parse(&text(alt_m), "degrees").expect("a scenario");
-        CoveragePlan::new(&scenario, Method::PowellBinpat).map(|_| ()).map_err(|e| e.to_string())
+        CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)
+            .map(|_| ())
+            .map_err(|e| e.to_string())
     };
     planned(0.0).expect("it is on the ground");
     let error = planned(20.0).expect_err("it is not");

@@ -8,7 +8,7 @@ use flockmate_tests::areas::Shape;
 use flockmate_tests::{areas, number};
 use host_sim::capacity::WAYPOINTS;
 use host_sim::coverage::CoveragePlan;
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::mission::stretches::next_division_inputs;
 use host_sim::progress::Progress;
 use host_sim::scenario;
@@ -43,7 +43,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
         let vehicles = 2 + (random.next_u32() % 5) as usize;
         let text = areas::lossy_radio_scenario(&mut random, vehicles, 0.0);
         let scenario = scenario::parse(&text, "area").expect("a scenario");
-        let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else {
+        let Ok(mut mission) = PreparedMission::prepare(scenario, &Progress::hidden()) else {
             return [0; 2];
         };
         let Ok(mut plan) = mission.plan() else { return [0; 2] };
@@ -128,7 +128,9 @@ fn stretches_leave_nothing_out_and_give_nothing_twice() {
         let mut random = Pcg32::seed_from_u64(seed);
         let text = areas::many_lanes_scenario(&mut random, Shape::Convex, 1 + (seed % 3) as usize);
         let Ok(scenario) = scenario::parse(&text, "area") else { return 0 };
-        let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
+        let Ok(mut mission) = PreparedMission::prepare(scenario, &Progress::hidden()) else {
+            return 0;
+        };
         let mut plan = mission.plan().expect("it was planned");
         let planned = CoveragePlan::plan_as_companions(&mission.scenario).expect("it was planned");
         let whole = (0..planned.tracks.waypoint_count())

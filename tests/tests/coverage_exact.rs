@@ -3,10 +3,10 @@
 
 use flockmate_tests::areas::{self, Shape};
 use host_sim::coverage::{CoveragePlan, divide_by_method};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
-use host_sim::scenario::coverage::Method;
+use host_sim::scenario::coverage::CoverageMethod;
 use planner_core::coverage::Flat;
 use planner_core::coverage::pack::{RouteDirection, RoutePlan, TrackUnit, Vehicle, Work};
 use rand_core::SeedableRng as _;
@@ -173,7 +173,7 @@ struct Tried {
 fn tried(seed: u64, shape: Shape) -> Option<Tried> {
     let text = drawn(seed, shape);
     let scenario = scenario::parse(&text, "random").ok()?;
-    let planned = CoveragePlan::new(&scenario, Method::Binpat).ok()?;
+    let planned = CoveragePlan::new(&scenario, CoverageMethod::Binpat).ok()?;
     if !(2..=MOST_WAYPOINTS).contains(&planned.tracks.waypoint_count()) {
         return None;
     }
@@ -187,7 +187,7 @@ fn tried(seed: u64, shape: Shape) -> Option<Tried> {
         following: planned.terrain_following,
     };
     let mut plan = RoutePlan::<{ host_sim::coverage::MAX_VEHICLES }>::new();
-    divide_by_method(&work, Method::Exact, &mut plan).ok()?;
+    divide_by_method(&work, CoverageMethod::Exact, &mut plan).ok()?;
     let lengths = Lengths::new(&planned, &vehicles);
     let all: Vec<usize> = (0..vehicles.len()).collect();
     let layers: Vec<u8> = (1..=vehicles.len() as u8).collect();
@@ -237,10 +237,10 @@ fn exact_divisions_are_planned_by_companions_or_refused_by_name() {
             .replace("id = ", "endurance_s = 7200\nid = ");
         let scenario = scenario::parse(&text, "exact").ok()?;
         let best_s = CoveragePlan::plan_as_companions(&scenario).ok()?.plan.max_cost_s();
-        match Mission::prepare(scenario.clone(), &Progress::hidden()) {
+        match PreparedMission::prepare(scenario.clone(), &Progress::hidden()) {
             Ok(_) => {
-                let powell =
-                    CoveragePlan::new(&scenario, Method::PowellBinpat).expect("it was planned");
+                let powell = CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)
+                    .expect("it was planned");
                 assert!(best_s <= powell.plan.max_cost_s() * 1.0001, "seed {seed}");
                 Some(true)
             }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use companion::margins::{self, TRACKING_M};
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::{covered, number};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 use rand_core::{Rng as _, SeedableRng as _};
@@ -211,7 +211,7 @@ fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
              [deconfliction]\nsafety_distance_m = {safety_m}\nseparation_m = {separation_m}\n"
         );
         let scenario = scenario::parse(&text, "area").expect("a scenario");
-        let mission = Mission::prepare(scenario, &Progress::hidden()).expect("a mission");
+        let mission = PreparedMission::prepare(scenario, &Progress::hidden()).expect("a mission");
         let radius_m = mission.scenario.vehicles[0].radius_m;
         let pace = |bound_m: f32| {
             margins::speed_share_for_bound(bound_m, mission.tasks[0].required_clearance_m, radius_m)
@@ -236,7 +236,8 @@ fn pictures_look_along_all_lanes_alike_or_the_way_that_is_flown() {
              personality = \"{autopilot}\"\n"
         );
         let scenario = scenario::parse(&text, "area").expect("a scenario");
-        let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("a mission");
+        let mut mission =
+            PreparedMission::prepare(scenario, &Progress::hidden()).expect("a mission");
         let mut pictures = Vec::new();
         covered::fly_on(&mut mission, &mut pictures).expect("a flight");
         // Pictures in the middle of lanes: the angle between the nose and the direction of flight.
@@ -322,7 +323,7 @@ fn pictures_are_refused_so_low_that_an_error_reaches_the_ground() {
                  estimator = \"{estimator}\"\n[[vehicles]]\nid = 1\nstart = [0, -8, 0]\npersonality = \"{autopilot}\"\n"
             );
             let scenario = scenario::parse(&text, "area").expect("a scenario");
-            Mission::prepare(scenario, &Progress::hidden())
+            PreparedMission::prepare(scenario, &Progress::hidden())
                 .map(|mission| mission.scenario.vehicles[0].radius_m)
         };
         let radius_m = prepared(35.0).expect("a mission");

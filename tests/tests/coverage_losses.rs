@@ -7,7 +7,7 @@
 use flockmate_tests::areas::Shape;
 use flockmate_tests::owners::{self, Flown};
 use flockmate_tests::{areas, covered, number};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::result::{MissionResult, VehicleResult};
 use host_sim::scenario;
@@ -264,7 +264,7 @@ fn who_lands_keeps_off_where_another_may_have_fallen() {
         let struck =
             format!("{text}[[faults]]\nat_s = {at_s:.1}\nkind = \"kill\"\nvehicle = {fallen}\n");
         let scenario = scenario::parse(&struck, "area").ok()?;
-        let mut mission = Mission::prepare(scenario, &Progress::hidden()).ok()?;
+        let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).ok()?;
         let flight = covered::flight(&mut mission, &mut Vec::new()).ok()?;
         let vehicles = || flight.result.vehicles.iter().zip(&flight.tracks);
         let lies = |wanted: u8| {

@@ -7,11 +7,11 @@ use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::{covered, number};
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::check_plan;
-use host_sim::coverage::obstacles::Obstacles;
+use host_sim::coverage::obstacles::MapObstacles;
 use host_sim::map::{Occupancy, OccupancyMap, Unknown, bt};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
-use host_sim::scenario::coverage::Method;
+use host_sim::scenario::coverage::CoverageMethod;
 use host_sim::scenario::{self, Scenario};
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
@@ -154,7 +154,7 @@ fn plans_keep_clear_of_all_that_a_map_holds_at_their_height() {
             Ok(scenario) => scenario,
             Err(error) => return refused(error.to_string()),
         };
-        let planned = match CoveragePlan::new(&scenario, Method::PowellBinpat) {
+        let planned = match CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat) {
             Ok(planned) => planned,
             Err(error) => return refused(format!("{error:#}")),
         };
@@ -200,7 +200,7 @@ fn an_area_with_towers_is_photographed_without_contact() {
     let text = with_map(FIELD, &path, 0.5);
     let prepared = || {
         let scenario = scenario::parse(&text, "area").expect("a scenario");
-        Mission::prepare(scenario, &Progress::hidden()).expect("a mission")
+        PreparedMission::prepare(scenario, &Progress::hidden()).expect("a mission")
     };
     let flight = covered::flight(&mut prepared(), &mut Vec::new()).expect("it is flown");
     if let Some(faults) = covered::faults(&flight.result) {
@@ -218,7 +218,7 @@ fn an_area_with_towers_is_photographed_without_contact() {
     let mut mission = prepared();
     let mast = [[60.0, 0.0, 0.0], [61.0, 60.0, 45.0]];
     let map = map_of(&[&BLOCKS[..], &[mast]].concat(), 0.5);
-    let obstacles = Obstacles::new(&map, Unknown::Free, 1.5);
+    let obstacles = MapObstacles::new(&map, Unknown::Free, 1.5);
     mission.scenario.area.as_mut().expect("an area").obstacles = Some(Arc::new(obstacles));
     let (result, _) = covered::fly(&mut mission).expect("it is flown");
     assert!(result.safety.wall_contacts > 0);
@@ -231,7 +231,8 @@ fn what_a_map_leaves_no_room_for_is_refused_by_name() {
     let plan = |text: &str| {
         let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
         let rings = scenario.area.as_ref().map_or(0, |area| area.rings.len());
-        CoveragePlan::new(&scenario, Method::PowellBinpat).map_err(|error| format!("{error:#}"))?;
+        CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)
+            .map_err(|error| format!("{error:#}"))?;
         Ok::<_, String>(rings)
     };
     let beside = |boxes: &[Block]| {

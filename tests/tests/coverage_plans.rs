@@ -7,12 +7,12 @@ use companion::link::frame::{self, Framer, Header};
 use companion::time::Instant;
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::{self, Picture};
-use host_sim::coverage::export::{self, MissionItem};
+use host_sim::coverage::export::{self, ExportedItem};
 use host_sim::coverage::flight::{FlightPoint, WaypointAction};
 use host_sim::scenario;
-use host_sim::scenario::coverage::Method;
+use host_sim::scenario::coverage::CoverageMethod;
 use planner_core::Point;
-use sim_autopilot::{Autopilot, AutopilotKind, Config, Photo};
+use sim_autopilot::{Autopilot, AutopilotConfig, Photo, SimulatedKind};
 
 /// Greatest horizontal distance at which a waypoint is passed, metres: 2 m, and the flight of one
 /// step.
@@ -79,7 +79,7 @@ impl Client {
         }
     }
 
-    fn upload(&mut self, items: &[MissionItem]) {
+    fn upload(&mut self, items: &[ExportedItem]) {
         let count = items.len() as u16;
         let [low, high] = count.to_le_bytes();
         self.send(44, &[low, high, 1, 1, 0]);
@@ -120,18 +120,18 @@ impl Client {
 fn fly(
     planned: &CoveragePlan<'_>,
     points: &[FlightPoint],
-    items: &[MissionItem],
-    personality: AutopilotKind,
+    items: &[ExportedItem],
+    personality: SimulatedKind,
 ) -> Vec<Photo> {
     let origin = planned.area_settings.origin;
     let start = points[0].position;
-    let config = Config {
+    let config = AutopilotConfig {
         autopilot: personality,
         world_origin: origin,
         ekf_origin: origin,
         start,
         estimator_ready_s: 2.0,
-        ..Config::default()
+        ..AutopilotConfig::default()
     };
     let autopilot = Autopilot::new(&config).expect("a sound configuration");
     let mut client = Client {
@@ -143,16 +143,16 @@ fn fly(
     };
     client.run(3.0);
     // The delay item is left out, as it serves the swarm; ArduPilot's item 0 is home.
-    let mut items: Vec<MissionItem> =
+    let mut items: Vec<ExportedItem> =
         items.iter().filter(|item| item.command != 93).cloned().collect();
-    if personality == AutopilotKind::Ardupilot {
+    if personality == SimulatedKind::Ardupilot {
         items.insert(
             0,
-            MissionItem { command: 16, frame: 0, params: [Some(0.0); 4], place: [0.0; 3] },
+            ExportedItem { command: 16, frame: 0, params: [Some(0.0); 4], place: [0.0; 3] },
         );
     }
     client.upload(&items);
-    if personality == AutopilotKind::Ardupilot {
+    if personality == SimulatedKind::Ardupilot {
         client.command(176, 1.0, 4.0);
         client.command(400, 1.0, 0.0);
     }
@@ -173,7 +173,7 @@ fn fly(
         (client.autopilot.true_state().position - points[points.len() - 1].position).xy().norm();
     assert!(off < 1.0, "{personality:?} came home {off} m off");
     let all: Vec<u16> =
-        (u16::from(personality == AutopilotKind::Ardupilot)..items.len() as u16).collect();
+        (u16::from(personality == SimulatedKind::Ardupilot)..items.len() as u16).collect();
     assert_eq!(client.reached, all, "each item is reported once");
     let photos = client.autopilot.take_photos();
     assert_eq!(client.announced, photos.len(), "each picture is announced");
@@ -213,9 +213,9 @@ fn judge_gaps(photos: &[Photo], wanted: &[&FlightPoint], label: &str) {
 }
 
 /// Flies the plans of a scenario, and judges their pictures.
-fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
+fn judge(text: &str, personality: SimulatedKind, trigger: &str) {
     let scenario = scenario::parse(text, "plans").expect("a scenario");
-    let planned = CoveragePlan::new(&scenario, Method::Binpat).expect("a plan");
+    let planned = CoveragePlan::new(&scenario, CoverageMethod::Binpat).expect("a plan");
     let flights = planned.flights();
     assert_eq!(flights.len(), 2);
     for (sortie, points, _) in &flights {
@@ -256,7 +256,7 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
             }
             _ => assert_eq!(photos.len(), 0, "{label}"),
         }
-        if personality == AutopilotKind::Px4 && trigger == "waypoint" {
+        if personality == SimulatedKind::Px4 && trigger == "waypoint" {
             // With the heading of the sweep all pictures look the same way, within the error for
             // which PX4 waits.
             let turned =
@@ -266,8 +266,8 @@ fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
     }
 }
 
-const ALL: [(&str, AutopilotKind); 2] =
-    [("px4", AutopilotKind::Px4), ("ardupilot", AutopilotKind::Ardupilot)];
+const ALL: [(&str, SimulatedKind); 2] =
+    [("px4", SimulatedKind::Px4), ("ardupilot", SimulatedKind::Ardupilot)];
 
 #[test]
 fn each_plan_is_flown_and_photographs_what_was_planned() {
@@ -303,7 +303,7 @@ fn plans_above_terrain_are_flown_as_planned() {
             let text = scenario(name, trigger).replace("height_m", &terrain);
             judge(&text, personality, trigger);
             let found = scenario::parse(&text, "plans").expect("a scenario");
-            let planned = CoveragePlan::new(&found, Method::Binpat).expect("a plan");
+            let planned = CoveragePlan::new(&found, CoverageMethod::Binpat).expect("a plan");
             let flights = planned.flights();
             let heights = flights
                 .iter()
@@ -327,7 +327,7 @@ fn plans_flown_without_a_companion_photograph_the_whole_area() {
             let text = scenario(name, trigger).replace("lane_m = 9.0\nwaypoint_m = 8.0", camera);
             assert!(text.contains(camera));
             let scenario = scenario::parse(&text, "plans").expect("a scenario");
-            let planned = CoveragePlan::new(&scenario, Method::Binpat).expect("a plan");
+            let planned = CoveragePlan::new(&scenario, CoverageMethod::Binpat).expect("a plan");
             let mut pictures = Vec::new();
             for (sortie, points, _) in &planned.flights() {
                 let items = export::flight_items(&planned, sortie, points);

@@ -9,7 +9,7 @@ use std::fmt::Write as _;
 
 use flockmate_tests::areas::SMALL_FIELD;
 use flockmate_tests::{covered, number};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
 use host_sim::scenario;
@@ -22,7 +22,7 @@ const START_CANCELLED: &str = "Its part was given away: start cancelled";
 
 fn fly(text: &str) -> (MissionResult, String) {
     let scenario = scenario::parse(text, "area").expect("a scenario");
-    let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("a plan");
+    let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).expect("a plan");
     let (result, log) = covered::fly(&mut mission).expect("a flight");
     (result, covered::log_lines(&log))
 }

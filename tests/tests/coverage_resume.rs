@@ -17,10 +17,10 @@ use flockmate_tests::areas::{self, SMALL_FIELD};
 use flockmate_tests::{covered, host_sim, number};
 use host_sim::coverage::check::Picture;
 use host_sim::flash::{HOST_FLASH_LAYOUT, HostFlash};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
-use host_sim::scenario::{self, Companion};
+use host_sim::scenario::{self, CompanionHost};
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -71,9 +71,9 @@ fn fly(
     let mut scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
     for vehicle in &mut scenario.vehicles {
         let flash = Some(dir.join(format!("{}.flash", vehicle.id)));
-        vehicle.companion = Companion::InProcess { flash };
+        vehicle.companion = CompanionHost::InProcess { flash };
     }
-    let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
+    let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).map_err(said)?;
     let (result, log) = covered::fly_on(&mut mission, pictures).map_err(said)?;
     Ok((result, covered::log_lines(&log)))
 }

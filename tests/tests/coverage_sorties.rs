@@ -5,7 +5,7 @@ use flockmate_tests::areas::{self, Shape};
 use host_sim::coverage::check::{CoverageFindings, check_plan};
 use host_sim::coverage::sorties::{BATTERY_SWAP_S, Sortie, USABLE_CHARGE};
 use host_sim::coverage::{CoveragePlan, SortieFlight, export, flight};
-use host_sim::scenario::coverage::Method;
+use host_sim::scenario::coverage::CoverageMethod;
 use host_sim::scenario::{self, Scenario};
 use planner_core::coverage::pack::Route;
 use rand_core::SeedableRng as _;
@@ -147,7 +147,8 @@ fn judge(seed: u64) -> Option<Seen> {
     let mut random = Pcg32::seed_from_u64(seed);
     let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
     let text = areas::scenario(&mut random, shape, 1 + (seed % 5) as usize);
-    let methods = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
+    let methods =
+        [CoverageMethod::SimpleBinpat, CoverageMethod::Binpat, CoverageMethod::PowellBinpat];
     let method = methods[(seed % 3) as usize];
     let plain = scenario::parse(&text, "plain").ok()?;
     let whole = CoveragePlan::new(&plain, method).ok()?;
@@ -226,7 +227,7 @@ fn without_batteries_a_route_that_takes_longer_is_refused() {
                 endurance_s = 500\n";
     let sorties = |text: &str| -> Result<usize, String> {
         let scenario = scenario::parse(text, "one battery").expect("a scenario");
-        let planned = CoveragePlan::new(&scenario, Method::PowellBinpat)
+        let planned = CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)
             .map_err(|error| format!("{error:#}"))?;
         judge_route(&planned, &planned.plan.routes[0], 500.0 * USABLE_CHARGE, &mut Seen::default());
         Ok(planned.sorties.len())

@@ -10,7 +10,7 @@ use flockmate_tests::shared_data;
 use heapless::Vec as Few;
 use host_sim::capacity::BOARDS;
 use host_sim::map::{self, Unknown, VoxelMap, building};
-use host_sim::roadmap::{self, Roadmap};
+use host_sim::roadmap::{self, BuiltRoadmap};
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::Path;
@@ -54,7 +54,7 @@ fn files(map: &VoxelMap, clearance_m: f32) -> Files {
     let (roadmap, _) = roadmap::build(map, &[], &config).expect("there is free space");
     let roadmap = roadmap.fit_to_board(&BOARDS[0]).expect("it can be cut down");
     let header = roadmap::header(&config, Geodetic::default(), 0, GOALS);
-    let Roadmap { nodes, edges, .. } = &roadmap;
+    let BuiltRoadmap { nodes, edges, .. } = &roadmap;
     let mut old = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).expect("it is small")];
     let mut ws = Box::new(SearchWorkspace::<HOST>::new());
     write_with_landmarks(&header, nodes, edges, &[], &mut ws, &mut old).expect("it is a roadmap");

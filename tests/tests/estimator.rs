@@ -2,7 +2,7 @@
 //! suffice by true motion.
 
 use host_sim::margins;
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario::{self, PositionErrors, Scenario, ScenarioError};
 use host_sim::swarm;
@@ -49,7 +49,7 @@ fn the_demo_flies_clean_by_the_truth_at_the_margins_for_recorded_errors() {
         .unwrap_or(SEEDS);
     for seed in 1..=seeds {
         let mut mission =
-            Mission::prepare(demo(seed, 0.9, 3.3).unwrap(), &Progress::hidden()).unwrap();
+            PreparedMission::prepare(demo(seed, 0.9, 3.3).unwrap(), &Progress::hidden()).unwrap();
         let plan = mission.plan().unwrap();
         let flight =
             swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden()).unwrap();

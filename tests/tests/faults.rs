@@ -14,12 +14,12 @@
 //! whose lines contain this text, `FLOCKMATE_FAULT_SEED=17` one seed, and prints its logs.
 
 use flockmate_tests::vehicle::ahead;
-use host_sim::mission::{Mission, SwarmPlan};
+use host_sim::mission::{HostPlan, PreparedMission};
 use host_sim::progress::Progress;
-use host_sim::report::Event;
+use host_sim::report::LogEvent;
 use host_sim::result::VehicleResult;
 use host_sim::scenario::{self, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence};
-use host_sim::swarm::{self, Flight};
+use host_sim::swarm::{self, SwarmFlight};
 use planner_core::Point;
 use rayon::prelude::*;
 
@@ -109,7 +109,7 @@ impl Case {
         self.script.contains("late-plan") || self.script.contains("bad-roadmap")
     }
 
-    fn faults(&self, at_s: f32, vehicle: u8, plan: &SwarmPlan) -> Vec<Fault> {
+    fn faults(&self, at_s: f32, vehicle: u8, plan: &HostPlan) -> Vec<Fault> {
         let [x, y, z] = ahead(&plan.flights[usize::from(vehicle) - 1].path).into();
         let script = self
             .script
@@ -124,23 +124,23 @@ impl Case {
 }
 
 /// The demo's mission by a seed, and its plan.
-fn prepare(seed: u64) -> (Mission, Box<SwarmPlan>) {
+fn prepare(seed: u64) -> (PreparedMission, Box<HostPlan>) {
     prepare_inside(None, seed)
 }
 
 /// As [`prepare`], planned inside a geofence.
-fn prepare_inside(geofence: Option<Geofence>, seed: u64) -> (Mission, Box<SwarmPlan>) {
+fn prepare_inside(geofence: Option<Geofence>, seed: u64) -> (PreparedMission, Box<HostPlan>) {
     let mut scenario = scenario::parse(DEMO, "demo.toml").expect("the demo is good");
     scenario.seed = seed;
     scenario.simulation.time_limit_s = TIME_LIMIT_S;
     scenario.mission.geofence = geofence;
     let mut mission =
-        Mission::prepare(scenario, &Progress::on_terminal()).expect("the demo has room");
+        PreparedMission::prepare(scenario, &Progress::on_terminal()).expect("the demo has room");
     let plan = mission.plan().expect("the demo has a plan");
     (mission, plan)
 }
 
-fn fly(mission: &Mission, plan: &SwarmPlan) -> Flight {
+fn fly(mission: &PreparedMission, plan: &HostPlan) -> SwarmFlight {
     swarm::fly(mission, plan, "fly", swarm::Pace::Fastest, &Progress::on_terminal())
         .expect("the script can be played")
 }
@@ -156,10 +156,10 @@ struct Outcome {
     wrong: Vec<String>,
 }
 
-fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
+fn judge(case: &Case, flight: &SwarmFlight, at_s: f32, struck: &[u8]) -> Outcome {
     let result = &flight.result;
     let (mut wrong, mut notes) = (Vec::new(), Vec::new());
-    let is_struck = |e: &Event| e.vehicle.is_some_and(|id| struck.contains(&id));
+    let is_struck = |e: &LogEvent| e.vehicle.is_some_and(|id| struck.contains(&id));
     let said = |text: &str| flight.log.iter().any(|e| is_struck(e) && e.text.contains(text));
     // A vehicle that is out of the plan descends where it is, whatever is there.
     let own_contacts_count = case.then == GoesOn;
@@ -174,7 +174,7 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
     // A vehicle that was unavoidably hit counts as struck from then on; the simulation lets it fly
     // on.
     let is_hit =
-        |e: &&Event| e.text.contains("is hit by falling") && is_unavoidable(flight, at_s, e);
+        |e: &&LogEvent| e.text.contains("is hit by falling") && is_unavoidable(flight, at_s, e);
     let hit_at: Vec<(u8, f32)> =
         flight.log.iter().filter(is_hit).filter_map(|e| Some((e.vehicle?, e.t_s))).collect();
     for e in &flight.log {
@@ -217,7 +217,8 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
         wrong.push(format!("none of {struck:?} said {AT_FENCE:?}"));
     }
     for vehicle in struck {
-        let log: Vec<&Event> = flight.log.iter().filter(|e| e.vehicle == Some(*vehicle)).collect();
+        let log: Vec<&LogEvent> =
+            flight.log.iter().filter(|e| e.vehicle == Some(*vehicle)).collect();
         let by = |text: &str, t_s: f32| log.iter().any(|e| e.t_s < t_s && e.text.contains(text));
         let on_path = by("Following the path", at_s) && !by(AT_GOAL, at_s + 3.0);
         let says = |text: &&str| log.iter().any(|e| e.t_s >= at_s && e.text.contains(*text));
@@ -234,7 +235,7 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
 /// s of radio delay and two steps of 0.05 s. The airframe responds 0.55 s later, then gains
 /// distance at 1.5 m/s². The missing distance is the horizontal overlap of both hulls (radius 0.3 m
 /// each).
-fn is_unavoidable(flight: &Flight, at_s: f32, hit: &Event) -> bool {
+fn is_unavoidable(flight: &SwarmFlight, at_s: f32, hit: &LogEvent) -> bool {
     let wreck = hit.text.rsplit(' ').next().and_then(|n| n.parse::<usize>().ok());
     let (Some(wreck), Some(vehicle)) = (wreck, hit.vehicle) else { return false };
     // The track nearest to the hit: positions are recorded every 0.2 s.
@@ -252,7 +253,7 @@ fn is_unavoidable(flight: &Flight, at_s: f32, hit: &Event) -> bool {
 
 /// A geofence that the paths of one to three vehicles leave and from which all other paths keep the
 /// greatest distance, and the ids of these vehicles.
-fn fence_for_some(plan: &SwarmPlan) -> (Vec<u8>, Geofence) {
+fn fence_for_some(plan: &HostPlan) -> (Vec<u8>, Geofence) {
     let reach = |axis: usize, sign: f32, i: usize| {
         let points = plan.flights[i].path.waypoints().iter();
         points.map(|w| sign * w.position[axis]).fold(f32::NEG_INFINITY, f32::max)
@@ -287,8 +288,8 @@ fn seeds() -> (std::ops::RangeInclusive<u64>, bool) {
     }
 }
 
-fn print_log(flight: &Flight) {
-    let mut log: Vec<&Event> = flight.log.iter().collect();
+fn print_log(flight: &SwarmFlight) {
+    let mut log: Vec<&LogEvent> = flight.log.iter().collect();
     log.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
     for e in log {
         println!("{:7.2} s {:?} {}", e.t_s, e.vehicle, e.text);
@@ -370,7 +371,7 @@ fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
 }
 
 /// Number of paths that leave a box.
-fn count_outside(plan: &SwarmPlan, fence: &Geofence) -> usize {
+fn count_outside(plan: &HostPlan, fence: &Geofence) -> usize {
     let paths = plan.flights.iter().map(|flight| flight.path.waypoints());
     paths.filter(|points| points.iter().any(|w| !fence.contains(&w.position))).count()
 }

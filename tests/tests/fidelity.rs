@@ -2,7 +2,7 @@
 //! the whole table.
 
 use flockmate_tests::fidelity::{Correction, Estimator, RUNS, Recording, allowed_m, recordings};
-use sim_autopilot::AutopilotKind;
+use sim_autopilot::SimulatedKind;
 
 /// The recorded flights that no pilot or failsafe interrupted, with their allowed difference,
 /// metres.
@@ -21,7 +21,7 @@ fn plain_flights_are_flown_again_as_they_were_recorded() {
         assert!(c.whole.rms <= allowed_m.min(0.2), "{name}");
         // NaN where the flight has no such part.
         assert!(!(c.lift_off.rms > 0.3 || c.landing.rms > 0.3), "{name}");
-        let in_follow_m = if recording.autopilot == AutopilotKind::Ardupilot { 0.08 } else { 0.12 };
+        let in_follow_m = if recording.autopilot == SimulatedKind::Ardupilot { 0.08 } else { 0.12 };
         assert!(c.follow.rms.is_nan() || c.follow.rms <= in_follow_m, "{name}");
     }
 }
@@ -31,7 +31,7 @@ fn plain_flights_do_not_need_the_recorded_errors_to_come_near() {
     for (recording, allowed_m) in plain() {
         let c = recording.compare(Estimator::Perfect, Correction::Simulated);
         // Two recorded flights of one mission differ by 0.24 to 0.51 m with PX4.
-        let px4 = recording.autopilot == AutopilotKind::Px4;
+        let px4 = recording.autopilot == SimulatedKind::Px4;
         let name = format!("{} {}: {c:.2?}", recording.run, recording.vehicle);
         println!("{name}");
         assert!(c.whole.rms <= if px4 { 0.45 } else { allowed_m }, "{name}");
@@ -47,7 +47,7 @@ fn setpoints_as_they_were_sent_are_flown_as_recorded_under_the_recorded_errors()
         println!("{name}");
         assert!(c.whole.rms <= allowed_m.min(0.25), "{name}");
         assert!(!(c.lift_off.rms > 0.3 || c.landing.rms > 0.3), "{name}");
-        let in_follow_m = if recording.autopilot == AutopilotKind::Ardupilot { 0.08 } else { 0.2 };
+        let in_follow_m = if recording.autopilot == SimulatedKind::Ardupilot { 0.08 } else { 0.2 };
         assert!(c.follow.rms.is_nan() || c.follow.rms <= in_follow_m, "{name}");
     }
 }

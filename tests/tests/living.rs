@@ -5,7 +5,7 @@ use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config, Event, Instant, Link, State};
 use planner_core::Point;
 use planner_core::flight::{Path, Task, VehiclePlan};
-use sim_autopilot::{Autopilot, AutopilotKind, Mode, ardupilot};
+use sim_autopilot::{Autopilot, Px4Mode, SimulatedKind, ardupilot};
 
 const STEP_US: u64 = 4_000;
 const START: Point = Point::new(0.0, 0.0, 2.0);
@@ -31,11 +31,11 @@ struct Pair {
 }
 
 impl Pair {
-    fn new(personality: AutopilotKind) -> Self {
-        let config = sim_autopilot::Config {
+    fn new(personality: SimulatedKind) -> Self {
+        let config = sim_autopilot::AutopilotConfig {
             autopilot: personality,
             estimator_ready_s: READY_S,
-            ..sim_autopilot::Config::default()
+            ..sim_autopilot::AutopilotConfig::default()
         };
         let mut autopilot = Autopilot::new(&config).unwrap();
         autopilot.land_on_stream_loss();
@@ -53,7 +53,7 @@ impl Pair {
     }
 
     /// A pair in flight, in the middle of its path.
-    fn following(personality: AutopilotKind) -> Self {
+    fn following(personality: SimulatedKind) -> Self {
         let mut pair = Self::new(personality);
         pair.until(State::Ready);
         pair.command(191, 300, [0.0; 2]);
@@ -204,7 +204,7 @@ fn plan() -> VehiclePlan<16, 8> {
 
 #[test]
 fn px4s_flood_with_messages_nobody_knows_is_lived_with() {
-    let mut pair = Pair::following(AutopilotKind::Px4);
+    let mut pair = Pair::following(SimulatedKind::Px4);
     pair.until(State::Done);
     pair.assert_at_goal();
     let counters = pair.companion.counters(Link::Autopilot);
@@ -214,7 +214,7 @@ fn px4s_flood_with_messages_nobody_knows_is_lived_with() {
 
 #[test]
 fn px4s_failsafe_is_left_alone_to_the_ground() {
-    let mut pair = Pair::following(AutopilotKind::Px4);
+    let mut pair = Pair::following(SimulatedKind::Px4);
     pair.stalled = true;
     pair.run(2.5);
     assert!(pair.autopilot.in_failsafe());
@@ -231,21 +231,21 @@ fn px4s_failsafe_is_left_alone_to_the_ground() {
 
 #[test]
 fn px4_disarms_itself_after_landing_and_shows_offboard_again() {
-    let mut pair = Pair::following(AutopilotKind::Px4);
+    let mut pair = Pair::following(SimulatedKind::Px4);
     pair.until(State::Disarm);
     let since_us = pair.now_us;
     pair.until(State::Done);
     assert!(pair.asked(since_us, ARM).is_empty(), "it was given the time to");
     pair.run(10.0);
-    assert_eq!(pair.autopilot.custom_mode(), Mode::Offboard.custom_mode());
+    assert_eq!(pair.autopilot.custom_mode(), Px4Mode::Offboard.custom_mode());
     assert_eq!(pair.companion.state(), State::Done);
     assert_eq!(pair.count(pair.entered(State::Done), SETPOINT), 0);
 }
 
 #[test]
 fn a_hold_px4s_pilot_chose_stays_until_offboard_and_a_word() {
-    let mut pair = Pair::following(AutopilotKind::Px4);
-    pair.autopilot.set_pilot_mode(Mode::Hold);
+    let mut pair = Pair::following(SimulatedKind::Px4);
+    pair.autopilot.set_pilot_mode(Px4Mode::Hold);
     pair.until(State::PilotControl);
     let since_us = pair.now_us;
     pair.run(5.0);
@@ -265,7 +265,7 @@ fn a_hold_px4s_pilot_chose_stays_until_offboard_and_a_word() {
 
 #[test]
 fn arducopters_estimator_is_waited_for_and_its_stray_parameters_passed_over() {
-    let mut pair = Pair::new(AutopilotKind::Ardupilot);
+    let mut pair = Pair::new(SimulatedKind::Ardupilot);
     pair.run(READY_S - 1.0);
     assert_eq!(pair.companion.state(), State::WaitPosition);
     pair.run(30.0);
@@ -281,7 +281,7 @@ fn arducopters_armed_bit_may_come_a_second_late() {
     // HEARTBEAT comes at 1 Hz: eight starts spread over its period.
     let mut latest_us = 0;
     for phase in 0..8 {
-        let mut pair = Pair::new(AutopilotKind::Ardupilot);
+        let mut pair = Pair::new(SimulatedKind::Ardupilot);
         pair.until(State::Ready);
         pair.run(0.125 * phase as f32);
         pair.command(191, 300, [0.0; 2]);
@@ -300,7 +300,7 @@ fn arducopters_armed_bit_may_come_a_second_late() {
 
 #[test]
 fn a_stall_beside_arducopter_does_not_fly_the_last_velocity_on() {
-    let mut pair = Pair::following(AutopilotKind::Ardupilot);
+    let mut pair = Pair::following(SimulatedKind::Ardupilot);
     pair.stalled = true;
     let before = pair.at();
     let mut farthest_m = 0.0_f32;
@@ -318,8 +318,8 @@ fn a_stall_beside_arducopter_does_not_fly_the_last_velocity_on() {
 
 #[test]
 fn a_stream_that_still_runs_when_arducopters_pilot_returns_holds_the_place() {
-    let mut pair = Pair::following(AutopilotKind::Ardupilot);
-    pair.autopilot.set_pilot_mode(ardupilot::Mode::Brake);
+    let mut pair = Pair::following(SimulatedKind::Ardupilot);
+    pair.autopilot.set_pilot_mode(ardupilot::CopterMode::Brake);
     pair.until(State::PilotControl);
     pair.run(3.0);
     let at = pair.at();
@@ -334,7 +334,7 @@ fn a_stream_that_still_runs_when_arducopters_pilot_returns_holds_the_place() {
 
 #[test]
 fn arducopters_ground_station_failsafe_ends_the_mission() {
-    let mut pair = Pair::new(AutopilotKind::Ardupilot);
+    let mut pair = Pair::new(SimulatedKind::Ardupilot);
     pair.autopilot.set_parameter("FS_GCS_ENABLE", 1).unwrap();
     let beat = [0, 0, 0, 0, 6, 8, 0, 4, 3];
     pair.until(State::Ready);
@@ -352,7 +352,7 @@ fn arducopters_ground_station_failsafe_ends_the_mission() {
 
 #[test]
 fn an_autopilot_that_reboots_on_the_ground_is_asked_for_its_streams_again() {
-    for personality in [AutopilotKind::Px4, AutopilotKind::Ardupilot] {
+    for personality in [SimulatedKind::Px4, SimulatedKind::Ardupilot] {
         let mut pair = Pair::new(personality);
         pair.until(State::Ready);
         pair.autopilot.reboot();

@@ -20,7 +20,7 @@ use planner_core::frames::Geodetic;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
-use sim_autopilot::{Autopilot, AutopilotKind};
+use sim_autopilot::{Autopilot, SimulatedKind};
 
 /// Where PX4's recording was flown.
 const ORIGIN: Geodetic = Geodetic { lat_deg: 47.397_741_4, lon_deg: 8.545_596_2, alt_m: 489.8 };
@@ -128,16 +128,16 @@ struct Victims {
 impl Victims {
     fn new() -> Self {
         let autopilot = |personality| {
-            let config = sim_autopilot::Config {
+            let config = sim_autopilot::AutopilotConfig {
                 autopilot: personality,
-                ..sim_autopilot::Config::default()
+                ..sim_autopilot::AutopilotConfig::default()
             };
             Autopilot::new(&config).unwrap()
         };
         Self {
             now: Instant::ZERO,
             companion: Companion::new(Config::new(1, START, ORIGIN)).unwrap(),
-            autopilots: [AutopilotKind::Px4, AutopilotKind::Ardupilot].map(autopilot),
+            autopilots: [SimulatedKind::Px4, SimulatedKind::Ardupilot].map(autopilot),
             heard: [const { Framer::new() }; 4],
             said: 0,
         }

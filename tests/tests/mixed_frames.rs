@@ -6,7 +6,7 @@
 
 use companion::Instant;
 use companion::link::frame::Framer;
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 use host_sim::swarm::ground_station::GroundStation;
@@ -109,7 +109,8 @@ fn fly(seed: u64) -> Errors {
     let text = scenario_text(&mut rng);
     let scenario =
         scenario::parse(&text, "mixed frames").unwrap_or_else(|e| panic!("mission {seed}: {e}"));
-    let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("the lobby is free");
+    let mut mission =
+        PreparedMission::prepare(scenario, &Progress::hidden()).expect("the lobby is free");
     let plan = mission.plan().expect("they fly side by side");
     let mut members = vehicles_on_pads(&mission).expect("good vehicles");
     // The radio has one station more than vehicles, which only listens.

@@ -1,7 +1,7 @@
 //! The demo's building flown by PX4 and ArduCopter together: with the same companions and the same
 //! plan, no vehicle touches anything.
 
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario::{self, AutopilotKind};
 use host_sim::swarm;
@@ -14,7 +14,7 @@ fn half_the_demo_by_ardupilot_is_complete_and_clean() {
     for vehicle in scenario.vehicles.iter_mut().filter(|vehicle| vehicle.id % 2 == 0) {
         vehicle.personality = AutopilotKind::ArduPilot;
     }
-    let mut mission = Mission::prepare(scenario, &Progress::hidden()).unwrap();
+    let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).unwrap();
     let plan = mission.plan().unwrap();
     let flight =
         swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden()).unwrap();

@@ -14,7 +14,7 @@ use flockmate_tests::{logs, shared_data};
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA};
 use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
-use sim_autopilot::{Autopilot, AutopilotKind, Config};
+use sim_autopilot::{Autopilot, AutopilotConfig, SimulatedKind};
 
 const COMMAND_ACK: u32 = 77;
 const HEARTBEAT: u32 = 0;
@@ -74,7 +74,7 @@ impl Story {
 
 /// Sends a simulated autopilot the messages that were sent to the real one, which had booted
 /// `booted_s` before the recording. Returns both stories.
-fn replay(recorded: &[Recorded], config: &Config, booted_s: f64) -> (Story, Story) {
+fn replay(recorded: &[Recorded], config: &AutopilotConfig, booted_s: f64) -> (Story, Story) {
     let mut autopilot = Autopilot::new(config).unwrap();
     let (mut framer, mut buffer) = (Framer::new(), [0; 2048]);
     let (mut real, mut simulated) = (Story::default(), Story::default());
@@ -132,12 +132,12 @@ fn assert_same_acks(real: &Story, simulated: &Story) {
 fn the_simulated_arducopter_answers_as_the_recorded_one_did() {
     let Some(path) = shared_data("mavlink/arducopter-4.6-guided.tlog") else { return };
     let origin = Geodetic { lat_deg: -35.363_262, lon_deg: 149.165_237, alt_m: 584.09 };
-    let config = Config {
-        autopilot: AutopilotKind::Ardupilot,
+    let config = AutopilotConfig {
+        autopilot: SimulatedKind::Ardupilot,
         world_origin: origin,
         ekf_origin: origin,
         estimator_ready_s: 41.6,
-        ..Config::default()
+        ..AutopilotConfig::default()
     };
     // TIMESYNC: 10.002 s after boot came 7.648 s into the recording.
     let (real, simulated) = replay(&recording(&path), &config, 2.353);
@@ -150,7 +150,8 @@ fn the_simulated_arducopter_answers_as_the_recorded_one_did() {
 fn the_simulated_px4_answers_as_the_recorded_one_did() {
     let Some(path) = shared_data("mavlink/px4-1.17-offboard.tlog") else { return };
     let origin = Geodetic { lat_deg: 47.397_741_4, lon_deg: 8.545_596_2, alt_m: 489.8 };
-    let config = Config { world_origin: origin, ekf_origin: origin, ..Config::default() };
+    let config =
+        AutopilotConfig { world_origin: origin, ekf_origin: origin, ..AutopilotConfig::default() };
     let (real, simulated) = replay(&recording(&path), &config, 1.0);
     assert_same_acks(&real, &simulated);
     assert_eq!(real.modes, simulated.modes);

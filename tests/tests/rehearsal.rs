@@ -11,7 +11,7 @@ use std::time::{Duration, Instant as Clock};
 use companion::Instant;
 use companion::link::frame::{self, Framer, Header};
 use flockmate_tests::{Guard, autopilot, free_port, host_sim, listening, workspace};
-use host_sim::link::{Link, LinkUrl};
+use host_sim::link::{ByteLink, LinkUrl};
 use serialport::TTYPort;
 
 /// Timeout of a wait. A machine may stand still for long; no step that works takes half as long.
@@ -75,7 +75,7 @@ impl Flight {
 
 /// A pilot's or operator's link.
 struct Ground {
-    link: Box<dyn Link>,
+    link: Box<dyn ByteLink>,
     framer: Framer,
     sequence: u8,
     began: Clock,

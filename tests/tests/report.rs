@@ -13,7 +13,7 @@ use std::time::Duration;
 use flockmate_tests::areas::SMALL_FIELD;
 use flockmate_tests::{Guard, chromium, host_sim};
 use host_sim::report::{
-    Curve, Event, Level, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint,
+    Curve, Level, LogEvent, MapSurface, Plot, PlotLimit, ReportData, RoadmapLines, TrackPoint,
     VehicleTrack, page as page_of, vehicle_color,
 };
 use planner_core::Point;
@@ -103,7 +103,7 @@ fn report() -> ReportData {
         t_s: vec![0.0, 4.0, 8.0, 12.0],
         values: vec![4.5, 1.9, f32::NAN, 3.0],
     };
-    let limit = Some(Limit { value: 1.5, label: "safety distance".to_owned() });
+    let limit = Some(PlotLimit { value: 1.5, label: "safety distance".to_owned() });
     let plot = |title: &str, limit, curves| Plot {
         title: title.to_owned(),
         unit: "m".to_owned(),
@@ -111,7 +111,7 @@ fn report() -> ReportData {
         curves,
     };
     let event =
-        |t_s, vehicle, level, text: &str| Event { t_s, vehicle, level, text: text.to_owned() };
+        |t_s, vehicle, level, text: &str| LogEvent { t_s, vehicle, level, text: text.to_owned() };
     ReportData {
         title: "Two rooms </script><b>&".to_owned(),
         command: "fly".to_owned(),

@@ -14,9 +14,9 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
-use sim_autopilot::{Autopilot, AutopilotKind, Config};
+use sim_autopilot::{Autopilot, AutopilotConfig, SimulatedKind};
 
-use crate::link::{Link, LinkUrl};
+use crate::link::{ByteLink, LinkUrl};
 use crate::progress::check_printed;
 use crate::say;
 
@@ -36,7 +36,7 @@ pub struct AutopilotArgs {
     pub listen: Vec<LinkUrl>,
     /// Autopilot to simulate
     #[arg(long, value_name = "NAME", default_value = "px4", value_parser = autopilot_kind_parser())]
-    pub personality: AutopilotKind,
+    pub personality: SimulatedKind,
     /// MAVLink system id
     #[arg(long, value_name = "N", default_value_t = 1)]
     #[arg(value_parser = clap::value_parser!(u8).range(1..))]
@@ -57,9 +57,9 @@ pub struct AutopilotArgs {
     pub origin: Option<Place>,
 }
 
-fn autopilot_kind_parser() -> impl TypedValueParser<Value = AutopilotKind> {
+fn autopilot_kind_parser() -> impl TypedValueParser<Value = SimulatedKind> {
     let names = PossibleValuesParser::new(["px4", "ardupilot"]);
-    names.map(|name| if name == "px4" { AutopilotKind::Px4 } else { AutopilotKind::Ardupilot })
+    names.map(|name| if name == "px4" { SimulatedKind::Px4 } else { SimulatedKind::Ardupilot })
 }
 
 fn parse_seconds(text: &str) -> Result<f32, String> {
@@ -96,7 +96,7 @@ impl FromStr for Place {
 /// A link cannot be opened or is permanently lost, or the autopilot cannot be simulated.
 pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
     let home = args.home.0;
-    let config = Config {
+    let config = AutopilotConfig {
         system_id: args.sysid,
         autopilot: args.personality,
         world_origin: home,
@@ -108,7 +108,7 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
             .map_or(0, |t| t.as_micros() as u64),
         ports: args.listen.len(),
         forwards: true,
-        ..Config::default()
+        ..AutopilotConfig::default()
     };
     let mut autopilot =
         Autopilot::new(&config).context("cannot simulate the autopilot: --personality")?;
@@ -142,7 +142,7 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
 fn exchange_bytes(
     autopilot: &mut Autopilot,
     port: usize,
-    link: &mut dyn Link,
+    link: &mut dyn ByteLink,
 ) -> std::io::Result<()> {
     let mut buffer = [0; 2048];
     loop {

@@ -15,7 +15,7 @@ use super::load;
 use crate::capacity::{HostCompanion, VEHICLES, new_companion};
 use crate::flash::{self, HostFlash};
 use crate::link::{self, LinkUrl};
-use crate::mission::Mission;
+use crate::mission::PreparedMission;
 use crate::progress::Progress;
 use crate::say;
 use crate::shortage;
@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scenario = load(&args.scenario, None)?;
     // Opens the flash first, so that a bad file fails before the planning, which takes long.
     let mut flash = HostFlash::open(args.flash.as_deref())?;
-    let mut mission = Mission::prepare(scenario, &Progress::on_terminal())?;
+    let mut mission = PreparedMission::prepare(scenario, &Progress::on_terminal())?;
     let index = mission.index_of(args.id)?;
     let plan = mission.plan()?;
     let left = mission.unserved(&plan);
@@ -83,7 +83,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             .collect::<FixedVec<_, _>>();
     }
     let mut companion = start(&config, &mut flash)?;
-    let mut links: Vec<(Link, Box<dyn link::Link>)> =
+    let mut links: Vec<(Link, Box<dyn link::ByteLink>)> =
         vec![(Link::Autopilot, args.autopilot.open()?)];
     if let Some(swarm) = &args.swarm {
         links.push((Link::Swarm, swarm.open()?));

@@ -20,7 +20,7 @@ use crate::result::{
     self, CoverageResult, RoadmapSize, Safety, Timing, Totals, VehicleResult, rounded,
 };
 use crate::say;
-use crate::scenario::coverage::Method;
+use crate::scenario::coverage::CoverageMethod;
 use crate::scenario::{self, DEFAULT_ORIGIN, Scenario};
 
 /// Arguments of `host-sim cover`.
@@ -35,8 +35,8 @@ pub struct Args {
     out: PathBuf,
     /// Method of dividing the area, instead of the scenario's: simple-binpat, binpat, powell-binpat
     /// or exact
-    #[arg(long, value_name = "METHOD", value_parser = Method::named)]
-    method: Option<Method>,
+    #[arg(long, value_name = "METHOD", value_parser = CoverageMethod::named)]
+    method: Option<CoverageMethod>,
 }
 
 /// The `result.json` of `host-sim cover`.
@@ -326,7 +326,7 @@ mod tests {
                  [[vehicles]]\nid = 1\nstart = [-10, -10, 0]\n"
             );
             let scenario = scenario::parse(&text, "lanes").unwrap();
-            let planned = CoveragePlan::new(&scenario, Method::Binpat).unwrap();
+            let planned = CoveragePlan::new(&scenario, CoverageMethod::Binpat).unwrap();
             let flights = planned.flights();
             let flown = check::flights_to_check(&planned, &flights);
             let findings = check::check_flights(&planned, &flown);

@@ -14,16 +14,16 @@ use crate::files::ResultFiles;
 use crate::flown::kept::PictureStore;
 use crate::flown::{layers, page, pictures};
 use crate::link::LinkUrl;
-use crate::mission::{Mission, SwarmPlan};
+use crate::mission::{HostPlan, PreparedMission};
 use crate::output;
 use crate::progress::Progress;
 use crate::quote::quoted_path;
 use crate::report::Level;
 use crate::say;
-use crate::scenario::{self, Companion, Scenario};
+use crate::scenario::{self, CompanionHost, Scenario};
 use crate::swarm::faults;
 use crate::swarm::gateway::Gateway;
-use crate::swarm::{self, Flight, Pace};
+use crate::swarm::{self, Pace, SwarmFlight};
 
 /// The demo's scenario, compiled into the program so that no file is needed.
 const DEMO_SCENARIO: &str = include_str!("../../scenarios/demo.toml");
@@ -128,7 +128,7 @@ fn set_board_links(
     );
     for (i, (vehicle, autopilot)) in scenario.vehicles.iter_mut().zip(companions).enumerate() {
         vehicle.companion =
-            Companion::Url { autopilot: autopilot.clone(), radio: radios.get(i).cloned() };
+            CompanionHost::Url { autopilot: autopilot.clone(), radio: radios.get(i).cloned() };
     }
     Ok(())
 }
@@ -139,12 +139,12 @@ fn keep_flashes(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
         .with_context(|| format!("cannot keep flashes: {}", quoted_path(dir)))?;
     for vehicle in &mut scenario.vehicles {
         ensure!(
-            matches!(vehicle.companion, Companion::InProcess { .. }),
+            matches!(vehicle.companion, CompanionHost::InProcess { .. }),
             "--flash: vehicle {} has a companion elsewhere, with a flash of its own",
             vehicle.id
         );
         let file = dir.join(format!("vehicle-{}.flash", vehicle.id));
-        vehicle.companion = Companion::InProcess { flash: Some(file) };
+        vehicle.companion = CompanionHost::InProcess { flash: Some(file) };
     }
     Ok(())
 }
@@ -166,7 +166,7 @@ fn set_emulated_boards(
     );
     for vehicle in &mut scenario.vehicles[..boards] {
         let log = out.join(format!("board-{}.defmt", vehicle.id));
-        vehicle.companion = Companion::Emulated { program: program.to_owned(), log };
+        vehicle.companion = CompanionHost::Emulated { program: program.to_owned(), log };
     }
     Ok(())
 }
@@ -182,9 +182,9 @@ pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
 }
 
 /// Refuses a mission that is larger than the emulated board holds.
-fn check_emulated_boards(mission: &Mission, plan: &SwarmPlan) -> anyhow::Result<()> {
+fn check_emulated_boards(mission: &PreparedMission, plan: &HostPlan) -> anyhow::Result<()> {
     let mut vehicles = mission.scenario.vehicles.iter();
-    if vehicles.any(|vehicle| matches!(vehicle.companion, Companion::Emulated { .. })) {
+    if vehicles.any(|vehicle| matches!(vehicle.companion, CompanionHost::Emulated { .. })) {
         let board = BoardCapacity::by_name(EMULATED_BOARD).map_err(anyhow::Error::msg)?;
         if let Some(why) = mission.board_limit_exceeded(plan, board) {
             bail!("the mission does not fit {}: {}: {why}", board.name, mission.scenario.path);
@@ -195,7 +195,7 @@ fn check_emulated_boards(mission: &Mission, plan: &SwarmPlan) -> anyhow::Result<
 
 /// Prints whether the flight was given up at its time limit, its errors, and how fast it was
 /// simulated.
-fn print_course(flight: &Flight, limit_s: f32) {
+fn print_course(flight: &SwarmFlight, limit_s: f32) {
     let aloft = flight.result.vehicles.iter().filter(|vehicle| !vehicle.landed).count();
     if aloft > 0 && flight.simulated_s >= f64::from(limit_s) {
         say!("given up   at simulation.time_limit_s = {limit_s} s, {aloft} not landed");
@@ -216,8 +216,8 @@ fn print_course(flight: &Flight, limit_s: f32) {
 /// companions knew no waypoint, or every waypoint, as photographed: then they began the area again.
 fn add_earlier_pictures(
     kept: &PictureStore,
-    mission: &Mission,
-    flight: &mut Flight,
+    mission: &PreparedMission,
+    flight: &mut SwarmFlight,
 ) -> anyhow::Result<()> {
     let done: u32 = flight.done.iter().map(|range| range.end - range.first).sum();
     let planned = CoveragePlan::plan_as_companions(&mission.scenario)?;
@@ -241,7 +241,7 @@ fn plan_and_fly(
     let began = Instant::now();
     let progress = Progress::on_terminal();
     output::print_speed_limits(&scenario);
-    let mut mission = Mission::prepare(scenario, &progress)?;
+    let mut mission = PreparedMission::prepare(scenario, &progress)?;
     let plan = mission.plan()?;
     check_emulated_boards(&mission, &plan)?;
     let mut flight = match gateway {

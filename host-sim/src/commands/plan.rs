@@ -10,7 +10,7 @@ use anyhow::bail;
 use super::load;
 use crate::capacity::{BOARDS, BoardCapacity, WAYPOINTS};
 use crate::files::ResultFiles;
-use crate::mission::{Mission, SwarmPlan};
+use crate::mission::{HostPlan, PreparedMission};
 use crate::output;
 use crate::progress::Progress;
 use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded};
@@ -45,7 +45,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let names = ["starts.txt", "goals.txt", "roadmap.bin", "field.bin", "mission.bin"];
     let mut results = ResultFiles::open(&args.out, &[&output::RESULT_FILES[..], &names].concat())?;
     output::print_speed_limits(&scenario);
-    let mut mission = Mission::prepare_for(scenario, args.board, &Progress::on_terminal())?;
+    let mut mission = PreparedMission::prepare_for(scenario, args.board, &Progress::on_terminal())?;
     let plan = mission.plan()?;
     if let Some((board, why)) =
         args.board.and_then(|board| Some((board, mission.board_limit_exceeded(&plan, board)?)))
@@ -98,7 +98,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn planned_result(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
+fn planned_result(mission: &PreparedMission, plan: &HostPlan) -> MissionResult {
     let schedule = mission.schedule();
     let nominal_s = |f: &planner_core::flight::Flight<WAYPOINTS>| {
         (f.climb_m + f.descent_m) / schedule.vertical_mps + f.path.length_m() / schedule.cruise_mps

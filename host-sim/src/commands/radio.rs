@@ -9,7 +9,7 @@ use companion::Instant;
 use companion::link::frame::{Framer, MAX_FRAME_LEN};
 use planner_core::Point;
 
-use crate::link::{Link, LinkUrl};
+use crate::link::{ByteLink, LinkUrl};
 use crate::progress::check_printed;
 use crate::say;
 use crate::swarm::radio::{Radio, RadioConfig};
@@ -56,7 +56,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let config = RadioConfig { range_m: f32::INFINITY, loss: args.loss, delay_s: args.delay };
     let mut radio = Radio::new(config, args.listen.len(), args.seed);
     let places = vec![Point::zeros(); args.listen.len()];
-    let mut links: Vec<(&LinkUrl, Box<dyn Link>, Framer)> = Vec::new();
+    let mut links: Vec<(&LinkUrl, Box<dyn ByteLink>, Framer)> = Vec::new();
     for url in &args.listen {
         let link = url.open()?;
         say!("listening {}", url.with_bound_port(&*link));

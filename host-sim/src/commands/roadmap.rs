@@ -10,7 +10,7 @@ use planner_core::roadmap::{LANDMARKS, RoadmapError, RoadmapView};
 use super::load;
 use crate::capacity::BoardCapacity;
 use crate::files::{self, ResultFiles};
-use crate::mission::Mission;
+use crate::mission::PreparedMission;
 use crate::progress::Progress;
 use crate::quote::quoted_path;
 use crate::say;
@@ -19,11 +19,11 @@ use crate::say;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     #[command(subcommand)]
-    action: Action,
+    action: RoadmapAction,
 }
 
 #[derive(Debug, Subcommand)]
-enum Action {
+enum RoadmapAction {
     /// Build the roadmap of a scenario as the file that is uploaded to a board
     Build {
         /// The scenario
@@ -48,15 +48,15 @@ enum Action {
 /// The scenario or file is bad; the error names it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
-        Action::Build { scenario, out, board } => {
+        RoadmapAction::Build { scenario, out, board } => {
             let scenario = load(scenario, None)?;
             let mut results = ResultFiles::single_file(out)?;
-            let mission = Mission::prepare_for(scenario, *board, &Progress::on_terminal())?;
+            let mission = PreparedMission::prepare_for(scenario, *board, &Progress::on_terminal())?;
             results.add_file(out, &mission.roadmap_or_field_file)?;
             results.commit()?;
             print(&mission.roadmap_view());
         }
-        Action::Info { file } => {
+        RoadmapAction::Info { file } => {
             let bytes = files::read(file, files::MAX_BINARY_BYTES)
                 .with_context(|| format!("cannot read: {}", quoted_path(file)))?;
             let view =

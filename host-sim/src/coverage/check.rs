@@ -412,7 +412,7 @@ impl CoverageCells {
 mod tests {
     use super::*;
     use crate::scenario;
-    use crate::scenario::coverage::Method;
+    use crate::scenario::coverage::CoverageMethod;
 
     /// If no cell counts, nothing is known of the area: that is a fault, not a fully covered area.
     #[test]
@@ -421,7 +421,7 @@ mod tests {
                     lane_m = 10.0\nwaypoint_m = 5.0\n[mission]\ncruise_mps = 5.0\n\
                     [[vehicles]]\nid = 1\nstart = [-10, -10, 0]\n";
         let scenario = scenario::parse(text, "narrow").unwrap();
-        let planned = CoveragePlan::new(&scenario, Method::Binpat).unwrap();
+        let planned = CoveragePlan::new(&scenario, CoverageMethod::Binpat).unwrap();
         let fine = check_plan(&planned);
         assert!(fine.is_clean() && fine.cells > 0 && fine.covered_share == 1.0, "{fine:?}");
         // Cells of one metre, whose centres all lie outside the area.

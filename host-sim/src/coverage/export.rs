@@ -33,7 +33,7 @@ const FRAME_MISSION: u8 = 2;
 
 /// One MAVLink mission item.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MissionItem {
+pub struct ExportedItem {
     /// Command: a MAV_CMD number.
     pub command: u16,
     /// Coordinate frame: a MAV_FRAME number.
@@ -46,7 +46,7 @@ pub struct MissionItem {
     pub place: [f64; 3],
 }
 
-impl MissionItem {
+impl ExportedItem {
     fn from_command(command: u16, params: [f64; 4]) -> Self {
         Self { command, frame: FRAME_MISSION, params: params.map(Some), place: [0.0; 3] }
     }
@@ -86,7 +86,7 @@ pub fn flight_items(
     planned: &CoveragePlan<'_>,
     sortie: &Sortie,
     points: &[FlightPoint],
-) -> Vec<MissionItem> {
+) -> Vec<ExportedItem> {
     let (scenario, route) = (planned.scenario, &sortie.route);
     let home = home_position(planned, route);
     let start = scenario.vehicles[usize::from(route.vehicle)].start;
@@ -98,7 +98,7 @@ pub fn flight_items(
             round_to(f64::from(position.z - start.z), 1e3),
         ]
     };
-    let waypoint = |index: usize| MissionItem {
+    let waypoint = |index: usize| ExportedItem {
         command: NAV_WAYPOINT,
         frame: FRAME_RELATIVE,
         params: [Some(0.0), Some(0.0), Some(0.0), Some(yaw_deg(planned, points, index))],
@@ -108,19 +108,19 @@ pub fn flight_items(
     let top = points.get(1).map_or(0.0, |point| f64::from(point.position.z - start.z));
     let mut items = Vec::new();
     if sortie.depart_s > 0.0 {
-        items.push(MissionItem::from_command(
+        items.push(ExportedItem::from_command(
             NAV_DELAY,
             [f64::from(sortie.depart_s), -1.0, -1.0, -1.0],
         ));
     }
     items.extend([
-        MissionItem {
+        ExportedItem {
             command: NAV_TAKEOFF,
             frame: FRAME_RELATIVE,
             params: [Some(0.0), Some(0.0), Some(0.0), None],
             place: [round_to(home.lat_deg, 1e9), round_to(home.lon_deg, 1e9), round_to(top, 1e3)],
         },
-        MissionItem::from_command(DO_CHANGE_SPEED, [1.0, round_to(speed, 1e3), -1.0, 0.0]),
+        ExportedItem::from_command(DO_CHANGE_SPEED, [1.0, round_to(speed, 1e3), -1.0, 0.0]),
     ]);
     for (index, point) in points.iter().enumerate().skip(2) {
         let lane_at = |i: Option<usize>| i.and_then(|i| points.get(i)).and_then(|point| point.lane);
@@ -128,11 +128,11 @@ pub fn flight_items(
         let ends = point.lane.is_some() && lane_at(Some(index + 1)) != point.lane;
         match (point.action, planned.area_settings.trigger) {
             (WaypointAction::Pad, _) => {
-                items.push(MissionItem::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4]));
+                items.push(ExportedItem::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4]));
             }
             (WaypointAction::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));
-                items.push(MissionItem::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
+                items.push(ExportedItem::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
                 // Parameter 5 of DO_DIGICAM_CONTROL, 1, takes a picture; its slot is `place[0]`.
                 if let Some(last) = items.last_mut() {
                     last.place[0] = 1.0;
@@ -151,13 +151,13 @@ pub fn flight_items(
                     });
                     // Takes a picture at once, then one each `step` metres.
                     let trigger = [round_to(f64::from(step), 1e3), 0.0, 1.0, 0.0];
-                    items.push(MissionItem::from_command(DO_SET_CAM_TRIGG_DIST, trigger));
+                    items.push(ExportedItem::from_command(DO_SET_CAM_TRIGG_DIST, trigger));
                 }
                 if trigger == Trigger::Distance && ends {
                     // Takes the last picture at once and stops the trigger. Autopilots check the
                     // distance some times a second, so pictures are a little further apart than
                     // `step`, and the last one would otherwise lie beyond the lane's end.
-                    items.push(MissionItem::from_command(
+                    items.push(ExportedItem::from_command(
                         DO_SET_CAM_TRIGG_DIST,
                         [0.0, 0.0, 1.0, 0.0],
                     ));
@@ -174,10 +174,10 @@ fn round_to(value: f64, by: f64) -> f64 {
 }
 
 /// The mission of one flight as a QGroundControl `.plan` document (JSON).
-pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[MissionItem]) -> Value {
+pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[ExportedItem]) -> Value {
     let home = home_position(planned, route);
     let vehicle = &planned.scenario.vehicles[usize::from(route.vehicle)];
-    let item = |(index, item): (usize, &MissionItem)| {
+    let item = |(index, item): (usize, &ExportedItem)| {
         let mut params: Vec<Value> =
             item.params.iter().map(|p| p.map_or(Value::Null, Value::from)).collect();
         params.extend(item.place.map(Value::from));
@@ -225,7 +225,7 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[MissionItem]
 }
 
 /// The mission of one flight as `.waypoints` text: one item a line, home first.
-pub fn waypoints_file(planned: &CoveragePlan<'_>, route: &Route, items: &[MissionItem]) -> String {
+pub fn waypoints_file(planned: &CoveragePlan<'_>, route: &Route, items: &[ExportedItem]) -> String {
     let home = home_position(planned, route);
     let mut text = "QGC WPL 110\n".to_owned();
     let mut line =

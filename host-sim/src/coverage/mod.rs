@@ -34,8 +34,8 @@ use planner_core::frames::{Geodetic, enu_to_geodetic};
 pub use self::planned::{CoveragePlan, MAX_CORNERS, MAX_LANES, MAX_VEHICLES};
 use self::sorties::{BATTERY_SWAP_S, LaneTooLong, Sortie, USABLE_CHARGE};
 use crate::area::MAX_VERTICES;
-use crate::scenario::coverage::{self, Method, ORIGIN_HINT};
-use crate::scenario::{self, Scenario};
+use crate::scenario::coverage::{AreaSection, CoverageMethod, ORIGIN_HINT};
+use crate::scenario::{Scenario, VehicleSection};
 
 /// Most changes of the lanes' order that the host tries while it shortens the path.
 pub const MAX_ORDER_CHANGES: u32 = 20_000_000;
@@ -52,7 +52,7 @@ impl<'a> CoveragePlan<'a> {
     ///
     /// # Errors
     /// No plan was found; the error says why, and names the place in the scenario.
-    pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
+    pub fn new(scenario: &'a Scenario, method: CoverageMethod) -> anyhow::Result<Self> {
         // A pad may be on a roof, unless the origin's altitude is 0, which counts as not given.
         let given = scenario.area.as_ref().is_some_and(|area| area.origin.alt_m != 0.0);
         check_starts(scenario, if given { f32::INFINITY } else { MAX_OFF_GROUND_M })?;
@@ -71,7 +71,7 @@ impl<'a> CoveragePlan<'a> {
 
     fn plan_with_search(
         scenario: &'a Scenario,
-        method: Method,
+        method: CoverageMethod,
         search_steps: u32,
     ) -> anyhow::Result<Self> {
         let Some(wanted) = &scenario.area else {
@@ -98,7 +98,7 @@ impl<'a> CoveragePlan<'a> {
             transit: &transit,
             vehicles: &vehicles,
             heights: wanted.heights,
-            unit: if method == Method::SimpleBinpat {
+            unit: if method == CoverageMethod::SimpleBinpat {
                 TrackUnit::Lane
             } else {
                 TrackUnit::Waypoint
@@ -293,7 +293,7 @@ impl<'a> CoveragePlan<'a> {
 }
 
 /// The surface that vehicles follow above terrain; none above level ground.
-fn terrain_following(wanted: &coverage::Area) -> anyhow::Result<Option<TerrainFollowing<'_>>> {
+fn terrain_following(wanted: &AreaSection) -> anyhow::Result<Option<TerrainFollowing<'_>>> {
     let following =
         wanted.terrain.as_ref().map(|terrain| terrain.following(wanted.height_m)).transpose();
     following.map_err(|error| anyhow::anyhow!("bad field: {}: {error}", wanted.place))
@@ -301,7 +301,7 @@ fn terrain_following(wanted: &coverage::Area) -> anyhow::Result<Option<TerrainFo
 
 /// The lanes of an area, in the best order of those that are tried.
 fn build_tracks(
-    wanted: &coverage::Area,
+    wanted: &AreaSection,
     area: &Area<'_>,
     transit: &Transit<'_, MAX_CORNERS>,
     search_steps: u32,
@@ -326,8 +326,8 @@ pub fn check_starts_on_ground(scenario: &Scenario) -> anyhow::Result<()> {
 /// Refuses a start below the ground, or more than `most_m` above it.
 fn check_starts(scenario: &Scenario, most_m: f32) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
-    let above_m = |v: &scenario::Vehicle| v.start.z - area.ground_m(&v.start.xy());
-    let stray = |v: &scenario::Vehicle| !(-MAX_OFF_GROUND_M..=most_m).contains(&above_m(v));
+    let above_m = |v: &VehicleSection| v.start.z - area.ground_m(&v.start.xy());
+    let stray = |v: &VehicleSection| !(-MAX_OFF_GROUND_M..=most_m).contains(&above_m(v));
     if let Some(index) = scenario.vehicles.iter().position(stray) {
         let vehicle = &scenario.vehicles[index];
         bail!(
@@ -377,7 +377,7 @@ fn zone_at(area: &Area<'_>, place: &Flat) -> Option<usize> {
 }
 
 /// The planner's description of a vehicle: pad, speeds and weight.
-fn planner_vehicle(vehicle: &scenario::Vehicle, scenario: &Scenario) -> Vehicle {
+fn planner_vehicle(vehicle: &VehicleSection, scenario: &Scenario) -> Vehicle {
     let place = vehicle.start.xy();
     let [climb_mps, descend_mps] = vehicle.climb_and_descent_mps();
     Vehicle {
@@ -400,20 +400,20 @@ const MIN_SHARE_M: f32 = 1e-3;
 /// As the method's planner.
 pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
-    method: Method,
+    method: CoverageMethod,
     plan: &mut RoutePlan<K>,
 ) -> Result<Option<Vec<f32>>, CoverageError> {
     let own = || Some(work.vehicles.iter().map(|vehicle| vehicle.weight).collect());
     match method {
-        Method::SimpleBinpat | Method::Binpat => {
+        CoverageMethod::SimpleBinpat | CoverageMethod::Binpat => {
             binpat(work, &mut PackWorkspace::<K>::new(), plan).map(|()| own())
         }
-        Method::PowellBinpat => {
+        CoverageMethod::PowellBinpat => {
             let mut ws = powell::PowellWorkspace::<K>::new();
             powell::powell(work, &powell::PowellConfig::USUAL, &mut ws, plan)?;
             Ok(Some(ws.pack.shares()[..work.vehicles.len()].to_vec()))
         }
-        Method::Exact => {
+        CoverageMethod::Exact => {
             let count = work.tracks.waypoint_count() as usize;
             let [ways, reaches, states] =
                 exact::ExactWorkspace::required_lengths(work.vehicles.len(), count);
@@ -461,7 +461,7 @@ fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
 }
 
 /// The error text for a coverage plan that failed, with the place in the scenario.
-fn explain_error(error: CoverageError, wanted: &coverage::Area, vehicles: usize) -> anyhow::Error {
+fn explain_error(error: CoverageError, wanted: &AreaSection, vehicles: usize) -> anyhow::Error {
     let place = &wanted.place;
     let why = match error {
         CoverageError::Area(area) => format!("{area:?}"),

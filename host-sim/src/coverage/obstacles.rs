@@ -53,7 +53,7 @@ pub struct TooManyCorners(pub usize);
 
 /// The obstacles of a map above the ground.
 #[derive(Debug)]
-pub struct Obstacles {
+pub struct MapObstacles {
     /// The map, without the cells that count as ground; beyond its faces all is free.
     pub map: VoxelMap,
     /// Horizontal distance that paths keep from obstacles at their height, metres.
@@ -61,7 +61,7 @@ pub struct Obstacles {
     field: OnceLock<ClearanceField>,
 }
 
-impl Obstacles {
+impl MapObstacles {
     /// The obstacles of a map: its occupied cells without those that count as ground.
     pub fn new(map: &OccupancyMap, unknown: Unknown, clearance_m: f32) -> Self {
         let mut map = VoxelMap {

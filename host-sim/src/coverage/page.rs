@@ -8,7 +8,7 @@ use planner_core::coverage::area::RingKind;
 use super::check::CoverageFindings;
 use super::flight::FlightPoint;
 use super::{CoveragePlan, SortieFlight, parts};
-use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
+use crate::report::{AreaOutline, Curve, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
 /// Spacing of the points of a height profile along a path, metres.
 const PROFILE_SPACING_M: f32 = 5.0;
@@ -98,13 +98,13 @@ fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> 
 }
 
 /// Outlines of the area, its holes and no-fly zones, at the height of the ground.
-pub(crate) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<Outline> {
+pub(crate) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<AreaOutline> {
     let kinds = [
         (RingKind::Outer, OutlineKind::Area),
         (RingKind::Hole, OutlineKind::Hole),
         (RingKind::NoFly, OutlineKind::NoFly),
     ];
-    let outline = |ring: &[Flat], kind| Outline {
+    let outline = |ring: &[Flat], kind| AreaOutline {
         kind,
         points: ring
             .iter()

@@ -4,11 +4,11 @@ use super::CoveragePlan;
 use super::SortieFlight;
 use super::check::{self, Picture};
 use super::flight::{FlightPoint, WaypointAction};
-use crate::report::{CoverageLayers, Division, Footprint, Part};
+use crate::report::{CoverageLayers, PictureFootprint, ReportDivision, ReportPart};
 
 /// Coverage data of the report page for a plan that was not flown.
 pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> CoverageLayers {
-    let mut parts: Vec<Part> = Vec::new();
+    let mut parts: Vec<ReportPart> = Vec::new();
     for (sortie, points, _) in flights {
         let photos = |point: &&FlightPoint| matches!(point.action, WaypointAction::Photo(_));
         let photos: Vec<&FlightPoint> = points.iter().filter(photos).collect();
@@ -16,7 +16,7 @@ pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> C
         let lanes = lanes.flat_map(|lane| [lane[0].position, lane[lane.len() - 1].position]);
         let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         let index = parts.iter().position(|part| part.vehicle == vehicle).unwrap_or_else(|| {
-            parts.push(Part { vehicle, ..Part::default() });
+            parts.push(ReportPart { vehicle, ..ReportPart::default() });
             parts.len() - 1
         });
         let part = &mut parts[index];
@@ -25,7 +25,7 @@ pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> C
         part.lanes.extend(lanes);
     }
     parts.sort_by_key(|part| part.vehicle);
-    let divisions = vec![Division { parts, ..Division::default() }];
+    let divisions = vec![ReportDivision { parts, ..ReportDivision::default() }];
     let pictures = check::planned_pictures(planned, &check::flights_to_check(planned, flights));
     coverage_layers(planned, divisions, pictures)
 }
@@ -33,12 +33,12 @@ pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> C
 /// The layers of a plan or a flight, with the footprint of each picture on the ground.
 pub(crate) fn coverage_layers(
     planned: &CoveragePlan<'_>,
-    divisions: Vec<Division>,
+    divisions: Vec<ReportDivision>,
     mut pictures: Vec<Picture>,
 ) -> CoverageLayers {
     pictures.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
     let corners = check::footprints(planned, &pictures);
-    let footprint = |(picture, corners): (&Picture, [[f32; 2]; 4])| Footprint {
+    let footprint = |(picture, corners): (&Picture, [[f32; 2]; 4])| PictureFootprint {
         t_s: picture.t_s,
         vehicle: picture.vehicle.unwrap_or(0),
         corners,

@@ -7,7 +7,7 @@ use planner_core::coverage::transit::Transit;
 use planner_core::field::follow::TerrainFollowing;
 
 use crate::scenario::Scenario;
-use crate::scenario::coverage::{self, Method};
+use crate::scenario::coverage::{self, CoverageMethod};
 
 /// Most vehicles of a coverage mission.
 pub const MAX_VEHICLES: usize = 32;
@@ -45,13 +45,13 @@ pub struct CoveragePlan<'a> {
     /// The scenario that was planned.
     pub scenario: &'a Scenario,
     /// Section `[area]` of the scenario, with settings of the plan.
-    pub area_settings: &'a coverage::Area,
+    pub area_settings: &'a coverage::AreaSection,
     /// Surface that paths follow over terrain; `None` over level ground.
     pub terrain_following: Option<TerrainFollowing<'a>>,
     /// The area's rings, checked.
     pub area: Area<'a>,
     /// Method by which the path was divided among vehicles.
-    pub method: Method,
+    pub method: CoverageMethod,
     /// The planner's description of each vehicle, in the scenario's order.
     pub vehicles: Vec<Vehicle>,
     /// All lanes, in the order of the path.

@@ -153,7 +153,7 @@ fn count_flown_twice(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u6
 mod tests {
     use super::*;
     use crate::scenario;
-    use crate::scenario::coverage::Method;
+    use crate::scenario::coverage::CoverageMethod;
 
     /// [`count_missed_and_repeated`] with one picture at each waypoint (5 m apart) of a plan of at
     /// least three lanes, after `change` has changed the pictures.
@@ -162,7 +162,7 @@ mod tests {
                     waypoint_m = 5.0\ncamera = { fov_deg = 73.7, aspect = 1.5 }\n[mission]\ncruise_mps = 5.0\n\
                     [[vehicles]]\nid = 1\nstart = [-10, -10, 0]\n";
         let scenario = scenario::parse(text, "taken").unwrap();
-        let planned = CoveragePlan::new(&scenario, Method::Binpat).unwrap();
+        let planned = CoveragePlan::new(&scenario, CoverageMethod::Binpat).unwrap();
         let waypoints = (0..planned.tracks.waypoint_count())
             .filter_map(|number| planned.tracks.waypoint(number));
         let picture = |place: Flat| Picture {

@@ -112,7 +112,8 @@ fn a_start_inside_a_no_fly_zone_is_refused_by_the_name_of_the_zone() {
         ([zone(20), around_pad.to_owned(), zone(60)], 1),
     ] {
         let scenario = field(&format!("{SPACING}no_fly = [{}]", zones.join(", ")));
-        let refused = CoveragePlan::new(&scenario, Method::Binpat).err().map(|e| e.to_string());
+        let refused =
+            CoveragePlan::new(&scenario, CoverageMethod::Binpat).err().map(|e| e.to_string());
         let place = &scenario.vehicle_places[1];
         let why = format!("bad vehicle: {place}: vehicle 2 starts inside no-fly zone {named}");
         assert_eq!(refused, Some(why));

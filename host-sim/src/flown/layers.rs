@@ -5,15 +5,15 @@ use std::collections::BTreeMap;
 
 use companion::swarm::fleet::DivisionInput;
 use planner_core::Point;
-use planner_core::flight::{Flight as PathFlight, Task, WaypointRange};
+use planner_core::flight::{Flight, Task, WaypointRange};
 
 use crate::capacity::WAYPOINTS;
 use crate::coverage::check::Picture;
 use crate::coverage::{CoveragePlan, parts};
-use crate::mission::{Mission, SwarmPlan};
-use crate::report::{CoverageLayers, Division, Part, WaypointTransfer};
-use crate::swarm::Flight as Flown;
-use crate::swarm::divisions::Division as Begun;
+use crate::mission::{HostPlan, PreparedMission};
+use crate::report::{CoverageLayers, ReportDivision, ReportPart, WaypointTransfer};
+use crate::swarm::SwarmFlight;
+use crate::swarm::divisions::FlownDivision;
 
 /// Id of the vehicle that photographs a waypoint, by waypoint number.
 type WaypointOwners = BTreeMap<u32, u8>;
@@ -25,17 +25,17 @@ type WaypointOwners = BTreeMap<u32, u8>;
 /// A division that companions made cannot be planned here.
 pub fn flown_layers(
     planned: &CoveragePlan<'_>,
-    mission: &Mission,
-    plan: &SwarmPlan,
-    flight: &Flown,
+    mission: &PreparedMission,
+    plan: &HostPlan,
+    flight: &SwarmFlight,
     pictures: Vec<Picture>,
 ) -> anyhow::Result<CoverageLayers> {
     let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.id).collect();
     ids.sort_unstable();
-    let mut shown: Vec<Division> = Vec::new();
+    let mut shown: Vec<ReportDivision> = Vec::new();
     let (mut before, mut gone, mut losses) =
         (WaypointOwners::new(), Vec::new(), Vec::<&[DivisionInput]>::new());
-    let whole = Begun { t_s: 0.0, vehicle: 0, number: 0, inputs: Vec::new(), plan_crc: 0 };
+    let whole = FlownDivision { t_s: 0.0, vehicle: 0, number: 0, inputs: Vec::new(), plan_crc: 0 };
     for division in std::iter::once(&whole).chain(&flight.divisions) {
         // Skipped: a division already shown, which another vehicle begins to fly later, or one
         // whose inputs no vehicle reported, which cannot be planned here.
@@ -55,7 +55,7 @@ pub fn flown_layers(
             ids.iter().zip(&division.inputs).filter(|(_, input)| !input.alive).map(|(id, _)| *id);
         let lost: Vec<u8> = lost.filter(|id| !gone.contains(id)).collect();
         gone.extend(&lost);
-        shown.push(Division {
+        shown.push(ReportDivision {
             t_s: division.t_s,
             lost,
             parts: flights
@@ -70,7 +70,7 @@ pub fn flown_layers(
     Ok(parts::coverage_layers(planned, shown, pictures))
 }
 
-fn flight_part(flight: &PathFlight<WAYPOINTS>) -> Part {
+fn flight_part(flight: &Flight<WAYPOINTS>) -> ReportPart {
     let path = &flight.path;
     let (mut lanes, mut waypoints) = (Vec::<Point>::new(), 0);
     if let Task::Photograph(photographs) = &flight.task {
@@ -80,10 +80,10 @@ fn flight_part(flight: &PathFlight<WAYPOINTS>) -> Part {
         }
     }
     let places = path.waypoints().iter().map(|waypoint| waypoint.position);
-    Part { vehicle: flight.id, waypoints, path: places.collect(), lanes }
+    ReportPart { vehicle: flight.id, waypoints, path: places.collect(), lanes }
 }
 
-fn waypoint_owners(flights: &[PathFlight<WAYPOINTS>]) -> WaypointOwners {
+fn waypoint_owners(flights: &[Flight<WAYPOINTS>]) -> WaypointOwners {
     let mut owners = WaypointOwners::new();
     for flight in flights {
         let Task::Photograph(photographs) = &flight.task else { continue };

@@ -1,17 +1,17 @@
 //! The report page of a flight.
 
-use crate::mission::{Mission, SwarmPlan};
+use crate::mission::{HostPlan, PreparedMission};
 use crate::output::planned_page;
-use crate::report::{Curve, Limit, Plot, ReportData, TrackPoint};
-use crate::swarm::Flight;
-use crate::swarm::referee::Sample;
+use crate::report::{Curve, Plot, PlotLimit, ReportData, TrackPoint};
+use crate::swarm::SwarmFlight;
+use crate::swarm::referee::DistanceSample;
 
 /// Report page of a flown mission: the page of its plan, with tracks, event log and plots of the
 /// smallest distances.
 pub fn flown_page(
-    mission: &Mission,
-    plan: &SwarmPlan,
-    flight: &Flight,
+    mission: &PreparedMission,
+    plan: &HostPlan,
+    flight: &SwarmFlight,
 ) -> anyhow::Result<ReportData> {
     let mut page = planned_page(mission, plan, &flight.result)?;
     let flown = flight.tracks.iter().zip(&flight.lost_s);
@@ -21,7 +21,7 @@ pub fn flown_page(
     }
     page.events = flight.log.clone();
     let t_s: Vec<f32> = flight.samples.iter().map(|s| s.t_s).collect();
-    let plot = |title: &str, limit: Limit, value: fn(&Sample) -> f32| Plot {
+    let plot = |title: &str, limit: PlotLimit, value: fn(&DistanceSample) -> f32| Plot {
         title: title.to_owned(),
         unit: "m".to_owned(),
         limit: Some(limit),
@@ -32,12 +32,12 @@ pub fn flown_page(
             values: flight.samples.iter().map(value).collect(),
         }],
     };
-    let safety = Limit {
+    let safety = PlotLimit {
         value: mission.scenario.deconfliction.safety_distance_m,
         label: "safety distance".to_owned(),
     };
     let largest_m = mission.scenario.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max);
-    let body = Limit { value: largest_m, label: "vehicle radius".to_owned() };
+    let body = PlotLimit { value: largest_m, label: "vehicle radius".to_owned() };
     page.plots = vec![plot("Smallest separation", safety, |s| s.separation_m)];
     // A coverage mission has no walls, so no clearance to them is plotted.
     if mission.scenario.area.is_none() {

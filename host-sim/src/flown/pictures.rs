@@ -7,7 +7,7 @@ use planner_core::plan::SwarmPlan;
 
 use crate::coverage::check::{self, CoverageFindings, Picture};
 use crate::coverage::{CoveragePlan, page, result};
-use crate::report::{Outline, Plot};
+use crate::report::{AreaOutline, Plot};
 use crate::result::CoverageResult;
 use crate::scenario::Scenario;
 
@@ -16,7 +16,7 @@ pub struct FlightFindings {
     /// The coverage section of `result.json`.
     pub result: CoverageResult,
     /// Borders of the area, its holes and no-fly zones, for the report page.
-    pub outlines: Vec<Outline>,
+    pub outlines: Vec<AreaOutline>,
     /// Curve of the share of the area that is photographed, over time.
     pub plot: Plot,
     /// Whether every cell of the area that counts is photographed.

@@ -1,5 +1,5 @@
 //! Byte links between processes and devices: link URLs, and nonblocking TCP, UDP and serial ports
-//! behind the trait [`Link`].
+//! behind the trait [`ByteLink`].
 //!
 //! | URL | is |
 //! |---|---|
@@ -11,7 +11,7 @@
 //!
 //! A TCP client or serial port whose connection is lost is opened again: one attempt per second.
 //!
-//! A datagram is one or more whole frames, since senders hand whole frames to [`Link::send`]. A
+//! A datagram is one or more whole frames, since senders hand whole frames to [`ByteLink::send`]. A
 //! stream (TCP, serial) may be split anywhere.
 
 mod reconnect;
@@ -26,7 +26,7 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::str::FromStr;
 use std::time::Duration;
 
-pub use self::transport::Link;
+pub use self::transport::ByteLink;
 use crate::quote::quoted;
 
 /// Longest wait for a TCP connection when a link is first opened.
@@ -119,7 +119,7 @@ impl LinkUrl {
     /// # Errors
     /// The link cannot be opened: unknown host, port in use, no server listening. The error names
     /// the URL.
-    pub fn open(&self) -> Result<Box<dyn Link>, LinkError> {
+    pub fn open(&self) -> Result<Box<dyn ByteLink>, LinkError> {
         let link = self.open_once(CONNECT_TIMEOUT)?;
         Ok(match self {
             Self::Tcp(_) | Self::Serial { .. } => {
@@ -132,7 +132,7 @@ impl LinkUrl {
     }
 
     /// This URL with the port that the system chose for port 0; unchanged for other kinds of links.
-    pub fn with_bound_port(&self, link: &dyn Link) -> Self {
+    pub fn with_bound_port(&self, link: &dyn ByteLink) -> Self {
         match (self, link.local_address()) {
             (Self::TcpListen(_), Some(at)) => Self::TcpListen(at.to_string()),
             (Self::UdpListen(_), Some(at)) => Self::UdpListen(at.to_string()),
@@ -140,7 +140,7 @@ impl LinkUrl {
         }
     }
 
-    fn open_once(&self, timeout: Duration) -> Result<Box<dyn Link>, LinkError> {
+    fn open_once(&self, timeout: Duration) -> Result<Box<dyn ByteLink>, LinkError> {
         let failed = |why| LinkError::Open { url: self.clone(), why };
         match self {
             Self::Tcp(at) => Ok(Box::new(
@@ -156,7 +156,7 @@ impl LinkUrl {
                 Ok(Box::new(udp::UdpHub::bind(resolve(at).map_err(failed)?).map_err(failed)?))
             }
             Self::Serial { path, baud } => {
-                Ok(Box::new(serial::Port::open(path, *baud).map_err(failed)?))
+                Ok(Box::new(serial::OpenSerialPort::open(path, *baud).map_err(failed)?))
             }
         }
     }
@@ -173,7 +173,7 @@ mod tests {
     use super::*;
     use std::time::Instant;
 
-    pub(super) fn hear(link: &mut dyn Link) -> Vec<u8> {
+    pub(super) fn hear(link: &mut dyn ByteLink) -> Vec<u8> {
         let mut buffer = [0; 2048];
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(5) {
@@ -186,7 +186,7 @@ mod tests {
         panic!("nothing heard in five seconds");
     }
 
-    fn open(text: &str) -> Box<dyn Link> {
+    fn open(text: &str) -> Box<dyn ByteLink> {
         text.parse::<LinkUrl>().unwrap().open().unwrap()
     }
 

@@ -5,30 +5,30 @@ use std::io;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use super::transport::Link;
+use super::transport::ByteLink;
 
 /// Time between two attempts to open a lost link.
 pub(super) const RECONNECT_EVERY: Duration = Duration::from_secs(1);
 
 /// Tries to open the link; `None` if that fails now.
-type OpenLink = Box<dyn Fn() -> Option<Box<dyn Link>> + Send>;
+type OpenLink = Box<dyn Fn() -> Option<Box<dyn ByteLink>> + Send>;
 
 /// A link that reconnects. While it is lost, it receives nothing and drops what is sent.
 pub struct ReconnectingLink {
     /// URL of the link, for messages.
     name: String,
     open: OpenLink,
-    link: Option<Box<dyn Link>>,
+    link: Option<Box<dyn ByteLink>>,
     retry_at: Instant,
 }
 
 impl ReconnectingLink {
     /// Wraps an open link; `open` opens it again after a loss.
-    pub fn new(name: String, link: Box<dyn Link>, open: OpenLink) -> Self {
+    pub fn new(name: String, link: Box<dyn ByteLink>, open: OpenLink) -> Self {
         Self { name, open, link: Some(link), retry_at: Instant::now() }
     }
 
-    fn reopen(&mut self) -> Option<&mut Box<dyn Link>> {
+    fn reopen(&mut self) -> Option<&mut Box<dyn ByteLink>> {
         if self.link.is_none() && Instant::now() >= self.retry_at {
             self.link = (self.open)();
             self.retry_at = Instant::now() + RECONNECT_EVERY;
@@ -46,7 +46,7 @@ impl ReconnectingLink {
     }
 }
 
-impl Link for ReconnectingLink {
+impl ByteLink for ReconnectingLink {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.reopen().map_or(Ok(0), |link| link.receive(buffer)) {
             Err(why) => {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serialport::SerialPort;
 
-use super::transport::{Link, is_transient};
+use super::transport::{ByteLink, is_transient};
 
 /// Most bytes that wait to be written, if the line is slower than its sender: less than a second at
 /// 57600 baud. A frame that would exceed it is dropped, since old setpoints are worse than none.
@@ -15,12 +15,12 @@ const MAX_QUEUED_BYTES: usize = 4096;
 const WRITE_CHUNK: usize = 256;
 
 /// An open serial port.
-pub struct Port {
+pub struct OpenSerialPort {
     device: Box<dyn SerialPort>,
     queue: Vec<u8>,
 }
 
-impl Port {
+impl OpenSerialPort {
     /// Opens a device exclusively.
     pub fn open(path: &str, baud: u32) -> io::Result<Self> {
         let device = serialport::new(path, baud).timeout(Duration::ZERO).open()?;
@@ -33,7 +33,7 @@ fn is_idle(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::TimedOut || is_transient(error)
 }
 
-impl Link for Port {
+impl ByteLink for OpenSerialPort {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.device.read(buffer) {
             Ok(0) => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the device is gone")),
@@ -72,14 +72,14 @@ mod tests {
     use super::*;
 
     /// One end of a pair of pseudo terminals, and a link opened at the other.
-    fn pair() -> (Port, Port) {
+    fn pair() -> (OpenSerialPort, OpenSerialPort) {
         let (mut near, far) = TTYPort::pair().unwrap();
         let path = far.name().unwrap();
         // Closed, since a port that is open cannot be opened again.
         drop(far);
-        let far = Port::open(&path, 921_600).unwrap();
+        let far = OpenSerialPort::open(&path, 921_600).unwrap();
         near.set_timeout(Duration::ZERO).unwrap();
-        (Port { device: Box::new(near), queue: Vec::new() }, far)
+        (OpenSerialPort { device: Box::new(near), queue: Vec::new() }, far)
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
-use super::transport::{Link, is_transient};
+use super::transport::{ByteLink, is_transient};
 
 /// Most bytes that wait for a peer: about ten seconds of all that a PX4 streams.
 const MAX_QUEUED_BYTES: usize = 256 * 1024;
@@ -64,7 +64,7 @@ impl Client {
     }
 }
 
-impl Link for Client {
+impl ByteLink for Client {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.0.receive(buffer)
     }
@@ -102,7 +102,7 @@ impl Server {
     }
 }
 
-impl Link for Server {
+impl ByteLink for Server {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.accept();
         let Some(client) = &mut self.client else { return Ok(0) };

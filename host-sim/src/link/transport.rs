@@ -5,7 +5,7 @@ use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 /// A nonblocking byte link.
-pub trait Link: Send {
+pub trait ByteLink: Send {
     /// Copies bytes that have arrived into `buffer` and returns their number, 0 if none have. A
     /// buffer of 2 kB holds any datagram that Flockmate sends.
     ///

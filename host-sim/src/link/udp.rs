@@ -4,7 +4,7 @@ use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
-use super::transport::{Link, is_transient};
+use super::transport::{ByteLink, is_transient};
 
 /// A peer that has sent nothing for this long is sent nothing any more.
 const PEER_TIMEOUT: Duration = Duration::from_secs(60);
@@ -40,7 +40,7 @@ impl UdpPeer {
     }
 }
 
-impl Link for UdpPeer {
+impl ByteLink for UdpPeer {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
             match self.socket.recv_from(buffer) {
@@ -89,7 +89,7 @@ impl UdpHub {
     }
 }
 
-impl Link for UdpHub {
+impl ByteLink for UdpHub {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.socket.recv_from(buffer) {
             Ok((len, from)) => {

@@ -14,7 +14,7 @@ use planner_core::voxel::{GridShape, Outside, VoxelGrid};
 use pulp::Arch;
 use rayon::prelude::*;
 
-use search::{BOXES_PER_NODE, Node, Search, Segment};
+use search::{BOXES_PER_NODE, BoxSearch, CellSegment, Node};
 
 mod lanes;
 mod search;
@@ -149,7 +149,7 @@ impl BoxTree {
         let resolution_m = self.shape.resolution_m;
         let cells =
             |p: &Point| [0, 1, 2].map(|axis| (p[axis] - self.shape.min[axis]) / resolution_m);
-        let segment = Segment::new(cells(a), cells(b));
+        let segment = CellSegment::new(cells(a), cells(b));
         if !segment.is_finite() {
             return 0.0;
         }
@@ -158,7 +158,7 @@ impl BoxTree {
             limit = limit.min(segment.distance_to_faces(self.shape.dims)).max(0.0);
         }
         let enough = (enough_m / resolution_m).max(0.0);
-        let search = Search {
+        let search = BoxSearch {
             nodes: &self.nodes,
             segment: &segment,
             bound: limit * limit,

@@ -19,11 +19,11 @@ pub const DEFAULT_RESOLUTION_M: f32 = 0.25;
 #[derive(Debug, Args)]
 pub struct MapArgs {
     #[command(subcommand)]
-    action: Action,
+    action: MapAction,
 }
 
 #[derive(Debug, Subcommand)]
-enum Action {
+enum MapAction {
     /// Print the size, leaves and volumes of a map
     Info {
         /// An OctoMap `.bt` file or `builtin:building`
@@ -123,11 +123,11 @@ impl MapInfo {
 /// The map cannot be read or written; the error names the file.
 pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     match &args.action {
-        Action::Info { file, resolution, json } => {
+        MapAction::Info { file, resolution, json } => {
             let info = map_info(file, *resolution)?;
             say!("{}", if *json { serde_json::to_string_pretty(&info)? } else { info.text() });
         }
-        Action::Convert { file, out, resolution } => {
+        MapAction::Convert { file, out, resolution } => {
             if !matches!(Source::parse(&out.to_string_lossy()), Ok(Source::Bt(_))) {
                 let expected = "a file to write that ends in `.bt`";
                 return Err(

@@ -23,12 +23,12 @@ use planner_core::flight::{PathError, WaypointRange};
 use planner_core::plan::{PlanError, VehicleTask};
 use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 
-use super::ready::{Mission, OwnPlan, SwarmPlan, schedule_config};
+use super::ready::{HostPlan, OwnPlan, PreparedMission, schedule_config};
 use crate::area::MAX_VERTICES;
 use crate::capacity::{BOARD_CORNERS, BoardCapacity, GATES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::sorties::{self, USABLE_CHARGE};
 use crate::coverage::{CoveragePlan, MAX_CORNERS, MAX_LANES, MAX_VEHICLES as COVERAGE_VEHICLES};
-use crate::scenario::coverage::{Method, Terrain};
+use crate::scenario::coverage::{CoverageMethod, Terrain};
 use crate::scenario::{self, Scenario};
 use crate::{map, margins};
 
@@ -44,7 +44,7 @@ type HostWorkspace = Workspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES>;
 pub(super) fn prepare(
     mut scenario: Scenario,
     board: Option<&'static BoardCapacity>,
-) -> anyhow::Result<Mission> {
+) -> anyhow::Result<PreparedMission> {
     let planned = CoveragePlan::plan_as_companions(&scenario)?;
     let Some(shares) = planned.shares.clone() else {
         bail!(
@@ -89,7 +89,7 @@ pub(super) fn prepare(
     schedule.vertical_mps =
         climbs.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
     let mut mission =
-        Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
+        PreparedMission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
     if let Some(terrain) = mission.scenario.area.as_ref().and_then(|area| area.terrain.as_ref()) {
         mission.roadmap_or_field_file = terrain.field.to_vec();
     }
@@ -160,19 +160,22 @@ fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
 }
 
 /// The scenario's method of dividing the area among vehicles; the default one without an area.
-pub fn division_method(scenario: &Scenario) -> Method {
+pub fn division_method(scenario: &Scenario) -> CoverageMethod {
     scenario.area.as_ref().map(|area| area.method).unwrap_or_default()
 }
 
 /// The terrain settings of the mission file: height above ground, tolerance, lowest and highest
 /// ground.
-fn ground_settings(area: &scenario::coverage::Area, terrain: &Terrain) -> anyhow::Result<Ground> {
+fn ground_settings(
+    area: &scenario::coverage::AreaSection,
+    terrain: &Terrain,
+) -> anyhow::Result<Ground> {
     let [low_m, high_m] = ground_height_range_m(terrain)?;
     Ok(Ground { height_m: area.height_m, tolerance_m: terrain.tolerance_m, low_m, high_m })
 }
 
 /// Least height of the pictures above the ground, metres.
-fn pictures_above_ground_m(area: &scenario::coverage::Area) -> f32 {
+fn pictures_above_ground_m(area: &scenario::coverage::AreaSection) -> f32 {
     if area.terrain.is_some() { area.height_m } else { area.heights.mission_m }
 }
 
@@ -205,20 +208,20 @@ fn ground_map(planned: &CoveragePlan<'_>) -> anyhow::Result<map::OccupancyMap> {
     Ok(map::level_ground_map(&(low - around), &(high + around), cell_m)?)
 }
 
-impl Mission {
+impl PreparedMission {
     /// Encodes the mission file of an area, with each vehicle's share.
     fn encode_area(&mut self, shares: &[VehicleShare]) -> anyhow::Result<()> {
         let Some(area) = &self.scenario.area else { return Ok(()) };
         let parts = match division_method(&self.scenario) {
-            Method::PowellBinpat | Method::Exact => PartEligibility::Anyone,
-            Method::SimpleBinpat | Method::Binpat => {
+            CoverageMethod::PowellBinpat | CoverageMethod::Exact => PartEligibility::Anyone,
+            CoverageMethod::SimpleBinpat | CoverageMethod::Binpat => {
                 let alike = shares.iter().all(|share| share.weight == shares[0].weight);
                 if alike { PartEligibility::Anyone } else { PartEligibility::SameWeight }
             }
         };
         let header = CoverageHeader {
             unit: match area.method {
-                Method::SimpleBinpat => TrackUnit::Lane,
+                CoverageMethod::SimpleBinpat => TrackUnit::Lane,
                 _ => TrackUnit::Waypoint,
             },
             parts,
@@ -248,13 +251,13 @@ impl Mission {
         done: &[WaypointRange],
         losses: impl Iterator<Item = &'l [DivisionInput]> + Clone,
         ws: &mut HostWorkspace,
-    ) -> anyhow::Result<Box<SwarmPlan>> {
+    ) -> anyhow::Result<Box<HostPlan>> {
         let mission = self.mission_view();
         let MissionKind::Coverage(view) = mission.kind() else {
             bail!("no area: {}", self.scenario.path)
         };
         let mut schedule = on_heap(ScheduleWorkspace::new);
-        let mut plan = on_heap(SwarmPlan::new);
+        let mut plan = on_heap(HostPlan::new);
         coverage::plan_flights::<
             MAX_VERTICES,
             MAX_LANES,
@@ -286,7 +289,7 @@ impl Mission {
     }
 
     /// Plans the coverage mission from its start, with nothing photographed.
-    pub(super) fn plan_coverage(&self) -> anyhow::Result<Box<SwarmPlan>> {
+    pub(super) fn plan_coverage(&self) -> anyhow::Result<Box<HostPlan>> {
         self.plan_area(&[], iter::empty(), &mut on_heap(HostWorkspace::new))
     }
 
@@ -299,7 +302,7 @@ impl Mission {
         &self,
         done: &[WaypointRange],
         losses: impl Iterator<Item = &'l [DivisionInput]> + Clone,
-    ) -> anyhow::Result<Box<SwarmPlan>> {
+    ) -> anyhow::Result<Box<HostPlan>> {
         self.plan_area(done, losses, &mut on_heap(HostWorkspace::new))
     }
 

@@ -8,13 +8,13 @@ use planner_core::flight::PathError;
 use planner_core::plan::{self, PlanError, PlanWorkspace};
 use planner_core::schedule::ScheduleError;
 
-use super::ready::{Mission, SwarmPlan};
+use super::ready::{HostPlan, PreparedMission};
 use crate::capacity::{BoardCapacity, NUCLEO_H743, PICO2, WAYPOINTS, on_heap};
 
-impl Mission {
+impl PreparedMission {
     /// Text about the first capacity of a board that the mission or its plan exceeds; `None` if the
     /// board can fly it.
-    pub fn board_limit_exceeded(&self, plan: &SwarmPlan, board: &BoardCapacity) -> Option<String> {
+    pub fn board_limit_exceeded(&self, plan: &HostPlan, board: &BoardCapacity) -> Option<String> {
         let mission = self.mission_view();
         let of_mission = || board.mission_excess(&mission);
         match mission.kind() {
@@ -34,7 +34,7 @@ impl Mission {
 
     /// Plans with the capacities of a board: `None` if the plan's CRC equals that of `plan`, else a
     /// text that says why not.
-    fn plan_limit_exceeded(&self, plan: &SwarmPlan, board: &BoardCapacity) -> Option<String> {
+    fn plan_limit_exceeded(&self, plan: &HostPlan, board: &BoardCapacity) -> Option<String> {
         const H743: BoardCapacity = NUCLEO_H743;
         let planned = if board.nodes == H743.nodes {
             self.plan_crc_on_board::<{ H743.nodes }, { H743.vehicles }, { H743.timed_segments }>(

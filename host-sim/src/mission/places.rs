@@ -13,7 +13,7 @@ use planner_core::segment::segment_is_clear;
 use crate::map::VoxelMap;
 use crate::map::column::{ColumnError, ground_below_column, nearest_column};
 use crate::roadmap::passages::WantedConnection;
-use crate::roadmap::{self, BuildTimes, Roadmap};
+use crate::roadmap::{self, BuildTimes, BuiltRoadmap};
 use crate::scenario::{self, Scenario, Terminals};
 
 /// Spacing of the grid on which slots around a single goal are searched, metres.
@@ -85,7 +85,7 @@ pub(super) fn vehicle_tasks(
     scenario: &Scenario,
     map: &VoxelMap,
 ) -> anyhow::Result<Vec<VehicleTask>> {
-    let task = |(i, vehicle): (usize, &scenario::Vehicle)| {
+    let task = |(i, vehicle): (usize, &scenario::VehicleSection)| {
         let place = scenario.vehicle_places.get(i);
         let what = format!("start of vehicle {}", vehicle.id);
         Ok(VehicleTask {
@@ -113,7 +113,7 @@ pub(super) fn goal_points(
     schedule: &ScheduleConfig,
 ) -> anyhow::Result<Vec<Point>> {
     let given = &scenario.mission.goals;
-    if scenario.mission.mode != scenario::Mode::SingleGoal {
+    if scenario.mission.mode != scenario::MissionMode::SingleGoal {
         return Ok(given.clone());
     }
     let (goal, wanted) = (given[0], scenario.vehicles.len());
@@ -189,7 +189,7 @@ pub(super) fn build_roadmap(
     scenario: &Scenario,
     map: &VoxelMap,
     goals: &[Point],
-) -> anyhow::Result<(Roadmap, RoadmapHeader, BuildTimes)> {
+) -> anyhow::Result<(BuiltRoadmap, RoadmapHeader, BuildTimes)> {
     let starts = scenario.vehicles.iter().map(|v| v.start);
     let terminals: Vec<Point> = starts.chain(goals.iter().copied()).collect();
     let settings = &scenario.roadmap;
@@ -212,7 +212,7 @@ pub(super) fn build_roadmap(
         sampling: settings.sampling,
     };
     let (mut roadmap, mut parts) = roadmap::build(map, &terminals, &config)?;
-    let keep_apart = |roadmap: &mut Roadmap| {
+    let keep_apart = |roadmap: &mut BuiltRoadmap| {
         if settings.terminals == Terminals::Apart {
             let is_terminal = |node: u16| usize::from(node) < terminals.len();
             roadmap.edges.retain(|edge| !(is_terminal(edge.a) && is_terminal(edge.b)));

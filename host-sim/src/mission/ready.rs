@@ -18,11 +18,11 @@ use crate::capacity::{BoardCapacity, GATES, VEHICLES, WAYPOINTS};
 use crate::map::{ClearanceField, VoxelMap};
 use crate::margins;
 use crate::result::{RoadmapSize, Timing};
-use crate::roadmap::Roadmap;
+use crate::roadmap::BuiltRoadmap;
 use crate::scenario::{self, Scenario};
 
 /// The swarm's plan, with the host's capacities.
-pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
+pub type HostPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
 /// One vehicle's part of the swarm's plan, with its gates.
 pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
 
@@ -35,7 +35,7 @@ pub const VERTICAL_MPS: f32 = 1.0;
 const MEAN_SPEED_SHARE: f32 = 0.9;
 
 /// A mission ready to be planned and flown.
-pub struct Mission {
+pub struct PreparedMission {
     /// The scenario that the mission was made from.
     pub scenario: Scenario,
     /// The map on the planning grid.
@@ -43,7 +43,7 @@ pub struct Mission {
     /// Goals of the scenario, or the slots around its single goal, metres ENU.
     pub goals: Vec<Point>,
     /// The roadmap of a mission with goals; empty for an area.
-    pub roadmap: Roadmap,
+    pub roadmap: BuiltRoadmap,
     /// Bytes of the roadmap file for a board; over terrain those of the field file; empty over
     /// level ground.
     pub roadmap_or_field_file: Vec<u8>,
@@ -76,7 +76,7 @@ pub(super) fn schedule_config(scenario: &Scenario) -> ScheduleConfig {
     }
 }
 
-impl Mission {
+impl PreparedMission {
     /// A mission with empty goals, roadmap and files, for its caller to fill in.
     pub(super) fn new(
         scenario: Scenario,
@@ -89,7 +89,7 @@ impl Mission {
             scenario,
             map,
             goals: Vec::new(),
-            roadmap: Roadmap { nodes: Vec::new(), edges: Vec::new(), heights_m: Vec::new() },
+            roadmap: BuiltRoadmap { nodes: Vec::new(), edges: Vec::new(), heights_m: Vec::new() },
             roadmap_or_field_file: Vec::new(),
             mission_file: Vec::new(),
             tasks,
@@ -107,14 +107,14 @@ impl Mission {
         self.clearance_field.get_or_init(|| ClearanceField::new(&self.map.grid()))
     }
 
-    /// Separations and nominal speeds of the mission file; [`Mission::set_separation`] changes the
-    /// separations.
+    /// Separations and nominal speeds of the mission file; [`PreparedMission::set_separation`]
+    /// changes the separations.
     pub fn schedule(&self) -> &ScheduleConfig {
         &self.schedule
     }
 
     /// The part of `plan` that vehicle `index` flies, with its gates.
-    pub fn own_plan(&self, plan: &SwarmPlan, index: usize) -> Result<Box<OwnPlan>, ScheduleError> {
+    pub fn own_plan(&self, plan: &HostPlan, index: usize) -> Result<Box<OwnPlan>, ScheduleError> {
         let mut workspace = Default::default();
         let mut own = Box::new(OwnPlan::default());
         plan::vehicle_plan(plan, index, &self.schedule, &mut workspace, &mut own)?;
@@ -209,10 +209,10 @@ fn parse_roadmap(roadmap_file: &[u8]) -> RoadmapView<'_> {
     RoadmapView::parse(roadmap_file).expect("we wrote it ourselves")
 }
 
-fn planner_mode(mission: &scenario::Mission) -> GoalMode {
+fn planner_mode(mission: &scenario::MissionSection) -> GoalMode {
     match (mission.mode, mission.objective) {
-        (scenario::Mode::Labelled, _) => GoalMode::Labelled,
-        (_, scenario::Objective::Total) => GoalMode::Unlabelled(Objective::TotalDistance),
-        (_, scenario::Objective::Makespan) => GoalMode::Unlabelled(Objective::Makespan),
+        (scenario::MissionMode::Labelled, _) => GoalMode::Labelled,
+        (_, scenario::AssignmentObjective::Total) => GoalMode::Unlabelled(Objective::TotalDistance),
+        (_, scenario::AssignmentObjective::Makespan) => GoalMode::Unlabelled(Objective::Makespan),
     }
 }

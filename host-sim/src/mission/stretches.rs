@@ -5,7 +5,7 @@ use anyhow::bail;
 use companion::swarm::fleet::{COMMITMENT_S, DivisionInput, MAX_DIVISIONS};
 use planner_core::flight::{Flight, Task};
 
-use super::ready::{Mission, SwarmPlan};
+use super::ready::{HostPlan, PreparedMission};
 use crate::capacity::WAYPOINTS;
 
 /// Number of divisions, out of `MAX_DIVISIONS`, that are reserved for losses of vehicles.
@@ -46,7 +46,7 @@ fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> DivisionInput {
 
 /// Inputs, in the order of ids, of the division that the first vehicle to reach the end of its
 /// stretch requests; `None` if every route fits into its path.
-pub fn next_division_inputs(plan: &SwarmPlan) -> Option<Vec<DivisionInput>> {
+pub fn next_division_inputs(plan: &HostPlan) -> Option<Vec<DivisionInput>> {
     let hold_s =
         plan.flights.iter().filter_map(division_due_s).min_by(f32::total_cmp)? + COMMITMENT_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();
@@ -54,10 +54,10 @@ pub fn next_division_inputs(plan: &SwarmPlan) -> Option<Vec<DivisionInput>> {
     Some(flights.into_iter().map(|flight| division_input_at(flight, hold_s)).collect())
 }
 
-impl Mission {
+impl PreparedMission {
     /// Refuses a mission whose routes take more divisions without a loss than `MAX_DIVISIONS` less
     /// the reserve.
-    pub(super) fn check_stretches(&self, plan: &SwarmPlan) -> anyhow::Result<()> {
+    pub(super) fn check_stretches(&self, plan: &HostPlan) -> anyhow::Result<()> {
         let mut losses: Vec<Vec<DivisionInput>> = Vec::new();
         let mut next = next_division_inputs(plan);
         while let Some(inputs) = next {

@@ -16,7 +16,7 @@ use super::cpp_data::{
     SHORT_TRACK_COLUMNS, TABLE_4_COSTS_M,
 };
 use super::cpp_figures;
-use super::cpp_rows::{Row, Summary};
+use super::cpp_rows::{TableRow, ValueSummary};
 use crate::commands::cover;
 use crate::coverage::check::check_plan;
 use crate::coverage::{CoveragePlan, page};
@@ -24,7 +24,7 @@ use crate::files::ResultFiles;
 use crate::report::Figure;
 use crate::result::{self, Timing, rounded};
 use crate::say;
-use crate::scenario::coverage::Method;
+use crate::scenario::coverage::CoverageMethod;
 use crate::scenario::{self, Scenario};
 use crate::{output, report};
 
@@ -43,7 +43,8 @@ const COMPARED_AREAS: [&str; 2] = [
 const TABLE_4_AREA: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
 /// Starts of the three UAVs of Table 4, east and north in metres: the first is far away.
 const TABLE_4_STARTS: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
-const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
+const METHODS: [CoverageMethod; 3] =
+    [CoverageMethod::SimpleBinpat, CoverageMethod::Binpat, CoverageMethod::PowellBinpat];
 /// Number of plans timed for each method and fleet size; Table 3 gets the median time.
 const TIMED_RUNS: usize = 51;
 /// Unit of the rows of Table 3: milliseconds to compute a plan, for 2 to 7 vehicles.
@@ -76,7 +77,7 @@ fn in_a_row(count: usize) -> Vec<[f64; 2]> {
 
 /// Rows of all tables, and whether every plan so far passed its check.
 struct Tables {
-    rows: Vec<Row>,
+    rows: Vec<TableRow>,
     complete: bool,
     /// Cost in seconds and `result.json` of the plan with the greatest cost so far; a plan in which
     /// the check found a fault ranks above all others.
@@ -89,7 +90,7 @@ impl Tables {
     fn plan_costs(
         &mut self,
         scenario: &Scenario,
-        method: Method,
+        method: CoverageMethod,
         unit: &str,
     ) -> anyhow::Result<Vec<f64>> {
         let planned = CoveragePlan::new(scenario, method)?;
@@ -112,7 +113,7 @@ impl Tables {
     fn add(
         &mut self,
         table: &str,
-        method: Method,
+        method: CoverageMethod,
         spacing: (f64, f64),
         unit: &'static str,
         both: [Vec<f64>; 2],
@@ -120,8 +121,8 @@ impl Tables {
         let [ours, theirs] = both;
         // A row of planning times has one value for each fleet size, not one for each vehicle.
         let of_a_fleet = ours.len() > 1 && unit != PLANNING_UNIT;
-        let summary = |values: &[f64]| of_a_fleet.then(|| Summary::of(values));
-        self.rows.push(Row {
+        let summary = |values: &[f64]| of_a_fleet.then(|| ValueSummary::of(values));
+        self.rows.push(TableRow {
             table: table.to_owned(),
             track: None,
             method: method.name(),
@@ -162,7 +163,7 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     results.add(output::RESULT_FILES[1], result::json(&timing)?.as_bytes())?;
     // The page's 3D scene shows Fig. 8 d: the plan of Table 2 by POWELL-BINPAT.
     let scenario = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
-    let planned = CoveragePlan::new(&scenario, Method::PowellBinpat)?;
+    let planned = CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)?;
     let findings = check_plan(&planned);
     let result = serde_json::to_value(cover::cover_result(&planned, &findings))?;
     let mut page = page::report_data(&planned, &planned.flights(), &findings, result);
@@ -236,7 +237,7 @@ fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
 fn flown(tables: &mut Tables) -> anyhow::Result<()> {
     let mut mean_max = [[0.0; 3]; 2];
     for table in &FLIGHT_TIMES_TABLES {
-        let method = Method::named(table.method).map_err(anyhow::Error::msg)?;
+        let method = CoverageMethod::named(table.method).map_err(anyhow::Error::msg)?;
         let (polygon, columns) = if table.long {
             (LONG_TRACK, LONG_TRACK_COLUMNS)
         } else {
@@ -281,7 +282,7 @@ fn print(tables: &Tables) {
     say!("table     method         lanes  height  ours: max    CV %  theirs: max    CV %");
     for row in tables.rows.iter().filter(|row| row.unit != PLANNING_UNIT) {
         let max = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
-        let cv = |summary: &Option<Summary>| {
+        let cv = |summary: &Option<ValueSummary>| {
             summary.map_or("-".to_owned(), |s| format!("{:.2}", s.cv_percent))
         };
         say!(
@@ -322,13 +323,13 @@ mod tests {
         for table in &FLIGHT_TIMES_TABLES {
             let index = METHODS.iter().position(|m| m.name() == table.method).expect("a method");
             for times in table.times_s {
-                mean_max[usize::from(table.long)][index] += Summary::of(times).max / 12.0;
+                mean_max[usize::from(table.long)][index] += ValueSummary::of(times).max / 12.0;
             }
         }
         for (ours, printed) in mean_max.iter().flatten().zip(MEAN_LARGEST_TIME_S.iter().flatten()) {
             assert!((ours - printed).abs() < 0.01, "{ours} {printed}");
         }
-        assert!((Summary::of(&COSTS_M[2]).sd - 3.53).abs() < 0.01);
+        assert!((ValueSummary::of(&COSTS_M[2]).sd - 3.53).abs() < 0.01);
     }
 
     #[test]

@@ -5,12 +5,12 @@
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
 
-use super::cpp_rows::{Row, Summary};
+use super::cpp_rows::{TableRow, ValueSummary};
 use crate::coverage::CoveragePlan;
 use crate::report::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
 use crate::result::rounded;
 use crate::scenario::Scenario;
-use crate::scenario::coverage::Method;
+use crate::scenario::coverage::CoverageMethod;
 
 /// Numbers of UAVs: Fig. 12 has two panels for each, ours and the paper's.
 const FLEETS: [usize; 2] = [3, 5];
@@ -29,13 +29,13 @@ pub(super) fn route_figures(
     small: &Scenario,
 ) -> anyhow::Result<[Figure; 3]> {
     let three = [
-        (Method::SimpleBinpat, "SIMPLE-BINPAT"),
-        (Method::Binpat, "BINPAT"),
-        (Method::PowellBinpat, "POWELL-BINPAT"),
+        (CoverageMethod::SimpleBinpat, "SIMPLE-BINPAT"),
+        (CoverageMethod::Binpat, "BINPAT"),
+        (CoverageMethod::PowellBinpat, "POWELL-BINPAT"),
     ];
     let mut fig_8 = vec![route_map(
         "(a) area and UAVs".to_owned(),
-        &CoveragePlan::new(convex, Method::Binpat)?,
+        &CoveragePlan::new(convex, CoverageMethod::Binpat)?,
         MapContent::Area,
     )];
     for ((method, name), letter) in three.iter().zip('b'..) {
@@ -102,7 +102,7 @@ fn route_map(title: String, planned: &CoveragePlan<'_>, content: MapContent) -> 
     let flights = planned.flights();
     let (mut costs, mut most_s) = (Vec::new(), 0.0f32);
     let vehicles = planned.scenario.vehicles.iter().enumerate();
-    let route = |(index, vehicle): (usize, &crate::scenario::Vehicle)| {
+    let route = |(index, vehicle): (usize, &crate::scenario::VehicleSection)| {
         let own = flights.iter().find(|(sortie, _, _)| usize::from(sortie.route.vehicle) == index);
         let own = own.filter(|_| content == MapContent::Routes);
         let (cost_m, cost_s) =
@@ -141,7 +141,7 @@ impl ValueSource {
     const BOTH: [(Self, &'static str); 2] =
         [(Self::Ours, "ours, planned"), (Self::Theirs, "theirs, flown in Gazebo")];
 
-    fn of(self, row: &Row) -> Option<Summary> {
+    fn of(self, row: &TableRow) -> Option<ValueSummary> {
         match self {
             Self::Ours => row.ours_summary,
             Self::Theirs => row.theirs_summary,
@@ -151,24 +151,24 @@ impl ValueSource {
 
 /// Fig. 12: average time of the UAVs by case, for three and five UAVs. Fig. 13: coefficient of
 /// variation (CV) by case, on the short and the long track.
-pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
-    let rows: Vec<&Row> = rows.iter().filter(|row| row.track.is_some()).collect();
+pub(super) fn spread_figures(rows: &[TableRow]) -> [Figure; 2] {
+    let rows: Vec<&TableRow> = rows.iter().filter(|row| row.track.is_some()).collect();
     let (mut times, mut spreads) = (Vec::new(), Vec::new());
     for (fleet, letter) in FLEETS.into_iter().zip('a'..) {
         for (whose, name) in ValueSource::BOTH {
             let title = format!("({letter}) {fleet} UAVs: {name}");
-            let own = |row: &&&Row| row.ours.len() == fleet;
-            let value = |row: &Row| whose.of(row).map(|summary| summary.mean);
-            let own: Vec<&Row> = rows.iter().filter(own).copied().collect();
+            let own = |row: &&&TableRow| row.ours.len() == fleet;
+            let value = |row: &TableRow| whose.of(row).map(|summary| summary.mean);
+            let own: Vec<&TableRow> = rows.iter().filter(own).copied().collect();
             times.push(Panel::Bars(chart(title, ("Av, s", "average"), &own, value)));
         }
     }
     for (track, letter) in TRACKS.into_iter().zip('a'..) {
         for (whose, name) in ValueSource::BOTH {
             let title = format!("({letter}) {track} track: {name}");
-            let own: Vec<&Row> =
+            let own: Vec<&TableRow> =
                 rows.iter().filter(|row| row.track == Some(track)).copied().collect();
-            let value = |row: &Row| whose.of(row).map(|summary| summary.cv_percent);
+            let value = |row: &TableRow| whose.of(row).map(|summary| summary.cv_percent);
             spreads.push(Panel::Lines(chart(title, ("CV, %", "spread"), &own, value)));
         }
     }
@@ -195,8 +195,8 @@ pub(super) fn spread_figures(rows: &[Row]) -> [Figure; 2] {
 fn chart(
     title: String,
     (unit, scale): (&str, &'static str),
-    rows: &[&Row],
-    value: impl Fn(&Row) -> Option<f64>,
+    rows: &[&TableRow],
+    value: impl Fn(&TableRow) -> Option<f64>,
 ) -> Chart {
     let fleets = rows.iter().any(|row| row.ours.len() != rows[0].ours.len());
     let tracks = rows.iter().any(|row| row.track != rows[0].track);

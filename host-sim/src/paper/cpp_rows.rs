@@ -6,7 +6,7 @@ use crate::result::rounded;
 
 /// One line of a table.
 #[derive(Debug, Serialize)]
-pub(super) struct Row {
+pub(super) struct TableRow {
     pub(super) table: String,
     /// `short` or `long` in a row of Tables A1 to A12, `None` in any other.
     #[serde(skip)]
@@ -17,20 +17,20 @@ pub(super) struct Row {
     pub(super) unit: &'static str,
     pub(super) ours: Vec<f64>,
     pub(super) theirs: Vec<f64>,
-    pub(super) ours_summary: Option<Summary>,
-    pub(super) theirs_summary: Option<Summary>,
+    pub(super) ours_summary: Option<ValueSummary>,
+    pub(super) theirs_summary: Option<ValueSummary>,
 }
 
 /// Largest value, mean (Av), the sample's standard deviation (SD), and CV = 100 · SD / Av.
 #[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct Summary {
+pub(super) struct ValueSummary {
     pub(super) max: f64,
     pub(super) mean: f64,
     pub(super) sd: f64,
     pub(super) cv_percent: f64,
 }
 
-impl Summary {
+impl ValueSummary {
     pub(super) fn of(values: &[f64]) -> Self {
         let count = values.len() as f64;
         let mean = values.iter().sum::<f64>() / count;

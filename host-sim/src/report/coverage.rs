@@ -5,7 +5,7 @@ use planner_core::Point;
 use serde::Serialize;
 
 use super::pack;
-use super::track::Footprint;
+use super::track::PictureFootprint;
 
 /// A coverage mission's part of the report data.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -13,28 +13,28 @@ pub struct CoverageLayers {
     /// Distance from one lane to the next, metres.
     pub lane_m: f32,
     /// Divisions by rising time, at least one: the plan, then each division made in flight.
-    pub divisions: Vec<Division>,
+    pub divisions: Vec<ReportDivision>,
     /// Footprints of the pictures, by rising time.
     #[serde(serialize_with = "pack::footprints")]
-    pub footprints: Vec<Footprint>,
+    pub footprints: Vec<PictureFootprint>,
 }
 
 /// How the area is divided among the vehicles from `t_s` on, until the next division.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Division {
+pub struct ReportDivision {
     /// Time from which the division holds, seconds.
     pub t_s: f32,
     /// MAVLink ids of the vehicles lost since the division before.
     pub lost: Vec<u8>,
     /// Waypoints and path of each vehicle that still flies.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ReportPart>,
     /// Waypoints that this division moves from one vehicle to another.
     pub taken: Vec<WaypointTransfer>,
 }
 
 /// What one vehicle photographs in a division.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Part {
+pub struct ReportPart {
     /// MAVLink system id.
     pub vehicle: u8,
     /// Number of waypoints.

@@ -27,13 +27,13 @@ pub struct ReportData {
     /// Vehicles in the order of the page's table of vehicles.
     pub vehicles: Vec<VehicleTrack>,
     /// Borders on the ground: area, holes and no-fly zones of a coverage mission.
-    pub outlines: Vec<Outline>,
+    pub outlines: Vec<AreaOutline>,
     /// Divisions of the area and pictures; `None` outside coverage missions.
     pub coverage: Option<CoverageLayers>,
     /// Obstacles that appear in flight and are not in the map.
     pub obstacles: Vec<SphereObstacle>,
     /// Events, in any order.
-    pub events: Vec<Event>,
+    pub events: Vec<LogEvent>,
     /// Plots over time, in order.
     pub plots: Vec<Plot>,
     /// Figures that reproduce those of a paper, at the end of the page.
@@ -46,7 +46,7 @@ pub struct ReportData {
 
 /// A closed border on the ground.
 #[derive(Clone, Debug, Serialize)]
-pub struct Outline {
+pub struct AreaOutline {
     /// Area, hole or no-fly zone.
     pub kind: OutlineKind,
     /// Corners of the border, metres.
@@ -133,7 +133,7 @@ pub enum Level {
 
 /// One line of the event log.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Event {
+pub struct LogEvent {
     /// Time, seconds.
     pub t_s: f32,
     /// MAVLink id of the vehicle that the event is about; `None` for the swarm.
@@ -152,14 +152,14 @@ pub struct Plot {
     /// Unit of the values, such as `m`.
     pub unit: String,
     /// Limit for the values, drawn as a line, such as the safety distance; `None` draws none.
-    pub limit: Option<Limit>,
+    pub limit: Option<PlotLimit>,
     /// The curves.
     pub curves: Vec<Curve>,
 }
 
 /// A horizontal line in a plot.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Limit {
+pub struct PlotLimit {
     /// Value in the plot's unit.
     pub value: f32,
     /// Label of the line, such as `safety distance`.

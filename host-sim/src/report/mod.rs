@@ -16,14 +16,14 @@ mod track;
 
 use anyhow::Context;
 
-pub use coverage::{CoverageLayers, Division, Part, WaypointTransfer};
+pub use coverage::{CoverageLayers, ReportDivision, ReportPart, WaypointTransfer};
 pub use data::{
-    Curve, Event, Level, Limit, Outline, OutlineKind, Plot, ReportData, RoadmapLines,
+    AreaOutline, Curve, Level, LogEvent, OutlineKind, Plot, PlotLimit, ReportData, RoadmapLines,
     SphereObstacle, VehicleTrack, vehicle_color,
 };
 pub use figures::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
 pub use surface::{FACE_LIMIT, MapSurface};
-pub use track::{Footprint, TrackPoint};
+pub use track::{PictureFootprint, TrackPoint};
 
 /// The report page as one self-contained HTML text of a few megabytes.
 ///

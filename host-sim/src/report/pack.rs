@@ -9,7 +9,7 @@ use base64::engine::general_purpose::STANDARD;
 use planner_core::Point;
 use serde::{Serialize, Serializer};
 
-use super::track::{Footprint, TrackPoint};
+use super::track::{PictureFootprint, TrackPoint};
 
 fn base64<S: Serializer>(
     bytes: impl Iterator<Item = u8>,
@@ -40,7 +40,7 @@ pub(super) fn track<S: Serializer>(track: &[TrackPoint], serializer: S) -> Resul
 }
 
 pub(super) fn footprints<S: Serializer>(
-    all: &[Footprint],
+    all: &[PictureFootprint],
     serializer: S,
 ) -> Result<S::Ok, S::Error> {
     let floats = all.iter().flat_map(|f| {

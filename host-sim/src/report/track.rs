@@ -13,7 +13,7 @@ pub struct TrackPoint {
 
 /// Footprint of a picture on the ground.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Footprint {
+pub struct PictureFootprint {
     /// When the picture was taken, seconds.
     pub t_s: f32,
     /// Vehicle that took the picture; 0 for a picture of an earlier flight.

@@ -1,7 +1,7 @@
 //! Passages: rooms behind narrow doors are joined, by clear edges, and what is walled off stays so.
 
 use super::passages::{ConnectedComponents, WantedConnection};
-use super::{PrmConfig, Roadmap, add_passages, build};
+use super::{BuiltRoadmap, PrmConfig, add_passages, build};
 use crate::map::occupancy::{OccupancyMap, Unknown};
 use crate::map::{Occupancy, VoxelMap};
 use planner_core::Point;
@@ -53,7 +53,7 @@ fn rooms_behind_narrow_doors_are_joined() {
         };
         let (mut roadmap, _) = build(&map, &ends, &config).unwrap();
         let before = roadmap.nodes.len();
-        let joined = |roadmap: &Roadmap| {
+        let joined = |roadmap: &BuiltRoadmap| {
             let mut parts =
                 ConnectedComponents::new(roadmap.nodes.len(), &roadmap.edges, REQUIRED_M);
             parts.component_of(0) == parts.component_of(1)

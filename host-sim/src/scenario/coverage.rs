@@ -12,7 +12,7 @@ use planner_core::file::FileError;
 pub use planner_core::flight::Trigger;
 use planner_core::frames::Geodetic;
 
-use crate::coverage::obstacles::Obstacles;
+use crate::coverage::obstacles::MapObstacles;
 use crate::terrain::HeightGrid;
 
 /// Hint of an error about a vehicle whose start is not on the ground.
@@ -21,7 +21,7 @@ pub const ORIGIN_HINT: &str = "area.origin = { lat_deg = …, lon_deg = …, alt
 
 /// `[area]`: the area of a coverage mission, and how it is photographed.
 #[derive(Clone, Debug)]
-pub struct Area {
+pub struct AreaSection {
     /// Where the area stands in the scenario, for error messages, as `FILE:LINE`.
     pub place: String,
     /// Vertices of all rings, one ring after the other, metres east and north of the origin.
@@ -48,7 +48,7 @@ pub struct Area {
     /// Heights of the ground; `None` over level ground.
     pub terrain: Option<Terrain>,
     /// Obstacles of `[map]`, around which `rings` has no-fly zones; `None` without a map.
-    pub obstacles: Option<Arc<Obstacles>>,
+    pub obstacles: Option<Arc<MapObstacles>>,
     /// Direction of the lanes, degrees counter-clockwise from east; `None`: the plan chooses it.
     pub angle_deg: Option<f32>,
     /// How far beyond the area's edge lanes begin and end, metres.
@@ -56,7 +56,7 @@ pub struct Area {
     /// Whether a route may take more than one battery.
     pub batteries: bool,
     /// How the work is divided among the vehicles.
-    pub method: Method,
+    pub method: CoverageMethod,
     /// Heading of the vehicles on the lanes.
     pub heading: HeadingRule,
     /// What triggers the camera.
@@ -70,7 +70,7 @@ pub struct Terrain {
     pub grid: Arc<HeightGrid>,
     /// Bytes of the height field that vehicles follow (`field.bin`).
     pub field: Arc<[u8]>,
-    /// How far vehicles may fly higher above the field than [`Area::height_m`], metres.
+    /// How far vehicles may fly higher above the field than [`AreaSection::height_m`], metres.
     pub tolerance_m: f32,
     /// Steepest slope that vehicles fly, metres of height for each metre over ground.
     pub slope: f32,
@@ -87,7 +87,7 @@ impl Terrain {
     }
 }
 
-impl Area {
+impl AreaSection {
     /// Height of the ground at a place, metres above the origin; 0 without terrain and outside its
     /// map.
     pub fn ground_m(&self, place: &Flat) -> f32 {
@@ -104,7 +104,7 @@ impl Area {
 
 /// How the work is divided among the vehicles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Method {
+pub enum CoverageMethod {
     /// Whole lanes, divided in proportion to the vehicles' weights (SIMPLE-BINPAT).
     SimpleBinpat,
     /// Waypoints, divided in proportion to the vehicles' weights (BINPAT).
@@ -116,7 +116,7 @@ pub enum Method {
     Exact,
 }
 
-impl Method {
+impl CoverageMethod {
     /// Every method by its name.
     pub const NAMES: [(&str, Self); 6] = [
         ("powell-binpat", Self::PowellBinpat),

@@ -15,7 +15,7 @@ pub struct ScenarioError {
     pub file: String,
     /// Line and column of the fault, and the line's text; `None` if the file itself could not be
     /// read.
-    pub place: Option<Place>,
+    pub place: Option<SourcePlace>,
     /// Fault of the scenario.
     pub why: String,
     /// Remedy, if one can be stated.
@@ -24,7 +24,7 @@ pub struct ScenarioError {
 
 /// A place in a scenario's text.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct SourcePlace {
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
@@ -35,7 +35,7 @@ pub struct Place {
     pub marked: usize,
 }
 
-impl Place {
+impl SourcePlace {
     /// The place of a range of bytes in the text.
     pub(super) fn of(text: &str, span: &Range<usize>) -> Self {
         let start =
@@ -58,7 +58,7 @@ impl fmt::Display for ScenarioError {
         let Self { file, place, why, hint } = self;
         match place {
             None => write!(f, "bad scenario: {file}: {why}")?,
-            Some(Place { line, column, text, marked }) => {
+            Some(SourcePlace { line, column, text, marked }) => {
                 let margin = " ".repeat(line.to_string().len());
                 writeln!(f, "bad scenario: {file}:{line}:{column}: {why}")?;
                 writeln!(f, "{margin} |")?;

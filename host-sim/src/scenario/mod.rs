@@ -19,13 +19,14 @@ use std::path::{Path, PathBuf};
 use crate::files;
 use crate::quote::quoted_path;
 pub use companion::autopilot::AutopilotKind;
-pub use error::{Place, ScenarioError};
+pub use error::{ScenarioError, SourcePlace};
 pub use planner_core::deconflict::Method;
 pub use planner_core::prm::Sampling;
 pub(crate) use sections::DEFAULT_ORIGIN;
 pub use types::{
-    Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Mission, Mode,
-    Objective, PositionErrors, Roadmap, Scenario, Simulation, Terminals, UnsupportedTable, Vehicle,
+    AssignmentObjective, CompanionHost, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault,
+    Geofence, MapSection, MissionMode, MissionSection, PositionErrors, RoadmapSection, Scenario,
+    Simulation, Terminals, UnsupportedTable, VehicleSection,
 };
 
 /// Reads a scenario file; paths in it are relative to its folder.
@@ -56,7 +57,7 @@ pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
 
 /// Reads a scenario's text: a coverage mission if it has `[area]`, else one with goals.
 fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError> {
-    let text = reader::Text { file, text };
+    let text = reader::TomlText { file, text };
     sections::read_root(text, |root| match root.get("area") {
         Some(_) => sections::area::read_coverage_scenario(text, root, folder),
         None => sections::goals::goals_mission(text, root, folder),

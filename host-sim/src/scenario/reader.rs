@@ -10,30 +10,30 @@ use planner_core::roadmap::MAX_COORDINATE_M;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
-use super::error::{Place, ScenarioError};
+use super::error::{ScenarioError, SourcePlace};
 use crate::quote::quoted;
 
 /// Range of bytes in the scenario's text.
-pub(super) type Span = Range<usize>;
+pub(super) type TomlSpan = Range<usize>;
 pub(super) type Result<T> = std::result::Result<T, ScenarioError>;
 
 /// The scenario's text, and its name for errors.
 #[derive(Clone, Copy)]
-pub(super) struct Text<'a> {
+pub(super) struct TomlText<'a> {
     pub(super) file: &'a str,
     pub(super) text: &'a str,
 }
 
-impl Text<'_> {
+impl TomlText<'_> {
     /// Where the span begins, as `FILE:LINE`.
-    pub(super) fn line(&self, span: &Span) -> String {
-        format!("{}:{}", self.file, Place::of(self.text, span).line)
+    pub(super) fn line(&self, span: &TomlSpan) -> String {
+        format!("{}:{}", self.file, SourcePlace::of(self.text, span).line)
     }
 
-    pub(super) fn error(&self, span: &Span, why: impl Into<String>) -> ScenarioError {
+    pub(super) fn error(&self, span: &TomlSpan, why: impl Into<String>) -> ScenarioError {
         ScenarioError {
             file: self.file.into(),
-            place: Some(Place::of(self.text, span)),
+            place: Some(SourcePlace::of(self.text, span)),
             why: why.into(),
             hint: None,
         }
@@ -41,7 +41,7 @@ impl Text<'_> {
 
     pub(super) fn with_hint(
         &self,
-        span: &Span,
+        span: &TomlSpan,
         why: impl Into<String>,
         hint: impl Into<String>,
     ) -> ScenarioError {
@@ -51,15 +51,15 @@ impl Text<'_> {
 
 /// A TOML value, with its name and place for errors.
 #[derive(Clone)]
-pub(super) struct Value<'a> {
-    pub(super) text: Text<'a>,
+pub(super) struct TomlValue<'a> {
+    pub(super) text: TomlText<'a>,
     pub(super) name: String,
-    pub(super) span: Span,
+    pub(super) span: TomlSpan,
     value: &'a DeValue<'a>,
 }
 
-impl<'a> Value<'a> {
-    fn new(text: Text<'a>, name: String, value: &'a Spanned<DeValue<'a>>) -> Self {
+impl<'a> TomlValue<'a> {
+    fn new(text: TomlText<'a>, name: String, value: &'a Spanned<DeValue<'a>>) -> Self {
         Self { text, name, span: value.span(), value: value.get_ref() }
     }
 
@@ -130,7 +130,7 @@ impl<'a> Value<'a> {
         })
     }
 
-    pub(super) fn items(&self) -> Result<Vec<Value<'a>>> {
+    pub(super) fn items(&self) -> Result<Vec<TomlValue<'a>>> {
         let array = self.value.as_array().ok_or_else(|| {
             let error = self.expected_error("a list");
             let hint = self
@@ -138,7 +138,7 @@ impl<'a> Value<'a> {
                 .then(|| format!("in double brackets, [[{0}]], each is one of {0}", self.name));
             ScenarioError { hint, ..error }
         })?;
-        let item = |(i, value)| Value::new(self.text, format!("{}[{i}]", self.name), value);
+        let item = |(i, value)| TomlValue::new(self.text, format!("{}[{i}]", self.name), value);
         Ok(array.iter().enumerate().map(item).collect())
     }
 
@@ -172,15 +172,20 @@ impl<'a> Value<'a> {
 /// A table whose keys are read one by one; [`Table::refuse_unknown_keys`] refuses keys that were
 /// never asked for.
 pub(super) struct Table<'a> {
-    pub(super) text: Text<'a>,
-    pub(super) span: Span,
+    pub(super) text: TomlText<'a>,
+    pub(super) span: TomlSpan,
     name: String,
     table: &'a DeTable<'a>,
     known: RefCell<Vec<&'static str>>,
 }
 
 impl<'a> Table<'a> {
-    pub(super) fn new(text: Text<'a>, name: &str, span: Span, table: &'a DeTable<'a>) -> Self {
+    pub(super) fn new(
+        text: TomlText<'a>,
+        name: &str,
+        span: TomlSpan,
+        table: &'a DeTable<'a>,
+    ) -> Self {
         Self { text, span, name: name.into(), table, known: RefCell::default() }
     }
 
@@ -188,13 +193,13 @@ impl<'a> Table<'a> {
         if self.name.is_empty() { key.into() } else { format!("{}.{key}", self.name) }
     }
 
-    pub(super) fn get(&self, key: &'static str) -> Option<Value<'a>> {
+    pub(super) fn get(&self, key: &'static str) -> Option<TomlValue<'a>> {
         self.known.borrow_mut().push(key);
-        self.table.get(key).map(|value| Value::new(self.text, self.path(key), value))
+        self.table.get(key).map(|value| TomlValue::new(self.text, self.path(key), value))
     }
 
     /// The value of `key`; if the key is missing, an error at the table with `hint`.
-    pub(super) fn required(&self, key: &'static str, hint: &str) -> Result<Value<'a>> {
+    pub(super) fn required(&self, key: &'static str, hint: &str) -> Result<TomlValue<'a>> {
         self.get(key).ok_or_else(|| {
             // A misspelt key is what the user sees in the file, so that is reported, not the
             // missing key.

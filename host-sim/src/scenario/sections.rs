@@ -22,10 +22,10 @@ use self::checks::VehicleSpans;
 use self::simulation::{read_deconfliction, read_fault, read_simulation};
 use self::values::{MAX_ID, read_point};
 use super::error::ScenarioError;
-use super::reader::{Result, Span, Table, Text, Value};
+use super::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
 use super::types::{
-    Companion, Deconfliction, Fault, Geofence, Map, Roadmap, Simulation, Terminals,
-    UnsupportedTable, Vehicle,
+    CompanionHost, Deconfliction, Fault, Geofence, MapSection, RoadmapSection, Simulation,
+    Terminals, UnsupportedTable, VehicleSection,
 };
 use crate::link::LinkUrl;
 use crate::map::{RESOLUTION_RANGE_M, Source, Unknown};
@@ -41,7 +41,7 @@ pub(crate) const DEFAULT_ORIGIN: Geodetic =
 
 /// Parses the text as TOML, refuses unknown root keys, and calls `read` with the root table.
 pub(super) fn read_root<T>(
-    text: Text<'_>,
+    text: TomlText<'_>,
     read: impl FnOnce(&Table<'_>) -> Result<T>,
 ) -> Result<T> {
     let root = DeTable::parse(text.text).map_err(|error| {
@@ -74,12 +74,16 @@ struct Common {
     deconfliction: Deconfliction,
     simulation: Simulation,
     /// Where `simulation.estimator` stands, if it is given.
-    estimator_span: Option<Span>,
+    estimator_span: Option<TomlSpan>,
 }
 
 /// Reads the settings that every kind of mission has. Two defaults depend on the kind: by how much
 /// two vehicles together deviate from their paths, metres, and the time limit of a flight, seconds.
-fn read_common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> Result<Common> {
+fn read_common(
+    text: TomlText<'_>,
+    root: &Table<'_>,
+    (stray_m, limit_s): (f32, f32),
+) -> Result<Common> {
     let seed = root.integer_in_range("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
     let deconfliction = deconfliction.unwrap_or_else(|| empty_table(text, "deconfliction"));
@@ -92,7 +96,10 @@ fn read_common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32))
 }
 
 /// Reads `[[faults]]`; a fault's vehicle must be one of `vehicles`.
-fn read_faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Vec<Fault>> {
+fn read_faults(
+    root: &Table<'_>,
+    vehicles: &[(VehicleSection, VehicleSpans)],
+) -> Result<Vec<Fault>> {
     let ids: Vec<u8> = vehicles.iter().map(|(v, _)| v.id).collect();
     let Some(value) = root.get("faults") else { return Ok(Vec::new()) };
     let items = value.items()?;
@@ -116,12 +123,12 @@ fn syntax_hint(rest: &str, what: &str) -> Option<&'static str> {
 }
 
 /// An empty table in place of one that the file leaves out: all its keys have their defaults.
-fn empty_table<'a>(text: Text<'a>, name: &str) -> Table<'a> {
+fn empty_table<'a>(text: TomlText<'a>, name: &str) -> Table<'a> {
     static EMPTY: std::sync::LazyLock<DeTable<'static>> = std::sync::LazyLock::new(DeTable::new);
     Table::new(text, name, 0..0, &EMPTY)
 }
 
-fn unsupported_error(text: Text<'_>, span: &Span, what: &str) -> ScenarioError {
+fn unsupported_error(text: TomlText<'_>, span: &TomlSpan, what: &str) -> ScenarioError {
     text.error(span, format!("not available yet: {what}"))
 }
 
@@ -139,7 +146,7 @@ fn read_unsupported(
     Ok(Some(UnsupportedTable { table }))
 }
 
-fn read_geodetic(value: &Value<'_>) -> Result<Geodetic> {
+fn read_geodetic(value: &TomlValue<'_>) -> Result<Geodetic> {
     let table = value.table()?;
     let hint = "a position is { lat_deg = …, lon_deg = …, alt_m = … }";
     let lat_deg = table.required("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
@@ -150,7 +157,7 @@ fn read_geodetic(value: &Value<'_>) -> Result<Geodetic> {
 }
 
 /// Reads `[map]`; the flag says whether the scenario gives the map's origin.
-fn read_map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
+fn read_map(table: &Table<'_>, folder: &Path) -> Result<(MapSection, bool)> {
     let file_value =
         table.required("file", "a path to an OctoMap `.bt` file, or \"builtin:building\"")?;
     let name = file_value.str()?;
@@ -163,7 +170,7 @@ fn read_map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
         folder.join(name).display().to_string()
     };
     let origin = table.get("origin").map(|v| read_geodetic(&v)).transpose()?;
-    let map = Map {
+    let map = MapSection {
         file,
         resolution_m: table.f32("resolution_m", 0.25, RESOLUTION_RANGE_M)?,
         unknown: table.one_of(
@@ -177,7 +184,7 @@ fn read_map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
     Ok((map, origin.is_some()))
 }
 
-fn read_roadmap(table: &Table<'_>) -> Result<Roadmap> {
+fn read_roadmap(table: &Table<'_>) -> Result<RoadmapSection> {
     let edge_max = table.get("edge_max_m");
     let shares = [("edge_min_share", "edge_min_m"), ("edge_max_share", "edge_max_m")];
     for (share, metres) in shares {
@@ -187,7 +194,7 @@ fn read_roadmap(table: &Table<'_>) -> Result<Roadmap> {
             );
         }
     }
-    let roadmap = Roadmap {
+    let roadmap = RoadmapSection {
         nodes: table.integer_in_range("nodes", 2300, 0..=1_000_000)? as u32,
         edge_min_m: table.f32("edge_min_m", 0.5, 0.0..=MAX_EDGE_M.into())?,
         edge_max_m: table.f32("edge_max_m", 8.0, 0.001..=MAX_EDGE_M.into())?,
@@ -225,7 +232,7 @@ fn read_roadmap(table: &Table<'_>) -> Result<Roadmap> {
 /// Reads the geofence, and the MAVLink system ids of ground stations whose commands count.
 fn fence_and_ground_stations(
     table: &Table<'_>,
-    vehicles: &[(Vehicle, VehicleSpans)],
+    vehicles: &[(VehicleSection, VehicleSpans)],
 ) -> Result<(Option<Geofence>, [u8; GROUND_STATIONS])> {
     let geofence = table.get("geofence").map(|v| read_geofence(&v)).transpose()?;
     let ground_stations =
@@ -235,7 +242,7 @@ fn fence_and_ground_stations(
 }
 
 /// Refuses a list of more than `most` items, which are called `what` in the error.
-fn check_list_len(value: &Value<'_>, count: usize, most: usize, what: &str) -> Result<()> {
+fn check_list_len(value: &TomlValue<'_>, count: usize, most: usize, what: &str) -> Result<()> {
     if count > most {
         return Err(value.error(&format!("holds more than {most} {what}")));
     }
@@ -244,8 +251,8 @@ fn check_list_len(value: &Value<'_>, count: usize, most: usize, what: &str) -> R
 
 /// Reads the MAVLink system ids of the ground stations whose commands count.
 fn read_stations(
-    value: &Value<'_>,
-    vehicles: &[(Vehicle, VehicleSpans)],
+    value: &TomlValue<'_>,
+    vehicles: &[(VehicleSection, VehicleSpans)],
 ) -> Result<[u8; GROUND_STATIONS]> {
     let given = value.items()?;
     if !(1..=GROUND_STATIONS).contains(&given.len()) {
@@ -263,7 +270,7 @@ fn read_stations(
 
 /// Reads a point of the mission frame: ENU metres, or latitude, longitude and altitude, which need
 /// an `origin` given in the scenario.
-fn read_place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
+fn read_place(value: &TomlValue<'_>, origin: Option<&Geodetic>) -> Result<Point> {
     if !value.is_table() {
         return read_point(value);
     }
@@ -291,7 +298,7 @@ fn read_place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
     Ok(place)
 }
 
-fn read_geofence(value: &Value<'_>) -> Result<Geofence> {
+fn read_geofence(value: &TomlValue<'_>) -> Result<Geofence> {
     let table = value.table()?;
     let hint = "a geofence is { min = [x, y, z], max = [x, y, z] }";
     let (min, max) =
@@ -303,12 +310,15 @@ fn read_geofence(value: &Value<'_>) -> Result<Geofence> {
     Ok(Geofence { min, max })
 }
 
+/// What a scenario without vehicles lacks.
+const VEHICLES_HINT: &str = "add a `[[vehicles]]` with `id` and `start` for each";
+
 fn read_vehicles(
-    value: &Value<'_>,
+    value: &TomlValue<'_>,
     origin: Option<&Geodetic>,
     unsupported: &mut Vec<ScenarioError>,
-) -> Result<Vec<(Vehicle, VehicleSpans)>> {
-    let mut vehicles: Vec<(Vehicle, VehicleSpans)> = Vec::new();
+) -> Result<Vec<(VehicleSection, VehicleSpans)>> {
+    let mut vehicles: Vec<(VehicleSection, VehicleSpans)> = Vec::new();
     for item in value.items()? {
         let table = item.table()?;
         let id_value =
@@ -330,7 +340,7 @@ fn read_vehicle(
     id: u8,
     origin: Option<&Geodetic>,
     unsupported: &mut Vec<ScenarioError>,
-) -> Result<(Vehicle, VehicleSpans)> {
+) -> Result<(VehicleSection, VehicleSpans)> {
     let start = table.required(
         "start",
         "where its path begins: [east, north, up] in metres, or { lat_deg, lon_deg, alt_m }",
@@ -342,16 +352,16 @@ fn read_vehicle(
         &[("px4", AutopilotKind::Px4), ("ardupilot", AutopilotKind::ArduPilot)],
     )?;
     let companion = match table.get("companion") {
-        None => Companion::InProcess { flash: None },
+        None => CompanionHost::InProcess { flash: None },
         Some(value) => match value.str()? {
-            "in-process" => Companion::InProcess { flash: None },
-            _ => Companion::Url {
+            "in-process" => CompanionHost::InProcess { flash: None },
+            _ => CompanionHost::Url {
                 autopilot: read_link(&value)?,
                 radio: table.get("radio").map(|radio| read_link(&radio)).transpose()?,
             },
         },
     };
-    let vehicle = Vehicle {
+    let vehicle = VehicleSection {
         id,
         start: read_place(&start, origin)?,
         goal: goal
@@ -382,7 +392,7 @@ fn read_vehicle(
     Ok((vehicle, spans))
 }
 
-fn read_link(value: &Value<'_>) -> Result<LinkUrl> {
+fn read_link(value: &TomlValue<'_>) -> Result<LinkUrl> {
     let parsed = value.str()?.parse();
     parsed.map_err(|_| value.error("must be \"in-process\" or a URL such as \"tcp:HOST:PORT\""))
 }

@@ -26,13 +26,12 @@ fn a_short_scenario_has_the_defaults() {
     );
     let roadmap = &scenario.roadmap;
     assert_eq!((roadmap.nodes, roadmap.edge_min_m, roadmap.edge_max_m), (2300, 0.5, 8.0));
-    assert_eq!((scenario.mission.mode, scenario.mission.cruise_mps), (Mode::Unlabelled, 2.0));
-    assert_eq!(scenario.mission.ground_stations, [255, 0, 0, 0]);
-    assert_eq!(scenario.mission.goals[1], Point::new(3.0, 4.0, 12.5));
-    assert_eq!(
-        (scenario.vehicles.len(), scenario.vehicles[1].id, scenario.vehicles[1].radius_m),
-        (2, 2, 0.3)
-    );
+    let mission = &scenario.mission;
+    assert_eq!((mission.mode, mission.cruise_mps), (MissionMode::Unlabelled, 2.0));
+    assert_eq!(mission.ground_stations, [255, 0, 0, 0]);
+    assert_eq!(mission.goals[1], Point::new(3.0, 4.0, 12.5));
+    let vehicles = &scenario.vehicles;
+    assert_eq!((vehicles.len(), vehicles[1].id, vehicles[1].radius_m), (2, 2, 0.3));
     assert_eq!(
         scenario.deconfliction,
         Deconfliction { method: Method::Priority, safety_distance_m: 1.5, separation_m: 2.0 }

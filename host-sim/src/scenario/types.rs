@@ -9,7 +9,7 @@ use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
 use planner_core::prm::Sampling;
 
-use super::coverage::Area;
+use super::coverage::AreaSection;
 use super::error::ScenarioError;
 use crate::link::LinkUrl;
 use crate::map::Unknown;
@@ -24,13 +24,13 @@ pub struct Scenario {
     /// Seed of all random numbers of the run.
     pub seed: u64,
     /// `[map]`
-    pub map: Map,
+    pub map: MapSection,
     /// `[roadmap]`
-    pub roadmap: Roadmap,
+    pub roadmap: RoadmapSection,
     /// `[mission]`
-    pub mission: Mission,
+    pub mission: MissionSection,
     /// `[[vehicles]]`, in the order of the file.
-    pub vehicles: Vec<Vehicle>,
+    pub vehicles: Vec<VehicleSection>,
     /// Where each vehicle's start stands in the file, as `FILE:LINE`.
     pub vehicle_places: Vec<String>,
     /// `[deconfliction]`
@@ -40,7 +40,7 @@ pub struct Scenario {
     /// `[[faults]]`
     pub faults: Vec<Fault>,
     /// `[area]`: what a coverage mission photographs; `None` in a mission with goals.
-    pub area: Option<Area>,
+    pub area: Option<AreaSection>,
     /// `[formation]`, which is not supported yet.
     pub formation: Option<UnsupportedTable>,
     /// An error for each setting that is not supported yet, in the order of reading.
@@ -56,7 +56,7 @@ pub struct UnsupportedTable {
 
 /// `[map]`: the obstacle map.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Map {
+pub struct MapSection {
     /// Name of a built-in map, or path of the map file relative to the working directory (resolved
     /// against the scenario's folder). Empty in a coverage mission: level ground at height 0.
     pub file: String,
@@ -70,7 +70,7 @@ pub struct Map {
 
 /// `[roadmap]`: how the roadmap is built.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Roadmap {
+pub struct RoadmapSection {
     /// Number of random nodes besides starts and goals.
     pub nodes: u32,
     /// Shortest length of an edge, metres.
@@ -102,11 +102,11 @@ pub enum Terminals {
 
 /// `[mission]`
 #[derive(Clone, Debug, PartialEq)]
-pub struct Mission {
+pub struct MissionSection {
     /// How goals are assigned to vehicles, or which other kind of mission it is.
-    pub mode: Mode,
+    pub mode: MissionMode,
     /// What the assignment of goals minimises.
-    pub objective: Objective,
+    pub objective: AssignmentObjective,
     /// Nominal speed of the vehicles along their paths, m/s.
     pub cruise_mps: f32,
     /// Goals of the vehicles, ENU metres.
@@ -121,7 +121,7 @@ pub struct Mission {
 
 /// How goals are assigned to vehicles, or which other kind of mission it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
+pub enum MissionMode {
     /// Any vehicle may fly to any goal: the assignment decides.
     Unlabelled,
     /// Each vehicle flies to the goal that its `goal` names.
@@ -136,7 +136,7 @@ pub enum Mode {
 
 /// What the assignment of goals minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Objective {
+pub enum AssignmentObjective {
     /// The sum of all path lengths.
     Total,
     /// The length of the longest path.
@@ -161,12 +161,12 @@ impl Geofence {
 
 /// One vehicle of `[[vehicles]]`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Vehicle {
+pub struct VehicleSection {
     /// MAVLink system id, 1 to 250.
     pub id: u8,
     /// Where the vehicle's path begins, ENU metres.
     pub start: Point,
-    /// Index (from 0) into [`Mission::goals`], for labelled missions.
+    /// Index (from 0) into [`MissionSection::goals`], for labelled missions.
     pub goal: Option<usize>,
     /// Radius of the vehicle's hull, metres.
     pub radius_m: f32,
@@ -185,7 +185,7 @@ pub struct Vehicle {
     /// EKF origin of the autopilot; `None`: the vehicle's pad.
     pub ekf_origin: Option<Geodetic>,
     /// Where the vehicle's companion runs.
-    pub companion: Companion,
+    pub companion: CompanionHost,
     /// Coverage: relative weight of the vehicle in the division of the work; `None`: 1.
     pub weight: Option<f32>,
     /// Coverage: climb speed (V_a in paper CPP), m/s; `None`: 3 m/s.
@@ -201,7 +201,7 @@ const DEFAULT_DESCEND_MPS: f32 = 1.0;
 /// Time in a hover on one battery if the vehicle gives none, seconds.
 const DEFAULT_ENDURANCE_S: f32 = 1200.0;
 
-impl Vehicle {
+impl VehicleSection {
     /// Speeds of climb and descent, m/s.
     pub fn climb_and_descent_mps(&self) -> [f32; 2] {
         [
@@ -218,7 +218,7 @@ impl Vehicle {
 
 /// Where a vehicle's companion runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Companion {
+pub enum CompanionHost {
     /// The companion runs in this process.
     InProcess {
         /// File that holds the companion's flash; `None` in every scenario read from a file.
@@ -312,7 +312,7 @@ pub struct Fault {
 impl Fault {
     /// Whether the fault strikes this vehicle: a fault without a vehicle strikes all, an obstacle
     /// strikes none.
-    pub fn strikes(&self, vehicle: &Vehicle) -> bool {
+    pub fn strikes(&self, vehicle: &VehicleSection) -> bool {
         self.kind != FAULT_OBSTACLE && self.vehicle.is_none_or(|id| id == vehicle.id)
     }
 }

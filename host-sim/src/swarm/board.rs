@@ -23,10 +23,10 @@ use super::radio::Radio;
 use super::serial::SerialLink;
 use super::step::STEP_US;
 use crate::boards::{self, EmulatedBoard, PortBytes};
-use crate::link::{Link, LinkUrl};
+use crate::link::{ByteLink, LinkUrl};
 
 /// One companion on a board or in another process.
-pub struct Board {
+pub struct RemoteCompanion {
     ends: BoardConnection,
     framer: Framer,
     state: State,
@@ -53,7 +53,7 @@ pub struct BoardLinks<'a> {
 enum BoardConnection {
     /// Opened links to a board that runs by its own clock; `radio` is `None` if its radio is not
     /// simulated.
-    Links { autopilot: Box<dyn Link>, radio: Option<Box<dyn Link>> },
+    Links { autopilot: Box<dyn ByteLink>, radio: Option<Box<dyn ByteLink>> },
     /// An emulated board that runs only while the simulation grants it time.
     LockStep(LockStep),
 }
@@ -67,7 +67,7 @@ struct LockStep {
     runs: bool,
 }
 
-impl Board {
+impl RemoteCompanion {
     /// Starts a board in QEMU whose flash holds this roadmap file and this mission file.
     ///
     /// # Errors
@@ -167,7 +167,7 @@ impl Board {
                 radio.send(&packet)?;
             }
         }
-        let drain = |link: &mut Box<dyn Link>| -> anyhow::Result<Vec<u8>> {
+        let drain = |link: &mut Box<dyn ByteLink>| -> anyhow::Result<Vec<u8>> {
             let (mut heard, mut buffer) = (Vec::new(), [0; 2048]);
             loop {
                 match link.receive(&mut buffer)? {

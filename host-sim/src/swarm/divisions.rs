@@ -15,7 +15,7 @@ use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 
 /// A division that the swarm agreed on, as flown by one vehicle.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Division {
+pub struct FlownDivision {
     /// When the vehicle first reported the plan of this division, seconds.
     pub t_s: f32,
     /// MAVLink system id of the vehicle.
@@ -46,7 +46,7 @@ pub struct DivisionLog {
     vehicles: HashMap<u8, Reported>,
     /// Inputs of each division, by the hash that the vehicles reported for it.
     inputs_by_hash: HashMap<u32, Vec<DivisionInput>>,
-    reported: Vec<Division>,
+    reported: Vec<FlownDivision>,
 }
 
 impl DivisionLog {
@@ -102,12 +102,12 @@ impl DivisionLog {
             (reported.flown_number, reported.flown_crc) = (reported.number, reported.plan_crc);
             let Reported { number, counted, plan_crc, .. } = *reported;
             let inputs = self.inputs_by_hash.get(&counted).cloned().unwrap_or_default();
-            self.reported.push(Division { t_s, vehicle, number, inputs, plan_crc });
+            self.reported.push(FlownDivision { t_s, vehicle, number, inputs, plan_crc });
         }
     }
 
     /// The divisions that vehicles flew, in order of time.
-    pub fn into_divisions(self) -> Vec<Division> {
+    pub fn into_divisions(self) -> Vec<FlownDivision> {
         self.reported
     }
 }

@@ -29,10 +29,10 @@ use planner_core::frames::enu_to_geodetic;
 use sim_autopilot::GpsFix;
 
 use super::ground_station::{GroundStation, OperatorCommand};
-use super::member::{Planner, SimulatedVehicle};
+use super::member::{PlanAnswer, SimulatedVehicle};
 use super::radio::{Radio, RadioOutage};
-use crate::report::{Event, Level};
-use crate::scenario::{Companion, FAULT_OBSTACLE, Fault, Scenario};
+use crate::report::{Level, LogEvent};
+use crate::scenario::{CompanionHost, FAULT_OBSTACLE, Fault, Scenario};
 
 /// Share of bytes that `serial-corrupt` changes: half of all frames as long as a setpoint are lost.
 const CORRUPTED_SHARE: f64 = 0.01;
@@ -55,10 +55,10 @@ pub fn check(scenario: &Scenario) -> anyhow::Result<()> {
     for fault in &scenario.faults {
         for vehicle in scenario.vehicles.iter().filter(|vehicle| fault.strikes(vehicle)) {
             let in_vain = match (&vehicle.companion, fault.kind) {
-                (Companion::InProcess { .. }, _) => false,
+                (CompanionHost::InProcess { .. }, _) => false,
                 (_, "companion-reset" | "late-plan" | "bad-roadmap") => true,
-                (Companion::Emulated { .. }, _) => false,
-                (Companion::Url { radio, .. }, kind) => kind == "radio-cut" && radio.is_none(),
+                (CompanionHost::Emulated { .. }, _) => false,
+                (CompanionHost::Url { radio, .. }, kind) => kind == "radio-cut" && radio.is_none(),
             };
             anyhow::ensure!(
                 !in_vain,
@@ -85,7 +85,7 @@ pub struct FaultTargets<'a> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Stage {
+enum FaultStage {
     Ahead,
     Acting,
     Over,
@@ -94,7 +94,7 @@ enum Stage {
 /// The scenario's faults, which of them act or are over, and which vehicles they have struck.
 pub struct FaultScript<'a> {
     scenario: &'a Scenario,
-    stages: Vec<Stage>,
+    stages: Vec<FaultStage>,
     struck: Vec<bool>,
 }
 
@@ -103,7 +103,7 @@ impl<'a> FaultScript<'a> {
     pub fn new(scenario: &'a Scenario) -> Self {
         Self {
             scenario,
-            stages: vec![Stage::Ahead; scenario.faults.len()],
+            stages: vec![FaultStage::Ahead; scenario.faults.len()],
             struck: vec![false; scenario.vehicles.len()],
         }
     }
@@ -118,7 +118,7 @@ impl<'a> FaultScript<'a> {
         let ends = |fault: &Fault| fault.duration_s.is_some();
         let mut pairs = self.scenario.faults.iter().zip(&self.stages);
         pairs.all(|(fault, stage)| {
-            *stage == Stage::Over || (*stage == Stage::Acting && !ends(fault))
+            *stage == FaultStage::Over || (*stage == FaultStage::Acting && !ends(fault))
         })
     }
 
@@ -127,21 +127,21 @@ impl<'a> FaultScript<'a> {
         &mut self,
         now_us: u64,
         world: &mut FaultTargets<'_>,
-        log: &mut Vec<Event>,
+        log: &mut Vec<LogEvent>,
     ) -> anyhow::Result<()> {
         let t_s = (now_us as f64 * 1e-6) as f32;
         for (fault, stage) in self.scenario.faults.iter().zip(&mut self.stages) {
             let ends_s = fault.duration_s.map_or(f32::INFINITY, |lasts_s| fault.at_s + lasts_s);
             let next = match *stage {
-                Stage::Ahead if t_s >= fault.at_s => Stage::Acting,
-                Stage::Acting if t_s >= ends_s => Stage::Over,
+                FaultStage::Ahead if t_s >= fault.at_s => FaultStage::Acting,
+                FaultStage::Acting if t_s >= ends_s => FaultStage::Over,
                 _ => continue,
             };
             *stage = next;
             if let (FAULT_OBSTACLE, Some(place), Some(radius_m)) =
                 (fault.kind, fault.position, fault.radius_m)
             {
-                let done = if next == Stage::Acting {
+                let done = if next == FaultStage::Acting {
                     world.obstacles.push((place, radius_m));
                     let centre = enu_to_geodetic(&self.scenario.map.origin, &place);
                     world.ground_station.report_obstacle(centre, radius_m);
@@ -151,14 +151,14 @@ impl<'a> FaultScript<'a> {
                     "ends"
                 };
                 let text = format!("fault {done}: {}", fault.kind);
-                log.push(Event { t_s, vehicle: None, level: Level::Warning, text });
+                log.push(LogEvent { t_s, vehicle: None, level: Level::Warning, text });
                 continue;
             }
             for (i, vehicle) in self.scenario.vehicles.iter().enumerate() {
                 if !fault.strikes(vehicle) {
                     continue;
                 }
-                let done = if next == Stage::Acting {
+                let done = if next == FaultStage::Acting {
                     self.struck[i] = true;
                     begin_fault(fault, i, now_us, world)?;
                     "begins"
@@ -173,7 +173,7 @@ impl<'a> FaultScript<'a> {
                     "ends"
                 };
                 let text = format!("fault {done}: {}", fault.kind);
-                log.push(Event { t_s, vehicle: Some(vehicle.id), level: Level::Warning, text });
+                log.push(LogEvent { t_s, vehicle: Some(vehicle.id), level: Level::Warning, text });
             }
         }
         Ok(())
@@ -211,8 +211,8 @@ fn begin_fault(
         "pilot-return" => return_from_pilot(i, now_us, world),
         "autopilot-reboot" => member.reboot_autopilot(spell_us),
         "companion-reset" => member.reset_companion(now_us)?,
-        "late-plan" => member.planner = Planner::Late,
-        "bad-roadmap" => member.planner = Planner::BadRoadmap,
+        "late-plan" => member.planner = PlanAnswer::Late,
+        "bad-roadmap" => member.planner = PlanAnswer::BadRoadmap,
         "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Pause),
         "return-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Return),
         "land-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Land),
@@ -234,7 +234,7 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
         }
         "gps-loss" => member.autopilot.set_gps_fix(GpsFix::Held),
         "pilot-takeover" => return_from_pilot(i, now_us, world),
-        "late-plan" | "bad-roadmap" => member.planner = Planner::Sound,
+        "late-plan" | "bad-roadmap" => member.planner = PlanAnswer::Sound,
         "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Resume),
         // All other faults end by themselves or never.
         _ => {}

@@ -16,7 +16,7 @@ use planner_core::Point;
 
 use super::member::SimulatedVehicle;
 use super::radio::Radio;
-use crate::link::Link;
+use crate::link::ByteLink;
 
 /// Message ids passed on from companions: HEARTBEAT, COMMAND_ACK, STATUSTEXT.
 const FORWARDED_MESSAGE_IDS: [u32; 3] = [0, 77, 253];
@@ -25,13 +25,13 @@ const MAX_DATAGRAM: usize = 1400;
 
 /// A link to a ground station, and the datagram that is being filled for it.
 pub struct Gateway {
-    link: Box<dyn Link>,
+    link: Box<dyn ByteLink>,
     datagram: Vec<u8>,
 }
 
 impl Gateway {
     /// A gateway on an open link.
-    pub fn new(link: Box<dyn Link>) -> Self {
+    pub fn new(link: Box<dyn ByteLink>) -> Self {
         Self { link, datagram: Vec::new() }
     }
 

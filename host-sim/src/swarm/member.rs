@@ -8,7 +8,7 @@ use companion::{Config, Event, Instant, Link, PlanKind, PlanRequests, State};
 use planner_core::Point;
 use sim_autopilot::{Autopilot, Photo};
 
-use super::board::{Board, BoardLinks};
+use super::board::{BoardLinks, RemoteCompanion};
 use super::radio::Radio;
 use super::serial::{SerialConfig, SerialLink};
 use super::step::{STEP_S, STEP_US};
@@ -16,7 +16,7 @@ use crate::boards::STACK_LEN;
 use crate::capacity::{HostCompanion, VEHICLES, new_companion};
 use crate::coverage::check::Picture;
 use crate::flash::{HOST_FLASH_LAYOUT, HostFlash};
-use crate::mission::{Mission, OwnPlan};
+use crate::mission::{OwnPlan, PreparedMission};
 use crate::report::{self, Level};
 use crate::say;
 
@@ -25,7 +25,7 @@ const GROUND_CHECK_STEPS: u64 = 25;
 
 /// How the simulation answers a companion that requests a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Planner {
+pub enum PlanAnswer {
     /// With the right plan, at once.
     #[default]
     Sound,
@@ -42,13 +42,13 @@ pub struct SimulatedVehicle {
     /// The companion in this process; idle if `board` flies the vehicle.
     pub companion: Box<HostCompanion>,
     /// The board or process whose companion flies the vehicle instead of `companion`.
-    board: Option<Board>,
+    board: Option<RemoteCompanion>,
     /// Flash of the companion; `None`: it has no store.
     flash: Option<HostFlash>,
     /// The plans that the companion has requested and not got yet.
     plan_requests: PlanRequests,
     /// How a plan request is answered.
-    pub planner: Planner,
+    pub planner: PlanAnswer,
     /// Text of the last warning of the mission table since the vehicle last followed its path.
     pub last_warning: Option<&'static str>,
     /// When the vehicle first left the ground, seconds.
@@ -76,7 +76,7 @@ pub struct SimulatedVehicle {
 impl SimulatedVehicle {
     /// A vehicle on its pad, switched on.
     pub fn new(
-        autopilot: &sim_autopilot::Config,
+        autopilot: &sim_autopilot::AutopilotConfig,
         config: Config<VEHICLES>,
         serial: SerialConfig,
         seed: u64,
@@ -89,7 +89,7 @@ impl SimulatedVehicle {
             flash: None,
             config,
             plan_requests: PlanRequests::new(),
-            planner: Planner::Sound,
+            planner: PlanAnswer::Sound,
             last_warning: None,
             took_off_s: None,
             landed_s: None,
@@ -124,7 +124,7 @@ impl SimulatedVehicle {
     }
 
     /// From now on this board flies the vehicle instead of the companion in this process.
-    pub fn attach_board(&mut self, board: Board) {
+    pub fn attach_board(&mut self, board: RemoteCompanion) {
         self.board = Some(board);
     }
 
@@ -134,7 +134,7 @@ impl SimulatedVehicle {
     /// The board is gone.
     pub fn print_stack_use(&mut self) -> anyhow::Result<()> {
         let (id, board) = (self.system_id(), self.board.as_mut());
-        if let Some(used) = board.map(Board::stack_used).transpose()?.flatten() {
+        if let Some(used) = board.map(RemoteCompanion::stack_used).transpose()?.flatten() {
             say!("board {id}: stack: {used} of {STACK_LEN} bytes used");
         }
         Ok(())
@@ -142,7 +142,7 @@ impl SimulatedVehicle {
 
     /// State of the companion's mission.
     pub fn state(&self) -> State {
-        self.board.as_ref().map_or_else(|| self.companion.state(), Board::state)
+        self.board.as_ref().map_or_else(|| self.companion.state(), RemoteCompanion::state)
     }
 
     /// MAVLink system id.
@@ -220,10 +220,10 @@ impl SimulatedVehicle {
         &mut self,
         step: u64,
         station: usize,
-        mission: &Mission,
+        mission: &PreparedMission,
         radio: &mut Radio,
         places: &[Point],
-        log: &mut Vec<report::Event>,
+        log: &mut Vec<report::LogEvent>,
     ) -> anyhow::Result<()> {
         let now_us = (step + 1) * STEP_US;
         if step % GROUND_CHECK_STEPS == station as u64 % GROUND_CHECK_STEPS {
@@ -284,14 +284,14 @@ impl SimulatedVehicle {
         station: usize,
         radio: &mut Radio,
         places: &[Point],
-        log: &mut Vec<report::Event>,
+        log: &mut Vec<report::LogEvent>,
     ) -> anyhow::Result<()> {
         let id = self.system_id();
         let Some(board) = &mut self.board else { return Ok(()) };
         let mut said = |text: &str| {
             say!("board {id}: {text}");
             let t_s = (now_us as f64 * 1e-6) as f32;
-            log.push(report::Event {
+            log.push(report::LogEvent {
                 t_s,
                 vehicle: Some(id),
                 level: Level::Info,
@@ -321,7 +321,7 @@ impl SimulatedVehicle {
         station: usize,
         radio: &mut Radio,
         places: &[Point],
-        log: &mut Vec<report::Event>,
+        log: &mut Vec<report::LogEvent>,
     ) {
         let now = self.companion_now(now_us);
         if !self.bytes.is_empty() {
@@ -343,7 +343,7 @@ impl SimulatedVehicle {
                 Event::FlownAround { left } => {
                     let text = format!("Flown around: {left} waypoints are left");
                     let (t_s, vehicle) = ((now_us as f64 * 1e-6) as f32, Some(self.system_id()));
-                    log.push(report::Event { t_s, vehicle, level: Level::Info, text });
+                    log.push(report::LogEvent { t_s, vehicle, level: Level::Info, text });
                 }
                 Event::StateChanged { from, to, text, warning } => {
                     self.note_warning(from, to, Some(text).filter(|t| warning && !t.is_empty()));
@@ -406,7 +406,7 @@ impl SimulatedVehicle {
         }
     }
 
-    fn log_entry(&self, now_us: u64, from: State, to: State, text: &str) -> report::Event {
+    fn log_entry(&self, now_us: u64, from: State, to: State, text: &str) -> report::LogEvent {
         let level = match to {
             State::Aborted | State::Failsafe => Level::Error,
             State::PilotControl
@@ -418,7 +418,7 @@ impl SimulatedVehicle {
         };
         let colon = if text.is_empty() { "" } else { ": " };
         let text = format!("{from:?} → {to:?}{colon}{text}");
-        report::Event {
+        report::LogEvent {
             t_s: (now_us as f64 * 1e-6) as f32,
             vehicle: Some(self.system_id()),
             level,
@@ -438,7 +438,7 @@ impl SimulatedVehicle {
     /// Removes and returns the companion's most urgent plan request; `None` if there is none, or if
     /// requests are not answered (`late-plan`).
     pub fn next_plan_request(&self) -> Option<PlanKind> {
-        if self.planner == Planner::Late { None } else { self.plan_requests.take() }
+        if self.planner == PlanAnswer::Late { None } else { self.plan_requests.take() }
     }
 
     /// Gives the companion the plan that it requested, or the failure.

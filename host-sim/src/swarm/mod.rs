@@ -26,22 +26,22 @@ use planner_core::Point;
 use planner_core::flight::WaypointRange;
 use planner_core::roadmap::RoadmapView;
 
-use self::divisions::{Division, DivisionLog};
+use self::divisions::{DivisionLog, FlownDivision};
 use self::faults::{FaultScript, FaultTargets};
 use self::gateway::Gateway;
 use self::ground_station::GroundStation;
-use self::member::{Planner, SimulatedVehicle, is_finished, is_started};
+use self::member::{PlanAnswer, SimulatedVehicle, is_finished, is_started};
 use self::radio::{Radio, RadioConfig};
-use self::referee::{Referee, Sample};
+use self::referee::{DistanceSample, Referee};
 use self::step::STEP_US;
 use self::vehicles::vehicles_on_pads;
 use crate::coverage::check::Picture;
 use crate::margins;
-use crate::mission::{Mission, OwnPlan, SwarmPlan};
+use crate::mission::{HostPlan, OwnPlan, PreparedMission};
 use crate::progress::Progress;
 use crate::report::{self, Level};
 use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded};
-use crate::scenario::Companion;
+use crate::scenario::CompanionHost;
 use crate::shortage;
 
 /// Distance from its goal within which a vehicle counts as having reached it, metres.
@@ -59,7 +59,7 @@ const STANDSTILL_S: f64 = 30.0;
 const MAX_CLOCK_LAG: Duration = Duration::from_millis(200);
 
 /// Outcome of a simulated flight.
-pub struct Flight {
+pub struct SwarmFlight {
     /// `result.json`.
     pub result: MissionResult,
     /// True track of each vehicle: times in seconds, positions in ENU metres.
@@ -67,15 +67,15 @@ pub struct Flight {
     /// When each vehicle lost its power, or its motors in the air, seconds; `None` for the others.
     pub lost_s: Vec<Option<f32>>,
     /// Smallest distances over time, one sample each 0.2 s.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<DistanceSample>,
     /// Pictures taken, sorted by vehicle.
     pub pictures: Vec<Picture>,
     /// Events of the companions, the fault script and the referee.
-    pub log: Vec<report::Event>,
+    pub log: Vec<report::LogEvent>,
     /// Waypoints of a coverage mission that were photographed in earlier flights.
     pub done: Vec<WaypointRange>,
     /// Divisions that companions of a coverage mission agreed on, in order of time.
-    pub divisions: Vec<Division>,
+    pub divisions: Vec<FlownDivision>,
     /// Length of the simulated flight, seconds.
     pub simulated_s: f64,
     /// Time that the simulation took on this machine's clock, seconds.
@@ -95,12 +95,12 @@ pub enum Pace {
 /// Simulates the flight of a planned mission. Each companion requests a plan and gets its vehicle's
 /// part of `plan`.
 pub fn fly(
-    mission: &Mission,
-    plan: &SwarmPlan,
+    mission: &PreparedMission,
+    plan: &HostPlan,
     command: &'static str,
     pace: Pace,
     progress: &Progress,
-) -> anyhow::Result<Flight> {
+) -> anyhow::Result<SwarmFlight> {
     simulate(mission, plan, command, pace, None, progress)
 }
 
@@ -109,19 +109,19 @@ pub fn fly(
 /// # Errors
 /// The link to the ground station is gone.
 pub fn fly_with_ground_station(
-    mission: &Mission,
-    plan: &SwarmPlan,
+    mission: &PreparedMission,
+    plan: &HostPlan,
     command: &'static str,
     gateway: Gateway,
     progress: &Progress,
-) -> anyhow::Result<Flight> {
+) -> anyhow::Result<SwarmFlight> {
     simulate(mission, plan, command, Pace::RealTime, Some(gateway), progress)
 }
 
 /// A simulation under way.
 struct SimulationRun<'a> {
-    mission: &'a Mission,
-    plan: &'a SwarmPlan,
+    mission: &'a PreparedMission,
+    plan: &'a HostPlan,
     members: Vec<SimulatedVehicle>,
     radio: Radio,
     referee: Referee<'a>,
@@ -129,7 +129,7 @@ struct SimulationRun<'a> {
     gateway: Option<Gateway>,
     divisions: DivisionLog,
     script: FaultScript<'a>,
-    log: Vec<report::Event>,
+    log: Vec<report::LogEvent>,
     done: Vec<WaypointRange>,
     places: Vec<Point>,
     nearest_goal_m: Vec<f32>,
@@ -141,18 +141,18 @@ struct SimulationRun<'a> {
 }
 
 fn simulate(
-    mission: &Mission,
-    plan: &SwarmPlan,
+    mission: &PreparedMission,
+    plan: &HostPlan,
     command: &'static str,
     pace: Pace,
     gateway: Option<Gateway>,
     progress: &Progress,
-) -> anyhow::Result<Flight> {
+) -> anyhow::Result<SwarmFlight> {
     let mut run = SimulationRun::new(mission, plan, gateway)?;
     let settings = &mission.scenario.simulation;
     // A board behind links runs by its own clock, so the simulation runs in real time.
     let by_clock =
-        mission.scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
+        mission.scenario.vehicles.iter().any(|v| matches!(v.companion, CompanionHost::Url { .. }));
     let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
     let bar = progress.begin_counted_stage("flight", settings.time_limit_s as u64);
     let began = Clock::now();
@@ -182,7 +182,7 @@ fn simulate(
     let pictures = run.members.iter_mut().flat_map(SimulatedVehicle::take_pictures).collect();
     let SimulationRun { referee, log, done, divisions, t_s, .. } = run;
     let divisions = divisions.into_divisions();
-    Ok(Flight {
+    Ok(SwarmFlight {
         result,
         tracks,
         lost_s,
@@ -198,8 +198,8 @@ fn simulate(
 
 impl<'a> SimulationRun<'a> {
     fn new(
-        mission: &'a Mission,
-        plan: &'a SwarmPlan,
+        mission: &'a PreparedMission,
+        plan: &'a HostPlan,
         gateway: Option<Gateway>,
     ) -> anyhow::Result<Self> {
         let scenario = &mission.scenario;
@@ -269,7 +269,7 @@ impl<'a> SimulationRun<'a> {
             member.step(step, i, mission, radio, places, log)?;
             if let Some(wanted) = member.next_plan_request() {
                 let own = match member.planner {
-                    Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_or_field_file),
+                    PlanAnswer::BadRoadmap => plan_on_damaged(&mission.roadmap_or_field_file),
                     _ => mission.answer_plan_request(plan, i, wanted, &mut member.companion),
                 };
                 if wanted == PlanKind::Mission {
@@ -410,10 +410,10 @@ impl<'a> SimulationRun<'a> {
                 (self.has_completed_task(i, vehicle), member.link_trouble(self.t_s))
             {
                 let (t_s, level) = (self.t_s as f32, Level::Error);
-                self.log.push(report::Event { t_s, vehicle: Some(vehicle.id), level, text });
+                self.log.push(report::LogEvent { t_s, vehicle: Some(vehicle.id), level, text });
             }
         }
-        self.log.extend(self.referee.incidents.iter().map(|(t_s, i, text)| report::Event {
+        self.log.extend(self.referee.incidents.iter().map(|(t_s, i, text)| report::LogEvent {
             t_s: *t_s as f32,
             vehicle: Some(scenario.vehicles[*i].id),
             level: Level::Error,

@@ -10,7 +10,7 @@ use planner_core::Point;
 use planner_core::segment::point_clearance;
 use planner_core::voxel::VoxelGrid;
 
-use crate::coverage::obstacles::Obstacles;
+use crate::coverage::obstacles::MapObstacles;
 use crate::map::edt::ClearanceField;
 use crate::terrain::HeightGrid;
 
@@ -28,7 +28,7 @@ const RECORD_EVERY_S: f64 = 0.2;
 
 /// Phase of a vehicle's flight, as far as the referee's rules differ by it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phase {
+pub enum RefereePhase {
     /// On the ground with motors off, before or after the flight.
     Grounded,
     /// On the ground with motors on, or in the air off its path.
@@ -47,7 +47,7 @@ pub struct Observation {
     /// Centre of the body, ENU metres.
     pub position: Point,
     /// Phase of the vehicle's flight.
-    pub phase: Phase,
+    pub phase: RefereePhase,
     /// Whether the vehicle stands still by command of operator or pilot.
     pub holds_by_command: bool,
     /// Arc length along its path, metres; `None`: moving by 1 m counts as progress instead.
@@ -56,7 +56,7 @@ pub struct Observation {
 
 /// Smallest distances of all vehicles since the sample before.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample {
+pub struct DistanceSample {
     /// Seconds since the start of the simulation.
     pub t_s: f32,
     /// Smallest distance between two centres, not both on the ground, metres; infinite if no such
@@ -91,13 +91,13 @@ pub struct Referee<'a> {
     /// Height of uneven ground, which the grid does not hold; `None` over level ground.
     pub terrain: Option<&'a HeightGrid>,
     /// Obstacles of the map beside an area, which the grid does not hold; `None` without one.
-    pub walls: Option<&'a Obstacles>,
+    pub walls: Option<&'a MapObstacles>,
     safety_distance_m: f32,
     vehicles: Vec<WatchedVehicle>,
     too_near: Vec<bool>,
     touching: Vec<bool>,
     recorded_s: f64,
-    window: Sample,
+    window: DistanceSample,
     /// Whether a deadlock that ends no longer counts: where faults strike, vehicles wait until it
     /// is known what became of the struck vehicle, and for their turn to fly around it.
     pub retracts_ended_deadlocks: bool,
@@ -114,7 +114,7 @@ pub struct Referee<'a> {
     /// Smallest distance between two centres, not both on the ground, in the whole flight, metres.
     pub min_separation_m: f32,
     /// Smallest distances over time, one sample each 0.2 s.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<DistanceSample>,
     /// Contacts, violations and deadlocks: seconds, index of the vehicle, and text.
     pub incidents: Vec<(f64, usize, String)>,
 }
@@ -176,7 +176,7 @@ impl<'a> Referee<'a> {
         self.watch_pairs(t_s, seen);
         if t_s - self.recorded_s >= RECORD_EVERY_S - 1e-6 {
             self.recorded_s = t_s;
-            self.samples.push(Sample { t_s: t_s as f32, ..self.window });
+            self.samples.push(DistanceSample { t_s: t_s as f32, ..self.window });
             self.window = EMPTY_SAMPLE;
             for (vehicle, now) in self.vehicles.iter_mut().zip(seen) {
                 vehicle.track.push((t_s as f32, now.position));
@@ -206,11 +206,12 @@ impl<'a> Referee<'a> {
     }
 
     fn watch_walls(&mut self, i: usize, t_s: f64, now: &Observation) {
-        if matches!(now.phase, Phase::Grounded | Phase::Falling | Phase::Wreck) {
+        if matches!(now.phase, RefereePhase::Grounded | RefereePhase::Falling | RefereePhase::Wreck)
+        {
             return;
         }
         let radius_m = self.vehicles[i].radius_m;
-        let flying = now.phase == Phase::Flying;
+        let flying = now.phase == RefereePhase::Flying;
         // Only a clearance that means contact, or is the smallest of this sample, must be exact.
         let wanted = if flying { self.window.clearance_m.max(radius_m) } else { radius_m };
         // A clearance changes by no more than the distance flown since it was measured.
@@ -280,8 +281,8 @@ impl<'a> Referee<'a> {
         for i in 0..n {
             for j in 0..i {
                 let apart = (seen[i].position - seen[j].position).norm();
-                let rests = |phase| matches!(phase, Phase::Grounded | Phase::Wreck);
-                let out = |phase| matches!(phase, Phase::Falling | Phase::Wreck);
+                let rests = |phase| matches!(phase, RefereePhase::Grounded | RefereePhase::Wreck);
+                let out = |phase| matches!(phase, RefereePhase::Falling | RefereePhase::Wreck);
                 match (seen[i].phase, seen[j].phase) {
                     (a, b) if rests(a) && rests(b) => continue,
                     (a, b) if out(a) || out(b) => {
@@ -317,15 +318,25 @@ impl<'a> Referee<'a> {
     }
 
     /// A vehicle need not keep the safety distance from a wreck; touching one is a wall contact.
-    fn watch_wreck(&mut self, t_s: f64, flier: usize, wreck: usize, phase: Phase, apart_m: f32) {
+    fn watch_wreck(
+        &mut self,
+        t_s: f64,
+        flier: usize,
+        wreck: usize,
+        phase: RefereePhase,
+        apart_m: f32,
+    ) {
         let pair = flier.max(wreck) * self.vehicles.len() + flier.min(wreck);
         let touches = apart_m < self.vehicles[flier].radius_m + self.vehicles[wreck].radius_m;
         if std::mem::replace(&mut self.too_near[pair], touches) || !touches {
             return;
         }
         self.wall_contacts += 1;
-        let what =
-            if phase == Phase::Falling { "is hit by falling" } else { "touches the wreck of" };
+        let what = if phase == RefereePhase::Falling {
+            "is hit by falling"
+        } else {
+            "touches the wreck of"
+        };
         self.incidents.push((t_s, flier, format!("{what} vehicle {}", self.vehicles[wreck].id)));
     }
 
@@ -341,13 +352,13 @@ impl<'a> Referee<'a> {
             Some(progress_m) => progress_m > vehicle.best_progress_m + MIN_PROGRESS_M,
             None => (now.position - vehicle.progressed_at).norm() > OFF_HOVER_M,
         };
-        if now.phase != Phase::Flying || now.holds_by_command || moved {
+        if now.phase != RefereePhase::Flying || now.holds_by_command || moved {
             vehicle.best_progress_m =
                 now.progress_m.unwrap_or(f32::NEG_INFINITY).max(vehicle.best_progress_m);
             vehicle.progressed_at = now.position;
             vehicle.progressed_s = t_s;
             // A vehicle whose power fails may have waited for a good reason.
-            let ends = moved || now.phase != Phase::Flying;
+            let ends = moved || now.phase != RefereePhase::Flying;
             if std::mem::take(&mut vehicle.stuck) && ends && self.retracts_ended_deadlocks {
                 self.deadlocks -= 1;
                 let text = no_progress();
@@ -397,8 +408,8 @@ fn no_progress() -> String {
 
 /// Greatest clearance to an obstacle that is measured exactly, metres.
 const MAX_MEASURED_CLEARANCE_M: f32 = 3.0;
-const EMPTY_SAMPLE: Sample =
-    Sample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };
+const EMPTY_SAMPLE: DistanceSample =
+    DistanceSample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };
 
 #[cfg(test)]
 mod tests;

@@ -7,13 +7,13 @@ use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
 use sim_autopilot as autopilot;
 
-use super::board::Board;
+use super::board::RemoteCompanion;
 use super::member::SimulatedVehicle;
 use super::serial::SerialConfig;
 use crate::capacity::VEHICLES;
 use crate::flash::HostFlash;
-use crate::mission::{Mission, PLANNED_ACCEL_MPS2};
-use crate::scenario::{AutopilotKind, Companion, PositionErrors, Vehicle};
+use crate::mission::{PLANNED_ACCEL_MPS2, PreparedMission};
+use crate::scenario::{AutopilotKind, CompanionHost, PositionErrors, VehicleSection};
 
 /// Radio range from which on a simulated radio counts as reaching every vehicle, metres.
 const UNLIMITED_RANGE_M: f32 = 500.0;
@@ -24,7 +24,7 @@ const MIN_RANGE_M: f32 = 1.0;
 ///
 /// # Errors
 /// Names the vehicle's setting that is wrong.
-pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicle>> {
+pub fn vehicles_on_pads(mission: &PreparedMission) -> anyhow::Result<Vec<SimulatedVehicle>> {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
     let serial = SerialConfig {
@@ -43,16 +43,16 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
             let mut member = SimulatedVehicle::new(&config, companion, serial, scenario.seed)?;
             member.autopilot.land_on_stream_loss();
             match &vehicle.companion {
-                Companion::InProcess { flash: None } => {}
-                Companion::InProcess { flash: Some(file) } => {
+                CompanionHost::InProcess { flash: None } => {}
+                CompanionHost::InProcess { flash: Some(file) } => {
                     member.attach_flash(HostFlash::open(Some(file))?)?;
                 }
-                Companion::Url { autopilot, radio } => {
-                    member.attach_board(Board::open(autopilot, radio.as_ref())?);
+                CompanionHost::Url { autopilot, radio } => {
+                    member.attach_board(RemoteCompanion::open(autopilot, radio.as_ref())?);
                 }
-                Companion::Emulated { program, log } => {
+                CompanionHost::Emulated { program, log } => {
                     let (roadmap, file) = (&mission.roadmap_or_field_file, &mission.mission_file);
-                    member.attach_board(Board::emulate(program, log, roadmap, file)?);
+                    member.attach_board(RemoteCompanion::emulate(program, log, roadmap, file)?);
                 }
             }
             Ok(member)
@@ -61,7 +61,11 @@ pub fn vehicles_on_pads(mission: &Mission) -> anyhow::Result<Vec<SimulatedVehicl
 }
 
 /// The settings of a vehicle's autopilot; the vehicle's path begins `climb_m` above its pad.
-fn autopilot_config(mission: &Mission, vehicle: &Vehicle, climb_m: f32) -> autopilot::Config {
+fn autopilot_config(
+    mission: &PreparedMission,
+    vehicle: &VehicleSection,
+    climb_m: f32,
+) -> autopilot::AutopilotConfig {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
     let pad = vehicle.start - Point::new(0.0, 0.0, climb_m);
@@ -71,7 +75,7 @@ fn autopilot_config(mission: &Mission, vehicle: &Vehicle, climb_m: f32) -> autop
         endurance_s: vehicle.battery_hover_s(),
         ..autopilot::VehicleLimits::default()
     };
-    let mut config = autopilot::Config {
+    let mut config = autopilot::AutopilotConfig {
         system_id: vehicle.id,
         autopilot: simulated_kind(vehicle.personality),
         world_origin: scenario.map.origin,
@@ -88,7 +92,7 @@ fn autopilot_config(mission: &Mission, vehicle: &Vehicle, climb_m: f32) -> autop
         position_noise_m: settings.position_noise_m,
         estimator: estimator_errors(settings.estimator),
         seed: scenario.seed,
-        ..autopilot::Config::default()
+        ..autopilot::AutopilotConfig::default()
     };
     if vehicle.ekf_origin.is_none() {
         // The GNSS receiver set this origin, so it has the receiver's height error.
@@ -98,10 +102,10 @@ fn autopilot_config(mission: &Mission, vehicle: &Vehicle, climb_m: f32) -> autop
 }
 
 /// The simulated autopilot of a kind.
-pub fn simulated_kind(kind: AutopilotKind) -> autopilot::AutopilotKind {
+pub fn simulated_kind(kind: AutopilotKind) -> autopilot::SimulatedKind {
     match kind {
-        AutopilotKind::Px4 => autopilot::AutopilotKind::Px4,
-        AutopilotKind::ArduPilot => autopilot::AutopilotKind::Ardupilot,
+        AutopilotKind::Px4 => autopilot::SimulatedKind::Px4,
+        AutopilotKind::ArduPilot => autopilot::SimulatedKind::Ardupilot,
     }
 }
 
@@ -116,7 +120,7 @@ fn estimator_errors(errors: PositionErrors) -> autopilot::EstimatorErrors {
 
 /// Settings of one vehicle's companion: those of the mission file, with the scenario's fence,
 /// method and radio range; the same in a swarm simulation and for a companion alone.
-pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
+pub fn companion_config(mission: &PreparedMission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
     mission.index_of(id)?;
     let config = mission.mission_view().companion_config(id);
     let config =

@@ -14,7 +14,7 @@ use planner_core::coverage::Flat;
 
 use super::crs::{CoordinateSystem, Crs, wkt_height_unit_m};
 use super::error::TerrainError;
-use super::frame::{Frame, widened_window};
+use super::frame::{TerrainFrame, widened_window};
 use super::geokeys::GeoKeys;
 use super::grid::HeightGrid;
 use super::limits::MAX_BYTES;
@@ -33,7 +33,7 @@ const RETURNS_PER_BATCH: u64 = 4096;
 /// Classes of returns that are measurement errors.
 const NOISE: [Classification; 2] = [Classification::LowPoint, Classification::HighNoise];
 
-pub(super) fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
+pub(super) fn read(path: &Path, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError> {
     let length = files::regular_file_len(path)?;
     if length > MAX_BYTES {
         return Err(TerrainError::TooLong(length));
@@ -45,7 +45,7 @@ fn malformed(why: &impl ToString) -> TerrainError {
     TerrainError::malformed(FORMAT, why)
 }
 
-pub(super) fn decode<R>(mut file: R, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError>
+pub(super) fn decode<R>(mut file: R, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError>
 where
     R: Read + Seek + Send + Sync + 'static,
 {
@@ -54,7 +54,7 @@ where
     decoded.unwrap_or_else(|| Err(malformed(&"its returns are damaged")))
 }
 
-fn grid_of_returns<R>(file: R, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError>
+fn grid_of_returns<R>(file: R, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError>
 where
     R: Read + Seek + Send + Sync + 'static,
 {
@@ -118,7 +118,11 @@ fn coordinate_system(header: &Header) -> Result<(Crs, f64), TerrainError> {
 }
 
 /// An empty grid over the cloud's extent, or over the frame's window.
-fn empty_grid(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
+fn empty_grid(
+    header: &Header,
+    crs: &Crs,
+    frame: &TerrainFrame<'_>,
+) -> Result<HeightGrid, TerrainError> {
     let bounds = header.bounds();
     let (low, high) = ([bounds.min.x, bounds.min.y], [bounds.max.x, bounds.max.y]);
     let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];

@@ -14,7 +14,7 @@ pub enum WithoutCrs {
 
 /// Mission frame and box in which heights are requested.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame<'a> {
+pub struct TerrainFrame<'a> {
     /// Origin of the mission frame. Its altitude is not subtracted: heights stay above sea level.
     pub origin: &'a Geodetic,
     /// What the file's coordinates mean if it states no coordinate system.

@@ -20,7 +20,7 @@ pub struct HeightGrid {
 
 /// Greatest height in the cells of a box, and whether any cell has none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Heights {
+pub struct BoxHeights {
     /// The greatest height, metres; `None` if no cell has a height.
     pub highest_m: Option<f32>,
     /// Whether a cell has no height, or the box reaches out of the grid.
@@ -108,9 +108,9 @@ impl HeightGrid {
     }
 
     /// Greatest height in the cells that a box touches, and whether any of these has none.
-    pub fn heights_in_box(&self, low: &Flat, high: &Flat) -> Heights {
+    pub fn heights_in_box(&self, low: &Flat, high: &Flat) -> BoxHeights {
         let index = |at: f32, from: f32| ((at - from) / self.cell_m).floor();
-        let mut found = Heights::default();
+        let mut found = BoxHeights::default();
         let mut ranges = [(0, 0); 2];
         for axis in 0..2 {
             let (from, to) = (index(low[axis], self.low[axis]), index(high[axis], self.low[axis]));
@@ -119,7 +119,7 @@ impl HeightGrid {
             let over = high[axis] > self.bounds()[1][axis];
             found.holes |= from < 0.0 || over || from > most;
             if to < 0.0 || from > most || from > to {
-                return Heights { highest_m: None, holes: true };
+                return BoxHeights { highest_m: None, holes: true };
             }
             ranges[axis] = (from.max(0.0) as usize, to.min(most) as usize);
         }

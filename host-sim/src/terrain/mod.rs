@@ -30,8 +30,8 @@ use std::path::Path;
 
 pub use self::error::TerrainError;
 pub use self::field::{FieldConfig, FieldError, encode_field};
-pub use self::frame::{Frame, WithoutCrs};
-pub use self::grid::{HeightGrid, Heights};
+pub use self::frame::{TerrainFrame, WithoutCrs};
+pub use self::grid::{BoxHeights, HeightGrid};
 pub use self::limits::{MAX_BYTES, MAX_CELLS};
 use crate::quote::quoted_path;
 
@@ -40,7 +40,7 @@ use crate::quote::quoted_path;
 /// # Errors
 /// The file cannot be read, is not what its name says, is in a coordinate system that is not
 /// supported, or has no height in the frame's window.
-pub fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
+pub fn read(path: &Path, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError> {
     let ending = path.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     let grid = match ending.to_ascii_lowercase().as_str() {
         "asc" => asc::read(path)?.resampled(frame)?,

@@ -10,7 +10,7 @@ use planner_core::frames::Geodetic;
 
 use super::crs::Crs;
 use super::error::TerrainError;
-use super::frame::{Frame, widened_window};
+use super::frame::{TerrainFrame, widened_window};
 use super::grid::HeightGrid;
 
 /// Heights as a file has them, in its own coordinates.
@@ -39,7 +39,7 @@ impl Raster {
 
     /// Resamples the heights to a grid in the mission frame, whose cells are about as large as the
     /// file's.
-    pub(super) fn resampled(&self, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
+    pub(super) fn resampled(&self, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError> {
         self.crs.check(frame.without_crs)?;
         let origin = frame.origin;
         let window = match frame.window {

@@ -19,8 +19,8 @@ use super::*;
 /// A place in UTM zone 30 north.
 pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 43.3, lon_deg: -2.9, alt_m: 0.0 };
 
-pub(super) fn anywhere(origin: &Geodetic) -> Frame<'_> {
-    Frame { origin, without_crs: WithoutCrs::Refused, window: None }
+pub(super) fn anywhere(origin: &Geodetic) -> TerrainFrame<'_> {
+    TerrainFrame { origin, without_crs: WithoutCrs::Refused, window: None }
 }
 
 /// A GeoTIFF of signed 16-bit heights with the GeoKeys `system`; `corner` is the north-western one,
@@ -80,7 +80,7 @@ proptest! {
         let (columns, count, cell) = (rows[0].len(), rows.len(), f32::from(cell));
         let corner = corner.map(|at| at as f32);
         let text = asc(columns, corner.map(f64::from), f64::from(cell), &rows);
-        let frame = Frame { origin: &ORIGIN, without_crs: WithoutCrs::Metres, window: None };
+        let frame = TerrainFrame { origin: &ORIGIN, without_crs: WithoutCrs::Metres, window: None };
         let raster = asc::parse(&text, Crs::Unstated).unwrap();
         let grid = raster.resampled(&frame).unwrap();
         prop_assert_eq!(grid.size(), [columns, count]);
@@ -94,7 +94,7 @@ proptest! {
             let sides = Flat::new(columns as f32, count as f32) * cell;
             let low = Flat::new(corner[0], corner[1]) + sides.component_mul(&Flat::new(x, y));
             let high = low + sides.component_mul(&Flat::new(wide, tall));
-            let mut want = Heights { highest_m: None, holes: false };
+            let mut want = BoxHeights { highest_m: None, holes: false };
             let touches = |axis: usize, index: usize| {
                 let from = corner[axis] + index as f32 * cell;
                 high[axis] >= from && low[axis] < from + cell

@@ -1,8 +1,8 @@
 //! ArduCopter's arming and disarming.
 
 use super::Copter;
-use super::setpoint::Goal;
-use crate::command::{Arming, Outcome};
+use super::setpoint::GuidedGoal;
+use crate::command::{Arming, CommandOutcome};
 use crate::platform::{Platform, SensorReadings};
 
 impl Copter {
@@ -24,30 +24,30 @@ impl Copter {
         platform: &mut Platform,
         sensors: &SensorReadings,
         arming: Arming,
-    ) -> Outcome {
+    ) -> CommandOutcome {
         if self.armed {
-            return Outcome::Done;
+            return CommandOutcome::Done;
         }
         if arming == Arming::Checked
             && let Err(why) = self.check_arming(sensors)
         {
             platform.send_text(2, why);
-            return Outcome::Refused;
+            return CommandOutcome::Refused;
         }
         self.armed = true;
         self.since.armed_us = sensors.now_us;
         self.since.idle_us = sensors.now_us;
-        self.goal = Goal::STOP;
+        self.goal = GuidedGoal::STOP;
         platform.announce_origin();
         platform.set_home_here();
         platform.send_text(6, "Arming motors");
-        Outcome::Done
+        CommandOutcome::Done
     }
 
     /// Disarms. Refused in the air, unless forced.
-    pub(super) fn disarm(&mut self, platform: &mut Platform, arming: Arming) -> Outcome {
+    pub(super) fn disarm(&mut self, platform: &mut Platform, arming: Arming) -> CommandOutcome {
         if self.armed && !self.landed && arming == Arming::Checked {
-            return Outcome::Refused;
+            return CommandOutcome::Refused;
         }
         if self.armed {
             platform.send_text(6, "Disarming motors");
@@ -57,6 +57,6 @@ impl Copter {
         self.takeoff = None;
         self.failsafe = None;
         self.speed = None;
-        Outcome::Done
+        CommandOutcome::Done
     }
 }

@@ -9,9 +9,9 @@
 use planner_core::Point;
 
 use super::auto_state::Auto;
-use super::setpoint::Goal;
-use super::{Copter, Mode, ReturnLeg, TakeOff};
-use crate::command::Outcome;
+use super::setpoint::GuidedGoal;
+use super::{Copter, CopterMode, ReturnLeg, TakeOff};
+use crate::command::CommandOutcome;
 use crate::itinerary::{LandedState, MissionLeg, interpolate_height};
 use crate::platform::{Platform, SensorReadings};
 
@@ -32,18 +32,18 @@ impl Copter {
 
     /// Executes MISSION_START: enters AUTO and allows the take-off. Refused if AUTO cannot be
     /// entered.
-    pub(super) fn start_mission(&mut self, platform: &mut Platform) -> Outcome {
+    pub(super) fn start_mission(&mut self, platform: &mut Platform) -> CommandOutcome {
         if !self.can_enter_auto(platform) {
-            return Outcome::Refused;
+            return CommandOutcome::Refused;
         }
-        let started = self.request_mode(Mode::Auto, &platform.sensors());
+        let started = self.request_mode(CopterMode::Auto, &platform.sensors());
         self.auto.may_lift |= started.is_done() && self.armed;
         started
     }
 
     /// Whether the vehicle descends to land in AUTO (landing item, or the end of a return item).
     pub(super) fn is_landing_in_auto(&self) -> bool {
-        self.mode == Mode::Auto
+        self.mode == CopterMode::Auto
             && match self.auto.leg {
                 Some(MissionLeg::Land { .. }) => true,
                 Some(MissionLeg::Return) => self.leg == ReturnLeg::Land,
@@ -65,7 +65,7 @@ impl Copter {
 
     /// Advances the mission by one step: updates the leg to fly, speed and take-off.
     pub(super) fn fly_mission(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
-        if self.mode != Mode::Auto {
+        if self.mode != CopterMode::Auto {
             if self.auto.leg.take().is_some() {
                 platform.missions.progress.restart_item();
             }
@@ -96,7 +96,7 @@ impl Copter {
     }
 
     /// The goal of the mission's current leg.
-    pub(super) fn auto_goal(&mut self, sensors: &SensorReadings) -> Goal {
+    pub(super) fn auto_goal(&mut self, sensors: &SensorReadings) -> GuidedGoal {
         if self.takeoff.is_some() {
             return self.take_off_goal();
         }
@@ -117,11 +117,11 @@ impl Copter {
                 );
                 let heading = self.auto.heading.unwrap_or(f32::NAN);
                 let velocity = Point::new(0.0, 0.0, rate);
-                Goal { heading, velocity, ..Goal::hold(Point::new(at.x, at.y, up)) }
+                GuidedGoal { heading, velocity, ..GuidedGoal::hold(Point::new(at.x, at.y, up)) }
             }
             Some(MissionLeg::TakeOff { up }) => {
                 let stay = self.auto.stay.unwrap_or(at);
-                Goal::hold(Point::new(stay.x, stay.y, up))
+                GuidedGoal::hold(Point::new(stay.x, stay.y, up))
             }
             Some(MissionLeg::Land { at: Some([east, north]) })
                 if libm::hypotf(east - sensors.position.x, north - sensors.position.y)
@@ -129,11 +129,13 @@ impl Copter {
                     && !sensors.touching =>
             {
                 let up = self.auto.stay.map_or(at.z, |stay| stay.z);
-                Goal::hold(Point::new(east, north, up))
+                GuidedGoal::hold(Point::new(east, north, up))
             }
             Some(MissionLeg::Land { .. }) => self.landing_goal(sensors),
             Some(MissionLeg::Return) => self.return_goal(sensors),
-            Some(MissionLeg::Wait(_)) | None => self.auto.stay.map_or(Goal::STOP, Goal::hold),
+            Some(MissionLeg::Wait(_)) | None => {
+                self.auto.stay.map_or(GuidedGoal::STOP, GuidedGoal::hold)
+            }
         }
     }
 }

@@ -1,11 +1,11 @@
 //! ArduCopter's handling of commands, SET_MODE, message intervals and stream requests, and its
 //! COMMAND_ACKs.
 
-use super::setpoint::Goal;
-use super::{Copter, Mode, STREAMS};
+use super::setpoint::GuidedGoal;
+use super::{Copter, CopterMode, STREAMS};
 use crate::command::{
-    ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
-    DO_SET_CAM_TRIGG_DIST, FAILED, UNSUPPORTED, message_id,
+    ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, DENIED, DO_DIGICAM_CONTROL,
+    DO_SET_CAM_TRIGG_DIST, FAILED, ReceivedCommand, UNSUPPORTED, message_id,
 };
 use crate::platform::Platform;
 use crate::port::Sender;
@@ -31,7 +31,7 @@ impl Copter {
         &mut self,
         platform: &mut Platform,
         from: Sender,
-        command: &Command,
+        command: &ReceivedCommand,
     ) {
         let sensors = platform.sensors();
         let result = match command.id {
@@ -47,9 +47,9 @@ impl Copter {
             }
             // NAV_TAKEOFF's height counts from home.
             22 => self.take_off(sensors.home.z + command.z, &sensors).result_or(FAILED),
-            21 => self.request_mode(Mode::Land, &sensors).result_or(FAILED),
-            20 => self.request_mode(Mode::Rtl, &sensors).result_or(FAILED),
-            17 => self.request_mode(Mode::Loiter, &sensors).result_or(FAILED),
+            21 => self.request_mode(CopterMode::Land, &sensors).result_or(FAILED),
+            20 => self.request_mode(CopterMode::Rtl, &sensors).result_or(FAILED),
+            17 => self.request_mode(CopterMode::Loiter, &sensors).result_or(FAILED),
             192 => self.reposition(platform, command),
             178 => {
                 self.speed = (command.param[1] > 0.0).then_some(command.param[1]);
@@ -100,24 +100,24 @@ impl Copter {
         if base & CUSTOM_MODE == 0 {
             return DENIED;
         }
-        let runs = |mode: &Mode| *mode != Mode::Auto || self.can_enter_auto(platform);
-        match Mode::from_number(number).filter(runs) {
+        let runs = |mode: &CopterMode| *mode != CopterMode::Auto || self.can_enter_auto(platform);
+        match CopterMode::from_number(number).filter(runs) {
             Some(mode) => self.request_mode(mode, &platform.sensors()).result_or(FAILED),
             None => FAILED,
         }
     }
 
     /// Executes DO_REPOSITION: flies to a point in Guided. Returns the MAV_RESULT.
-    fn reposition(&mut self, platform: &Platform, command: &Command) -> u8 {
+    fn reposition(&mut self, platform: &Platform, command: &ReceivedCommand) -> u8 {
         let sensors = platform.sensors();
         let Some(to) = platform.reposition_target(command) else { return DENIED };
         let changes_mode = command.param[1] as u32 & 1 != 0;
-        let guided = self.mode == Mode::Guided
-            || changes_mode && self.request_mode(Mode::Guided, &sensors).is_done();
+        let guided = self.mode == CopterMode::Guided
+            || changes_mode && self.request_mode(CopterMode::Guided, &sensors).is_done();
         if !guided || !to.iter().all(|x| x.is_finite()) {
             return if guided { DENIED } else { FAILED };
         }
-        self.fly_to(Goal::hold(to), &sensors);
+        self.fly_to(GuidedGoal::hold(to), &sensors);
         ACCEPTED
     }
 }

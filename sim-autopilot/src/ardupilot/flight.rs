@@ -2,9 +2,9 @@
 
 use planner_core::Point;
 
-use super::reference::Reference;
-use super::setpoint::Goal;
-use super::{Copter, Mode, ReturnLeg, micros_from_s};
+use super::reference::CopterReference;
+use super::setpoint::GuidedGoal;
+use super::{Copter, CopterMode, ReturnLeg, micros_from_s};
 use crate::platform::SensorReadings;
 use crate::shaping::approach_rate;
 use crate::vehicle::Demand;
@@ -28,19 +28,22 @@ impl Copter {
         let mut tuning = self.tuning;
         tuning.speed = self.speed.unwrap_or(tuning.speed);
         let goal = match self.mode {
-            Mode::Auto => self.auto_goal(sensors),
-            Mode::Guided if self.takeoff.is_some() => self.take_off_goal(),
-            Mode::Guided => self.guided_goal(sensors.now_us, dt),
-            Mode::Brake => {
+            CopterMode::Auto => self.auto_goal(sensors),
+            CopterMode::Guided if self.takeoff.is_some() => self.take_off_goal(),
+            CopterMode::Guided => self.guided_goal(sensors.now_us, dt),
+            CopterMode::Brake => {
                 tuning.acceleration = BRAKE_MPS2;
-                Goal::STOP
+                GuidedGoal::STOP
             }
-            Mode::Stabilize | Mode::AltHold | Mode::Loiter => {
+            CopterMode::Stabilize | CopterMode::AltHold | CopterMode::Loiter => {
                 tuning.speed_down = tuning.stick_sink;
-                Goal { velocity: Point::new(0.0, 0.0, -tuning.stick_sink), ..Goal::STOP }
+                GuidedGoal {
+                    velocity: Point::new(0.0, 0.0, -tuning.stick_sink),
+                    ..GuidedGoal::STOP
+                }
             }
-            Mode::Rtl => self.return_goal(sensors),
-            Mode::Land => self.landing_goal(sensors),
+            CopterMode::Rtl => self.return_goal(sensors),
+            CopterMode::Land => self.landing_goal(sensors),
         };
         self.reference.advance(&goal, &tuning, dt);
         // Without a position estimate the horizontal position is not controlled.
@@ -79,10 +82,10 @@ impl Copter {
             .map_or(f32::NAN, |&(_, up)| up)
     }
 
-    pub(super) fn take_off_goal(&mut self) -> Goal {
-        let Some(takeoff) = self.takeoff else { return Goal::STOP };
+    pub(super) fn take_off_goal(&mut self) -> GuidedGoal {
+        let Some(takeoff) = self.takeoff else { return GuidedGoal::STOP };
         let at = self.reference.position;
-        let goal = Goal::hold(Point::new(at.x, at.y, takeoff.up));
+        let goal = GuidedGoal::hold(Point::new(at.x, at.y, takeoff.up));
         if takeoff.up - at.z < TAKEN_OFF_M {
             self.takeoff = None;
             self.goal = goal;
@@ -92,11 +95,11 @@ impl Copter {
 
     /// The goal of Guided in this step. A goal position moves with the goal velocity, which becomes
     /// zero after `GUID_TIMEOUT`.
-    fn guided_goal(&mut self, now_us: u64, dt: f32) -> Goal {
+    fn guided_goal(&mut self, now_us: u64, dt: f32) -> GuidedGoal {
         let age_us = now_us.saturating_sub(self.goal_us);
         if self.goal.expires && age_us > micros_from_s(self.tuning.guided_timeout_s) {
             self.goal =
-                Goal { velocity: Point::zeros(), acceleration: Point::zeros(), ..self.goal };
+                GuidedGoal { velocity: Point::zeros(), acceleration: Point::zeros(), ..self.goal };
             self.goal.heading_rate = f32::NAN;
         }
         if let Some(position) = &mut self.goal.position {
@@ -108,16 +111,16 @@ impl Copter {
     /// Demand to land: descends as if to stop at `LAND_ALT_LOW` above home, at least at
     /// `LAND_SPEED` and at most at `WPNAV_SPEED_DN` (`Mode::land_run_vertical_control`). Heights
     /// count from home, since no rangefinder measures the ground.
-    pub(super) fn landing_goal(&self, sensors: &SensorReadings) -> Goal {
+    pub(super) fn landing_goal(&self, sensors: &SensorReadings) -> GuidedGoal {
         let tuning = &self.tuning;
         let above_low = sensors.position.z - sensors.home.z - tuning.land_slow_below.max(1.0);
         let rate =
             approach_rate(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
         let sink = rate.min(tuning.speed_down).max(tuning.land_speed);
-        Goal { velocity: Point::new(0.0, 0.0, -sink), ..Goal::STOP }
+        GuidedGoal { velocity: Point::new(0.0, 0.0, -sink), ..GuidedGoal::STOP }
     }
 
-    pub(super) fn return_goal(&mut self, sensors: &SensorReadings) -> Goal {
+    pub(super) fn return_goal(&mut self, sensors: &SensorReadings) -> GuidedGoal {
         let home = sensors.home;
         let at = self.reference.position;
         let away = libm::hypotf(home.x - sensors.position.x, home.y - sensors.position.y);
@@ -133,20 +136,20 @@ impl Copter {
                 if up - sensors.position.z < ARRIVED_M {
                     self.leg = ReturnLeg::Cross { up };
                 }
-                Goal::hold(Point::new(at.x, at.y, up))
+                GuidedGoal::hold(Point::new(at.x, at.y, up))
             }
             ReturnLeg::Cross { up } => {
                 if away < ARRIVED_M {
                     self.leg = ReturnLeg::Wait { since_us: sensors.now_us, up };
                 }
-                Goal::hold(Point::new(home.x, home.y, up))
+                GuidedGoal::hold(Point::new(home.x, home.y, up))
             }
             ReturnLeg::Wait { since_us, up } => {
                 if sensors.now_us - since_us >= micros_from_s(self.tuning.return_loiter_s) {
                     self.leg = ReturnLeg::Land;
-                    self.reference = Reference::new(at, self.reference.velocity);
+                    self.reference = CopterReference::new(at, self.reference.velocity);
                 }
-                Goal::hold(Point::new(home.x, home.y, up))
+                GuidedGoal::hold(Point::new(home.x, home.y, up))
             }
             ReturnLeg::Land => self.landing_goal(sensors),
         }

@@ -23,22 +23,22 @@ pub mod reference;
 pub mod setpoint;
 mod unasked;
 
-pub use self::modes::Mode;
+pub use self::modes::CopterMode;
 
 use planner_core::Point;
 
 use self::auto_state::Auto;
 use self::params::Tuning;
-use self::reference::Reference;
-use self::setpoint::Goal;
-use super::command::{Arming, Outcome};
+use self::reference::CopterReference;
+use self::setpoint::GuidedGoal;
+use super::command::{Arming, CommandOutcome};
 use super::params::Params;
 use super::platform::{ControlDemand, IntegralAction, Platform, SensorReadings};
 use super::port::Sender;
 use super::status::{AutopilotStatus, MotorState};
 use super::vehicle::{Demand, VehicleLimits};
 use super::wire::PayloadReader;
-use crate::{AutopilotKind, GpsFix};
+use crate::{GpsFix, SimulatedKind};
 
 /// Time from arming to lift-off if NAV_TAKEOFF comes at once, seconds: `MOT` arming delay 2 s,
 /// spool-up 0.5 s, and the throttle's slew to hover.
@@ -142,15 +142,15 @@ pub struct Copter {
     /// initialised.
     controller_starts: bool,
     landed: bool,
-    mode: Mode,
+    mode: CopterMode,
     failsafe: Option<Failsafe>,
     position_ok: bool,
     position_lost_us: Option<u64>,
     gcs_heartbeat_us: Option<u64>,
     takeoff: Option<TakeOff>,
-    goal: Goal,
+    goal: GuidedGoal,
     goal_us: u64,
-    reference: Reference,
+    reference: CopterReference,
     speed: Option<f32>,
     leg: ReturnLeg,
     auto: Auto,
@@ -170,15 +170,15 @@ impl Copter {
             since: PhaseStartTimes::default(),
             controller_starts: false,
             landed: true,
-            mode: Mode::Stabilize,
+            mode: CopterMode::Stabilize,
             failsafe: None,
             position_ok: true,
             position_lost_us: None,
             gcs_heartbeat_us: None,
             takeoff: None,
-            goal: Goal::STOP,
+            goal: GuidedGoal::STOP,
             goal_us: 0,
-            reference: Reference::new(Point::zeros(), Point::zeros()),
+            reference: CopterReference::new(Point::zeros(), Point::zeros()),
             speed: None,
             leg: ReturnLeg::Land,
             auto: Auto::default(),
@@ -213,9 +213,9 @@ impl Copter {
     pub fn status(&self, sensors: &SensorReadings) -> AutopilotStatus {
         let now_us = sensors.now_us;
         let known = self.position_known(now_us);
-        let sticks = matches!(self.mode, Mode::Stabilize | Mode::AltHold);
+        let sticks = matches!(self.mode, CopterMode::Stabilize | CopterMode::AltHold);
         AutopilotStatus {
-            autopilot: AutopilotKind::Ardupilot,
+            autopilot: SimulatedKind::Ardupilot,
             custom_mode: self.mode.number(),
             intended_mode: self.mode.number(),
             // Flags custom mode, stabilized and manual input; and guided, except in STABILIZE and
@@ -231,12 +231,12 @@ impl Copter {
             landed_state: match self.mode {
                 _ if self.landed => 1,
                 _ if self.takeoff.is_some() => 3,
-                Mode::Land => 4,
-                Mode::Auto if self.is_landing_in_auto() => 4,
-                Mode::Rtl if self.leg == ReturnLeg::Land => 4,
+                CopterMode::Land => 4,
+                CopterMode::Auto if self.is_landing_in_auto() => 4,
+                CopterMode::Rtl if self.leg == ReturnLeg::Land => 4,
                 _ => 2,
             },
-            guided: self.mode == Mode::Guided,
+            guided: self.mode == CopterMode::Guided,
             ekf_flags: if now_us < micros_from_s(BOOT_TO_ATTITUDE_S).min(self.ready_us) {
                 0x400
             } else if known {
@@ -255,7 +255,7 @@ impl Copter {
 
     /// Handles a setpoint message (`id` 84 or 86); ignored outside Guided.
     pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &PayloadReader<'_>) {
-        if self.mode != Mode::Guided {
+        if self.mode != CopterMode::Guided {
             return;
         }
         let goal = if id == 84 {
@@ -267,10 +267,10 @@ impl Copter {
     }
 
     /// Sets the goal of Guided, which ends a take-off in progress.
-    fn fly_to(&mut self, goal: Goal, sensors: &SensorReadings) {
+    fn fly_to(&mut self, goal: GuidedGoal, sensors: &SensorReadings) {
         if self.takeoff.take().is_some() || goal.position.is_some() != self.goal.position.is_some()
         {
-            self.reference = Reference::new(sensors.position, sensors.velocity);
+            self.reference = CopterReference::new(sensors.position, sensors.velocity);
         }
         (self.goal, self.goal_us) = (goal, sensors.now_us);
     }
@@ -289,44 +289,44 @@ impl Copter {
     }
 
     /// Enters the mode. Refused while armed, if it needs a position and there is none.
-    fn request_mode(&mut self, mode: Mode, sensors: &SensorReadings) -> Outcome {
+    fn request_mode(&mut self, mode: CopterMode, sensors: &SensorReadings) -> CommandOutcome {
         if self.armed && mode.needs_position() && !self.position_known(sensors.now_us) {
-            return Outcome::Refused;
+            return CommandOutcome::Refused;
         }
         self.force_mode(mode, sensors);
-        Outcome::Done
+        CommandOutcome::Done
     }
 
     /// Enters the mode as a pilot's switch does, even if it cannot run; not if it is current.
-    pub fn force_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
+    pub fn force_mode(&mut self, mode: CopterMode, sensors: &SensorReadings) {
         if mode == self.mode {
             return;
         }
         // LAND continues with the running controller's reference; all other modes start a new one.
         let runs = self.mode.needs_position() && !self.landed;
-        if mode != Mode::Land || !runs {
-            self.reference = Reference::new(sensors.position, sensors.velocity);
+        if mode != CopterMode::Land || !runs {
+            self.reference = CopterReference::new(sensors.position, sensors.velocity);
             self.reference.acceleration =
                 if self.landed { Point::zeros() } else { sensors.acceleration };
             self.controller_starts = !self.landed;
         }
         self.mode = mode;
         self.takeoff = None;
-        self.goal = Goal::STOP;
+        self.goal = GuidedGoal::STOP;
         self.leg = ReturnLeg::Climb { up: f32::NAN };
     }
 
     /// Starts a take-off (NAV_TAKEOFF) to height `up` (mission frame). Refused if not possible.
-    fn take_off(&mut self, up: f32, sensors: &SensorReadings) -> Outcome {
+    fn take_off(&mut self, up: f32, sensors: &SensorReadings) -> CommandOutcome {
         let possible =
-            self.armed && self.landed && self.mode == Mode::Guided && up > sensors.position.z;
+            self.armed && self.landed && self.mode == CopterMode::Guided && up > sensors.position.z;
         if !possible {
-            return Outcome::Refused;
+            return CommandOutcome::Refused;
         }
         let since_us = self.takeoff.map_or(sensors.now_us, |takeoff| takeoff.since_us);
         self.takeoff = Some(TakeOff { since_us, up });
         self.auto.may_lift = true;
-        Outcome::Done
+        CommandOutcome::Done
     }
 
     /// Advances one step: failsafes, timers, mission, land detector, and the demand of the mode.
@@ -357,7 +357,7 @@ impl Copter {
             self.landed = false;
             self.since.touching_us = None;
             self.since.lifted_us = now_us;
-            self.reference = Reference::new(sensors.position, Point::zeros());
+            self.reference = CopterReference::new(sensors.position, Point::zeros());
         }
         if self.landed {
             return self.idle_command();
@@ -397,7 +397,7 @@ impl Copter {
         {
             self.failsafe = Some(Failsafe::Estimator);
             platform.send_text(2, "EKF Failsafe: changed to LAND Mode");
-            self.force_mode(Mode::Land, sensors);
+            self.force_mode(CopterMode::Land, sensors);
         }
         if self.failsafe.is_some() || self.landed {
             return;
@@ -407,12 +407,12 @@ impl Copter {
         if self.tuning.gcs_failsafe && self.gcs_heartbeat_us.is_some_and(silent) {
             self.failsafe = Some(Failsafe::GroundStation);
             platform.send_text(4, "GCS Failsafe");
-            self.force_mode(Mode::Rtl, sensors);
+            self.force_mode(CopterMode::Rtl, sensors);
         } else if sensors.battery < self.tuning.battery_low && self.tuning.battery_action > 0 {
             self.failsafe = Some(Failsafe::Battery);
             platform.send_text(4, "Battery 1 is low");
             self.force_mode(
-                if self.tuning.battery_action == 1 { Mode::Land } else { Mode::Rtl },
+                if self.tuning.battery_action == 1 { CopterMode::Land } else { CopterMode::Rtl },
                 sensors,
             );
         }
@@ -424,7 +424,8 @@ impl Copter {
             self.since.idle_us = sensors.now_us;
         } else {
             let delay = self.tuning.disarm_delay_s - DISARM_EARLY_S;
-            let landing = matches!(self.mode, Mode::Land | Mode::Rtl) || self.is_landing_in_auto();
+            let landing = matches!(self.mode, CopterMode::Land | CopterMode::Rtl)
+                || self.is_landing_in_auto();
             if landing && since(self.since.landed_us) >= micros_from_s(LAND_DISARM_S)
                 || delay > 0.0 && since(self.since.idle_us) >= micros_from_s(delay)
             {
@@ -448,7 +449,7 @@ impl Copter {
             self.landed = true;
             self.since.landed_us = sensors.now_us;
             self.takeoff = None;
-            self.goal = Goal::STOP;
+            self.goal = GuidedGoal::STOP;
         }
     }
 }

@@ -2,7 +2,7 @@
 
 /// ArduCopter's flight modes that the simulation supports; the number is HEARTBEAT's `custom_mode`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
+pub enum CopterMode {
     /// Sticks control attitude and throttle; no remote control is simulated, the throttle is low:
     /// it descends.
     Stabilize = 0,
@@ -23,24 +23,24 @@ pub enum Mode {
     Brake = 17,
 }
 
-const MODES: [Mode; 8] = [
-    Mode::Stabilize,
-    Mode::AltHold,
-    Mode::Auto,
-    Mode::Guided,
-    Mode::Loiter,
-    Mode::Rtl,
-    Mode::Land,
-    Mode::Brake,
+const MODES: [CopterMode; 8] = [
+    CopterMode::Stabilize,
+    CopterMode::AltHold,
+    CopterMode::Auto,
+    CopterMode::Guided,
+    CopterMode::Loiter,
+    CopterMode::Rtl,
+    CopterMode::Land,
+    CopterMode::Brake,
 ];
 
-impl From<Mode> for u32 {
-    fn from(mode: Mode) -> Self {
+impl From<CopterMode> for u32 {
+    fn from(mode: CopterMode) -> Self {
         mode.number()
     }
 }
 
-impl Mode {
+impl CopterMode {
     /// Value of `custom_mode`.
     pub fn number(self) -> u32 {
         self as u32

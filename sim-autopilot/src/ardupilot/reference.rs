@@ -8,7 +8,7 @@
 use planner_core::Point;
 
 use super::params::Tuning;
-use super::setpoint::Goal;
+use super::setpoint::GuidedGoal;
 use crate::shaping::approach_rate;
 
 /// Fraction of the acceleration limit that corrections of the position may use.
@@ -16,7 +16,7 @@ const CORRECTION_ACCEL_SHARE: f32 = 0.5;
 
 /// Position, velocity and acceleration of the reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reference {
+pub struct CopterReference {
     /// Position, ENU metres.
     pub position: Point,
     /// Velocity, ENU m/s.
@@ -25,14 +25,14 @@ pub struct Reference {
     pub acceleration: Point,
 }
 
-impl Reference {
+impl CopterReference {
     /// A reference at this position with this velocity, without acceleration.
     pub fn new(position: Point, velocity: Point) -> Self {
         Self { position, velocity, acceleration: Point::zeros() }
     }
 
     /// Moves the reference for one step of `dt` seconds towards `goal`.
-    pub fn advance(&mut self, goal: &Goal, tuning: &Tuning, dt: f32) {
+    pub fn advance(&mut self, goal: &GuidedGoal, tuning: &Tuning, dt: f32) {
         let error = goal.position.map_or(Point::zeros(), |position| position - self.position);
         // Horizontal axes, limited as one vector.
         let (limit, jerk) = (tuning.acceleration, tuning.jerk);
@@ -81,8 +81,8 @@ mod tests {
     #[test]
     fn it_arrives_within_every_limit_and_does_not_overshoot() {
         let tuning = Tuning::new(&params::default_params(1, &VehicleLimits::default()));
-        let mut reference = Reference::new(Point::zeros(), Point::zeros());
-        let goal = Goal::hold(Point::new(12.0, 16.0, 10.0));
+        let mut reference = CopterReference::new(Point::zeros(), Point::zeros());
+        let goal = GuidedGoal::hold(Point::new(12.0, 16.0, 10.0));
         let dt = 0.004;
         let mut fastest = 0.0_f32;
         for _ in 0..5000 {

@@ -25,7 +25,7 @@ const MASK_YAW_RATE: u16 = 0x800;
 
 /// Goal of the reference, in the mission frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Goal {
+pub struct GuidedGoal {
     /// Position, ENU metres; `None`: only the velocity is flown.
     pub position: Option<Point>,
     /// Velocity, ENU m/s; feed-forward if there is a position.
@@ -40,7 +40,7 @@ pub struct Goal {
     pub expires: bool,
 }
 
-impl Goal {
+impl GuidedGoal {
     /// Stop and hold.
     pub const STOP: Self = Self {
         position: None,
@@ -58,11 +58,11 @@ impl Goal {
 }
 
 /// Reads the payload of SET_POSITION_TARGET_LOCAL_NED.
-pub fn read_local_ned(fields: &PayloadReader<'_>, platform: &Platform) -> Goal {
+pub fn read_local_ned(fields: &PayloadReader<'_>, platform: &Platform) -> GuidedGoal {
     let frame = fields.u8(52);
     let in_body = matches!(frame, FRAME_BODY_NED | FRAME_BODY_OFFSET_NED);
     if frame != FRAME_LOCAL_NED && frame != FRAME_LOCAL_OFFSET_NED && !in_body {
-        return Goal::STOP;
+        return GuidedGoal::STOP;
     }
     let (sin, cos) = libm::sincos(f64::from(platform.vehicle.state().heading_rad));
     let turned = |v: Vector3<f64>| match in_body {
@@ -80,11 +80,11 @@ pub fn read_local_ned(fields: &PayloadReader<'_>, platform: &Platform) -> Goal {
 }
 
 /// Reads the payload of SET_POSITION_TARGET_GLOBAL_INT.
-pub fn read_global_int(fields: &PayloadReader<'_>, platform: &Platform) -> Goal {
+pub fn read_global_int(fields: &PayloadReader<'_>, platform: &Platform) -> GuidedGoal {
     let base = match fields.u8(52) {
         0 | 5 => 0.0,
         3 | 6 => platform.home.alt_m,
-        _ => return Goal::STOP,
+        _ => return GuidedGoal::STOP,
     };
     let asked = Geodetic {
         lat_deg: f64::from(fields.i32(4)) * 1e-7,
@@ -92,7 +92,7 @@ pub fn read_global_int(fields: &PayloadReader<'_>, platform: &Platform) -> Goal 
         alt_m: f64::from(fields.f32(12)) + base,
     };
     if !asked.is_valid() {
-        return Goal::STOP;
+        return GuidedGoal::STOP;
     }
     let rate = |at| platform.frame.enu_velocity_from_ned(&read_vector(fields, at)).cast::<f32>();
     goal_from_fields(
@@ -112,7 +112,7 @@ fn goal_from_fields(
     position: Point,
     velocity: Point,
     acceleration: Point,
-) -> Goal {
+) -> GuidedGoal {
     let mask = fields.u16(48);
     let given = |bits: u16| mask & bits == 0;
     let has = (given(MASK_POSITION), given(MASK_VELOCITY), given(MASK_ACCELERATION));
@@ -121,7 +121,7 @@ fn goal_from_fields(
         && (!has.1 || sound(&velocity))
         && (!has.2 || sound(&acceleration));
     if !usable || (mask & MASK_FORCE != 0 && has.2) {
-        return Goal::STOP;
+        return GuidedGoal::STOP;
     }
     let optional = |bit: u16, at: usize| {
         let value = fields.f32(at);
@@ -129,18 +129,18 @@ fn goal_from_fields(
     };
     let turn = core::f32::consts::TAU;
     let heading = optional(MASK_YAW, 40);
-    let goal = Goal {
+    let goal = GuidedGoal {
         heading: heading - turn * libm::roundf(heading / turn),
         heading_rate: optional(MASK_YAW_RATE, 44),
-        ..Goal::STOP
+        ..GuidedGoal::STOP
     };
     let acceleration = if has.2 { acceleration } else { Point::zeros() };
     match has {
         (true, true, _) => {
-            Goal { position: Some(position), velocity, acceleration, expires: true, ..goal }
+            GuidedGoal { position: Some(position), velocity, acceleration, expires: true, ..goal }
         }
-        (false, true, _) => Goal { velocity, acceleration, expires: true, ..goal },
-        (true, false, false) => Goal { position: Some(position), ..goal },
-        _ => Goal::STOP,
+        (false, true, _) => GuidedGoal { velocity, acceleration, expires: true, ..goal },
+        (true, false, false) => GuidedGoal { position: Some(position), ..goal },
+        _ => GuidedGoal::STOP,
     }
 }

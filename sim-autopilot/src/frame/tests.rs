@@ -24,7 +24,7 @@ fn written((id, sender, payload): &(u32, (u8, u8, u8), Vec<u8>)) -> Vec<u8> {
     out
 }
 
-fn all(framer: &mut Framer, now_us: u64, mut input: &[u8]) -> Vec<Frame> {
+fn all(framer: &mut PortFramer, now_us: u64, mut input: &[u8]) -> Vec<CheckedFrame> {
     core::iter::from_fn(|| framer.next(now_us, &mut input)).collect()
 }
 
@@ -40,7 +40,7 @@ proptest! {
         prop_assert_eq!(seed, super::crc_extra(*id));
         let len = seed.map_or(0, |seed| other::encode_raw(header, *id, seed, payload, &mut theirs));
         prop_assert_eq!(&ours[..], &theirs[..len]);
-        let read = all(&mut Framer::default(), 0, &theirs[..len]);
+        let read = all(&mut PortFramer::default(), 0, &theirs[..len]);
         let heard = other::Framer::new().next(Instant::ZERO, &mut &ours[..]);
         prop_assert_eq!(read.len(), usize::from(seed.is_some()));
         for (frame, heard) in read.iter().zip(heard) {
@@ -71,7 +71,7 @@ proptest! {
             .iter()
             .flat_map(|(noise, frame)| [noise.clone(), written(frame)].concat())
             .collect();
-        let (mut framer, mut found, mut rest) = (Framer::default(), Vec::new(), &bytes[..]);
+        let (mut framer, mut found, mut rest) = (PortFramer::default(), Vec::new(), &bytes[..]);
         for cut in cuts.iter().cycle() {
             if rest.is_empty() {
                 break;
@@ -81,7 +81,7 @@ proptest! {
             rest = later;
         }
         found.extend(all(&mut framer, PARTIAL_LIFETIME_US + 1, &[]));
-        let again = |found: &Frame| {
+        let again = |found: &CheckedFrame| {
             let mut again = Vec::new();
             found.write(&mut again);
             again
@@ -105,7 +105,7 @@ fn version_1_and_signed_frames_are_read() {
     let mut signed = vec![V2_START, 1, FLAG_SIGNED, 0, 8, 3, 1, 0, 0, 0, 5];
     signed.extend(calculate_crc(&signed[1..], seed).to_le_bytes());
     signed.extend([0; 13]);
-    let mut framer = Framer::default();
+    let mut framer = PortFramer::default();
     let found = all(&mut framer, 0, &[first, signed.clone()].concat());
     assert_eq!(found.iter().map(|frame| frame.sequence).collect::<Vec<_>>(), [7, 8]);
     assert_eq!(found[0].padded_payload()[..9], [0, 0, 0, 0, 2, 12, 1, 3, 3]);
@@ -118,7 +118,7 @@ fn version_1_and_signed_frames_are_read() {
 fn a_frame_that_takes_too_long_is_given_up() {
     let whole = written(&(4, (1, 1, 9), vec![1; 14]));
     for (late_us, count) in [(0, 1), (PARTIAL_LIFETIME_US, 1), (PARTIAL_LIFETIME_US + 1, 0)] {
-        let mut framer = Framer::default();
+        let mut framer = PortFramer::default();
         assert!(all(&mut framer, 5, &whole[..7]).is_empty());
         assert_eq!(all(&mut framer, 5 + late_us, &[]).len(), 0);
         assert_eq!(all(&mut framer, 5 + late_us, &whole[7..]).len(), count, "{late_us}");

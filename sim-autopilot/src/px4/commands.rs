@@ -3,12 +3,12 @@
 
 use planner_core::frames::Geodetic;
 
-use super::Mode;
+use super::Px4Mode;
 use super::firmware::Px4;
 use crate::command::{
-    ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
-    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, Outcome, PROTOCOL_VERSION, TEMPORARILY_REJECTED,
-    UNSUPPORTED, message_id,
+    ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, CommandOutcome, DENIED, DO_DIGICAM_CONTROL,
+    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, PROTOCOL_VERSION, ReceivedCommand,
+    TEMPORARILY_REJECTED, UNSUPPORTED, message_id,
 };
 use crate::platform::Platform;
 use crate::port::Sender;
@@ -21,7 +21,7 @@ impl Px4 {
         &mut self,
         platform: &mut Platform,
         from: Sender,
-        command: &Command,
+        command: &ReceivedCommand,
     ) {
         let result = match command.id {
             // DO_SET_MODE gets two COMMAND_ACKs: at once ACCEPTED, and in the next step whether the
@@ -38,9 +38,9 @@ impl Px4 {
             }
             400 => self.arm_or_disarm(platform, command),
             22 => self.take_off(platform, command),
-            21 => self.change_mode(platform, Mode::Land).result_or(TEMPORARILY_REJECTED),
-            20 => self.change_mode(platform, Mode::Return).result_or(TEMPORARILY_REJECTED),
-            17 => self.change_mode(platform, Mode::Hold).result_or(TEMPORARILY_REJECTED),
+            21 => self.change_mode(platform, Px4Mode::Land).result_or(TEMPORARILY_REJECTED),
+            20 => self.change_mode(platform, Px4Mode::Return).result_or(TEMPORARILY_REJECTED),
+            17 => self.change_mode(platform, Px4Mode::Hold).result_or(TEMPORARILY_REJECTED),
             192 => self.reposition(platform, command),
             178 => {
                 self.commander.set_cruise(command.param[1]);
@@ -48,7 +48,7 @@ impl Px4 {
             }
             179 => platform.handle_set_home(command).result_or(DENIED),
             193 if command.param[0] == 0.0 => {
-                self.change_mode(platform, Mode::Hold).result_or(TEMPORARILY_REJECTED)
+                self.change_mode(platform, Px4Mode::Hold).result_or(TEMPORARILY_REJECTED)
             }
             193 => TEMPORARILY_REJECTED,
             300 => self.start_mission(platform),
@@ -93,12 +93,12 @@ impl Px4 {
             || telemetry::PX4_STREAMS.iter().any(|stream| stream.0 == id)
     }
 
-    fn change_mode(&mut self, platform: &Platform, mode: Mode) -> Outcome {
+    fn change_mode(&mut self, platform: &Platform, mode: Px4Mode) -> CommandOutcome {
         let sensors = platform.sensors();
         self.commander.request_mode(mode, &sensors, &self.tuning)
     }
 
-    fn arm_or_disarm(&mut self, platform: &mut Platform, command: &Command) -> u8 {
+    fn arm_or_disarm(&mut self, platform: &mut Platform, command: &ReceivedCommand) -> u8 {
         let arming = Arming::commanded_by(command);
         if command.param[0] == 1.0 {
             self.arm(platform, arming).result_or(TEMPORARILY_REJECTED)
@@ -112,14 +112,15 @@ impl Px4 {
     /// Executes MISSION_START: enters AUTO.MISSION and arms. Returns the MAV_RESULT.
     fn start_mission(&mut self, platform: &mut Platform) -> u8 {
         self.commander.note_mission(platform);
-        if !platform.has_mission() || self.change_mode(platform, Mode::Mission) == Outcome::Refused
+        if !platform.has_mission()
+            || self.change_mode(platform, Px4Mode::Mission) == CommandOutcome::Refused
         {
             return DENIED;
         }
         self.arm(platform, Arming::Checked).result_or(DENIED)
     }
 
-    fn arm(&mut self, platform: &mut Platform, arming: Arming) -> Outcome {
+    fn arm(&mut self, platform: &mut Platform, arming: Arming) -> CommandOutcome {
         let sensors = platform.sensors();
         let was_armed = self.commander.armed();
         let armed = self.commander.arm(&sensors, &self.tuning, arming);
@@ -129,7 +130,7 @@ impl Px4 {
         armed
     }
 
-    fn take_off(&mut self, platform: &Platform, command: &Command) -> u8 {
+    fn take_off(&mut self, platform: &Platform, command: &ReceivedCommand) -> u8 {
         // The altitude counts from sea level or home; converting it to the mission frame's height
         // needs latitude and longitude, here the vehicle's.
         let up = if command.z.is_finite() && command.z != 0.0 {
@@ -144,7 +145,7 @@ impl Px4 {
         self.commander.takeoff(up, &sensors, &self.tuning).result_or(TEMPORARILY_REJECTED)
     }
 
-    fn reposition(&mut self, platform: &Platform, command: &Command) -> u8 {
+    fn reposition(&mut self, platform: &Platform, command: &ReceivedCommand) -> u8 {
         let Some(to) = platform.reposition_target(command) else { return DENIED };
         let sensors = platform.sensors();
         self.commander.set_cruise(command.param[0]);
@@ -155,6 +156,6 @@ impl Px4 {
     }
 }
 
-fn mode_of(base: u8, main: u8, sub: u8) -> Option<Mode> {
-    if base & CUSTOM_MODE != 0 { Mode::from_main_sub(main, sub) } else { None }
+fn mode_of(base: u8, main: u8, sub: u8) -> Option<Px4Mode> {
+    if base & CUSTOM_MODE != 0 { Px4Mode::from_main_sub(main, sub) } else { None }
 }

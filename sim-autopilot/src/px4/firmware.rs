@@ -3,9 +3,9 @@
 
 use super::params::{self, Tuning};
 use super::setpoint;
-use super::{Commander, Mode};
-use crate::AutopilotKind;
-use crate::command::{DO_SET_MODE, Outcome, TEMPORARILY_REJECTED};
+use super::{Commander, Px4Mode};
+use crate::SimulatedKind;
+use crate::command::{CommandOutcome, DO_SET_MODE, TEMPORARILY_REJECTED};
 use crate::itinerary::{LandedState, MissionLeg};
 use crate::params::Params;
 use crate::platform::{ControlDemand, Platform, SensorReadings};
@@ -34,7 +34,7 @@ pub struct Px4 {
     /// Values of the parameters that have an effect.
     pub tuning: Tuning,
     /// A DO_SET_MODE to be decided in the next step: sender, and the requested mode if it is valid.
-    pub(super) pending_mode: Option<(Sender, Option<Mode>)>,
+    pub(super) pending_mode: Option<(Sender, Option<Px4Mode>)>,
 }
 
 impl Px4 {
@@ -60,7 +60,7 @@ impl Px4 {
         if let Some((from, mode)) = self.pending_mode.take() {
             let changed = match mode {
                 Some(mode) => self.commander.request_mode(mode, sensors, &self.tuning),
-                None => Outcome::Refused,
+                None => CommandOutcome::Refused,
             };
             platform.acknowledge(from, DO_SET_MODE, changed.result_or(TEMPORARILY_REJECTED));
         }
@@ -85,7 +85,7 @@ impl Px4 {
             }
             return;
         }
-        if self.commander.mode() != Mode::Mission {
+        if self.commander.mode() != Px4Mode::Mission {
             if self.commander.mission.leg.take().is_some() {
                 platform.missions.progress.restart_item();
             }
@@ -106,7 +106,7 @@ impl Px4 {
             self.commander.mission.leg = None;
             platform.complete_item();
             platform.rewind_mission();
-            self.commander.force_mode(Mode::Return, sensors);
+            self.commander.force_mode(Px4Mode::Return, sensors);
         }
     }
 
@@ -114,7 +114,7 @@ impl Px4 {
     pub fn status(&self, platform: &Platform, sensors: &SensorReadings) -> AutopilotStatus {
         let (system_status, flags) = self.commander.heartbeat(platform.time_us, &self.tuning);
         AutopilotStatus {
-            autopilot: AutopilotKind::Px4,
+            autopilot: SimulatedKind::Px4,
             custom_mode: self.commander.mode().custom_mode(),
             intended_mode: self.commander.intended_mode().custom_mode(),
             flags,

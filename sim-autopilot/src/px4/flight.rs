@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::glide::{self, SmoothedApproach};
 use super::params::Tuning;
-use super::{CRAWL_FACTOR, Commander, Mode, ReturnLeg, SensorReadings};
+use super::{CRAWL_FACTOR, Commander, Px4Mode, ReturnLeg, SensorReadings};
 use crate::itinerary::{MissionLeg, interpolate_height};
 use crate::shaping::JerkLimitedRate;
 use crate::vehicle::Demand;
@@ -27,13 +27,13 @@ const GROUND_DISTANCE_LAG_S: f32 = 0.2;
 
 impl Commander {
     /// Initialises a mode that is entered: stopping point, heading, first leg of a return.
-    pub(super) fn enter_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
+    pub(super) fn enter_mode(&mut self, mode: Px4Mode, sensors: &SensorReadings) {
         self.hold_point = sensors.position + glide::stopping_point(&sensors.velocity);
         self.glide = SmoothedApproach::new(sensors.now_us, &sensors.position, &sensors.velocity);
         self.hold_heading = sensors.heading;
         self.leg = ReturnLeg::Climb { up: f32::NAN };
         self.descent = None;
-        if mode == Mode::Takeoff {
+        if mode == Px4Mode::Takeoff {
             (self.hold_point.x, self.hold_point.y) = (sensors.position.x, sensors.position.y);
         }
     }
@@ -41,9 +41,9 @@ impl Commander {
     /// Whether the demand makes a vehicle on the ground take off. Hold, Return and Land never do.
     pub(super) fn demands_lift_off(&self, sensors: &SensorReadings, demand: &Demand) -> bool {
         match self.mode() {
-            Mode::Takeoff => true,
-            Mode::Mission => demand.position.z - sensors.position.z > MIN_CLIMB_DEMAND_M,
-            Mode::Offboard => {
+            Px4Mode::Takeoff => true,
+            Px4Mode::Mission => demand.position.z - sensors.position.z > MIN_CLIMB_DEMAND_M,
+            Px4Mode::Offboard => {
                 demand.position.z - sensors.position.z > MIN_CLIMB_DEMAND_M
                     || demand.velocity.z > MIN_CLIMB_DEMAND_MPS
                     || demand.acceleration.z > MIN_CLIMB_DEMAND_MPS
@@ -63,7 +63,7 @@ impl Commander {
             ..tuning.default_demand()
         };
         match self.mode() {
-            Mode::Offboard => match self.setpoint {
+            Px4Mode::Offboard => match self.setpoint {
                 Some(s) => Demand {
                     position: s.position,
                     velocity: s.velocity,
@@ -74,13 +74,13 @@ impl Commander {
                 },
                 None => held,
             },
-            Mode::Takeoff => {
+            Px4Mode::Takeoff => {
                 let up = self.takeoff_up;
                 let up = if up.is_nan() { sensors.home.z + tuning.takeoff_height } else { up };
                 if !self.landed && sensors.position.z > up - ARRIVED_M {
                     // The height is reached: PX4 continues in Hold at this height.
-                    self.intended_mode = Mode::Hold;
-                    self.after_disarm = Mode::Hold;
+                    self.intended_mode = Px4Mode::Hold;
+                    self.after_disarm = Px4Mode::Hold;
                     self.takeoff_up = f32::NAN;
                     self.hold_point.z = up;
                     self.glide =
@@ -89,14 +89,14 @@ impl Commander {
                 let position = Point::new(self.hold_point.x, self.hold_point.y, up);
                 Demand { position, climb_max: tuning.takeoff_speed.min(held.climb_max), ..held }
             }
-            Mode::Mission => self.mission_demand(sensors, tuning, held),
-            Mode::Land => {
+            Px4Mode::Mission => self.mission_demand(sensors, tuning, held),
+            Px4Mode::Land => {
                 let across = self.approach_demand(sensors, tuning, &held);
                 let down = self.landing_demand(sensors, tuning, held);
                 with_vertical(across, &down)
             }
-            Mode::Hold => self.approach_demand(sensors, tuning, &held),
-            Mode::Return => self.return_demand(sensors, tuning, held),
+            Px4Mode::Hold => self.approach_demand(sensors, tuning, &held),
+            Px4Mode::Return => self.return_demand(sensors, tuning, held),
             _ => held,
         }
     }

@@ -23,10 +23,10 @@ pub mod firmware;
 use planner_core::Point;
 
 use self::glide::SmoothedApproach;
-pub use self::modes::Mode;
+pub use self::modes::Px4Mode;
 use self::params::Tuning;
-use self::setpoint::Setpoint;
-use super::command::{Arming, Outcome};
+use self::setpoint::OffboardSetpoint;
+use super::command::{Arming, CommandOutcome};
 use super::itinerary::MissionLeg;
 use super::platform::{ControlDemand, IntegralAction, Platform, SensorReadings};
 use super::shaping::JerkLimitedRate;
@@ -86,14 +86,14 @@ pub struct Commander {
     armed: bool,
     landed: bool,
     flown_since_arming: bool,
-    intended_mode: Mode,
-    after_disarm: Mode,
-    failsafe: Option<Mode>,
+    intended_mode: Px4Mode,
+    after_disarm: Px4Mode,
+    failsafe: Option<Px4Mode>,
     phase: FlightPhase,
     armed_us: u64,
     landed_us: u64,
     touching_us: Option<u64>,
-    setpoint: Option<Setpoint>,
+    setpoint: Option<OffboardSetpoint>,
     setpoint_us: u64,
     hold_point: Point,
     /// Smoothed path to `hold_point`.
@@ -121,8 +121,8 @@ impl Commander {
             armed: false,
             landed: true,
             flown_since_arming: false,
-            intended_mode: Mode::Hold,
-            after_disarm: Mode::Hold,
+            intended_mode: Px4Mode::Hold,
+            after_disarm: Px4Mode::Hold,
             failsafe: None,
             phase: FlightPhase::Ground,
             armed_us: 0,
@@ -153,12 +153,12 @@ impl Commander {
     }
 
     /// The mode that is flown: a failsafe's, else the requested one.
-    pub fn mode(&self) -> Mode {
+    pub fn mode(&self) -> Px4Mode {
         self.failsafe.unwrap_or(self.intended_mode)
     }
 
     /// The mode that was last requested, even while a failsafe flies another.
-    pub fn intended_mode(&self) -> Mode {
+    pub fn intended_mode(&self) -> Px4Mode {
         self.intended_mode
     }
 
@@ -171,11 +171,11 @@ impl Commander {
     pub fn landed_state(&self) -> u8 {
         match self.mode() {
             _ if self.landed => 1,
-            Mode::Takeoff => 3,
-            Mode::Mission if matches!(self.mission.leg, Some(MissionLeg::TakeOff { .. })) => 3,
-            Mode::Mission if matches!(self.mission.leg, Some(MissionLeg::Land { .. })) => 4,
-            Mode::Land => 4,
-            Mode::Return if self.leg == ReturnLeg::Land => 4,
+            Px4Mode::Takeoff => 3,
+            Px4Mode::Mission if matches!(self.mission.leg, Some(MissionLeg::TakeOff { .. })) => 3,
+            Px4Mode::Mission if matches!(self.mission.leg, Some(MissionLeg::Land { .. })) => 4,
+            Px4Mode::Land => 4,
+            Px4Mode::Return if self.leg == ReturnLeg::Land => 4,
             _ => 2,
         }
     }
@@ -188,7 +188,7 @@ impl Commander {
             (true, None) => 4,
             // Disarmed in a mode that cannot run, PX4 reports 0 (UNINIT), not STANDBY.
             (false, _)
-                if mode == Mode::Offboard && !self.is_setpoint_stream_fresh(now_us, tuning) =>
+                if mode == Px4Mode::Offboard && !self.is_setpoint_stream_fresh(now_us, tuning) =>
             {
                 0
             }
@@ -217,7 +217,7 @@ impl Commander {
     }
 
     /// Stores a valid setpoint and its time.
-    pub fn handle_setpoint(&mut self, setpoint: Setpoint, now_us: u64) {
+    pub fn handle_setpoint(&mut self, setpoint: OffboardSetpoint, now_us: u64) {
         self.setpoint = Some(setpoint);
         self.setpoint_us = now_us;
     }
@@ -229,37 +229,42 @@ impl Commander {
     }
 
     /// Arms if the mode can run and the checks pass, or if forced.
-    pub fn arm(&mut self, sensors: &SensorReadings, tuning: &Tuning, arming: Arming) -> Outcome {
+    pub fn arm(
+        &mut self,
+        sensors: &SensorReadings,
+        tuning: &Tuning,
+        arming: Arming,
+    ) -> CommandOutcome {
         if self.armed {
-            return Outcome::Done;
+            return CommandOutcome::Done;
         }
         if arming == Arming::Checked && !self.is_armable(sensors, tuning) {
-            return Outcome::Refused;
+            return CommandOutcome::Refused;
         }
         self.armed = true;
         self.armed_us = sensors.now_us;
         self.flown_since_arming = !self.landed;
         self.enter_mode(self.intended_mode, sensors);
-        Outcome::Done
+        CommandOutcome::Done
     }
 
     /// Whether the vehicle may be armed: the requested mode can run, there is a position, and the
     /// battery is not low.
     pub fn is_armable(&self, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let runs = match self.intended_mode {
-            Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
-            Mode::Hold | Mode::Takeoff => true,
-            Mode::Mission => self.mission.ready,
-            Mode::Land | Mode::Return => false,
-            Mode::Manual | Mode::Altitude | Mode::Position => false,
+            Px4Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
+            Px4Mode::Hold | Px4Mode::Takeoff => true,
+            Px4Mode::Mission => self.mission.ready,
+            Px4Mode::Land | Px4Mode::Return => false,
+            Px4Mode::Manual | Px4Mode::Altitude | Px4Mode::Position => false,
         };
         runs && self.position_ok && sensors.battery >= tuning.battery_low
     }
 
     /// Disarms. Refused in the air, unless forced.
-    pub fn disarm(&mut self, arming: Arming) -> Outcome {
+    pub fn disarm(&mut self, arming: Arming) -> CommandOutcome {
         if self.armed && !self.landed && arming == Arming::Checked {
-            return Outcome::Refused;
+            return CommandOutcome::Refused;
         }
         self.armed = false;
         self.failsafe = None;
@@ -268,36 +273,36 @@ impl Commander {
         if self.intended_mode.ends_with_flight() {
             self.intended_mode = self.after_disarm;
         }
-        Outcome::Done
+        CommandOutcome::Done
     }
 
     /// Enters the mode. While armed, a mode that cannot run is refused. The second COMMAND_ACK of
     /// DO_SET_MODE carries the result.
     pub fn request_mode(
         &mut self,
-        mode: Mode,
+        mode: Px4Mode,
         sensors: &SensorReadings,
         tuning: &Tuning,
-    ) -> Outcome {
+    ) -> CommandOutcome {
         let runs = match mode {
-            Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
-            Mode::Mission => self.mission.ready,
+            Px4Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
+            Px4Mode::Mission => self.mission.ready,
             mode => !mode.needs_sticks(),
         };
         if self.armed && !runs {
-            return Outcome::Refused;
+            return CommandOutcome::Refused;
         }
         self.force_mode(mode, sensors);
-        Outcome::Done
+        CommandOutcome::Done
     }
 
     /// Enters the mode as a pilot's switch does, even if it cannot run.
-    pub fn force_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
+    pub fn force_mode(&mut self, mode: Px4Mode, sensors: &SensorReadings) {
         self.intended_mode = mode;
         if !mode.ends_with_flight() {
             self.after_disarm = mode;
         }
-        if mode != Mode::Takeoff {
+        if mode != Px4Mode::Takeoff {
             self.takeoff_up = f32::NAN;
         }
         self.failsafe = None;
@@ -306,8 +311,13 @@ impl Commander {
 
     /// Enters Takeoff to height `up` in the mission frame, metres; NaN: `MIS_TAKEOFF_ALT` above
     /// home.
-    pub fn takeoff(&mut self, up: f32, sensors: &SensorReadings, tuning: &Tuning) -> Outcome {
-        let accepted = self.request_mode(Mode::Takeoff, sensors, tuning);
+    pub fn takeoff(
+        &mut self,
+        up: f32,
+        sensors: &SensorReadings,
+        tuning: &Tuning,
+    ) -> CommandOutcome {
+        let accepted = self.request_mode(Px4Mode::Takeoff, sensors, tuning);
         if accepted.is_done() {
             self.takeoff_up = if up.is_nan() { sensors.home.z + tuning.takeoff_height } else { up };
         }
@@ -322,9 +332,11 @@ impl Commander {
         heading: f32,
         sensors: &SensorReadings,
         tuning: &Tuning,
-    ) -> Outcome {
-        if !self.armed || self.request_mode(Mode::Hold, sensors, tuning) == Outcome::Refused {
-            return Outcome::Refused;
+    ) -> CommandOutcome {
+        if !self.armed
+            || self.request_mode(Px4Mode::Hold, sensors, tuning) == CommandOutcome::Refused
+        {
+            return CommandOutcome::Refused;
         }
         for axis in 0..3 {
             if to[axis].is_finite() {
@@ -334,7 +346,7 @@ impl Commander {
         if heading.is_finite() {
             self.hold_heading = heading;
         }
-        Outcome::Done
+        CommandOutcome::Done
     }
 
     /// Sets the cruise speed of the automatic modes (DO_CHANGE_SPEED), m/s; 0 or less: the
@@ -406,28 +418,28 @@ impl Commander {
     }
 
     fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
-        let stream_lost = self.intended_mode == Mode::Offboard
+        let stream_lost = self.intended_mode == Px4Mode::Offboard
             && !self.is_setpoint_stream_fresh(sensors.now_us, tuning);
         let battery_out =
             sensors.battery < tuning.battery_critical && !self.intended_mode.ends_with_flight();
         let action = if !self.position_ok {
-            (self.intended_mode != Mode::Land).then_some(Mode::Land)
+            (self.intended_mode != Px4Mode::Land).then_some(Px4Mode::Land)
         } else if stream_lost {
             match tuning.offboard_loss_action {
-                4 => Some(Mode::Land),
-                5 => Some(Mode::Hold),
+                4 => Some(Px4Mode::Land),
+                5 => Some(Px4Mode::Hold),
                 6 | 7 => {
                     self.disarm(Arming::Forced);
                     return;
                 }
                 // Position, Altitude and Manual (0 to 2) need a remote control, which is absent:
                 // Return, as for 3.
-                _ => Some(Mode::Return),
+                _ => Some(Px4Mode::Return),
             }
         } else if battery_out && tuning.low_battery_action == 2 {
-            Some(Mode::Land)
+            Some(Px4Mode::Land)
         } else if battery_out && tuning.low_battery_action == 3 {
-            Some(Mode::Return)
+            Some(Px4Mode::Return)
         } else {
             None
         };
@@ -458,7 +470,7 @@ impl Commander {
 
     fn detect_landing(&mut self, sensors: &SensorReadings, demand: &Demand, tuning: &Tuning) {
         // Outside Offboard the crawl is simulated slower than PX4 commands it (`CRAWL_FACTOR`).
-        let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_FACTOR };
+        let share = if self.mode() == Px4Mode::Offboard { 1.0 } else { CRAWL_FACTOR };
         let wants_down = -demand.velocity.z >= share * MIN_LAND_RATE_MPS;
         if !sensors.touching || !wants_down {
             self.touching_us = None;

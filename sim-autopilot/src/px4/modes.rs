@@ -2,7 +2,7 @@
 
 /// PX4's flight modes that the simulation supports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
+pub enum Px4Mode {
     /// Manual: without stick input the simulated vehicle holds its position.
     Manual,
     /// Altitude: without stick input the simulated vehicle holds its position.
@@ -23,19 +23,19 @@ pub enum Mode {
     Offboard,
 }
 
-const MODES: [(Mode, u8, u8); 9] = [
-    (Mode::Manual, 1, 0),
-    (Mode::Altitude, 2, 0),
-    (Mode::Position, 3, 0),
-    (Mode::Mission, 4, 4),
-    (Mode::Hold, 4, 3),
-    (Mode::Return, 4, 5),
-    (Mode::Takeoff, 4, 2),
-    (Mode::Land, 4, 6),
-    (Mode::Offboard, 6, 0),
+const MODES: [(Px4Mode, u8, u8); 9] = [
+    (Px4Mode::Manual, 1, 0),
+    (Px4Mode::Altitude, 2, 0),
+    (Px4Mode::Position, 3, 0),
+    (Px4Mode::Mission, 4, 4),
+    (Px4Mode::Hold, 4, 3),
+    (Px4Mode::Return, 4, 5),
+    (Px4Mode::Takeoff, 4, 2),
+    (Px4Mode::Land, 4, 6),
+    (Px4Mode::Offboard, 6, 0),
 ];
 
-impl Mode {
+impl Px4Mode {
     /// `custom_mode` of HEARTBEAT: main mode << 16 | sub mode << 24.
     pub fn custom_mode(self) -> u32 {
         MODES
@@ -72,8 +72,8 @@ impl Mode {
     }
 }
 
-impl From<Mode> for u32 {
-    fn from(mode: Mode) -> Self {
+impl From<Px4Mode> for u32 {
+    fn from(mode: Px4Mode) -> Self {
         mode.custom_mode()
     }
 }

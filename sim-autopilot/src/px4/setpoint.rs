@@ -25,7 +25,7 @@ const MASK_NOTHING: u16 = 0x1ff;
 
 /// A setpoint in the mission frame; NaN: no demand on that axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setpoint {
+pub struct OffboardSetpoint {
     /// Position, ENU metres.
     pub position: Point,
     /// Velocity, ENU m/s.
@@ -49,7 +49,10 @@ pub struct FrameContext<'a> {
 }
 
 /// Reads the payload of SET_POSITION_TARGET_LOCAL_NED; `None` if PX4 would ignore it.
-pub fn read_local_ned(fields: &PayloadReader<'_>, context: &FrameContext<'_>) -> Option<Setpoint> {
+pub fn read_local_ned(
+    fields: &PayloadReader<'_>,
+    context: &FrameContext<'_>,
+) -> Option<OffboardSetpoint> {
     let frame = fields.u8(52);
     if frame != FRAME_LOCAL_NED && frame != FRAME_BODY_NED {
         return None;
@@ -70,7 +73,10 @@ pub fn read_local_ned(fields: &PayloadReader<'_>, context: &FrameContext<'_>) ->
 }
 
 /// Reads the payload of SET_POSITION_TARGET_GLOBAL_INT; `None` if PX4 would ignore it.
-pub fn read_global_int(fields: &PayloadReader<'_>, context: &FrameContext<'_>) -> Option<Setpoint> {
+pub fn read_global_int(
+    fields: &PayloadReader<'_>,
+    context: &FrameContext<'_>,
+) -> Option<OffboardSetpoint> {
     let base = match fields.u8(52) {
         FRAME_GLOBAL | FRAME_GLOBAL_INT => 0.0,
         FRAME_GLOBAL_RELATIVE_ALT | FRAME_GLOBAL_RELATIVE_ALT_INT => context.home_alt_m,
@@ -137,7 +143,7 @@ fn setpoint_from_fields(
     velocity: Vector3<f64>,
     acceleration: Vector3<f64>,
     context: &FrameContext<'_>,
-) -> Option<Setpoint> {
+) -> Option<OffboardSetpoint> {
     if mask & MASK_NOTHING == MASK_NOTHING || mask & MASK_FORCE != 0 {
         return None;
     }
@@ -152,7 +158,7 @@ fn setpoint_from_fields(
         let value = fields.f32(at);
         if mask & bit == 0 && value.is_finite() { value } else { f32::NAN }
     };
-    Some(Setpoint {
+    Some(OffboardSetpoint {
         position: position.cast::<f32>(),
         velocity: velocity.cast::<f32>(),
         acceleration: acceleration.cast::<f32>(),

@@ -3,7 +3,7 @@
 
 mod protocol;
 
-use super::super::ardupilot::Mode as Copter;
+use super::super::ardupilot::CopterMode as Copter;
 use super::*;
 
 const GUIDED: f32 = 4.0;
@@ -13,8 +13,12 @@ const LAND: f32 = 9.0;
 const BRAKE: f32 = 17.0;
 const READY_S: f32 = 8.0;
 
-fn config() -> Config {
-    Config { autopilot: AutopilotKind::Ardupilot, estimator_ready_s: READY_S, ..Config::default() }
+fn config() -> AutopilotConfig {
+    AutopilotConfig {
+        autopilot: SimulatedKind::Ardupilot,
+        estimator_ready_s: READY_S,
+        ..AutopilotConfig::default()
+    }
 }
 
 impl Bench {
@@ -203,7 +207,8 @@ fn frames_1_8_and_9_move_it_and_12_stops_it() {
         assert_eq!(bench.texts().len(), texts, "without a word");
     }
     // In the body frames forward is where the nose points, and positions are offsets.
-    let mut bench = Bench::with(&Config { heading_rad: core::f32::consts::FRAC_PI_2, ..config() });
+    let mut bench =
+        Bench::with(&AutopilotConfig { heading_rad: core::f32::consts::FRAC_PI_2, ..config() });
     bench.run(f64::from(READY_S));
     bench.mode(GUIDED);
     bench.arm();

@@ -8,27 +8,27 @@ const DISTANCE: u16 = 206;
 
 /// Id of the message that announces a picture, offsets of latitude, longitude and index in its
 /// payload, and the first index.
-fn layout(personality: AutopilotKind) -> (u32, [usize; 3], u32) {
+fn layout(personality: SimulatedKind) -> (u32, [usize; 3], u32) {
     match personality {
-        AutopilotKind::Px4 => (263, [12, 16, 44], 0),
-        AutopilotKind::Ardupilot => (180, [8, 12, 40], 1),
+        SimulatedKind::Px4 => (263, [12, 16, 44], 0),
+        SimulatedKind::Ardupilot => (180, [8, 12, 40], 1),
     }
 }
 
 /// A bench whose vehicle hovers at 10 m, ready for setpoints.
-fn hovering(personality: AutopilotKind) -> Bench {
+fn hovering(personality: SimulatedKind) -> Bench {
     match personality {
-        AutopilotKind::Px4 => Bench::hovering(10.0),
-        AutopilotKind::Ardupilot => Bench::in_guided(10.0),
+        SimulatedKind::Px4 => Bench::hovering(10.0),
+        SimulatedKind::Ardupilot => Bench::in_guided(10.0),
     }
 }
 
 /// Index and place (mission frame, metres east and north) of each announced picture.
-fn said(bench: &Bench, personality: AutopilotKind) -> Vec<(u32, [f64; 2])> {
+fn said(bench: &Bench, personality: SimulatedKind) -> Vec<(u32, [f64; 2])> {
     let (id, [lat, lon, index], _) = layout(personality);
     let long =
         |b: &[u8; 255], at: usize| i32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]);
-    let world = Config::default().world_origin;
+    let world = AutopilotConfig::default().world_origin;
     bench
         .of(id)
         .map(|(_, frame)| {
@@ -57,7 +57,7 @@ fn fly_north(bench: &mut Bench, metres: f32, seconds: f64) -> Vec<Photo> {
 
 #[test]
 fn by_distance_it_photographs_where_it_says_and_at_that_distance() {
-    for personality in [AutopilotKind::Px4, AutopilotKind::Ardupilot] {
+    for personality in [SimulatedKind::Px4, SimulatedKind::Ardupilot] {
         let mut bench = hovering(personality);
         let (id, _, first) = layout(personality);
         assert_eq!(bench.of(id).count(), 0);
@@ -92,7 +92,7 @@ fn by_distance_it_photographs_where_it_says_and_at_that_distance() {
 
 #[test]
 fn without_a_picture_at_once_px4_begins_with_one_and_ardupilot_does_not() {
-    for (personality, count) in [(AutopilotKind::Px4, 3), (AutopilotKind::Ardupilot, 2)] {
+    for (personality, count) in [(SimulatedKind::Px4, 3), (SimulatedKind::Ardupilot, 2)] {
         let mut bench = hovering(personality);
         bench.command(DISTANCE, [5.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
         assert_eq!(fly_north(&mut bench, 13.0, 12.0).len(), count, "{personality:?}");
@@ -110,7 +110,7 @@ fn without_a_picture_at_once_px4_begins_with_one_and_ardupilot_does_not() {
 
 #[test]
 fn at_once_it_photographs_at_once_and_knows_how_it_was_turned() {
-    for personality in [AutopilotKind::Px4, AutopilotKind::Ardupilot] {
+    for personality in [SimulatedKind::Px4, SimulatedKind::Ardupilot] {
         let mut bench = hovering(personality);
         bench.stream(20.0, setpoint(0x9F8, 1, [0.0, 0.0, -10.0], [0.0; 3], 1.0));
         bench.run(5.0);
@@ -137,7 +137,7 @@ fn at_once_it_photographs_at_once_and_knows_how_it_was_turned() {
 
 #[test]
 fn numbers_that_are_none_photograph_nothing() {
-    for personality in [AutopilotKind::Px4, AutopilotKind::Ardupilot] {
+    for personality in [SimulatedKind::Px4, SimulatedKind::Ardupilot] {
         let mut bench = hovering(personality);
         for value in [f32::NAN, f32::NEG_INFINITY, -1.0] {
             bench.command(DISTANCE, [value, value, f32::NAN, 0.0, value, 0.0, 0.0]);
@@ -149,7 +149,7 @@ fn numbers_that_are_none_photograph_nothing() {
 
 #[test]
 fn a_reboot_forgets_the_distance_and_keeps_what_was_photographed() {
-    let mut bench = hovering(AutopilotKind::Px4);
+    let mut bench = hovering(SimulatedKind::Px4);
     bench.command(DISTANCE, [5.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
     bench.run(0.1);
     bench.autopilot.reboot();
@@ -160,7 +160,7 @@ fn a_reboot_forgets_the_distance_and_keeps_what_was_photographed() {
 
 #[test]
 fn it_turns_to_a_commanded_yaw_the_short_way_at_a_bounded_rate() {
-    for personality in [AutopilotKind::Px4, AutopilotKind::Ardupilot] {
+    for personality in [SimulatedKind::Px4, SimulatedKind::Ardupilot] {
         let mut bench = hovering(personality);
         let most = bench.autopilot.firmware.gains().heading_rate_max;
         for yaw in [3.0_f32, -3.0, 0.5, -0.5] {

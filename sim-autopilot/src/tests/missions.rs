@@ -29,7 +29,7 @@ impl Bench {
     fn upload(&mut self, plan: Plan<'_>) {
         let personality = self.autopilot.platform.config.autopilot;
         let home = (16, 0, [0.0; 4], [0.0; 2], 488.0);
-        let home: Plan<'_> = if personality == AutopilotKind::Ardupilot { &[home] } else { &[] };
+        let home: Plan<'_> = if personality == SimulatedKind::Ardupilot { &[home] } else { &[] };
         let items: Vec<_> = home.iter().chain(plan).collect();
         let [low, high] = (items.len() as u16).to_le_bytes();
         self.send(44, &[low, high, 1, 1, 0]);
@@ -38,7 +38,7 @@ impl Bench {
             for (at, param) in params.iter().enumerate() {
                 payload[4 * at..4 * at + 4].copy_from_slice(&param.to_le_bytes());
             }
-            let world = Config::default().world_origin;
+            let world = AutopilotConfig::default().world_origin;
             let geodetic = frames::enu_to_geodetic(&world, &Point::new(place[0], place[1], 0.0));
             let scaled =
                 [geodetic.lat_deg, geodetic.lon_deg].map(|degrees| (degrees * 1e7).round() as i32);
@@ -56,10 +56,10 @@ impl Bench {
     }
 
     /// A bench with an uploaded mission; armed if MISSION_START does not arm (ArduCopter).
-    fn with_mission(personality: AutopilotKind, plan: Plan<'_>) -> Self {
+    fn with_mission(personality: SimulatedKind, plan: Plan<'_>) -> Self {
         let mut bench = match personality {
-            AutopilotKind::Px4 => Self::new(),
-            AutopilotKind::Ardupilot => Self::armed(),
+            SimulatedKind::Px4 => Self::new(),
+            SimulatedKind::Ardupilot => Self::armed(),
         };
         bench.upload(plan);
         bench
@@ -76,7 +76,7 @@ impl Bench {
     }
 }
 
-const BOTH: [AutopilotKind; 2] = [AutopilotKind::Px4, AutopilotKind::Ardupilot];
+const BOTH: [SimulatedKind; 2] = [SimulatedKind::Px4, SimulatedKind::Ardupilot];
 
 #[test]
 fn a_survey_is_flown_photographed_and_ends_at_home() {
@@ -84,7 +84,7 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
         let mut bench = Bench::with_mission(personality, SURVEY);
         assert_eq!(bench.start(), [0], "{personality:?}");
         let mode = bench.autopilot.custom_mode();
-        assert_eq!(mode, if personality == AutopilotKind::Px4 { 0x0404_0000 } else { 3 });
+        assert_eq!(mode, if personality == SimulatedKind::Px4 { 0x0404_0000 } else { 3 });
         bench.until(10.0, |a| !a.true_state().landed);
         bench.until(120.0, |a| !a.true_state().armed);
         let at = bench.autopilot.true_state().position;
@@ -108,18 +108,18 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
             (last.position - Point::new(43.0, 30.0, 10.3)).norm() < 2.2,
             "{personality:?} {last:?}"
         );
-        if personality == AutopilotKind::Px4 {
+        if personality == SimulatedKind::Px4 {
             assert!(
                 photos.iter().all(|p| (p.heading_rad - 1.57).abs() < 0.22),
                 "PX4 looks as asked: {photos:?}"
             );
         }
-        let home = u16::from(personality == AutopilotKind::Ardupilot);
+        let home = u16::from(personality == SimulatedKind::Ardupilot);
         let all: Vec<u16> = (0..SURVEY.len() as u16).map(|k| k + home).collect();
         assert_eq!(bench.reached(), all, "{personality:?}");
         // The next flight begins with the first item.
         bench.autopilot.take_photos();
-        if personality == AutopilotKind::Ardupilot {
+        if personality == SimulatedKind::Ardupilot {
             assert_eq!((bench.mode(4.0), bench.arm()), (vec![0], vec![0]));
         }
         assert_eq!(bench.start(), [0]);
@@ -167,7 +167,7 @@ fn a_mission_that_is_left_goes_on_with_the_item_it_was_at() {
         bench.until(90.0, |a| a.true_state().position.x > 15.0);
         let before = bench.reached();
         bench.autopilot.take_over_by_pilot();
-        if personality == AutopilotKind::Px4 {
+        if personality == SimulatedKind::Px4 {
             bench.set_mode(4.0, 3.0);
         }
         bench.run(10.0);

@@ -46,14 +46,14 @@ fn sequence_numbers_have_no_gap() {
 
 #[test]
 fn ned_is_about_its_own_ekf_origin() {
-    let world = Config::default().world_origin;
+    let world = AutopilotConfig::default().world_origin;
     let ekf = frames::enu_to_geodetic(&world, &Point::new(1200.0, -700.0, 12.0));
-    let mut bench = Bench::with(&Config { ekf_origin: ekf, ..Config::default() });
+    let mut bench = Bench::with(&AutopilotConfig { ekf_origin: ekf, ..AutopilotConfig::default() });
     bench.run(0.5);
     let b = *bench.of(32).last().unwrap().1.padded_payload();
     let said = |at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
     let truth = frames::enu_to_geodetic(&world, &bench.autopilot.true_state().position);
-    let expected = frames::geodetic_to_ned(AutopilotKind::Px4.projection(), &ekf, &truth);
+    let expected = frames::geodetic_to_ned(SimulatedKind::Px4.projection(), &ekf, &truth);
     for (k, at) in [4, 8, 12].into_iter().enumerate() {
         assert!(
             (said(at) - expected[k]).abs() < 0.01,
@@ -161,7 +161,8 @@ fn ping_and_timesync_are_answered() {
 
 #[test]
 fn every_port_has_its_own_streams() {
-    let mut autopilot = Autopilot::new(&Config { ports: 2, ..Config::default() }).unwrap();
+    let mut autopilot =
+        Autopilot::new(&AutopilotConfig { ports: 2, ..AutopilotConfig::default() }).unwrap();
     let header = Header { system: 1, component: 191, sequence: 0 };
     let mut payload = [0; 33];
     payload[..4].copy_from_slice(&30.0_f32.to_le_bytes());
@@ -202,12 +203,12 @@ fn hostile_bytes_neither_panic_nor_move_it() {
     bench.autopilot.handle_bytes(&noise);
     bench.run(1.0);
     assert!(!bench.autopilot.true_state().armed);
-    assert_eq!(bench.autopilot.true_state().position, Config::default().start);
+    assert_eq!(bench.autopilot.true_state().position, AutopilotConfig::default().start);
 }
 
 #[test]
 fn a_port_nobody_drains_does_not_grow() {
-    let mut autopilot = Autopilot::new(&Config::default()).unwrap();
+    let mut autopilot = Autopilot::new(&AutopilotConfig::default()).unwrap();
     for _ in 0..25_000 {
         autopilot.step(DT, 0.0);
     }
@@ -221,9 +222,18 @@ fn a_port_nobody_drains_does_not_grow() {
 
 #[test]
 fn what_cannot_be_simulated_is_refused_by_name() {
-    let refuse = |config: Config| Autopilot::new(&config).err().unwrap().to_string();
-    assert!(refuse(Config { system_id: 0, ..Config::default() }).contains("system id"));
+    let refuse = |config: AutopilotConfig| Autopilot::new(&config).err().unwrap().to_string();
+    assert!(
+        refuse(AutopilotConfig { system_id: 0, ..AutopilotConfig::default() })
+            .contains("system id")
+    );
     let nowhere = Geodetic { lat_deg: 91.0, lon_deg: 0.0, alt_m: 0.0 };
-    assert!(refuse(Config { ekf_origin: nowhere, ..Config::default() }).contains("EKF origin"));
-    assert!(refuse(Config { gust_mps: f32::NAN, ..Config::default() }).contains("gust"));
+    assert!(
+        refuse(AutopilotConfig { ekf_origin: nowhere, ..AutopilotConfig::default() })
+            .contains("EKF origin")
+    );
+    assert!(
+        refuse(AutopilotConfig { gust_mps: f32::NAN, ..AutopilotConfig::default() })
+            .contains("gust")
+    );
 }

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
-use sim_autopilot::AutopilotKind;
+use sim_autopilot::SimulatedKind;
 
 use super::recording::{Message, Recording, Sample, Setpoint};
 
@@ -53,7 +53,7 @@ impl Events {
                 Geodetic { lat_deg: numbers[0], lon_deg: numbers[1], alt_m: numbers[2] };
         }
         if text.contains("Stabilize") {
-            recording.autopilot = AutopilotKind::Ardupilot;
+            recording.autopilot = SimulatedKind::Ardupilot;
         }
         if let Some(message) = message(text) {
             self.asked.push((t_s, message));
@@ -101,7 +101,7 @@ pub(super) fn read(path: &Path, run: &str, vehicle: u8) -> Recording {
     let mut recording = Recording {
         run: run.into(),
         vehicle,
-        autopilot: AutopilotKind::Px4,
+        autopilot: SimulatedKind::Px4,
         origin: Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 },
         estimate: Vec::new(),
         truth: Vec::new(),

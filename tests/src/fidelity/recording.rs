@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
-use sim_autopilot::AutopilotKind;
+use sim_autopilot::SimulatedKind;
 
 /// Position and velocity of a vehicle at one time, estimated or true.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ pub struct Recording {
     /// MAVLink system id.
     pub vehicle: u8,
     /// Which autopilot flew the vehicle.
-    pub autopilot: AutopilotKind,
+    pub autopilot: SimulatedKind,
     /// EKF origin of the autopilot.
     pub origin: Geodetic,
     /// Positions and velocities that the autopilot estimated.

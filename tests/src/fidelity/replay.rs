@@ -7,7 +7,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 use nalgebra::Vector3;
 use planner_core::Point;
-use sim_autopilot::{Autopilot, AutopilotKind, Config};
+use sim_autopilot::{Autopilot, AutopilotConfig, SimulatedKind};
 
 use super::recording::{Message, Recording, Sample, Setpoint};
 use super::{Correction, Estimator};
@@ -37,16 +37,16 @@ impl Recording {
         before().map(|s| s.position).sum::<Vector3<f64>>() / before().count().max(1) as f64
     }
 
-    fn config(&self) -> Config {
+    fn config(&self) -> AutopilotConfig {
         let ned = self.start();
-        Config {
+        AutopilotConfig {
             autopilot: self.autopilot,
             world_origin: self.origin,
             ekf_origin: self.origin,
             start: Point::new(ned.y as f32, ned.x as f32, -ned.z as f32),
             estimator_ready_s: 1.0,
             distance_sensor: true,
-            ..Config::default()
+            ..AutopilotConfig::default()
         }
     }
 
@@ -100,7 +100,7 @@ impl Recording {
         let mut autopilot = Autopilot::new(&config).expect("a recorded place is one");
         autopilot.land_on_stream_loss();
         let ground_m = config.start.z - config.vehicle.radius_m;
-        let clock = if self.autopilot == AutopilotKind::Px4 { PX4_CLOCK } else { 1.0 };
+        let clock = if self.autopilot == SimulatedKind::Px4 { PX4_CLOCK } else { 1.0 };
         let (mut setpoints, mut messages) =
             (self.setpoints.iter().peekable(), self.messages.iter().peekable());
         let (mut sequence, mut buffer) = (0_u8, [0; 512]);

@@ -3,7 +3,7 @@
 //! The distances of all boxes of a node are computed at once, with vector instructions where the
 //! machine has them: branches that depend on distances are mispredicted often, and cost more than
 //! the arithmetic. The results are bit-identical with any instruction set. Functions that use
-//! [`SimdLanes`] must be inlined into [`Search::with_simd`]; closures would not be, so there are
+//! [`SimdLanes`] must be inlined into [`BoxSearch::with_simd`]; closures would not be, so there are
 //! none.
 
 use pulp::{Simd, WithSimd};
@@ -55,15 +55,15 @@ struct OpenNode {
 /// A search for the squared distance, cells², to the nearest obstacle; the result is at most
 /// `bound`. It stops at the first distance found that is at most `enough`. It is a type, not a
 /// closure, so that all of it is compiled for the vector instructions in use.
-pub(super) struct Search<'a> {
+pub(super) struct BoxSearch<'a> {
     /// All nodes of the tree; the root is the first.
     pub(super) nodes: &'a [Node],
-    pub(super) segment: &'a Segment,
+    pub(super) segment: &'a CellSegment,
     pub(super) bound: f32,
     pub(super) enough: f32,
 }
 
-impl WithSimd for Search<'_> {
+impl WithSimd for BoxSearch<'_> {
     type Output = f32;
 
     #[inline(always)]
@@ -105,7 +105,7 @@ fn least_of<S: Simd>(simd: S, numbers: &[f32; BOXES_PER_NODE]) -> f32 {
 }
 
 /// A segment, in cells.
-pub(super) struct Segment {
+pub(super) struct CellSegment {
     a: [f32; 3],
     d: [f32; 3],
     low: [f32; 3],
@@ -116,7 +116,7 @@ pub(super) struct Segment {
     inv_square: f32,
 }
 
-impl Segment {
+impl CellSegment {
     pub(super) fn new(a: [f32; 3], b: [f32; 3]) -> Self {
         let d = [0, 1, 2].map(|axis| b[axis] - a[axis]);
         let square = d[0] * d[0] + d[1] * d[1] + d[2] * d[2];

@@ -13,20 +13,22 @@ use planner_core::frames::{Geodetic, geodetic_to_enu};
 use self::errors::{area_hint, describe_area_error, faulty_ring, file_hint, overlap_error};
 use self::spacing::{read_camera, read_spacing};
 use super::checks::{VehicleSpans, check_margins};
-use super::obstacles::{Flown, MapBesideArea};
+use super::obstacles::{FlightSettings, MapBesideArea};
 use super::terrain::UnreadTerrain;
 use super::{
-    Common, DEFAULT_ORIGIN, empty_table, fence_and_ground_stations, read_common, read_faults,
-    read_geodetic, read_unsupported, read_vehicles, unsupported_error,
+    Common, DEFAULT_ORIGIN, VEHICLES_HINT, empty_table, fence_and_ground_stations, read_common,
+    read_faults, read_geodetic, read_unsupported, read_vehicles, unsupported_error,
 };
 use crate::area::{self, AreaFormat, MAX_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
 use crate::margins;
 use crate::quote::quoted_path;
-use crate::scenario::coverage::{Area, HeadingRule, Method, ORIGIN_HINT, Trigger};
+use crate::scenario::coverage::{AreaSection, CoverageMethod, HeadingRule, ORIGIN_HINT, Trigger};
 use crate::scenario::error::ScenarioError;
-use crate::scenario::reader::{Result, Span, Table, Text, Value};
-use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
+use crate::scenario::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
+use crate::scenario::{
+    AssignmentObjective, MapSection, MissionMode, MissionSection, Scenario, VehicleSection,
+};
 use crate::terrain::WithoutCrs;
 
 /// Time limit of a simulated flight in a coverage mission if the scenario gives none, seconds:
@@ -46,14 +48,14 @@ enum Coordinates {
 }
 
 /// The map of a mission without one: level ground.
-fn level_ground(origin: Geodetic) -> Map {
+fn level_ground(origin: Geodetic) -> MapSection {
     let file = String::new();
-    Map { file, resolution_m: LEVEL_GROUND_CELL_M, unknown: Unknown::Free, origin }
+    MapSection { file, resolution_m: LEVEL_GROUND_CELL_M, unknown: Unknown::Free, origin }
 }
 
 /// Reads the scenario of a coverage mission.
 pub(in crate::scenario) fn read_coverage_scenario(
-    text: Text<'_>,
+    text: TomlText<'_>,
     root: &Table<'_>,
     folder: &Path,
 ) -> Result<Scenario> {
@@ -63,10 +65,9 @@ pub(in crate::scenario) fn read_coverage_scenario(
     let map = MapBesideArea::from_root(root, folder)?;
     let origin = map.as_ref().and_then(MapBesideArea::origin);
     let (mut area, terrain) = read_area(&root.required("area", hint)?.table()?, folder, origin)?;
-    let hint = "add a `[[vehicles]]` with `id` and `start` for each";
     let mut unsupported = Vec::new();
-    let mut vehicles =
-        read_vehicles(&root.required("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
+    let vehicles = root.required("vehicles", VEHICLES_HINT)?;
+    let mut vehicles = read_vehicles(&vehicles, Some(&area.origin), &mut unsupported)?;
     // These keys are unsupported in missions with goals, but not here.
     unsupported.retain(|error| !COVERAGE_VEHICLE_KEYS.iter().any(|key| error.why.ends_with(key)));
     let formation = read_unsupported(root, "formation", &mut unsupported)?;
@@ -81,7 +82,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
         terrain.apply_terrain(text, &mut area, &mut vehicles, &mission, &simulation)?;
     }
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
-    let (vehicles, spans): (Vec<Vehicle>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
+    let (vehicles, spans): (Vec<VehicleSection>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
     let apart_m =
         margins::min_pad_distance_m(&simulation, deconfliction.safety_distance_m, &vehicles);
     check_pads(text, &vehicles, &spans, apart_m)?;
@@ -99,7 +100,8 @@ pub(in crate::scenario) fn read_coverage_scenario(
     if let Some(map) = &map {
         let (vehicles, spans) = (&vehicles[..], &spans[..]);
         let (simulation, deconfliction, roadmap) = (&simulation, &deconfliction, &roadmap);
-        map.apply(text, &mut area, &Flown { vehicles, spans, simulation, deconfliction, roadmap })?;
+        let settings = FlightSettings { vehicles, spans, simulation, deconfliction, roadmap };
+        map.apply(text, &mut area, &settings)?;
     }
     Ok(Scenario {
         path: text.file.to_owned(),
@@ -120,7 +122,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
 }
 
 /// An error for each given key about goals or their assignment: a coverage mission has no goals.
-fn goal_keys_beside_area(text: Text<'_>, mission: &Table<'_>) -> Vec<ScenarioError> {
+fn goal_keys_beside_area(text: TomlText<'_>, mission: &Table<'_>) -> Vec<ScenarioError> {
     let unsupported = |key: &'static str| {
         let value = mission.get(key)?;
         Some(unsupported_error(text, &value.span, &format!("mission.{key} beside [area]")))
@@ -135,14 +137,14 @@ const COVERAGE_VEHICLE_KEYS: [&str; 4] = ["endurance_s", "weight", "climb_mps", 
 
 /// Refuses pads less than `apart_m` apart horizontally: no vehicle may climb through another one.
 fn check_pads(
-    text: Text<'_>,
-    vehicles: &[Vehicle],
+    text: TomlText<'_>,
+    vehicles: &[VehicleSection],
     spans: &[VehicleSpans],
     apart_m: f32,
 ) -> Result<()> {
     for (index, (vehicle, spans)) in vehicles.iter().zip(spans).enumerate() {
-        let apart = |other: &Vehicle| (vehicle.start - other.start).xy().norm();
-        let near = |other: &&Vehicle| apart(other) < apart_m;
+        let apart = |other: &VehicleSection| (vehicle.start - other.start).xy().norm();
+        let near = |other: &&VehicleSection| apart(other) < apart_m;
         if let Some(other) = vehicles[..index].iter().find(near) {
             let why = format!(
                 "vehicles {} and {} start {:.2} m apart: to land beside each other they need {apart_m:.2} m",
@@ -158,8 +160,8 @@ fn check_pads(
 
 /// Refuses a vehicle that starts at or above the height at which pictures are taken.
 fn check_heights(
-    text: Text<'_>,
-    vehicles: &[Vehicle],
+    text: TomlText<'_>,
+    vehicles: &[VehicleSection],
     spans: &[VehicleSpans],
     height_m: f32,
 ) -> Result<()> {
@@ -177,14 +179,14 @@ fn check_heights(
 /// Reads `[mission]` of a coverage mission, which has no goals.
 fn read_coverage_mission(
     table: &Table<'_>,
-    vehicles: &[(Vehicle, VehicleSpans)],
-) -> Result<Mission> {
-    table.one_of("mode", Mode::Coverage, &[("coverage", Mode::Coverage)])?;
+    vehicles: &[(VehicleSection, VehicleSpans)],
+) -> Result<MissionSection> {
+    table.one_of("mode", MissionMode::Coverage, &[("coverage", MissionMode::Coverage)])?;
     table.declare_keys(&GOAL_KEYS);
     let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
-    let mission = Mission {
-        mode: Mode::Coverage,
-        objective: Objective::Makespan,
+    let mission = MissionSection {
+        mode: MissionMode::Coverage,
+        objective: AssignmentObjective::Makespan,
         cruise_mps: table.f32("cruise_mps", 2.0, 0.01..=100.0)?,
         goals: Vec::new(),
         goal_places: Vec::new(),
@@ -201,7 +203,7 @@ fn read_area(
     table: &Table<'_>,
     folder: &Path,
     origin: Option<Geodetic>,
-) -> Result<(Area, Option<UnreadTerrain>)> {
+) -> Result<(AreaSection, Option<UnreadTerrain>)> {
     let (polygons, coordinates, source) = read_polygons(table, folder)?;
     let given = table.get("origin").map(|v| read_geodetic(&v)).transpose()?.or(origin);
     let first = polygons.outers[0][0];
@@ -222,8 +224,8 @@ fn read_area(
     let camera = table.get("camera").map(|v| read_camera(&v)).transpose()?;
     let (height_m, spacing) = read_spacing(table, camera.as_ref())?;
     let layer_m = table.f32("layer_m", 5.0, 0.1..=1000.0)?;
-    let method = table.get("method").map(|v| v.one_of(&Method::NAMES)).transpose()?;
-    let area = Area {
+    let method = table.get("method").map(|v| v.one_of(&CoverageMethod::NAMES)).transpose()?;
+    let area = AreaSection {
         place: table.text.line(&source),
         vertices,
         rings,
@@ -239,7 +241,7 @@ fn read_area(
         angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
         margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
         batteries: table.boolean("batteries")?,
-        method: method.unwrap_or(Method::PowellBinpat),
+        method: method.unwrap_or(CoverageMethod::PowellBinpat),
         heading: table.one_of(
             "heading",
             HeadingRule::Sweep,
@@ -260,7 +262,7 @@ fn read_area(
 }
 
 /// Reads the area's polygons, whether they are in degrees or metres, and where they stand.
-fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, Span)> {
+fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, TomlSpan)> {
     let (file, polygon) = (table.get("file"), table.get("polygon"));
     let words = [
         ("wgs84", Coordinates::Wgs84),
@@ -321,9 +323,9 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
 
 /// Reads one ring: `[[x, y], …]` counts as metres unless `coordinates` says otherwise,
 /// `[{ lat_deg, lon_deg }, …]` is degrees.
-fn read_ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
+fn read_ring(value: &TomlValue<'_>) -> Result<(RingXy, Coordinates)> {
     let items = value.items()?;
-    let degrees = items.first().is_some_and(Value::is_table);
+    let degrees = items.first().is_some_and(TomlValue::is_table);
     let mut ring = RingXy::with_capacity(items.len());
     for item in &items {
         ring.push(match degrees {
@@ -356,7 +358,7 @@ fn read_ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
 /// Converts the rings to the mission frame, and refuses rings that form no area.
 fn rings_in_mission_frame(
     table: &Table<'_>,
-    source: &Span,
+    source: &TomlSpan,
     polygons: &Polygons,
     coordinates: Coordinates,
     origin: &Geodetic,
@@ -418,7 +420,7 @@ fn rings_in_mission_frame(
 
 /// Key and place of a hole or no-fly zone that the scenario's own keys give; `None` for other
 /// rings.
-fn ring_span(table: &Table<'_>, rings: &[Ring], ring: usize) -> Option<(&'static str, Span)> {
+fn ring_span(table: &Table<'_>, rings: &[Ring], ring: usize) -> Option<(&'static str, TomlSpan)> {
     let kind = rings[ring].kind;
     let key = match kind {
         RingKind::Outer => return None,

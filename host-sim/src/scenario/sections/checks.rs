@@ -3,25 +3,28 @@
 use planner_core::Point;
 
 use crate::margins;
-use crate::scenario::reader::{Result, Span, Table, Text};
-use crate::scenario::{Deconfliction, Mission, Mode, PositionErrors, Roadmap, Simulation, Vehicle};
+use crate::scenario::reader::{Result, Table, TomlSpan, TomlText};
+use crate::scenario::{
+    Deconfliction, MissionMode, MissionSection, PositionErrors, RoadmapSection, Simulation,
+    VehicleSection,
+};
 
 /// Where the keys of a vehicle stand in the scenario, for errors.
 pub(super) struct VehicleSpans {
-    pub(super) start: Span,
-    pub(super) goal: Option<Span>,
-    pub(super) table: Span,
+    pub(super) start: TomlSpan,
+    pub(super) goal: Option<TomlSpan>,
+    pub(super) table: TomlSpan,
 }
 
 /// With `estimator = "recorded"`, refuses a separation, and a safety margin if there is a roadmap,
 /// that leave no room for the estimates' errors.
 pub(super) fn check_margins(
-    text: Text<'_>,
-    span: &Span,
-    roadmap: Option<&Roadmap>,
+    text: TomlText<'_>,
+    span: &TomlSpan,
+    roadmap: Option<&RoadmapSection>,
     deconfliction: &Deconfliction,
     simulation: &Simulation,
-    vehicles: &[Vehicle],
+    vehicles: &[VehicleSection],
 ) -> Result<()> {
     if simulation.estimator != PositionErrors::Recorded {
         return Ok(());
@@ -49,8 +52,8 @@ pub(super) fn check_margins(
 }
 
 pub(super) fn check_apart(
-    text: Text<'_>,
-    vehicles: &[(Vehicle, VehicleSpans)],
+    text: TomlText<'_>,
+    vehicles: &[(VehicleSection, VehicleSpans)],
     safety_distance_m: f32,
 ) -> Result<()> {
     for (index, (vehicle, spans)) in vehicles.iter().enumerate() {
@@ -72,10 +75,10 @@ pub(super) fn check_apart(
 /// near.
 pub(super) fn check_goals_apart(
     table: &Table<'_>,
-    mission: &Mission,
+    mission: &MissionSection,
     safety_distance_m: f32,
     simulation: &Simulation,
-    vehicles: &[Vehicle],
+    vehicles: &[VehicleSection],
 ) -> Result<()> {
     let goals = &mission.goals;
     for (i, goal) in goals.iter().enumerate() {
@@ -99,8 +102,8 @@ pub(super) fn check_goals_apart(
 /// Refuses a vehicle's start, or a goal, outside the geofence.
 pub(super) fn check_inside(
     table: &Table<'_>,
-    vehicles: &[(Vehicle, VehicleSpans)],
-    mission: &Mission,
+    vehicles: &[(VehicleSection, VehicleSpans)],
+    mission: &MissionSection,
 ) -> Result<()> {
     let Some(fence) = &mission.geofence else { return Ok(()) };
     let outside = |place: &Point| !fence.contains(place);
@@ -118,7 +121,7 @@ pub(super) fn check_inside(
 }
 
 /// Where a goal stands in the scenario, for errors.
-fn goal_span(table: &Table<'_>, index: usize) -> Span {
+fn goal_span(table: &Table<'_>, index: usize) -> TomlSpan {
     let Some(goals) = table.get("goals") else {
         return table.get("goals_file").map_or(table.span.clone(), |v| v.span);
     };
@@ -127,11 +130,11 @@ fn goal_span(table: &Table<'_>, index: usize) -> Span {
 }
 
 pub(super) fn check_goals(
-    text: Text<'_>,
-    vehicles: &[(Vehicle, VehicleSpans)],
-    mission: &Mission,
+    text: TomlText<'_>,
+    vehicles: &[(VehicleSection, VehicleSpans)],
+    mission: &MissionSection,
 ) -> Result<()> {
-    if mission.mode != Mode::Labelled {
+    if mission.mode != MissionMode::Labelled {
         return Ok(());
     }
     for (index, (vehicle, spans)) in vehicles.iter().enumerate() {

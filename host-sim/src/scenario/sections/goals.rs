@@ -10,21 +10,21 @@ use super::checks::{
     VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins,
 };
 use super::{
-    Common, DEFAULT_TIME_LIMIT_S, check_list_len, empty_table, fence_and_ground_stations,
-    read_common, read_faults, read_map, read_place, read_roadmap, read_unsupported, read_vehicles,
-    unsupported_error,
+    Common, DEFAULT_TIME_LIMIT_S, VEHICLES_HINT, check_list_len, empty_table,
+    fence_and_ground_stations, read_common, read_faults, read_map, read_place, read_roadmap,
+    read_unsupported, read_vehicles, unsupported_error,
 };
 use crate::capacity::VEHICLES;
 use crate::files;
 use crate::margins;
 use crate::quote::{quoted, quoted_path};
 use crate::scenario::error::ScenarioError;
-use crate::scenario::reader::{Result, Span, Table, Text, Value};
-use crate::scenario::{Mission, Mode, Objective, Scenario, Vehicle};
+use crate::scenario::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
+use crate::scenario::{AssignmentObjective, MissionMode, MissionSection, Scenario, VehicleSection};
 
 /// Reads the scenario of a mission with goals.
 pub(in crate::scenario) fn goals_mission(
-    text: Text<'_>,
+    text: TomlText<'_>,
     root: &Table<'_>,
     folder: &Path,
 ) -> Result<Scenario> {
@@ -38,12 +38,9 @@ pub(in crate::scenario) fn goals_mission(
     let roadmap = read_roadmap(&roadmap.unwrap_or_else(|| empty_table(text, "roadmap")))?;
     let origin = has_origin.then_some(map.origin);
     let mission_value = root.get("mission");
-    let vehicles = read_vehicles(
-        &root.required("vehicles", "add a `[[vehicles]]` with `id` and `start` for each")?,
-        origin.as_ref(),
-        &mut unsupported,
-    )?;
-    let mission_table = mission_value.as_ref().map(Value::table).transpose()?;
+    let vehicles = root.required("vehicles", VEHICLES_HINT)?;
+    let vehicles = read_vehicles(&vehicles, origin.as_ref(), &mut unsupported)?;
+    let mission_table = mission_value.as_ref().map(TomlValue::table).transpose()?;
     let mission_table = mission_table.unwrap_or_else(|| empty_table(text, "mission"));
     let (mission, mode_span) = read_mission(&mission_table, folder, origin.as_ref(), &vehicles)?;
     let faults = read_faults(root, &vehicles)?;
@@ -58,7 +55,7 @@ pub(in crate::scenario) fn goals_mission(
     check_goals(text, &vehicles, &mission)?;
     check_inside(&mission_table, &vehicles, &mission)?;
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
-    let vehicles: Vec<Vehicle> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
+    let vehicles: Vec<VehicleSection> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
     check_goals_apart(
         &mission_table,
         &mission,
@@ -89,18 +86,20 @@ pub(in crate::scenario) fn goals_mission(
 
 /// Refuses coverage mode, whose scenario needs `[area]`; notes formation mode as unsupported.
 fn check_mode(
-    text: Text<'_>,
+    text: TomlText<'_>,
     root: &Table<'_>,
-    mode: Mode,
-    span: &Span,
+    mode: MissionMode,
+    span: &TomlSpan,
     unsupported: &mut Vec<ScenarioError>,
 ) -> Result<()> {
     match mode {
-        Mode::Coverage if root.get("area").is_none() => {
+        MissionMode::Coverage if root.get("area").is_none() => {
             let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`, and leave out [map]";
             return Err(text.with_hint(span, "mission.mode \"coverage\" needs an [area]", hint));
         }
-        Mode::Formation => unsupported.push(unsupported_error(text, span, "this mission.mode")),
+        MissionMode::Formation => {
+            unsupported.push(unsupported_error(text, span, "this mission.mode"));
+        }
         _ => {}
     }
     Ok(())
@@ -111,26 +110,26 @@ fn read_mission(
     table: &Table<'_>,
     folder: &Path,
     origin: Option<&Geodetic>,
-    vehicles: &[(Vehicle, VehicleSpans)],
-) -> Result<(Mission, Option<Span>)> {
+    vehicles: &[(VehicleSection, VehicleSpans)],
+) -> Result<(MissionSection, Option<TomlSpan>)> {
     let mode_span = table.get("mode").map(|v| v.span);
     let mode = table.one_of(
         "mode",
-        Mode::Unlabelled,
+        MissionMode::Unlabelled,
         &[
-            ("unlabelled", Mode::Unlabelled),
-            ("labelled", Mode::Labelled),
-            ("single-goal", Mode::SingleGoal),
-            ("coverage", Mode::Coverage),
-            ("formation", Mode::Formation),
-            ("unlabeled", Mode::Unlabelled),
-            ("labeled", Mode::Labelled),
+            ("unlabelled", MissionMode::Unlabelled),
+            ("labelled", MissionMode::Labelled),
+            ("single-goal", MissionMode::SingleGoal),
+            ("coverage", MissionMode::Coverage),
+            ("formation", MissionMode::Formation),
+            ("unlabeled", MissionMode::Unlabelled),
+            ("labeled", MissionMode::Labelled),
         ],
     )?;
     let objective = table.one_of(
         "objective",
-        Objective::Total,
-        &[("total", Objective::Total), ("makespan", Objective::Makespan)],
+        AssignmentObjective::Total,
+        &[("total", AssignmentObjective::Total), ("makespan", AssignmentObjective::Makespan)],
     )?;
     let cruise_mps = table.f32("cruise_mps", 2.0, 0.01..=100.0)?;
     let (given, file) = (table.get("goals"), table.get("goals_file"));
@@ -150,26 +149,33 @@ fn read_mission(
         (None, None) => Vec::new(),
     };
     let (goals, goal_places): (Vec<Point>, Vec<String>) = goals.into_iter().unzip();
-    let takes_goals = !matches!(mode, Mode::Coverage | Mode::Formation);
+    let takes_goals = !matches!(mode, MissionMode::Coverage | MissionMode::Formation);
     if takes_goals && goals.is_empty() {
         let span = given.or(file).map_or(table.span.clone(), |v| v.span);
         let hint = "add `goals = [[east, north, up], …]` in metres, or `goals_file = \"FILE\"`, to [mission]";
         return Err(table.text.with_hint(&span, "mission.goals is missing or empty", hint));
     }
-    if mode == Mode::SingleGoal && goals.len() != 1 {
+    if mode == MissionMode::SingleGoal && goals.len() != 1 {
         let span = given.or(file).map_or(table.span.clone(), |v| v.span);
         let why = format!("mission.mode \"single-goal\" takes one goal, not {}", goals.len());
         return Err(table.text.error(&span, why));
     }
     let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
     table.refuse_unknown_keys()?;
-    let mission =
-        Mission { mode, objective, cruise_mps, goals, goal_places, geofence, ground_stations };
+    let mission = MissionSection {
+        mode,
+        objective,
+        cruise_mps,
+        goals,
+        goal_places,
+        geofence,
+        ground_stations,
+    };
     Ok((mission, mode_span))
 }
 
 /// Reads goals, one `x y z` a line, each with its `FILE:LINE`; skips empty lines and `#` lines.
-fn read_goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> {
+fn read_goals_file(value: &TomlValue<'_>, folder: &Path) -> Result<Vec<(Point, String)>> {
     let path = folder.join(value.str()?);
     let text = files::read_text(&path).map_err(|error| {
         value.error(&format!("cannot be read: {}: {error}", quoted_path(&path)))

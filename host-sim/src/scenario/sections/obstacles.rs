@@ -10,27 +10,27 @@ use planner_core::frames::Geodetic;
 use super::checks::VehicleSpans;
 use super::{DEFAULT_ORIGIN, read_map};
 use crate::coverage::MAX_CORNERS;
-use crate::coverage::obstacles::{Obstacles, TooManyCorners};
+use crate::coverage::obstacles::{MapObstacles, TooManyCorners};
 use crate::map::{self, Unknown};
 use crate::margins;
-use crate::scenario::coverage::Area;
-use crate::scenario::reader::{Result, Span, Table, Text};
-use crate::scenario::{Deconfliction, Map, Roadmap, Simulation, Vehicle};
+use crate::scenario::coverage::AreaSection;
+use crate::scenario::reader::{Result, Table, TomlSpan, TomlText};
+use crate::scenario::{Deconfliction, MapSection, RoadmapSection, Simulation, VehicleSection};
 
 /// The map that stands beside an area, not yet read.
 pub(super) struct MapBesideArea {
-    map: Map,
-    span: Span,
+    map: MapSection,
+    span: TomlSpan,
     has_origin: bool,
 }
 
 /// Settings of the scenario on which the distance between paths and obstacles depends.
-pub(super) struct Flown<'a> {
-    pub(super) vehicles: &'a [Vehicle],
+pub(super) struct FlightSettings<'a> {
+    pub(super) vehicles: &'a [VehicleSection],
     pub(super) spans: &'a [VehicleSpans],
     pub(super) simulation: &'a Simulation,
     pub(super) deconfliction: &'a Deconfliction,
-    pub(super) roadmap: &'a Roadmap,
+    pub(super) roadmap: &'a RoadmapSection,
 }
 
 impl MapBesideArea {
@@ -53,7 +53,7 @@ impl MapBesideArea {
     }
 
     /// Refuses a map whose origin is not the mission's, or is missing while the area has one.
-    fn check_origin(&self, text: Text<'_>, origin: &Geodetic) -> Result<()> {
+    fn check_origin(&self, text: TomlText<'_>, origin: &Geodetic) -> Result<()> {
         let same = self.map.origin == *origin;
         let why = match (self.has_origin, same) {
             (true, true) => return Ok(()),
@@ -72,7 +72,12 @@ impl MapBesideArea {
     }
 
     /// Reads the map, and adds its obstacles to the area as no-fly zones.
-    pub(super) fn apply(&self, text: Text<'_>, area: &mut Area, flown: &Flown<'_>) -> Result<()> {
+    pub(super) fn apply(
+        &self,
+        text: TomlText<'_>,
+        area: &mut AreaSection,
+        flown: &FlightSettings<'_>,
+    ) -> Result<()> {
         self.check_origin(text, &area.origin)?;
         if area.terrain.is_some() {
             let hint = "leave out [map], or area.terrain where the ground is level";
@@ -81,7 +86,7 @@ impl MapBesideArea {
         let map = map::load(&self.map.file, self.map.resolution_m)
             .map_err(|error| text.error(&self.span, format!("map.file: {error}")))?;
         let clearance_m = flown.clearance_m();
-        let obstacles = Obstacles::new(&map, self.map.unknown, clearance_m);
+        let obstacles = MapObstacles::new(&map, self.map.unknown, clearance_m);
         drop(map);
         flown.check_climbs(text, &obstacles)?;
         let below_m = flown.clearance_below_m().max(clearance_m);
@@ -111,7 +116,7 @@ impl MapBesideArea {
     }
 }
 
-impl Flown<'_> {
+impl FlightSettings<'_> {
     /// Horizontal distance between paths and obstacles, metres: the largest radius, plus how far
     /// companions let a vehicle deviate from its path over a field, at least the margin to walls.
     fn clearance_m(&self) -> f32 {
@@ -123,7 +128,7 @@ impl Flown<'_> {
 
     /// Height that a path keeps above obstacles below it, metres.
     fn clearance_below_m(&self) -> f32 {
-        let lower_m = |vehicle: &Vehicle| {
+        let lower_m = |vehicle: &VehicleSection| {
             margins::max_height_error_m(self.simulation.estimator, vehicle.personality)
         };
         let lower_m = self.vehicles.iter().map(lower_m).fold(0.0, f32::max);
@@ -135,7 +140,7 @@ impl Flown<'_> {
     }
 
     /// Refuses a pad beside or below an obstacle.
-    fn check_climbs(&self, text: Text<'_>, obstacles: &Obstacles) -> Result<()> {
+    fn check_climbs(&self, text: TomlText<'_>, obstacles: &MapObstacles) -> Result<()> {
         for (vehicle, spans) in self.vehicles.iter().zip(self.spans) {
             let mut hull = vehicle.start;
             hull.z += vehicle.radius_m;

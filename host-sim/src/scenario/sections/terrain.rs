@@ -10,11 +10,13 @@ use planner_core::frames::Geodetic;
 use super::checks::VehicleSpans;
 use crate::margins;
 use crate::quote::quoted_path;
-use crate::scenario::coverage::{Area, Terrain};
+use crate::scenario::coverage::{AreaSection, Terrain};
 use crate::scenario::error::ScenarioError;
-use crate::scenario::reader::{Result, Span, Table, Text};
-use crate::scenario::{Mission, Simulation, Vehicle};
-use crate::terrain::{self, FieldConfig, FieldError, Frame, HeightGrid, TerrainError, WithoutCrs};
+use crate::scenario::reader::{Result, Table, TomlSpan, TomlText};
+use crate::scenario::{MissionSection, Simulation, VehicleSection};
+use crate::terrain::{
+    self, FieldConfig, FieldError, HeightGrid, TerrainError, TerrainFrame, WithoutCrs,
+};
 
 /// Greatest difference between a start's given height and the ground below it, metres.
 const MAX_PAD_HEIGHT_ERROR_M: f32 = 5.0;
@@ -24,7 +26,7 @@ const AROUND_LANES_M: f32 = 5.0;
 /// The file of heights that `[area]` names, not yet read.
 pub(super) struct UnreadTerrain {
     path: PathBuf,
-    span: Span,
+    span: TomlSpan,
     tolerance_m: f32,
     without_crs: WithoutCrs,
 }
@@ -52,12 +54,12 @@ impl UnreadTerrain {
         }))
     }
 
-    fn read(&self, text: Text<'_>, origin: &Geodetic, window: [Flat; 2]) -> Result<HeightGrid> {
-        let frame = Frame { origin, without_crs: self.without_crs, window: Some(window) };
+    fn read(&self, text: TomlText<'_>, origin: &Geodetic, window: [Flat; 2]) -> Result<HeightGrid> {
+        let frame = TerrainFrame { origin, without_crs: self.without_crs, window: Some(window) };
         terrain::read(&self.path, &frame).map_err(|error| self.terrain_error(text, &error))
     }
 
-    fn terrain_error(&self, text: Text<'_>, error: &TerrainError) -> ScenarioError {
+    fn terrain_error(&self, text: TomlText<'_>, error: &TerrainError) -> ScenarioError {
         let path = quoted_path(&self.path);
         match error {
             TerrainError::System { what, hint } => text.with_hint(
@@ -87,7 +89,7 @@ impl UnreadTerrain {
     }
 
     /// Height of the ground at the origin, metres above sea level.
-    pub(super) fn altitude_m(&self, text: Text<'_>, origin: &Geodetic) -> Result<f64> {
+    pub(super) fn altitude_m(&self, text: TomlText<'_>, origin: &Geodetic) -> Result<f64> {
         let grid = self.read(text, origin, [Flat::repeat(-1.0), Flat::repeat(1.0)])?;
         let height_m = grid.height_at(&Flat::zeros());
         let hint = "another area.origin, or a file that holds it";
@@ -104,10 +106,10 @@ impl UnreadTerrain {
     /// the ground.
     pub(super) fn apply_terrain(
         &self,
-        text: Text<'_>,
-        area: &mut Area,
-        vehicles: &mut [(Vehicle, VehicleSpans)],
-        mission: &Mission,
+        text: TomlText<'_>,
+        area: &mut AreaSection,
+        vehicles: &mut [(VehicleSection, VehicleSpans)],
+        mission: &MissionSection,
         simulation: &Simulation,
     ) -> Result<()> {
         let pads: Vec<Flat> = vehicles.iter().map(|(vehicle, _)| vehicle.start.xy()).collect();
@@ -118,7 +120,8 @@ impl UnreadTerrain {
         // Lanes may begin outside the border, by the margin and half a footprint.
         let beyond =
             Flat::repeat(area.margin_m + area.spacing.footprint.across_m / 2.0 + AROUND_LANES_M);
-        let own: Vec<Vehicle> = vehicles.iter().map(|(vehicle, _)| vehicle.clone()).collect();
+        let own: Vec<VehicleSection> =
+            vehicles.iter().map(|(vehicle, _)| vehicle.clone()).collect();
         let slope = own.iter().map(|vehicle| {
             let [climb_mps, descend_mps] = vehicle.climb_and_descent_mps();
             climb_mps.min(descend_mps) / mission.cruise_mps.min(vehicle.speed_max_mps)

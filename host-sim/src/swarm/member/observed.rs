@@ -3,8 +3,8 @@
 use companion::State;
 
 use super::SimulatedVehicle;
-use crate::swarm::board::Board;
-use crate::swarm::referee::{Observation, Phase};
+use crate::swarm::board::RemoteCompanion;
+use crate::swarm::referee::{Observation, RefereePhase};
 
 impl SimulatedVehicle {
     /// The vehicle's true position and phase, for the referee.
@@ -16,21 +16,21 @@ impl SimulatedVehicle {
         let phase = match (truth.touching, on_path(state) && !lands) {
             (touching, _) if self.wrecked => {
                 if touching {
-                    Phase::Wreck
+                    RefereePhase::Wreck
                 } else {
-                    Phase::Falling
+                    RefereePhase::Falling
                 }
             }
-            (true, _) if !truth.armed => Phase::Grounded,
-            (false, true) => Phase::Flying,
-            _ => Phase::TakeOffOrLanding,
+            (true, _) if !truth.armed => RefereePhase::Grounded,
+            (false, true) => RefereePhase::Flying,
+            _ => RefereePhase::TakeOffOrLanding,
         };
         // A vehicle that stands by command of operator or pilot is not deadlocked.
         let ordered = matches!(state, State::Paused | State::PilotControl | State::PilotReturned);
         let progress_m = self
             .board
             .as_ref()
-            .map_or_else(|| Some(self.companion.progress_m()), Board::progress_m);
+            .map_or_else(|| Some(self.companion.progress_m()), RemoteCompanion::progress_m);
         Observation { position: truth.position, phase, holds_by_command: ordered, progress_m }
     }
 }

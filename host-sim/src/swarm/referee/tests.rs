@@ -20,7 +20,7 @@ fn with_monitor(test: impl FnOnce(Referee<'_>)) {
     test(Referee::new(grid, &field, 1.5, &[(7, 0.5), (9, 0.5)]));
 }
 
-fn at(x: f32, y: f32, z: f32, phase: Phase) -> Observation {
+fn at(x: f32, y: f32, z: f32, phase: RefereePhase) -> Observation {
     Observation {
         position: Point::new(x, y, z),
         phase,
@@ -32,9 +32,9 @@ fn at(x: f32, y: f32, z: f32, phase: Phase) -> Observation {
 #[test]
 fn a_body_in_the_wall_is_one_contact_however_long() {
     with_monitor(|mut referee| {
-        let far = at(2.0, 8.0, 5.0, Phase::Flying);
+        let far = at(2.0, 8.0, 5.0, RefereePhase::Flying);
         for (step, x) in [7.0, 7.6, 7.7, 7.0, 7.6].into_iter().enumerate() {
-            referee.observe(step as f64 * 0.004, &[at(x, 2.0, 5.0, Phase::Flying), far]);
+            referee.observe(step as f64 * 0.004, &[at(x, 2.0, 5.0, RefereePhase::Flying), far]);
         }
         assert_eq!(referee.wall_contacts, 2);
         assert!((referee.min_clearance_m - 0.3).abs() < 1e-5, "{}", referee.min_clearance_m);
@@ -44,13 +44,13 @@ fn a_body_in_the_wall_is_one_contact_however_long() {
 #[test]
 fn the_floor_is_none_while_landing_but_a_wall_is() {
     with_monitor(|mut referee| {
-        let far = at(2.0, 8.0, 5.0, Phase::Flying);
-        referee.observe(0.0, &[at(4.0, 2.0, 1.4, Phase::TakeOffOrLanding), far]);
+        let far = at(2.0, 8.0, 5.0, RefereePhase::Flying);
+        referee.observe(0.0, &[at(4.0, 2.0, 1.4, RefereePhase::TakeOffOrLanding), far]);
         assert_eq!(referee.wall_contacts, 0);
-        referee.observe(0.1, &[at(4.0, 2.0, 1.4, Phase::Flying), far]);
+        referee.observe(0.1, &[at(4.0, 2.0, 1.4, RefereePhase::Flying), far]);
         assert_eq!(referee.wall_contacts, 1);
-        referee.observe(0.2, &[at(4.0, 2.0, 5.0, Phase::Flying), far]);
-        referee.observe(0.3, &[at(7.7, 2.0, 1.6, Phase::TakeOffOrLanding), far]);
+        referee.observe(0.2, &[at(4.0, 2.0, 5.0, RefereePhase::Flying), far]);
+        referee.observe(0.3, &[at(7.7, 2.0, 1.6, RefereePhase::TakeOffOrLanding), far]);
         assert_eq!(referee.wall_contacts, 2);
     });
 }
@@ -59,12 +59,12 @@ fn the_floor_is_none_while_landing_but_a_wall_is() {
 fn a_near_pair_is_one_violation_unless_both_stand() {
     with_monitor(|mut referee| {
         let pair = |apart: f32, phase| {
-            [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, Phase::Grounded)]
+            [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, RefereePhase::Grounded)]
         };
-        referee.observe(0.0, &pair(1.0, Phase::Grounded));
+        referee.observe(0.0, &pair(1.0, RefereePhase::Grounded));
         assert_eq!(referee.violations, 0);
-        referee.observe(0.1, &pair(1.4, Phase::Flying));
-        referee.observe(0.2, &pair(1.3, Phase::Flying));
+        referee.observe(0.1, &pair(1.4, RefereePhase::Flying));
+        referee.observe(0.2, &pair(1.3, RefereePhase::Flying));
         assert_eq!(referee.violations, 1);
         // The text names the other vehicle of the pair by its id.
         assert_eq!(
@@ -78,9 +78,9 @@ fn a_near_pair_is_one_violation_unless_both_stand() {
 #[test]
 fn a_wreck_may_be_passed_near_but_not_touched() {
     with_monitor(|mut referee| {
-        let wreck = at(2.0, 2.0, 1.5, Phase::Wreck);
+        let wreck = at(2.0, 2.0, 1.5, RefereePhase::Wreck);
         for (step, z) in [3.0, 2.6, 2.4, 2.3, 2.6].into_iter().enumerate() {
-            referee.observe(step as f64 * 0.004, &[at(2.0, 2.0, z, Phase::Flying), wreck]);
+            referee.observe(step as f64 * 0.004, &[at(2.0, 2.0, z, RefereePhase::Flying), wreck]);
         }
         assert_eq!((referee.wall_contacts, referee.violations), (1, 0));
     });
@@ -89,7 +89,8 @@ fn a_wreck_may_be_passed_near_but_not_touched() {
 #[test]
 fn hovering_on_for_twenty_seconds_is_a_deadlock() {
     with_monitor(|mut referee| {
-        let seen = [at(2.0, 2.0, 5.0, Phase::Flying), at(5.0, 5.0, 5.0, Phase::Grounded)];
+        let seen =
+            [at(2.0, 2.0, 5.0, RefereePhase::Flying), at(5.0, 5.0, 5.0, RefereePhase::Grounded)];
         for step in 0..300 {
             referee.observe(f64::from(step) * 0.1, &seen);
         }
@@ -100,8 +101,8 @@ fn hovering_on_for_twenty_seconds_is_a_deadlock() {
 #[test]
 fn one_that_tells_of_no_progress_makes_some_by_flying_on() {
     with_monitor(|mut referee| {
-        let silent = |x| Observation { progress_m: None, ..at(x, 2.0, 5.0, Phase::Flying) };
-        let rests = at(5.0, 5.0, 5.0, Phase::Grounded);
+        let silent = |x| Observation { progress_m: None, ..at(x, 2.0, 5.0, RefereePhase::Flying) };
+        let rests = at(5.0, 5.0, 5.0, RefereePhase::Grounded);
         for step in 0..300 {
             referee.observe(f64::from(step) * 0.1, &[silent(2.0 + step as f32 * 0.02), rests]);
         }
@@ -118,7 +119,8 @@ fn one_that_tells_of_no_progress_makes_some_by_flying_on() {
 fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
     with_monitor(|mut referee| {
         referee.retracts_ended_deadlocks = true;
-        let on_path = |x| [at(x, 2.0, 5.0, Phase::Flying), at(5.0, 5.0, 5.0, Phase::Grounded)];
+        let on_path =
+            |x| [at(x, 2.0, 5.0, RefereePhase::Flying), at(5.0, 5.0, 5.0, RefereePhase::Grounded)];
         for step in 0..300 {
             referee.observe(f64::from(step) * 0.1, &on_path(2.0));
         }
@@ -129,15 +131,18 @@ fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
             referee.observe(f64::from(step) * 0.1, &on_path(2.5));
         }
         assert_eq!(referee.deadlocks, 1);
-        let lands =
-            [at(2.5, 2.0, 5.0, Phase::TakeOffOrLanding), at(5.0, 5.0, 5.0, Phase::Grounded)];
+        let lands = [
+            at(2.5, 2.0, 5.0, RefereePhase::TakeOffOrLanding),
+            at(5.0, 5.0, 5.0, RefereePhase::Grounded),
+        ];
         referee.observe(60.0, &lands);
         assert_eq!(referee.deadlocks, 0);
         for step in 601..900 {
             referee.observe(f64::from(step) * 0.1, &on_path(3.5));
         }
         assert_eq!(referee.deadlocks, 1);
-        let falls = [at(3.5, 2.0, 5.0, Phase::Falling), at(5.0, 5.0, 5.0, Phase::Grounded)];
+        let falls =
+            [at(3.5, 2.0, 5.0, RefereePhase::Falling), at(5.0, 5.0, 5.0, RefereePhase::Grounded)];
         referee.observe(90.0, &falls);
         assert_eq!(referee.deadlocks, 0);
     });

@@ -76,7 +76,7 @@ fn decode_cloud(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
 fn decode_asc(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
     let text = String::from_utf8_lossy(bytes);
     asc::parse(&text, Crs::Unstated)?
-        .resampled(&Frame { without_crs: WithoutCrs::Metres, ..anywhere(&ORIGIN) })
+        .resampled(&TerrainFrame { without_crs: WithoutCrs::Metres, ..anywhere(&ORIGIN) })
 }
 
 #[test]
@@ -197,6 +197,6 @@ fn files_that_say_that_they_are_vast_are_refused() {
     let bytes = tiff([2, 2], &values, &keys(1, 32630), [500_000.0, 4_794_000.0], 1.0);
     let window = Some([Flat::repeat(-50_000.0), Flat::repeat(50_000.0)]);
     let raster = geotiff::decode(Cursor::new(bytes)).unwrap();
-    let laid = raster.resampled(&Frame { window, ..anywhere(&ORIGIN) });
+    let laid = raster.resampled(&TerrainFrame { window, ..anywhere(&ORIGIN) });
     assert!(matches!(laid, Err(TerrainError::TooManyCells(_))));
 }

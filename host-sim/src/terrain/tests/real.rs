@@ -39,7 +39,7 @@ fn bilbao_is_where_its_system_says() {
         let window = Some([Flat::repeat(-400.0), Flat::repeat(900.0)]);
         let grid = super::read(
             &path,
-            &Frame { origin: &origin, without_crs: WithoutCrs::Refused, window },
+            &TerrainFrame { origin: &origin, without_crs: WithoutCrs::Refused, window },
         )
         .unwrap();
         let highest = grid.heights_in_box(&Flat::repeat(-300.0), &Flat::repeat(800.0));
@@ -166,16 +166,18 @@ fn clouds_without_returns_or_a_system_are_refused_by_name() {
     let error = super::read(&simple, &anywhere(&ORIGIN)).unwrap_err().to_string();
     assert!(error.contains("does not say where it is"), "{error}");
     // If the mission's coordinates are metres, the file's are taken for metres too.
-    let grid =
-        super::read(&simple, &Frame { without_crs: WithoutCrs::Metres, ..anywhere(&ORIGIN) })
-            .unwrap();
+    let grid = super::read(
+        &simple,
+        &TerrainFrame { without_crs: WithoutCrs::Metres, ..anywhere(&ORIGIN) },
+    )
+    .unwrap();
     let range = grid.range_m().unwrap();
     assert!(range[0] >= 406.59 && (range[1] - 586.38).abs() < 0.01, "{range:?}");
     // The file's coordinates are far from any mission.
     let window = Some([Flat::repeat(-100.0), Flat::repeat(100.0)]);
     let error = super::read(
         &simple,
-        &Frame { without_crs: WithoutCrs::Metres, window, ..anywhere(&ORIGIN) },
+        &TerrainFrame { without_crs: WithoutCrs::Metres, window, ..anywhere(&ORIGIN) },
     )
     .unwrap_err();
     assert!(error.to_string().contains("lies elsewhere"), "{error}");

@@ -121,9 +121,9 @@ fn a_reboot_forgets_streams_and_keeps_parameters_and_missions() {
 
 #[test]
 fn ned_is_in_its_own_projection_about_its_own_origin() {
-    let world = Config::default().world_origin;
+    let world = AutopilotConfig::default().world_origin;
     let ekf = frames::enu_to_geodetic(&world, &Point::new(1200.0, -700.0, 12.0));
-    let mut bench = Bench::with(&Config { ekf_origin: ekf, ..config() });
+    let mut bench = Bench::with(&AutopilotConfig { ekf_origin: ekf, ..config() });
     bench.want(32);
     bench.run(f64::from(READY_S) + 1.0);
     let b = *bench.of(32).last().unwrap().1.padded_payload();
@@ -143,7 +143,7 @@ fn ned_is_in_its_own_projection_about_its_own_origin() {
 
 #[test]
 fn an_installer_sets_integers_of_either_firmware() {
-    for (config, name) in [(config(), "RTL_ALT"), (Config::default(), "COM_OBL_RC_ACT")] {
+    for (config, name) in [(config(), "RTL_ALT"), (AutopilotConfig::default(), "COM_OBL_RC_ACT")] {
         let mut bench = Bench::with(&config);
         bench.autopilot.set_parameter(name, 5).unwrap();
         assert_eq!(bench.autopilot.firmware.params().i32_value(name), 5);

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use flockmate_tests::{Guard, board, workspace};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::{scenario, swarm};
 
@@ -18,7 +18,7 @@ pub fn run() -> Result<()> {
     let folder = tempfile::tempdir()?;
     let demo = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let progress = Progress::on_terminal();
-    let mut mission = Mission::prepare(demo, &progress)?;
+    let mut mission = PreparedMission::prepare(demo, &progress)?;
     board::put_on_boards(&mut mission, &program, folder.path());
     let plan = mission.plan()?;
     let fly = || swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &progress);

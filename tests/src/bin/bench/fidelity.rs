@@ -9,7 +9,7 @@
 use flockmate_tests::fidelity::{
     Comparison, Correction, Difference, Estimator, RUNS, Recording, allowed_m, recordings,
 };
-use sim_autopilot::AutopilotKind;
+use sim_autopilot::SimulatedKind;
 
 use crate::row::Row;
 
@@ -77,7 +77,7 @@ fn print_others() {
         "under the errors of another flight: correlation of the errors; off the recording; moved by them"
     );
     let all: Vec<Recording> = RUNS.iter().flat_map(|run| recordings(run)).collect();
-    let px4 = || all.iter().filter(|r| r.autopilot == AutopilotKind::Px4);
+    let px4 = || all.iter().filter(|r| r.autopilot == SimulatedKind::Px4);
     for recording in px4().filter(|r| allowed_m(r).is_some()) {
         print!("{:20}", format!("{} {}", recording.run, recording.vehicle));
         let lasts = |r: &&Recording| r.armed_s.1 >= recording.armed_s.1 - 3.0;

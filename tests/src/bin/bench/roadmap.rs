@@ -23,7 +23,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use host_sim::map::{Unknown, bt, building};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::result::Timing;
 use host_sim::scenario;
@@ -168,7 +168,7 @@ fn planned() -> Result<Timing> {
             start.z
         );
     }
-    Ok(Mission::prepare(scenario::parse(&text, "bench.toml")?, &Progress::hidden())?.timing)
+    Ok(PreparedMission::prepare(scenario::parse(&text, "bench.toml")?, &Progress::hidden())?.timing)
 }
 
 /// Prints the median time of each part of `host-sim plan`'s map and roadmap.

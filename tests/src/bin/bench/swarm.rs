@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use host_sim::map::{Occupancy, OccupancyMap, bt};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 use host_sim::swarm;
@@ -66,7 +66,7 @@ fn row(name: &str, took_s: f64, simulated_s: f64, required: f64, n: usize) -> Ro
 fn fly(text: &str, name: &str) -> Result<(f64, f64)> {
     let scenario = scenario::parse(text, name).context("the scenario of a bench")?;
     let began = Instant::now();
-    let mut mission = Mission::prepare(scenario, &Progress::hidden())?;
+    let mut mission = PreparedMission::prepare(scenario, &Progress::hidden())?;
     let plan = mission.plan()?;
     mission.clearance_field();
     let planned_s = began.elapsed().as_secs_f64();

@@ -8,8 +8,8 @@
 use std::collections::VecDeque;
 use std::fmt;
 
-use host_sim::mission::{Mission, SwarmPlan};
-use host_sim::swarm::Flight;
+use host_sim::mission::{HostPlan, PreparedMission};
+use host_sim::swarm::SwarmFlight;
 use planner_core::Point;
 use planner_core::segment::segment_is_clear;
 use serde::Serialize;
@@ -85,9 +85,9 @@ pub struct Struck {
 
 /// Why vehicle `held` landed short of its goal.
 pub fn cause(
-    mission: &Mission,
-    plan: &SwarmPlan,
-    flight: &Flight,
+    mission: &PreparedMission,
+    plan: &HostPlan,
+    flight: &SwarmFlight,
     struck: Struck,
     held: usize,
 ) -> Cause {
@@ -149,7 +149,7 @@ fn first_place_since(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
 
 /// How far a silent vehicle lies beside its path, and how far along its path from where it was last
 /// heard, metres.
-pub fn rest_offsets_m(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Option<[f32; 2]> {
+pub fn rest_offsets_m(plan: &HostPlan, flight: &SwarmFlight, struck: Struck) -> Option<[f32; 2]> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
     let (_, rest) = track.last()?;
@@ -167,8 +167,8 @@ pub fn rest_offsets_m(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Opti
 /// Points on the ground below the path, as far as the vehicle may fly unheard from where it was
 /// last heard.
 fn possible_rest_places(
-    plan: &SwarmPlan,
-    flight: &Flight,
+    plan: &HostPlan,
+    flight: &SwarmFlight,
     struck: Struck,
     radius_m: f32,
 ) -> Vec<Ball> {
@@ -192,7 +192,7 @@ fn possible_rest_places(
 
 /// A search for a path from `from` to `over`, with a descent from there to `ground`.
 struct Search<'a> {
-    mission: &'a Mission,
+    mission: &'a PreparedMission,
     required_m: f32,
     from: Point,
     over: Point,

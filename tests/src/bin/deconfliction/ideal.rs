@@ -6,7 +6,7 @@
 //! are those of the mission.
 
 use host_sim::capacity::WAYPOINTS;
-use host_sim::mission::{Mission, SwarmPlan};
+use host_sim::mission::{HostPlan, PreparedMission};
 use planner_core::Point;
 use planner_core::flight::{Flight, Path};
 use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleWorkspace, earliest_departure};
@@ -30,21 +30,24 @@ pub struct Landings {
 
 /// The last landing by `plan`, by `alone`, and by the best order; `None` if a flight has no path
 /// here.
-pub fn landings(mission: &Mission, plan: &SwarmPlan, alone: &SwarmPlan) -> Option<Landings> {
+pub fn landings(mission: &PreparedMission, plan: &HostPlan, alone: &HostPlan) -> Option<Landings> {
     let last =
-        |plan: &SwarmPlan| plan.flights.iter().map(|f| landed_s(mission, f)).fold(0.0, f32::max);
+        |plan: &HostPlan| plan.flights.iter().map(|f| landed_s(mission, f)).fold(0.0, f32::max);
     let ideal_s = ideal_s(mission, plan)?;
     Some(Landings { alone_s: last(alone), planned_s: last(plan), ideal_s })
 }
 
-fn landed_s(mission: &Mission, flight: &Flight<WAYPOINTS>) -> f32 {
+fn landed_s(mission: &PreparedMission, flight: &Flight<WAYPOINTS>) -> f32 {
     let over_goal_s = flight.path.waypoints().last().map_or(0.0, |w| w.leave_s);
     flight.depart_s + over_goal_s + flight.descent_m / mission.schedule().vertical_mps
 }
 
 /// Possible flights of a vehicle: straight, or with one corner at right angles, where the map is
 /// clear.
-fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<WAYPOINTS>>> {
+fn flights(
+    mission: &PreparedMission,
+    flight: &Flight<WAYPOINTS>,
+) -> Option<Vec<Flight<WAYPOINTS>>> {
     let waypoints = flight.path.waypoints();
     let (from, to) = (waypoints.first()?.position, waypoints.last()?.position);
     let (x_first, y_first) = (Point::new(to.x, from.y, from.z), Point::new(from.x, to.y, from.z));
@@ -67,7 +70,7 @@ fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<W
     Some(all)
 }
 
-fn ideal_s(mission: &Mission, plan: &SwarmPlan) -> Option<f32> {
+fn ideal_s(mission: &PreparedMission, plan: &HostPlan) -> Option<f32> {
     let choices: Vec<_> =
         plan.flights.iter().map(|f| flights(mission, f)).collect::<Option<_>>()?;
     let mut ws = ScheduleWorkspace::default();

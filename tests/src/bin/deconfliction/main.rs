@@ -14,7 +14,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use host_sim::mission::{Mission, SwarmPlan};
+use host_sim::mission::{HostPlan, PreparedMission};
 use host_sim::progress::Progress;
 use host_sim::report::Level;
 use host_sim::result::{MissionResult, VehicleResult};
@@ -243,8 +243,10 @@ fn rows(meeting: &Meeting) -> Vec<Row> {
 fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<Row>> {
     let mut rows = rows(meeting);
     rows.iter_mut().filter(|row| row.method.contains(only)).for_each(|row| row.seeds = 1);
-    let mut mission =
-        Mission::prepare(parsed(meeting, "off", cases::GUSTS, seed, dir)?, &Progress::hidden())?;
+    let mut mission = PreparedMission::prepare(
+        parsed(meeting, "off", cases::GUSTS, seed, dir)?,
+        &Progress::hidden(),
+    )?;
     let plan = match mission.plan() {
         Ok(plan) => plan,
         Err(error) => {
@@ -300,9 +302,9 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
 /// Adds to a row why each vehicle landed short of its goal, and where a silent struck vehicle lies.
 fn explain(
     row: &mut Row,
-    mission: &Mission,
-    plan: &SwarmPlan,
-    flight: &swarm::Flight,
+    mission: &PreparedMission,
+    plan: &HostPlan,
+    flight: &swarm::SwarmFlight,
     struck: Struck,
 ) {
     if let Some([beside_m, along_m]) =
@@ -320,7 +322,7 @@ fn explain(
 }
 
 /// Id of the vehicle that faults strike, and when, in seconds as text for the scenario.
-fn strike(meeting: &Meeting, plan: &SwarmPlan, alone: &MissionResult, seed: u64) -> (u8, String) {
+fn strike(meeting: &Meeting, plan: &HostPlan, alone: &MissionResult, seed: u64) -> (u8, String) {
     let (id, share) = meeting.strikes(seed);
     let index = usize::from(id) - 1;
     let flying_s = share * (alone.vehicles[index].flight_time_s as f32);
@@ -340,7 +342,7 @@ fn parsed(
     Ok(scenario::parse(&meeting.scenario(method, simulation, seed), &name)?)
 }
 
-fn fly(mission: &Mission, plan: &SwarmPlan) -> Result<swarm::Flight> {
+fn fly(mission: &PreparedMission, plan: &HostPlan) -> Result<swarm::SwarmFlight> {
     swarm::fly(mission, plan, "fly", swarm::Pace::Fastest, &Progress::hidden())
 }
 

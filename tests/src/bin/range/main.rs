@@ -7,10 +7,10 @@
 use anyhow::{Context, Result};
 use clap::Parser;
 use flockmate_tests::edge::{Edge, Outcome};
-use host_sim::mission::Mission;
+use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
-use host_sim::swarm::{self, Flight};
+use host_sim::swarm::{self, SwarmFlight};
 use rayon::prelude::*;
 
 const DEMO: &str = include_str!("../../../../host-sim/scenarios/demo.toml");
@@ -53,12 +53,12 @@ fn main() -> Result<()> {
             continue;
         }
         let seeds = args.seed.map_or(1..=args.seeds, |seed| seed..=seed);
-        let flown: Vec<(u64, Result<Flight>)> =
+        let flown: Vec<(u64, Result<SwarmFlight>)> =
             seeds.into_par_iter().map(|seed| (seed, fly(seed, range_m))).collect();
         let flights = flown.len();
         let (mut complete, mut safety, mut left, mut unnamed) = (0, [0; 3], 0, 0);
         for (seed, flight) in flown {
-            let Flight { result, log, .. } = flight.with_context(|| format!("seed {seed}"))?;
+            let SwarmFlight { result, log, .. } = flight.with_context(|| format!("seed {seed}"))?;
             for event in log.iter().filter(|_| args.seed.is_some()) {
                 println!("  {:7.2} s, vehicle {:?}: {}", event.t_s, event.vehicle, event.text);
             }
@@ -143,11 +143,11 @@ fn strike(args: &Args) -> Result<()> {
     Ok(())
 }
 
-fn fly(seed: u64, range_m: f32) -> Result<Flight> {
+fn fly(seed: u64, range_m: f32) -> Result<SwarmFlight> {
     let text = DEMO.replacen("seed = 1", &format!("seed = {seed}"), 1);
     let mut parsed = scenario::parse(&text, "demo.toml")?;
     parsed.simulation.radio_range_m = range_m;
-    let mut mission = Mission::prepare(parsed, &Progress::hidden())?;
+    let mut mission = PreparedMission::prepare(parsed, &Progress::hidden())?;
     let plan = mission.plan()?;
     swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())
 }

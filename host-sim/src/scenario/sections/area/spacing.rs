@@ -4,9 +4,9 @@ use planner_core::coverage::CoverageError;
 use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
 
 use crate::scenario::error::ScenarioError;
-use crate::scenario::reader::{Result, Table, Value};
+use crate::scenario::reader::{Result, Table, TomlValue};
 
-pub(super) fn read_camera(value: &Value<'_>) -> Result<Camera> {
+pub(super) fn read_camera(value: &TomlValue<'_>) -> Result<Camera> {
     let table = value.table()?;
     let sensor = table.get("sensor_mm");
     let camera = match &sensor {
@@ -33,7 +33,10 @@ pub(super) fn read_camera(value: &Value<'_>) -> Result<Camera> {
     Ok(camera)
 }
 
-fn read_pair<T: Copy>(value: &Value<'_>, item: impl Fn(&Value<'_>) -> Result<T>) -> Result<[T; 2]> {
+fn read_pair<T: Copy>(
+    value: &TomlValue<'_>,
+    item: impl Fn(&TomlValue<'_>) -> Result<T>,
+) -> Result<[T; 2]> {
     let items = value.items()?;
     let [a, b] = items.as_slice() else { return Err(value.error("must be two numbers")) };
     Ok([item(a)?, item(b)?])
