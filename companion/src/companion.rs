@@ -223,18 +223,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.step();
         }
         if self.timers.take_due(Timer::Heartbeat, now, HEARTBEAT_EVERY) {
-            self.links.set_due(Link::Autopilot, OnDemandMessage::Heartbeat, true);
-            self.links.set_due(Link::Swarm, OnDemandMessage::Heartbeat, true);
-            self.links.set_due(Link::Swarm, OnDemandMessage::Relay, true);
+            self.links.set_due(Link::Autopilot, OnDemandMessage::Heartbeat);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Heartbeat);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Relay);
         }
         let every = Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
         if self.timers.take_due(Timer::Swarm, now, every) {
-            self.links.set_due(
-                Link::Swarm,
-                OnDemandMessage::Position,
-                self.telemetry.position_at.is_some(),
-            );
-            self.links.set_due(Link::Swarm, OnDemandMessage::Intent, true);
+            self.set_position_due();
+            self.links.set_due(Link::Swarm, OnDemandMessage::Intent);
         }
         // The roster message has a period of its own, no multiple of the intent's or of the step's.
         if let Some(fleet) = self.neighbours.fleet()
@@ -242,7 +238,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         {
             let every = if fleet.is_dividing() { ROSTER_EVERY_DIVIDING } else { ROSTER_EVERY };
             self.timers.schedule_next(Timer::Roster, now, every);
-            self.links.set_due(Link::Swarm, OnDemandMessage::Roster, true);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Roster);
         }
     }
 

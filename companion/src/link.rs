@@ -10,6 +10,7 @@ pub mod intent;
 pub mod outbox;
 pub mod rate_limit;
 pub mod roster;
+pub mod severity;
 
 use self::answer_limits::{AnswerKind, AnswerTokenBuckets, SenderKind};
 use self::commands::{Command, CommandHistory};
@@ -17,6 +18,7 @@ use self::echo::{IntentEcho, SentIntents};
 use self::frame::{Counters, Frame, Framer, Header};
 use self::outbox::{Outbox, Outgoing};
 use self::rate_limit::RadioTokenBucket;
+use self::severity::Severity;
 use crate::events::Link;
 use crate::time::Instant;
 
@@ -83,18 +85,20 @@ impl Links {
         self.outboxes[link as usize].dropped()
     }
 
-    /// Sets or clears the due flag of a message: a message that is due is made at the next poll of
-    /// the link.
-    pub(crate) fn set_due(&mut self, link: Link, what: OnDemandMessage, due: bool) {
-        let bit = 1 << what as u8;
-        let bits = &mut self.due[link as usize];
-        *bits = if due { *bits | bit } else { *bits & !bit };
+    /// Sets the due flag of a message: it is made at the next poll of the link.
+    pub(crate) fn set_due(&mut self, link: Link, what: OnDemandMessage) {
+        self.due[link as usize] |= 1 << what as u8;
+    }
+
+    /// Clears the due flag of a message.
+    pub(crate) fn clear_due(&mut self, link: Link, what: OnDemandMessage) {
+        self.due[link as usize] &= !(1 << what as u8);
     }
 
     /// Clears the due flag of a message. Returns whether it was set.
     pub(crate) fn take_due(&mut self, link: Link, what: OnDemandMessage) -> bool {
         let due = self.due[link as usize] & 1 << what as u8 != 0;
-        self.set_due(link, what, false);
+        self.clear_due(link, what);
         due
     }
 
@@ -104,21 +108,21 @@ impl Links {
     }
 
     /// Queues a STATUSTEXT, at most 50 bytes, on both links.
-    pub(crate) fn send_text(&mut self, warning: bool, text: &'static str) {
-        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
+    pub(crate) fn send_text(&mut self, severity: Severity, text: &'static str) {
+        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { severity, text }));
     }
 
     /// Queues a STATUSTEXT on both links; each `#` in the text is replaced by one of the numbers.
     pub(crate) fn send_text_with_numbers(
         &mut self,
-        warning: bool,
+        severity: Severity,
         text: &'static str,
         numbers: [u32; 2],
     ) {
         let numbers = [numbers[0], numbers[1], 0];
         self.outboxes
             .iter_mut()
-            .for_each(|outbox| outbox.push(Outgoing::TextWithNumbers { warning, text, numbers }));
+            .for_each(|outbox| outbox.push(Outgoing::TextWithNumbers { severity, text, numbers }));
     }
 
     /// Whether an answer may be queued now: its rate limit and the link's queue have room. If so,
@@ -160,7 +164,7 @@ impl Links {
         &mut self,
         now: Instant,
         sender: SenderKind,
-        warning: bool,
+        severity: Severity,
         text: &'static str,
         numbers: [u32; 3],
     ) {
@@ -170,7 +174,7 @@ impl Links {
                 link,
                 sender,
                 AnswerKind::Text,
-                Outgoing::TextWithNumbers { warning, text, numbers },
+                Outgoing::TextWithNumbers { severity, text, numbers },
             );
         }
     }
@@ -184,7 +188,8 @@ impl Links {
         text: &'static str,
         from: (u8, u8),
     ) {
-        self.send_sender_text(now, sender, false, text, [u32::from(from.0), u32::from(from.1), 0]);
+        let numbers = [u32::from(from.0), u32::from(from.1), 0];
+        self.send_sender_text(now, sender, Severity::Info, text, numbers);
     }
 
     /// Queues a text with the sender of a command that took effect.
@@ -203,10 +208,10 @@ impl Links {
         self.repeats.remember(frame, result, now);
     }
 
-    /// Whether the radio's token bucket allows another frame beside the state messages. State
-    /// messages are not limited.
-    pub(crate) fn may_send_by_radio(&mut self, now: Instant, armed: bool) -> bool {
-        self.radio.may_send(now, armed)
+    /// Whether the radio's token bucket, which fills by `bytes_per_s`, allows another frame beside
+    /// the state messages. State messages are not limited.
+    pub(crate) fn may_send_by_radio(&mut self, now: Instant, bytes_per_s: u32) -> bool {
+        self.radio.may_send(now, bytes_per_s)
     }
 
     /// Whether more than half of the radio's token bucket is full.

@@ -111,8 +111,8 @@ impl Services {
     ) -> Option<FlashRequest<'_>> {
         let store = self.store.as_mut()?;
         self.ftp.continue_work(store, now, erasing);
-        if let Some((warning, text)) = self.ftp.take_text() {
-            links.send_text(warning, text);
+        if let Some((severity, text)) = self.ftp.take_text() {
+            links.send_text(severity, text);
         }
         store.poll_request(erasing)
     }

@@ -9,6 +9,7 @@
 
 use core::fmt::Write as _;
 
+use companion::link::severity::Severity;
 use companion::storage::mission_file::{self, MissionError, MissionView};
 use companion::storage::store::{ReadFlash, Store};
 use companion::{Config, Link};
@@ -144,17 +145,21 @@ async fn planner_and_flash_task(
     let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
     companion.attach_store(store);
     if let Some(text) = said.crashed {
-        companion.send_text(true, CRASH.init(text).as_str());
+        companion.send_text(Severity::Warning, CRASH.init(text).as_str());
     }
-    said.warnings.iter().copied().chain(aside).for_each(|text| companion.send_text(true, text));
+    said.warnings
+        .iter()
+        .copied()
+        .chain(aside)
+        .for_each(|text| companion.send_text(Severity::Warning, text));
     if is_stranger {
-        companion.send_text(true, NOT_IN_MISSION);
+        companion.send_text(Severity::Warning, NOT_IN_MISSION);
     }
     if let Some(error) = refused {
         let mut text = String::new();
         // Text that does not fit is cut; a test checks that every error fits.
         let _ = write!(text, "Mission: {error}");
-        companion.send_text(true, REFUSED.init(text).as_str());
+        companion.send_text(Severity::Warning, REFUSED.init(text).as_str());
     }
     shell.start(companion);
     start_links(links, shell, known.is_none(), autopilot, swarm);

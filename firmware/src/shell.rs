@@ -10,6 +10,7 @@ use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use companion::link::frame::{Framer, MAX_FRAME_LEN};
+use companion::link::severity::Severity;
 use companion::storage::store::{FlashRequest, MAX_READ};
 use companion::{Event, Link, PlanFailure, PlanRequests, State};
 use embassy_futures::select::select;
@@ -208,7 +209,7 @@ impl Shell {
                     Event::StateChanged { to: State::Done | State::Aborted, .. } => {
                         if let Some(reported) = self.setpoints.take_setpoint_stats(now_ms()) {
                             companion.send_text_with_numbers(
-                                false,
+                                Severity::Info,
                                 "Setpoints: #, at most # ms apart",
                                 reported,
                             );
@@ -286,7 +287,7 @@ impl Shell {
                     let counters = companion.counters(link);
                     let damaged = counters.bad_crc.wrapping_add(counters.expired);
                     companion.send_text_with_numbers(
-                        true,
+                        Severity::Warning,
                         UART_ERROR_TEXTS[link as usize],
                         [count, damaged],
                     );

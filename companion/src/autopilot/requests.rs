@@ -12,6 +12,7 @@ use crate::events::Link;
 use crate::link::Links;
 use crate::link::frame::{COMPANION_COMPONENT, Frame};
 use crate::link::outbox::Outgoing;
+use crate::link::severity::Severity;
 use crate::mission::State;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
@@ -319,7 +320,7 @@ impl Requests {
             return;
         }
         if let Some((text, numbers)) = self.handshake.handle_ack(state, ack, now) {
-            links.send_text_with_numbers(true, text, numbers);
+            links.send_text_with_numbers(Severity::Warning, text, numbers);
         }
     }
 }

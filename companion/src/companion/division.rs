@@ -8,6 +8,7 @@ use super::Companion;
 use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::roster::MemberStatus;
+use crate::link::severity::Severity;
 use crate::mission::State;
 use crate::mission::table::{ON_PAD, STARTED_ON_PAD};
 use crate::swarm::detour::path_kind::RejoinPlace;
@@ -302,7 +303,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let left = self.mission.resume_own_path(plan, self.detours.left_at_m(), back_m);
             if left > 0 {
                 self.links.send_text_with_numbers(
-                    true,
+                    Severity::Warning,
                     "Flown around: # waypoints are left",
                     [left, 0],
                 );
@@ -334,7 +335,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // are left.
             Err(_) if fleet.needs_division() => {
                 fleet.set_hash_from_plan(UNDIVIDED);
-                self.links.send_text(true, "What is left cannot be divided");
+                self.links.send_text(Severity::Warning, "What is left cannot be divided");
             }
             Err(_) if may_take && self.detours.is_beside_plan() => {
                 self.detours.end_area_detour(false);
@@ -367,7 +368,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 } else if self.detours.is_beside_plan() {
                     self.detours.end_area_detour(false);
                 } else {
-                    self.links.send_text(true, "The division begins elsewhere");
+                    self.links.send_text(Severity::Warning, "The division begins elsewhere");
                 }
             }
             Ok(_) => {}

@@ -18,6 +18,7 @@ use crate::link::frame::{AUTOPILOT_COMPONENT, COMPANION_COMPONENT, Frame};
 use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
 use crate::link::roster::RosterReport;
+use crate::link::severity::Severity;
 use crate::link::{OnDemandMessage, rate_limit};
 use crate::services::{ReceivedFrame, ftp};
 use crate::swarm::neighbours::relay::Relay;
@@ -117,7 +118,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             TelemetryChange::OriginFar(km) => {
                 if self.timers.take_due(Timer::OriginReport, now, REPORT_EVERY) {
                     let text = "EKF origin # km away: not used";
-                    self.links.send_text_with_numbers(true, text, [km, 0]);
+                    self.links.send_text_with_numbers(Severity::Warning, text, [km, 0]);
                 }
                 true
             }
@@ -177,7 +178,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             if self.config.roster.iter().any(|entry| entry.system_id == id) {
                 let text = "Vehicle # has another mission file";
                 let numbers = [u32::from(id), 0, 0];
-                self.links.send_sender_text(self.now, SenderKind::Other, true, text, numbers);
+                self.links.send_sender_text(
+                    self.now,
+                    SenderKind::Other,
+                    Severity::Warning,
+                    text,
+                    numbers,
+                );
             }
             return;
         }
@@ -212,7 +219,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.links.send_sender_text(
             self.now,
             sender,
-            true,
+            Severity::Warning,
             "Command # denied, not a ground station: #/#",
             numbers,
         );
@@ -265,19 +272,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if !self.links.take_answer_token(self.now, link, sender, AnswerKind::Message) {
             return TEMPORARILY_REJECTED;
         }
-        if link == Link::Swarm && !self.links.may_send_by_radio(self.now, self.telemetry.armed) {
+        if link == Link::Swarm && !self.may_send_by_radio() {
             return TEMPORARILY_REJECTED;
         }
         if message == HEARTBEAT_DATA::ID as f32 {
-            self.links.set_due(link, OnDemandMessage::Heartbeat, true);
+            self.links.set_due(link, OnDemandMessage::Heartbeat);
         } else if message == AUTOPILOT_VERSION_DATA::ID as f32 {
-            self.links.set_due(link, OnDemandMessage::Version, true);
+            self.links.set_due(link, OnDemandMessage::Version);
         } else if message == GLOBAL_POSITION_INT_DATA::ID as f32 && link == Link::Swarm {
-            self.links.set_due(
-                link,
-                OnDemandMessage::Position,
-                self.telemetry.position_at.is_some(),
-            );
+            self.set_position_due();
         } else {
             return DENIED;
         }

@@ -67,10 +67,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         [Link::Autopilot, Link::Swarm]
             .into_iter()
-            .for_each(|link| self.links.set_due(link, OnDemandMessage::DoneCount, true));
+            .for_each(|link| self.links.set_due(link, OnDemandMessage::DoneCount));
         let every = if flies { done::PERIOD_IN_FLIGHT } else { done::PERIOD_ON_GROUND };
         if self.timers.take_due(Timer::DoneReport, self.now, every) {
-            self.links.set_due(Link::Swarm, OnDemandMessage::Done, true);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Done);
         }
     }
 

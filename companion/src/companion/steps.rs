@@ -7,6 +7,7 @@ use crate::config::PlanFailure;
 use crate::events::{Event, Link, PlanKind};
 use crate::guidance::GuidanceInputs;
 use crate::link::OnDemandMessage;
+use crate::link::severity::Severity;
 use crate::margins;
 use crate::mission::task::{PathProgress, PathRelation};
 use crate::mission::{self, Action, State, TransitionRow};
@@ -36,10 +37,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if !self.guidance.step(self.mission.state(), &scene, &mut self.neighbours, now, dt_s)
             && self.timers.take_due(Timer::HeldReport, now, REPORT_EVERY)
         {
-            self.links.send_text(true, "Setpoint out of limits: holding");
+            self.links.send_text(Severity::Warning, "Setpoint out of limits: holding");
         }
         if self.guidance.take_hold_changed() {
-            self.links.set_due(Link::Swarm, OnDemandMessage::Intent, true);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Intent);
         }
         self.step_division();
         self.report_unstarted_vehicle();
@@ -57,8 +58,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.guidance.set_limits(&self.config, self.requests.limits());
         }
         let flows = self.mission.state().streams_setpoints();
-        self.links.set_due(Link::Autopilot, OnDemandMessage::Setpoint, flows);
-        let every = if flows { SETPOINT_EVERY } else { IDLE_STEP_EVERY };
+        let every = if flows {
+            self.links.set_due(Link::Autopilot, OnDemandMessage::Setpoint);
+            SETPOINT_EVERY
+        } else {
+            self.links.clear_due(Link::Autopilot, OnDemandMessage::Setpoint);
+            IDLE_STEP_EVERY
+        };
         self.timers.schedule_next(Timer::Step, now, every);
     }
 
@@ -105,7 +111,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let id = waited.filter(|id| self.neighbours.is_not_started(*id)).unwrap_or(0);
         if self.mission.should_report_wait(id, self.now) {
             self.links.send_text_with_numbers(
-                true,
+                Severity::Warning,
                 "Waiting for vehicle #: it has not started",
                 [u32::from(id), 0],
             );
@@ -142,13 +148,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             margins::TRACKING_M,
         );
         let room_cm = libm::fmaxf(room_m * 100.0, 0.0) as u32;
-        let (warning, text) = match kind(pace) {
-            2 => (false, "Estimate within # cm again"),
-            1 => (true, "Estimate within # cm, margin # cm: slower"),
-            _ if bound_m > 100.0 => (true, "Estimate of unknown accuracy: stopping"),
-            _ => (true, "Estimate within # cm, margin # cm: stopping"),
+        let (severity, text) = match kind(pace) {
+            2 => (Severity::Info, "Estimate within # cm again"),
+            1 => (Severity::Warning, "Estimate within # cm, margin # cm: slower"),
+            _ if bound_m > 100.0 => (Severity::Warning, "Estimate of unknown accuracy: stopping"),
+            _ => (Severity::Warning, "Estimate within # cm, margin # cm: stopping"),
         };
-        self.links.send_text_with_numbers(warning, text, [cm, room_cm]);
+        self.links.send_text_with_numbers(severity, text, [cm, room_cm]);
     }
 
     pub(super) fn run_mission_table(&mut self) {
@@ -177,13 +183,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.detours.take_up_plan();
         }
         if !row.text.is_empty() {
-            self.links.send_text(row.warning, row.text);
+            self.links.send_text(row.severity, row.text);
         }
         if let Some(text) = self.mission.interruption_text(from, to) {
-            self.links.send_text(false, text);
+            self.links.send_text(Severity::Info, text);
         }
         // The queue is full only if the shell does not drain: then this event is lost.
-        let changed = Event::StateChanged { from, to, text: row.text, warning: row.warning };
+        let warning = row.severity == Severity::Warning;
+        let changed = Event::StateChanged { from, to, text: row.text, warning };
         let _ = self.events.push_back(changed);
         // Where setpoints begin to stream, the next step is due at once.
         if to.streams_setpoints() && !from.streams_setpoints() {

@@ -13,7 +13,9 @@ use crate::events::Link;
 use crate::guidance::Setpoint;
 use crate::link::frame::{self, AUTOPILOT_COMPONENT};
 use crate::link::intent::{self, Intent};
+use crate::link::rate_limit::{ARMED_BYTES_PER_S, DISARMED_BYTES_PER_S};
 use crate::link::roster;
+use crate::link::severity::Severity;
 use crate::link::{OnDemandMessage, done};
 use crate::mission::State;
 use crate::services;
@@ -78,7 +80,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let data = self.done_count_message();
             return frame::encode(self.links.next_header(link, system), &data, out);
         }
-        if link == Link::Swarm && !self.links.may_send_by_radio(self.now, self.telemetry.armed) {
+        if link == Link::Swarm && !self.may_send_by_radio() {
             return 0;
         }
         let relayed = if link == Link::Swarm { self.relay_neighbours(out) } else { 0 };
@@ -87,6 +89,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.links.take_radio_tokens(length);
         }
         length
+    }
+
+    /// Whether another frame may be sent to the radio beside the state messages.
+    pub(super) fn may_send_by_radio(&mut self) -> bool {
+        let rate = if self.telemetry.armed { ARMED_BYTES_PER_S } else { DISARMED_BYTES_PER_S };
+        self.links.may_send_by_radio(self.now, rate)
+    }
+
+    /// Makes the message with this vehicle's position due, as far as the position is known.
+    pub(super) fn set_position_due(&mut self) {
+        match self.telemetry.position_at {
+            Some(_) => self.links.set_due(Link::Swarm, OnDemandMessage::Position),
+            None => self.links.clear_due(Link::Swarm, OnDemandMessage::Position),
+        }
     }
 
     /// Writes a message that relays the progress of vehicles that some neighbour does not hear,
@@ -132,13 +148,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Queues a STATUSTEXT, at most 50 bytes, on both links.
-    pub fn send_text(&mut self, warning: bool, text: &'static str) {
-        self.links.send_text(warning, text);
+    pub fn send_text(&mut self, severity: Severity, text: &'static str) {
+        self.links.send_text(severity, text);
     }
 
     /// Queues a STATUSTEXT on both links; each `#` in the text is replaced by one of the numbers.
-    pub fn send_text_with_numbers(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
-        self.links.send_text_with_numbers(warning, text, numbers);
+    pub fn send_text_with_numbers(
+        &mut self,
+        severity: Severity,
+        text: &'static str,
+        numbers: [u32; 2],
+    ) {
+        self.links.send_text_with_numbers(severity, text, numbers);
     }
 
     fn setpoint_message(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {

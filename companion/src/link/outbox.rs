@@ -12,6 +12,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use crate::link::frame::{self, AUTOPILOT_COMPONENT, COMPANION_COMPONENT, Header};
+use crate::link::severity::Severity;
 
 /// Most messages in a link's queue.
 pub const QUEUE_DEPTH: usize = 32;
@@ -85,15 +86,15 @@ pub enum Outgoing {
     },
     /// STATUSTEXT.
     Text {
-        /// Severity WARNING if true, INFO if false.
-        warning: bool,
+        /// Severity.
+        severity: Severity,
         /// At most 50 bytes.
         text: &'static str,
     },
     /// STATUSTEXT with numbers: each `#` of the text is replaced by the next number.
     TextWithNumbers {
-        /// Severity WARNING if true, INFO if false.
-        warning: bool,
+        /// Severity.
+        severity: Severity,
         /// The text, at most 50 bytes with its numbers.
         text: &'static str,
         /// Numbers that replace the text's `#`, in order.
@@ -245,16 +246,16 @@ impl Outbox {
                     out,
                 );
             }
-            Outgoing::Text { warning, text } => {
-                let severity = text_severity(warning);
+            Outgoing::Text { severity, text } => {
+                let severity = mav_severity(severity);
                 return frame::encode(
                     header,
                     &STATUSTEXT_DATA { severity, text: text.into() },
                     out,
                 );
             }
-            Outgoing::TextWithNumbers { warning, text, numbers } => {
-                let (severity, text) = (text_severity(warning), format_text(text, numbers));
+            Outgoing::TextWithNumbers { severity, text, numbers } => {
+                let (severity, text) = (mav_severity(severity), format_text(text, numbers));
                 return frame::encode(
                     header,
                     &STATUSTEXT_DATA { severity, text: text.as_str().into() },
@@ -266,8 +267,11 @@ impl Outbox {
     }
 }
 
-fn text_severity(warning: bool) -> MavSeverity {
-    if warning { MavSeverity::MAV_SEVERITY_WARNING } else { MavSeverity::MAV_SEVERITY_INFO }
+fn mav_severity(severity: Severity) -> MavSeverity {
+    match severity {
+        Severity::Info => MavSeverity::MAV_SEVERITY_INFO,
+        Severity::Warning => MavSeverity::MAV_SEVERITY_WARNING,
+    }
 }
 
 /// The text with each `#` replaced by the next number, cut to 50 bytes.

@@ -54,10 +54,11 @@ impl Default for RadioTokenBucket {
 }
 
 impl RadioTokenBucket {
-    /// Fills the bucket up to `now` and returns whether another frame may be sent: whether any
-    /// token is left. The frame may take more tokens than there are; the bucket is then negative.
-    pub fn may_send(&mut self, now: Instant, armed: bool) -> bool {
-        let rate = i64::from(if armed { ARMED_BYTES_PER_S } else { DISARMED_BYTES_PER_S });
+    /// Fills the bucket up to `now`, by `bytes_per_s`, and returns whether another frame may be
+    /// sent: whether any token is left. The frame may take more tokens than there are; the bucket
+    /// is then negative.
+    pub fn may_send(&mut self, now: Instant, bytes_per_s: u32) -> bool {
+        let rate = i64::from(bytes_per_s);
         // An hour fills the bucket in any case; the cap keeps the product below from overflowing.
         let passed_us = (now - self.at).as_micros().min(3_600_000_000) as i64;
         self.at = now;

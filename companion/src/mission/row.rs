@@ -2,6 +2,7 @@
 
 use super::guard::Guard;
 use super::state::{State, TargetState};
+use crate::link::severity::Severity;
 use crate::time::Duration;
 
 /// What the companion does when a row is taken, in addition to the change of state.
@@ -84,8 +85,8 @@ pub struct TransitionRow {
     pub action: Action,
     /// STATUSTEXT for the operator, at most 50 bytes; empty for none.
     pub text: &'static str,
-    /// Whether the text has severity WARNING; else INFO.
-    pub warning: bool,
+    /// Severity of the text; a warning: the mission leaves its usual course.
+    pub severity: Severity,
 }
 
 pub(crate) const AT_ONCE: Duration = Duration::from_millis(0);

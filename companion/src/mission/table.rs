@@ -4,6 +4,7 @@
 use super::guard::Guard;
 use super::row::{AT_ONCE, Action, TransitionRow, state_mask};
 use super::state::{State, TargetState};
+use crate::link::severity::Severity;
 use crate::time::Duration;
 
 pub(crate) const fn secs(secs: u64) -> Duration {
@@ -26,7 +27,7 @@ pub(crate) const fn info_row(
         to: TargetState::State(to),
         action,
         text,
-        warning: false,
+        severity: Severity::Info,
     }
 }
 
@@ -46,7 +47,7 @@ pub(crate) const fn warning_row(
         to: TargetState::State(to),
         action,
         text,
-        warning: true,
+        severity: Severity::Warning,
     }
 }
 
@@ -66,7 +67,7 @@ pub(crate) const fn resume_row(
         to: TargetState::Interrupted,
         action,
         text,
-        warning: false,
+        severity: Severity::Info,
     }
 }
 

@@ -225,12 +225,12 @@ fn what_is_owed_is_paid_back_by_time() {
     let mut rate_limit = RadioTokenBucket::default();
     let at = |ms| Instant::ZERO + Duration::from_millis(ms);
     let mut sent = 0;
-    while rate_limit.may_send(at(0), true) {
+    while rate_limit.may_send(at(0), ARMED_BYTES_PER_S) {
         rate_limit.take_tokens(MAX_FRAME_LEN);
         sent += MAX_FRAME_LEN as u32;
     }
     assert!((MAX_SAVED_BYTES..=MAX_SAVED_BYTES + MAX_FRAME_LEN as u32).contains(&sent));
-    assert!(!rate_limit.may_send(at(10), true));
-    assert!(rate_limit.may_send(at(1100), true));
-    assert!(rate_limit.may_send(at(u64::from(u32::MAX)), true), "and never overflows");
+    assert!(!rate_limit.may_send(at(10), ARMED_BYTES_PER_S));
+    assert!(rate_limit.may_send(at(1100), ARMED_BYTES_PER_S));
+    assert!(rate_limit.may_send(at(u64::from(u32::MAX)), ARMED_BYTES_PER_S), "and never overflows");
 }

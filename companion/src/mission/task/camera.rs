@@ -19,6 +19,7 @@ use crate::autopilot::telemetry::Ack;
 use crate::events::Link;
 use crate::link::Links;
 use crate::link::outbox::Outgoing;
+use crate::link::severity::Severity;
 use crate::time::{Duration, Instant};
 
 /// Most camera commands in the queue.
@@ -243,7 +244,7 @@ impl CameraControl {
             }
             (self.tries, self.sent_at) = (0, None);
             if !core::mem::replace(&mut self.failed, true) {
-                links.send_text(true, "Camera trigger is not acknowledged");
+                links.send_text(Severity::Warning, "Camera trigger is not acknowledged");
             }
             return;
         }
@@ -266,7 +267,7 @@ impl CameraControl {
         self.drop_current_command();
         if ack.result != ACCEPTED && !core::mem::replace(&mut self.failed, true) {
             links.send_text_with_numbers(
-                true,
+                Severity::Warning,
                 "Autopilot refuses the camera: # (result #)",
                 [u32::from(ack.command), u32::from(ack.result)],
             );

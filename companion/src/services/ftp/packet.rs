@@ -2,6 +2,7 @@
 //! opcode, size, opcode replied to, burst complete, 0, offset u32), then at most 239 bytes of data.
 
 use crate::link::frame::Frame;
+use crate::link::severity::Severity;
 use crate::storage::store::{File, UploadError, crc32};
 
 /// Most bytes of data in an FTP packet.
@@ -61,20 +62,20 @@ impl From<UploadError> for NakError {
     }
 }
 
-/// A STATUSTEXT for the operator: whether its severity is WARNING (else INFO), and the text.
-pub type Text = (bool, &'static str);
+/// A STATUSTEXT for the operator: its severity, and the text.
+pub type Text = (Severity, &'static str);
 
 /// All STATUSTEXTs of the FTP server.
 pub const FTP_TEXTS: [Text; 9] = [
-    (false, "Roadmap stored: used from the next start"),
-    (false, "Mission stored: used from the next start"),
-    (false, "File removed from the next start on"),
-    (true, "Upload refused: armed"),
-    (true, "Upload refused: restart to use the last one"),
-    (true, "Upload incomplete: old file kept"),
-    (true, "Upload is no such file or damaged: old file kept"),
-    (true, "Flash failed: old file kept"),
-    (false, "Field stored: used from the next start"),
+    (Severity::Info, "Roadmap stored: used from the next start"),
+    (Severity::Info, "Mission stored: used from the next start"),
+    (Severity::Info, "File removed from the next start on"),
+    (Severity::Warning, "Upload refused: armed"),
+    (Severity::Warning, "Upload refused: restart to use the last one"),
+    (Severity::Warning, "Upload incomplete: old file kept"),
+    (Severity::Warning, "Upload is no such file or damaged: old file kept"),
+    (Severity::Warning, "Flash failed: old file kept"),
+    (Severity::Info, "Field stored: used from the next start"),
 ];
 
 /// STATUSTEXT after a file was removed.
