@@ -16,7 +16,7 @@ use planner_core::flight::VehiclePlan;
 
 use crate::autopilot::AutopilotKind;
 use crate::autopilot::requests::{RequestContext, Requests};
-use crate::autopilot::telemetry::Telemetry;
+use crate::autopilot::telemetry::{OriginRange, Telemetry};
 use crate::config::{CheckedConfig, Config, ConfigError, PlanFailure};
 use crate::events::{Event, Link, PlanKind};
 use crate::guidance::{Guidance, GuidanceInputs, SetpointStats};
@@ -108,7 +108,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             now: Instant::ZERO,
             timers: Timers::default(),
             links: Links::default(),
-            telemetry: Telemetry::new(config.mission_crc == 0),
+            telemetry: Telemetry::new(match config.mission_crc {
+                0 => OriginRange::Anywhere,
+                _ => OriginRange::NearMission,
+            }),
             neighbours,
             detours: Detours::default(),
             requests: Requests::default(),
@@ -305,7 +308,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             climb_m: self.mission.climb_m(),
             guided_timeout_s: timeout_s,
             column_clear,
-            may_land: RequestContext::may_request_landing(in_state, column_clear, self.must_land()),
+            may_land: self.must_land()
+                || (column_clear && RequestContext::is_column_checked(in_state)),
         }
     }
 

@@ -102,7 +102,7 @@ impl Handshake {
     }
 
     /// Whether an arming request is to be sent now; if so, counts it as sent.
-    pub(crate) fn should_request_arming(&mut self, now: Instant, armed: bool) -> bool {
+    pub(crate) fn should_request_arming(&mut self, now: Instant, telemetry: &Telemetry) -> bool {
         let due = match self.requested_at {
             None => true,
             Some(at) if self.denied => now - at >= ARMING_RETRY_EVERY,
@@ -112,7 +112,7 @@ impl Handshake {
                     && !self.heartbeat_gap
             }
         };
-        let asks = due && !armed && self.accepted_at.is_none();
+        let asks = due && !telemetry.armed && self.accepted_at.is_none();
         if asks {
             (self.requested_at, self.denied, self.heartbeat_gap) = (Some(now), false, false);
             self.unanswered += 1;

@@ -236,7 +236,7 @@ impl Requests {
             if silent {
                 self.handshake.note_heartbeat_gap();
             }
-            if s.column_clear && self.handshake.should_request_arming(now, telemetry.armed) {
+            if s.column_clear && self.handshake.should_request_arming(now, telemetry) {
                 links.push(Link::Autopilot, Outgoing::Arm(true));
             }
         } else {
@@ -326,14 +326,10 @@ impl Requests {
 }
 
 impl RequestContext {
-    /// Whether the landing mode may be requested: once the column below has been checked for 0.1 s
-    /// (`LAND_REQUEST_AFTER`) and is clear, or at any time if the vehicle `must_land`.
-    pub(crate) fn may_request_landing(
-        in_state: Duration,
-        column_clear: bool,
-        must_land: bool,
-    ) -> bool {
-        must_land || (in_state >= LAND_REQUEST_AFTER && column_clear)
+    /// Whether, after this time in the state, the column below has been checked for long enough,
+    /// 0.1 s (`LAND_REQUEST_AFTER`), to request the landing mode if it is clear.
+    pub(crate) fn is_column_checked(in_state: Duration) -> bool {
+        in_state >= LAND_REQUEST_AFTER
     }
 }
 

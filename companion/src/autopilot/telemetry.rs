@@ -106,6 +106,16 @@ pub enum TelemetryChange {
     OriginFar(u32),
 }
 
+/// Where an EKF origin is accepted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum OriginRange {
+    /// Within 30 km (`MAX_ORIGIN_DISTANCE_M`) of the mission's origin.
+    #[default]
+    NearMission,
+    /// At any distance: the board has no mission.
+    Anywhere,
+}
+
 /// The autopilot's state as last received.
 #[derive(Clone, Debug, Default)]
 pub struct Telemetry {
@@ -128,9 +138,8 @@ pub struct Telemetry {
     pub battery_percent: i8,
     /// Height above home, metres; ArduCopter's NAV_TAKEOFF takes its height from there.
     pub above_home_m: f32,
-    /// Whether an EKF origin counts at any distance, as there is no mission origin to compare it
-    /// with.
-    accept_any_origin: bool,
+    /// Where an EKF origin is accepted.
+    origin_range: OriginRange,
     /// EKF origin, which positions are relative to; `None` until one is received, and again after
     /// it was refused as too far away, or after the autopilot restarted or its position jumped.
     pub ekf_origin: Option<Geodetic>,
@@ -168,10 +177,9 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// Telemetry before any frame was received. With `anywhere` (a board without a mission) an EKF
-    /// origin is accepted at any distance.
-    pub fn new(anywhere: bool) -> Self {
-        Self { battery_percent: -1, accept_any_origin: anywhere, ..Self::default() }
+    /// Telemetry before any frame was received.
+    pub fn new(origin_range: OriginRange) -> Self {
+        Self { battery_percent: -1, origin_range, ..Self::default() }
     }
 
     /// Kind of autopilot that flies the vehicle; PX4 until a HEARTBEAT is received.
@@ -380,7 +388,7 @@ impl Telemetry {
             self.origin_doubtful_since = None;
         }
         let away_m = frames::geodetic_to_enu(mission_origin, &origin).length();
-        if away_m > MAX_ORIGIN_DISTANCE_M && !self.accept_any_origin {
+        if away_m > MAX_ORIGIN_DISTANCE_M && self.origin_range == OriginRange::NearMission {
             (self.ekf_origin, self.position_at, self.position_read_at) = (None, None, None);
             self.settled_at = now + POSITION_SETTLE_TIME;
             return TelemetryChange::OriginFar((away_m * 1e-3) as u32);

@@ -26,7 +26,7 @@ fn heard(
     longitude: i32,
     altitude: i32,
 ) -> (Telemetry, TelemetryChange) {
-    let mut telemetry = Telemetry { kind: Some(kind), ..Telemetry::new(false) };
+    let mut telemetry = Telemetry { kind: Some(kind), ..Telemetry::new(OriginRange::NearMission) };
     let data = GPS_GLOBAL_ORIGIN_DATA { latitude, longitude, altitude };
     let change = telemetry.handle_frame(Instant::ZERO, &origin, &frame(&data, 0));
     (telemetry, change)
