@@ -357,7 +357,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let own = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
                 let here = self.detours.rejoin().map(|back| back.position).or(own);
                 let place = here.filter(|_| in_air).unwrap_or(self.mission.path_start());
-                if self.mission.accept_division(plan, &place, division, in_air) {
+                if self.mission.accept_division(plan, &place, division) {
                     self.neighbours.forget_plan();
                     self.detours.forget_plan();
                     // From now on places are measured along the new path.

@@ -9,6 +9,7 @@ use crate::events::Link;
 use crate::link::OnDemandMessage;
 use crate::link::done::{self, PhotographedReport};
 use crate::mission::State;
+use crate::mission::photographed::{FlightStage, PlansWith};
 use crate::swarm::fleet::Fleet;
 use crate::time::Duration;
 use crate::timers::Timer;
@@ -38,37 +39,45 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.is_not_started() || self.mission.state() == State::Scheduled
     }
 
-    /// Whether this vehicle has taken off and not finished, so that it may photograph further
-    /// waypoints.
-    fn has_left_pad(&self) -> bool {
-        !self.plans_with_others() && !self.mission.state().is_over()
+    /// How far this vehicle's flight is.
+    fn flight_stage(&self) -> FlightStage {
+        match self.mission.state() {
+            _ if self.plans_with_others() => FlightStage::OnPad,
+            state if state.is_over() => FlightStage::Over,
+            _ => FlightStage::UnderWay,
+        }
     }
 
-    /// Notes, stores and reports the photographed waypoints, at 1 Hz. Those of its own path are
-    /// noted up to `pictures_to_m` metres along it, and also when the vehicle leaves the path; that
-    /// is `None` where it takes no pictures.
-    pub(super) fn update_photographed(&mut self, pictures_to_m: Option<f32>, leaves_path: bool) {
-        let due = self.is_area_mission() && self.timers.take_due(Timer::Done, self.now, NOTE_EVERY);
-        let flies = self.has_left_pad();
-        if (due || leaves_path)
-            && flies
+    /// Whether the photographed waypoints are to be noted, stored and reported now, at 1 Hz.
+    pub(super) fn take_photographed_due(&mut self) -> bool {
+        self.is_area_mission() && self.timers.take_due(Timer::Done, self.now, NOTE_EVERY)
+    }
+
+    /// Notes the photographed waypoints of its own path, up to `pictures_to_m` metres along it;
+    /// that is `None` where the vehicle takes no pictures.
+    pub(super) fn note_photographed(&mut self, pictures_to_m: Option<f32>) {
+        if self.flight_stage() == FlightStage::UnderWay
             && !self.detours.has_left_plan()
             && self.guidance.along_m() >= 0.0
             && let Some(along_m) = pictures_to_m
         {
             self.mission.note_photographed(along_m);
         }
-        if !due {
-            return;
-        }
-        let crc = self.config.mission_crc;
-        if let Some(kept) = self.mission.photographed_mut().record_to_store(crc, !flies) {
+    }
+
+    /// Stores and reports the photographed waypoints.
+    pub(super) fn keep_and_report_photographed(&mut self) {
+        let (crc, stage) = (self.config.mission_crc, self.flight_stage());
+        if let Some(kept) = self.mission.photographed_mut().record_to_store(crc, stage) {
             self.services.set_photographed_record(kept);
         }
         [Link::Autopilot, Link::Swarm]
             .into_iter()
             .for_each(|link| self.links.set_due(link, OnDemandMessage::DoneCount));
-        let every = if flies { done::PERIOD_IN_FLIGHT } else { done::PERIOD_ON_GROUND };
+        let every = match stage {
+            FlightStage::UnderWay => done::PERIOD_IN_FLIGHT,
+            FlightStage::OnPad | FlightStage::Over => done::PERIOD_ON_GROUND,
+        };
         if self.timers.take_due(Timer::DoneReport, self.now, every) {
             self.links.set_due(Link::Swarm, OnDemandMessage::Done);
         }
@@ -76,8 +85,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// This vehicle's report of the photographed waypoints to the others.
     pub(super) fn done_report(&mut self) -> PhotographedReport {
-        let (waits, flies) = (self.plans_with_others(), self.has_left_pad());
-        let report = self.mission.photographed_mut().next_report(waits, flies);
+        let stage = self.flight_stage();
+        let report = self.mission.photographed_mut().next_report(stage);
         PhotographedReport {
             system_id: self.config.system_id,
             mission_crc: self.config.mission_crc,
@@ -90,13 +99,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ours = report.mission_crc == self.config.mission_crc
             && self.config.roster.iter().any(|entry| entry.system_id == report.system_id);
         if ours && self.is_area_mission() && self.config.skips_photographed {
-            // Once started, it keeps its part of a flight in which others fly or have flown.
-            let plans = self.plans_with_others()
-                && !(self.mission.state() == State::Scheduled
-                    && self.neighbours.fleet().is_some_and(Fleet::is_flight_under_way));
-            let waits = self.plans_with_others();
-            let photographed = self.mission.photographed_mut();
-            photographed.handle_report(report, waits, plans, self.now);
+            let under_way = || self.neighbours.fleet().is_some_and(Fleet::is_flight_under_way);
+            let planning = match self.mission.state() {
+                _ if !self.plans_with_others() => PlansWith::Nobody,
+                // Once started, it keeps its part of a flight in which others fly or have flown.
+                State::Scheduled if under_way() => PlansWith::ThoseInFlight,
+                _ => PlansWith::All,
+            };
+            self.mission.photographed_mut().handle_report(report, planning, self.now);
         }
     }
 

@@ -90,7 +90,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // Braking to land, the vehicle goes on along its path, and takes no pictures.
         let photographs = along.place == PathRelation::OnPath
             || (!off_plan && (leaves_path || self.guidance.is_at_end(&self.guidance_inputs())));
-        self.update_photographed(photographs.then_some(along.progress_m), leaves_path);
+        let pictures_to_m = photographs.then_some(along.progress_m);
+        let due = self.take_photographed_due();
+        if due || leaves_path {
+            self.note_photographed(pictures_to_m);
+        }
+        if due {
+            self.keep_and_report_photographed();
+        }
     }
 
     /// Notes whether a vehicle that is due to depart is kept on its pad by another vehicle in the
@@ -99,8 +106,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let due = self.mission.departure_due(self.now) && self.guidance.advice.lets_depart();
         let waits =
             due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
-        let barred = waits && (!self.guidance.filter.column_clear() || self.detours.is_blocked());
-        self.mission.note_start_barred(barred, self.now);
+        if waits && (!self.guidance.filter.column_clear() || self.detours.is_blocked()) {
+            self.mission.note_start_barred(self.now);
+        } else {
+            self.mission.note_start_free(self.now);
+        }
     }
 
     /// Reports, by text and event, a vehicle that this one waits for and that was not started.
@@ -135,7 +145,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             ),
         };
         let before = self.guidance.set_estimate_speed_share(pace);
-        self.mission.note_estimate_usable(pace > 0.0, now);
+        self.mission.note_estimate_speed_share(pace, now);
         let kind = |pace: f32| if pace >= 1.0 { 2 } else { u8::from(pace > 0.0) };
         if kind(before) == kind(pace) || !self.mission.state().streams_setpoints() {
             return;
@@ -172,7 +182,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // After an interruption, a vehicle that sought a landing place resumes with a landing.
         let lands =
             self.detours.seeks_landing() && !self.guidance.returning && !self.detours.is_homeward();
-        let (from, to) = self.mission.enter_state(row, self.telemetry.custom_mode, lands, now);
+        let after_search = if lands { State::Land } else { State::Blocked };
+        let (from, to) =
+            self.mission.enter_state(row, self.telemetry.custom_mode, after_search, now);
         self.requests.reset_for_state(from, to);
         self.run_action(from, to, row);
         // Leaving a replanning state ends the search for a detour.
@@ -210,9 +222,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.detours.forget_plan();
                 self.neighbours.forget_plan();
                 self.guidance.reset();
-                self.mission
-                    .photographed_mut()
-                    .prepare_plan_request(self.config.skips_photographed);
+                let photographed = self.mission.photographed_mut();
+                if self.config.skips_photographed {
+                    photographed.prepare_plan_of_rest();
+                } else {
+                    photographed.prepare_plan_of_new_round();
+                }
                 if let Some(fleet) = self.neighbours.fleet_mut() {
                     if fleet.has_reported_leaving() {
                         // The vehicle takes part again: it leaves its share at the earliest after

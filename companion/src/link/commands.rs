@@ -9,7 +9,9 @@
 //! An unknown command to all components belongs to another component and stays unanswered.
 
 use crate::link::frame::{COMPANION_COMPONENT, Frame};
-use crate::mission::{Guard, GuardInputs, MAX_POSITION_AGE, State, has_row_for};
+use crate::mission::{
+    Action, Guard, GuardInputs, MAX_POSITION_AGE, State, TransitionRow, has_row_for,
+};
 use crate::time::{Duration, Instant};
 
 const COMMAND_INT: u32 = 75;
@@ -196,12 +198,15 @@ pub struct PendingCommands {
 }
 
 impl PendingCommands {
-    /// Clears the commands that the row with this guard has carried out by entering `to`; all of
-    /// them if the mission `ends`.
-    pub(crate) fn clear_carried_out(&mut self, guard: Guard, to: State, ends: bool) {
+    /// Clears the commands that this row has carried out by entering `to`; all of them if the
+    /// mission ends or its start is given up.
+    pub(crate) fn clear_carried_out(&mut self, row: &TransitionRow, to: State) {
         use State::*;
+        let guard = row.guard;
         self.resume = false;
-        if ends {
+        if matches!(to, Aborted | Done)
+            || matches!(row.action, Action::ForgetStart | Action::CancelStart)
+        {
             *self = Self::default();
         }
         let lands = matches!(to, Land | Stopping);

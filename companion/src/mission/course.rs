@@ -12,7 +12,7 @@ use crate::link::commands::{self, Command, PendingCommands};
 use crate::mission::photographed::PhotographedWaypoints;
 use crate::mission::task::{PathProgress, Tasks};
 use crate::mission::waits::{BarredStart, Waits};
-use crate::mission::{Action, GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
+use crate::mission::{GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
 use crate::time::{Duration, Instant};
 
 /// Greatest distance between the first point of a path and the place where it must begin, metres; a
@@ -176,9 +176,10 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.imprecise_since.map_or(Duration::default(), |since| now - since)
     }
 
-    /// Notes whether the estimate's error bound fits into the margin, at crawl speed at least.
-    pub(crate) fn note_estimate_usable(&mut self, usable: bool, now: Instant) {
-        self.imprecise_since = if usable { None } else { self.imprecise_since.or(Some(now)) };
+    /// Notes the share of the cruise speed at which the estimate's error bound fits into the
+    /// margin; 0 if it does not even at crawl speed.
+    pub(crate) fn note_estimate_speed_share(&mut self, share: f32, now: Instant) {
+        self.imprecise_since = if share > 0.0 { None } else { self.imprecise_since.or(Some(now)) };
     }
 
     /// To be called each step with the vehicle that has not started and that this one waits for, 0
@@ -187,9 +188,14 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.waits.report.update(id, now)
     }
 
-    /// To be called each step: whether a vehicle or an obstacle bars the start now.
-    pub(crate) fn note_start_barred(&mut self, barred: bool, now: Instant) {
-        self.waits.barred_start.update(barred, now);
+    /// To be called each step in which a vehicle or an obstacle bars the start.
+    pub(crate) fn note_start_barred(&mut self, now: Instant) {
+        self.waits.barred_start.note_barred(now);
+    }
+
+    /// To be called each step in which nothing bars the start.
+    pub(crate) fn note_start_free(&mut self, now: Instant) {
+        self.waits.barred_start.note_free(now);
     }
 
     /// Time for which the start of this vehicle has been barred.
@@ -203,13 +209,13 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         commands::apply_command(&mut self.pending, self.state, inputs, command)
     }
 
-    /// Changes the state as a row says. `lands`: a place to land is being sought, so an
-    /// interruption resumes with a landing. Returns the states before and after.
+    /// Changes the state as a row says. `after_search` as in
+    /// [`InterruptedStates::record_interruption`]. Returns the states before and after.
     pub(crate) fn enter_state(
         &mut self,
         row: &TransitionRow,
         custom_mode: u32,
-        lands: bool,
+        after_search: State,
         now: Instant,
     ) -> (State, State) {
         let from = self.state;
@@ -217,7 +223,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             TargetState::State(to) => to,
             TargetState::Interrupted => self.interrupted.target(from),
         };
-        self.interrupted.record_interruption(from, to, lands);
+        self.interrupted.record_interruption(from, to, after_search);
         (self.state, self.entered_at) = (to, now);
         if (from, to) == (State::Ready, State::Scheduled) {
             (self.started_at, self.mode_before) = (now, custom_mode);
@@ -225,8 +231,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         if to == State::PilotControl && from != State::PilotReturned {
             self.pilot_since = now;
         }
-        let ends = to.is_over() || matches!(row.action, Action::ForgetStart | Action::CancelStart);
-        self.pending.clear_carried_out(row.guard, to, ends);
+        self.pending.clear_carried_out(row, to);
         (from, to)
     }
 
@@ -313,19 +318,19 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Stores the plan after `division` divisions if it is valid and begins at `place`; returns
-    /// whether it does. With `in_air` the vehicle flies it once a row of the table says so.
+    /// whether it does. A vehicle in the air flies it once a row of the table says so.
     pub(crate) fn accept_division(
         &mut self,
         plan: &VehiclePlan<W, G>,
         place: &Point,
         division: usize,
-        in_air: bool,
     ) -> bool {
         let begins = self.starts_at(plan, place);
         if begins {
             self.begin_plan(plan);
             self.tasks.begin_plan();
-            (self.division, self.division_plan_ready) = (division, in_air);
+            self.division = division;
+            self.division_plan_ready = self.state == State::Dividing;
         }
         begins
     }

@@ -26,6 +26,28 @@ const FLIGHT_REPORT_LIFETIME: Duration = Duration::from_secs(25);
 const HEADER_LEN: usize = 5;
 const _: () = assert!(HEADER_LEN + MAX_PHOTOGRAPHED_RANGES * RANGE_LEN <= MAX_PROGRAM);
 
+/// How far the flight of this vehicle is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FlightStage {
+    /// On its pad before its take-off, where it has to compute the same plan as the others.
+    OnPad,
+    /// It has taken off and not finished, so it may photograph further waypoints.
+    UnderWay,
+    /// Finished or given up.
+    Over,
+}
+
+/// Whose plans the next plan of this vehicle has to fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PlansWith {
+    /// Nobody's: it has its plan, and flies it or has flown it.
+    Nobody,
+    /// Those of the vehicles in flight.
+    ThoseInFlight,
+    /// Those of all other vehicles, in flight and on the ground.
+    All,
+}
+
 /// The photographed waypoints of an area.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PhotographedWaypoints {
@@ -66,18 +88,17 @@ impl PhotographedWaypoints {
     }
 
     /// The flash record to be written now. `None` unless at least 10 more waypoints
-    /// (`STORE_EVERY_WAYPOINTS`; with `at_once` one more) are known than in the last record, or
+    /// (`STORE_EVERY_WAYPOINTS`; on the ground one more) are known than in the last record, or
     /// fewer than in it.
     pub(crate) fn record_to_store(
         &mut self,
         mission_crc: u32,
-        at_once: bool,
+        stage: FlightStage,
     ) -> Option<store::PhotographedRecord> {
         let count = self.known.count();
-        let least =
-            if at_once { self.stored_count + 1 } else { self.stored_count + STORE_EVERY_WAYPOINTS };
+        let new = if stage == FlightStage::UnderWay { STORE_EVERY_WAYPOINTS } else { 1 };
         // Fewer waypoints than in the last record belong to another round.
-        if (self.stored_count..least).contains(&count) {
+        if (self.stored_count..self.stored_count + new).contains(&count) {
             return None;
         }
         self.stored_count = count;
@@ -92,16 +113,23 @@ impl PhotographedWaypoints {
         Some(kept)
     }
 
-    /// Prepares the request for a plan. With `resumes` the plan leaves out the known waypoints, or,
-    /// if the vehicle has not flown since its last request, those agreed on the ground. Without it
-    /// a new round begins, and the plan leaves out none.
-    pub(crate) fn prepare_plan_request(&mut self, resumes: bool) {
-        if !resumes {
-            self.begin_round();
-            self.left_out_by_plan.clear();
-        } else if self.has_flown {
+    /// Prepares the request for a plan of the rest of the area: it leaves out the known waypoints,
+    /// or, if the vehicle has not flown since its last request, those agreed on the ground.
+    pub(crate) fn prepare_plan_of_rest(&mut self) {
+        if self.has_flown {
             self.left_out_by_plan = self.known.clone();
         }
+        self.note_plan_requested();
+    }
+
+    /// Prepares the request for a plan of a new round: it leaves out no waypoint.
+    pub(crate) fn prepare_plan_of_new_round(&mut self) {
+        self.begin_round();
+        self.left_out_by_plan.clear();
+        self.note_plan_requested();
+    }
+
+    fn note_plan_requested(&mut self) {
         (self.planned_round, self.has_flown, self.outdated) = (self.round, false, false);
     }
 
@@ -152,18 +180,16 @@ impl PhotographedWaypoints {
             .for_each(|range| _ = self.known.insert(range));
     }
 
-    /// Handles another vehicle's report of photographed waypoints. `waits`: this vehicle stands on
-    /// the ground and must plan as those in flight do; `plans`: it must also plan as those on the
-    /// ground do.
+    /// Handles another vehicle's report of photographed waypoints; `planning`: whose plans that of
+    /// this vehicle has to fit.
     pub(crate) fn handle_report(
         &mut self,
         report: &PhotographedReport,
-        waits: bool,
-        plans: bool,
+        planning: PlansWith,
         now: Instant,
     ) {
         if report.is_left_out_by_plan {
-            if waits {
+            if planning != PlansWith::Nobody {
                 self.adopt_plan_of(report, now);
             }
             return;
@@ -173,7 +199,7 @@ impl PhotographedWaypoints {
             return;
         }
         let follows = self.followed_at.is_some_and(|at| now - at <= FLIGHT_REPORT_LIFETIME);
-        let plans = plans && !report.flies && !follows;
+        let plans = planning == PlansWith::All && !report.flies && !follows;
         if newer > 0 {
             self.round = report.round;
             self.known.clear();
@@ -204,7 +230,8 @@ impl PhotographedWaypoints {
     /// This vehicle's next report: 19 ranges (`MAX_RANGES`) of the known waypoints in turn. In
     /// flight every other report has the waypoints that the plan leaves out, if they fit into one
     /// report.
-    pub(crate) fn next_report(&mut self, waits: bool, flies: bool) -> PhotographedReport {
+    pub(crate) fn next_report(&mut self, stage: FlightStage) -> PhotographedReport {
+        let flies = stage == FlightStage::UnderWay;
         let plan =
             flies && !self.reports_plan && self.left_out_by_plan.ranges().len() <= MAX_RANGES;
         self.reports_plan = plan;
@@ -218,7 +245,7 @@ impl PhotographedWaypoints {
                 ..PhotographedReport::default()
             };
         }
-        let done = if waits { &self.left_out_by_plan } else { &self.known };
+        let done = if stage == FlightStage::OnPad { &self.left_out_by_plan } else { &self.known };
         let first = if self.next_range < done.ranges().len() { self.next_range } else { 0 };
         self.next_range = first + MAX_RANGES;
         let ranges = done.ranges().iter().skip(first).take(MAX_RANGES).copied().collect();

@@ -255,15 +255,14 @@ impl InterruptedStates {
         if state == State::Paused { self.by_pause } else { self.by_loss }
     }
 
-    /// Stores the state that a change from `from` to `to` interrupts. `lands`: the search under way
-    /// is for a place to land, so the landing is resumed.
-    pub(crate) fn record_interruption(&mut self, from: State, to: State, lands: bool) {
+    /// Stores the state that a change from `from` to `to` interrupts. `after_search`: the state
+    /// that is resumed after a search under way, the landing if it is for a place to land.
+    pub(crate) fn record_interruption(&mut self, from: State, to: State, after_search: State) {
         use State::*;
         // These states cannot be resumed half-way: a search begins again in the state before it, a
         // disarming in the landing, and so does a start that ended with the motors armed.
         let kept = match from {
-            Replanning if lands => Land,
-            Replanning => Blocked,
+            Replanning => after_search,
             Arming | CancelStart | Disarm | LandingHeld => Land,
             other => other,
         };

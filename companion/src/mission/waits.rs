@@ -53,12 +53,15 @@ pub(crate) struct BarredStart {
 }
 
 impl BarredStart {
-    /// To be called each step: whether a vehicle or an obstacle bars the start now.
-    pub(crate) fn update(&mut self, barred: bool, now: Instant) {
-        if barred {
-            self.since.get_or_insert(now);
-            self.barred_at = now;
-        } else if now - self.barred_at > UNBARRED_AFTER {
+    /// To be called each step in which a vehicle or an obstacle bars the start.
+    pub(crate) fn note_barred(&mut self, now: Instant) {
+        self.since.get_or_insert(now);
+        self.barred_at = now;
+    }
+
+    /// To be called each step in which nothing bars the start.
+    pub(crate) fn note_free(&mut self, now: Instant) {
+        if now - self.barred_at > UNBARRED_AFTER {
             self.since = None;
         }
     }
