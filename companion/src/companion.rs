@@ -166,7 +166,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.mission.plan(),
             &self.telemetry,
             (self.neighbours.own_rank(), self.config.system_id),
-            self.detours.is_on_detour(),
+            self.detours.path_source(),
         );
         self.guidance.query_filter(self.mission.state(), &scene, &self.neighbours, now)
     }
@@ -288,7 +288,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.mission.plan(),
             &self.telemetry,
             (self.neighbours.own_rank(), self.config.system_id),
-            self.detours.is_on_detour(),
+            self.detours.path_source(),
         )
     }
 

@@ -34,20 +34,20 @@ use planner_core::track::{self, ReferenceState, TrackConfig};
 use planner_core::{Length, Point};
 
 use self::filter::SafetyFilter;
-use self::hold::Hold;
-use self::limits::{MotionLimits, Settings};
+use self::hold::{FIRST_STANDSTILL, Hold, YIELDING_STANDSTILL};
+use self::limits::{MotionLimits, Settings, Urgency};
 use self::phase::Phase;
 use self::setpoint::position_correction;
 use self::smoother::{ClockPace, SetpointSmoother, TICK_S};
 use self::waypoints::Algorithm2Waypoints;
 use crate::autopilot::limits::AutopilotLimits;
 use crate::config::Config;
-use crate::guidance::evade::EvadeSearch;
+use crate::guidance::evade::{EvadeSearch, StepBack};
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 
-pub use self::scene::GuidanceInputs;
+pub use self::scene::{GuidanceInputs, PathSource};
 pub use self::setpoint::Setpoint;
 pub use self::smoother::SetpointStats;
 
@@ -313,7 +313,7 @@ impl Guidance {
                 position,
                 along_m,
                 path: &plan.path,
-                detours: scene.is_on_detour,
+                detours: scene.is_on_detour(),
             };
             self.advice =
                 deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.states_at(now));
@@ -336,11 +336,11 @@ impl Guidance {
                     let least_m = track::braking_distance_m(&self.track, &plan.path, &self.tracker);
                     along_m + self.advice.stop_within_m.max(least_m)
                 }
-                _ => self.setpoint_m + self.smoother.stopping_distance_m(false),
+                _ => self.setpoint_m + self.smoother.stopping_distance_m(Urgency::Smooth),
             };
         }
         self.step_filter(state, scene, neighbours, now);
-        let urgent = self.filter.is_stopping(now);
+        let urgency = self.filter.urgency(now);
         let known = scene.telemetry.position_at.is_some();
         if !state.streams_setpoints() {
             self.smoother.end_stream();
@@ -371,14 +371,17 @@ impl Guidance {
             self.guides_landing = false;
             self.sent_acceleration = Point::zeros();
             self.forget_waiting();
-            self.finish_step(sends);
+            if sends {
+                self.note_place_sent();
+            }
             return true;
         }
         let up =
             state == State::Follow && self.phase == Phase::Descent && self.filter.climbs_back(now);
         let turns = self.phase == Phase::Descent && self.leg.is_some() && up != self.climbing_back;
         let leads = self.update_guided_landing(state, scene, now);
-        let goes = known && !turns && (leads || state.advances()) && (!urgent || up);
+        let goes =
+            known && !turns && (leads || state.advances()) && (urgency == Urgency::Smooth || up);
         let mut advice = if state == State::Follow { self.advice } else { Advice::FREE };
         advice.speed_scale = advice.speed_scale.min(self.filter.speed_scale(now));
         let path = scene.plan.map(|plan| &plan.path);
@@ -388,7 +391,7 @@ impl Guidance {
         if self.leg.is_none() {
             self.climbing_back = up;
         }
-        let wanted = goes || (self.back_to_m.is_some() && !urgent);
+        let wanted = goes || (self.back_to_m.is_some() && urgency == Urgency::Smooth);
         let back_up = up && self.is_leg_done();
         let holds = (!wanted || back_up)
             && self.on_path
@@ -396,8 +399,11 @@ impl Guidance {
             && state.is_on_path()
             && self.smoother.is_standing();
         let yields = self.filter.is_yielding() || state != State::Follow;
-        let late_s = if holds { neighbours.max_message_delay_s() } else { 0.0 };
-        self.hold_changed |= self.hold.step(holds, yields, late_s, now);
+        let patience = if yields { YIELDING_STANDSTILL } else { FIRST_STANDSTILL };
+        self.hold_changed |= match holds {
+            true => self.hold.stand(patience, neighbours.max_message_delay_s(), now),
+            false => self.hold.end(),
+        };
         let moves = wanted && !self.hold.is_binding(now);
         if !moves && self.smoother.is_standing() && !self.raw_point_at_rest {
             if let (Some(path), Phase::Path) = (path, self.phase) {
@@ -406,20 +412,21 @@ impl Guidance {
             self.smoother.forget_curve();
             self.forget_leg();
         }
-        let share = self.lag_share(scene.telemetry, moves, now);
-        let mut blocked = false;
+        let lag_share = self.lag_share(scene.telemetry, now);
+        let share = if moves { lag_share } else { self.standing_share() };
+        let mut back = StepBack::Free;
         let dt_s = if self.smoother.resumes_from_last() { self.unsent_s } else { dt_s };
         // Advice was computed once for this step: its stop stays at one place while the raw points
         // move on.
         let stops_at_m = advised_at_m + advice.stop_within_m;
         self.stopped_at_fence &= !moves;
-        for _ in 0..self.smoother.begin_step(ClockPace { speed_share: share, urgent }, dt_s) {
+        for _ in 0..self.smoother.begin_step(ClockPace { speed_share: share, urgency }, dt_s) {
             if self.phase == Phase::Path && !self.is_algorithm2() {
                 advice.stop_within_m = (stops_at_m - self.tracker.along_m).max(0.0);
             }
             let raw = match scene.plan {
                 Some(plan) if moves => {
-                    self.next_raw_point(state, scene, plan, &advice, neighbours, now, &mut blocked)
+                    self.next_raw_point(state, scene, plan, &advice, neighbours, now, &mut back)
                 }
                 _ if state.prepares_take_off() && known => {
                     let away = position - self.smoother.raw_point();
@@ -434,7 +441,7 @@ impl Guidance {
             };
             self.smoother.push_raw_point(raw);
         }
-        self.mark_trapped(blocked, now);
+        self.mark_trapped(back, now);
         let sound = self.smoother.make_setpoint();
         let correction = if flies && state != State::PilotControl && known {
             position_correction(
@@ -446,7 +453,7 @@ impl Guidance {
             Point::zeros()
         };
         let change = self.smoother.acceleration() + correction - self.sent_acceleration;
-        let most = self.smoother.jerk_mps3(urgent) * dt_s;
+        let most = self.smoother.jerk_mps3(urgency) * dt_s;
         self.sent_acceleration += change * (most / change.length().max(most).max(1e-6));
         if self.tracker.along_m > self.progress_m + MIN_PROGRESS_M {
             self.progress_m = self.tracker.along_m;
@@ -455,16 +462,10 @@ impl Guidance {
         if scene.plan.is_some() && (self.on_path || self.phase == Phase::Climb) && known {
             self.reported_m = self.progress_m(state, scene);
         }
-        self.finish_step(sends);
-        sound
-    }
-
-    /// Ends a step; `sends`: its setpoint carries a place, which is remembered as sent.
-    fn finish_step(&mut self, sends: bool) {
-        if sends && self.smoother.has_setpoint() {
-            self.smoother.mark_sent();
-            self.unsent_s = 0.0;
+        if sends {
+            self.note_place_sent();
         }
+        sound
     }
 
     /// System id of the neighbour that the safety filter stops for now; 0 for none. The filter's

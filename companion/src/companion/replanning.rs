@@ -36,7 +36,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn save_place_before_jump(&mut self, to: State) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
-        let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.is_on_detour());
+        let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.path_source());
         let view =
             DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
         detours.save_place_before_jump(to, &view);
@@ -46,7 +46,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn scan_for_obstacles(&mut self) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
-        let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.is_on_detour());
+        let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.path_source());
         let view =
             DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
         if let Some(clear_at) = detours.scan_path(&view) {

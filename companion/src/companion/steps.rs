@@ -32,7 +32,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.mission.plan(),
             &self.telemetry,
             (self.neighbours.own_rank(), self.config.system_id),
-            self.detours.is_on_detour(),
+            self.detours.path_source(),
         );
         if !self.guidance.step(self.mission.state(), &scene, &mut self.neighbours, now, dt_s)
             && self.timers.take_due(Timer::HeldReport, now, REPORT_EVERY)
@@ -317,8 +317,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             State::Land => self.request_landing(from),
             _ => {
                 let climbs = self.mission.uninterrupted_state().takes_off();
-                if let Some(plan) = self.mission.plan() {
-                    self.guidance.resume_flight(plan, climbs, &position, now);
+                match self.mission.plan() {
+                    Some(_) if climbs => self.guidance.resume_climb(&position, now),
+                    Some(plan) => self.guidance.resume_flight(plan, &position, now),
+                    None => {}
                 }
                 if to == State::Blocked {
                     // Counts as blocked until the next scan has checked the path.

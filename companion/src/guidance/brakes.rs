@@ -5,7 +5,7 @@ use planner_core::deconflict::Advice;
 use planner_core::flight::Path;
 
 use super::{Guidance, Phase};
-use crate::guidance::evade::{self, EvadeTarget};
+use crate::guidance::evade::{self, EvadeTarget, StepBack};
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
@@ -61,7 +61,7 @@ impl Guidance {
         let waits = state.is_on_path()
             && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.ends_away_from_goal && follows);
-        let lands_m = along_m.min(self.expected_up_to_m(alone, neighbours));
+        let lands_m = along_m.min(self.expected_up_to_m(state, neighbours));
         let beyond = alone && along_m > lands_m + BEYOND_KNOWN_M;
         let wait_m = if follows { along_m + advice.stop_within_m.max(0.0) } else { lands_m };
         let beside_m = safety_m + evade::EVADE_MARGIN_M;
@@ -93,11 +93,12 @@ impl Guidance {
         self.no_better_place = nowhere;
     }
 
-    /// Place along its path up to which others expect an `alone` vehicle, metres: gates that opened
-    /// since may have let it fly beyond what it could report. ∞ for any other vehicle, in a
+    /// Place along its path up to which others expect a vehicle in `Alone`, metres: gates that
+    /// opened since may have let it fly beyond what it could report. ∞ in any other state, in a
     /// coverage mission, and where the radio's range is known, so that others expect it further on.
-    fn expected_up_to_m<const V: usize>(&self, alone: bool, neighbours: &Neighbours<V>) -> f32 {
-        let expected = alone && neighbours.fleet().is_none() && !neighbours.knows_range();
+    fn expected_up_to_m<const V: usize>(&self, state: State, neighbours: &Neighbours<V>) -> f32 {
+        let expected =
+            state == State::Alone && neighbours.fleet().is_none() && !neighbours.knows_range();
         if expected {
             self.acknowledged_path.from_m.max(self.acknowledged_path.to_m)
         } else {
@@ -124,9 +125,10 @@ impl Guidance {
     }
 
     /// Notes whether the vehicle is trapped below one that descends: no place back along the path
-    /// is better, or the way back is barred. `blocked`: a raw point of this step could not go back.
-    pub(super) fn mark_trapped(&mut self, blocked: bool, now: Instant) {
-        let barred = blocked || (self.filter.scans_backwards() && self.filter.is_stopped());
+    /// is better, or the way back is barred. `step_back`: that of this step's raw points.
+    pub(super) fn mark_trapped(&mut self, step_back: StepBack, now: Instant) {
+        let barred = step_back == StepBack::Barred
+            || (self.filter.scans_backwards() && self.filter.is_stopped());
         if self.no_better_place || (self.back_to_m.is_some() && barred) {
             self.trapped_since.get_or_insert(now);
         } else if !self.evading

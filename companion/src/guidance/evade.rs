@@ -57,6 +57,15 @@ pub enum EvadeTarget {
     Nowhere,
 }
 
+/// Whether a vehicle can step back from below one that descends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepBack {
+    /// It can, or need not.
+    Free,
+    /// Its next step back is barred.
+    Barred,
+}
+
 /// Search for the nearest waiting place that is outside all landing columns, over several steps.
 #[derive(Clone, Debug, Default)]
 pub struct EvadeSearch {

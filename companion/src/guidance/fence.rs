@@ -13,7 +13,7 @@ use fpu::sqrtf;
 use libm::{fabsf, fmaxf, fminf};
 use planner_core::Point;
 
-use super::limits::MotionLimits;
+use super::limits::{MotionLimits, Urgency};
 use super::motion::{Motion, clamp_length};
 
 /// Distance by which setpoints stay inside the fence, metres: the autopilot's frame rounds a
@@ -171,7 +171,7 @@ impl AxisBounds {
 fn axis_brake(limits: &MotionLimits, axis: usize) -> BrakingLimits {
     BrakingLimits {
         accel_mps2: ACCEL_SHARES[axis / 2][1] * limits.max_accel_mps2[axis / 2],
-        jerk_mps3: JERK_SHARES[1] * limits.jerk(false),
+        jerk_mps3: JERK_SHARES[1] * limits.jerk(Urgency::Smooth),
     }
 }
 

@@ -14,6 +14,7 @@
 mod conflict;
 mod look;
 
+use crate::guidance::limits::Urgency;
 use crate::time::{Duration, Instant};
 
 /// Length of the path ahead that has to be free before a stopped vehicle continues, metres.
@@ -202,10 +203,13 @@ impl SafetyFilter {
         *self = Self { activations: self.activations, ..Self::default() };
     }
 
-    /// Whether the vehicle is to stop in this step: passing a stranger slowly it stops only while
-    /// the sets conflict.
-    pub(super) fn is_stopping(&self, now: Instant) -> bool {
-        self.is_stopped() && (self.sets_intersect || !self.passes_stranger(now))
+    /// Whether the filter stops the vehicle in this step: passing a stranger slowly it stops only
+    /// while the sets conflict.
+    pub(super) fn urgency(&self, now: Instant) -> Urgency {
+        match self.is_stopped() && (self.sets_intersect || !self.passes_stranger(now)) {
+            true => Urgency::Urgent,
+            false => Urgency::Smooth,
+        }
     }
 
     /// Share of the nominal speed at which the vehicle may fly: less than 1 past a stranger.
@@ -224,11 +228,12 @@ impl SafetyFilter {
 }
 
 impl SafetyFilter {
-    fn note_hindered(&mut self, yields: bool, now: Instant) {
+    /// Notes that a neighbour keeps the vehicle from continuing, to which it yields or not.
+    fn note_hindered(&mut self, now: Instant) {
         if now - self.hindered_at > FREE_AFTER {
             self.hindered_since = now;
         }
-        (self.hindered_at, self.hindered_yields) = (now, yields);
+        (self.hindered_at, self.hindered_yields) = (now, self.yields);
     }
 
     fn note_column(&mut self, found: Option<&FilterConflict>, now: Instant) {

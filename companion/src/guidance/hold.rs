@@ -14,10 +14,10 @@ use crate::time::{Duration, Instant};
 /// Time for which others rely on a reported hold: longer than three lost reports in a row.
 const HOLD_REPORT_LIFETIME: Duration = Duration::from_millis(1000);
 /// Time of standing after which a vehicle that yields reports that it holds.
-const YIELDING_STANDSTILL: Duration = Duration::from_millis(300);
+pub(super) const YIELDING_STANDSTILL: Duration = Duration::from_millis(300);
 /// Time of standing after which a vehicle that goes first reports that it holds: time for the
 /// others to stop.
-const FIRST_STANDSTILL: Duration = Duration::from_secs(4);
+pub(super) const FIRST_STANDSTILL: Duration = Duration::from_secs(4);
 
 /// Whether the vehicle reports that it holds, and when it last did.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,19 +30,16 @@ pub(crate) struct Hold {
 }
 
 impl Hold {
-    /// One step. `stands`: the vehicle stands and is not to move; `yields`: another one goes first;
-    /// `late_s`: delay of messages, seconds. Returns whether the hold begins or ends.
-    pub(super) fn step(&mut self, stands: bool, yields: bool, late_s: f32, now: Instant) -> bool {
-        if stands {
-            self.message_delay = Duration::from_micros((late_s * 1e6) as u64);
-        }
-        self.since = self.since.or(Some(now)).filter(|_| stands);
-        let patience = if yields { YIELDING_STANDSTILL } else { FIRST_STANDSTILL };
-        let on = self.since.is_some_and(|since| now - since >= patience || self.on);
+    /// One step in which the vehicle stands and is not to move; after `patience` the hold begins.
+    /// `late_s`: delay of messages, seconds. Returns whether it begins.
+    pub(super) fn stand(&mut self, patience: Duration, late_s: f32, now: Instant) -> bool {
+        self.message_delay = Duration::from_micros((late_s * 1e6) as u64);
+        let since = *self.since.get_or_insert(now);
+        let on = now - since >= patience || self.on;
         core::mem::replace(&mut self.on, on) != on
     }
 
-    /// Ends the hold: guidance no longer moves the vehicle. Returns whether it was on.
+    /// Ends the hold: the vehicle moves, or guidance no longer moves it. Returns whether it was on.
     pub(super) fn end(&mut self) -> bool {
         self.since = None;
         core::mem::take(&mut self.on)

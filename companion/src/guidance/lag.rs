@@ -7,9 +7,8 @@ use planner_core::Length;
 
 impl Guidance {
     /// Share of the nominal speed at which the setpoint advances: 1 while its lead over the vehicle
-    /// is at most half of the greatest lead, 0 at the greatest lead. `moves`: the vehicle is to fly
-    /// on.
-    pub(super) fn lag_share(&mut self, telemetry: &Telemetry, moves: bool, now: Instant) -> f32 {
+    /// is at most half of the greatest lead, 0 at the greatest lead. To be called each step.
+    pub(super) fn lag_share(&mut self, telemetry: &Telemetry, now: Instant) -> f32 {
         let place = self.smoother.position();
         let lead_m = self.lead_m(telemetry);
         let advance = place - self.followed_place;
@@ -18,12 +17,13 @@ impl Guidance {
             (self.followed_at, self.followed_place) = (now, place);
         }
         let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
-        match moves {
-            true => share.min(self.estimate_speed_share),
-            // At rest the setpoint holds; before the take-off it follows the position estimate.
-            false if self.raw_point_at_rest => 1.0,
-            false => 0.0,
-        }
+        share.min(self.estimate_speed_share)
+    }
+
+    /// Share of the nominal speed at which the setpoint advances while the vehicle is not to fly
+    /// on: at rest it holds; before the take-off it follows the position estimate.
+    pub(super) fn standing_share(&self) -> f32 {
+        if self.raw_point_at_rest { 1.0 } else { 0.0 }
     }
 
     /// Time for which the vehicle has not been at its setpoint, and the setpoint has not advanced

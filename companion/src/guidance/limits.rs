@@ -27,6 +27,15 @@ const UNHEARD_NOTICED_S: f32 = 1.8;
 /// Least limit of the speed on a straight leg (climb, join, descent), m/s.
 pub(crate) const JOIN_MPS: f32 = 1.0;
 
+/// With how much jerk a setpoint may brake.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Urgency {
+    /// Outside stops by the safety filter.
+    Smooth,
+    /// In a stop by the safety filter, with twice the jerk.
+    Urgent,
+}
+
 /// Limits of a vehicle's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionLimits {
@@ -71,10 +80,12 @@ impl MotionLimits {
         }
     }
 
-    /// Greatest jerk of a setpoint, m/s³; higher where the safety filter stops the vehicle
-    /// (`urgent`).
-    pub(crate) fn jerk(&self, urgent: bool) -> f32 {
-        if urgent { fminf(MAX_URGENT_JERK_MPS3, 2.0 * self.jerk_mps3) } else { self.jerk_mps3 }
+    /// Greatest jerk of a setpoint, m/s³; higher where the safety filter stops the vehicle.
+    pub(crate) fn jerk(&self, urgency: Urgency) -> f32 {
+        match urgency {
+            Urgency::Smooth => self.jerk_mps3,
+            Urgency::Urgent => fminf(MAX_URGENT_JERK_MPS3, 2.0 * self.jerk_mps3),
+        }
     }
 
     /// Greatest acceleration of the reference along a direction (a unit vector, or nearly zero),

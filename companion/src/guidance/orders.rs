@@ -2,6 +2,7 @@
 //! path, lead a landing down.
 
 use super::acknowledged_path::AcknowledgedPath;
+use super::limits::Urgency;
 use super::nearest::nearest_arc_length_m;
 use super::phase::Phase;
 use super::smoother::TICK_S;
@@ -150,7 +151,7 @@ impl Guidance {
 
     /// Nearest place along the path at which the vehicle could stop now, metres.
     pub(crate) fn stopping_point_m(&self) -> f32 {
-        let braking_m = self.smoother.stopping_distance_m(false);
+        let braking_m = self.smoother.stopping_distance_m(Urgency::Smooth);
         self.tracker.along_m.max(self.setpoint_m + braking_m)
     }
 
@@ -178,22 +179,24 @@ impl Guidance {
         self.guides_landing = false;
     }
 
+    /// Resumes the climb after an interruption, from the setpoint, or from the vehicle where there
+    /// is none.
+    pub fn resume_climb(&mut self, position: &Point, now: Instant) {
+        self.hold_at(*position);
+        self.followed_at = now;
+        self.phase = Phase::Climb;
+    }
+
     /// Resumes the flight after an interruption, from the setpoint, or from the vehicle where there
-    /// is none: up its climb (`climbs`), down its descent, or on from the nearest point of the
-    /// path.
+    /// is none: down its descent, or on from the nearest point of the path.
     pub fn resume_flight<const W: usize, const G: usize>(
         &mut self,
         plan: &VehiclePlan<W, G>,
-        climbs: bool,
         position: &Point,
         now: Instant,
     ) {
         self.hold_at(*position);
         self.followed_at = now;
-        if climbs {
-            self.phase = Phase::Climb;
-            return;
-        }
         let (path, place) = (&plan.path, self.smoother.position());
         let below = path.point_at(path.length_m()).is_some_and(|end| {
             end.z > place.z && (end - place).xy().norm_squared() < ARRIVED_M * ARRIVED_M

@@ -42,4 +42,12 @@ impl Guidance {
             scene.plan.and_then(|plan| task::heading(&plan.task, &plan.path, self.setpoint_m));
         Setpoint::Move(smoother.position(), velocity, self.sent_acceleration, heading)
     }
+
+    /// Ends a step whose setpoint, if there is one, carries a place: that is remembered as sent.
+    pub(super) fn note_place_sent(&mut self) {
+        if self.smoother.has_setpoint() {
+            self.smoother.mark_sent();
+            self.unsent_s = 0.0;
+        }
+    }
 }

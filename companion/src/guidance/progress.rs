@@ -48,7 +48,7 @@ impl Guidance {
         &self,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> f32 {
-        let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.is_on_detour) else {
+        let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.is_on_detour()) else {
             return f32::NEG_INFINITY;
         };
         let gate_m = plan.gates.get(self.gates_open).map_or(f32::INFINITY, |gate| gate.at_m);

@@ -12,14 +12,14 @@ use super::{
     GuidanceInputs, LEG_LEAD_M, MIN_LEG_M, Phase, SETTLE_WINDOW_M, TOUCHDOWN_MPS,
 };
 use crate::autopilot::AutopilotKind;
-use crate::guidance::evade;
+use crate::guidance::evade::{self, StepBack};
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
 impl Guidance {
-    /// Advances the raw point by a tick, and the phase if the present one is done. Sets `blocked`
-    /// if a step back from below a vehicle that descends was not possible.
+    /// Advances the raw point by a tick, and the phase if the present one is done. Notes
+    /// whether a step back from below a vehicle that descends was barred.
     #[expect(clippy::too_many_arguments, reason = "what a step knows")]
     pub(super) fn next_raw_point<const V: usize, const W: usize, const G: usize>(
         &mut self,
@@ -29,7 +29,7 @@ impl Guidance {
         advice: &Advice,
         neighbours: &mut Neighbours<V>,
         now: Instant,
-        blocked: &mut bool,
+        step_back: &mut StepBack,
     ) -> Point {
         let path = &plan.path;
         let raw = self.smoother.raw_point();
@@ -67,7 +67,7 @@ impl Guidance {
                     .unwrap_or(raw);
             }
             Phase::Path => {
-                return self.next_on_path(path, advice, neighbours, now, blocked).unwrap_or(raw);
+                return self.next_on_path(path, advice, neighbours, now, step_back).unwrap_or(raw);
             }
         };
         let Some(target) = target else { return raw };
@@ -119,7 +119,7 @@ impl Guidance {
         advice: &Advice,
         neighbours: &mut Neighbours<V>,
         now: Instant,
-        blocked: &mut bool,
+        step_back: &mut StepBack,
     ) -> Option<Point> {
         let mut advice = *advice;
         if let Some(to_m) = self.back_to_m {
@@ -135,7 +135,7 @@ impl Guidance {
             {
                 return Some(place);
             } else {
-                *blocked = true;
+                *step_back = StepBack::Barred;
                 advice.stop_within_m = 0.0;
             }
         }

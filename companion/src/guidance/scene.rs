@@ -14,8 +14,17 @@ pub struct GuidanceInputs<'a, const W: usize, const G: usize> {
     pub rank: u16,
     /// MAVLink system id of the vehicle.
     pub id: u8,
-    /// Whether the path is a detour, not that of the shared plan.
-    pub is_on_detour: bool,
+    /// Where that path comes from.
+    pub source: PathSource,
+}
+
+/// Where the path that a vehicle flies comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PathSource {
+    /// From the plan that all vehicles share.
+    SharedPlan,
+    /// It is a detour of this vehicle alone.
+    Detour,
 }
 
 impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
@@ -24,9 +33,14 @@ impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
         plan: Option<&'a VehiclePlan<W, G>>,
         telemetry: &'a Telemetry,
         (rank, id): (u16, u8),
-        detours: bool,
+        source: PathSource,
     ) -> Self {
         let plan = plan.filter(|plan| !plan.path.waypoints().is_empty());
-        Self { plan, telemetry, rank, id, is_on_detour: detours }
+        Self { plan, telemetry, rank, id, source }
+    }
+
+    /// Whether the path is a detour, not that of the shared plan.
+    pub(crate) fn is_on_detour(&self) -> bool {
+        self.source == PathSource::Detour
     }
 }

@@ -29,7 +29,7 @@ use libm::{fmaxf, fminf};
 use planner_core::{Length, Point};
 
 use super::fence::Fence;
-use super::limits::{MAX_SMOOTHING_S, MotionLimits};
+use super::limits::{MAX_SMOOTHING_S, MotionLimits, Urgency};
 use super::motion::{Motion, clamp_length};
 
 /// Time between two raw points, seconds: the period of the setpoints.
@@ -77,7 +77,7 @@ pub struct ClockPace {
     /// 1 runs at full speed, 0 stops.
     pub speed_share: f32,
     /// Whether the safety filter stops the vehicle: then the clock brakes with the higher jerk.
-    pub urgent: bool,
+    pub urgency: Urgency,
 }
 
 /// Statistics of the setpoints since the start: greatest values, and number of steps in which the
@@ -129,7 +129,7 @@ pub struct SetpointSmoother {
     /// Of the step under way: its length, whether the safety filter stops, whether all raw points
     /// were sound.
     dt_s: f32,
-    stopping: bool,
+    urgency: Urgency,
     raw_points_valid: bool,
     /// Acceleration of the curve at the last setpoint.
     curve_acceleration: Point,
@@ -158,7 +158,7 @@ impl SetpointSmoother {
             resumes: false,
             followed_velocity: Point::zeros(),
             dt_s: 0.0,
-            stopping: false,
+            urgency: Urgency::Smooth,
             raw_points_valid: true,
             curve_acceleration: Point::zeros(),
             motion: Motion::at_rest(Point::zeros()),
@@ -208,14 +208,14 @@ impl SetpointSmoother {
         self.steps[self.newest_step].length() / TICK_S * self.clock_speed
     }
 
-    /// Greatest jerk of a setpoint, m/s³; with `urgent` that of a stop by the safety filter.
-    pub(crate) fn jerk_mps3(&self, urgent: bool) -> f32 {
-        self.limits.jerk(urgent)
+    /// Greatest jerk of a setpoint, m/s³.
+    pub(crate) fn jerk_mps3(&self, urgency: Urgency) -> f32 {
+        self.limits.jerk(urgency)
     }
 
     /// Whether the setpoint is in a stop by the safety filter, until it no longer brakes.
     pub(crate) fn is_in_urgent_stop(&self) -> bool {
-        self.has_setpoint && self.stopping
+        self.has_setpoint && self.urgency == Urgency::Urgent
     }
 
     /// Distance of the setpoint from its curve, metres.
@@ -230,19 +230,19 @@ impl SetpointSmoother {
     }
 
     /// Length of a stop of the setpoint that begins now, metres: while the braking builds up, and
-    /// while the setpoint brakes. `urgent`: for the safety filter.
-    pub(crate) fn stopping_distance_m(&self, urgent: bool) -> f32 {
+    /// while the setpoint brakes.
+    pub(crate) fn stopping_distance_m(&self, urgency: Urgency) -> f32 {
         let velocity = self.velocity();
         let speed = sqrtf(velocity.norm_squared());
         if speed < SETPOINT_STANDSTILL_MPS {
             return 0.0;
         }
         let accel = self.limits.accel_along(&(velocity / speed));
-        let jerk = CLOCK_JERK_SHARE * self.limits.jerk(urgent);
+        let jerk = CLOCK_JERK_SHARE * self.limits.jerk(urgency);
         let ahead = fmaxf(self.acceleration().dot(&velocity) / speed, 0.0);
         let build_up_s = (accel + ahead) / jerk + TICK_S;
         let end_s =
-            0.5 * accel / (END_JERK_SHARE * self.limits.jerk(urgent)) + 0.5 / STOP_DECAY_PER_S;
+            0.5 * accel / (END_JERK_SHARE * self.limits.jerk(urgency)) + 0.5 / STOP_DECAY_PER_S;
         speed * speed / (2.0 * accel)
             + speed * build_up_s
             + fminf(speed, accel * end_s) * end_s
@@ -352,8 +352,11 @@ impl SetpointSmoother {
         // A stop by the safety filter keeps its higher jerk until it no longer brakes.
         let brakes =
             self.clock_acceleration < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
-        self.stopping = pace.urgent || (self.stopping && brakes);
-        let pace = ClockPace { urgent: self.stopping, ..pace };
+        self.urgency = match pace.urgency {
+            Urgency::Smooth if brakes => self.urgency,
+            urgency => urgency,
+        };
+        let pace = ClockPace { urgency: self.urgency, ..pace };
         let clock_before = self.clock_speed;
         self.run_clock(pace, self.dt_s);
         self.tick_fraction += 0.5 * (clock_before + self.clock_speed) * self.dt_s / TICK_S;
@@ -400,15 +403,14 @@ impl SetpointSmoother {
         }
         self.curve_acceleration = acceleration;
         let before = self.motion;
-        let jerk_mps3 = self.limits.jerk(self.stopping);
+        let jerk_mps3 = self.limits.jerk(self.urgency);
         self.motion.follow(&to, &self.limits, self.fence.as_ref(), jerk_mps3, dt_s);
         self.hold_inside();
         let step_m = (self.motion.position - before.position).length();
         let jerk_mps3 = (self.motion.acceleration - before.acceleration).length() / dt_s;
-        let worst = if self.stopping {
-            &mut self.stats.urgent_jerk_mps3
-        } else {
-            &mut self.stats.jerk_mps3
+        let worst = match self.urgency {
+            Urgency::Smooth => &mut self.stats.jerk_mps3,
+            Urgency::Urgent => &mut self.stats.urgent_jerk_mps3,
         };
         *worst = fmaxf(*worst, jerk_mps3);
         self.stats.speed_mps = fmaxf(self.stats.speed_mps, (step_m - STEP_SLACK_M) / dt_s);
@@ -471,9 +473,9 @@ impl SetpointSmoother {
 
 /// Number of ticks in each average's window: long enough for the limit of jerk.
 fn ticks_per_average(limits: &MotionLimits) -> usize {
-    let n =
-        libm::ceilf(2.0 * JERK_RESERVE * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3)
-            as usize;
+    let n = libm::ceilf(
+        2.0 * JERK_RESERVE * limits.accel_mps2 / (limits.jerk(Urgency::Smooth) * TICK_S) - 1e-3,
+    ) as usize;
     n.clamp(MIN_WINDOW_TICKS, MAX_WINDOW_TICKS)
 }
 

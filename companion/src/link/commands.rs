@@ -204,9 +204,7 @@ impl PendingCommands {
         use State::*;
         let guard = row.guard;
         self.resume = false;
-        if matches!(to, Aborted | Done)
-            || matches!(row.action, Action::ForgetStart | Action::CancelStart)
-        {
+        if to.is_over() || matches!(row.action, Action::ForgetStart | Action::CancelStart) {
             *self = Self::default();
         }
         let lands = matches!(to, Land | Stopping);

@@ -5,6 +5,7 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{self, MotionBounds, OwnSet, REACTION_S, ReachableSet};
 use planner_core::{Length, Point};
 
+use super::super::limits::Urgency;
 use super::super::{Guidance, GuidanceInputs, Phase};
 use super::{FilterConflict, MAX_STOP_FOR_STRANGER};
 use crate::autopilot::telemetry::Telemetry;
@@ -52,8 +53,10 @@ impl Guidance {
         let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
         let reference_mps = fpu::sqrtf(self.smoother.velocity().norm_squared());
         let speed_mps = reference_mps.max(velocity_mps - STOPPING_SWAY_MPS);
-        let braking_m =
-            bounds.braking.stop_m(speed_mps).max(self.smoother.stopping_distance_m(true));
+        let braking_m = bounds
+            .braking
+            .stop_m(speed_mps)
+            .max(self.smoother.stopping_distance_m(Urgency::Urgent));
         let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
         let here = self.smoother.position();
         let points = path.waypoints();
@@ -213,7 +216,7 @@ impl Guidance {
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
-        !self.returning && !scene.is_on_detour && !state.lands()
+        !self.returning && !scene.is_on_detour() && !state.lands()
     }
 
     /// Whether this vehicle lets the neighbour `met` go first: a vehicle on the plan goes before

@@ -5,7 +5,7 @@ use planner_core::deconflict::Method;
 use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{Legs, OwnSet, REACTION_S, ReachableSet};
 
-use super::super::limits::filter_bounds;
+use super::super::limits::{Urgency, filter_bounds};
 use super::super::motion::clamp_to;
 use super::super::{Guidance, GuidanceInputs};
 use super::{
@@ -92,7 +92,8 @@ impl Guidance {
             }
             FlightDirection::Vertical { to_m, speed_mps } => {
                 let speed_mps = if stopped { 0.0 } else { speed_mps };
-                let stop_m = if stopped { 0.0 } else { self.smoother.stopping_distance_m(true) };
+                let stop_m =
+                    if stopped { 0.0 } else { self.smoother.stopping_distance_m(Urgency::Urgent) };
                 let braking_m = bounds.braking.stop_m(speed_mps).max(stop_m);
                 let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
                 let down = to_m < position.z;
@@ -139,14 +140,15 @@ impl Guidance {
                     self.filter.activations = self.filter.activations.wrapping_add(1);
                 }
                 self.filter.clear_since = None;
+                self.filter.yields = found.yields;
                 // A stranger counts as a hindrance only where it bars even the slow flight past it.
                 if !found.stranger || self.filter.passes_stranger(now) {
-                    self.filter.note_hindered(found.yields, now);
+                    self.filter.note_hindered(now);
                 }
                 if neighbours.comes_down_unheard(found.id, now) {
                     self.filter.fall_at = now;
                 }
-                (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
+                self.filter.blocker = found.id;
                 (self.filter.blocker_is_stranger, self.filter.blocker_rests) =
                     (found.stranger, found.rests);
             }
@@ -176,7 +178,7 @@ impl Guidance {
     ) -> f32 {
         let z_m = scene.telemetry.position.z;
         let mut ground_m = self.ground_m(plan).min(z_m);
-        if self.returning && scene.is_on_detour {
+        if self.returning && scene.is_on_detour() {
             // The way back along a detour ends in the air where the detour began: the ground there
             // counts as no higher than the climb's height below that.
             ground_m = plan
@@ -233,9 +235,9 @@ impl Guidance {
             && self.advice.stop_within_m.min(self.wait_distance_m) < STANDSTILL_WITHIN_M
             && !scene.plan.is_some_and(gate)
         {
-            self.filter.note_hindered(id < scene.id, now);
             (self.filter.yields, self.filter.blocker_rests) =
                 (id < scene.id, neighbours.is_at_rest(id, now));
+            self.filter.note_hindered(now);
         }
     }
 }

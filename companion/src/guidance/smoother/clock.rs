@@ -35,7 +35,7 @@ impl SetpointSmoother {
         let lack = (pace.speed_share.clamp(0.0, 1.0) - clock) * speed;
         let size = fmaxf(fabsf(lack) - fabsf(self.clock_acceleration) * speed * dt_s, 0.0);
         let end_share = if lack > 0.0 { RISE_JERK_SHARE } else { END_JERK_SHARE };
-        let end_jerk = end_share * limits.jerk(pace.urgent);
+        let end_jerk = end_share * limits.jerk(pace.urgency);
         let rate = fminf(fminf(accel, sqrtf(2.0 * end_jerk * size)), STOP_DECAY_PER_S * size);
         let wanted = if lack < 0.0 { -rate } else { rate };
         let own = along * clock * clock;
@@ -48,7 +48,7 @@ impl SetpointSmoother {
         let ahead = bend + third * (clock * dt_s);
         let next = (clock + self.clock_acceleration * dt_s).clamp(0.0, 1.0);
         let change = ahead * (next * next) - self.curve_acceleration;
-        let most = PLANNED_JERK_SHARE * limits.jerk(pace.urgent) * dt_s;
+        let most = PLANNED_JERK_SHARE * limits.jerk(pace.urgency) * dt_s;
         let slope_sq = fmaxf(slope.norm_squared(), MIN_CURVE_MPS * MIN_CURVE_MPS);
         let middle = -change.dot(&slope) / slope_sq;
         let left = most * most - change.norm_squared() + middle * middle * slope_sq;

@@ -48,10 +48,10 @@ proptest! {
             paces.iter().flat_map(|p| (0..p.2).map(move |_| (p.0, p.1, p.2))).enumerate()
         {
             let pace = match kind {
-                0 => ClockPace { speed_share: 0.0, urgent: false },
-                1 => ClockPace { speed_share: 0.0, urgent: true },
-                2 => ClockPace { speed_share: share, urgent: false },
-                _ => ClockPace { speed_share: 1.0, urgent: false },
+                0 => ClockPace { speed_share: 0.0, urgency: Urgency::Smooth },
+                1 => ClockPace { speed_share: 0.0, urgency: Urgency::Urgent },
+                2 => ClockPace { speed_share: share, urgency: Urgency::Smooth },
+                _ => ClockPace { speed_share: 1.0, urgency: Urgency::Smooth },
             };
             // Most steps are on time.
             let dt_s = if step % 7 == 0 { late[step % late.len()] } else { TICK_S };
@@ -90,7 +90,7 @@ proptest! {
             let [across, up] = LIMITS.max_accel_mps2;
             prop_assert!(a.xy().norm() <= across + 1e-4 && a.z.abs() <= up + 1e-4, "{a:?}");
             let jerk = (a - acceleration).norm() / dt_s;
-            let most = LIMITS.jerk(smoother.stopping);
+            let most = LIMITS.jerk(smoother.urgency);
             prop_assert!(jerk <= most * 1.001 + 1e-3, "{jerk} m/s³ of {most}, {pace:?}");
             if let Some((low, high)) = fence {
                 prop_assert!((0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]));
@@ -146,9 +146,10 @@ proptest! {
                 step += 1;
                 let (kind, share) = paces[step % paces.len()];
                 let pace = match kind {
-                    0 => ClockPace { speed_share: 0.0, urgent: step % 3 == 0 },
-                    1 => ClockPace { speed_share: share, urgent: false },
-                    _ => ClockPace { speed_share: 1.0, urgent: false },
+                    0 if step % 3 == 0 => ClockPace { speed_share: 0.0, urgency: Urgency::Urgent },
+                    0 => ClockPace { speed_share: 0.0, urgency: Urgency::Smooth },
+                    1 => ClockPace { speed_share: share, urgency: Urgency::Smooth },
+                    _ => ClockPace { speed_share: 1.0, urgency: Urgency::Smooth },
                 };
                 let dt_s = if step % 7 == 0 { late[step % late.len()] } else { TICK_S };
                 let before = smoother.acceleration();
@@ -167,7 +168,7 @@ proptest! {
                 // Two axes that begin to brake at once pass the disc's edge by a hair.
                 prop_assert!(a.xy().norm() <= across * 1.02 && a.z.abs() <= up + 1e-3, "{a:?}");
                 let jerk = (a - before).norm() / dt_s.min(0.2);
-                let most = limits.jerk(smoother.stopping);
+                let most = limits.jerk(smoother.urgency);
                 prop_assert!(
                     jerk <= most * 1.001 + 1e-3,
                     "{jerk} m/s³ of {most} at {place:?} of {low:?} {high:?}"

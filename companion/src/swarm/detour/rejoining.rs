@@ -4,6 +4,7 @@
 
 use super::path_kind::{DetourPurpose, PathKind, RejoinPlace, RejoinPlaces};
 use super::{Detours, beside};
+use crate::guidance::PathSource;
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 
@@ -18,6 +19,11 @@ impl Detours {
     /// Whether the path that is flown is not the plan's.
     pub(crate) fn is_on_detour(&self) -> bool {
         self.path_kind.is_detour()
+    }
+
+    /// Where the path that is flown comes from, for guidance.
+    pub(crate) fn path_source(&self) -> PathSource {
+        if self.is_on_detour() { PathSource::Detour } else { PathSource::SharedPlan }
     }
 
     /// Purpose of the path that is requested from the shell; `None` if none is.
