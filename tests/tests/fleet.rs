@@ -15,7 +15,7 @@
 use std::collections::VecDeque;
 
 use companion::link::roster::{MemberStatus, RosterReport};
-use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport};
+use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport, StartStatus};
 use companion::time::{Duration, Instant};
 use flockmate_tests::number;
 use flockmate_tests::parts::{WAYPOINT_DM, parts};
@@ -188,7 +188,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 vehicle.heard_at[from] = Some(now);
                 vehicle.heard_bits[from] = bits;
                 if let Some(roster) = roster {
-                    vehicle.fleet.handle_roster(from, &roster, false);
+                    vehicle.fleet.handle_roster(from, &roster, StartStatus::Started);
                 }
             }
             let fresh =
@@ -448,7 +448,7 @@ fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
     assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM), "vehicle 2 is lost");
     let mut finished = fleet.roster_message(0);
     finished.entries[2].status = MemberStatus::Finished;
-    fleet.handle_roster(2, &finished, false);
+    fleet.handle_roster(2, &finished, StartStatus::Started);
     step(&mut fleet, 50, 2);
     assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM));
 }

@@ -314,7 +314,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.neighbours.forget_avoided();
             self.guidance.begin_path_at(back_m, self.now);
         }
-        self.detours.end_area_detour(meets);
+        match meets {
+            true => self.detours.end_area_detour(),
+            false => self.detours.give_up_plan(),
+        }
     }
 
     /// Handles the shell's answer to the request for a division's plan.
@@ -338,7 +341,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.links.send_text(Severity::Warning, "What is left cannot be divided");
             }
             Err(_) if may_take && self.detours.is_beside_plan() => {
-                self.detours.end_area_detour(false);
+                self.detours.give_up_plan();
             }
             Err(_) if may_take && division > self.mission.division_count() => {
                 self.mission.keep_plan_after_division(division);
@@ -366,7 +369,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                         false => self.guidance.reset(),
                     }
                 } else if self.detours.is_beside_plan() {
-                    self.detours.end_area_detour(false);
+                    self.detours.give_up_plan();
                 } else {
                     self.links.send_text(Severity::Warning, "The division begins elsewhere");
                 }

@@ -21,6 +21,7 @@ use crate::link::roster::RosterReport;
 use crate::link::severity::Severity;
 use crate::link::{OnDemandMessage, rate_limit};
 use crate::services::{ReceivedFrame, ftp};
+use crate::swarm::fleet::StartStatus;
 use crate::swarm::neighbours::relay::Relay;
 use crate::timers::Timer;
 
@@ -161,8 +162,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
         } else if let Some(roster) = RosterReport::decode(payload, id) {
             if roster.mission_crc == self.config.mission_crc {
-                let waits = self.is_not_started();
-                self.neighbours.handle_roster(id, &roster, waits);
+                let own = match self.is_not_started() {
+                    true => StartStatus::NotStarted,
+                    false => StartStatus::Started,
+                };
+                self.neighbours.handle_roster(id, &roster, own);
             }
         } else if let Some(report) = PhotographedReport::decode(payload, id) {
             self.handle_done_report(&report);

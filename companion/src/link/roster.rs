@@ -55,6 +55,12 @@ pub enum MemberStatus {
 
 impl MemberStatus {
     const ALL: [Self; 4] = [Self::Alive, Self::Lost, Self::Left, Self::Finished];
+
+    /// The status that counts in another plan or division than the one that it was reported of. A
+    /// vehicle that had finished its part may have another part there: it counts as having left.
+    pub(crate) fn in_another_division(self) -> Self {
+        if self == Self::Finished { Self::Left } else { self }
+    }
 }
 
 /// State of one vehicle of the roster, as the sender of the report knows it.
@@ -74,6 +80,18 @@ pub struct RosterReportEntry {
     pub holds: bool,
     /// Whether the vehicle computed the same hash of the division under way as the sender.
     pub agrees: bool,
+}
+
+impl RosterReportEntry {
+    /// The entry without what depends on the plan and division: places along the path.
+    pub(crate) fn without_places(&self) -> Self {
+        Self { incarnation: self.incarnation, status: self.status, ..Self::default() }
+    }
+
+    /// The entry as it counts in another plan or division than the one that it was reported of.
+    pub(crate) fn in_another_division(&self) -> Self {
+        Self { status: self.status.in_another_division(), ..self.without_places() }
+    }
 }
 
 /// The roster report, with at most [`MAX_ENTRIES`] vehicles.

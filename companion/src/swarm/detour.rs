@@ -236,16 +236,11 @@ impl Detours {
             && self.area_searches.may_seek(view.now)
     }
 
-    /// Ends a detour in a coverage mission. If the vehicle's own plan `came` from the shell, it
-    /// flies that next; else it does not return to its plan.
-    pub(crate) fn end_area_detour(&mut self, came: bool) {
-        if came {
-            let field_searches = self.area_searches;
-            self.forget_plan();
-            (self.path_kind, self.area_searches) = (PathKind::PlanReady, field_searches);
-        } else {
-            self.give_up_plan();
-        }
+    /// Ends a detour in a coverage mission: the vehicle flies its own plan, which has come, next.
+    pub(crate) fn end_area_detour(&mut self) {
+        let field_searches = self.area_searches;
+        self.forget_plan();
+        (self.path_kind, self.area_searches) = (PathKind::PlanReady, field_searches);
     }
 
     /// Whether the requested detour has come and is not flown yet.
@@ -338,7 +333,7 @@ impl Detours {
             self.scanned_at = now;
             self.scan_began.get_or_insert(now);
         }
-        let looked = self.take_scan_result(on_ground, view);
+        let looked = self.take_scan_result(view);
         if looked.is_some() || due {
             self.update_blocked(view);
         }
@@ -348,11 +343,10 @@ impl Detours {
     /// Continues the scan under way; `None` while it goes on, or where there is none.
     fn take_scan_result<const V: usize, const W: usize, const G: usize>(
         &mut self,
-        on_ground: bool,
         view: &DetourView<'_, V, W, G>,
     ) -> Option<ScanResult> {
         let began = self.scan_began?;
-        let in_the_way = self.continue_path_scan(on_ground, view)?;
+        let in_the_way = self.continue_path_scan(view)?;
         self.scan_began = None;
         self.obstructed = in_the_way;
         Some(ScanResult { clear_at: (!in_the_way).then_some(began) })
@@ -422,11 +416,13 @@ impl Detours {
     /// Whether an obstacle is on the path; `None` while the scan is not finished.
     fn continue_path_scan<const V: usize, const W: usize, const G: usize>(
         &mut self,
-        on_ground: bool,
         view: &DetourView<'_, V, W, G>,
     ) -> Option<bool> {
         let Some(plan) = view.mission.plan() else { return Some(false) };
-        let here = if on_ground { view.mission.pad_position() } else { view.telemetry.position };
+        let here = match view.mission.state() {
+            State::Scheduled | State::PadReplanning => view.mission.pad_position(),
+            _ => view.telemetry.position,
+        };
         let along_m = view.guidance.along_m();
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
         // A hovering vehicle sways. So in a coverage mission an obstacle that has blocked the path
@@ -434,7 +430,7 @@ impl Detours {
         let waits = view.config.lost_vehicle_down_s.is_some()
             && view.mission.state() == State::Blocked
             && self.obstructed;
-        let [beside_m, beyond_m] = beside::blocking_distances_m(waits);
+        let [beside_m, beyond_m] = if waits { beside::STAYS_BLOCKED_M } else { beside::BLOCKED_M };
         let apart_m = view.config.safety_distance_m + beside_m;
         let (now, neighbours) = (view.now, view.neighbours);
         let new = self.obstacles.unavoided();

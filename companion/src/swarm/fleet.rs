@@ -42,6 +42,15 @@ const LANDED_AFTER_SILENCE: Duration = Duration::from_secs(1800);
 /// Number of distinct incarnations, the counts of a vehicle's flights: 3 bits.
 const INCARNATIONS: u8 = 8;
 
+/// Whether this vehicle was started.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartStatus {
+    /// Not yet, or no more after a restart: it may take part again as a new vehicle.
+    NotStarted,
+    /// It was started.
+    Started,
+}
+
 /// This vehicle's state, as it reports it to the fleet.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnReport {
@@ -191,7 +200,7 @@ impl<const V: usize> Fleet<V> {
         self.division_inputs.clear();
         self.previous_inputs.clear();
         for member in &mut self.members {
-            member.entry = entry_in_division(&member.entry, false);
+            member.entry = member.entry.in_another_division();
             (member.has_part, member.hash) = (true, 0);
         }
     }
@@ -233,10 +242,13 @@ impl<const V: usize> Fleet<V> {
         if caught_up && entry.status == MemberStatus::Alive {
             entry.progress_dm = entry.progress_dm.max(own.progress_dm);
         }
-        entry.status = entry.status.max(status_in_division(own.status, caught_up));
+        let status = if caught_up { own.status } else { own.status.in_another_division() };
+        entry.status = entry.status.max(status);
         let takes_off = !own.waits && entry.status == MemberStatus::Alive;
-        self.note_flight(usize::from(self.own), takes_off, false);
-        let mut linked = self.own_bit();
+        let bit = self.own_bit();
+        self.in_flight = if takes_off { self.in_flight | bit } else { self.in_flight & !bit };
+        self.hear_flight &= !bit;
+        let mut linked = bit;
         let counted = self.counted_ranks();
         for (rank, member) in self.members.iter_mut().enumerate() {
             let heard = hearing(rank);
@@ -282,14 +294,6 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Notes what the vehicle of this rank reports: whether it is in flight, and hears one that is.
-    fn note_flight(&mut self, rank: usize, flies: bool, hears: bool) {
-        let bit = 1u32 << rank.min(31);
-        for (bits, set) in [(&mut self.in_flight, flies), (&mut self.hear_flight, hears)] {
-            *bits = if set { *bits | bit } else { *bits & !bit };
-        }
-    }
-
     /// Whether another vehicle is in flight, as far as this one has heard, or as a vehicle that it
     /// hears has heard. A vehicle that fell silent in flight may still fly.
     fn knows_flight(&self) -> bool {
@@ -313,7 +317,7 @@ impl<const V: usize> Fleet<V> {
         for (rank, member) in self.members.iter_mut().enumerate() {
             member.heard_at = now;
             if rank != usize::from(self.own) {
-                member.entry = entry_in_division(&member.entry, false);
+                member.entry = member.entry.in_another_division();
             }
         }
     }
@@ -418,7 +422,10 @@ impl<const V: usize> Fleet<V> {
         for (member, input) in self.members.iter_mut().zip(&inputs) {
             member.has_part &= input.alive;
             member.hash = 0;
-            member.entry = entry_in_division(&member.entry, !input.alive);
+            member.entry = match input.alive {
+                true => member.entry.in_another_division(),
+                false => member.entry.without_places(),
+            };
         }
         // With `MAX_DIVISIONS` no further one is ever under way.
         let _ = self.divisions.push(inputs);
@@ -481,19 +488,4 @@ impl<const V: usize> Fleet<V> {
     pub fn committed_hash(&self) -> u32 {
         self.committed_hash
     }
-}
-
-/// The status that counts in this plan and division; `same`: the report is of the same ones. A
-/// vehicle that had finished its part in an earlier one may have another part now: it counts as
-/// having left.
-fn status_in_division(standing: MemberStatus, same: bool) -> MemberStatus {
-    if standing == MemberStatus::Finished && !same { MemberStatus::Left } else { standing }
-}
-
-/// The entry with which a vehicle enters another plan or division: without places along the path
-/// before it. `same` as in [`status_in_division`].
-fn entry_in_division(entry: &RosterReportEntry, same: bool) -> RosterReportEntry {
-    let RosterReportEntry { incarnation, status, .. } = *entry;
-    let status = status_in_division(status, same);
-    RosterReportEntry { incarnation, status, ..RosterReportEntry::default() }
 }

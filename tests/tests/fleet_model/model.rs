@@ -6,7 +6,7 @@ use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
 use companion::link::roster::{MemberStatus, RosterReport};
-use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport};
+use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport, StartStatus};
 use companion::time::{Duration, Instant};
 use flockmate_tests::parts::{WAYPOINT_DM, parts};
 
@@ -217,7 +217,7 @@ impl FleetModel {
         vehicle.hears = 0;
         for (from, message) in heard {
             vehicle.hears |= 1 << from;
-            vehicle.fleet.handle_roster(*from, &message.roster, false);
+            vehicle.fleet.handle_roster(*from, &message.roster, StartStatus::Started);
         }
         if self.planted == Planted::PresentAlone {
             self.forget_silent(&mut vehicle);
@@ -288,7 +288,7 @@ impl FleetModel {
             }
         }
         for sender in (0..self.count).filter(|rank| *rank != vehicle.rank).take(1) {
-            vehicle.fleet.handle_roster(sender, &roster, false);
+            vehicle.fleet.handle_roster(sender, &roster, StartStatus::Started);
         }
     }
 

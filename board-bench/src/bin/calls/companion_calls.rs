@@ -13,7 +13,7 @@ use companion::storage::mission_file::{
     self, MissionBlock, MissionGoal, MissionHeader, MissionVehicle, MissionView,
 };
 use companion::storage::store::{FlashFault, FlashRequest, MAX_READ, ReadFlash, Store};
-use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport};
+use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport, StartStatus};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
 use firmware::capacity::BoardCompanion;
@@ -216,7 +216,7 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
             }
             let sender = 1 + usize::from(round) % (VEHICLES / 2);
             meter.call("fleet::Fleet::handle_roster, 32", bytes, || {
-                fleet.handle_roster(sender, &reported, false)
+                fleet.handle_roster(sender, &reported, StartStatus::Started)
             });
         }
     }

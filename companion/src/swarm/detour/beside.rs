@@ -30,6 +30,12 @@ const BLOCKED_BEYOND_STOP_M: f32 = 8.0;
 /// Added to [`BLOCKED_BEYOND_STOP_M`] once the path is blocked, metres: the vehicle may have
 /// stopped a little sooner than expected.
 const STAYS_BLOCKED_BEYOND_M: f32 = 4.0;
+/// Distance from the path within which a zone blocks it, beyond the safety distance, and distance
+/// beyond where the vehicle can stop up to which that counts, metres.
+pub(super) const BLOCKED_M: [f32; 2] = [BLOCKED_WITHIN_M, BLOCKED_BEYOND_STOP_M];
+/// As [`BLOCKED_M`], of a path that is blocked already, metres.
+pub(super) const STAYS_BLOCKED_M: [f32; 2] =
+    [DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + STAYS_BLOCKED_BEYOND_M];
 /// Distance from the vehicle within which zones count, and along the path within which a block is
 /// searched, for the place where a detour returns to the path, metres.
 const LOOK_AHEAD_M: f32 = 60.0;
@@ -75,17 +81,6 @@ impl AreaDetourSearches {
     /// [`MAX_DETOURS`] times at most.
     pub(super) fn may_seek(&self, now: Instant) -> bool {
         self.found < MAX_DETOURS && self.failed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
-    }
-}
-
-/// Distance from the path within which a zone blocks it, beyond the safety distance, and distance
-/// beyond where the vehicle can stop up to which that counts, metres. `waits`: the path is blocked
-/// already.
-pub(super) const fn blocking_distances_m(waits: bool) -> [f32; 2] {
-    if waits {
-        [DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + STAYS_BLOCKED_BEYOND_M]
-    } else {
-        [BLOCKED_WITHIN_M, BLOCKED_BEYOND_STOP_M]
     }
 }
 

@@ -1,25 +1,25 @@
 //! What the vehicles of a fleet report to each other, and how a report changes a vehicle's
 //! knowledge.
 
-use super::{Fleet, FleetMember, INCARNATIONS, status_in_division};
+use super::{Fleet, FleetMember, INCARNATIONS, StartStatus};
 use crate::link::roster::{MAX_ENTRIES, MemberStatus, RosterReport, RosterReportEntry};
 
 impl<const V: usize> Fleet<V> {
-    /// Handles the roster report of the vehicle of rank `sender`; `waits`: this vehicle was not
+    /// Handles the roster report of the vehicle of rank `sender`; `own`: whether this vehicle was
     /// started.
-    pub fn handle_roster(&mut self, sender: usize, roster: &RosterReport, waits: bool) {
+    pub fn handle_roster(&mut self, sender: usize, roster: &RosterReport, own: StartStatus) {
         if sender >= self.members.len() || sender == usize::from(self.own) {
             return;
         }
-        self.note_flight(sender, roster.in_flight, roster.hears_flight);
+        self.note_flight(sender, roster);
         let here = self.divisions.len() as u8;
         // The sender may fly, or have flown, by another plan: before a restart, or without what was
         // photographed meanwhile. Its divisions and places then belong to another plan than ours.
         let same_plan = roster.plan == self.plan;
         if same_plan && roster.divisions > here {
-            let left = self.has_left(sender, roster);
-            if !self.adopt_division(roster, left) && !left {
-                self.excluded = !waits;
+            let status = self.sender_status(sender, roster);
+            if !self.adopt_division(roster, status) && status != MemberStatus::Left {
+                self.excluded = own == StartStatus::Started;
             }
         }
         let same = same_plan && usize::from(roster.divisions) == self.divisions.len();
@@ -30,10 +30,10 @@ impl<const V: usize> Fleet<V> {
             roster.entries.iter().enumerate().map(|(i, e)| (i + usize::from(roster.first), e))
         {
             if rank == usize::from(self.own) {
-                self.handle_own_entry(entry, waits);
+                self.handle_own_entry(entry, own);
             } else if rank < self.members.len() {
                 if rank == sender {
-                    self.introduce(sender, entry.incarnation, waits);
+                    self.introduce(sender, entry.incarnation, own);
                 }
                 let behind =
                     same_plan && roster.divisions < self.divisions.len() as u8 && rank != sender;
@@ -43,7 +43,8 @@ impl<const V: usize> Fleet<V> {
                     && entry.status == MemberStatus::Left
                     && self.members[rank].heard_itself)
                 {
-                    self.merge_entry(rank, entry, same, waits);
+                    let counts = if same { *entry } else { entry.in_another_division() };
+                    self.merge_entry(rank, &counts, own);
                 }
                 if same && entry.agrees && rank != sender && roster.hash != 0 {
                     self.members[rank].hash = roster.hash;
@@ -52,23 +53,34 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Whether the sender of a report has left, as this report or an earlier one says. A division
-    /// that only the sender had agreed to before it was cut off excludes nobody: the sender flew by
-    /// it until its lease ended, and the others divide what they had heard of the sender.
-    fn has_left(&self, sender: usize, roster: &RosterReport) -> bool {
+    /// Notes what the vehicle of this rank reports: whether it is in flight, and hears one that is.
+    fn note_flight(&mut self, rank: usize, roster: &RosterReport) {
+        let bit = 1u32 << rank.min(31);
+        for (bits, set) in
+            [(&mut self.in_flight, roster.in_flight), (&mut self.hear_flight, roster.hears_flight)]
+        {
+            *bits = if set { *bits | bit } else { *bits & !bit };
+        }
+    }
+
+    /// Status of the sender of a report, as this report or an earlier one says. A division that
+    /// only a sender that has left had agreed to before it was cut off excludes nobody: the sender
+    /// flew by it until its lease ended, and the others divide what they had heard of the sender.
+    fn sender_status(&self, sender: usize, roster: &RosterReport) -> MemberStatus {
         let own = sender.checked_sub(usize::from(roster.first)).and_then(|i| roster.entries.get(i));
         let known = &self.members[sender].entry;
-        own.unwrap_or(known).status == MemberStatus::Left
+        own.unwrap_or(known).status
     }
 
     /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
-    /// then the others counted on that. Returns whether it did so. Where the sender has `left`, the
-    /// others may meanwhile have counted on a later hash instead.
-    fn adopt_division(&mut self, roster: &RosterReport, left: bool) -> bool {
+    /// then the others counted on that. Returns whether it did so. Where the sender has left, by
+    /// its `status`, the others may meanwhile have counted on a later hash instead.
+    fn adopt_division(&mut self, roster: &RosterReport, status: MemberStatus) -> bool {
         let here = self.divisions.len() as u8;
         if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
             return false;
         }
+        let left = status == MemberStatus::Left;
         if roster.committed_hash == self.previous_hash && (self.hash == 0 || !left) {
             (self.division_inputs, self.hash) = (self.previous_inputs.clone(), self.previous_hash);
         }
@@ -81,64 +93,68 @@ impl<const V: usize> Fleet<V> {
 
     /// Takes a sender's incarnation as it is the first time that it reports itself: this vehicle,
     /// just switched on, knew none, and could not tell a newer one from an older one.
-    fn introduce(&mut self, sender: usize, incarnation: u8, waits: bool) {
+    fn introduce(&mut self, sender: usize, incarnation: u8, own: StartStatus) {
         let bit = 1 << sender.min(31);
         if self.introduced & bit == 0 && self.members[sender].entry.incarnation != incarnation {
-            self.take_newer_incarnation(sender, incarnation, waits);
+            self.take_newer_incarnation(sender, incarnation, own);
         }
         self.introduced |= bit;
     }
 
-    /// Merges what another vehicle reports of the vehicle of this rank. `same`: the report is of
-    /// our plan and last division; `waits`: this vehicle was not started.
-    fn merge_entry(&mut self, rank: usize, entry: &RosterReportEntry, same: bool, waits: bool) {
+    /// Merges what another vehicle reports of the vehicle of this rank, as far as it counts in our
+    /// plan and last division; `own`: whether this vehicle was started.
+    fn merge_entry(&mut self, rank: usize, entry: &RosterReportEntry, own: StartStatus) {
         let newer =
             entry.incarnation.wrapping_sub(self.members[rank].entry.incarnation) % INCARNATIONS;
         if newer >= INCARNATIONS / 2 {
             return;
         }
         if newer > 0 {
-            self.take_newer_incarnation(rank, entry.incarnation, waits);
+            self.take_newer_incarnation(rank, entry.incarnation, own);
         }
         let known = &mut self.members[rank].entry;
-        known.status = known.status.max(status_in_division(entry.status, same));
-        if same {
-            known.progress_dm = known.progress_dm.max(entry.progress_dm);
-            known.commitment_dm = known.commitment_dm.or(entry.commitment_dm);
-            known.holds |= entry.holds;
-        }
+        known.status = known.status.max(entry.status);
+        known.progress_dm = known.progress_dm.max(entry.progress_dm);
+        known.commitment_dm = known.commitment_dm.or(entry.commitment_dm);
+        known.holds |= entry.holds;
     }
 
     /// The vehicle of this rank was started again. In a flight under way it keeps its status and
     /// progress: of two sides that do not hear each other one might count it again and the other
     /// not, and both be a majority. Before that flight and after it, it is a new vehicle.
-    fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, waits: bool) {
+    fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, own: StartStatus) {
+        let started = own == StartStatus::Started;
         let (alive, flight) = (self.is_alive(usize::from(self.own)), self.knows_flight());
-        if !waits && !alive && !flight && !self.airborne {
+        if started && !alive && !flight && !self.airborne {
             // The flight in which this vehicle left is over, and another one begins.
             self.forget_plan();
         }
         let member = &mut self.members[rank];
         let RosterReportEntry { status, progress_dm, .. } = member.entry;
         let kept = RosterReportEntry { status, progress_dm, ..RosterReportEntry::default() };
-        let kept = if alive && (!waits || flight) { kept } else { RosterReportEntry::default() };
+        let kept = if alive && (started || flight) { kept } else { RosterReportEntry::default() };
         member.entry = RosterReportEntry { incarnation, ..kept };
         member.hash = 0;
     }
 
-    /// Handles the entry about this vehicle in another one's report; `waits`: it was not started.
-    fn handle_own_entry(&mut self, entry: &RosterReportEntry, waits: bool) {
+    /// Handles the entry about this vehicle in another one's report; `start`: whether it was
+    /// started.
+    fn handle_own_entry(&mut self, entry: &RosterReportEntry, start: StartStatus) {
         let flies = self.knows_flight();
         let own = &mut self.members[usize::from(self.own)].entry;
         let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
         let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.status > own.status);
-        match (outlived, waits) {
+        match (outlived, start) {
             (false, _) => {}
             // This vehicle was restarted: the others report its flight before.
-            (true, true) if !flies => self.rejoin((entry.incarnation + 1) % INCARNATIONS),
+            (true, StartStatus::NotStarted) if !flies => {
+                self.rejoin((entry.incarnation + 1) % INCARNATIONS);
+            }
             // This vehicle was restarted during the others' flight, in which it is no new vehicle.
-            (true, true) => own.incarnation = entry.incarnation,
-            (true, false) => (own.incarnation, self.excluded) = (entry.incarnation, true),
+            (true, StartStatus::NotStarted) => own.incarnation = entry.incarnation,
+            (true, StartStatus::Started) => {
+                (own.incarnation, self.excluded) = (entry.incarnation, true);
+            }
         }
     }
 

@@ -183,8 +183,7 @@ impl Swarm {
 
     /// A vehicle reports; what it sends reaches some of the others.
     fn report(&mut self, own: usize) {
-        let count = self.vehicles.len();
-        let sender = &self.vehicles[own];
+        let (count, sender) = (self.vehicles.len(), &self.vehicles[own]);
         let now = sender.clock(self.now);
         let heard = (0..count).filter(|rank| lately(now, sender.heard_at[*rank], 800));
         let bits = heard.fold(0u32, |bits, rank| bits | 1 << rank);
@@ -194,7 +193,8 @@ impl Swarm {
             let to = &mut self.vehicles[to];
             if to.on && arrives {
                 (to.heard_at[own], to.heard_bits[own]) = (Some(to.clock(self.now)), bits);
-                to.fleet.handle_roster(own, &roster, to.waits);
+                let start = if to.waits { StartStatus::NotStarted } else { StartStatus::Started };
+                to.fleet.handle_roster(own, &roster, start);
             }
         }
     }

@@ -3,7 +3,9 @@
 use super::*;
 use crate::config::Ground;
 use crate::link::roster::{MAX_ENTRIES, RosterReport};
-use crate::swarm::fleet::{FleetTimeouts, LEASE_HEARD_WITHIN, MemberReception, OwnReport};
+use crate::swarm::fleet::{
+    FleetTimeouts, LEASE_HEARD_WITHIN, MemberReception, OwnReport, StartStatus,
+};
 
 /// Time for which a neighbour's report of another plan counts.
 const PLAN_REPORT_LIFETIME: Duration = Duration::from_secs(3);
@@ -81,11 +83,11 @@ impl<const V: usize> Neighbours<V> {
         self.fleet.as_ref().is_some_and(|fleet| others.any(|c| fleet.is_alive(usize::from(c.rank))))
     }
 
-    /// Handles another vehicle's roster report. `waits`: this vehicle has not been started.
-    pub(crate) fn handle_roster(&mut self, id: u8, roster: &RosterReport, waits: bool) {
+    /// Handles another vehicle's roster report; `own`: whether this vehicle was started.
+    pub(crate) fn handle_roster(&mut self, id: u8, roster: &RosterReport, own: StartStatus) {
         let rank = self.roster_index(id).map(|at| usize::from(self.contacts[at].rank));
         if let (Some(fleet), Some(rank)) = (&mut self.fleet, rank) {
-            fleet.handle_roster(rank, roster, waits);
+            fleet.handle_roster(rank, roster, own);
         }
     }
 

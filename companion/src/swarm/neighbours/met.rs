@@ -219,10 +219,11 @@ impl NeighbourEntry {
         now - self.position_at.unwrap_or(Instant::ZERO)
     }
 
-    /// The neighbour for the safety filter, as its last reports describe it, `dead` or not. If its
-    /// position is old, [`Neighbours::apply_silence`] has to follow.
+    /// The neighbour for the safety filter, as its last reports describe it. The caller sets `lost`
+    /// if it counts as dead; then, if its position is old, [`Neighbours::apply_silence`] has to
+    /// follow.
     #[inline(always)]
-    pub(crate) fn filter_neighbour(&self, dead: bool, now: Instant) -> FilterNeighbour<'_> {
+    pub(crate) fn filter_neighbour(&self, now: Instant) -> FilterNeighbour<'_> {
         let grounded = self.reports_any(GROUNDED | LANDED);
         let comes_down = !grounded && self.has_column();
         FilterNeighbour {
@@ -231,7 +232,7 @@ impl NeighbourEntry {
             on_plan: self.on_plan(),
             out_of_range: false,
             shares_plan: self.shares_plan,
-            lost: dead,
+            lost: false,
             waits: self.reports_any(WAITING) && self.heard_within(now, HEARD_WITHIN),
             stands: grounded || now - self.moved_at >= STANDS_AFTER,
             motion: NeighbourMotion {

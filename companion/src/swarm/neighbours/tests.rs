@@ -388,7 +388,8 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             lands,
         };
         let dead = table.contacts[1].rests_silently(now - placed_at, now);
-        let mut met = table.contacts[1].filter_neighbour(dead, now);
+        let mut met = table.contacts[1].filter_neighbour(now);
+        met.lost = dead;
         table.apply_silence(&table.contacts[1], now, &mut met);
         if met.on_plan && reach.on_plan {
             met.motion.delay_s = 0.0;
