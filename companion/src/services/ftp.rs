@@ -56,12 +56,19 @@ struct Reply {
     packet: [u8; HEADER_LEN + MAX_DATA],
 }
 
+/// What the client does with the file of its session.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Access {
+    Read,
+    Write,
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Session {
     id: u8,
     client: (u8, u8),
     file: File,
-    writes: bool,
+    access: Access,
     /// Whether no byte was written to the file yet.
     fresh: bool,
     opened_by: Request,
@@ -265,7 +272,7 @@ impl Ftp {
         match request.opcode {
             op::NONE => self.ack(request, &[]),
             op::TERMINATE => match self.session_of(request) {
-                Ok(Session { writes: true, .. }) => {
+                Ok(Session { access: Access::Write, .. }) => {
                     store.finish_upload();
                     self.operation = FtpOperation::Close(*request);
                 }
@@ -292,7 +299,7 @@ impl Ftp {
                 {
                     None => self.nak(request, NakError::NotFound),
                     Some((file, size)) => {
-                        if self.open_session(request, file, false, store) {
+                        if self.open_session(request, file, Access::Read, store) {
                             self.duplicates.remember(request, Ok(()), self.now);
                             self.ack(request, &size.to_le_bytes());
                         }
@@ -300,7 +307,9 @@ impl Ftp {
                 }
             }
             op::READ | op::BURST_READ => match self.session_of(request) {
-                Ok(Session { writes: true, .. }) => self.nak(request, NakError::InvalidSession),
+                Ok(Session { access: Access::Write, .. }) => {
+                    self.nak(request, NakError::InvalidSession);
+                }
                 Ok(_) => {
                     self.burst = (request.opcode == op::BURST_READ).then(|| FtpBurst::new(request));
                     self.operation = FtpOperation::Read(*request, false);
@@ -366,7 +375,7 @@ impl Ftp {
             (session.opened_by, session.used_at) = (*request, self.now);
             return self.ack(request, &[]);
         }
-        if !self.open_session(request, file, true, store) {
+        if !self.open_session(request, file, Access::Write, store) {
             return;
         }
         match store.open_upload(file, erasing) {
@@ -381,7 +390,7 @@ impl Ftp {
 
     fn handle_write(&mut self, request: &Request, store: &mut Store) {
         match self.session_of(request) {
-            Ok(Session { writes: true, .. }) => {}
+            Ok(Session { access: Access::Write, .. }) => {}
             Ok(_) => return self.nak(request, NakError::Protected),
             Err(no) => return self.nak(request, no),
         }
@@ -404,7 +413,7 @@ impl Ftp {
     /// Sends again the ACK with which the session was opened.
     fn repeat_open_ack(&mut self, request: &Request, session: &Session, store: &Store) {
         match store.file_size(session.file) {
-            Some(size) if !session.writes => self.ack(request, &size.to_le_bytes()),
+            Some(size) if session.access == Access::Read => self.ack(request, &size.to_le_bytes()),
             _ => self.ack(request, &[]),
         }
     }
@@ -434,7 +443,7 @@ impl Ftp {
         &mut self,
         request: &Request,
         file: File,
-        writes: bool,
+        access: Access,
         store: &mut Store,
     ) -> bool {
         let held = |session: &Session| session.client != request.client && !self.is_idle(session);
@@ -444,14 +453,14 @@ impl Ftp {
         }
         self.drop_session(store);
         let Request { client, session: id, .. } = *request;
-        let opened_by = *request;
+        let (opened_by, fresh) = (*request, access == Access::Write);
         self.session =
-            Some(Session { id, client, file, writes, fresh: writes, opened_by, used_at: self.now });
+            Some(Session { id, client, file, access, fresh, opened_by, used_at: self.now });
         true
     }
 
     fn drop_session(&mut self, store: &mut Store) {
-        if self.session.take().is_some_and(|session| session.writes) {
+        if self.session.take().is_some_and(|session| session.access == Access::Write) {
             store.abandon_upload();
         }
     }

@@ -295,7 +295,7 @@ impl Store {
     ) {
         let len = self.reassembly.file_len();
         let field = matches!(self.upload, Some((File::Field, _)));
-        if (done == 0 && !Self::is_file_head(field, bytes, len)) || bytes.is_empty() {
+        if (done == 0 && !self.is_file_head(bytes, len)) || bytes.is_empty() {
             return self.end_upload(Err(UploadError::Damaged));
         }
         // The last four bytes of the file are the CRC-32 of all others.

@@ -15,7 +15,7 @@ impl Store {
         if let Some(compaction) = self.journal.compacting.clone() {
             return Some(self.continue_compaction(compaction));
         }
-        let closing = self.upload == Some((File::Mission, UploadState::Closing));
+        let closing = self.is_mission_closing();
         if self.journal.failures >= MAX_JOURNAL_TRIES {
             if closing {
                 self.end_upload(Err(UploadError::Flash));
@@ -37,7 +37,7 @@ impl Store {
             self.journal.end + record_len(len) <= FlashArea::Half(active).end(&self.layout)
         };
         if !self.journal.active.is_some_and(fits) {
-            return self.begin_compaction(erasing, closing);
+            return self.begin_compaction(erasing);
         }
         let at = self.journal.end;
         Some(FlashJob::Record(match kind {
@@ -51,6 +51,11 @@ impl Store {
                 JournalRecord { kind, at, len, crc, source, step, done: 0, sum: CRC_START }
             }
         }))
+    }
+
+    /// Whether an uploaded mission file is about to be stored.
+    fn is_mission_closing(&self) -> bool {
+        self.upload == Some((File::Mission, UploadState::Closing))
     }
 
     /// The next step of a compaction.
@@ -81,7 +86,7 @@ impl Store {
         }
     }
 
-    fn begin_compaction(&mut self, erasing: ErasePermission, closing: bool) -> Option<FlashJob> {
+    fn begin_compaction(&mut self, erasing: ErasePermission) -> Option<FlashJob> {
         let half = usize::from(self.journal.active == Some(0));
         match self.journal.halves[half] {
             AreaCondition::Clean => Some(FlashJob::MarkUsed(FlashArea::Half(half))),
@@ -92,7 +97,7 @@ impl Store {
                     ErasePermission::NotYet => return None,
                     ErasePermission::Forbidden => UploadError::Armed,
                 };
-                if closing {
+                if self.is_mission_closing() {
                     self.end_upload(Err(refused));
                 }
                 None

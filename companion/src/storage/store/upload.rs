@@ -113,12 +113,14 @@ impl Store {
         self.slots.iter().position(|slot| *slot == AreaCondition::Open).map(FlashArea::Slot)
     }
 
-    /// Whether the file's first bytes are the head of a roadmap, or with `field` of a field of
-    /// heights, of length `len`.
-    pub(super) fn is_file_head(field: bool, bytes: &[u8], len: u32) -> bool {
-        let declared = match field {
-            true => bytes.first_chunk().and_then(|head| field::declared_len(head).ok()),
-            false => bytes.first_chunk().and_then(|head| roadmap::declared_len(head).ok()),
+    /// Whether these first bytes are the head of a field of heights, if that is being uploaded,
+    /// else of a roadmap, of length `len`.
+    pub(super) fn is_file_head(&self, bytes: &[u8], len: u32) -> bool {
+        let declared = match self.upload {
+            Some((File::Field, _)) => {
+                bytes.first_chunk().and_then(|head| field::declared_len(head).ok())
+            }
+            _ => bytes.first_chunk().and_then(|head| roadmap::declared_len(head).ok()),
         };
         declared == Some(len as usize)
     }
