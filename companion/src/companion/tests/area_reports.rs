@@ -47,7 +47,7 @@ fn counted_rosters(b: &mut Bench, state: State) -> (Vec<usize>, RosterReport) {
 #[test]
 fn rosters_go_out_twice_a_second_in_flight_and_five_times_while_dividing() {
     for swarm_hz in [2, 3, 5, 10] {
-        let mut b = over_a_field_with(true, |config| config.swarm_hz = swarm_hz);
+        let mut b = over_a_field_with(AutopilotKind::Px4, |config| config.swarm_hz = swarm_hz);
         b.start();
         b.run_until(Follow, 30.0);
         b.stuck = true;

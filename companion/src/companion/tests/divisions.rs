@@ -13,6 +13,7 @@ use proptest::prelude::{ProptestConfig, any};
 
 use super::State::*;
 use super::*;
+use crate::autopilot::AutopilotKind;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::intent::{FLYING, GROUNDED, ON_PLAN, OUT_OF_PLAN};
 use crate::link::roster::{self, MemberStatus, RosterReport, RosterReportEntry};
@@ -32,17 +33,20 @@ fn ahead(b: &Bench, height_m: f32) -> Point {
 
 /// A coverage mission of three vehicles: this one flies the path of `field_plan`, 77 is heard, 78
 /// is not.
-pub(super) fn over_a_field(px4: bool) -> Bench {
-    over_a_field_with(px4, |_| {})
+pub(super) fn over_a_field(kind: AutopilotKind) -> Bench {
+    over_a_field_with(kind, |_| {})
 }
 
 /// As [`over_a_field`], with settings changed by `set`.
-pub(super) fn over_a_field_with(px4: bool, set: impl Fn(&mut Config<4>)) -> Bench {
+pub(super) fn over_a_field_with(kind: AutopilotKind, set: impl Fn(&mut Config<4>)) -> Bench {
     let mut config = two_vehicles();
     config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
     config.lost_vehicle_down_s = Some(60.0);
     set(&mut config);
-    let mut bench = if px4 { Bench::new(config) } else { Bench::ardupilot(config) };
+    let mut bench = match kind {
+        AutopilotKind::Px4 => Bench::new(config),
+        AutopilotKind::ArduPilot => Bench::ardupilot(config),
+    };
     bench.answer_plan = Some(Ok(field_plan()));
     bench.neighbour = FAR_AWAY;
     bench.run_until(Ready, 6.0);
@@ -189,7 +193,7 @@ impl Watch {
             Pause => _ = order(b, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
             Resume => _ = order(b, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0),
             Pilot => {
-                b.mode = if b.kind == crate::autopilot::AutopilotKind::Px4 {
+                b.mode = if b.kind == AutopilotKind::Px4 {
                     px4::HOLD
                 } else {
                     crate::autopilot::ardupilot::BRAKE
@@ -229,7 +233,8 @@ proptest::proptest! {
         planner_takes_ms in proptest::collection::vec(0u64..8000, 0..4),
         script in proptest::collection::vec((0usize..ALL.len(), 1u32..200), 1..14),
     ) {
-        let mut b = over_a_field(px4);
+        let kind = if px4 { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
+        let mut b = over_a_field(kind);
         b.planner_takes = planner_takes_ms.into_iter().map(Duration::from_millis).collect();
         let mut watch = Watch {
             other: Other { mute: true, counts_after, ..Other::default() },
@@ -290,7 +295,7 @@ proptest::proptest! {
 #[test]
 fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
     for run_s in [3.0, 5.0, 7.0] {
-        let mut b = over_a_field(true);
+        let mut b = over_a_field(AutopilotKind::Px4);
         b.start();
         b.run_until(Follow, 30.0);
         b.run(run_s);
@@ -305,7 +310,7 @@ fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
 /// part of that one's area.
 #[test]
 fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
-    let mut b = over_a_field(true);
+    let mut b = over_a_field(AutopilotKind::Px4);
     b.start();
     b.run_until(Follow, 30.0);
     b.neighbour = None;
@@ -325,7 +330,7 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
 /// one flies on, it waits for three minutes only.
 #[test]
 fn above_its_pad_a_vehicle_waits_for_one_that_hears_nobody_for_a_limited_time() {
-    let mut b = over_a_field_with(true, |config| _ = config.roster.pop());
+    let mut b = over_a_field_with(AutopilotKind::Px4, |config| _ = config.roster.pop());
     b.start();
     b.run_until(Follow, 30.0);
     b.neighbour_hears = 0;
@@ -338,7 +343,7 @@ fn above_its_pad_a_vehicle_waits_for_one_that_hears_nobody_for_a_limited_time() 
 /// pad. Vehicle 77 lies on the path.
 #[test]
 fn a_vehicle_flies_around_what_lies_on_its_path_while_another_is_silent() {
-    let mut b = over_a_field(true);
+    let mut b = over_a_field(AutopilotKind::Px4);
     b.start();
     b.run_until(Follow, 30.0);
     b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
@@ -420,7 +425,7 @@ proptest::proptest! {
         waits in any::<bool>(),
         lies in proptest::collection::vec((lie(), 0u32..60), 1..20),
     ) {
-        let mut b = over_a_field(true);
+        let mut b = over_a_field(AutopilotKind::Px4);
         if !waits {
             b.start();
             b.run_until(Follow, 30.0);
@@ -463,8 +468,9 @@ proptest::proptest! {
 /// In a coverage mission the lease limits how far an unheard vehicle flies on, not the radio range.
 #[test]
 fn a_vehicle_over_an_area_whose_lease_ends_stands_and_lands_whatever_the_radios_range() {
-    for (px4, radio_range_m) in [(true, 60.0), (false, 60.0), (true, 10_000.0)] {
-        let mut b = over_a_field_with(px4, |config| {
+    use AutopilotKind::*;
+    for (kind, radio_range_m) in [(Px4, 60.0), (ArduPilot, 60.0), (Px4, 10_000.0)] {
+        let mut b = over_a_field_with(kind, |config| {
             config.radio_range_m = radio_range_m;
             (config.cruise_mps, config.slowest_mps) = (0.4, 0.4);
         });

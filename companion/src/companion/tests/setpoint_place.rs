@@ -37,11 +37,17 @@ fn interruption() -> impl Strategy<Value = Interruption> {
     ]
 }
 
-/// A path of straight legs: a transit with corners of any angle, whose last leg may be flown back
-/// and forth, then lanes back and forth.
+/// How the last leg of a transit is flown.
+#[derive(Clone, Copy, PartialEq)]
+enum LastLeg {
+    Once,
+    BackAndForth,
+}
+
+/// A path of straight legs: a transit with corners of any angle, then lanes back and forth.
 fn random_path(
     turns: &[(f32, f32)],
-    back: bool,
+    last_leg: LastLeg,
     (lanes, long_m, apart_m): (usize, f32, f32),
 ) -> Path<WAYPOINTS> {
     let mut path = Path::new();
@@ -52,7 +58,7 @@ fn random_path(
         at += Point::new(heading.cos(), heading.sin(), 0.0) * *leg_m;
         path.push(at, 10.0).unwrap();
     }
-    if let ([.., before, _], true) = (path.waypoints(), back) {
+    if let ([.., before, _], LastLeg::BackAndForth) = (path.waypoints(), last_leg) {
         let back = before.position + (at - before.position) * 0.3;
         path.push(back, 10.0).unwrap();
         path.push(at, 10.0).unwrap();
@@ -213,7 +219,8 @@ proptest! {
         back in any::<bool>(),
         events in proptest::collection::vec((1u32..160, interruption(), 1u32..160), 1..6),
     ) {
-        let mut flight = Flight::new(cruise_mps, random_path(&turns, back, lanes));
+        let last_leg = if back { LastLeg::BackAndForth } else { LastLeg::Once };
+        let mut flight = Flight::new(cruise_mps, random_path(&turns, last_leg, lanes));
         for (flown, by, stopped) in events {
             flight.run(flown);
             // On a leg that is flown back and forth a resumed flight may skip the turn.

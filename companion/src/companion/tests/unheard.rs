@@ -22,9 +22,9 @@ fn beside_m(intent: &Intent, from: &Point, place: &Point) -> f32 {
 #[test]
 fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
     let (mut furthest_m, mut beyond) = (0.0_f32, 0);
-    for px4 in [true, false] {
+    for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
         for tenths in (2..280).step_by(13) {
-            let mut bench = over_a_field(px4);
+            let mut bench = over_a_field(kind);
             bench.start();
             while !matches!(bench.state(), TakeOff | Climb | Follow) {
                 bench.run(0.1);

@@ -241,14 +241,20 @@ fn nothing_is_erased_while_armed() {
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
 }
 
-/// Sends a request three times, 4 s apart, with the same sequence number or new ones. Returns the
-/// opcodes of the answers.
-fn ask_three_times(world: &mut World, renumbers: bool, opcode: u8, data: &[u8]) -> [u8; 3] {
+/// Sequence numbers of a request that is repeated.
+#[derive(Clone, Copy, PartialEq)]
+enum Numbers {
+    Same,
+    New,
+}
+
+/// Sends a request three times, 4 s apart. Returns the opcodes of the answers.
+fn ask_three_times(world: &mut World, numbers: Numbers, opcode: u8, data: &[u8]) -> [u8; 3] {
     let mut request = world.packet(0, opcode, data.len() as u8, 0, data);
     [(); 3].map(|()| {
         let answer = world.ask_again(&request).opcode;
         world.now = world.now + Duration::from_secs(4);
-        if renumbers {
+        if numbers == Numbers::New {
             request = world.packet(0, opcode, data.len() as u8, 0, data);
         }
         answer
@@ -257,11 +263,12 @@ fn ask_three_times(world: &mut World, renumbers: bool, opcode: u8, data: &[u8]) 
 
 #[test]
 fn a_client_whose_answers_are_lost_is_told_the_same_late_and_under_other_numbers() {
-    for (renumbers, damaged) in [(false, false), (false, true), (true, false), (true, true)] {
+    use Numbers::*;
+    for (numbers, damaged) in [(Same, false), (Same, true), (New, false), (New, true)] {
         let mut world = World::new(70, 0, 0);
         let mut file = roadmap(80);
         file[100] ^= u8::from(damaged);
-        assert_eq!(ask_three_times(&mut world, renumbers, op::CREATE, b"roadmap.bin"), [ACK; 3]);
+        assert_eq!(ask_three_times(&mut world, numbers, op::CREATE, b"roadmap.bin"), [ACK; 3]);
         let erased = world.flash.programmed;
         world.ask(0, op::CREATE, 0, b"roadmap.bin");
         assert_eq!(world.flash.programmed, erased, "opened once");
@@ -269,7 +276,7 @@ fn a_client_whose_answers_are_lost_is_told_the_same_late_and_under_other_numbers
             assert_eq!(world.ask(0, op::WRITE, (i * MAX_DATA) as u32, piece).opcode, ACK);
         }
         let reported = if damaged { NAK } else { ACK };
-        assert_eq!(ask_three_times(&mut world, renumbers, op::TERMINATE, &[]), [reported; 3]);
+        assert_eq!(ask_three_times(&mut world, numbers, op::TERMINATE, &[]), [reported; 3]);
         assert_eq!(world.texts.len(), 1, "{:?}", world.texts);
         world.now = world.now + Duration::from_secs(10);
         assert_eq!(world.ask(0, op::TERMINATE, 0, &[]).opcode, NAK, "there is no session");

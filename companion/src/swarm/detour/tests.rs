@@ -145,13 +145,21 @@ fn who_died_may_have_been_flown_back_to_its_pad() {
     );
 }
 
-/// Zones of vehicle 77, with these flags, after 30 s; with `moves` false its position stays old.
-fn kept_off(flags: u8, moves: bool) -> Vec<KeepOutZone> {
+/// Positions that vehicle 77 reports.
+#[derive(Clone, Copy, PartialEq)]
+enum Positions {
+    Fresh,
+    /// It repeats an old one.
+    Old,
+}
+
+/// Zones of vehicle 77, with these flags, after 30 s.
+fn kept_off(flags: u8, positions: Positions) -> Vec<KeepOutZone> {
     let mut bench = Bench::started_with_neighbour(two_vehicles());
     let at = Point::new(8.0, 40.0, 9.0);
     bench.neighbour = Some((at, flags, 0.0, 5));
     bench.run(1.0);
-    if !moves {
+    if positions == Positions::Old {
         bench.neighbour_clock = Some(bench.now);
     }
     bench.run(30.0);
@@ -162,12 +170,12 @@ fn kept_off(flags: u8, moves: bool) -> Vec<KeepOutZone> {
 
 #[test]
 fn who_lies_where_it_does_not_know_is_kept_off_by_the_foot_of_its_column() {
-    let known = kept_off(GROUNDED | OUT_OF_PLAN, true);
+    let known = kept_off(GROUNDED | OUT_OF_PLAN, Positions::Fresh);
     assert!(
         matches!(known[..], [KeepOutZone { kind: ZoneKind::Static, .. }])
             && known[0].from == known[0].to
     );
-    let vague = kept_off(GROUNDED | OUT_OF_PLAN, false);
+    let vague = kept_off(GROUNDED | OUT_OF_PLAN, Positions::Old);
     assert!(
         matches!(vague[..], [KeepOutZone { kind: ZoneKind::Grounded, .. }])
             && vague[0].to.z < -40.0

@@ -83,18 +83,28 @@ fn flown(draw: &mut Draw) -> Bench {
     b
 }
 
-/// Whether a vehicle at `place`, which lands unaided if `lands`, may fly to its path.
-fn may_join(b: &Bench, place: &Point, lands: bool) -> bool {
-    let Some(plan) = b.companion.mission.plan() else { return false };
+/// Places 0.1 m apart on the path of a plan, and its end.
+fn places_on_path(plan: &Plan) -> impl Iterator<Item = Point> {
     let length_m = plan.path.length_m();
     let along = (0..=(length_m * 10.0) as usize).map(|step| step as f32 / 10.0).chain([length_m]);
-    let path = || along.clone().filter_map(|along_m| plan.path.point_at(along_m));
+    along.filter_map(|along_m| plan.path.point_at(along_m))
+}
+
+/// Whether a vehicle at `place` may fly to its path.
+fn may_join(b: &Bench, place: &Point) -> bool {
+    let Some(plan) = b.companion.mission.plan() else { return false };
     let near_start = (place - START).xy().norm() < NEAR_START_M;
-    let in_column = lands && path().any(|at| (at - place).xy().norm() < COLUMN_M);
     // Below the end of its path it descends in any case.
-    let in_descent =
-        plan.path.point_at(length_m).is_some_and(|end| (end - place).xy().norm() < COLUMN_M);
-    near_start || in_column || in_descent || path().any(|at| (at - place).norm() < OFF_PATH_M)
+    let end = plan.path.point_at(plan.path.length_m());
+    let in_descent = end.is_some_and(|end| (end - place).xy().norm() < COLUMN_M);
+    near_start || in_descent || places_on_path(plan).any(|at| (at - place).norm() < OFF_PATH_M)
+}
+
+/// Whether `place` is in a column below or above the vehicle's path: one that lands there unaided
+/// may fly back up.
+fn is_in_column(b: &Bench, place: &Point) -> bool {
+    let beside = |at: Point| (at - place).xy().norm() < COLUMN_M;
+    b.companion.mission.plan().is_some_and(|plan| places_on_path(plan).any(beside))
 }
 
 #[test]
@@ -125,7 +135,7 @@ fn a_carried_vehicle_never_flies_to_its_path() {
         b.answer_detour = draw.one(&[Some(Ok(())), Some(Err(PlanFailure::Unreachable))]);
         b.run(1.0);
         let (left_at, sent) = (b.enu, b.setpoints.len());
-        let may_join = may_join(&b, &left_at, sticks);
+        let may_join = may_join(&b, &left_at) || (sticks && is_in_column(&b, &left_at));
         for _ in 0..draw.one(&[1, 2, 5, 9]) {
             match draw.one(&[0, 1, 2, 3, 4, 5]) {
                 0 => _ = land(&mut b),

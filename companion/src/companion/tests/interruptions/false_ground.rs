@@ -3,11 +3,17 @@
 
 use super::*;
 
-/// A vehicle at least 0.3 m high in its climb. `flown`: its landing detector has reported flight;
-/// otherwise it reports ground from the pad on.
-fn climbing(kind: AutopilotKind, flown: bool) -> Bench {
+/// What the landing detector has reported since the pad.
+#[derive(Clone, Copy, PartialEq)]
+enum Reported {
+    Flight,
+    OnlyGround,
+}
+
+/// A vehicle at least 0.3 m high in its climb, whose landing detector reports the ground.
+fn climbing(kind: AutopilotKind, before: Reported) -> Bench {
     let mut b = bench(kind);
-    b.false_ground = !flown;
+    b.false_ground = before == Reported::OnlyGround;
     b.start();
     b.run_until(State::Climb, 20.0);
     while b.enu.z < 0.3 {
@@ -43,9 +49,10 @@ fn cancelled_in_air() -> Bench {
 #[test]
 fn a_pause_disarms_no_vehicle_in_the_air() {
     use AutopilotKind::*;
+    use Reported::*;
     // An ArduCopter that reports no flight stays in `TakeOff`, not in `Climb`.
-    for (kind, flown) in [(Px4, true), (Px4, false), (ArduPilot, true)] {
-        let mut b = climbing(kind, flown);
+    for (kind, before) in [(Px4, Flight), (Px4, OnlyGround), (ArduPilot, Flight)] {
+        let mut b = climbing(kind, before);
         assert_eq!(pause(&mut b), Some(ACCEPTED));
         b.run(1.0);
         assert_eq!(b.state(), State::Climb, "{kind:?}: {:?}", b.texts);

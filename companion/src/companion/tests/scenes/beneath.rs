@@ -153,13 +153,22 @@ fn path(last_m: f32, clearance_m: f32) -> Path<WAYPOINTS> {
     path
 }
 
+/// What the vehicles of a mission do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum MissionKind {
+    /// Each flies to its goal.
+    Goals,
+    /// They photograph an area.
+    Area,
+}
+
 /// A vehicle that has flown a few metres and holds its place in this state.
-fn holding(state: State, over_area: bool, faller: &mut Faller) -> Bench {
+fn holding(state: State, mission: MissionKind, faller: &mut Faller) -> Bench {
     let mut config = two_vehicles();
     let mut wanted =
         VehiclePlan { path: path(faller.real(1.0, 6.0), 1.2), descent_m: 4.0, ..plan() };
     let flown_m = faller.real(5.0, 9.0);
-    if over_area {
+    if mission == MissionKind::Area {
         config.lost_vehicle_down_s = Some(60.0);
         let mut out = path(6.0, OPEN_FIELD_CLEARANCE_M);
         for point in [Point::new(8.0, 18.0, 4.0), Point::new(8.0, 12.0, 4.0), START] {
@@ -223,9 +232,10 @@ fn faller(state: State, seed: u64) -> Faller {
 
 /// Plays one fall. Returns the least distance between the two vehicles, metres, and whether the
 /// flight ended; in a coverage mission, whether it ended in `Done`.
-fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
+fn falls_over(state: State, mission: MissionKind, seed: u64) -> (f32, bool) {
+    let over_area = mission == MissionKind::Area;
     let mut faller = faller(state, seed);
-    let mut b = holding(state, over_area, &mut faller);
+    let mut b = holding(state, mission, &mut faller);
     let wait_s = if state == Replanning { faller.real(0.0, 2.0) } else { faller.real(2.0, 6.0) };
     faller.until(&mut b, wait_s, |_| false);
     (faller.loss, faller.delay_s) = (faller.real(0.0, 0.3), faller.real(0.0, 0.8));
@@ -270,15 +280,14 @@ fn falls_over(state: State, over_area: bool, seed: u64) -> (f32, bool) {
 #[test]
 fn whoever_holds_its_place_makes_room_for_one_that_comes_down() {
     let safety_m = config().safety_distance_m;
-    let area = [(Follow, true), (Dividing, true)];
-    for (state, over_area) in
-        [Follow, Blocked, Replanning, Paused].map(|state| (state, false)).into_iter().chain(area)
-    {
+    let to_goals = [Follow, Blocked, Replanning, Paused].map(|state| (state, MissionKind::Goals));
+    let over_area = [Follow, Dividing].map(|state| (state, MissionKind::Area));
+    for (state, mission) in to_goals.into_iter().chain(over_area) {
         let falls: Vec<_> =
-            (0..FALLS).map(|seed| (seed, falls_over(state, over_area, seed))).collect();
+            (0..FALLS).map(|seed| (seed, falls_over(state, mission, seed))).collect();
         let bad: Vec<_> =
             falls.iter().filter(|(_, (least_m, down))| *least_m < safety_m || !down).collect();
-        assert!(bad.is_empty(), "{state:?}, {over_area}, {} of {FALLS}: {bad:?}", bad.len());
+        assert!(bad.is_empty(), "{state:?}, {mission:?}, {} of {FALLS}: {bad:?}", bad.len());
     }
 }
 
@@ -289,7 +298,7 @@ fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
     let mut returns = 0;
     for seed in 0..FALLS {
         let mut faller = faller(Blocked, seed);
-        let mut b = holding(Blocked, true, &mut faller);
+        let mut b = holding(Blocked, MissionKind::Area, &mut faller);
         let (east_m, north_m) = (faller.real(-0.8, 0.8), faller.real(-0.8, 0.8));
         faller.place = b.enu + Point::new(east_m, north_m, faller.real(10.0, 16.0));
         faller.until(&mut b, 1.0, |_| false);
@@ -316,7 +325,7 @@ fn whoever_is_interrupted_while_it_seeks_a_way_aside_flies_its_part() {
     for seed in 0..FALLS {
         for state in [Follow, Dividing] {
             let mut faller = faller(state, seed);
-            let mut b = holding(state, true, &mut faller);
+            let mut b = holding(state, MissionKind::Area, &mut faller);
             let (east_m, north_m) = (faller.real(-0.8, 0.8), faller.real(-0.8, 0.8));
             faller.place = b.enu + Point::new(east_m, north_m, faller.real(10.0, 16.0));
             faller.until(&mut b, 1.0, |_| false);

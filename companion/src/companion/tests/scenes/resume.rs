@@ -8,9 +8,9 @@ use super::*;
 use crate::link::done::{self, PhotographedReport};
 use crate::link::roster::MemberStatus;
 
-/// The other vehicle reports what it knows to be photographed.
-fn knows(b: &mut Bench, first: u32, round: u8, flies: bool) {
-    reports(b, &PhotographedReport { round, flies, ..report(first) });
+/// The other vehicle reports from the ground what it knows to be photographed.
+fn knows(b: &mut Bench, first: u32, round: u8) {
+    reports(b, &PhotographedReport { round, ..report(first) });
 }
 
 fn report(first: u32) -> PhotographedReport {
@@ -32,7 +32,7 @@ fn reports(b: &mut Bench, report: &PhotographedReport) {
 pub(super) fn others_know_of_more(scenes: &mut Scenes) {
     for state in [Ready, Scheduled] {
         let reported = |b: &mut Bench| {
-            knows(b, 20, 0, false);
+            knows(b, 20, 0);
             b.run(1.0);
             assert_eq!(b.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
         };
@@ -57,7 +57,7 @@ pub(super) fn another_plan_is_flown(scenes: &mut Scenes) {
 #[test]
 fn who_comes_late_takes_the_set_of_those_that_fly() {
     let mut bench = over_a_field(Ready);
-    knows(&mut bench, 40, 0, false);
+    knows(&mut bench, 40, 0);
     bench.run(1.0);
     reports(
         &mut bench,
@@ -65,7 +65,7 @@ fn who_comes_late_takes_the_set_of_those_that_fly() {
     );
     bench.run(1.0);
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
-    knows(&mut bench, 60, 0, false);
+    knows(&mut bench, 60, 0);
     bench.run(1.0);
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
 }
@@ -75,19 +75,19 @@ fn who_comes_late_takes_the_set_of_those_that_fly() {
 #[test]
 fn only_what_others_on_the_ground_know_changes_the_plan() {
     let mut bench = over_a_field(Ready);
-    knows(&mut bench, 20, 0, true);
+    reports(&mut bench, &PhotographedReport { flies: true, ..report(20) });
     bench.run(2.0);
     assert_eq!((bench.companion.state(), bench.companion.excluded_waypoints()), (Ready, &[][..]));
-    knows(&mut bench, 40, 3, false);
+    knows(&mut bench, 40, 3);
     bench.run(2.0);
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
-    knows(&mut bench, 60, 2, false);
+    knows(&mut bench, 60, 2);
     bench.run(2.0);
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
     // In flight nothing changes the plan.
     bench.start();
     bench.run_until(Follow, 30.0);
-    knows(&mut bench, 80, 4, false);
+    knows(&mut bench, 80, 4);
     bench.run(2.0);
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
 }
@@ -99,7 +99,7 @@ fn whoever_was_started_keeps_its_plan_when_others_have_landed() {
     for status in [MemberStatus::Finished, MemberStatus::Left] {
         let mut bench = over_a_field(Scheduled);
         tells(&mut bench, MemberStatus::Alive, status);
-        knows(&mut bench, 20, 0, false);
+        knows(&mut bench, 20, 0);
         bench.run(1.0);
         assert_eq!(bench.companion.excluded_waypoints(), [], "{:?}", bench.texts);
         bench.run_until(Follow, 30.0);

@@ -100,9 +100,9 @@ fn deliver(
     }
 }
 
-/// Flies the path. Returns where pictures were taken, metres along it, and whether the trigger was
-/// left on.
-fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32>, bool) {
+/// Flies the path. `loss`: share of the messages that are lost; `stops`: chance of a pause in each
+/// step. Returns where pictures were taken, metres along it, and whether the trigger was left on.
+fn fly(photographs: &PicturePlan, loss: f64, stops: f64, seed: u64) -> (Vec<f32>, bool) {
     let path = path();
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut chance = |share: f64| f64::from(rng.next_u32()) < share * f64::from(u32::MAX);
@@ -115,7 +115,7 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: bool, seed: u64) -> (Vec<f32
     while settle < 60 {
         now = now + Duration::from_millis(50);
         // A pause holds the vehicle where it is.
-        if stops && held == 0 && chance(0.01) {
+        if stops > 0.0 && held == 0 && chance(stops) {
             held = 40;
         }
         held = if held > 0 { held - 1 } else { 0 };
@@ -173,7 +173,7 @@ proptest! {
         distance in any::<bool>(),
     ) {
         let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
-        let (pictures_m, on) = fly(&photographs, 0.0, stops, seed);
+        let (pictures_m, on) = fly(&photographs, 0.0, if stops { 0.01 } else { 0.0 }, seed);
         prop_assert_eq!(widest(&photographs, &pictures_m, LATE_M), Ok(()), "{:?}", pictures_m);
         prop_assert!(!on);
         if !stops {
@@ -190,7 +190,7 @@ proptest! {
     #[test]
     fn lost_commands_and_answers_are_repeated(seed in any::<u64>(), distance in any::<bool>()) {
         let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
-        let (pictures_m, on) = fly(&photographs, 0.1, false, seed);
+        let (pictures_m, on) = fly(&photographs, 0.1, 0.0, seed);
         prop_assert_eq!(widest(&photographs, &pictures_m, LOST_M), Ok(()), "{:?}", pictures_m);
         prop_assert!(!on);
     }
@@ -297,7 +297,7 @@ fn a_silent_autopilot_is_reported_at_any_speed() {
 
 #[test]
 fn without_a_trigger_nothing_is_commanded() {
-    assert_eq!(fly(&photographs(Trigger::None), 0.0, true, 1), (Vec::new(), false));
+    assert_eq!(fly(&photographs(Trigger::None), 0.0, 0.01, 1), (Vec::new(), false));
 }
 
 #[test]

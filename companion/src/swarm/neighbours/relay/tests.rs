@@ -82,7 +82,7 @@ impl Swarm {
         self.now.as_micros() as f32 * 1e-6 + rank as f32
     }
 
-    fn step(&mut self, on_plan: &[bool], lost: &[bool], relays: bool) {
+    fn step(&mut self, on_plan: &[bool], lost: &[bool]) {
         self.now = self.now + Duration::from_millis(STEP_MS);
         for from in 0..self.tables.len() {
             let intent = Intent {
@@ -98,9 +98,7 @@ impl Swarm {
             for to in [from.wrapping_sub(1), from + 1] {
                 let Some(table) = self.tables.get_mut(to).filter(|_| !lost[from]) else { continue };
                 table.handle_intent(self.now, to as u16, &intent, MISSION, Some(PLAN));
-                if relays {
-                    table.handle_relay(self.now, intent.system_id, &relay);
-                }
+                table.handle_relay(self.now, intent.system_id, &relay);
             }
         }
     }
@@ -120,7 +118,7 @@ proptest! {
         let mut swarm = Swarm::new(count);
         for step in 0..60 {
             let lost: List<_> = lost[step * 8..].iter().take(8).map(|draw| *draw == 0).collect();
-            swarm.step(&[true; 8], &lost, true);
+            swarm.step(&[true; 8], &lost);
             for (of, other) in
                 (0..usize::from(count)).flat_map(|a| (0..usize::from(count)).map(move |b| (a, b)))
             {
@@ -138,12 +136,12 @@ proptest! {
 #[test]
 fn a_vehicle_that_was_heard_off_the_plan_is_not_believed_back_onto_it() {
     let mut swarm = Swarm::new(3);
-    (0..30).for_each(|_| swarm.step(&[true; 3], &[false; 3], true));
+    (0..30).for_each(|_| swarm.step(&[true; 3], &[false; 3]));
     assert!(swarm.believed_m(2, 0).is_some() && swarm.believed_m(1, 0).is_some());
     // Only the middle vehicle hears that the first left the plan; then nobody hears the first any
     // more.
-    swarm.step(&[false, true, true], &[false; 3], true);
-    (0..30).for_each(|_| swarm.step(&[true; 3], &[true, false, false], true));
+    swarm.step(&[false, true, true], &[false; 3]);
+    (0..30).for_each(|_| swarm.step(&[true; 3], &[true, false, false]));
     assert_eq!(swarm.believed_m(1, 0), None);
     let held_m = swarm.believed_m(2, 0);
     assert!(held_m.is_some_and(|m| m < swarm.progress_m(0) - 5.0), "{held_m:?}");
@@ -158,14 +156,14 @@ fn progress_outlives_the_sight_of_a_vehicle() {
         let count = 3 + rng.next_u32() as u8 % 4;
         let mut swarm = Swarm::new(count);
         let together = 1 + rng.next_u32() % 20;
-        (0..together).for_each(|_| swarm.step(&[true; 8], &[false; 8], true));
+        (0..together).for_each(|_| swarm.step(&[true; 8], &[false; 8]));
         let last_m = swarm.progress_m(0) - 0.2;
         let before_m = swarm.believed_m(1, 0).unwrap();
         // The first vehicle leaves the range of all.
         let lost: List<_> = (0..8).map(|i| i == 0).collect();
         let apart = 1 + rng.next_u32() % 100;
         for _ in 0..apart {
-            swarm.step(&[true; 8], &lost, true);
+            swarm.step(&[true; 8], &lost);
             let held_m = swarm.believed_m(1, 0);
             assert!(
                 held_m.is_some_and(|m| before_m <= m && m <= last_m + 0.3),
@@ -187,11 +185,11 @@ fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
     for _ in 0..200 {
         let count = 3 + rng.next_u32() as u8 % 4;
         let mut swarm = Swarm::new(count);
-        (0..20 + rng.next_u32() % 20).for_each(|_| swarm.step(&[true; 8], &[false; 8], true));
+        (0..20 + rng.next_u32() % 20).for_each(|_| swarm.step(&[true; 8], &[false; 8]));
         let lost: List<_> = (0..8).map(|i| i == 0).collect();
         let mut far_to_others = false;
         for _ in 0..60 {
-            swarm.step(&[true; 8], &lost, true);
+            swarm.step(&[true; 8], &lost);
             let far = |of: usize| swarm.tables[of].contacts[0].is_reported_out_of_range(swarm.now);
             assert!(!far(1), "it was heard until it failed");
             far_to_others |= far(2);
@@ -247,7 +245,7 @@ fn a_vehicle_that_fails_is_lost_in_time_though_messages_are_late() {
     let mut rng = Pcg32::seed_from_u64(13);
     for case in 0..100 {
         let mut swarm = Swarm::new(3);
-        (0..10).for_each(|_| swarm.step(&[true; 3], &[true, false, false], true));
+        (0..10).for_each(|_| swarm.step(&[true; 3], &[true, false, false]));
         let delay_ms = 50 + u64::from(rng.next_u32() % 950);
         let failed_at = swarm.now;
         let mut late = List::new();
