@@ -97,8 +97,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Handles a frame of this vehicle's autopilot; any other frame changes nothing. Returns whether
-    /// the mission table has to be evaluated now.
+    /// Handles a frame of this vehicle's autopilot; any other frame changes nothing. Returns
+    /// whether the mission table has to be evaluated now.
     fn handle_autopilot_frame(&mut self, heard: &ReceivedFrame<'_>) -> bool {
         if !self.is_from_autopilot(heard) {
             return false;

@@ -114,7 +114,9 @@ impl Guidance {
         while let Some((i, contact, dead)) = neighbours.next_within(next, now, &reach) {
             next = i + 1;
             let mut met = contact.filter_neighbour(now);
-            met.lost = dead;
+            if dead {
+                met.count_as_lost();
+            }
             neighbours.apply_silence(contact, now, &mut met);
             let by_gates = met.on_plan && on_plan;
             if met.out_of_range && (by_gates || lands) {

@@ -36,6 +36,11 @@ pub(crate) struct FilterNeighbour<'a> {
 }
 
 impl<'a> FilterNeighbour<'a> {
+    /// The neighbour has been silent for so long that it counts as lost.
+    pub(crate) fn count_as_lost(&mut self) {
+        self.lost = true;
+    }
+
     /// The delay of the neighbour's messages no longer counts.
     pub(crate) fn ignore_delay(&mut self) {
         self.motion.delay_s = 0.0;
@@ -219,9 +224,9 @@ impl NeighbourEntry {
         now - self.position_at.unwrap_or(Instant::ZERO)
     }
 
-    /// The neighbour for the safety filter, as its last reports describe it. The caller sets `lost`
-    /// if it counts as dead; then, if its position is old, [`Neighbours::apply_silence`] has to
-    /// follow.
+    /// The neighbour for the safety filter, as its last reports describe it. If it counts as
+    /// dead, [`FilterNeighbour::count_as_lost`] has to follow; then, if its position is old,
+    /// [`Neighbours::apply_silence`].
     #[inline(always)]
     pub(crate) fn filter_neighbour(&self, now: Instant) -> FilterNeighbour<'_> {
         let grounded = self.reports_any(GROUNDED | LANDED);
