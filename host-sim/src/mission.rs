@@ -21,7 +21,7 @@ use planner_core::schedule::ScheduleError;
 use planner_core::search::SearchWorkspace;
 
 use self::ready::schedule_config;
-pub use self::ready::{HostPlan, OwnPlan, PLANNED_ACCEL_MPS2, PreparedMission, VERTICAL_MPS};
+pub use self::ready::{HostPlan, OwnPlan, PreparedMission, VERTICAL_MPS};
 use crate::capacity::{
     BoardCapacity, GATES, HostCompanion, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
     on_heap,

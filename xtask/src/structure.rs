@@ -1,16 +1,19 @@
-//! `cargo xtask structure`: checks the sources for import cycles between files, large structs,
-//! long functions, long files and long lines.
+//! `cargo xtask structure`: checks the sources for import cycles between files, fields written
+//! outside their module, large structs, long functions, `bool` arguments, long files and lines.
 //!
 //! The sources are parsed with `syn`. Any path that names an item of another file is an import of
-//! that file: in a `use`, a type, a call. An item behind a `pub use` counts as an import of the
-//! file that defines it. Test modules may import anything; a `mod` line is no import.
+//! that file: in a `use`, a type, a call. A `pub use` is an import too, and an item behind one
+//! counts as an import of the file that defines it. Test modules may import anything; a `mod` line
+//! is no import.
 
 mod distances;
 mod imports;
 mod lines;
 mod shape;
 mod sources;
+mod writes;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use anyhow::{Result, ensure};
@@ -31,25 +34,39 @@ const CRATES: [&str; 10] = [
     "xtask",
 ];
 
-/// Prints every import cycle and every struct, function, file or line beyond the limits. An error
+/// Prints every import cycle, every foreign write, and every struct, function, file or line beyond
+/// the limits. An error
 /// if one of them has no listed reason, or if docs/margins.md does not match the sources.
 pub fn run() -> Result<()> {
-    let mut wrong = 0;
+    let (mut wrong, mut beyond) = (0, Vec::new());
+    let mut records = BTreeSet::new();
+    for tree in Tree::of_crate(Path::new("planner-core"))? {
+        records.extend(writes::public_fields(&tree));
+    }
     for name in CRATES {
         for tree in Tree::of_crate(Path::new(name))? {
             for cycle in imports::cycles(&tree) {
                 println!("{name}: import cycle:\n  {}", cycle.join("\n  "));
                 wrong += 1;
             }
+            for place in writes::foreign(&tree, &records) {
+                println!("{name}: {place}");
+                wrong += 1;
+            }
             for (what, reason) in shape::beyond(&tree) {
                 println!("{name}: {what}: {}", reason.unwrap_or("no reason given"));
                 wrong += usize::from(reason.is_none());
+                beyond.push(what);
             }
         }
     }
     for (what, reason) in lines::beyond()? {
         println!("{what}: {}", reason.unwrap_or("no reason given"));
         wrong += usize::from(reason.is_none());
+    }
+    for exception in shape::unused_exceptions(&beyond) {
+        println!("{exception}");
+        wrong += 1;
     }
     for place in distances::check_margins_page()? {
         println!("{place}");

@@ -23,7 +23,7 @@ use crate::map::{ClearanceField, OccupancyMap, Unknown, VoxelMap};
 /// Height above the ground up to which the map's cells count as ground, metres.
 const ROUGH_GROUND_M: f32 = 0.5;
 /// Added to the clearance of zones against rounding, metres.
-const ROUNDING_M: f64 = 0.01;
+const ZONE_ROUNDING_M: f64 = 0.01;
 /// Most corners of a zone that is not a box.
 const MAX_ZONE_CORNERS: usize = 8;
 /// Distance from the box around all lanes and pads within which zones are kept, metres: transits
@@ -286,7 +286,7 @@ impl Columns {
             true => bounding_box(&hull),
             false => simplified_outward(hull, MAX_ZONE_CORNERS),
         };
-        let zone = offset_outward(&inner, self.clearance_m + ROUNDING_M);
+        let zone = offset_outward(&inner, self.clearance_m + ZONE_ROUNDING_M);
         if self.free_share(&zone) <= outline.free_share {
             return vec![zone];
         }

@@ -16,7 +16,7 @@ const COMPARISON_STEP_S: f32 = 0.25;
 /// Time between two departures that are tried, seconds.
 const DEPARTURE_STEP_S: f32 = 2.0;
 /// A vehicle within this horizontal distance of its pad is over its pad, metres.
-const OVER_PAD_M: f32 = 0.01;
+const ABOVE_PAD_WITHIN_M: f32 = 0.01;
 /// Latest departure that is tried, seconds.
 const MAX_GROUND_WAIT_S: f32 = 900.0;
 
@@ -91,7 +91,7 @@ fn min_distance_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32)
     };
     let (pad_a, pad_b) = (a.0[0], b.0[0]);
     let pads_m = separation_m.min((pad_a - pad_b).xy().norm());
-    let over = |place: &Point, pad: &Point| (place - pad).xy().norm() < OVER_PAD_M;
+    let over = |place: &Point, pad: &Point| (place - pad).xy().norm() < ABOVE_PAD_WITHIN_M;
     let end = (a.0.len() + a.1).max(b.0.len() + b.1);
     let mut least_m = f32::INFINITY;
     for step in a.1.min(b.1)..end {

@@ -28,6 +28,7 @@ pub const FLOOR_HEIGHT_M: f32 = 5.44;
 /// Seed of `builtin:building` without `?seed=`.
 pub const DEFAULT_SEED: u64 = 1;
 
+/// Thickness of walls, floors and ceilings, metres.
 const WALL_M: f32 = 0.25;
 /// Range of the corridor in y between its walls, metres.
 const CORRIDOR_M: [f32; 2] = [9.5, 14.5];

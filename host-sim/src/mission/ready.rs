@@ -26,8 +26,6 @@ pub type HostPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
 /// One vehicle's part of the swarm's plan, with its gates.
 pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
 
-/// Acceleration and braking that missions are planned with, m/s².
-pub const PLANNED_ACCEL_MPS2: f32 = 1.5;
 /// Nominal speed of take-off and landing in a plan, m/s.
 pub const VERTICAL_MPS: f32 = 1.0;
 /// Mean speed along a path that the schedule assumes, as a share of cruise speed: corners, braking

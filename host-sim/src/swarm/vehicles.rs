@@ -4,6 +4,7 @@
 use companion::Config;
 use companion::config::REACHES_ALL_M;
 use planner_core::Point;
+use planner_core::coverage::flights::PLANNED_ACCEL_MPS2;
 use planner_core::frames::enu_to_geodetic;
 use sim_autopilot as autopilot;
 
@@ -12,7 +13,7 @@ use super::member::SimulatedVehicle;
 use super::serial::SerialConfig;
 use crate::capacity::VEHICLES;
 use crate::flash::HostFlash;
-use crate::mission::{PLANNED_ACCEL_MPS2, PreparedMission};
+use crate::mission::PreparedMission;
 use crate::scenario::{AutopilotKind, CompanionHost, PositionErrors, VehicleSection};
 
 /// Radio range from which on a simulated radio counts as reaching every vehicle, metres.

@@ -25,7 +25,7 @@ const FORMAT: &str = "a point cloud";
 /// Mean number of returns in a cell, from which the cell's side follows.
 const RETURNS_PER_CELL: f64 = 4.0;
 /// Least side of a cell of the grid, metres.
-const MIN_CELL_M: f64 = 0.5;
+const MIN_CLOUD_CELL_M: f64 = 0.5;
 /// An empty cell is filled if cells on both sides, at most this many cells away, have heights.
 const BRIDGED_CELLS: usize = 3;
 /// Number of returns decoded at a time.
@@ -136,7 +136,7 @@ fn empty_grid(
     let sides = high - low;
     let cell_m = (f64::from(sides.x) * f64::from(sides.y) * RETURNS_PER_CELL / count as f64)
         .sqrt()
-        .max(MIN_CELL_M);
+        .max(MIN_CLOUD_CELL_M);
     let cell_m = cell_m as f32;
     // Half a cell more on each side, so that the last return is in a cell too.
     let half = Flat::repeat(cell_m / 2.0);

@@ -14,7 +14,7 @@ use super::grid::HeightGrid;
 /// path are half a cell apart, and the nodes of a sample lie within one cell of the sample.
 pub const READ_AROUND_SAMPLE_CELLS: f32 = 1.5;
 /// Least distance between two nodes, metres.
-const MIN_CELL_M: f32 = 2.0;
+const MIN_NODE_SPACING_M: f32 = 2.0;
 /// Least number of height steps by which neighbouring nodes must be allowed to differ: with fewer,
 /// rounding would distort the slope.
 const MIN_RISE_STEPS: f32 = 5.0;
@@ -59,7 +59,7 @@ impl FieldConfig {
         let fits = (sides.x * sides.y / (MAX_NODES as f32 * 0.9)).sqrt();
         // In a long and narrow box the added row of border nodes matters.
         let long = sides.amax() / (MAX_NODES as f32 / 8.0);
-        MIN_CELL_M.max(rise).max(fits).max(long)
+        MIN_NODE_SPACING_M.max(rise).max(fits).max(long)
     }
 
     /// The box in which the field needs heights, without the cells that a reader adds around any

@@ -25,7 +25,7 @@ use crate::schedule::{
 use crate::sort;
 use crate::{Length, Point};
 
-/// Acceleration and deceleration that durations of coverage flights are computed with, m/s².
+/// Acceleration and braking that missions are planned with, m/s².
 pub const PLANNED_ACCEL_MPS2: f32 = 1.5;
 /// Longest path, metres: vehicles report progress to each other in decimetres, in 16 bits.
 pub const MAX_PATH_LENGTH_M: f32 = 6_553.0;

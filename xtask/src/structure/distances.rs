@@ -1,8 +1,8 @@
-//! Makes and checks docs/margins.md, the page of all distances, speeds and accelerations that the
-//! code on board decides by.
+//! Makes and checks docs/margins.md, the page of all distances, times, speeds and accelerations
+//! that the code on board, or the planning on the host, decides by.
 //!
-//! It lists every f32 or f64 `const` of planner-core and companion whose name ends in `_M`, `_MPS`
-//! or `_MPS2`: value, doc comment, and the files that use it. Two constants of one name are an
+//! It lists every f32 or f64 `const` of planner-core, companion and host-sim whose name ends in
+//! `_M`, `_S`, `_MPS`, `_MPS2` or `_MPS3`: value, doc comment, and the files that use it. Two constants of one name are an
 //! error.
 
 use std::collections::BTreeMap;
@@ -17,11 +17,12 @@ use syn::{Expr, ExprLit, Item, Lit, Meta, Type};
 use super::sources::{Source, Tree};
 
 const PAGE: &str = "docs/margins.md";
-const CRATES: [&str; 2] = ["planner-core", "companion"];
+const CRATES: [&str; 3] = ["planner-core", "companion", "host-sim"];
 /// Ends of constants' names, and the unit that each means.
-const UNITS: [(&str, &str); 3] = [("_M", "m"), ("_MPS", "m/s"), ("_MPS2", "m/s²")];
-const HEAD: &str = "# Distances, speeds and accelerations\n\nEvery one that the code on board decides by, with its \
-reason: margins, reserves, leads, windows, limits.\nMade from the sources: `FLOCKMATE_WRITE=1 cargo xtask structure`. How margins \
+const UNITS: [(&str, &str); 5] =
+    [("_M", "m"), ("_MPS", "m/s"), ("_MPS2", "m/s²"), ("_MPS3", "m/s³"), ("_S", "s")];
+const HEAD: &str = "# Distances, times, speeds and accelerations\n\nEvery one that the code on board (planner-core, companion) \
+or the host (host-sim) decides by, with its\nreason: margins, reserves, leads, windows, limits.\nMade from the sources: `FLOCKMATE_WRITE=1 cargo xtask structure`. How margins \
 add up to an argument is in\n[safety.md](safety.md#margins). What a mission states itself (radius, margin, separation, speeds) is not here.\n";
 
 struct Distance {

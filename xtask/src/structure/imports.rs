@@ -82,12 +82,9 @@ impl Visit<'_> for Paths {
     }
 
     fn visit_item_use(&mut self, item: &ItemUse) {
-        let passes_on = !matches!(item.vis, Visibility::Inherited);
-        if !passes_on {
-            flatten(&item.tree, &mut Vec::new(), &mut |path, _| {
-                self.found.push((self.module.clone(), path));
-            });
-        }
+        flatten(&item.tree, &mut Vec::new(), &mut |path, _| {
+            self.found.push((self.module.clone(), path));
+        });
     }
 
     fn visit_path(&mut self, path: &syn::Path) {
@@ -98,6 +95,21 @@ impl Visit<'_> for Paths {
         }
         visit::visit_path(self, path);
     }
+}
+
+/// Names that a `pub use` of the crate brings into scope.
+pub fn exported_names(tree: &Tree) -> BTreeSet<String> {
+    let mut names = BTreeSet::new();
+    for item in tree.sources.iter().flat_map(|source| &source.items) {
+        if let Item::Use(item) = item
+            && matches!(item.vis, Visibility::Public(_))
+        {
+            flatten(&item.tree, &mut Vec::new(), &mut |_, name| {
+                names.insert(name);
+            });
+        }
+    }
+    names
 }
 
 /// Calls `give` for every path of a `use`, with the name that it brings into scope.

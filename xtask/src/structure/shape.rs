@@ -1,7 +1,7 @@
-//! Finds structs and functions beyond the limits of size.
+//! Finds structs and functions beyond the limits of size, and functions that take a `bool`.
 
 use syn::visit::{self, Visit};
-use syn::{FnArg, ImplItemFn, ItemFn, ItemStruct, Signature};
+use syn::{FnArg, ImplItemFn, ItemFn, ItemStruct, Signature, TraitItemFn, Type};
 
 use super::sources::Tree;
 
@@ -20,8 +20,6 @@ const DRAWS: &str = "what is drawn follows from the order of the draws, which on
 const FIRMWARE: &str =
     "what the firmware remembers; each file of its folder changes what is its own";
 
-const MESSAGE: &str = "one match on the message id: an arm for each message";
-
 const AT_LIMITS: &str = "one call after the other, each at its limits";
 
 /// Exceptions from the limits: file, name of the struct or function, and reason.
@@ -31,8 +29,11 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "Telemetry",
         "a telemetry record: what the autopilot said last",
     ),
-    ("companion/src/autopilot/telemetry.rs", "handle_frame", MESSAGE),
-    ("companion/src/companion/frames.rs", "handle_frame", MESSAGE),
+    (
+        "companion/src/autopilot/telemetry.rs",
+        "handle_frame",
+        "one match: an arm for each message of the autopilot",
+    ),
     (
         "companion/src/companion/inputs.rs",
         "guard_inputs",
@@ -113,11 +114,6 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "NeighbourEntry",
         "a telemetry record: what one neighbour said last",
     ),
-    (
-        "companion/src/swarm/neighbours/met.rs",
-        "for_filter",
-        "one record of a contact, in the inner loop of the safety filter",
-    ),
     ("board-bench/src/calls/limits.rs", "call_sampling", AT_LIMITS),
     ("board-bench/src/calls/limits_graph.rs", "call_roadmap_files", AT_LIMITS),
     ("board-bench/src/calls/limits_routes.rs", "call_plans", AT_LIMITS),
@@ -160,6 +156,15 @@ pub fn beyond(tree: &Tree) -> Vec<(String, Option<&'static str>)> {
     shape.found
 }
 
+/// A line for each exception that none of `found` needs.
+pub fn unused_exceptions(found: &[String]) -> Vec<String> {
+    let unused = EXCEPTIONS.iter().filter(|(file, name, _)| {
+        let begins = format!("{file}: {name} has ");
+        !found.iter().any(|what| what.starts_with(&begins))
+    });
+    unused.map(|(file, name, _)| format!("{file}: {name} needs no exception")).collect()
+}
+
 struct Shape {
     file: String,
     found: Vec<(String, Option<&'static str>)>,
@@ -185,6 +190,8 @@ impl Shape {
             signature.inputs.iter().filter(|input| matches!(input, FnArg::Typed(_))).count();
         self.judge(&name, lines, LINES, "lines");
         self.judge(&name, arguments, ARGUMENTS, "arguments");
+        let bools = signature.inputs.iter().filter(|input| is_bool(input)).count();
+        self.judge(&name, bools, 0, "`bool` arguments");
     }
 }
 
@@ -206,10 +213,20 @@ impl Visit<'_> for Shape {
         visit::visit_item_fn(self, item);
     }
 
+    fn visit_trait_item_fn(&mut self, item: &TraitItemFn) {
+        self.function(&item.sig, item.default.as_ref().map_or(0, lines));
+        visit::visit_trait_item_fn(self, item);
+    }
+
     fn visit_impl_item_fn(&mut self, item: &ImplItemFn) {
         self.function(&item.sig, lines(&item.block));
         visit::visit_impl_item_fn(self, item);
     }
+}
+
+fn is_bool(input: &FnArg) -> bool {
+    matches!(input, FnArg::Typed(input)
+        if matches!(&*input.ty, Type::Path(path) if path.path.is_ident("bool")))
 }
 
 /// Number of lines between a function's braces.
