@@ -167,11 +167,11 @@ impl Firmware {
         match self {
             Self::Px4(px4) => {
                 px4.params.set(name, wire, wire_type);
-                px4.tuning = px4::params::Tuning::new(&px4.params);
+                px4.tuning = px4::params::Px4Tuning::new(&px4.params);
             }
             Self::Copter(copter) => {
                 copter.params.set(name, wire, wire_type);
-                copter.tuning = ardupilot::params::Tuning::new(&copter.params);
+                copter.tuning = ardupilot::params::CopterTuning::new(&copter.params);
             }
         }
     }

@@ -1,5 +1,6 @@
-//! `cargo xtask structure`: checks the sources for import cycles between files, fields written
-//! outside their module, large structs, long functions, `bool` arguments, long files and lines.
+//! `cargo xtask structure`: checks the sources for import cycles, imports that point up, fields
+//! written outside their module, large structs, long functions, `bool` arguments, long files and
+//! long lines.
 //!
 //! The sources are parsed with `syn`. Any path that names an item of another file is an import of
 //! that file: in a `use`, a type, a call. A `pub use` is an import too, and an item behind one
@@ -8,6 +9,7 @@
 
 mod distances;
 mod imports;
+mod layers;
 mod lines;
 mod shape;
 mod sources;
@@ -49,7 +51,7 @@ pub fn run() -> Result<()> {
                 println!("{name}: import cycle:\n  {}", cycle.join("\n  "));
                 wrong += 1;
             }
-            for place in writes::foreign(&tree, &records) {
+            for place in layers::upward(&tree).into_iter().chain(writes::foreign(&tree, &records)) {
                 println!("{name}: {place}");
                 wrong += 1;
             }

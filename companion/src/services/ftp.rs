@@ -25,8 +25,8 @@ use self::memory::DuplicateDetection;
 pub(crate) use self::packet::FTP_TEXTS;
 pub use self::packet::MAX_DATA;
 use self::packet::{
-    ACK, EFBIG, EIO, FILE_REMOVED, HEADER_LEN, NakError, Request, Text, chunk_len, format_decimal,
-    is_open, op, upload_text,
+    ACK, EFBIG, EIO, FILE_REMOVED, FtpRequest, HEADER_LEN, NakError, Text, chunk_len,
+    format_decimal, is_open, op, upload_text,
 };
 use self::stream::{FtpBurst, next_request};
 use crate::link::frame::Frame;
@@ -71,7 +71,7 @@ struct Session {
     access: Access,
     /// Whether no byte was written to the file yet.
     fresh: bool,
-    opened_by: Request,
+    opened_by: FtpRequest,
     used_at: Instant,
 }
 
@@ -80,16 +80,16 @@ struct Session {
 #[derive(Clone, Copy, Debug)]
 enum FtpOperation {
     Nothing,
-    Read(Request, bool),
-    Sum(Request, bool),
-    Open(Request),
-    Close(Request),
+    Read(FtpRequest, bool),
+    Sum(FtpRequest, bool),
+    Open(FtpRequest),
+    Close(FtpRequest),
 }
 
 /// The FTP server. 4 kB, most of it queued requests.
 #[derive(Clone, Debug)]
 pub struct Ftp {
-    queue: Deque<Request, MAX_QUEUED_REQUESTS>,
+    queue: Deque<FtpRequest, MAX_QUEUED_REQUESTS>,
     reply: Option<Reply>,
     session: Option<Session>,
     operation: FtpOperation,
@@ -119,8 +119,8 @@ impl Ftp {
     /// dropped: the client repeats it.
     pub fn queue_request(&mut self, link: usize, now: Instant, frame: &Frame) {
         self.now = now;
-        let request = Request::read(link, frame);
-        let same = |held: &Request| held.is_same_request(&request);
+        let request = FtpRequest::read(link, frame);
+        let same = |held: &FtpRequest| held.is_same_request(&request);
         let at_work = match &self.operation {
             FtpOperation::Nothing => false,
             FtpOperation::Read(held, _)
@@ -240,7 +240,7 @@ impl Ftp {
         }
     }
 
-    fn end_upload(&mut self, request: &Request, result: Result<(), UploadError>) {
+    fn end_upload(&mut self, request: &FtpRequest, result: Result<(), UploadError>) {
         self.operation = FtpOperation::Nothing;
         if let Some(session) = self.session.take() {
             self.text = Some(upload_text(session.file, result));
@@ -248,7 +248,7 @@ impl Ftp {
         self.finish(request, result.map_err(NakError::from));
     }
 
-    fn begin_request(&mut self, request: &Request, store: &mut Store, erasing: ErasePermission) {
+    fn begin_request(&mut self, request: &FtpRequest, store: &mut Store, erasing: ErasePermission) {
         if let Some(done) = self.duplicates.previous_outcome(request, self.now) {
             if !is_open(request) || done.is_err() {
                 self.respond(request, done);
@@ -341,7 +341,7 @@ impl Ftp {
         }
     }
 
-    fn handle_list(&mut self, request: &Request, store: &Store) {
+    fn handle_list(&mut self, request: &FtpRequest, store: &Store) {
         if !request.path().is_empty() {
             return self.nak(request, NakError::NotFound);
         }
@@ -363,7 +363,7 @@ impl Ftp {
         }
     }
 
-    fn handle_open(&mut self, request: &Request, store: &mut Store, erasing: ErasePermission) {
+    fn handle_open(&mut self, request: &FtpRequest, store: &mut Store, erasing: ErasePermission) {
         let Some(file) = request.requested_file() else {
             return self.nak(request, NakError::Protected);
         };
@@ -388,7 +388,7 @@ impl Ftp {
         }
     }
 
-    fn handle_write(&mut self, request: &Request, store: &mut Store) {
+    fn handle_write(&mut self, request: &FtpRequest, store: &mut Store) {
         match self.session_of(request) {
             Ok(Session { access: Access::Write, .. }) => {}
             Ok(_) => return self.nak(request, NakError::Protected),
@@ -411,7 +411,7 @@ impl Ftp {
     }
 
     /// Sends again the ACK with which the session was opened.
-    fn repeat_open_ack(&mut self, request: &Request, session: &Session, store: &Store) {
+    fn repeat_open_ack(&mut self, request: &FtpRequest, session: &Session, store: &Store) {
         match store.file_size(session.file) {
             Some(size) if session.access == Access::Read => self.ack(request, &size.to_le_bytes()),
             _ => self.ack(request, &[]),
@@ -419,7 +419,7 @@ impl Ftp {
     }
 
     /// The client's open session; a request sent before that session was opened is refused.
-    fn session_of(&mut self, request: &Request) -> Result<Session, NakError> {
+    fn session_of(&mut self, request: &FtpRequest) -> Result<Session, NakError> {
         let now = self.now;
         match &mut self.session {
             Some(session) if session.client == request.client && session.id == request.session => {
@@ -441,7 +441,7 @@ impl Ftp {
     /// client uses the session.
     fn open_session(
         &mut self,
-        request: &Request,
+        request: &FtpRequest,
         file: File,
         access: Access,
         store: &mut Store,
@@ -452,7 +452,7 @@ impl Ftp {
             return false;
         }
         self.drop_session(store);
-        let Request { client, session: id, .. } = *request;
+        let FtpRequest { client, session: id, .. } = *request;
         let (opened_by, fresh) = (*request, access == Access::Write);
         self.session =
             Some(Session { id, client, file, access, fresh, opened_by, used_at: self.now });

@@ -28,7 +28,7 @@ pub use self::modes::CopterMode;
 use planner_core::Point;
 
 use self::auto_state::Auto;
-use self::params::Tuning;
+use self::params::CopterTuning;
 use self::reference::CopterReference;
 use self::setpoint::GuidedGoal;
 use super::command::{Arming, CommandOutcome};
@@ -132,7 +132,7 @@ pub struct Copter {
     /// All parameters, as MAVLink reports them.
     pub params: Params,
     /// Values of the parameters that have an effect.
-    pub tuning: Tuning,
+    pub tuning: CopterTuning,
     ready_us: u64,
     reported_origin_and_position: [bool; 2],
     runtime_us: u64,
@@ -161,7 +161,7 @@ impl Copter {
     pub fn new(system_id: u8, limits: &VehicleLimits, ready_s: f32) -> Self {
         let params = params::default_params(system_id, limits);
         Self {
-            tuning: Tuning::new(&params),
+            tuning: CopterTuning::new(&params),
             params,
             ready_us: micros_from_s(ready_s),
             reported_origin_and_position: [false; 2],

@@ -84,8 +84,8 @@ const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 
 /// Values of the parameters that have an effect, each named by its effect. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
-#[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
-pub struct Tuning {
+#[expect(missing_docs, reason = "each is the parameter it is read from, in `CopterTuning::new`")]
+pub struct CopterTuning {
     pub gains: Gains,
     pub speed: f32,
     pub speed_up: f32,
@@ -112,7 +112,7 @@ pub struct Tuning {
     pub checks: bool,
 }
 
-impl Tuning {
+impl CopterTuning {
     /// A demand without position, velocity or heading.
     pub(super) fn default_demand(&self) -> Demand {
         Demand {
@@ -187,7 +187,7 @@ mod tests {
     fn every_parameter_that_acts_is_in_the_table() {
         // A misspelt name would read as 0; of these only the battery's and the GCS failsafe are 0
         // by default.
-        let t = Tuning::new(&default_params(3, &VehicleLimits::default()));
+        let t = CopterTuning::new(&default_params(3, &VehicleLimits::default()));
         let positive =
             [t.speed, t.speed_up, t.speed_down, t.land_speed, t.land_slow_below, t.stick_sink];
         assert!(positive.iter().all(|v| *v > 0.1));

@@ -7,7 +7,7 @@
 
 use planner_core::Point;
 
-use super::params::Tuning;
+use super::params::CopterTuning;
 use super::setpoint::GuidedGoal;
 use crate::shaping::approach_rate;
 
@@ -32,7 +32,7 @@ impl CopterReference {
     }
 
     /// Moves the reference for one step of `dt` seconds towards `goal`.
-    pub fn advance(&mut self, goal: &GuidedGoal, tuning: &Tuning, dt: f32) {
+    pub fn advance(&mut self, goal: &GuidedGoal, tuning: &CopterTuning, dt: f32) {
         let error = goal.position.map_or(Point::zeros(), |position| position - self.position);
         // Horizontal axes, limited as one vector.
         let (limit, jerk) = (tuning.acceleration, tuning.jerk);
@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn it_arrives_within_every_limit_and_does_not_overshoot() {
-        let tuning = Tuning::new(&params::default_params(1, &VehicleLimits::default()));
+        let tuning = CopterTuning::new(&params::default_params(1, &VehicleLimits::default()));
         let mut reference = CopterReference::new(Point::zeros(), Point::zeros());
         let goal = GuidedGoal::hold(Point::new(12.0, 16.0, 10.0));
         let dt = 0.004;

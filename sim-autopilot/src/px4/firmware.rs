@@ -1,7 +1,7 @@
 //! PX4 as a whole: commander, parameters, a pending mode change, and the gimbal commands at the
 //! start of a failsafe.
 
-use super::params::{self, Tuning};
+use super::params::{self, Px4Tuning};
 use super::setpoint;
 use super::{Commander, Px4Mode};
 use crate::SimulatedKind;
@@ -32,7 +32,7 @@ pub struct Px4 {
     /// All parameters, as MAVLink reports them.
     pub params: Params,
     /// Values of the parameters that have an effect.
-    pub tuning: Tuning,
+    pub tuning: Px4Tuning,
     /// A DO_SET_MODE to be decided in the next step: sender, and the requested mode if it is valid.
     pub(super) pending_mode: Option<(Sender, Option<Px4Mode>)>,
 }
@@ -43,7 +43,7 @@ impl Px4 {
         let params = params::default_params(system_id, limits);
         Self {
             commander: Commander::new(),
-            tuning: Tuning::new(&params),
+            tuning: Px4Tuning::new(&params),
             params,
             pending_mode: None,
         }

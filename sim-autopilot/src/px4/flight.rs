@@ -3,7 +3,7 @@
 use planner_core::Point;
 
 use super::glide::{self, SmoothedApproach};
-use super::params::Tuning;
+use super::params::Px4Tuning;
 use super::{CRAWL_FACTOR, Commander, Px4Mode, ReturnLeg, SensorReadings};
 use crate::itinerary::{MissionLeg, interpolate_height};
 use crate::shaping::JerkLimitedRate;
@@ -53,7 +53,7 @@ impl Commander {
     }
 
     /// The demand of the mode in this step.
-    pub(super) fn demand(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> Demand {
+    pub(super) fn demand(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) -> Demand {
         let held = Demand {
             position: self.hold_point,
             heading: self.hold_heading,
@@ -106,7 +106,7 @@ impl Commander {
     fn approach_demand(
         &mut self,
         sensors: &SensorReadings,
-        tuning: &Tuning,
+        tuning: &Px4Tuning,
         held: &Demand,
     ) -> Demand {
         self.glide.advance(sensors.now_us, &self.hold_point, held.speed_max, tuning.auto_jerk);
@@ -125,7 +125,7 @@ impl Commander {
     fn mission_demand(
         &mut self,
         sensors: &SensorReadings,
-        tuning: &Tuning,
+        tuning: &Px4Tuning,
         held: Demand,
     ) -> Demand {
         match self.mission.leg {
@@ -173,7 +173,7 @@ impl Commander {
     fn landing_demand(
         &mut self,
         sensors: &SensorReadings,
-        tuning: &Tuning,
+        tuning: &Px4Tuning,
         held: Demand,
     ) -> Demand {
         let [high, low] = tuning.land_slow_below;
@@ -209,7 +209,12 @@ impl Commander {
         }
     }
 
-    fn return_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
+    fn return_demand(
+        &mut self,
+        sensors: &SensorReadings,
+        tuning: &Px4Tuning,
+        held: Demand,
+    ) -> Demand {
         let away =
             libm::hypotf(sensors.home.x - sensors.position.x, sensors.home.y - sensors.position.y);
         if let ReturnLeg::Climb { up } = &mut self.leg

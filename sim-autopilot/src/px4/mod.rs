@@ -24,7 +24,7 @@ use planner_core::Point;
 
 use self::glide::SmoothedApproach;
 pub use self::modes::Px4Mode;
-use self::params::Tuning;
+use self::params::Px4Tuning;
 use self::setpoint::OffboardSetpoint;
 use super::command::{Arming, CommandOutcome};
 use super::itinerary::MissionLeg;
@@ -181,7 +181,7 @@ impl Commander {
     }
 
     /// Values of MAV_STATE and MAV_MODE_FLAG for HEARTBEAT.
-    pub fn heartbeat(&self, now_us: u64, tuning: &Tuning) -> (u8, u8) {
+    pub fn heartbeat(&self, now_us: u64, tuning: &Px4Tuning) -> (u8, u8) {
         let mode = self.mode();
         let status = match (self.armed, self.failsafe) {
             (true, Some(_)) => 5,
@@ -223,7 +223,7 @@ impl Commander {
     }
 
     /// Whether the last setpoint is recent enough for Offboard.
-    pub fn is_setpoint_stream_fresh(&self, now_us: u64, tuning: &Tuning) -> bool {
+    pub fn is_setpoint_stream_fresh(&self, now_us: u64, tuning: &Px4Tuning) -> bool {
         let limit = micros_from_s(tuning.offboard_loss_s + LOSS_REACTION_S);
         self.setpoint.is_some() && now_us.saturating_sub(self.setpoint_us) <= limit
     }
@@ -232,7 +232,7 @@ impl Commander {
     pub fn arm(
         &mut self,
         sensors: &SensorReadings,
-        tuning: &Tuning,
+        tuning: &Px4Tuning,
         arming: Arming,
     ) -> CommandOutcome {
         if self.armed {
@@ -250,7 +250,7 @@ impl Commander {
 
     /// Whether the vehicle may be armed: the requested mode can run, there is a position, and the
     /// battery is not low.
-    pub fn is_armable(&self, sensors: &SensorReadings, tuning: &Tuning) -> bool {
+    pub fn is_armable(&self, sensors: &SensorReadings, tuning: &Px4Tuning) -> bool {
         let runs = match self.intended_mode {
             Px4Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
             Px4Mode::Hold | Px4Mode::Takeoff => true,
@@ -282,7 +282,7 @@ impl Commander {
         &mut self,
         mode: Px4Mode,
         sensors: &SensorReadings,
-        tuning: &Tuning,
+        tuning: &Px4Tuning,
     ) -> CommandOutcome {
         let runs = match mode {
             Px4Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
@@ -315,7 +315,7 @@ impl Commander {
         &mut self,
         up: f32,
         sensors: &SensorReadings,
-        tuning: &Tuning,
+        tuning: &Px4Tuning,
     ) -> CommandOutcome {
         let accepted = self.request_mode(Px4Mode::Takeoff, sensors, tuning);
         if accepted.is_done() {
@@ -331,7 +331,7 @@ impl Commander {
         to: &Point,
         heading: f32,
         sensors: &SensorReadings,
-        tuning: &Tuning,
+        tuning: &Px4Tuning,
     ) -> CommandOutcome {
         if !self.armed
             || self.request_mode(Px4Mode::Hold, sensors, tuning) == CommandOutcome::Refused
@@ -356,7 +356,7 @@ impl Commander {
     }
 
     /// Advances one step: failsafe, timers, flight phase, and the demand of the mode.
-    pub fn update(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> ControlDemand {
+    pub fn update(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) -> ControlDemand {
         let now = sensors.now_us;
         if self.armed {
             self.update_failsafe(sensors, tuning);
@@ -417,7 +417,7 @@ impl Commander {
         ControlDemand { motors, integral, demand }
     }
 
-    fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
+    fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) {
         let stream_lost = self.intended_mode == Px4Mode::Offboard
             && !self.is_setpoint_stream_fresh(sensors.now_us, tuning);
         let battery_out =
@@ -449,7 +449,7 @@ impl Commander {
         }
     }
 
-    fn update_timers(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
+    fn update_timers(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) {
         let since = |start: u64| sensors.now_us.saturating_sub(start);
         let idle = self.landed && self.phase == FlightPhase::Ground;
         if idle && !self.flown_since_arming && tuning.disarm_preflight_s > 0.0 {
@@ -468,7 +468,7 @@ impl Commander {
         }
     }
 
-    fn detect_landing(&mut self, sensors: &SensorReadings, demand: &Demand, tuning: &Tuning) {
+    fn detect_landing(&mut self, sensors: &SensorReadings, demand: &Demand, tuning: &Px4Tuning) {
         // Outside Offboard the crawl is simulated slower than PX4 commands it (`CRAWL_FACTOR`).
         let share = if self.mode() == Px4Mode::Offboard { 1.0 } else { CRAWL_FACTOR };
         let wants_down = -demand.velocity.z >= share * MIN_LAND_RATE_MPS;

@@ -122,8 +122,8 @@ const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 
 /// Values of the parameters that have an effect, each named by its effect. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
-#[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
-pub struct Tuning {
+#[expect(missing_docs, reason = "each is the parameter it is read from, in `Px4Tuning::new`")]
+pub struct Px4Tuning {
     pub gains: Gains,
     pub speed_max: f32,
     pub climb_max: f32,
@@ -155,7 +155,7 @@ pub struct Tuning {
     pub battery_low: f32,
 }
 
-impl Tuning {
+impl Px4Tuning {
     /// A demand without position, velocity or heading, with the speed limits of manual and Offboard
     /// flight.
     pub(super) fn default_demand(&self) -> Demand {
@@ -244,7 +244,7 @@ mod tests {
     #[test]
     fn every_parameter_that_acts_is_in_the_table() {
         // A misspelt name would read as 0; none of these defaults is 0 but the two actions.
-        let t = Tuning::new(&default_params(3, &VehicleLimits::default()));
+        let t = Px4Tuning::new(&default_params(3, &VehicleLimits::default()));
         for value in
             [t.speed_max, t.cruise, t.land_speed, t.spool_up_s, t.offboard_loss_s, t.return_height]
         {

@@ -54,12 +54,32 @@ fn reached(imports: &[BTreeSet<usize>], from: usize) -> BTreeSet<usize> {
 }
 
 fn of_file(tree: &Tree, at: usize) -> BTreeSet<usize> {
+    let file = |import| match import {
+        Import::File(file) => Some(file),
+        Import::Named(_) => None,
+    };
+    of(tree, at).into_iter().filter_map(file).collect()
+}
+
+/// What a path of a file leads to.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+pub enum Import {
+    /// The file with this index in the tree.
+    File(usize),
+    /// Another crate, or something in scope, by its name.
+    Named(String),
+}
+
+/// What the file with index `at` imports.
+pub fn of(tree: &Tree, at: usize) -> BTreeSet<Import> {
     let source = &tree.sources[at];
     let mut paths = Paths { module: source.module.clone(), found: Vec::new() };
     source.items.iter().for_each(|item| paths.visit_item(item));
-    let files =
-        paths.found.iter().filter_map(|(module, path)| resolve(tree, module, path, MAX_REEXPORTS));
-    files.filter(|file| *file != at).collect()
+    let imports = paths.found.iter().filter_map(|(module, path)| {
+        let file = resolve(tree, module, path, MAX_REEXPORTS).map(Import::File);
+        file.or_else(|| path.first().cloned().map(Import::Named))
+    });
+    imports.filter(|import| *import != Import::File(at)).collect()
 }
 
 /// Collects the item paths in a file, each with the module in which it stands.

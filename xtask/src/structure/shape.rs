@@ -119,8 +119,8 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("board-bench/src/calls/limits_routes.rs", "call_plans", AT_LIMITS),
     ("board-bench/src/calls/limits_routes.rs", "call_schedules", AT_LIMITS),
     ("board-bench/src/calls/limits_routes.rs", "call_detours", AT_LIMITS),
-    ("sim-autopilot/src/ardupilot/params.rs", "Tuning", SETTINGS),
-    ("sim-autopilot/src/px4/params.rs", "Tuning", SETTINGS),
+    ("sim-autopilot/src/ardupilot/params.rs", "CopterTuning", SETTINGS),
+    ("sim-autopilot/src/px4/params.rs", "Px4Tuning", SETTINGS),
     (
         "host-sim/src/commands/companion.rs",
         "run",

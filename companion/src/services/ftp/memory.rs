@@ -5,7 +5,7 @@
 //! for [`CLOSED_SESSION_WINDOW`] whatever the sequence number, until the client opens the next
 //! session.
 
-use super::packet::{NakError, Request, RequestFingerprint, op, request_fingerprint};
+use super::packet::{FtpRequest, NakError, RequestFingerprint, op, request_fingerprint};
 use crate::time::{Duration, Instant};
 
 /// Time for which a repetition of an answered request is recognised.
@@ -44,7 +44,7 @@ struct ClosedSession {
 impl DuplicateDetection {
     /// Remembers the outcome of a request: of TerminateSession by client and session, of any other
     /// request by its whole content.
-    pub fn remember(&mut self, request: &Request, outcome: Outcome, at: Instant) {
+    pub fn remember(&mut self, request: &FtpRequest, outcome: Outcome, at: Instant) {
         if request.opcode == op::TERMINATE {
             self.closed = Some(ClosedSession {
                 client: request.client,
@@ -60,7 +60,7 @@ impl DuplicateDetection {
     }
 
     /// Outcome of this same request if it was answered within the last 3 s (`DUPLICATE_WINDOW`).
-    pub fn previous_outcome(&self, request: &Request, now: Instant) -> Option<Outcome> {
+    pub fn previous_outcome(&self, request: &FtpRequest, now: Instant) -> Option<Outcome> {
         let print = request_fingerprint(request);
         let known =
             |done: &&AnsweredRequest| done.request == print && now - done.at < DUPLICATE_WINDOW;
@@ -69,7 +69,7 @@ impl DuplicateDetection {
 
     /// Outcome of closing the session that the request names, if that was within the last 10 s
     /// (`CLOSED_SESSION_WINDOW`).
-    pub fn previous_close_outcome(&self, request: &Request, now: Instant) -> Option<Outcome> {
+    pub fn previous_close_outcome(&self, request: &FtpRequest, now: Instant) -> Option<Outcome> {
         let known = |closed: &&ClosedSession| {
             (closed.client, closed.session) == (request.client, request.session)
                 && now - closed.at < CLOSED_SESSION_WINDOW

@@ -96,7 +96,7 @@ pub fn upload_text(file: File, result: Result<(), UploadError>) -> Text {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Request {
+pub struct FtpRequest {
     pub link: usize,
     pub client: (u8, u8),
     pub sequence: u16,
@@ -107,7 +107,7 @@ pub struct Request {
     pub data: [u8; MAX_DATA],
 }
 
-impl Request {
+impl FtpRequest {
     pub fn read(link: usize, frame: &Frame) -> Self {
         let p = &frame.padded_payload()[3..];
         let mut data = [0; MAX_DATA];
@@ -150,7 +150,7 @@ impl Request {
 }
 
 /// Whether the request opens a session.
-pub fn is_open(request: &Request) -> bool {
+pub fn is_open(request: &FtpRequest) -> bool {
     matches!(request.opcode, op::OPEN_READ | op::CREATE | op::OPEN_WRITE)
 }
 
@@ -158,13 +158,13 @@ pub fn is_open(request: &Request) -> bool {
 /// both begin at the same sequence number: session and data can distinguish them.
 pub type RequestFingerprint = ((u8, u8), u16, (u8, u8), u32, u32);
 
-pub fn request_fingerprint(request: &Request) -> RequestFingerprint {
-    let Request { client, sequence, session, opcode, offset, .. } = *request;
+pub fn request_fingerprint(request: &FtpRequest) -> RequestFingerprint {
+    let FtpRequest { client, sequence, session, opcode, offset, .. } = *request;
     (client, sequence, (session, opcode), offset, crc32(request.bytes()))
 }
 
 /// Bytes of data that each packet of a read or burst is to have; size 0 means the most possible.
-pub fn chunk_len(request: &Request) -> usize {
+pub fn chunk_len(request: &FtpRequest) -> usize {
     match usize::from(request.size) {
         0 => MAX_DATA,
         size => size.min(MAX_DATA),

@@ -1,28 +1,28 @@
 //! Replies to MAVLink FTP requests: the packets of ACK and NAK.
 
-use super::packet::{ACK, HEADER_LEN, MAX_DATA, NAK, NakError, Request};
+use super::packet::{ACK, FtpRequest, HEADER_LEN, MAX_DATA, NAK, NakError};
 use super::{Ftp, Reply};
 
 impl Ftp {
     /// Sets ACK or NAK as the reply to `request`, and remembers `result`: a repetition of the
     /// request is answered alike, not executed again.
-    pub(super) fn finish(&mut self, request: &Request, result: Result<(), NakError>) {
+    pub(super) fn finish(&mut self, request: &FtpRequest, result: Result<(), NakError>) {
         self.duplicates.remember(request, result, self.now);
         self.respond(request, result);
     }
 
-    pub(super) fn respond(&mut self, request: &Request, result: Result<(), NakError>) {
+    pub(super) fn respond(&mut self, request: &FtpRequest, result: Result<(), NakError>) {
         match result {
             Ok(()) => self.ack(request, &[]),
             Err(error) => self.nak(request, error),
         }
     }
 
-    pub(super) fn ack(&mut self, request: &Request, data: &[u8]) {
+    pub(super) fn ack(&mut self, request: &FtpRequest, data: &[u8]) {
         self.set_reply(request, ACK, 0, data);
     }
 
-    pub(super) fn nak(&mut self, request: &Request, error: NakError) {
+    pub(super) fn nak(&mut self, request: &FtpRequest, error: NakError) {
         let code = match error {
             NakError::Errno(errno) => return self.set_reply(request, NAK, 0, &[2, errno]),
             NakError::InvalidSize => 3,
@@ -38,7 +38,7 @@ impl Ftp {
 
     pub(super) fn set_reply(
         &mut self,
-        request: &Request,
+        request: &FtpRequest,
         opcode: u8,
         burst_complete: u8,
         data: &[u8],

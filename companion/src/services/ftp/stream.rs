@@ -1,7 +1,7 @@
 //! A burst: one request that is answered by several packets, each as if it had been requested
 //! alone.
 
-use super::packet::{Request, chunk_len};
+use super::packet::{FtpRequest, chunk_len};
 
 /// Packets of one burst; after the last one the client requests the next burst.
 pub const PACKETS_PER_BURST: u8 = 16;
@@ -9,7 +9,7 @@ pub const PACKETS_PER_BURST: u8 = 16;
 /// A burst under way: the request, and offset and sequence number of its next packet.
 #[derive(Clone, Copy, Debug)]
 pub struct FtpBurst {
-    request: Request,
+    request: FtpRequest,
     offset: u32,
     sequence: u16,
     packets_left: u8,
@@ -17,7 +17,7 @@ pub struct FtpBurst {
 
 impl FtpBurst {
     /// The burst that a request asks for, before its first packet.
-    pub fn new(request: &Request) -> Self {
+    pub fn new(request: &FtpRequest) -> Self {
         Self {
             request: *request,
             offset: request.offset,
@@ -27,13 +27,13 @@ impl FtpBurst {
     }
 
     /// The request that the client sent for the burst.
-    pub fn first_request(&self) -> Request {
+    pub fn first_request(&self) -> FtpRequest {
         self.request
     }
 
     /// The request that the client would have sent for the next packet alone.
-    fn next_request(&self) -> Request {
-        Request { sequence: self.sequence, offset: self.offset, ..self.request }
+    fn next_request(&self) -> FtpRequest {
+        FtpRequest { sequence: self.sequence, offset: self.offset, ..self.request }
     }
 
     /// The burst after a packet with `len` bytes of data was read; `None` if that packet was its
@@ -47,7 +47,7 @@ impl FtpBurst {
 
 /// The request that the next packet answers: that of the burst's next packet if `request` started
 /// the burst, else `request` itself.
-pub fn next_request(request: &Request, stream: Option<&FtpBurst>) -> Request {
+pub fn next_request(request: &FtpRequest, stream: Option<&FtpBurst>) -> FtpRequest {
     stream
         .filter(|stream| stream.request.is_same_request(request))
         .map_or(*request, FtpBurst::next_request)
