@@ -1,18 +1,14 @@
-//! The planning workspace: one memory for four uses, of which one is active at a time (planning on
-//! a roadmap, building one, the parts of coverage planning for measurements, planning a coverage
-//! mission).
+//! The planning workspace: one memory for three uses, of which one is active at a time (planning on
+//! a roadmap, building one, planning a coverage mission).
 //!
 //! An enum is not used: to change its variant the compiler would build the new value on the stack,
 //! where there is no room for it.
-#![expect(unsafe_code, reason = "four uses of one piece of memory")]
+#![expect(unsafe_code, reason = "three uses of one piece of memory")]
 
 use core::mem::{ManuallyDrop, MaybeUninit};
 
 use companion::planner::coverage;
 use planner_core::Point;
-use planner_core::coverage::pack::RoutePlan;
-use planner_core::coverage::tracks::{self, Tracks};
-use planner_core::coverage::{losses, powell};
 use planner_core::plan::PlanWorkspace;
 use planner_core::prm::{self, PrmConfig, PrmError};
 use planner_core::roadmap::Edge;
@@ -47,7 +43,7 @@ impl Default for CoveragePlanWorkspace {
     }
 }
 
-/// The memory for all four uses, as large as the largest; a board has one.
+/// The memory for all three uses, as large as the largest; a board has one.
 pub struct WorkspaceOverlay {
     memory: Memory,
     used: OverlayUse,
@@ -57,35 +53,23 @@ pub struct WorkspaceOverlay {
 enum OverlayUse {
     Plan,
     Build,
-    CoverageBench,
     CoveragePlan,
 }
 
 union Memory {
     plan: ManuallyDrop<Planner>,
     build: ManuallyDrop<RoadmapBuilder>,
-    coverage: ManuallyDrop<CoverageBenchWorkspace>,
-    area: ManuallyDrop<CoveragePlanWorkspace>,
+    coverage: ManuallyDrop<CoveragePlanWorkspace>,
 }
 
-/// All-zero values of the four types: this constant compiles only if all zeros is a valid value of
+/// All-zero values of the three types: this constant compiles only if all zeros is a valid value of
 /// each.
 #[expect(dead_code, reason = "made by the compiler alone")]
-const ALL_ZEROS: (Planner, RoadmapBuilder, CoverageBenchWorkspace, CoveragePlanWorkspace) = {
+const ALL_ZEROS: (Planner, RoadmapBuilder, CoveragePlanWorkspace) = {
     // SAFETY: the compiler evaluates this and rejects an invalid value.
     unsafe {
-        let zeroed = (
-            MaybeUninit::zeroed(),
-            MaybeUninit::zeroed(),
-            MaybeUninit::zeroed(),
-            MaybeUninit::zeroed(),
-        );
-        (
-            zeroed.0.assume_init(),
-            zeroed.1.assume_init(),
-            zeroed.2.assume_init(),
-            zeroed.3.assume_init(),
-        )
+        let zeroed = (MaybeUninit::zeroed(), MaybeUninit::zeroed(), MaybeUninit::zeroed());
+        (zeroed.0.assume_init(), zeroed.1.assume_init(), zeroed.2.assume_init())
     }
 };
 
@@ -111,19 +95,11 @@ impl WorkspaceOverlay {
         unsafe { &mut self.memory.build }
     }
 
-    /// The memory as workspaces of coverage's separate steps. It is zeroed if it had another use
-    /// before.
-    pub fn coverage_bench(&mut self) -> &mut CoverageBenchWorkspace {
-        self.switch_use(OverlayUse::CoverageBench);
-        // SAFETY: as in `planner`; all zeros is an empty workspace.
-        unsafe { &mut self.memory.coverage }
-    }
-
     /// The memory as workspace of coverage plans. It is zeroed if it had another use before.
     pub fn coverage_plan(&mut self) -> &mut CoveragePlanWorkspace {
         self.switch_use(OverlayUse::CoveragePlan);
         // SAFETY: as in `planner`; all zeros is an area without vertices.
-        unsafe { &mut self.memory.area }
+        unsafe { &mut self.memory.coverage }
     }
 
     /// Zeroes the memory if `used` differs from its use until now.
@@ -137,45 +113,6 @@ impl WorkspaceOverlay {
 }
 
 impl Default for WorkspaceOverlay {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
-/// Workspaces of the separate steps of coverage planning, for measuring them.
-pub struct CoverageBenchWorkspace {
-    /// All lanes of the area, along one path.
-    pub tracks: Tracks<LANES>,
-    /// Lanes that are not photographed after a vehicle was lost.
-    pub left: Tracks<LANES>,
-    /// Workspace for computing lanes.
-    pub build: tracks::LaneWorkspace<AREA_VERTICES>,
-    /// Workspace for dividing lanes among vehicles.
-    pub powell: powell::PowellWorkspace<VEHICLES>,
-    /// Each vehicle's route over its lanes.
-    pub plan: RoutePlan<VEHICLES>,
-    /// Workspace for lost vehicles and the lanes left after them.
-    pub losses: losses::LossesWorkspace<LANES, VEHICLES>,
-    /// Workspace for scheduling the flights.
-    pub schedule: ScheduleWorkspace,
-}
-
-impl CoverageBenchWorkspace {
-    /// Empty; its bytes are all zeros.
-    pub const fn new() -> Self {
-        Self {
-            tracks: Tracks::new(),
-            left: Tracks::new(),
-            build: tracks::LaneWorkspace::new(),
-            powell: powell::PowellWorkspace::new(),
-            plan: RoutePlan::new(),
-            losses: losses::LossesWorkspace::new(),
-            schedule: ScheduleWorkspace::new(),
-        }
-    }
-}
-
-impl Default for CoverageBenchWorkspace {
     fn default() -> Self {
         Self::new()
     }

@@ -7,7 +7,6 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use board_bench::calls::{Meter, coverage, coverage_missions};
-use firmware::scratch::WorkspaceOverlay;
 use host_sim::map::{Unknown, building};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
@@ -211,10 +210,10 @@ pub fn counted(program: &Path) -> Result<HashMap<String, CallCost>> {
     let lines =
         board::measure(program, &mission.roadmap_or_field_file, &board::map_image(&map.grid()));
     let calls = coverage::measure_coverage_calls(&mut Uncounted, &mut Box::default());
-    let mut scratch = Box::new(WorkspaceOverlay::new());
     let flights = coverage_missions::measure_coverage_flights(
         &mut Uncounted,
-        &mut scratch,
+        &mut Box::default(),
+        &mut Box::default(),
         &mut Box::default(),
     );
     let host = format!("coverage {calls:08x} {flights:08x}");

@@ -3,7 +3,6 @@
 //! test compares board and host bit by bit.
 
 use firmware::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
-use firmware::scratch::CoverageBenchWorkspace;
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::area::{Area, Ring, RingKind};
@@ -18,6 +17,7 @@ use planner_core::detour::{DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::{VehiclePlan, WaypointRange};
 
 use super::Meter;
+use super::coverage_workspace::CoverageWorkspace;
 
 /// Most changes of the lanes' order that the planner tries.
 pub const MAX_ORDER_CHANGES: u32 = companion::planner::coverage::MAX_ORDER_CHANGES;
@@ -59,7 +59,7 @@ impl Checksum {
 
 /// Makes all calls of coverage planning; returns the checksum of their results.
 #[inline(never)]
-pub fn measure_coverage_calls(meter: &mut impl Meter, lent: &mut CoverageBenchWorkspace) -> u32 {
+pub fn measure_coverage_calls(meter: &mut impl Meter, lent: &mut CoverageWorkspace) -> u32 {
     let mut sum = Checksum(1);
     measure_cameras(meter, &mut sum);
     // Area of five vertices, 300 by 150 m; its lanes are 10 m apart.
@@ -118,12 +118,12 @@ fn measure_cameras(meter: &mut impl Meter, sum: &mut Checksum) {
 fn measure_plans(
     meter: &mut impl Meter,
     area: Area<'_>,
-    lent: &mut CoverageBenchWorkspace,
+    lent: &mut CoverageWorkspace,
     sum: &mut Checksum,
 ) {
     let transit = Transit::<1>::empty();
     let few = vehicles(LIMITED_VEHICLES);
-    let CoverageBenchWorkspace { tracks, left, build, powell, plan, .. } = lent;
+    let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
     let bytes = size_of_val(tracks) + size_of_val(build) + size_of_val(powell);
     meter.call("a coverage plan, 3", bytes, || {
         tracks::build_lanes(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
@@ -192,12 +192,12 @@ fn flown_lanes(tracks: &Tracks<LANES>, plan: &RoutePlan<VEHICLES>) -> Vec<Waypoi
 fn measure_division(
     meter: &mut impl Meter,
     area: Area<'_>,
-    lent: &mut CoverageBenchWorkspace,
+    lent: &mut CoverageWorkspace,
     sum: &mut Checksum,
 ) {
     let transit = Transit::<1>::empty();
     let many = vehicles(VEHICLES);
-    let CoverageBenchWorkspace { tracks, left, build, powell, plan, .. } = lent;
+    let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
     let pack = &mut powell.pack;
     // Lanes along y: 2559 m / 5 m are 512; in this convex area their order is not searched.
     let pattern = pattern(Some(90.0), 5.0);
@@ -308,11 +308,7 @@ fn largest_area() -> (Vec<Flat, AREA_VERTICES>, Vec<Ring, { ZONES + 1 }>) {
 
 /// Plans an area with as many vertices, and as many corners of no-fly zones among them, as a board
 /// holds.
-fn measure_largest_area(
-    meter: &mut impl Meter,
-    lent: &mut CoverageBenchWorkspace,
-    sum: &mut Checksum,
-) {
+fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, sum: &mut Checksum) {
     let (vertices, rings) = largest_area();
     let area =
         meter.call("area::Area::new, 256", 0, || Area::new(&vertices, &rings)).expect("an area");
@@ -339,7 +335,7 @@ fn measure_largest_area(
         sum.add(far_m.to_bits() ^ corners.len() as u32 ^ u32::from(clear) ^ u32::from(inside));
     }
     measure_ways_home(meter, &transit, sum);
-    let CoverageBenchWorkspace { tracks, build, powell, plan, .. } = lent;
+    let CoverageWorkspace { tracks, build, powell, plan, .. } = lent;
     let mut hull: Vec<Flat, AREA_VERTICES> = Vec::new();
     let direction = meter.call("sweep::direction_of_least_width, 256", size_of_val(&hull), || {
         sweep::direction_of_least_width(&area, &mut hull)
@@ -381,9 +377,9 @@ mod tests {
 
     #[test]
     fn all_calls_are_made_and_the_sum_is_the_same_again() {
-        let mut lent = Box::<CoverageBenchWorkspace>::default();
+        let mut lent = Box::<CoverageWorkspace>::default();
         let first = measure_coverage_calls(&mut Uncounted, &mut lent);
         assert_eq!(measure_coverage_calls(&mut Uncounted, &mut lent), first);
-        std::println!("lent {} bytes", size_of::<CoverageBenchWorkspace>());
+        std::println!("lent {} bytes", size_of::<CoverageWorkspace>());
     }
 }

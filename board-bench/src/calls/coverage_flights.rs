@@ -3,7 +3,6 @@
 //! checksum, by which a test compares board and host bit by bit.
 
 use firmware::capacity::{AREA_CORNERS, GATES, VEHICLES, WAYPOINTS};
-use firmware::scratch;
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -19,6 +18,7 @@ use planner_core::plan::SwarmPlan;
 use planner_core::schedule::ScheduleConfig;
 
 use super::Meter;
+use super::coverage_workspace::CoverageWorkspace;
 
 /// Flights of the largest swarm that the board holds.
 pub type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
@@ -90,7 +90,7 @@ pub(super) fn spacing(lane_m: f32) -> Spacing {
 #[inline(never)]
 pub(super) fn measure_plan_parts(
     meter: &mut impl Meter,
-    lent: &mut scratch::CoverageBenchWorkspace,
+    lent: &mut CoverageWorkspace,
     out: &mut Flights,
 ) -> u32 {
     let mut sum = 1;
@@ -159,21 +159,13 @@ fn measure_division(
     meter: &mut impl Meter,
     case: &Case<'_>,
     [flights_name, again_name]: [&'static str; 2],
-    lent: &mut scratch::CoverageBenchWorkspace,
+    lent: &mut CoverageWorkspace,
     out: &mut Flights,
     sum: &mut u32,
 ) {
     let mut transit = Transit::<AREA_CORNERS>::empty();
     transit.set_area(case.area).expect("they fit");
-    let scratch::CoverageBenchWorkspace {
-        tracks,
-        build,
-        powell,
-        plan: routes,
-        losses,
-        schedule,
-        ..
-    } = lent;
+    let CoverageWorkspace { tracks, build, powell, plan: routes, losses, schedule, .. } = lent;
     let pack = &mut powell.pack;
     let looks = super::coverage::MAX_ORDER_CHANGES;
     let pattern = LanePattern {

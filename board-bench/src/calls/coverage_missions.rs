@@ -10,7 +10,7 @@ use companion::storage::mission_file::{
 };
 use companion::swarm::fleet::{DivisionInput, DivisionInputs};
 use firmware::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
-use firmware::scratch;
+use firmware::scratch::CoveragePlanWorkspace;
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -24,6 +24,7 @@ use super::coverage_flights::{
     CLIMB_M, CLIMB_MPS, CRUISE_MPS, DESCEND_MPS, FIVE_VERTICES, Flights, HEIGHTS, LIMITED_VEHICLES,
     NO_FLY_ZONES, PAD_SPACING_M, SCHEDULE, WIDE_VERTICES, add_to_checksum, rings, spacing,
 };
+use super::coverage_workspace::CoverageWorkspace;
 use super::{Meter, coverage_flights, flight};
 
 /// Most divisions of a mission that are measured.
@@ -62,18 +63,18 @@ const PLAIN: Mission<'static> = Mission {
 #[inline(never)]
 pub fn measure_coverage_flights(
     meter: &mut impl Meter,
-    lent: &mut scratch::WorkspaceOverlay,
+    lent: &mut CoveragePlanWorkspace,
+    parts: &mut CoverageWorkspace,
     out: &mut Flights,
 ) -> u32 {
-    measure_missions(meter, lent.coverage_plan(), out)
-        ^ coverage_flights::measure_plan_parts(meter, lent.coverage_bench(), out)
+    measure_missions(meter, lent, out) ^ coverage_flights::measure_plan_parts(meter, parts, out)
 }
 
 /// Measures plans and divisions of all missions; returns a checksum of the results.
 #[inline(never)]
 fn measure_missions(
     meter: &mut impl Meter,
-    lent: &mut scratch::CoveragePlanWorkspace,
+    lent: &mut CoveragePlanWorkspace,
     out: &mut Flights,
 ) -> u32 {
     let zones = Mission {
@@ -160,7 +161,7 @@ fn write_mission(mission: &Mission<'_>, out: &mut [u8]) -> usize {
 struct Board<'a> {
     mission: &'a Mission<'a>,
     view: MissionView<'a>,
-    lent: &'a mut scratch::CoveragePlanWorkspace,
+    lent: &'a mut CoveragePlanWorkspace,
     out: &'a mut Flights,
     sum: &'a mut u32,
 }
@@ -179,7 +180,7 @@ impl Board<'_> {
         let (out, lent) = (&mut *self.out, &mut *self.lent);
         let schedule = &mission.header().schedule;
         meter
-            .call(name, size_of::<scratch::CoveragePlanWorkspace>(), || {
+            .call(name, size_of::<CoveragePlanWorkspace>(), || {
                 coverage::plan_flights::<
                     AREA_VERTICES,
                     LANES,
@@ -257,8 +258,8 @@ mod tests {
     #[test]
     fn all_flights_are_planned_and_the_sum_is_the_same_again() {
         let mut out = Box::new(Flights::new());
-        let mut area = Box::<scratch::CoveragePlanWorkspace>::default();
-        let mut lent = Box::<scratch::CoverageBenchWorkspace>::default();
+        let mut area = Box::<CoveragePlanWorkspace>::default();
+        let mut lent = Box::<CoverageWorkspace>::default();
         let mut sums = || {
             [
                 measure_missions(&mut Uncounted, &mut area, &mut out),

@@ -8,6 +8,7 @@
 pub mod coverage;
 pub mod coverage_flights;
 pub mod coverage_missions;
+pub mod coverage_workspace;
 pub mod flight;
 pub mod limits;
 mod limits_area_flights;

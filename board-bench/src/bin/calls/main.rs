@@ -6,6 +6,7 @@
 #![no_main]
 
 mod companion_calls;
+mod coverage_calls;
 mod planner_calls;
 
 use core::hint::black_box;

@@ -1,6 +1,6 @@
 //! Counts the instructions of planner-core's public calls.
 
-use board_bench::calls::{Meter, coverage, coverage_missions, flight};
+use board_bench::calls::{Meter, flight};
 use board_bench::cases::{self, StepCase, random_below, random_between, random_point};
 use firmware::boards::chosen::memory;
 use firmware::capacity::{
@@ -26,6 +26,8 @@ use planner_core::voxel::{Outside, VoxelGrid};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 use static_cell::ConstStaticCell;
+
+use super::coverage_calls;
 
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 type Search = SearchWorkspace<ROADMAP_NODES>;
@@ -90,8 +92,7 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     measure_roadmap_builds(meter, &grid, scratch);
     let search = &mut scratch.planner().search;
     measure_host_calls(meter, &grid, search, beside);
-    let flights = coverage_missions::measure_coverage_flights(meter, scratch, &mut beside.plan);
-    [coverage::measure_coverage_calls(meter, scratch.coverage_bench()), flights]
+    coverage_calls::measure_coverage(meter, scratch.coverage_plan(), &mut beside.plan)
 }
 
 fn random_geodetic(rng: &mut Pcg32) -> Geodetic {
