@@ -11,20 +11,21 @@ use companion::link::roster::{self, RosterReport, RosterReportEntry};
 use companion::{Duration, Event, Instant, Link, PlanFailure};
 use firmware::capacity::{BoardCompanion, GATES, VEHICLES, WAYPOINTS};
 use heapless::Vec;
+use planner_core::Point;
 use planner_core::flight::{Task, VehiclePlan};
-use planner_core::frames::{self, Geodetic};
-use planner_core::{Point, frames::swap_enu_ned};
+use planner_core::frames::{self, swap_enu_ned};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 
 mod drawn;
 
-pub use self::drawn::{area_config, config, random_area_plan, random_path, random_plan};
+pub use self::drawn::{
+    CRUISE_MPS, ORIGIN, area_config, config, random_area_plan, random_path, random_plan,
+};
+use self::drawn::{MISSION_CRC, PLAN_CRC, SYSTEM};
 use super::Meter;
 use crate::cases::{random_below, random_between, random_point};
 
-/// Origin of the mission frame, and EKF origin, of every flight.
-pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 /// Row of the table in `docs/worst-case.md`: a control step while all neighbours are heard.
 pub const STEP: &str = "Companion::handle_timeout, 32 speak";
 /// Row of the table: a control step after most neighbours left the plan or fell silent.
@@ -39,11 +40,6 @@ pub const AREA_STEP: &str = "a control step, coverage, 32 near";
 pub const FILTER: &str = "Companion::query_filter, 32 near";
 /// Row of the table: any other control step.
 pub const OTHER_STEP: &str = "Companion::handle_timeout, else";
-const SYSTEM: u8 = 1;
-/// Cruise speed, m/s: so fast that many corners lie within the braking distance of 8 m.
-pub const CRUISE_MPS: f32 = 5.0;
-const MISSION_CRC: u32 = 0xC0FFEE;
-const PLAN_CRC: u32 = 5;
 /// Least distance of a neighbour beside this vehicle, metres.
 const MIN_BESIDE_M: f32 = 4.0;
 /// Least distance by which a silent neighbour is moved away in a flight of [`has_silent_far_away`],

@@ -7,11 +7,18 @@ use planner_core::Point;
 use planner_core::flight::{
     Gate, HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointOrder, WaypointRange,
 };
+use planner_core::frames::Geodetic;
 use rand_pcg::Pcg32;
 
-use super::{CRUISE_MPS, MISSION_CRC, ORIGIN, PLAN_CRC, SYSTEM};
 use crate::cases::{random_below, random_between, random_point};
 
+/// Origin of the mission frame, and EKF origin, of every flight.
+pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+/// Cruise speed, m/s: so fast that many corners lie within the braking distance of 8 m.
+pub const CRUISE_MPS: f32 = 5.0;
+pub(super) const SYSTEM: u8 = 1;
+pub(super) const MISSION_CRC: u32 = 0xC0FFEE;
+pub(super) const PLAN_CRC: u32 = 5;
 /// Time after its last message until a lost vehicle is assumed on the ground, seconds.
 const LOST_VEHICLE_DOWN_S: f32 = 60.0;
 /// Distance between pictures along a lane, metres.

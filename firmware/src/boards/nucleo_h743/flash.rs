@@ -47,6 +47,9 @@ const PSIZE_64: u8 = 3;
 const BFHFNMIGN: u32 = 1 << 8;
 /// The bus fault byte of `CFSR`; writing ones clears it.
 const BUS_FAULTS: u32 = 0xFF00;
+/// Number of the MPU region of the roadmap in use: above that of the whole bank, so that it takes
+/// precedence, and below the stack guard's.
+const ROADMAP_REGION: u32 = 3;
 
 /// Layout of the file store, which is all of bank 2.
 pub const LAYOUT: FlashLayout = FlashLayout::H743;
@@ -73,9 +76,7 @@ impl Flash {
             .lender
             .lend(at, unsafe { core::slice::from_raw_parts(address as *const u8, len) })?;
         // SAFETY: the region makes the sectors read only, and nothing writes to them.
-        unsafe {
-            mpu::set_region(super::ROADMAP_REGION, Some(&h743::roadmap_region(at, len as u32)))
-        };
+        unsafe { mpu::set_region(ROADMAP_REGION, Some(&h743::roadmap_region(at, len as u32))) };
         Some(lent)
     }
 
@@ -84,7 +85,7 @@ impl Flash {
         // SAFETY: disables a region that only this driver uses; after the start no other code
         // maintains the cache.
         unsafe {
-            mpu::set_region(super::ROADMAP_REGION, None);
+            mpu::set_region(ROADMAP_REGION, None);
             let mut core = cortex_m::Peripherals::steal();
             core.SCB.clean_invalidate_dcache(&mut core.CPUID);
         }

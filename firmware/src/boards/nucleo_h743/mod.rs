@@ -54,9 +54,6 @@ static DMA_AUTOPILOT_OUT: ConstStaticCell<transmitter::Buffer> =
 static DMA_RADIO_OUT: ConstStaticCell<transmitter::Buffer> =
     ConstStaticCell::new(transmitter::EMPTY);
 
-/// Number of the MPU region of the roadmap in use: above that of the whole bank, so that it takes
-/// precedence, and below the stack guard's.
-const ROADMAP_REGION: u32 = 3;
 /// Warning: BOR_LEV in the option bytes is below 3, as on a new chip.
 const BROWN_OUT_OFF: &str = "Brown-out reset is off: set BOR_LEV to 3";
 /// Warning: the ST-LINK outputs no clock.

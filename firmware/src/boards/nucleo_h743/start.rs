@@ -85,7 +85,7 @@ pub(super) fn clock_config(revision: Revision, has_hse: bool) -> embassy_stm32::
 
 /// Sets the MPU's regions, then enables both caches.
 pub(super) fn configure_mpu_and_caches() {
-    // Region `super::ROADMAP_REGION` stays disabled until a roadmap is lent.
+    // Region `flash::ROADMAP_REGION` stays disabled until a roadmap is lent.
     let regions = [
         Some(h743::EXTERNAL),
         Some(h743::DMA),
