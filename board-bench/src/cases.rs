@@ -204,11 +204,27 @@ pub struct StepCase {
     neighbours: Vec<Neighbour, VEHICLES>,
 }
 
+/// Kind of a [`StepCase`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StepKind {
+    /// Neighbours, their progress and the gates are anywhere.
+    Spread,
+    /// All neighbours are near, all gates are within 3 m ahead, and either all neighbours have
+    /// passed all gates or none sends its progress.
+    Hard,
+}
+
+impl StepKind {
+    /// Kind of case `number`: every second one is hard.
+    pub fn of_case(number: usize) -> Self {
+        if number.is_multiple_of(2) { Self::Hard } else { Self::Spread }
+    }
+}
+
 impl StepCase {
-    /// A random case beside `neighbours` neighbours, at most [`VEHICLES`]. In a hard one all
-    /// neighbours are near, all gates are within 3 m ahead, and either all neighbours have passed
-    /// all gates or none sends its progress.
-    pub fn new(rng: &mut Pcg32, neighbours: usize, hard: bool) -> Self {
+    /// A random case of this kind beside `neighbours` neighbours, at most [`VEHICLES`].
+    pub fn new(rng: &mut Pcg32, neighbours: usize, kind: StepKind) -> Self {
+        let hard = kind == StepKind::Hard;
         let cfg = DeconflictConfig {
             method: Method::Priority,
             safety_distance_m: random_between(rng, 0.5, 3.0),

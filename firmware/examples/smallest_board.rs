@@ -22,7 +22,7 @@ use firmware::capacity::{BoardCompanion, VEHICLES, WAYPOINTS};
 use firmware::flash::Flash;
 use firmware::planner::{OwnPlanMemory, Planner, PlanningMemory};
 use firmware::scratch::WorkspaceOverlay;
-use firmware::shell::{Shell, wait_for_system_id};
+use firmware::shell::{OnAutopilot, Shell, wait_for_system_id};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
@@ -104,8 +104,8 @@ async fn board() {
     let mut planner =
         Planner { roadmap: None, field: None, mission: None, system_id, files_checksum: 0, memory };
     let links = join5(
-        SHELL.receive(Link::Autopilot, &FROM_AUTOPILOT, false),
-        SHELL.receive(Link::Swarm, &FROM_RADIO, false),
+        SHELL.receive(Link::Autopilot, &FROM_AUTOPILOT, OnAutopilot::GoOn),
+        SHELL.receive(Link::Swarm, &FROM_RADIO, OnAutopilot::GoOn),
         SHELL.transmit(Link::Autopilot, &TO_AUTOPILOT),
         SHELL.transmit(Link::Swarm, &TO_RADIO),
         SHELL.run_timers(),

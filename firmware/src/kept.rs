@@ -270,10 +270,17 @@ mod tests {
         assert_eq!(says(&crashed, ResetCause::Power), None, "memory of another day");
     }
 
+    /// How a start ends while it plans.
+    #[derive(Clone, Copy, PartialEq, Eq)]
+    enum End {
+        Panic,
+        Reset,
+    }
+
     /// A start that ends while it plans on these files; false if they are set aside.
-    fn fails(kept: &mut CrashRecord, files: u32, cause: ResetCause, panics: bool) -> bool {
+    fn fails(kept: &mut CrashRecord, files: u32, cause: ResetCause, end: End) -> bool {
         let begun = kept.begin_work(FileWork::Plan, files);
-        if panics {
+        if end == End::Panic {
             kept.note_crash("Restarted: panic");
         }
         *kept = start(kept, cause).0;
@@ -282,13 +289,13 @@ mod tests {
 
     #[test]
     fn files_that_bring_three_starts_in_a_row_down_are_set_aside() {
-        for (cause, panics) in [
-            (ResetCause::Request, true),
-            (ResetCause::Unknown, true),
-            (ResetCause::Watchdog, false),
+        for (cause, end) in [
+            (ResetCause::Request, End::Panic),
+            (ResetCause::Unknown, End::Panic),
+            (ResetCause::Watchdog, End::Reset),
         ] {
             let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
-            assert!((0..3).all(|_| fails(&mut kept, 7, cause, panics)));
+            assert!((0..3).all(|_| fails(&mut kept, 7, cause, end)));
             assert!(!kept.begin_work(FileWork::Plan, 7), "three times");
             let again = start(&kept, ResetCause::Key).0;
             assert!(!again.clone().begin_work(FileWork::Plan, 7), "still after a reset");
@@ -313,21 +320,22 @@ mod tests {
             assert!(!kept.begin_work(FileWork::CheckRoadmap, 1));
             assert!(kept.begin_work(FileWork::CheckRoadmap, 2));
             kept.finish_work();
-            assert!(fails(&mut kept, 7, ResetCause::Request, true));
+            assert!(fails(&mut kept, 7, ResetCause::Request, End::Panic));
         }
         assert!(!kept.begin_work(FileWork::CheckRoadmap, 1) && !kept.begin_work(FileWork::Plan, 7));
     }
 
     #[test]
     fn only_starts_in_a_row_count_and_only_those_that_the_planner_brought_down() {
-        let fail = |kept: &mut CrashRecord| assert!(fails(kept, 7, ResetCause::Request, true));
+        let fail =
+            |kept: &mut CrashRecord| assert!(fails(kept, 7, ResetCause::Request, End::Panic));
         let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
         (0..2).for_each(|_| fail(&mut kept));
         // A start without a plan leaves the count, and so does one ended by key, brown-out or
         // debugger.
         kept = start(&kept, ResetCause::Watchdog).0;
         for cause in [ResetCause::Key, ResetCause::BrownOut, ResetCause::Request] {
-            assert!(fails(&mut kept, 7, cause, false));
+            assert!(fails(&mut kept, 7, cause, End::Reset));
         }
         // A plan that completes does not reset the count if another one then crashes the start.
         assert!(kept.begin_work(FileWork::Plan, 7));

@@ -24,7 +24,9 @@ use firmware::kept::FileWork;
 use firmware::lent::LentFlash;
 use firmware::planner::{OwnPlanMemory, Planner, PlanningMemory};
 use firmware::scratch::WorkspaceOverlay;
-use firmware::shell::{CHECK_IN_EVERY, SYSTEM_ID_WITHOUT_AUTOPILOT, Shell, wait_for_system_id};
+use firmware::shell::{
+    CHECK_IN_EVERY, OnAutopilot, SYSTEM_ID_WITHOUT_AUTOPILOT, Shell, wait_for_system_id,
+};
 use heapless::{String, Vec};
 use planner_core::Point;
 use planner_core::field::FieldView;
@@ -162,7 +164,8 @@ async fn planner_and_flash_task(
         companion.send_text(Severity::Warning, REFUSED.init(text).as_str());
     }
     shell.start(companion);
-    start_links(links, shell, known.is_none(), autopilot, swarm);
+    let then = if known.is_some() { OnAutopilot::GoOn } else { OnAutopilot::Restart };
+    start_links(links, shell, then, autopilot, swarm);
     let memory =
         PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
     let mut planner = Planner { roadmap, field, mission, system_id, files_checksum: files, memory };
@@ -241,28 +244,21 @@ fn find_mission(
 fn start_links(
     links: SendSpawner,
     shell: &'static Shell,
-    restart_on_autopilot: bool,
+    then: OnAutopilot,
     autopilot: UartEnds,
     swarm: UartEnds,
 ) {
     let once = "there is one such task for each link";
-    links.spawn(
-        receive_task(shell, Link::Autopilot, autopilot.0, restart_on_autopilot).expect(once),
-    );
-    links.spawn(receive_task(shell, Link::Swarm, swarm.0, false).expect(once));
+    links.spawn(receive_task(shell, Link::Autopilot, autopilot.0, then).expect(once));
+    links.spawn(receive_task(shell, Link::Swarm, swarm.0, OnAutopilot::GoOn).expect(once));
     links.spawn(transmit_task(shell, Link::Autopilot, autopilot.1).expect(once));
     links.spawn(transmit_task(shell, Link::Swarm, swarm.1).expect(once));
     links.spawn(timer_task(shell).expect(once));
 }
 
 #[task(pool_size = 2)]
-async fn receive_task(
-    shell: &'static Shell,
-    link: Link,
-    uart: Receiver,
-    restart_on_autopilot: bool,
-) {
-    shell.receive(link, uart, restart_on_autopilot).await
+async fn receive_task(shell: &'static Shell, link: Link, uart: Receiver, then: OnAutopilot) {
+    shell.receive(link, uart, then).await
 }
 
 #[task(pool_size = 2)]

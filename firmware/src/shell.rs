@@ -140,6 +140,15 @@ impl AutopilotListener {
     }
 }
 
+/// What a board does when it hears an autopilot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OnAutopilot {
+    /// It restarts: it started without one.
+    Restart,
+    /// It goes on.
+    GoOn,
+}
+
 /// Longest start of a board, milliseconds: search of the flash, check of the roadmap, wait for an
 /// autopilot. Until then the watchdog is fed although no task checks in.
 pub const START_TIMEOUT_MS: u32 = 20_000;
@@ -249,18 +258,10 @@ impl Shell {
     }
 
     /// Task: passes bytes from `uart` to the companion as those of `link`; reports UART errors as
-    /// STATUSTEXT.
-    ///
-    /// `restart_on_autopilot`: the board started without an autopilot, and restarts when it hears
-    /// one.
-    pub async fn receive(
-        &'static self,
-        link: Link,
-        mut uart: impl Read,
-        restart_on_autopilot: bool,
-    ) -> ! {
+    /// STATUSTEXT. `then` is what the board does when it hears an autopilot on this link.
+    pub async fn receive(&'static self, link: Link, mut uart: impl Read, then: OnAutopilot) -> ! {
         let mut chunk = [0; UART_CHUNK];
-        let mut listener = restart_on_autopilot.then(AutopilotListener::new);
+        let mut listener = (then == OnAutopilot::Restart).then(AutopilotListener::new);
         let errors = &self.line_errors[link as usize];
         let (mut reported, mut next_report_at) = (0, Instant::MIN);
         loop {

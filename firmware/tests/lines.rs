@@ -12,7 +12,7 @@ use companion::{Config, Link};
 use embassy_time_driver::Driver;
 use embedded_io_async::{ErrorKind, ErrorType, Read, Write};
 use firmware::capacity::BoardCompanion;
-use firmware::shell::Shell;
+use firmware::shell::{OnAutopilot, Shell};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, STATUSTEXT_DATA};
 use planner_core::Point;
@@ -93,7 +93,7 @@ fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
     let shell: &'static Shell = Box::leak(Box::new(Shell::new()));
     shell.start(Box::leak(Box::new(BoardCompanion::new(config).expect("the settings are good"))));
     let lines = [Line::default(), Line::default()];
-    let mut receives = pin!(shell.receive(Link::Autopilot, End(&lines[0]), false));
+    let mut receives = pin!(shell.receive(Link::Autopilot, End(&lines[0]), OnAutopilot::GoOn));
     let mut transmits = pin!(shell.transmit(Link::Autopilot, End(&lines[0])));
     let mut tells = pin!(shell.transmit(Link::Swarm, End(&lines[1])));
     let mut keeps_time = pin!(shell.run_timers());

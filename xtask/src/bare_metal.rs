@@ -33,6 +33,14 @@ pub struct Region {
     pub has_stack: bool,
 }
 
+impl Region {
+    /// The same region, which holds the stack too.
+    const fn with_stack(mut self) -> Self {
+        self.has_stack = true;
+        self
+    }
+}
+
 impl Board {
     /// All boards.
     pub const ALL: [Self; 3] = [Self::Qemu, Self::NucleoH743, Self::Pico2];
@@ -56,36 +64,30 @@ impl Board {
 
     /// The board's RAMs, as in its `memory.x`, with the budget of statics in each.
     pub fn regions(self) -> &'static [Region] {
-        const fn region(
-            name: &'static str,
-            at: u64,
-            len: usize,
-            most: usize,
-            has_stack: bool,
-        ) -> Region {
-            Region { name, at, len: len << 10, statics_budget: most << 10, has_stack }
+        const fn region(name: &'static str, at: u64, len: usize, most: usize) -> Region {
+            Region { name, at, len: len << 10, statics_budget: most << 10, has_stack: false }
         }
         // In DTCM companion, crash record and stack guard have 40 kB; the stack has the rest.
         const H743: &[Region] = &[
-            region("axi_bytes", 0x2400_0000, 512, 400, false),
-            region("dtcm_bytes", 0x2000_0000, 128, 36, true),
-            region("sram12_bytes", 0x3000_0000, 256, 256, false),
-            region("sram3_bytes", 0x3004_0000, 32, 32, false),
-            region("sram4_bytes", 0x3800_0000, 64, 32, false),
-            region("itcm_bytes", 0x400, 63, 63, false),
+            region("axi_bytes", 0x2400_0000, 512, 400),
+            region("dtcm_bytes", 0x2000_0000, 128, 36).with_stack(),
+            region("sram12_bytes", 0x3000_0000, 256, 256),
+            region("sram3_bytes", 0x3004_0000, 32, 32),
+            region("sram4_bytes", 0x3800_0000, 64, 32),
+            region("itcm_bytes", 0x400, 63, 63),
         ];
         // The same sizes at other addresses; the emulated UARTs' buffers (10 kB) lie in AXI SRAM.
         const QEMU: &[Region] = &[
-            region("axi_bytes", 0x2000_0000, 512, 400, false),
-            region("dtcm_bytes", 0x2008_0000, 128, 36, true),
-            region("sram12_bytes", 0x2010_0000, 256, 256, false),
-            region("sram3_bytes", 0x2014_0000, 32, 32, false),
-            region("sram4_bytes", 0x2015_0000, 64, 32, false),
-            region("itcm_bytes", 0x2016_0000, 63, 63, false),
+            region("axi_bytes", 0x2000_0000, 512, 400),
+            region("dtcm_bytes", 0x2008_0000, 128, 36).with_stack(),
+            region("sram12_bytes", 0x2010_0000, 256, 256),
+            region("sram3_bytes", 0x2014_0000, 32, 32),
+            region("sram4_bytes", 0x2015_0000, 64, 32),
+            region("itcm_bytes", 0x2016_0000, 63, 63),
         ];
         const PICO2: &[Region] = &[
-            region("ram_bytes", 0x2000_0000, 512, 448, true),
-            region("crash_bytes", 0x2008_0000, 4, 4, false),
+            region("ram_bytes", 0x2000_0000, 512, 448).with_stack(),
+            region("crash_bytes", 0x2008_0000, 4, 4),
         ];
         match self {
             Self::Qemu => QEMU,

@@ -6,7 +6,7 @@
 
 use core::hint::black_box;
 
-use board_bench::cases::{self, StepCase};
+use board_bench::cases::{self, StepCase, StepKind};
 use firmware::boards::chosen::{clock, memory};
 use firmware::boards::stack;
 use firmware::capacity::{ROADMAP_NODES, VEHICLES, WAYPOINTS};
@@ -108,7 +108,7 @@ fn measure_steps() {
     let mut rng = Pcg32::seed_from_u64(1);
     let (mut worst, mut sum) = (0, 0);
     for number in 0..cases::STEP_CASES {
-        let case = StepCase::new(&mut rng, VEHICLES, number % 2 == 0);
+        let case = StepCase::new(&mut rng, VEHICLES, StepKind::of_case(number));
         let (_, count) = count_instructions(|| black_box(&case).advise(Method::Priority));
         worst = worst.max(count);
         sum += count;

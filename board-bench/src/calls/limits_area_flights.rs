@@ -125,7 +125,7 @@ fn call_flight_plans(
         let result = to.call("flights::plan_flights", || {
             flights::plan_flights(work, routes, flight_inputs, ws, out)
         });
-        to.add_bool(result.is_ok());
+        to.add_count(usize::from(result.is_ok()));
         assert!(result.is_err() || is_finite(out), "{flight_inputs:?}");
         result
     };
@@ -298,7 +298,7 @@ fn call_divisions(
         let begun = to.call("losses::LossesWorkspace::start_plan", || {
             memory.losses.start_plan(good.tracks, good.transit, &done).is_ok()
         });
-        to.add_bool(begun);
+        to.add_count(usize::from(begun));
         let done = to.call("losses::LossesWorkspace::done", || memory.losses.done().len());
         assert!(done <= 1);
     }
@@ -346,7 +346,7 @@ fn call_redivide(
         losses::redivide_work(loss, losses, pack, schedule, routes, out)
     });
     assert!(divided.is_err() || is_finite(out), "{:?}", loss.statuses);
-    to.add_bool(divided.is_ok());
+    to.add_count(usize::from(divided.is_ok()));
     divided
 }
 
@@ -399,15 +399,15 @@ fn call_ways_home(
                 let finite =
                     path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite()));
                 assert!(found.is_err() || finite);
-                to.add_bool(found.is_ok());
+                to.add_count(usize::from(found.is_ok()));
                 let again = to.call("around::plan_vehicle_detour", || {
                     around::plan_vehicle_detour(transit, field, &request, &mut [thing], own)
                 });
                 assert_eq!(again, found);
                 let mut short = Path::<1>::new();
-                to.add_bool(
+                to.add_count(usize::from(
                     around::plan_detour(transit, field, &request, &mut [], &mut short).is_ok(),
-                );
+                ));
             }
         }
     }

@@ -35,7 +35,7 @@ pub(super) fn call_cameras(to: &mut Results<'_, impl Listener>) {
             to.add(height_m.unwrap_or(0.0));
             let spacing = Spacing { footprint, lane_m: hard, waypoint_m: 1.0 };
             let checked = check_spacing(to, &spacing).is_ok();
-            to.add_bool(checked);
+            to.add_count(usize::from(checked));
         }
         for spacing in [
             Spacing { lane_m: hard, ..SPACING },

@@ -104,7 +104,7 @@ fn call_areas(to: &mut Results<'_, impl Listener>) {
             let mut vertices = CORNERS_OF_ALL;
             vertices[2] = Flat::new(x, y);
             let found = to.call("area::Area::new", || Area::new(&vertices, &RINGS));
-            to.add_bool(found.is_ok());
+            to.add_count(usize::from(found.is_ok()));
             let place = Flat::new(x, y);
             let holds = to.call("area::Area::contains", || test_area().contains(&place));
             let forbids =
@@ -169,7 +169,7 @@ fn call_transits(to: &mut Results<'_, impl Listener>, transit: &mut ZoneTransit<
                 let clear = to.call("transit::Transit::is_line_clear", || {
                     transit.is_line_clear(&from, &there)
                 });
-                to.add_bool(clear);
+                to.add_count(usize::from(clear));
                 let far_m =
                     to.call("transit::Transit::distance_m", || transit.distance_m(&from, &there));
                 to.add(far_m);
@@ -177,10 +177,10 @@ fn call_transits(to: &mut Results<'_, impl Listener>, transit: &mut ZoneTransit<
                 let way = to.call("transit::Transit::shortest_path", || {
                     transit.shortest_path(&from, &there, &mut corners)
                 });
-                to.add_bool(way.is_ok());
+                to.add_count(usize::from(way.is_ok()));
                 to.add_count(corners.len());
                 let back = transit.shortest_path(&there, &from, &mut corners);
-                to.add_bool(back.is_ok());
+                to.add_count(usize::from(back.is_ok()));
             }
         }
     }
@@ -211,7 +211,7 @@ fn call_lanes(
             let built = to.call("tracks::build_lanes", || {
                 tracks::build_lanes(area, &pattern, transit, build, tracks)
             });
-            to.add_bool(built.is_ok());
+            to.add_count(usize::from(built.is_ok()));
             if built.is_ok() {
                 call_waypoint_numbers(to, tracks);
             }
@@ -250,7 +250,7 @@ fn call_given_lanes(
             let ordered = to.call("given::order_given_lanes", || {
                 given::order_given_lanes(&lanes[..count], &SPACING, 100, transit, tracks)
             });
-            to.add_bool(ordered.is_ok());
+            to.add_count(usize::from(ordered.is_ok()));
             assert!(count > 2 || ordered.is_ok() == (count == 2));
         }
     }
@@ -289,7 +289,7 @@ fn call_divisions(
                     divide::remaining_lanes(tracks, done, transit, left)
                 });
                 assert!(found.is_err() || first <= end && end <= tracks.waypoint_count());
-                to.add_bool(found.is_ok());
+                to.add_count(usize::from(found.is_ok()));
                 for number in WAYPOINT_NUMBERS {
                     let whole = to.call("divide::original_waypoint_number", || {
                         divide::original_waypoint_number(done, number)
@@ -348,7 +348,7 @@ fn call_packing(
         let checked = to.call("pack::Work::check", || work.check::<VEHICLES>());
         let packed = to.call("pack::binpat", || pack::binpat(work, ws, plan));
         assert!(checked.is_ok() || packed == checked);
-        to.add_bool(packed.is_ok());
+        to.add_count(usize::from(packed.is_ok()));
         let shares = to.call("pack::PackWorkspace::shares", || *ws.shares());
         shares.iter().for_each(|share| to.add(*share));
         for vehicle in work.vehicles {
@@ -407,7 +407,7 @@ fn call_packing_by_shares(
         let by_shares = || pack::binpat_by_shares(work, shares, ws, plan);
         let cut = to.call("pack::binpat_by_shares", by_shares);
         assert!(shares.len() == VEHICLES || cut.is_err());
-        to.add_bool(cut.is_ok());
+        to.add_count(usize::from(cut.is_ok()));
         let mut ends = [0; VEHICLES];
         to.call("pack::cbinpack", || pack::cbinpack(tracks, unit, shares, &mut ends));
         assert!(ends.iter().all(|end| *end <= tracks.waypoint_count()), "{shares:?}");
@@ -438,7 +438,7 @@ fn call_share_searches(
                 let config = powell::PowellConfig { evaluations };
                 let found = to.call("powell::powell", || powell(&work, &config, ws, plan));
                 assert!(checked.is_ok() || found == checked);
-                to.add_bool(found.is_ok());
+                to.add_count(usize::from(found.is_ok()));
                 to.add(plan.max_cost_s());
             }
             let mut memory = exact::ExactWorkspace {
@@ -450,7 +450,7 @@ fn call_share_searches(
                 exact::plan_exact(&work, &mut memory, &mut ws.pack, plan)
             });
             assert!(checked.is_ok() || found == checked);
-            to.add_bool(found.is_ok());
+            to.add_count(usize::from(found.is_ok()));
             to.add(plan.max_cost_s());
         }
     }

@@ -74,10 +74,10 @@ pub(super) fn call_roadmap_files(
             let read =
                 written.and_then(|len| RoadmapView::parse(&file[..len]).map(|view| view.crc()));
             assert_eq!(written.is_ok(), read.is_ok(), "{header:?}");
-            to.add_bool(written.is_ok());
+            to.add_count(usize::from(written.is_ok()));
         }
         let with = [Edge { clearance_m: hard, ..edges[0] }];
-        to.add_bool(roadmap::write(&HEADER, &NODE_PLACES, &with, file).is_ok());
+        to.add_count(usize::from(roadmap::write(&HEADER, &NODE_PLACES, &with, file).is_ok()));
     }
     for (a, b) in [(0, 0), (0, 6), (u16::MAX, 0)] {
         assert!(
@@ -88,7 +88,7 @@ pub(super) fn call_roadmap_files(
     for p in extreme_points() {
         let mut places = NODE_PLACES;
         places[5] = p;
-        to.add_bool(roadmap::write(&HEADER, &places, &edges, file).is_ok());
+        to.add_count(usize::from(roadmap::write(&HEADER, &places, &edges, file).is_ok()));
     }
     assert!(roadmap::write(&HEADER, &NODE_PLACES, &edges, &mut file[..100]).is_err());
     let mut small = SearchWorkspace::<2>::new();
@@ -161,7 +161,7 @@ pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &Roa
         let around =
             to.call("ground::RoadmapView::ground_range_near", || view.ground_range_near(&p));
         assert!(around.is_none_or(|(low_m, high_m)| low_m == 0.0 && high_m == 0.0 && p.z >= 0.0));
-        to.add_bool(around.is_some());
+        to.add_count(usize::from(around.is_some()));
     }
     let edge = view.edge_between(0, 4).expect("an edge");
     for hard in HARD_NUMBERS {

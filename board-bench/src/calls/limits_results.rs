@@ -58,10 +58,6 @@ impl<'a, L: Listener> Results<'a, L> {
         self.sum = self.sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ answer as u32;
     }
 
-    pub(super) fn add_bool(&mut self, answer: bool) {
-        self.add_count(usize::from(answer));
-    }
-
     /// The checksum of all results so far.
     pub fn sum(&self) -> u32 {
         self.sum

@@ -196,7 +196,7 @@ fn call_plans(
     for (climb_m, gates_most) in [(0.0, GATES), (1e7, GATES), (1.5, 0)] {
         let tasks = TASKS.map(|task| VehicleTask { climb_m, ..task });
         let request = PlanRequest { max_gates: gates_most, ..request(&tasks, &heights) };
-        to.add_bool(plan::plan_swarm(view, &request, ws, out).is_ok());
+        to.add_count(usize::from(plan::plan_swarm(view, &request, ws, out).is_ok()));
     }
     assert_eq!(plan::plan_swarm(view, &good, ws, out), Ok(()));
 }
@@ -247,10 +247,10 @@ fn call_schedules(
                         &mut ws.schedule,
                     )
                 });
-                to.add_bool(answer.is_ok());
+                to.add_count(usize::from(answer.is_ok()));
                 let pair = [flight.clone(), flights[1].clone()];
                 let answer = schedule::gates(&cfg, &pair, 1, &mut ws.schedule, &mut own.gates);
-                to.add_bool(answer.is_ok());
+                to.add_count(usize::from(answer.is_ok()));
                 let mut found = flight.clone();
                 let route = RouteQuery {
                     cfg: &cfg,
@@ -270,7 +270,7 @@ fn call_schedules(
                         &mut found,
                     )
                 });
-                to.add_bool(answer.is_ok());
+                to.add_count(usize::from(answer.is_ok()));
             }
         }
     }
@@ -291,7 +291,7 @@ fn call_schedules(
         });
         let there = usize::from(from.max(to_node)) < view.node_count();
         assert!(there || answer == Err(ScheduleError::BadIndex));
-        to.add_bool(answer.is_ok());
+        to.add_count(usize::from(answer.is_ok()));
     }
 }
 
@@ -353,7 +353,7 @@ fn call_detours(
                         .iter()
                         .all(|w| w.position.iter().all(|c| c.is_finite()))
             );
-            to.add_bool(answer.is_ok());
+            to.add_count(usize::from(answer.is_ok()));
             let again = to.call("detour::plan_vehicle_detour", || {
                 detour::plan_vehicle_detour(view, &request, &mut [thing], ws, &mut nodes, own)
             });
@@ -375,7 +375,7 @@ fn call_detours(
             to.call("detour::is_path_blocked", || {
                 detour::is_path_blocked(path, -1.0..hard, p.x, p.y, &p, &thing)
             });
-            to.add_bool(blocked);
+            to.add_count(usize::from(blocked));
             let count = to
                 .call("detour::count_segments_ahead", || detour::count_segments_ahead(path, hard));
             assert!(count <= path.waypoints().len() + 2);

@@ -10,6 +10,15 @@ pub const HSE_MHZ: u32 = 8;
 /// Frequency of the chip's internal oscillator, MHz.
 pub const HSI_MHZ: u32 = 64;
 
+/// The oscillator that feeds PLL1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ClockSource {
+    /// HSE, the external clock of [`HSE_MHZ`].
+    External,
+    /// HSI, the chip's own oscillator of [`HSI_MHZ`].
+    Internal,
+}
+
 /// Revision of the silicon: DBGMCU_IDC.REV_ID (RM0433, "DBGMCU identity code register").
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Revision {
@@ -38,9 +47,12 @@ impl Revision {
     /// Settings of PLL1 for [`Self::core_mhz`]: input divider and multiplication factor. The PLL
     /// makes twice the processor's clock, which divider P halves. The divided input is 8 MHz from
     /// HSE, else 16 MHz; the PLL's output is at most 960 MHz (RM0433, "PLL configuration").
-    pub const fn pll_divider_and_factor(self, has_hse: bool) -> (u32, u32) {
-        let (source, divider) = if has_hse { (HSE_MHZ, 1) } else { (HSI_MHZ, 4) };
-        (divider, 2 * self.core_mhz() / (source / divider))
+    pub const fn pll_divider_and_factor(self, source: ClockSource) -> (u32, u32) {
+        let (source_mhz, divider) = match source {
+            ClockSource::External => (HSE_MHZ, 1),
+            ClockSource::Internal => (HSI_MHZ, 4),
+        };
+        (divider, 2 * self.core_mhz() / (source_mhz / divider))
     }
 }
 

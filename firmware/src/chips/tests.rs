@@ -1,5 +1,6 @@
 //! Values from the manuals, written down by hand.
 
+use super::h743::ClockSource;
 use super::mpu::{Access, Region};
 use super::{ResetCause, fault, h743, rp2350};
 
@@ -37,10 +38,10 @@ fn every_revision_of_the_h743_has_a_clock_it_can_run_at() {
     {
         let revision = h743::Revision::from_idcode(idc);
         assert_eq!(revision.core_mhz(), mhz);
-        for (has_hse, source) in [(true, 8), (false, 64)] {
-            let (divider, factor) = revision.pll_divider_and_factor(has_hse);
-            let input = source / divider;
-            assert_eq!((input * factor, source % divider), (2 * mhz, 0));
+        for (source, source_mhz) in [(ClockSource::External, 8), (ClockSource::Internal, 64)] {
+            let (divider, factor) = revision.pll_divider_and_factor(source);
+            let input = source_mhz / divider;
+            assert_eq!((input * factor, source_mhz % divider), (2 * mhz, 0));
             assert!((8..=16).contains(&input) && (192..=960).contains(&(input * factor)));
         }
     }

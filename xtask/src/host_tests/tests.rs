@@ -1,24 +1,32 @@
 use super::*;
 
-fn artifact(kind: &str, test: bool, executable: &Value) -> Value {
+/// An artifact as cargo reports it.
+fn artifact(kind: &str, executable: &Value) -> Value {
     serde_json::json!({
         "manifest_path": "/checkout/tests/Cargo.toml",
         "target": { "name": "edge", "kind": [kind] },
-        "profile": { "test": test },
+        "profile": { "test": false },
         "executable": executable,
     })
+}
+
+/// An artifact that was built with its tests.
+fn test_artifact(kind: &str, executable: &Value) -> Value {
+    let mut artifact = artifact(kind, executable);
+    artifact["profile"]["test"] = true.into();
+    artifact
 }
 
 #[test]
 fn only_tests_and_examples_are_run() {
     let edge =
-        program(&artifact("test", true, &"/target/edge-1".into())).expect("a program of tests");
+        program(&test_artifact("test", &"/target/edge-1".into())).expect("a program of tests");
     assert_eq!((edge.name.as_str(), turn(&edge)), ("edge", FIRST.len()));
     assert_eq!((edge.path, edge.package), ("/target/edge-1".into(), "/checkout/tests".into()));
-    let example = program(&artifact("example", false, &"/target/examples/edge".into()));
+    let example = program(&artifact("example", &"/target/examples/edge".into()));
     assert_eq!(example.expect("an example").path, PathBuf::from("/target/examples/edge"));
-    assert_eq!(program(&artifact("bin", false, &"/target/edge".into())), None, "a binary");
-    assert_eq!(program(&artifact("lib", true, &Value::Null)), None, "a library");
+    assert_eq!(program(&artifact("bin", &"/target/edge".into())), None, "a binary");
+    assert_eq!(program(&test_artifact("lib", &Value::Null)), None, "a library");
 }
 
 #[test]

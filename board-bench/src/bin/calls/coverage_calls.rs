@@ -10,7 +10,6 @@ static PARTS: ConstStaticCell<CoverageWorkspace> = ConstStaticCell::new(Coverage
 
 /// Counts the instructions of whole plans, then of their steps. Returns two checksums of results:
 /// of the steps, and of the flights.
-#[inline(never)]
 pub fn measure_coverage(
     meter: &mut impl Meter,
     lent: &mut CoveragePlanWorkspace,

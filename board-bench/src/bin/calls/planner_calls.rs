@@ -1,7 +1,7 @@
 //! Counts the instructions of planner-core's public calls.
 
 use board_bench::calls::{Meter, flight};
-use board_bench::cases::{self, StepCase, random_below, random_between, random_point};
+use board_bench::cases::{self, StepCase, StepKind, random_below, random_between, random_point};
 use firmware::boards::chosen::memory;
 use firmware::capacity::{
     GATES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
@@ -374,7 +374,7 @@ fn measure_paths(meter: &mut impl Meter) {
                 &obstacle,
             )
         });
-        let step = StepCase::new(&mut rng, VEHICLES, case % 2 == 0);
+        let step = StepCase::new(&mut rng, VEHICLES, StepKind::of_case(case));
         meter.call("deconflict::advise, priority", 0, || step.advise(Method::Priority));
         meter.call("deconflict::advise, algorithm2", 0, || step.advise(Method::Algorithm2));
     }

@@ -22,7 +22,7 @@ use static_cell::ConstStaticCell;
 use self::start::{clock_config, configure_mpu_and_caches};
 use super::limits::WATCHDOG_TIMEOUT_US;
 use super::{executors, parts};
-use crate::chips::h743::{self, Revision};
+use crate::chips::h743::{self, ClockSource, Revision};
 
 bind_interrupts!(struct Irqs {
     USART2 => usart::InterruptHandler<peripherals::USART2>;
@@ -89,14 +89,16 @@ pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 pub fn start() -> Parts {
     start::start_watchdog();
     let revision = Revision::from_idcode(pac::DBGMCU.idc().read().0);
-    let has_hse = start::try_hse();
-    let p = embassy_stm32::init(clock_config(revision, has_hse));
+    let source = start::start_clock_source();
+    let p = embassy_stm32::init(clock_config(revision, source));
     let mut watchdog = Watchdog::new(p.IWDG1, Output::new(p.PB0, Level::Low, Speed::Low));
     watchdog.start();
     configure_mpu_and_caches();
     let mut warnings = Vec::new();
     let level = h743::brown_out_level(pac::FLASH.optsr_cur().read().0);
-    let wrong = [(level < 3, BROWN_OUT_OFF), (!has_hse, NO_HSE)].into_iter().filter(|(is, _)| *is);
+    let wrong = [(level < 3, BROWN_OUT_OFF), (source == ClockSource::Internal, NO_HSE)]
+        .into_iter()
+        .filter(|(is, _)| *is);
     // Cannot overflow: it has room for both warnings.
     wrong.for_each(|(_, text)| _ = warnings.push(text));
     interrupt::UART7.set_priority(LINKS_AT);

@@ -9,7 +9,7 @@ use embassy_stm32::time::Hertz;
 
 use super::super::mpu;
 use crate::chips::ResetCause;
-use crate::chips::h743::{self, Revision};
+use crate::chips::h743::{self, ClockSource, Revision};
 
 /// Most polls of the external clock's ready flag, a few cycles of 64 MHz each: more than 10 ms in
 /// all; the clock is ready within 2 ms (DS12110).
@@ -44,24 +44,27 @@ pub(super) fn start_watchdog() {
     pac::IWDG1.kr().write(|w| w.set_key(Key::START));
 }
 
-/// Switches on the external clock (HSE), which the board's ST-LINK outputs. Returns whether it
-/// became ready; it does not if the ST-LINK has no power.
-pub(super) fn try_hse() -> bool {
+/// Switches on the external clock (HSE), which the board's ST-LINK outputs. Returns it if it became
+/// ready, else the internal oscillator: the ST-LINK has no power.
+pub(super) fn start_clock_source() -> ClockSource {
     pac::RCC.cr().modify(|w| w.set_hsebyp(true));
     pac::RCC.cr().modify(|w| w.set_hseon(true));
-    (0..MAX_HSE_POLLS).any(|_| pac::RCC.cr().read().hserdy())
+    let is_ready = (0..MAX_HSE_POLLS).any(|_| pac::RCC.cr().read().hserdy());
+    if is_ready { ClockSource::External } else { ClockSource::Internal }
 }
 
-/// Clock settings: the fastest that the silicon allows, from the external clock if `has_hse`, else
-/// from the chip's internal oscillator.
-pub(super) fn clock_config(revision: Revision, has_hse: bool) -> embassy_stm32::Config {
+/// Clock settings: the fastest that the silicon allows, from this source.
+pub(super) fn clock_config(revision: Revision, source: ClockSource) -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hsi = Some(rcc::HSIPrescaler::DIV1);
     let hse = rcc::Hse { freq: Hertz::mhz(h743::HSE_MHZ), mode: HseMode::Bypass };
-    config.rcc.hse = has_hse.then_some(hse);
-    let (divider, factor) = revision.pll_divider_and_factor(has_hse);
+    config.rcc.hse = (source == ClockSource::External).then_some(hse);
+    let (divider, factor) = revision.pll_divider_and_factor(source);
     config.rcc.pll1 = Some(rcc::Pll {
-        source: if has_hse { rcc::PllSource::HSE } else { rcc::PllSource::HSI },
+        source: match source {
+            ClockSource::External => rcc::PllSource::HSE,
+            ClockSource::Internal => rcc::PllSource::HSI,
+        },
         prediv: PllPreDiv::from_bits(divider as u8),
         // The register field holds the factor minus one.
         mul: PllMul::from_bits(factor as u16 - 1),

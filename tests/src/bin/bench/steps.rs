@@ -12,7 +12,7 @@ use std::hint::black_box;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use board_bench::cases::{STEP_CASES, StepCase};
+use board_bench::cases::{STEP_CASES, StepCase, StepKind};
 use planner_core::deconflict::{Advice, Method};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
@@ -80,7 +80,7 @@ fn priority_step(case: &StepCase) -> Advice {
 pub fn run(neighbours: usize) {
     let mut rng = Pcg32::seed_from_u64(SEED);
     for number in 0..STEP_CASES {
-        let case = StepCase::new(&mut rng, neighbours, number % 2 == 0);
+        let case = StepCase::new(&mut rng, neighbours, StepKind::of_case(number));
         black_box(priority_step(black_box(&case)));
     }
 }
