@@ -175,21 +175,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Handles the intent of vehicle `id`; an intent of another mission changes nothing but is
-    /// reported.
+    /// Handles the intent of vehicle `id`. One of another mission changes nothing but is reported;
+    /// one of a vehicle that is not of the roster changes nothing.
     fn handle_intent(&mut self, id: u8, sequence: u8, intent: &Intent) {
-        if intent.mission_crc != self.config.mission_crc {
-            if self.config.roster.iter().any(|entry| entry.system_id == id) {
-                let text = "Vehicle # has another mission file";
-                let numbers = [u32::from(id), 0, 0];
-                self.links.send_sender_text(
-                    self.now,
-                    SenderKind::Other,
-                    Severity::Warning,
-                    text,
-                    numbers,
-                );
-            }
+        let of_roster = self.config.roster.iter().any(|entry| entry.system_id == id);
+        if of_roster && intent.mission_crc != self.config.mission_crc {
+            let text = "Vehicle # has another mission file";
+            let numbers = [u32::from(id), 0, 0];
+            let sender = SenderKind::Other;
+            self.links.send_sender_text(self.now, sender, Severity::Warning, text, numbers);
+        }
+        // A stranger's echo acknowledges nothing: whoever flies by the mission is in its roster.
+        if !of_roster || intent.mission_crc != self.config.mission_crc {
             return;
         }
         let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());

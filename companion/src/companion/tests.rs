@@ -18,6 +18,7 @@ macro_rules! happens {
 mod ardupilot;
 mod area_reports;
 mod divisions;
+mod echoes;
 mod estimate;
 mod hostile;
 mod interruptions;
