@@ -10,6 +10,7 @@ pub mod intent;
 pub mod outbox;
 pub mod rate_limit;
 pub mod roster;
+pub mod sequence;
 pub mod severity;
 
 use self::answer_limits::{AnswerKind, AnswerTokenBuckets, SenderKind};

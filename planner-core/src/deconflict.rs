@@ -107,15 +107,7 @@ pub struct Advice {
 impl Advice {
     /// No limits: no gate and no neighbour asks for a stop.
     pub const FREE: Self = Self { speed_scale: 1.0, stop_within_m: f32::INFINITY, waiting_for: 0 };
-
-    /// Whether the vehicle may fly on far enough for its departure to be worth it.
-    pub fn lets_depart(&self) -> bool {
-        self.stop_within_m > MIN_DEPARTURE_M
-    }
 }
-
-/// Distance up to a stop below which a vehicle on its pad does not depart, metres.
-const MIN_DEPARTURE_M: f32 = 0.05;
 
 /// Most points of the own path that are compared with a neighbour's predicted positions: four
 /// seconds of flight at the nominal speed.

@@ -25,6 +25,7 @@ use planner_core::{Length, Point};
 use crate::autopilot::AutopilotKind;
 use crate::autopilot::ardupilot;
 use crate::link::frame::Frame;
+use crate::link::sequence::SequenceFilter;
 use crate::margins;
 use crate::time::{Duration, Instant};
 
@@ -52,32 +53,9 @@ pub const POSITION_SETTLE_TIME: Duration = Duration::from_millis(1000);
 /// Time for which only another EKF origin is reported while armed, after which the origin counts as
 /// moved and the mission lands; it is requested several times meanwhile.
 const ORIGIN_DOUBT_TIME: Duration = Duration::from_millis(800);
-/// Gap between two frames after which any sequence number is accepted.
-const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
 
 /// Most streams whose age is kept: no autopilot kind has more streams on.
 const MAX_STREAMS: usize = 8;
-
-/// Drops MAVLink frames that repeat or come late: up to 63 numbers behind the last accepted frame,
-/// for 1 s after it.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct SequenceFilter {
-    last: Option<(u8, Instant)>,
-}
-
-impl SequenceFilter {
-    /// Whether the frame is new; if so, stores its sequence number as the last.
-    pub fn accept_if_new(&mut self, sequence: u8, now: Instant) -> bool {
-        if let Some((last, at)) = self.last {
-            let behind = last.wrapping_sub(sequence);
-            if behind < 64 && now - at < SEQUENCE_LIFETIME {
-                return false;
-            }
-        }
-        self.last = Some((sequence, now));
-        true
-    }
-}
 
 /// The autopilot's COMMAND_ACK.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

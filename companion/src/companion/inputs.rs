@@ -159,7 +159,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             airborne: t.armed && t.on_ground == Some(false),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
             gates_open: self.has_goal()
-                && self.guidance.advice.lets_depart()
+                && self.guidance.may_depart()
                 && self.guidance.filter.column_clear()
                 && self.mission.departure_due(now)
                 && !self.hears_another_plan()

@@ -103,7 +103,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Notes whether a vehicle that is due to depart is kept on its pad by another vehicle in the
     /// column above the pad, or by a blocked path.
     fn note_barred_start(&mut self) {
-        let due = self.mission.departure_due(self.now) && self.guidance.advice.lets_depart();
+        let due = self.mission.departure_due(self.now) && self.guidance.may_depart();
         let waits =
             due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
         if waits && (!self.guidance.filter.column_clear() || self.detours.is_blocked()) {

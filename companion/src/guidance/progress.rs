@@ -20,7 +20,15 @@ const LAG_WINDOW_ABOVE_MPS: f32 = 2.0;
 /// the setpoint's curve follows the reference by up to 1.2 s, and the vehicle that curve by 0.4 s.
 const LAG_WINDOW_S: f32 = 1.0;
 
+/// Distance up to a stop below which a vehicle on its pad does not depart, metres.
+const MIN_DEPARTURE_M: f32 = 0.05;
+
 impl Guidance {
+    /// Whether advice lets the vehicle fly on far enough for its departure to be worth it.
+    pub(crate) fn may_depart(&self) -> bool {
+        self.advice.stop_within_m > MIN_DEPARTURE_M
+    }
+
     /// Place along the plan's path up to which this vehicle flies while unheard, through gates that
     /// are open or open after a short wait, metres; and the seconds by which those gates delay it
     /// ([`Neighbours::unheard_reach`]).

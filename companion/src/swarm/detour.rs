@@ -292,7 +292,7 @@ impl Detours {
                     || !view.guidance.filter.column_clear()
                     || view.neighbours.silence_duration(now, view.mission.started_at())
                         >= UNHEARD_ON_PAD_AFTER
-                    || (held && !view.guidance.advice.lets_depart())
+                    || (held && !view.guidance.may_depart())
             }
             State::Follow => held && stands,
             State::Climb => {

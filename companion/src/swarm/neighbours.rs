@@ -27,10 +27,10 @@ use planner_core::{Length, Point};
 pub(crate) use self::bounds::MAX_HOVER_MPS;
 use self::bounds::*;
 use self::contact::NeighbourEntry;
-use crate::autopilot::telemetry::SequenceFilter;
 use crate::config::{Ground, REACHES_ALL_M, RosterEntry};
 use crate::link::echo::{IntentEcho, MessageDelay};
 use crate::link::intent::{GROUNDED, Intent, LANDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
+use crate::link::sequence::SequenceFilter;
 use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
 

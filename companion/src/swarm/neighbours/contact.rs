@@ -8,10 +8,10 @@ use planner_core::safety::{PlaceOnPoints, PointsReach};
 use planner_core::{Length, Point};
 
 use super::bounds::*;
-use crate::autopilot::telemetry::SequenceFilter;
 use crate::config::Ground;
 use crate::link::echo::MessageDelay;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, MAX_POINTS, ON_DETOUR, OUT_OF_PLAN, WAITING};
+use crate::link::sequence::SequenceFilter;
 use crate::time::{Duration, Instant};
 
 /// Where and when silent vehicles come down in a coverage mission.
