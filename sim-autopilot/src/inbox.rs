@@ -8,6 +8,7 @@ use mavlink::dialects::ardupilotmega as dialect;
 
 use super::command::ReceivedCommand;
 use super::frame::CheckedFrame;
+use super::msg;
 use super::params::Encoding;
 use super::port::{AUTOPILOT_COMPONENT, Sender};
 use super::wire::PayloadReader;
@@ -25,8 +26,8 @@ impl Autopilot {
         };
         let (firmware, platform) = (&mut self.firmware, &mut self.platform);
         match frame.message_id {
-            0 => firmware.handle_heartbeat(platform, from),
-            4 if fields.u8(12) == 0 && fields.u8(13) == 0 => {
+            msg::HEARTBEAT => firmware.handle_heartbeat(platform, from),
+            msg::PING if fields.u8(12) == 0 && fields.u8(13) == 0 => {
                 let answer = telemetry::ping_payload(
                     fields.u64(0),
                     fields.u32(8),
@@ -35,36 +36,52 @@ impl Autopilot {
                 );
                 platform.ports[port].send_raw(4, &answer);
             }
-            11 if fields.u8(4) == system_id => firmware.handle_set_mode(platform, from, &fields),
-            20 if for_us(2, 3) => self.handle_param_read(port, &fields),
-            21 if for_us(0, 1) => platform.ports[port].param_cursor = Some(0),
-            23 if for_us(4, 5) => self.handle_param_set(port, &fields),
+            msg::SET_MODE if fields.u8(4) == system_id => {
+                firmware.handle_set_mode(platform, from, &fields);
+            }
+            msg::PARAM_REQUEST_READ if for_us(2, 3) => self.handle_param_read(port, &fields),
+            msg::PARAM_REQUEST_LIST if for_us(0, 1) => platform.ports[port].param_cursor = Some(0),
+            msg::PARAM_SET if for_us(4, 5) => self.handle_param_set(port, &fields),
             // Messages of the mission protocol, by the offsets of their target system and
             // component.
-            43 | 45 if for_us(0, 1) => platform.handle_mission(from, frame.message_id, &fields),
-            40 | 41 | 44 | 47 | 51 if for_us(2, 3) => {
+            msg::MISSION_REQUEST_LIST | msg::MISSION_CLEAR_ALL if for_us(0, 1) => {
                 platform.handle_mission(from, frame.message_id, &fields);
             }
-            39 | 73 if for_us(32, 33) => platform.handle_mission(from, frame.message_id, &fields),
-            66 if for_us(2, 3) => firmware.handle_stream_request(platform, from, &fields),
-            75 if for_us(30, 31) => {
+            msg::MISSION_REQUEST
+            | msg::MISSION_SET_CURRENT
+            | msg::MISSION_COUNT
+            | msg::MISSION_ACK
+            | msg::MISSION_REQUEST_INT
+                if for_us(2, 3) =>
+            {
+                platform.handle_mission(from, frame.message_id, &fields);
+            }
+            msg::MISSION_ITEM | msg::MISSION_ITEM_INT if for_us(32, 33) => {
+                platform.handle_mission(from, frame.message_id, &fields);
+            }
+            msg::REQUEST_DATA_STREAM if for_us(2, 3) => {
+                firmware.handle_stream_request(platform, from, &fields);
+            }
+            msg::COMMAND_INT if for_us(30, 31) => {
                 firmware.handle_command(
                     platform,
                     from,
                     &ReceivedCommand::from_command_int(&fields),
                 );
             }
-            76 if for_us(30, 31) => {
+            msg::COMMAND_LONG if for_us(30, 31) => {
                 firmware.handle_command(
                     platform,
                     from,
                     &ReceivedCommand::from_command_long(&fields),
                 );
             }
-            84 | 86 if for_us(50, 51) => {
+            msg::SET_POSITION_TARGET_LOCAL_NED | msg::SET_POSITION_TARGET_GLOBAL_INT
+                if for_us(50, 51) =>
+            {
                 firmware.handle_setpoint(platform, frame.message_id, &fields);
             }
-            111 if fields.i64(0) == 0 => {
+            msg::TIMESYNC if fields.i64(0) == 0 => {
                 let message = dialect::TIMESYNC_DATA {
                     tc1: platform.time_us as i64 * 1000,
                     ts1: fields.i64(8),

@@ -32,6 +32,7 @@
 
 pub mod ardupilot;
 mod camera;
+mod cmd;
 mod command;
 mod config;
 pub mod estimator;
@@ -43,6 +44,7 @@ mod itinerary;
 mod kinds;
 mod messages;
 mod mission;
+mod msg;
 pub mod noise;
 pub mod params;
 mod platform;

@@ -6,20 +6,27 @@
 //! component was heard. A message for this autopilot alone is not forwarded.
 
 use super::frame::CheckedFrame;
+use super::msg;
 use super::port::{AUTOPILOT_COMPONENT, Port};
 
 /// Offset of the target system id in the payload of a message; the target component id follows it.
 /// `None`: the message has no target, so it is a broadcast.
 fn target_system_offset(message_id: u32) -> Option<usize> {
     Some(match message_id {
-        21 | 43 | 45 => 0,
-        110 => 1,
-        20 | 40 | 41 | 44 | 47 | 51 | 345 => 2,
-        11 | 23 => 4,
-        77 => 8,
-        75 | 76 => 30,
-        39 | 73 => 32,
-        84 | 86 => 50,
+        msg::PARAM_REQUEST_LIST | msg::MISSION_REQUEST_LIST | msg::MISSION_CLEAR_ALL => 0,
+        msg::FILE_TRANSFER_PROTOCOL => 1,
+        msg::PARAM_REQUEST_READ
+        | msg::MISSION_REQUEST
+        | msg::MISSION_SET_CURRENT
+        | msg::MISSION_COUNT
+        | msg::MISSION_ACK
+        | msg::MISSION_REQUEST_INT
+        | msg::PARAM_ERROR => 2,
+        msg::SET_MODE | msg::PARAM_SET => 4,
+        msg::COMMAND_ACK => 8,
+        msg::COMMAND_INT | msg::COMMAND_LONG => 30,
+        msg::MISSION_ITEM | msg::MISSION_ITEM_INT => 32,
+        msg::SET_POSITION_TARGET_LOCAL_NED | msg::SET_POSITION_TARGET_GLOBAL_INT => 50,
         _ => return None,
     })
 }
@@ -39,7 +46,10 @@ pub fn forward_to_other_ports(
     let target = target_system_offset(frame.message_id).map_or((0, 0), |at| {
         let payload = frame.padded_payload();
         // SET_MODE has no target component.
-        (payload[at], if frame.message_id == 11 { AUTOPILOT_COMPONENT } else { payload[at + 1] })
+        (
+            payload[at],
+            if frame.message_id == msg::SET_MODE { AUTOPILOT_COMPONENT } else { payload[at + 1] },
+        )
     });
     if target == (own_system, AUTOPILOT_COMPONENT) {
         return;

@@ -8,6 +8,7 @@ use mavlink::dialects::ardupilotmega as dialect;
 
 use super::command::{AUTOPILOT_VERSION, PROTOCOL_VERSION};
 use super::messages::{self, to_mavlink_units};
+use super::msg;
 use super::port::Port;
 use super::snapshot::Snapshot;
 
@@ -60,27 +61,33 @@ impl Snapshot {
     /// Queues a message about the autopilot's identity or state; false for any other id.
     fn send_state(&self, id: u32, port: &mut Port) -> bool {
         match id {
-            0 => self.send_heartbeat(port),
-            1 => self.send_sys_status(port),
-            2 => port.send(&dialect::SYSTEM_TIME_DATA {
+            msg::HEARTBEAT => self.send_heartbeat(port),
+            msg::SYS_STATUS => self.send_sys_status(port),
+            msg::SYSTEM_TIME => port.send(&dialect::SYSTEM_TIME_DATA {
                 time_unix_usec: self.unix_us,
                 time_boot_ms: self.boot_ms(),
             }),
-            4 => {
+            msg::PING => {
                 port.pings = port.pings.wrapping_add(1);
                 let seq = port.pings;
                 port.send_raw(4, &ping_payload(self.time_us, seq, 0, 0));
             }
-            8 | 380 | 410 | 411 | 441 => messages::send_recorded(id, port),
-            42 => {
+            msg::LINK_NODE_STATUS
+            | msg::TIME_ESTIMATE_TO_TARGET
+            | msg::EVENT
+            | msg::CURRENT_EVENT_SEQUENCE
+            | msg::GNSS_INTEGRITY => messages::send_recorded(id, port),
+            msg::MISSION_CURRENT => {
                 let (current, total) = self.mission;
                 let [[a, b], [c, d]] =
                     [current.min(total.saturating_sub(1)), total].map(u16::to_le_bytes);
                 port.send_raw(42, &[a, b, c, d, 0, 0]);
             }
-            111 => port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 }),
+            msg::TIMESYNC => {
+                port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 });
+            }
             AUTOPILOT_VERSION => self.send_version(port),
-            245 => {
+            msg::EXTENDED_SYS_STATE => {
                 // Two bytes: vtol_state undefined (PX4) or multicopter (ArduCopter), then
                 // landed_state.
                 let vtol = if self.is_px4() { 0 } else { 3 };
@@ -94,7 +101,7 @@ impl Snapshot {
                 }
                 port.send_raw(PROTOCOL_VERSION, &payload);
             }
-            436 => {
+            msg::CURRENT_MODE => {
                 let mut payload = [0; 9];
                 payload[..4].copy_from_slice(&self.status.custom_mode.to_le_bytes());
                 payload[4..8].copy_from_slice(&self.status.intended_mode.to_le_bytes());
@@ -108,7 +115,7 @@ impl Snapshot {
     /// Queues an attitude message; false for any other id.
     fn send_attitude(&self, id: u32, port: &mut Port) -> bool {
         match id {
-            30 => {
+            msg::ATTITUDE => {
                 let [roll, pitch, yaw] = self.attitude().euler;
                 port.send(&dialect::ATTITUDE_DATA {
                     time_boot_ms: self.boot_ms(),
@@ -120,7 +127,7 @@ impl Snapshot {
                     yawspeed: self.heading.1,
                 });
             }
-            31 => {
+            msg::ATTITUDE_QUATERNION => {
                 let [q1, q2, q3, q4] = self.attitude().quaternion;
                 port.send(&dialect::ATTITUDE_QUATERNION_DATA {
                     time_boot_ms: self.boot_ms(),
@@ -133,7 +140,7 @@ impl Snapshot {
                     yawspeed: self.heading.1,
                 });
             }
-            83 => port.send(&dialect::ATTITUDE_TARGET_DATA {
+            msg::ATTITUDE_TARGET => port.send(&dialect::ATTITUDE_TARGET_DATA {
                 time_boot_ms: self.boot_ms(),
                 q: self.attitude().quaternion,
                 body_roll_rate: 0.0,
@@ -151,8 +158,8 @@ impl Snapshot {
     fn send_position(&self, id: u32, port: &mut Port) -> bool {
         match id {
             // Sent only while the position estimate is valid, as PX4 does.
-            32 if !self.status.position_known => {}
-            32 => {
+            msg::LOCAL_POSITION_NED if !self.status.position_known => {}
+            msg::LOCAL_POSITION_NED => {
                 let (p, v) = (self.ned.cast::<f32>(), self.velocity.cast::<f32>());
                 port.send(&dialect::LOCAL_POSITION_NED_DATA {
                     time_boot_ms: self.boot_ms(),
@@ -164,14 +171,14 @@ impl Snapshot {
                     vz: v.z,
                 });
             }
-            33 => self.send_global_position(port),
+            msg::GLOBAL_POSITION_INT => self.send_global_position(port),
             // Not sent before there is an origin.
-            49 if !self.status.origin_known => {}
-            49 => {
+            msg::GPS_GLOBAL_ORIGIN if !self.status.origin_known => {}
+            msg::GPS_GLOBAL_ORIGIN => {
                 let (latitude, longitude, altitude) = to_mavlink_units(&self.ekf_origin);
                 port.send(&dialect::GPS_GLOBAL_ORIGIN_DATA { latitude, longitude, altitude });
             }
-            74 => {
+            msg::VFR_HUD => {
                 let v = self.velocity.cast::<f32>();
                 port.send(&dialect::VFR_HUD_DATA {
                     airspeed: f32::NAN,
@@ -182,9 +189,9 @@ impl Snapshot {
                     throttle: (100.0 * self.throttle()) as u16,
                 });
             }
-            85 if !self.status.guided => {}
-            85 => self.send_target(port),
-            141 => port.send(&dialect::ALTITUDE_DATA {
+            msg::POSITION_TARGET_LOCAL_NED if !self.status.guided => {}
+            msg::POSITION_TARGET_LOCAL_NED => self.send_target(port),
+            msg::ALTITUDE => port.send(&dialect::ALTITUDE_DATA {
                 time_usec: self.time_us,
                 altitude_monotonic: self.geodetic.alt_m as f32,
                 altitude_amsl: self.geodetic.alt_m as f32,
@@ -193,9 +200,11 @@ impl Snapshot {
                 altitude_terrain: -self.ned.z as f32 - self.height,
                 bottom_clearance: self.height,
             }),
-            62 => port.send(&dialect::NAV_CONTROLLER_OUTPUT_DATA::default()),
-            242 => self.send_home(port),
-            331 => self.send_odometry(port),
+            msg::NAV_CONTROLLER_OUTPUT => {
+                port.send(&dialect::NAV_CONTROLLER_OUTPUT_DATA::default());
+            }
+            msg::HOME_POSITION => self.send_home(port),
+            msg::ODOMETRY => self.send_odometry(port),
             _ => return false,
         }
         true
@@ -204,19 +213,19 @@ impl Snapshot {
     /// Queues a message about sensors, motors, battery or estimator; false for any other id.
     fn send_sensor(&self, id: u32, port: &mut Port) -> bool {
         match id {
-            24 => self.send_gps(port),
-            29 => port.send(&dialect::SCALED_PRESSURE_DATA {
+            msg::GPS_RAW_INT => self.send_gps(port),
+            msg::SCALED_PRESSURE => port.send(&dialect::SCALED_PRESSURE_DATA {
                 time_boot_ms: self.boot_ms(),
                 press_abs: self.pressure(),
                 press_diff: 0.0,
                 temperature: 1500,
             }),
-            36 => self.send_servos(port),
-            105 => self.send_imu(port),
-            132 => self.send_distance(port),
-            147 => self.send_battery(port),
-            193 => self.send_ekf_status_report(port),
-            230 => port.send(&dialect::ESTIMATOR_STATUS_DATA {
+            msg::SERVO_OUTPUT_RAW => self.send_servos(port),
+            msg::HIGHRES_IMU => self.send_imu(port),
+            msg::DISTANCE_SENSOR => self.send_distance(port),
+            msg::BATTERY_STATUS => self.send_battery(port),
+            msg::EKF_STATUS_REPORT => self.send_ekf_status_report(port),
+            msg::ESTIMATOR_STATUS => port.send(&dialect::ESTIMATOR_STATUS_DATA {
                 time_usec: self.time_us,
                 flags: dialect::EstimatorStatusFlags::from_bits_truncate(if self.gps.2 {
                     895
@@ -232,7 +241,7 @@ impl Snapshot {
                 pos_horiz_accuracy: self.accuracy[0],
                 pos_vert_accuracy: self.accuracy[1],
             }),
-            241 => port.send(&dialect::VIBRATION_DATA {
+            msg::VIBRATION => port.send(&dialect::VIBRATION_DATA {
                 time_usec: self.time_us,
                 vibration_x: 0.0,
                 vibration_y: 0.1,

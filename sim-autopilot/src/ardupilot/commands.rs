@@ -3,6 +3,7 @@
 
 use super::setpoint::GuidedGoal;
 use super::{Copter, CopterMode, STREAMS};
+use crate::cmd;
 use crate::command::{
     ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, DENIED, DO_DIGICAM_CONTROL,
     DO_SET_CAM_TRIGG_DIST, FAILED, ReceivedCommand, UNSUPPORTED, message_id,
@@ -35,48 +36,56 @@ impl Copter {
     ) {
         let sensors = platform.sensors();
         let result = match command.id {
-            176 => self.change_mode(platform, command.param[0] as u8, command.param[1] as u32),
-            400 if command.param[0] == 1.0 => {
+            cmd::DO_SET_MODE => {
+                self.change_mode(platform, command.param[0] as u8, command.param[1] as u32)
+            }
+            cmd::COMPONENT_ARM_DISARM if command.param[0] == 1.0 => {
                 self.arm(platform, &sensors, Arming::commanded_by(command)).result_or(FAILED)
             }
-            400 if command.param[0] == 0.0 => {
+            cmd::COMPONENT_ARM_DISARM if command.param[0] == 0.0 => {
                 self.disarm(platform, Arming::commanded_by(command)).result_or(FAILED)
             }
             DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => {
                 return platform.handle_camera_command(from, command);
             }
             // NAV_TAKEOFF's height counts from home.
-            22 => self.take_off(sensors.home.z + command.z, &sensors).result_or(FAILED),
-            21 => self.request_mode(CopterMode::Land, &sensors).result_or(FAILED),
-            20 => self.request_mode(CopterMode::Rtl, &sensors).result_or(FAILED),
-            17 => self.request_mode(CopterMode::Loiter, &sensors).result_or(FAILED),
-            192 => self.reposition(platform, command),
-            178 => {
+            cmd::NAV_TAKEOFF => {
+                self.take_off(sensors.home.z + command.z, &sensors).result_or(FAILED)
+            }
+            cmd::NAV_LAND => self.request_mode(CopterMode::Land, &sensors).result_or(FAILED),
+            cmd::NAV_RETURN_TO_LAUNCH => {
+                self.request_mode(CopterMode::Rtl, &sensors).result_or(FAILED)
+            }
+            cmd::NAV_LOITER_UNLIM => {
+                self.request_mode(CopterMode::Loiter, &sensors).result_or(FAILED)
+            }
+            cmd::DO_REPOSITION => self.reposition(platform, command),
+            cmd::DO_CHANGE_SPEED => {
                 self.speed = (command.param[1] > 0.0).then_some(command.param[1]);
                 ACCEPTED
             }
-            179 => platform.handle_set_home(command).result_or(FAILED),
-            193 => FAILED,
-            300 => self.start_mission(platform).result_or(FAILED),
-            245 => ACCEPTED,
-            241 | 246 if self.armed => FAILED,
-            241 => ACCEPTED,
-            246 => {
+            cmd::DO_SET_HOME => platform.handle_set_home(command).result_or(FAILED),
+            cmd::DO_PAUSE_CONTINUE => FAILED,
+            cmd::MISSION_START => self.start_mission(platform).result_or(FAILED),
+            cmd::PREFLIGHT_STORAGE => ACCEPTED,
+            cmd::PREFLIGHT_CALIBRATION | cmd::PREFLIGHT_REBOOT_SHUTDOWN if self.armed => FAILED,
+            cmd::PREFLIGHT_CALIBRATION => ACCEPTED,
+            cmd::PREFLIGHT_REBOOT_SHUTDOWN => {
                 if command.param[0] == 1.0 {
                     platform.schedule_reboot();
                 }
                 ACCEPTED
             }
-            510 => platform.report_interval(from, command.param[0], FAILED),
-            511 => platform.set_interval(from, command, &STREAMS, DENIED),
-            512 => match message_id(command.param[0]) {
+            cmd::GET_MESSAGE_INTERVAL => platform.report_interval(from, command.param[0], FAILED),
+            cmd::SET_MESSAGE_INTERVAL => platform.set_interval(from, command, &STREAMS, DENIED),
+            cmd::REQUEST_MESSAGE => match message_id(command.param[0]) {
                 Some(id) if STREAMS.iter().any(|stream| stream.0 == id) => {
                     platform.ports[from.port].requested_once.push(id);
                     ACCEPTED
                 }
                 _ => DENIED,
             },
-            520 => {
+            cmd::REQUEST_AUTOPILOT_CAPABILITIES => {
                 platform.ports[from.port].requested_once.push(AUTOPILOT_VERSION);
                 ACCEPTED
             }

@@ -5,6 +5,7 @@ use planner_core::frames::Geodetic;
 
 use super::Px4Mode;
 use super::firmware::Px4;
+use crate::cmd;
 use crate::command::{
     ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, CommandOutcome, DENIED, DO_DIGICAM_CONTROL,
     DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, PROTOCOL_VERSION, ReceivedCommand,
@@ -36,42 +37,54 @@ impl Px4 {
             DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => {
                 return platform.handle_camera_command(from, command);
             }
-            400 => self.arm_or_disarm(platform, command),
-            22 => self.take_off(platform, command),
-            21 => self.change_mode(platform, Px4Mode::Land).result_or(TEMPORARILY_REJECTED),
-            20 => self.change_mode(platform, Px4Mode::Return).result_or(TEMPORARILY_REJECTED),
-            17 => self.change_mode(platform, Px4Mode::Hold).result_or(TEMPORARILY_REJECTED),
-            192 => self.reposition(platform, command),
-            178 => {
+            cmd::COMPONENT_ARM_DISARM => self.arm_or_disarm(platform, command),
+            cmd::NAV_TAKEOFF => self.take_off(platform, command),
+            cmd::NAV_LAND => {
+                self.change_mode(platform, Px4Mode::Land).result_or(TEMPORARILY_REJECTED)
+            }
+            cmd::NAV_RETURN_TO_LAUNCH => {
+                self.change_mode(platform, Px4Mode::Return).result_or(TEMPORARILY_REJECTED)
+            }
+            cmd::NAV_LOITER_UNLIM => {
+                self.change_mode(platform, Px4Mode::Hold).result_or(TEMPORARILY_REJECTED)
+            }
+            cmd::DO_REPOSITION => self.reposition(platform, command),
+            cmd::DO_CHANGE_SPEED => {
                 self.commander.set_cruise(command.param[1]);
                 ACCEPTED
             }
-            179 => platform.handle_set_home(command).result_or(DENIED),
-            193 if command.param[0] == 0.0 => {
+            cmd::DO_SET_HOME => platform.handle_set_home(command).result_or(DENIED),
+            cmd::DO_PAUSE_CONTINUE if command.param[0] == 0.0 => {
                 self.change_mode(platform, Px4Mode::Hold).result_or(TEMPORARILY_REJECTED)
             }
-            193 => TEMPORARILY_REJECTED,
-            300 => self.start_mission(platform),
-            245 => ACCEPTED,
-            241 => TEMPORARILY_REJECTED,
-            246 if self.commander.armed() => TEMPORARILY_REJECTED,
-            246 => {
+            cmd::DO_PAUSE_CONTINUE => TEMPORARILY_REJECTED,
+            cmd::MISSION_START => self.start_mission(platform),
+            cmd::PREFLIGHT_STORAGE => ACCEPTED,
+            cmd::PREFLIGHT_CALIBRATION => TEMPORARILY_REJECTED,
+            cmd::PREFLIGHT_REBOOT_SHUTDOWN if self.commander.armed() => TEMPORARILY_REJECTED,
+            cmd::PREFLIGHT_REBOOT_SHUTDOWN => {
                 if command.param[0] == 1.0 {
                     platform.schedule_reboot();
                 }
                 ACCEPTED
             }
-            510 => platform.report_interval(from, command.param[0], FAILED),
-            511 => platform.set_interval(from, command, &telemetry::PX4_STREAMS, FAILED),
-            512 => match message_id(command.param[0]) {
+            cmd::GET_MESSAGE_INTERVAL => platform.report_interval(from, command.param[0], FAILED),
+            cmd::SET_MESSAGE_INTERVAL => {
+                platform.set_interval(from, command, &telemetry::PX4_STREAMS, FAILED)
+            }
+            cmd::REQUEST_MESSAGE => match message_id(command.param[0]) {
                 Some(id) if self.has_message(id) => {
                     platform.ports[from.port].requested_once.push(id);
                     ACCEPTED
                 }
                 _ => DENIED,
             },
-            519 | 520 => {
-                let id = if command.id == 519 { PROTOCOL_VERSION } else { AUTOPILOT_VERSION };
+            cmd::REQUEST_PROTOCOL_VERSION | cmd::REQUEST_AUTOPILOT_CAPABILITIES => {
+                let id = if command.id == cmd::REQUEST_PROTOCOL_VERSION {
+                    PROTOCOL_VERSION
+                } else {
+                    AUTOPILOT_VERSION
+                };
                 platform.ports[from.port].requested_once.push(id);
                 ACCEPTED
             }
