@@ -17,12 +17,11 @@ use planner_core::Point;
 
 use super::command::ReceivedCommand;
 use super::messages::to_mavlink_units;
+use super::msg::{CAMERA_FEEDBACK, CAMERA_IMAGE_CAPTURED};
 use super::port::Port;
 use super::snapshot::Snapshot;
 use crate::SimulatedKind;
 
-const CAMERA_FEEDBACK: u32 = 180;
-const CAMERA_IMAGE_CAPTURED: u32 = 263;
 /// Period at which PX4 and ArduPilot check the trigger distance, microseconds.
 const TRIGGER_CHECK_EVERY_US: [u64; 2] = [50_000, 20_000];
 /// Most photos that are kept if no referee fetches them.

@@ -12,11 +12,6 @@ pub const FAILED: u8 = 4;
 const ARM_FORCE: f32 = 21_196.0;
 /// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
 pub const CUSTOM_MODE: u8 = 1;
-pub const DO_SET_MODE: u16 = 176;
-pub const DO_DIGICAM_CONTROL: u16 = 203;
-pub const DO_SET_CAM_TRIGG_DIST: u16 = 206;
-pub const AUTOPILOT_VERSION: u32 = 148;
-pub const PROTOCOL_VERSION: u32 = 300;
 
 /// A received command.
 pub struct ReceivedCommand {

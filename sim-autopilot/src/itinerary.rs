@@ -11,20 +11,17 @@
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
-use super::command::{DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST, ReceivedCommand};
+use super::cmd::{
+    DO_CHANGE_SPEED, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST, NAV_DELAY, NAV_LAND,
+    NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF, NAV_WAYPOINT,
+};
+use super::command::ReceivedCommand;
 use super::mission::{MissionItem, MissionProgress};
+use super::msg::{MISSION_CURRENT, MISSION_ITEM_REACHED};
 use super::platform::{Platform, SensorReadings};
 use super::vehicle::wrap_pi;
 use crate::SimulatedKind;
 
-const NAV_WAYPOINT: u16 = 16;
-const NAV_RETURN_TO_LAUNCH: u16 = 20;
-const NAV_LAND: u16 = 21;
-const NAV_TAKEOFF: u16 = 22;
-const NAV_DELAY: u16 = 93;
-const DO_CHANGE_SPEED: u16 = 178;
-const MISSION_CURRENT: u32 = 42;
-const MISSION_ITEM_REACHED: u32 = 46;
 /// Horizontal distance at which a waypoint is reached, metres: `NAV_ACC_RAD` of PX4's multicopters,
 /// ArduCopter's `WPNAV_RADIUS`.
 const REACHED_M: f32 = 2.0;

@@ -5,19 +5,14 @@
 //! Download: REQUEST_LIST → COUNT, then each item on request. Source: MAVLink guide, "Mission
 //! Protocol".
 
+use super::msg::{
+    MISSION_ACK as ACK, MISSION_CLEAR_ALL as CLEAR_ALL, MISSION_COUNT as COUNT,
+    MISSION_CURRENT as CURRENT, MISSION_ITEM, MISSION_ITEM_INT, MISSION_REQUEST as REQUEST,
+    MISSION_REQUEST_INT as REQUEST_INT, MISSION_REQUEST_LIST as REQUEST_LIST,
+    MISSION_SET_CURRENT as SET_CURRENT,
+};
 use super::port::{Port, Sender};
 use super::wire::PayloadReader;
-
-const MISSION_ITEM: u32 = 39;
-const REQUEST: u32 = 40;
-const SET_CURRENT: u32 = 41;
-const CURRENT: u32 = 42;
-const REQUEST_LIST: u32 = 43;
-const COUNT: u32 = 44;
-const CLEAR_ALL: u32 = 45;
-const ACK: u32 = 47;
-const REQUEST_INT: u32 = 51;
-const MISSION_ITEM_INT: u32 = 73;
 
 /// Values of MAV_MISSION_RESULT.
 const ACCEPTED: u8 = 0;

@@ -1,14 +1,16 @@
 //! What both simulated autopilots share: vehicle, estimator, camera, ports, home, stored missions.
 
+use crate::cmd;
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
 use super::camera::{CameraTrigger, Photo};
-use super::command::{ACCEPTED, CommandOutcome, DO_DIGICAM_CONTROL, ReceivedCommand, message_id};
+use super::command::{ACCEPTED, CommandOutcome, ReceivedCommand, message_id};
 use super::config::AutopilotConfig;
 use super::estimator::EstimateErrors;
 use super::geodesy::LocalFrame;
 use super::mission::Missions;
+use super::msg::{GPS_GLOBAL_ORIGIN, HOME_POSITION, MESSAGE_INTERVAL};
 use super::noise::{self, Disturbance};
 use super::port::{PendingAck, Port, Sender};
 use super::status::MotorState;
@@ -16,9 +18,6 @@ use super::vehicle::{Demand, Multicopter};
 use super::wire::PayloadReader;
 use crate::SimulatedKind;
 
-const MESSAGE_INTERVAL: u32 = 244;
-const HOME_POSITION: u32 = 242;
-const GPS_GLOBAL_ORIGIN: u32 = 49;
 /// Delay of a COMMAND_ACK, microseconds: one step. In recordings PX4 took 1.3 to 16 ms and
 /// ArduCopter took 2.5 to 7 ms.
 const ANSWER_DELAY_US: u64 = 4_000;
@@ -222,7 +221,7 @@ impl Platform {
 
     /// Executes the same commands as `handle_camera_command`, but queues no COMMAND_ACK.
     pub(super) fn execute_camera_command(&mut self, command: &ReceivedCommand) {
-        if command.id == DO_DIGICAM_CONTROL {
+        if command.id == cmd::DO_DIGICAM_CONTROL {
             self.camera.handle_digicam_control(command);
         } else {
             self.camera.handle_trigger_distance(command);

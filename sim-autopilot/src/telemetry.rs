@@ -6,7 +6,6 @@
 
 use mavlink::dialects::ardupilotmega as dialect;
 
-use super::command::{AUTOPILOT_VERSION, PROTOCOL_VERSION};
 use super::messages::{self, to_mavlink_units};
 use super::msg;
 use super::port::Port;
@@ -86,20 +85,20 @@ impl Snapshot {
             msg::TIMESYNC => {
                 port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 });
             }
-            AUTOPILOT_VERSION => self.send_version(port),
+            msg::AUTOPILOT_VERSION => self.send_version(port),
             msg::EXTENDED_SYS_STATE => {
                 // Two bytes: vtol_state undefined (PX4) or multicopter (ArduCopter), then
                 // landed_state.
                 let vtol = if self.is_px4() { 0 } else { 3 };
                 port.send_raw(245, &[vtol, self.status.landed_state]);
             }
-            PROTOCOL_VERSION => {
+            msg::PROTOCOL_VERSION => {
                 // Version 2.00, at least 1.00, at most 2.00; no hashes.
                 let mut payload = [0; 22];
                 for (at, version) in [(0, 200_u16), (2, 100), (4, 200)] {
                     payload[at..at + 2].copy_from_slice(&version.to_le_bytes());
                 }
-                port.send_raw(PROTOCOL_VERSION, &payload);
+                port.send_raw(msg::PROTOCOL_VERSION, &payload);
             }
             msg::CURRENT_MODE => {
                 let mut payload = [0; 9];

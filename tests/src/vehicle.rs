@@ -159,7 +159,7 @@ impl Vehicle {
         self.begin_stream(port);
     }
 
-    /// Frames from this port begin anew.
+    /// The next byte from this port begins a frame.
     fn begin_stream(&mut self, port: Port) {
         self.framers[port as usize] = Framer::new();
         self.heard.last[port as usize] = None;

@@ -5,9 +5,9 @@ use super::setpoint::GuidedGoal;
 use super::{Copter, CopterMode, STREAMS};
 use crate::cmd;
 use crate::command::{
-    ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, DENIED, DO_DIGICAM_CONTROL,
-    DO_SET_CAM_TRIGG_DIST, FAILED, ReceivedCommand, UNSUPPORTED, message_id,
+    ACCEPTED, Arming, CUSTOM_MODE, DENIED, FAILED, ReceivedCommand, UNSUPPORTED, message_id,
 };
+use crate::msg;
 use crate::platform::Platform;
 use crate::port::Sender;
 use crate::wire::PayloadReader;
@@ -45,7 +45,7 @@ impl Copter {
             cmd::COMPONENT_ARM_DISARM if command.param[0] == 0.0 => {
                 self.disarm(platform, Arming::commanded_by(command)).result_or(FAILED)
             }
-            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => {
+            cmd::DO_DIGICAM_CONTROL | cmd::DO_SET_CAM_TRIGG_DIST => {
                 return platform.handle_camera_command(from, command);
             }
             // NAV_TAKEOFF's height counts from home.
@@ -86,7 +86,7 @@ impl Copter {
                 _ => DENIED,
             },
             cmd::REQUEST_AUTOPILOT_CAPABILITIES => {
-                platform.ports[from.port].requested_once.push(AUTOPILOT_VERSION);
+                platform.ports[from.port].requested_once.push(msg::AUTOPILOT_VERSION);
                 ACCEPTED
             }
             _ => UNSUPPORTED,

@@ -2,10 +2,9 @@
 //! home once set, PARAM_VALUE of its runtime.
 
 use super::Copter;
+use crate::msg::{HOME_POSITION, PARAM_VALUE};
 use crate::platform::Platform;
 
-const PARAM_VALUE: u32 = 22;
-const HOME_POSITION: u32 = 242;
 /// Period at which ArduCopter updates STAT_RUNTIME and sends it, microseconds.
 const STAT_RUNTIME_EVERY_US: u64 = 30_000_000;
 /// Value of MAV_PARAM_TYPE_INT32.

@@ -1,14 +1,14 @@
 //! PX4's handling of commands, SET_MODE, message intervals and message requests, and its
 //! COMMAND_ACKs.
 
+use crate::msg;
 use planner_core::frames::Geodetic;
 
 use super::Px4Mode;
 use super::firmware::Px4;
 use crate::cmd;
 use crate::command::{
-    ACCEPTED, AUTOPILOT_VERSION, Arming, CUSTOM_MODE, CommandOutcome, DENIED, DO_DIGICAM_CONTROL,
-    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, PROTOCOL_VERSION, ReceivedCommand,
+    ACCEPTED, Arming, CUSTOM_MODE, CommandOutcome, DENIED, FAILED, ReceivedCommand,
     TEMPORARILY_REJECTED, UNSUPPORTED, message_id,
 };
 use crate::platform::Platform;
@@ -27,14 +27,14 @@ impl Px4 {
         let result = match command.id {
             // DO_SET_MODE gets two COMMAND_ACKs: at once ACCEPTED, and in the next step whether the
             // mode changed.
-            DO_SET_MODE => {
+            cmd::DO_SET_MODE => {
                 let mode =
                     mode_of(command.param[0] as u8, command.param[1] as u8, command.param[2] as u8);
-                platform.acknowledge(from, DO_SET_MODE, ACCEPTED);
+                platform.acknowledge(from, cmd::DO_SET_MODE, ACCEPTED);
                 self.pending_mode = Some((from, mode));
                 return;
             }
-            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => {
+            cmd::DO_DIGICAM_CONTROL | cmd::DO_SET_CAM_TRIGG_DIST => {
                 return platform.handle_camera_command(from, command);
             }
             cmd::COMPONENT_ARM_DISARM => self.arm_or_disarm(platform, command),
@@ -81,9 +81,9 @@ impl Px4 {
             },
             cmd::REQUEST_PROTOCOL_VERSION | cmd::REQUEST_AUTOPILOT_CAPABILITIES => {
                 let id = if command.id == cmd::REQUEST_PROTOCOL_VERSION {
-                    PROTOCOL_VERSION
+                    msg::PROTOCOL_VERSION
                 } else {
-                    AUTOPILOT_VERSION
+                    msg::AUTOPILOT_VERSION
                 };
                 platform.ports[from.port].requested_once.push(id);
                 ACCEPTED
@@ -102,7 +102,7 @@ impl Px4 {
     }
 
     fn has_message(&self, id: u32) -> bool {
-        matches!(id, AUTOPILOT_VERSION | PROTOCOL_VERSION)
+        matches!(id, msg::AUTOPILOT_VERSION | msg::PROTOCOL_VERSION)
             || telemetry::PX4_STREAMS.iter().any(|stream| stream.0 == id)
     }
 

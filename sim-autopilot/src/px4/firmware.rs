@@ -5,8 +5,10 @@ use super::params::{self, Px4Tuning};
 use super::setpoint;
 use super::{Commander, Px4Mode};
 use crate::SimulatedKind;
-use crate::command::{CommandOutcome, DO_SET_MODE, TEMPORARILY_REJECTED};
+use crate::cmd;
+use crate::command::{CommandOutcome, TEMPORARILY_REJECTED};
 use crate::itinerary::{LandedState, MissionLeg};
+use crate::msg::COMMAND_LONG;
 use crate::params::Params;
 use crate::platform::{ControlDemand, Platform, SensorReadings};
 use crate::port::Sender;
@@ -14,7 +16,6 @@ use crate::status::AutopilotStatus;
 use crate::vehicle::VehicleLimits;
 use crate::wire::PayloadReader;
 
-const COMMAND_LONG: u32 = 76;
 /// Gimbal commands that PX4 was recorded to send when a failsafe starts: take control (1001), point
 /// ahead (1000, DO_GIMBAL_MANAGER_PITCHYAW), release control (1001, DO_GIMBAL_MANAGER_CONFIGURE).
 /// They go to component 0, a broadcast, and are not answered.
@@ -62,7 +63,7 @@ impl Px4 {
                 Some(mode) => self.commander.request_mode(mode, sensors, &self.tuning),
                 None => CommandOutcome::Refused,
             };
-            platform.acknowledge(from, DO_SET_MODE, changed.result_or(TEMPORARILY_REJECTED));
+            platform.acknowledge(from, cmd::DO_SET_MODE, changed.result_or(TEMPORARILY_REJECTED));
         }
         self.fly_mission(platform, sensors);
         let failed = self.commander.in_failsafe();

@@ -59,8 +59,7 @@ pub fn foreign(tree: &Tree, records: &BTreeSet<String>) -> Vec<String> {
             };
             let may_write = |owner: &Reach| match owner {
                 Reach::All => true,
-                Reach::Module(module) => source.module.starts_with(module),
-                Reach::Crate(module) => source.module.starts_with(module),
+                Reach::Module(module) | Reach::Crate(module) => source.module.starts_with(module),
             };
             let owner = owners.iter().find_map(|owner| match owner {
                 Reach::Crate(module) => Some(module.join("::")),
