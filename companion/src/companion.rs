@@ -1,5 +1,6 @@
 //! The companion itself: routes frames in, runs the mission table, makes frames out.
 
+mod actions;
 mod board;
 mod division;
 mod frames;
@@ -20,8 +21,8 @@ use crate::autopilot::telemetry::{OriginRange, Telemetry};
 use crate::config::{CheckedConfig, Config, ConfigError, PlanFailure};
 use crate::events::{Event, Link, PlanKind};
 use crate::guidance::{Guidance, GuidanceInputs, SetpointStats};
+use crate::link::Links;
 use crate::link::frame::Counters;
-use crate::link::{Links, OnDemandMessage};
 use crate::margins;
 use crate::mission::State;
 use crate::mission::course::Mission;
@@ -29,19 +30,10 @@ use crate::services::Services;
 use crate::swarm::detour::Detours;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
-use crate::timers::{Timer, Timers};
+use crate::timers::Timers;
 
-/// Period of setpoints and of control steps in flight: 20 Hz, twice the least rate that PX4 needs
-/// in practice.
-const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 /// Least time between two warnings that a setpoint is held, or that a far EKF origin is not used.
 const REPORT_EVERY: Duration = Duration::from_secs(5);
-/// Period of steps in the states that stream no setpoints: before take-off and after landing.
-const IDLE_STEP_EVERY: Duration = Duration::from_millis(200);
-/// Period at which a vehicle of a coverage mission sends its roster message to the swarm.
-const ROSTER_EVERY: Duration = Duration::from_millis(500);
-/// Period at which a vehicle sends its roster message to the swarm while a division is under way.
-const ROSTER_EVERY_DIVIDING: Duration = Duration::from_millis(200);
 /// Period of HEARTBEAT.
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 /// Limits of the value that the companion sets for ArduCopter's `GUID_TIMEOUT`, the time without
@@ -49,9 +41,6 @@ pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 /// in which a vehicle at cruise speed covers the safety margin to walls. With the default of 3 s it
 /// would fly on into walls while a link stalls. The lower limit is four setpoint periods.
 const GUID_TIMEOUT_RANGE_S: (f32, f32) = (0.2, 0.5);
-/// Maximum number of transitions of the mission table that one step makes. More would mean that the
-/// table has a cycle.
-const MAX_TRANSITIONS_PER_STEP: usize = 4;
 /// Maximum number of events that wait for the shell; when the queue is full a further event is
 /// dropped.
 const MAX_EVENTS: usize = 16;
@@ -210,38 +199,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         if relevant {
             self.run_mission_table();
-        }
-    }
-
-    /// Runs the control step and makes the periodic messages that are due at `now`: to be called
-    /// when [`Self::poll_timeout`] is due.
-    pub fn handle_timeout(&mut self, now: Instant) {
-        self.now = now;
-        for link in [Link::Autopilot, Link::Swarm] {
-            // Without new bytes the framer gives up a partial frame that is too old, and yields the
-            // frames behind it.
-            self.handle_bytes(link, now, &[]);
-        }
-        if self.timers.is_due(Timer::Step, now) {
-            self.step();
-        }
-        if self.timers.take_due(Timer::Heartbeat, now, HEARTBEAT_EVERY) {
-            self.links.set_due(Link::Autopilot, OnDemandMessage::Heartbeat);
-            self.links.set_due(Link::Swarm, OnDemandMessage::Heartbeat);
-            self.links.set_due(Link::Swarm, OnDemandMessage::Relay);
-        }
-        let every = Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
-        if self.timers.take_due(Timer::Swarm, now, every) {
-            self.set_position_due();
-            self.links.set_due(Link::Swarm, OnDemandMessage::Intent);
-        }
-        // The roster message has a period of its own, no multiple of the intent's or of the step's.
-        if let Some(fleet) = self.neighbours.fleet()
-            && self.timers.is_due(Timer::Roster, now)
-        {
-            let every = if fleet.is_dividing() { ROSTER_EVERY_DIVIDING } else { ROSTER_EVERY };
-            self.timers.schedule_next(Timer::Roster, now, every);
-            self.links.set_due(Link::Swarm, OnDemandMessage::Roster);
         }
     }
 

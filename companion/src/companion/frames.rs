@@ -197,16 +197,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.message_delay(id)) {
             late.update(delay_s);
         }
-        if self.neighbours.accept_intent(id, sequence, self.now) {
-            let plan_crc = self.mission.plan().map(|plan| plan.plan_crc);
-            self.neighbours.handle_intent(
-                self.now,
-                self.neighbours.own_rank(),
-                intent,
-                self.config.mission_crc,
-                plan_crc,
-            );
-        }
+        let plan_crc = self.mission.plan().map(|plan| plan.plan_crc);
+        let mission_crc = self.config.mission_crc;
+        self.neighbours.handle_numbered_intent(self.now, sequence, intent, mission_crc, plan_crc);
     }
 
     /// Denies a command from a sender that is no ground station of the mission.

@@ -1,24 +1,63 @@
-//! The control step, and the actions of the mission table's rows.
+//! What is done in time: the control step, and the messages that are sent periodically.
 
-use super::division::CANNOT_START_MOST;
-use super::{Companion, IDLE_STEP_EVERY, MAX_TRANSITIONS_PER_STEP, REPORT_EVERY, SETPOINT_EVERY};
-use crate::autopilot::requests::DISARM_EVERY;
-use crate::config::PlanFailure;
-use crate::events::{Event, Link, PlanKind};
+use super::{Companion, HEARTBEAT_EVERY, REPORT_EVERY};
+use crate::events::{Event, Link};
 use crate::guidance::GuidanceInputs;
 use crate::link::OnDemandMessage;
 use crate::link::severity::Severity;
 use crate::margins;
+use crate::mission::State;
 use crate::mission::task::{PathProgress, PathRelation};
-use crate::mission::{self, Action, State, TransitionRow};
 use crate::storage::store::ErasePermission;
-use crate::swarm::detour::path_kind::DetourPurpose;
+use crate::time::{Duration, Instant};
 use crate::timers::Timer;
 
+/// Period of setpoints and of control steps in flight: 20 Hz, twice the least rate that PX4 needs
+/// in practice.
+const SETPOINT_EVERY: Duration = Duration::from_millis(50);
+/// Period of steps in the states that stream no setpoints: before take-off and after landing.
+const IDLE_STEP_EVERY: Duration = Duration::from_millis(200);
+/// Period at which a vehicle of a coverage mission sends its roster message to the swarm.
+const ROSTER_EVERY: Duration = Duration::from_millis(500);
+/// Period at which a vehicle sends its roster message to the swarm while a division is under way.
+const ROSTER_EVERY_DIVIDING: Duration = Duration::from_millis(200);
+
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Runs the control step and makes the periodic messages that are due at `now`: to be called
+    /// when [`Self::poll_timeout`] is due.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.now = now;
+        for link in [Link::Autopilot, Link::Swarm] {
+            // Without new bytes the framer gives up a partial frame that is too old, and yields the
+            // frames behind it.
+            self.handle_bytes(link, now, &[]);
+        }
+        if self.timers.is_due(Timer::Step, now) {
+            self.step();
+        }
+        if self.timers.take_due(Timer::Heartbeat, now, HEARTBEAT_EVERY) {
+            self.links.set_due(Link::Autopilot, OnDemandMessage::Heartbeat);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Heartbeat);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Relay);
+        }
+        let every = Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
+        if self.timers.take_due(Timer::Swarm, now, every) {
+            self.set_position_due();
+            self.links.set_due(Link::Swarm, OnDemandMessage::Intent);
+        }
+        // The roster message has a period of its own, no multiple of the intent's or of the step's.
+        if let Some(fleet) = self.neighbours.fleet()
+            && self.timers.is_due(Timer::Roster, now)
+        {
+            let every = if fleet.is_dividing() { ROSTER_EVERY_DIVIDING } else { ROSTER_EVERY };
+            self.timers.schedule_next(Timer::Roster, now, every);
+            self.links.set_due(Link::Swarm, OnDemandMessage::Roster);
+        }
+    }
+
     /// One step of the control loop: guidance, division, scan of the path, mission table, requests
     /// to the autopilot.
-    pub(super) fn step(&mut self) {
+    fn step(&mut self) {
         let now = self.now;
         if self.services.has_unapplied_parameters()
             && self.erase_permission() == ErasePermission::Allowed
@@ -165,171 +204,5 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             _ => (Severity::Warning, "Estimate within # cm, margin # cm: stopping"),
         };
         self.links.send_text_with_numbers(severity, text, [cm, room_cm]);
-    }
-
-    pub(super) fn run_mission_table(&mut self) {
-        for _ in 0..MAX_TRANSITIONS_PER_STEP {
-            let inputs = self.guard_inputs();
-            let Some(row) = mission::first_applicable_row(self.mission.state(), &inputs) else {
-                return;
-            };
-            self.apply_row(row);
-        }
-    }
-
-    pub(super) fn apply_row(&mut self, row: &'static TransitionRow) {
-        let now = self.now;
-        // After an interruption, a vehicle that sought a landing place resumes with a landing.
-        let lands =
-            self.detours.seeks_landing() && !self.guidance.returning && !self.detours.is_homeward();
-        let after_search = if lands { State::Land } else { State::Blocked };
-        let (from, to) =
-            self.mission.enter_state(row, self.telemetry.custom_mode, after_search, now);
-        self.requests.reset_for_state(from, to);
-        self.run_action(from, to, row);
-        // Leaving a replanning state ends the search for a detour.
-        if from.waits_for_detour() {
-            self.detours.cancel_request();
-        }
-        if to == State::Follow {
-            self.detours.take_up_plan();
-        }
-        if !row.text.is_empty() {
-            self.links.send_text(row.severity, row.text);
-        }
-        if let Some(text) = self.mission.interruption_text(from, to) {
-            self.links.send_text(Severity::Info, text);
-        }
-        // The queue is full only if the shell does not drain: then this event is lost.
-        let warning = row.severity == Severity::Warning;
-        let changed = Event::StateChanged { from, to, text: row.text, warning };
-        let _ = self.events.push_back(changed);
-        // Where setpoints begin to stream, the next step is due at once.
-        if to.streams_setpoints() && !from.streams_setpoints() {
-            self.timers.set(Timer::Step, now);
-        }
-    }
-
-    pub(super) fn run_action(&mut self, from: State, to: State, row: &TransitionRow) {
-        let now = self.now;
-        self.save_place_before_jump(to);
-        let position = self.telemetry.position;
-        match row.action {
-            Action::None | Action::ForgetStart => {}
-            Action::Connect => self.request_streams(),
-            Action::RequestPlan => {
-                self.mission.forget_plan();
-                self.detours.forget_plan();
-                self.neighbours.forget_plan();
-                self.guidance.reset();
-                let photographed = self.mission.photographed_mut();
-                if self.config.skips_photographed {
-                    photographed.prepare_plan_of_rest();
-                } else {
-                    photographed.prepare_plan_of_new_round();
-                }
-                if let Some(fleet) = self.neighbours.fleet_mut() {
-                    if fleet.has_reported_leaving() {
-                        // The vehicle takes part again: it leaves its share at the earliest after
-                        // this time, since others have to hear it first.
-                        self.timers.set(Timer::LeaveWithoutCommitment, now + CANNOT_START_MOST);
-                    }
-                    fleet.begin_flight(now);
-                    self.detours.begin_flight();
-                }
-                let _ = self.events.push_back(Event::PlanRequested(PlanKind::Mission));
-            }
-            Action::HoldHere if to == State::Streaming => {
-                self.mission.leave_pad();
-                self.guidance.hold_at(position);
-            }
-            Action::HoldHere if to == State::PilotReturned => {
-                self.guidance.hold_after_pilot(position, self.mission.plan());
-            }
-            Action::HoldHere => self.guidance.hold_at(position),
-            Action::HoldOver => self.timers.set(Timer::Request, now),
-            Action::RequestOffboard | Action::RequestArming | Action::RequestTakeOff => {
-                self.timers.set(Timer::Request, now);
-            }
-            Action::RequestLandMode => self.request_landing(from),
-            Action::RequestDisarming if to == State::Disarm => {
-                self.timers.set(Timer::Request, now + DISARM_EVERY);
-            }
-            Action::RequestDisarming | Action::CancelStart => self.timers.set(Timer::Request, now),
-            Action::BeginClimb => self.guidance.begin_climb(&position),
-            Action::FollowPath => self.guidance.start_following(now),
-            Action::RequestDetour => self.request_detour(DetourPurpose::Goal),
-            Action::RequestPathHome => self.request_detour(DetourPurpose::Home),
-            Action::RequestDetourBackToPath => self.request_detour_back_to_path(),
-            Action::TurnHome => {
-                self.guidance.cancel_evasion();
-                self.detours.begin_way_home(now);
-            }
-            Action::RequestDetourAside => {
-                self.guidance.cancel_evasion();
-                self.request_detour_aside(from);
-            }
-            Action::RequestLanding => self.request_detour(DetourPurpose::Landing),
-            Action::NoteDetourFailure => self.handle_detour_failure(PlanFailure::Late),
-            Action::FlyDetour => self.guidance.start_following(now),
-            Action::FlyDivision => {
-                self.mission.note_division_flown();
-                self.detours.give_up_plan();
-                self.guidance.start_following(now);
-            }
-            Action::BrakeOnPath => self.guidance.cancel_evasion(),
-            Action::Rejoin => self.resume_interrupted_state(from, to),
-            Action::TurnBack => {
-                self.detours.begin_way_back();
-                let along_m = self.guidance.progress_m(from, &self.guidance_inputs());
-                let guidance = &mut self.guidance;
-                self.mission.reverse_path(along_m, |path| guidance.reverse_path(path, now));
-            }
-        }
-    }
-
-    pub(super) fn request_landing(&mut self, from: State) {
-        use State::*;
-        self.timers.set(Timer::Request, self.now);
-        let position = self.telemetry.position;
-        // Others avoid the place where an unheard vehicle may be on the ground, so setpoints guide
-        // it straight down. A held landing continues as it began: by setpoints or the autopilot.
-        if from == Alone || (from == LandingHeld && self.guidance.is_guiding_landing()) {
-            return self.guidance.begin_guided_landing(self.now);
-        }
-        self.guidance.end_guided_landing();
-        match from {
-            Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping | Land
-            | Disarm => {
-                self.guidance.cancel_evasion();
-            }
-            LandingHeld => self.guidance.hold_at(position),
-            // Off the path the reference may be behind a wall, so the vehicle holds where it is.
-            _ => self.guidance.hold_off_path(position),
-        }
-    }
-
-    /// Resumes, in guidance, the state `to` that was interrupted.
-    pub(super) fn resume_interrupted_state(&mut self, from: State, to: State) {
-        let (now, position) = (self.now, self.telemetry.position);
-        match to {
-            State::TakeOff => self.timers.set(Timer::Request, now),
-            State::Land => self.request_landing(from),
-            _ => {
-                let climbs = self.mission.uninterrupted_state().takes_off();
-                match self.mission.plan() {
-                    Some(_) if climbs => self.guidance.resume_climb(&position, now),
-                    Some(plan) => self.guidance.resume_flight(plan, &position, now),
-                    None => {}
-                }
-                if to == State::Blocked {
-                    // Counts as blocked until the next scan has checked the path.
-                    self.detours.assume_blocked();
-                }
-                if !to.advances() {
-                    self.guidance.cancel_evasion();
-                }
-            }
-        }
     }
 }

@@ -9,28 +9,29 @@
 mod bounds;
 mod contact;
 mod division;
+mod echoes;
+mod entry;
 pub(crate) mod met;
 mod places;
+mod range;
 mod reach;
 pub(crate) mod relay;
+mod silence;
 mod standing;
+mod states;
 
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use nalgebra::Vector3;
 use planner_core::deconflict::Neighbour;
-use planner_core::flight::Gate;
 use planner_core::frames::{self, Geodetic};
-use planner_core::safety::{PlaceOnPoints, PointsReach};
 use planner_core::{Length, Point};
 
 pub(crate) use self::bounds::MAX_HOVER_MPS;
 use self::bounds::*;
-use self::contact::NeighbourEntry;
-use crate::config::{Ground, REACHES_ALL_M, RosterEntry};
-use crate::link::echo::{IntentEcho, MessageDelay};
-use crate::link::intent::{GROUNDED, Intent, LANDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
-use crate::link::sequence::SequenceFilter;
+use self::entry::NeighbourEntry;
+use crate::config::{Ground, RosterEntry};
+use crate::link::intent::{GROUNDED, Intent, LANDED, ON_PLAN, OUT_OF_PLAN};
 use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
 
@@ -107,86 +108,13 @@ impl<const V: usize> Neighbours<V> {
         table
     }
 
-    /// Sets this vehicle's position, ENU, and the range of the radio, metres.
-    pub(crate) fn set_place(&mut self, place: Point, radio_range_m: f32) {
-        let all = radio_range_m >= REACHES_ALL_M;
-        self.range_edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
-        self.place = place;
-    }
-
-    /// Whether the operator has set the range of the radio (`FLK_RADIO_M`).
-    pub(crate) fn knows_range(&self) -> bool {
-        self.range_edge_m.is_finite()
-    }
-
-    /// Whether every vehicle of the roster that has not ended its flight was last heard, if ever,
-    /// where the radio may not reach: then its silence is no failure.
-    pub(crate) fn are_all_out_of_range(&self) -> bool {
-        let beyond = |c: &NeighbourEntry| {
-            c.at_range_edge || c.position_at.is_none() || c.reports_any(LANDED | OUT_OF_PLAN)
-        };
-        self.knows_range() && self.contacts[..self.roster_count].iter().all(beyond)
-    }
-
-    /// Rank of this vehicle in the roster.
-    pub(crate) fn own_rank(&self) -> u16 {
-        self.own_rank
-    }
-
     /// Number of positions dropped because the table had no room for their sender.
     pub fn dropped_count(&self) -> u16 {
         self.dropped
     }
 
     fn add_contact(&mut self, id: u8, rank: u16) -> Option<usize> {
-        let state = Neighbour {
-            id,
-            rank,
-            position: Point::zeros(),
-            velocity: Point::zeros(),
-            age_s: 0.0,
-            progress_m: None,
-            grounded: false,
-            out_of_plan: false,
-            detours: false,
-        };
-        let contact = NeighbourEntry {
-            id,
-            rank,
-            sequence: SequenceFilter::default(),
-            heard_at: None,
-            position_at: None,
-            boot_ms: 0,
-            flags: 0,
-            out_since: None,
-            hears_us_at: None,
-            heard_bits: 0,
-            relayed_m: None,
-            relayed_at: None,
-            intent_sequence: 0,
-            message_delay: MessageDelay::default(),
-            intent_at: None,
-            points: Vec::new(),
-            unheard_point_count: 0,
-            place_on_points: PlaceOnPoints::Unknown,
-            extent_m: 0.0,
-            points_reach: PointsReach::OPEN,
-            points_length_m: -1.0,
-            may_come_down: false,
-            gates_open_up_to_m: f32::NEG_INFINITY,
-            unheard_delay_s: 0,
-            at_range_edge: false,
-            assumed_speed_mps: self.assumed_speed_mps,
-            ground_m: f32::NAN,
-            speed_mps: 0.0,
-            shares_plan: false,
-            other_plan: false,
-            moved_at: Instant::ZERO,
-            furthest: None,
-            pad: None,
-            avoided_at: NO_PLACE,
-            state,
-        };
+        let contact = NeighbourEntry::unheard(id, rank, self.assumed_speed_mps);
         self.contacts.push(contact).ok()?;
         Some(self.contacts.len() - 1)
     }
@@ -237,18 +165,23 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether an intent of `id` is newer than its last one, by the sequence number. To be called
-    /// only for an intent that decodes and is of our mission: a message that anybody can send must
-    /// not make the next genuine one look late. Positions are ordered by their time instead.
-    pub fn accept_intent(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
-        self.roster_index(id).is_some_and(|at| {
-            let contact = &mut self.contacts[at];
-            let fresh = contact.sequence.accept_if_new(sequence, now);
-            if fresh {
-                contact.intent_sequence = sequence;
-            }
-            fresh
-        })
+    /// Handles a neighbour's intent with the sequence number of its frame: only one newer than the
+    /// last counts. To be called only for an intent of our mission: a message that anybody can send
+    /// must not make the next genuine one look late. Positions are ordered by their time instead.
+    pub fn handle_numbered_intent(
+        &mut self,
+        now: Instant,
+        sequence: u8,
+        intent: &Intent,
+        mission_crc: u32,
+        plan_crc: Option<u32>,
+    ) {
+        let Some(at) = self.roster_index(intent.system_id) else { return };
+        let contact = &mut self.contacts[at];
+        if contact.sequence.accept_if_new(sequence, now) {
+            contact.intent_sequence = sequence;
+            self.handle_intent(now, self.own_rank, intent, mission_crc, plan_crc);
+        }
     }
 
     /// Handles a position sent by `id`. It counts as that of the roster's vehicle only if that
@@ -340,94 +273,6 @@ impl<const V: usize> Neighbours<V> {
             shared.then(|| contact.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
     }
 
-    /// State and age, at `now`, of every neighbour whose position or progress was ever heard, or
-    /// that counts as dead. A vehicle out of the plan opens no gate until a scan has found that it
-    /// does not block the path ([`Self::mark_path_clear`]).
-    pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
-        self.states.clear();
-        self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
-        for contact in &self.contacts {
-            let progress_m = contact.passed_m(now);
-            let placed_at = contact.position_at;
-            let dead = contact.is_dead(self.clear_at);
-            if placed_at.is_none() && progress_m.is_none() && !dead {
-                continue;
-            }
-            let state = Neighbour {
-                // Of a vehicle known only by relays, only the progress is known.
-                position: placed_at.map_or(FAR_AWAY, |_| contact.state.position),
-                age_s: placed_at.map_or(0.0, |at| (now - at).as_secs_f32()),
-                rank: contact.rank,
-                progress_m,
-                grounded: contact.state.grounded || dead,
-                out_of_plan: contact.out_since.is_some_and(|since| since <= self.clear_at) || dead,
-                detours: contact.reports_any(ON_DETOUR),
-                ..contact.state
-            };
-            // Cannot overflow: there are as many slots as contacts.
-            let _ = self.states.push(state);
-        }
-        &self.states
-    }
-
-    /// Whether `gate` is open for good: its vehicle has passed it, or is out of the plan.
-    pub(crate) fn has_passed(&self, gate: &Gate, now: Instant) -> bool {
-        let contact = self.roster_index(gate.id).map(|at| &self.contacts[at]);
-        contact.is_some_and(|c| {
-            let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);
-            passed
-                || c.out_since.is_some_and(|since| since <= self.clear_at)
-                || c.is_dead(self.clear_at)
-        })
-    }
-
-    /// Estimated delay of the messages from the vehicle `id` of the roster.
-    pub(crate) fn message_delay(&mut self, id: u8) -> Option<&mut MessageDelay> {
-        let at = self.roster_index(id)?;
-        Some(&mut self.contacts[at].message_delay)
-    }
-
-    /// Greatest message delay of the roster's vehicles, seconds.
-    pub(crate) fn max_message_delay_s(&self) -> f32 {
-        self.contacts[..self.roster_count]
-            .iter()
-            .fold(0.0, |most, c| libm::fmaxf(most, c.message_delay.delay_s))
-    }
-
-    /// Whether no vehicle of the roster was heard for 3 s: this vehicle's receiver may have failed.
-    #[inline(never)]
-    pub(crate) fn hears_nobody(&self, now: Instant) -> bool {
-        self.roster_count > 0
-            && self.contacts[..self.roster_count]
-                .iter()
-                .all(|c| !c.heard_within(now, MAY_LAND_AFTER))
-    }
-
-    /// Whether this vehicle holds the lease in a coverage mission.
-    #[inline(never)]
-    pub(crate) fn holds_lease(&self, now: Instant) -> bool {
-        self.fleet().is_some_and(|fleet| fleet.has_lease(now))
-    }
-
-    /// An echo of a neighbour's last intent, for this vehicle's next intent; the neighbours take
-    /// turns.
-    pub(crate) fn next_echo(&self, turn: usize, now: Instant) -> Option<IntentEcho> {
-        let contact = self.contacts[..self.roster_count].get(turn % self.roster_count.max(1))?;
-        IntentEcho::new(contact.rank, contact.intent_sequence, now - contact.intent_at?)
-    }
-
-    /// Vehicles heard within 0.8 s, a bit for each rank below 32.
-    pub fn heard_bits(&self, now: Instant) -> u32 {
-        let heard =
-            self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
-        heard.fold(0, |bits, c| bits | 1 << c.rank)
-    }
-
-    /// Whether the vehicle `id` was last heard to follow the shared plan; true for an unknown id.
-    pub(crate) fn follows_plan(&self, id: u8) -> bool {
-        self.contacts.iter().find(|c| c.state.id == id).is_none_or(NeighbourEntry::on_plan)
-    }
-
     /// Number of vehicles in the table, strangers included.
     pub fn len(&self) -> usize {
         self.contacts.len()
@@ -447,27 +292,6 @@ impl<const V: usize> Neighbours<V> {
             (contact.relayed_m, contact.relayed_at) = (None, None);
             contact.gates_open_up_to_m = f32::NEG_INFINITY;
         }
-    }
-
-    /// Whether, within `span`, a vehicle of the roster was heard, and one reported that it hears
-    /// this vehicle.
-    pub fn linked_within(&self, now: Instant, span: Duration) -> bool {
-        let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
-        let roster = &self.contacts[..self.roster_count];
-        roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
-    }
-
-    /// Time since any vehicle of the roster was heard, or since one reported that it hears this
-    /// vehicle, whichever is longer; counted from `since` at the earliest. Zero when all of them
-    /// have landed or are out of the plan, or there are none.
-    pub fn silence_duration(&self, now: Instant, since: Instant) -> Duration {
-        if self.are_all_at_rest() {
-            return Duration::default();
-        }
-        let others = || self.contacts[..self.roster_count].iter();
-        let heard = others().filter_map(|c| c.heard_at).max().unwrap_or(since);
-        let hears_us = others().filter_map(|c| c.hears_us_at).max().unwrap_or(since);
-        now - heard.min(hears_us).max(since)
     }
 }
 

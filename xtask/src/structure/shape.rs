@@ -40,7 +40,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "a line for each fact that a guard of the table asks for",
     ),
     (
-        "companion/src/companion/steps.rs",
+        "companion/src/companion/actions.rs",
         "run_action",
         "one match: an arm for each action of the table",
     ),
@@ -110,7 +110,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "what is known of a blocked path, flat: reset as a whole where a path begins",
     ),
     (
-        "companion/src/swarm/neighbours/contact.rs",
+        "companion/src/swarm/neighbours/entry.rs",
         "NeighbourEntry",
         "a telemetry record: what one neighbour said last",
     ),

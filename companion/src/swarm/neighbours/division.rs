@@ -1,16 +1,26 @@
 //! The fleet of a coverage mission, and which vehicles hear each other, by which it decides.
 
-use super::*;
+use super::Neighbours;
+use super::bounds::*;
+use super::entry::NeighbourEntry;
 use crate::config::Ground;
+use crate::link::intent::{GROUNDED, LANDED, OUT_OF_PLAN};
 use crate::link::roster::{MAX_ENTRIES, RosterReport};
 use crate::swarm::fleet::{
-    FleetTimeouts, LEASE_HEARD_WITHIN, MemberReception, OwnReport, StartStatus,
+    Fleet, FleetTimeouts, LEASE_HEARD_WITHIN, MemberReception, OwnReport, StartStatus,
 };
+use crate::time::{Duration, Instant};
 
 /// Time for which a neighbour's report of another plan counts.
 const PLAN_REPORT_LIFETIME: Duration = Duration::from_secs(3);
 
 impl<const V: usize> Neighbours<V> {
+    /// Whether this vehicle holds the lease in a coverage mission.
+    #[inline(never)]
+    pub(crate) fn holds_lease(&self, now: Instant) -> bool {
+        self.fleet().is_some_and(|fleet| fleet.has_lease(now))
+    }
+
     /// Makes the mission a coverage mission, with a fleet that divides what a vehicle leaves.
     /// `down_s`: silence after which a lost vehicle is on the ground, seconds; `ground`: heights of
     /// ground that is not level; `stray_m`: distance by which two vehicles may be nearer than their

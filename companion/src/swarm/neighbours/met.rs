@@ -6,7 +6,11 @@ use planner_core::safety::{
     MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, OwnSet, PlaceOnPoints, PointsReach,
 };
 
-use super::*;
+use super::Neighbours;
+use super::bounds::*;
+use super::entry::NeighbourEntry;
+use crate::link::intent::{GROUNDED, LANDED, OUT_OF_PLAN, WAITING};
+use crate::time::{Duration, Instant};
 
 /// State of a neighbour that the safety filter compares: its priority, and its reachable set's
 /// inputs.
@@ -88,19 +92,6 @@ pub(crate) struct ReachQuery<'a> {
 }
 
 impl NeighbourEntry {
-    /// Finds where the neighbour's position is on its points; to be called when either is received.
-    pub(super) fn update_place_on_points(&mut self) {
-        let (at, points) = (&self.state, self.points_for_now());
-        let place = PlaceOnPoints::find(&at.position, points, &at.velocity);
-        self.points_reach = PointsReach::new(&at.position, points, &place, self.extent_m);
-        self.place_on_points = place;
-        if self.flies_all_points_unheard() {
-            let mut at = self.state.position;
-            let legs = self.points.iter().map(|next| next - core::mem::replace(&mut at, *next));
-            self.points_length_m = legs.map(|leg| fpu::sqrtf(leg.norm_squared())).sum();
-        }
-    }
-
     /// Whether the neighbour counts as dead, if it may come within reach; `None` if it stays out of
     /// reach wherever it can be, or has no position. Most are far away: this test needs no
     /// reachable set. Never `None` for a neighbour that is within reach after

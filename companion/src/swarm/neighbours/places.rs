@@ -3,7 +3,8 @@
 use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::{Length, Point};
 
-use super::contact::{AreaGround, NeighbourEntry};
+use super::contact::AreaGround;
+use super::entry::NeighbourEntry;
 use super::{
     GROUNDED, LANDED, MAX_HEIGHT_AGE, MAX_HEIGHT_AGE_S, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE,
     Neighbours, ON_PLAN, OUT_OF_PLAN, UNHEARD_LANDING_AFTER, VAGUE_POSITION_M,

@@ -24,7 +24,7 @@
 
 use heapless::Vec;
 
-use super::contact::NeighbourEntry;
+use super::entry::NeighbourEntry;
 use super::{HEARD_WITHIN, Neighbours};
 use crate::time::{Duration, Instant};
 

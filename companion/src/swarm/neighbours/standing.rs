@@ -2,7 +2,7 @@
 //! the turn to fly a detour.
 
 use super::Neighbours;
-use super::contact::NeighbourEntry;
+use super::entry::NeighbourEntry;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, OUT_OF_PLAN};
 use crate::time::{Duration, Instant};
 

@@ -1,0 +1,191 @@
+//! The table's entry of one neighbour, and how a message changes it.
+
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::deconflict::Neighbour;
+use planner_core::safety::{PlaceOnPoints, PointsReach};
+
+use super::bounds::*;
+use crate::link::echo::MessageDelay;
+use crate::link::intent::{MAX_POINTS, ON_DETOUR, OUT_OF_PLAN};
+use crate::link::sequence::SequenceFilter;
+use crate::time::{Duration, Instant};
+
+/// The table's entry of one neighbour: what was last heard of it.
+#[derive(Clone, Debug)]
+pub(crate) struct NeighbourEntry {
+    pub(super) id: u8,
+    pub(super) rank: u16,
+    pub(super) sequence: SequenceFilter,
+    pub(super) heard_at: Option<Instant>,
+    pub(super) position_at: Option<Instant>,
+    pub(super) boot_ms: u32,
+    pub(super) flags: u8,
+    /// Since when the neighbour has reported that it is out of the plan, with its position known.
+    pub(super) out_since: Option<Instant>,
+    pub(super) hears_us_at: Option<Instant>,
+    /// Vehicles that the neighbour hears, a bit for each rank.
+    pub(super) heard_bits: u32,
+    /// The neighbour's progress along the shared plan as others relayed it, metres.
+    pub(super) relayed_m: Option<f32>,
+    /// When the neighbour made the newest report that others relayed.
+    pub(super) relayed_at: Option<Instant>,
+    /// Sequence number of the neighbour's last intent.
+    pub(super) intent_sequence: u8,
+    pub(super) message_delay: MessageDelay,
+    /// When the neighbour's last intent of our mission was heard.
+    pub(super) intent_at: Option<Instant>,
+    pub(super) points: Vec<Point, MAX_POINTS>,
+    /// Number of points, at the end of the list, to which the neighbour flies only while unheard.
+    pub(super) unheard_point_count: u8,
+    /// Where the neighbour's position is on its reported points.
+    pub(super) place_on_points: PlaceOnPoints,
+    /// How far the neighbour's points, up to its stop for now, lead it.
+    pub(super) points_reach: PointsReach,
+    /// Greatest distance of the points, up to its stop for now, from the first of them, metres.
+    pub(super) extent_m: f32,
+    /// Length of the polyline from the neighbour's position through all its points, metres: in a
+    /// coverage mission it flies all of it unheard, as far as its lease allows. −1 in other
+    /// missions.
+    pub(super) points_length_m: f32,
+    /// Whether the neighbour may come down from where it is; and the height of the ground below it,
+    /// ENU up, metres, NaN if it never reported any.
+    pub(super) may_come_down: bool,
+    pub(super) ground_m: f32,
+    /// Place along its path up to which the neighbour's gates were open, or would open after a
+    /// wait, metres: unheard it flies on to there.
+    pub(super) gates_open_up_to_m: f32,
+    /// Seconds by which gates and climb delay its unheard flight to `gates_open_up_to_m`.
+    pub(super) unheard_delay_s: u8,
+    /// Whether the neighbour's last position was where the radio may not reach.
+    pub(super) at_range_edge: bool,
+    /// Least speed at which the neighbour is assumed to make progress while unheard, m/s.
+    pub(super) assumed_speed_mps: f32,
+    /// The neighbour's speed at its last position, m/s.
+    pub(super) speed_mps: f32,
+    /// Whether the neighbour's plan has our plan's CRC, whether it follows that plan or not.
+    pub(super) shares_plan: bool,
+    /// Whether the neighbour follows a plan of our mission with another CRC than ours.
+    pub(super) other_plan: bool,
+    /// When a position last showed the neighbour faster than [`MAX_HOVER_MPS`].
+    pub(super) moved_at: Instant,
+    /// Greatest progress that the neighbour can have made, metres along its path, and when.
+    pub(super) furthest: Option<(f32, Instant)>,
+    /// The neighbour's place before its take-off: its autopilot may fly it back there.
+    pub(super) pad: Option<Point>,
+    /// Place where the neighbour rested when the present detour was planned; NaN for none.
+    pub(super) avoided_at: Point,
+    pub(super) state: Neighbour,
+}
+
+impl NeighbourEntry {
+    /// The entry of a neighbour that has not been heard yet.
+    // Inlined at its only caller: a board's stack has no room for a copy.
+    #[inline(always)]
+    pub(super) fn unheard(id: u8, rank: u16, assumed_speed_mps: f32) -> Self {
+        let state = Neighbour {
+            id,
+            rank,
+            position: Point::zeros(),
+            velocity: Point::zeros(),
+            age_s: 0.0,
+            progress_m: None,
+            grounded: false,
+            out_of_plan: false,
+            detours: false,
+        };
+        Self {
+            id,
+            rank,
+            sequence: SequenceFilter::default(),
+            heard_at: None,
+            position_at: None,
+            boot_ms: 0,
+            flags: 0,
+            out_since: None,
+            hears_us_at: None,
+            heard_bits: 0,
+            relayed_m: None,
+            relayed_at: None,
+            intent_sequence: 0,
+            message_delay: MessageDelay::default(),
+            intent_at: None,
+            points: Vec::new(),
+            unheard_point_count: 0,
+            place_on_points: PlaceOnPoints::Unknown,
+            extent_m: 0.0,
+            points_reach: PointsReach::OPEN,
+            points_length_m: -1.0,
+            may_come_down: false,
+            gates_open_up_to_m: f32::NEG_INFINITY,
+            unheard_delay_s: 0,
+            at_range_edge: false,
+            assumed_speed_mps,
+            ground_m: f32::NAN,
+            speed_mps: 0.0,
+            shares_plan: false,
+            other_plan: false,
+            moved_at: Instant::ZERO,
+            furthest: None,
+            pad: None,
+            avoided_at: NO_PLACE,
+            state,
+        }
+    }
+
+    /// Whether the neighbour flies to the last of its points even unheard: in a coverage mission.
+    pub(crate) fn flies_all_points_unheard(&self) -> bool {
+        self.points_length_m >= 0.0
+    }
+
+    /// The neighbour's points up to where it will stop for now.
+    pub(super) fn points_for_now(&self) -> &[Point] {
+        &self.points[..self.points.len().saturating_sub(usize::from(self.unheard_point_count))]
+    }
+
+    pub(super) fn heard_within(&self, now: Instant, span: Duration) -> bool {
+        self.heard_at.is_some_and(|at| now - at < span)
+    }
+
+    /// Whether the neighbour follows the shared plan, as last heard.
+    pub(super) fn on_plan(&self) -> bool {
+        self.state.progress_m.is_some() && !self.reports_any(ON_DETOUR | OUT_OF_PLAN)
+    }
+
+    pub(super) fn reports_any(&self, flags: u8) -> bool {
+        self.flags & flags != 0
+    }
+
+    /// The part of a reported progress that is believed, metres: no more than the vehicle can have
+    /// flown since the report before, at `fastest_mps`. The rest is believed by and by; so is a
+    /// landing, whose report jumps to the end of the way. A lower progress is believed: it opens no
+    /// gate. The first report of a plan is believed, and that of a vehicle that was restarted.
+    pub(super) fn plausible_progress_m(
+        &mut self,
+        progress_m: f32,
+        fastest_mps: f32,
+        now: Instant,
+    ) -> f32 {
+        let furthest =
+            self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).as_secs_f32());
+        let believed_m =
+            furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));
+        let late_m = believed_m + fastest_mps * MAX_MESSAGE_DELAY_S + MAX_PROGRESS_JUMP_M;
+        self.furthest =
+            Some((furthest.map_or(late_m, |furthest_m| libm::fminf(furthest_m, late_m)), now));
+        believed_m
+    }
+
+    /// Finds where the neighbour's position is on its points; to be called when either is received.
+    pub(super) fn update_place_on_points(&mut self) {
+        let (at, points) = (&self.state, self.points_for_now());
+        let place = PlaceOnPoints::find(&at.position, points, &at.velocity);
+        self.points_reach = PointsReach::new(&at.position, points, &place, self.extent_m);
+        self.place_on_points = place;
+        if self.flies_all_points_unheard() {
+            let mut at = self.state.position;
+            let legs = self.points.iter().map(|next| next - core::mem::replace(&mut at, *next));
+            self.points_length_m = legs.map(|leg| fpu::sqrtf(leg.norm_squared())).sum();
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Whether the neighbours are within the range of the radio.
+
+use planner_core::Point;
+
+use super::Neighbours;
+use super::bounds::*;
+use super::entry::NeighbourEntry;
+use crate::config::REACHES_ALL_M;
+use crate::link::intent::{LANDED, OUT_OF_PLAN};
+
+impl<const V: usize> Neighbours<V> {
+    /// Sets this vehicle's position, ENU, and the range of the radio, metres.
+    pub(crate) fn set_place(&mut self, place: Point, radio_range_m: f32) {
+        let all = radio_range_m >= REACHES_ALL_M;
+        self.range_edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
+        self.place = place;
+    }
+
+    /// Whether the operator has set the range of the radio (`FLK_RADIO_M`).
+    pub(crate) fn knows_range(&self) -> bool {
+        self.range_edge_m.is_finite()
+    }
+
+    /// Whether every vehicle of the roster that has not ended its flight was last heard, if ever,
+    /// where the radio may not reach: then its silence is no failure.
+    pub(crate) fn are_all_out_of_range(&self) -> bool {
+        let beyond = |c: &NeighbourEntry| {
+            c.at_range_edge || c.position_at.is_none() || c.reports_any(LANDED | OUT_OF_PLAN)
+        };
+        self.knows_range() && self.contacts[..self.roster_count].iter().all(beyond)
+    }
+}

@@ -1,0 +1,58 @@
+//! The neighbours as the advice sees them: state and age at a given time.
+
+use planner_core::deconflict::Neighbour;
+use planner_core::flight::Gate;
+
+use super::Neighbours;
+use super::bounds::*;
+use super::entry::NeighbourEntry;
+use crate::link::intent::ON_DETOUR;
+use crate::time::Instant;
+
+impl<const V: usize> Neighbours<V> {
+    /// State and age, at `now`, of every neighbour whose position or progress was ever heard, or
+    /// that counts as dead. A vehicle out of the plan opens no gate until a scan has found that it
+    /// does not block the path ([`Self::mark_path_clear`]).
+    pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
+        self.states.clear();
+        self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
+        for contact in &self.contacts {
+            let progress_m = contact.passed_m(now);
+            let placed_at = contact.position_at;
+            let dead = contact.is_dead(self.clear_at);
+            if placed_at.is_none() && progress_m.is_none() && !dead {
+                continue;
+            }
+            let state = Neighbour {
+                // Of a vehicle known only by relays, only the progress is known.
+                position: placed_at.map_or(FAR_AWAY, |_| contact.state.position),
+                age_s: placed_at.map_or(0.0, |at| (now - at).as_secs_f32()),
+                rank: contact.rank,
+                progress_m,
+                grounded: contact.state.grounded || dead,
+                out_of_plan: contact.out_since.is_some_and(|since| since <= self.clear_at) || dead,
+                detours: contact.reports_any(ON_DETOUR),
+                ..contact.state
+            };
+            // Cannot overflow: there are as many slots as contacts.
+            let _ = self.states.push(state);
+        }
+        &self.states
+    }
+
+    /// Whether `gate` is open for good: its vehicle has passed it, or is out of the plan.
+    pub(crate) fn has_passed(&self, gate: &Gate, now: Instant) -> bool {
+        let contact = self.roster_index(gate.id).map(|at| &self.contacts[at]);
+        contact.is_some_and(|c| {
+            let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);
+            passed
+                || c.out_since.is_some_and(|since| since <= self.clear_at)
+                || c.is_dead(self.clear_at)
+        })
+    }
+
+    /// Whether the vehicle `id` was last heard to follow the shared plan; true for an unknown id.
+    pub(crate) fn follows_plan(&self, id: u8) -> bool {
+        self.contacts.iter().find(|c| c.state.id == id).is_none_or(NeighbourEntry::on_plan)
+    }
+}
