@@ -9,14 +9,16 @@ use firmware::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
-use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, OwnVehicle};
 use planner_core::flight::{Gate, Path};
+use planner_core::map::voxel::{GridShape, Outside, VoxelGrid};
 use planner_core::plan::{GoalMode, Objective, PlanRequest, VehicleTask};
-use planner_core::prm::{PrmConfig, Sampling};
+use planner_core::roadmap::prm::{PrmConfig, Sampling};
+use planner_core::roadmap::search::{self, SearchWorkspace};
 use planner_core::roadmap::{Edge, HalfEdge, RoadmapView};
 use planner_core::schedule::ScheduleConfig;
-use planner_core::search::{self, SearchWorkspace};
-use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+use planner_core::track::deconflict::{
+    self, Advice, DeconflictConfig, Method, Neighbour, OwnVehicle,
+};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 

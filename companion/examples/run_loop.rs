@@ -11,7 +11,7 @@ use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::{AUTOPILOT_COMPONENT, Companion, Config, Event, Instant, Link, State};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot};
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 /// At most 8 vehicles, 64 waypoints and 64 gates.
 type Small = Companion<8, 64, 64>;

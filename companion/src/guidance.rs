@@ -28,8 +28,8 @@ mod setpoint;
 mod smoother;
 mod waypoints;
 
-use planner_core::deconflict::{self, Advice, DeconflictConfig, OwnVehicle};
 use planner_core::flight::Path;
+use planner_core::track::deconflict::{self, Advice, DeconflictConfig, OwnVehicle};
 use planner_core::track::{self, ReferenceState, TrackConfig};
 use planner_core::{Length, Point};
 

@@ -14,7 +14,7 @@
 //! use companion::link::frame::MAX_FRAME_LEN;
 //! use companion::{Companion, Config, Instant, Link};
 //! use planner_core::Point;
-//! use planner_core::frames::Geodetic;
+//! use planner_core::geo::frames::Geodetic;
 //!
 //! let origin = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 //! let config = Config::new(1, Point::new(0.0, 0.0, 2.0), origin);

@@ -9,8 +9,8 @@ pub mod coverage;
 use heapless::Vec;
 use planner_core::plan::{self, PlanError, PlanWorkspace, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
+use planner_core::roadmap::search::SearchError;
 use planner_core::schedule::ScheduleError;
-use planner_core::search::SearchError;
 
 use crate::config::PlanFailure;
 use crate::storage::mission_file::MissionView;

@@ -25,7 +25,7 @@ use firmware::scratch::WorkspaceOverlay;
 use firmware::shell::{OnAutopilot, Shell, wait_for_system_id};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot};
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use planner_core::plan::SwarmPlan;
 use static_cell::{ConstStaticCell, StaticCell};
 

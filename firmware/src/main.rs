@@ -29,8 +29,8 @@ use firmware::shell::{
 };
 use heapless::{String, Vec};
 use planner_core::Point;
-use planner_core::field::FieldView;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
+use planner_core::map::field::FieldView;
 use planner_core::plan::SwarmPlan;
 use planner_core::roadmap::RoadmapView;
 use static_cell::{ConstStaticCell, StaticCell};

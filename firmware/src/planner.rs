@@ -9,8 +9,8 @@ use companion::swarm::fleet::{DivisionInputs, MAX_DIVISIONS};
 use companion::{MAX_PHOTOGRAPHED_RANGES, PlanFailure, PlanKind, planner};
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOutZone};
-use planner_core::field::FieldView;
 use planner_core::flight::{VehiclePlan, WaypointRange};
+use planner_core::map::field::FieldView;
 use planner_core::plan::{self, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
 

@@ -9,11 +9,11 @@ use core::mem::{ManuallyDrop, MaybeUninit};
 
 use companion::planner::coverage;
 use planner_core::Point;
+use planner_core::map::voxel::VoxelGrid;
 use planner_core::plan::PlanWorkspace;
-use planner_core::prm::{self, PrmConfig, PrmError};
 use planner_core::roadmap::Edge;
+use planner_core::roadmap::prm::{self, PrmConfig, PrmError};
 use planner_core::schedule::ScheduleWorkspace;
-use planner_core::voxel::VoxelGrid;
 
 use crate::capacity::{
     AREA_VERTICES, HALF_EDGES, LANES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES,

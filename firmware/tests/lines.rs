@@ -16,7 +16,7 @@ use firmware::shell::{OnAutopilot, Shell};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, STATUSTEXT_DATA};
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 /// The test's clock. The test polls all tasks at every step, so no task has to be woken.
 struct TestClock(AtomicU64);

@@ -17,8 +17,8 @@ use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOutZone};
 use planner_core::flight::{PathError, Task};
 use planner_core::plan::{self, PlanError};
+use planner_core::roadmap::search::SearchWorkspace;
 use planner_core::schedule::ScheduleError;
-use planner_core::search::SearchWorkspace;
 
 use self::ready::schedule_config;
 pub use self::ready::{HostPlan, OwnPlan, PreparedMission, VERTICAL_MPS};

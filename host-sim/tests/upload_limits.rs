@@ -5,7 +5,7 @@ use std::net::UdpSocket;
 use std::process::Command;
 
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use planner_core::roadmap::{self, Edge, RoadmapHeader};
 
 /// A roadmap of nodes half a metre apart, each joined to the next ones.

@@ -1,10 +1,10 @@
 //! Plans ten UAVs past a wall: map, roadmap, goals, paths, schedule, gates.
 //! `cargo run -p planner-core --example ten_uavs`
 
+use planner_core::map::voxel::{GridShape, Outside, VoxelGrid};
 use planner_core::plan::{self, GoalMode, Objective, PlanRequest, SwarmPlan, VehicleTask};
 use planner_core::roadmap::{self, Edge, RoadmapHeader, RoadmapView};
-use planner_core::voxel::{GridShape, Outside, VoxelGrid};
-use planner_core::{Point, flight, frames::Geodetic, prm, schedule::ScheduleConfig};
+use planner_core::{Point, flight, geo::frames::Geodetic, roadmap::prm, schedule::ScheduleConfig};
 
 fn main() {
     // A hall of 40 m × 24 m × 6 m in cells of 0.5 m. A wall at x = 20 m leaves a gap at each end.

@@ -19,9 +19,9 @@ use heapless::Vec;
 use libm::{fmaxf, fminf};
 
 use crate::flight::{Path, PathError, Task, VehiclePlan};
-use crate::geometry::segments_distance_sq;
+use crate::geo::distance::segments_distance_sq;
+use crate::roadmap::search::{self, SearchError, SearchWorkspace};
 use crate::roadmap::{HalfEdge, RoadmapView};
-use crate::search::{self, SearchError, SearchWorkspace};
 use crate::{Length, Point, SettingError};
 
 /// Sway of a hovering vehicle, metres: flying deeper into a zone by less than this is allowed.

@@ -9,8 +9,8 @@
 //!
 //! ```
 //! use planner_core::Point;
-//! use planner_core::segment::segment_is_clear;
-//! use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+//! use planner_core::map::segment::segment_is_clear;
+//! use planner_core::map::voxel::{GridShape, Outside, VoxelGrid};
 //!
 //! // A room of 8 m × 4 m × 4 m in cells of 0.5 m, with a pillar in one column of cells.
 //! let shape = GridShape { dims: [16, 8, 8], min: Point::zeros(), resolution_m: 0.5 };
@@ -23,7 +23,7 @@
 //! let (a, b) = (Point::new(1.0, 1.5, 2.0), Point::new(7.0, 1.5, 2.0));
 //! assert!(segment_is_clear(&grid, &a, &b, 0.4), "it passes the pillar at 0.5 m");
 //! assert!(!segment_is_clear(&grid, &a, &b, 0.6));
-//! # Ok::<(), planner_core::voxel::GridError>(())
+//! # Ok::<(), planner_core::map::voxel::GridError>(())
 //! ```
 //!
 //! `examples/ten_uavs.rs` continues from this map: roadmap, assignment, paths, schedule and gates
@@ -33,25 +33,18 @@
 
 pub mod assignment;
 pub mod coverage;
-pub mod deconflict;
 pub mod detour;
-pub mod field;
 pub mod file;
 pub mod flight;
-pub mod frames;
-mod geometry;
+pub mod geo;
+pub mod map;
 pub mod plan;
-pub mod prm;
 pub mod roadmap;
-pub mod safety;
 pub mod schedule;
-pub mod search;
-pub mod segment;
 mod sort;
 pub mod track;
-pub mod voxel;
 
-pub use geometry::{Length, Point};
+pub use geo::{Length, Point};
 
 /// A setting outside its allowed range; holds the setting's name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -24,11 +24,11 @@ pub use self::workspace::{PlanWorkspace, SwarmPlan};
 use crate::assignment;
 use crate::file::CRC32;
 use crate::flight::{Flight, Path, VehiclePlan};
+use crate::roadmap::search;
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::{
     self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace,
 };
-use crate::search;
 
 /// Plans the whole swarm: [`compute_costs`], then [`assign_goals`], then [`schedule_flights()`]. A
 /// vehicle that gets no goal, since none is left or none can be reached, stays on its pad.

@@ -25,6 +25,8 @@
 mod check;
 mod format;
 mod ground;
+pub mod prm;
+pub mod search;
 mod view;
 mod write;
 

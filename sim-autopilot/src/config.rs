@@ -1,7 +1,7 @@
 //! Configuration of a simulated autopilot, and its checks.
 
 use planner_core::Point;
-use planner_core::frames::{Geodetic, Projection};
+use planner_core::geo::frames::{Geodetic, Projection};
 
 use super::estimator::EstimateErrors;
 use super::vehicle::VehicleLimits;

@@ -9,7 +9,7 @@
 //! microseconds since boot.
 
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use super::cmd::{
     DO_CHANGE_SPEED, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST, NAV_DELAY, NAV_LAND,

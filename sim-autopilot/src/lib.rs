@@ -62,7 +62,7 @@ use core::cell::OnceCell;
 
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::frames::{self, Geodetic};
+use planner_core::geo::frames::{self, Geodetic};
 
 pub use self::camera::Photo;
 pub use self::config::{AutopilotConfig, AutopilotConfigError};

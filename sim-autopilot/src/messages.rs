@@ -1,7 +1,7 @@
 //! Encodes the larger telemetry messages from a [`Snapshot`].
 
 use mavlink::dialects::ardupilotmega as dialect;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use super::port::Port;
 use super::snapshot::Snapshot;

@@ -2,7 +2,7 @@
 
 use crate::cmd;
 use planner_core::Point;
-use planner_core::frames::{self, Geodetic};
+use planner_core::geo::frames::{self, Geodetic};
 
 use super::camera::{CameraTrigger, Photo};
 use super::command::{ACCEPTED, CommandOutcome, ReceivedCommand, message_id};

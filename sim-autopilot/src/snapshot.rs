@@ -3,7 +3,7 @@
 use core::cell::OnceCell;
 
 use nalgebra::Vector3;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use super::status::AutopilotStatus;
 use crate::SimulatedKind;

@@ -9,7 +9,7 @@ use host_sim::link::LinkUrl;
 use host_sim::mission::PreparedMission;
 use host_sim::scenario::CompanionHost;
 use host_sim::swarm::SwarmFlight;
-use planner_core::voxel::VoxelGrid;
+use planner_core::map::voxel::VoxelGrid;
 
 use crate::{Guard, free_port, workspace};
 

@@ -17,7 +17,7 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use planner_core::Point;
 use planner_core::flight::{self, HeadingMode, Path, PicturePlan, Task, Trigger};
-use planner_core::frames::{self, Geodetic};
+use planner_core::geo::frames::{self, Geodetic};
 
 use crate::meeting::autopilot::Autopilot;
 use crate::meeting::dice::Dice;

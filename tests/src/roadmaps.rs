@@ -12,17 +12,17 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec as Few;
 use planner_core::Point;
 use planner_core::flight::{Flight, Path, Task};
-use planner_core::frames::Geodetic;
-use planner_core::prm::squared_length;
+use planner_core::geo::frames::Geodetic;
+use planner_core::roadmap::prm::squared_length;
+use planner_core::roadmap::search::{
+    SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, path_lengths_to,
+};
 use planner_core::roadmap::{
     Edge, HEADER_LEN, HalfEdge, LANDMARKS, RoadmapError, RoadmapHeader, RoadmapView, encoded_len,
     write_with_landmarks,
 };
 use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleConfig};
-use planner_core::search::{
-    SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, path_lengths_to,
-};
 
 use crate::hostile::{Bytes, Entropy};
 use crate::meeting::dice::Dice;

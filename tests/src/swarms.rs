@@ -3,7 +3,7 @@
 use host_sim::capacity::on_heap;
 use planner_core::Point;
 use planner_core::flight::{Flight, VehiclePlan};
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use planner_core::plan::{
     self, GoalMode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
 };

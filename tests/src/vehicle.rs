@@ -19,7 +19,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 use planner_core::Point;
 use planner_core::flight::Path;
-use planner_core::frames::geodetic_to_enu;
+use planner_core::geo::frames::geodetic_to_enu;
 use sim_autopilot::{Autopilot, AutopilotConfig};
 
 use crate::board_failure::{self, BoardFailure};

@@ -16,7 +16,7 @@ use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
 use planner_core::plan::{self, PlanWorkspace, SwarmPlan};
-use planner_core::prm::{self, PrmConfig};
+use planner_core::roadmap::prm::{self, PrmConfig};
 
 /// Most instructions permitted, by the name that `measure` prints.
 const LIMITS: [(&str, u64); 4] = [
@@ -105,7 +105,7 @@ fn swarm_crc(mission: &PreparedMission) -> u32 {
 }
 
 /// The values that `measure` prints for a roadmap built on board, computed on the host.
-fn built(grid: &planner_core::voxel::VoxelGrid<'_>, config: &PrmConfig) -> String {
+fn built(grid: &planner_core::map::voxel::VoxelGrid<'_>, config: &PrmConfig) -> String {
     let mut nodes = vec![planner_core::Point::zeros(); config.nodes];
     prm::sample_nodes(grid, None, &[], config, &mut nodes).expect("free space");
     let mut index = Box::new(prm::NodeIndex::<4096, 8192>::new());

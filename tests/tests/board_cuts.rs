@@ -30,7 +30,7 @@ use mavlink::dialects::ardupilotmega::{
     HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType,
 };
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use planner_core::roadmap::{self, Edge, RoadmapHeader};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;

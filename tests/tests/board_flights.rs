@@ -23,7 +23,7 @@ use host_sim::mission::PreparedMission;
 use host_sim::upload::FtpClient;
 use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavCmd, MavFrame};
 use planner_core::Point;
-use planner_core::frames::{Geodetic, enu_to_geodetic};
+use planner_core::geo::frames::{Geodetic, enu_to_geodetic};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use sim_autopilot::ardupilot;

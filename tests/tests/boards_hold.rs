@@ -8,11 +8,11 @@ use host_sim::capacity::{BOARDS, BoardCapacity};
 use host_sim::map::{self, Occupancy, OccupancyMap, Unknown, VoxelMap};
 use host_sim::roadmap::{self, BuiltRoadmap};
 use planner_core::Point;
-use planner_core::frames::Geodetic;
-use planner_core::prm::{PrmConfig, Sampling};
+use planner_core::geo::frames::Geodetic;
+use planner_core::map::voxel::GridShape;
 use planner_core::roadmap::RoadmapView;
-use planner_core::search::{SearchWorkspace, dijkstra_all};
-use planner_core::voxel::GridShape;
+use planner_core::roadmap::prm::{PrmConfig, Sampling};
+use planner_core::roadmap::search::{SearchWorkspace, dijkstra_all};
 
 const CLEARANCES_M: [f32; 3] = [0.3, 0.8, 1.2];
 /// Nodes from which all others are searched.

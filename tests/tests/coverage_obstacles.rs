@@ -15,7 +15,7 @@ use host_sim::scenario::coverage::CoverageMethod;
 use host_sim::scenario::{self, Scenario};
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
-use planner_core::voxel::GridShape;
+use planner_core::map::voxel::GridShape;
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;

@@ -13,7 +13,7 @@ use host_sim::scenario::{self, Scenario};
 use host_sim::terrain::HeightGrid;
 use planner_core::Point;
 use planner_core::coverage::Flat;
-use planner_core::field::FieldView;
+use planner_core::map::field::FieldView;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;

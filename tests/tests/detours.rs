@@ -14,10 +14,10 @@ use host_sim::roadmap::{self, BuiltRoadmap};
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
 use planner_core::flight::Path;
-use planner_core::frames::Geodetic;
-use planner_core::prm::{PrmConfig, Sampling};
+use planner_core::geo::frames::Geodetic;
+use planner_core::roadmap::prm::{PrmConfig, Sampling};
+use planner_core::roadmap::search::{SearchWorkspace, astar};
 use planner_core::roadmap::{LANDMARKS, RoadmapView, encoded_len, write_with_landmarks};
-use planner_core::search::{SearchWorkspace, astar};
 
 /// Number of terminals (goals) of the roadmap: random nodes.
 const GOALS: u16 = 40;

@@ -16,7 +16,7 @@ use mavlink::Message;
 use mavlink::dialects::ardupilotmega::MavMessage;
 use planner_core::Point;
 use planner_core::flight::{Path as FlightPath, VehiclePlan};
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;

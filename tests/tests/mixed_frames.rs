@@ -16,7 +16,7 @@ use host_sim::swarm::step::STEP_US;
 use host_sim::swarm::vehicles::vehicles_on_pads;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use planner_core::Point;
-use planner_core::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
+use planner_core::geo::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;

@@ -13,7 +13,7 @@ use companion::{Companion, Config as CompanionConfig, Instant, Link};
 use flockmate_tests::{logs, shared_data};
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA};
 use planner_core::Point;
-use planner_core::frames::{Geodetic, geodetic_to_enu};
+use planner_core::geo::frames::{Geodetic, geodetic_to_enu};
 use sim_autopilot::{Autopilot, AutopilotConfig, SimulatedKind};
 
 const COMMAND_ACK: u32 = 77;

@@ -17,7 +17,7 @@ use host_sim::report::{
     VehicleTrack, page as page_of, vehicle_color,
 };
 use planner_core::Point;
-use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+use planner_core::map::voxel::{GridShape, Outside, VoxelGrid};
 use serde_json::json;
 
 const WINDOW: (u32, u32) = (1280, 800);

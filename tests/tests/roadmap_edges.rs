@@ -4,7 +4,7 @@
 use flockmate_tests::shared_data;
 use host_sim::map::{self, BoxTree, Unknown, VoxelMap};
 use host_sim::roadmap::{self, MAX_STORED_CLEARANCE_M};
-use planner_core::prm::{self, NodeIndex, PrmConfig, Sampling};
+use planner_core::roadmap::prm::{self, NodeIndex, PrmConfig, Sampling};
 
 const SEEDS: u64 = 20;
 

@@ -15,10 +15,10 @@ use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::pack::TrackUnit;
-use planner_core::deconflict::Method;
 use planner_core::flight::{Trigger, VehiclePlan};
 use planner_core::plan::{self, VehicleTask};
 use planner_core::schedule::ScheduleConfig;
+use planner_core::track::deconflict::Method;
 
 use super::coverage_flights::{
     CLIMB_M, CLIMB_MPS, CRUISE_MPS, DESCEND_MPS, FIVE_VERTICES, Flights, HEIGHTS, LIMITED_VEHICLES,
@@ -237,36 +237,4 @@ fn measure_losses(meter: &mut impl Meter, board: &mut Board<'_>) {
 }
 
 #[cfg(test)]
-mod tests {
-    extern crate std;
-
-    use std::boxed::Box;
-
-    use super::*;
-
-    struct Uncounted;
-
-    impl Meter for Uncounted {
-        fn call<T>(&mut self, name: &'static str, _: usize, work: impl FnOnce() -> T) -> T {
-            let began = std::time::Instant::now();
-            let result = work();
-            std::println!("{name}: {:?}", began.elapsed());
-            result
-        }
-    }
-
-    #[test]
-    fn all_flights_are_planned_and_the_sum_is_the_same_again() {
-        let mut out = Box::new(Flights::new());
-        let mut area = Box::<CoveragePlanWorkspace>::default();
-        let mut lent = Box::<CoverageWorkspace>::default();
-        let mut sums = || {
-            [
-                measure_missions(&mut Uncounted, &mut area, &mut out),
-                coverage_flights::measure_plan_parts(&mut Uncounted, &mut lent, &mut out),
-            ]
-        };
-        let first = sums();
-        assert_eq!(sums(), first);
-    }
-}
+mod tests;

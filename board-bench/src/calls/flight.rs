@@ -13,7 +13,7 @@ use firmware::capacity::{BoardCompanion, GATES, VEHICLES, WAYPOINTS};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::flight::{Task, VehiclePlan};
-use planner_core::frames::{self, swap_enu_ned};
+use planner_core::geo::frames::{self, swap_enu_ned};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 

@@ -9,9 +9,9 @@ use planner_core::coverage::pack::{
 };
 use planner_core::coverage::{CoverageError, Flat, around};
 use planner_core::detour::{DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
-use planner_core::field::follow::TerrainFollowing;
-use planner_core::field::{self, FieldShape, FieldView};
 use planner_core::flight::{HeadingMode, Path, Trigger, VehiclePlan, WaypointRange};
+use planner_core::map::field::follow::TerrainFollowing;
+use planner_core::map::field::{self, FieldShape, FieldView};
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
 

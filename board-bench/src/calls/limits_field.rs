@@ -2,8 +2,8 @@
 
 use planner_core::Point;
 use planner_core::coverage::Flat;
-use planner_core::field::follow::TerrainFollowing;
-use planner_core::field::{self, FieldShape, FieldView, MAX_NODES};
+use planner_core::map::field::follow::TerrainFollowing;
+use planner_core::map::field::{self, FieldShape, FieldView, MAX_NODES};
 
 use super::limits_results::{HARD_NUMBERS, Listener, Results};
 

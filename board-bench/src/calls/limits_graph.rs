@@ -3,9 +3,9 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::assignment::{self, AssignmentError, AssignmentWorkspace};
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
+use planner_core::roadmap::search::{self, RoadmapWithLengths, SearchError, SearchWorkspace};
 use planner_core::roadmap::{self, Edge, HalfEdge, LANDMARKS, RoadmapHeader, RoadmapView};
-use planner_core::search::{self, RoadmapWithLengths, SearchError, SearchWorkspace};
 
 use super::limits_results::{HARD_NUMBERS, Listener, Results, extreme_points};
 

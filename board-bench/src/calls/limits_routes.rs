@@ -9,9 +9,9 @@ use planner_core::plan::{
     self, GoalMode, Goals, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
 };
 use planner_core::roadmap::RoadmapView;
+use planner_core::roadmap::search::SearchWorkspace;
 use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
 use planner_core::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorkspace};
-use planner_core::search::SearchWorkspace;
 
 use super::limits_area_flights as area_flights;
 use super::limits_field as field;

@@ -1,7 +1,7 @@
 //! The kind of autopilot that flies the vehicle, by HEARTBEAT's `autopilot` field, and that kind's
 //! modes, masks, limits and streams (constants of `px4` and `ardupilot`).
 
-use planner_core::frames::Projection;
+use planner_core::geo::frames::Projection;
 
 use super::limits::{AutopilotLimits, LimitParameter};
 use super::{ardupilot, px4};

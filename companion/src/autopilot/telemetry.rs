@@ -19,7 +19,7 @@ use mavlink::dialects::ardupilotmega::{
     GPS_GLOBAL_ORIGIN_DATA, LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA,
 };
 use nalgebra::Vector3;
-use planner_core::frames::{self, Geodetic};
+use planner_core::geo::frames::{self, Geodetic};
 use planner_core::{Length, Point};
 
 use crate::autopilot::AutopilotKind;

@@ -30,7 +30,7 @@ mod unheard;
 use std::vec::Vec;
 
 use mavlink::dialects::ardupilotmega::MavCmd;
-use planner_core::deconflict::Method;
+use planner_core::track::deconflict::Method;
 
 use super::*;
 use crate::autopilot::px4;

@@ -6,7 +6,8 @@ use mavlink::dialects::ardupilotmega::{
     MavModeFlag, MavState, MavType, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
     TUNNEL_DATA,
 };
-use planner_core::{Point, frames};
+use planner_core::Point;
+use planner_core::geo::frames;
 
 use super::Companion;
 use crate::events::Link;

@@ -1,8 +1,8 @@
 //! Where the reference stops on its path, and when it steps back from below a vehicle that
 //! descends.
 
-use planner_core::deconflict::Advice;
 use planner_core::flight::Path;
+use planner_core::track::deconflict::Advice;
 
 use super::{Guidance, Phase};
 use crate::guidance::evade::{self, EvadeTarget, StepBack};

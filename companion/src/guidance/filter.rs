@@ -2,11 +2,11 @@
 //! planned, commanded or reported.
 //!
 //! In each step it compares the places that this vehicle can no longer avoid with those where each
-//! neighbour can be ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It
-//! continues once the next metre of its path is free. If it is the one of the two that yields, it
-//! also waits until the part of the neighbour's path flown in 3 s is free, or the neighbour stands.
-//! In a descent the vehicle that yields climbs back up its own column. The filter trusts no gates,
-//! progress or advice: gates only decide which of two stopped vehicles goes first.
+//! neighbour can be ([`planner_core::track::safety`]). Where the two come too near, the vehicle
+//! stops. It continues once the next metre of its path is free. If it is the one of the two that
+//! yields, it also waits until the part of the neighbour's path flown in 3 s is free, or the
+//! neighbour stands. In a descent the vehicle that yields climbs back up its own column. The filter
+//! trusts no gates, progress or advice: gates only decide which of two stopped vehicles goes first.
 //!
 //! ENU metres. Cost: a cheap bound for each neighbour, a reachable set for each one that may be
 //! within reach; more than four of those stop the vehicle.

@@ -1,7 +1,7 @@
 //! Progress of the vehicle along its flight: climb, path and descent, and which of them are done.
 
-use planner_core::deconflict::Method;
 use planner_core::flight::{Path, VehiclePlan};
+use planner_core::track::deconflict::Method;
 use planner_core::{Length, Point};
 
 use super::motion::clamp_to;

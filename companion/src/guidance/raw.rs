@@ -1,7 +1,7 @@
 //! The next raw point: along the path, or along the straight leg of a climb, a join or a descent.
 
-use planner_core::deconflict::Advice;
 use planner_core::flight::{Path, VehiclePlan};
+use planner_core::track::deconflict::Advice;
 use planner_core::track::{self, Reference, ReferenceState};
 use planner_core::{Length, Point};
 

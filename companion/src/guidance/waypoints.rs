@@ -2,10 +2,11 @@
 //! to, and the end of its path.
 //!
 //! The vehicle flies straight to its current waypoint at the speed that lines 12 to 17 leave
-//! ([`planner_core::deconflict`]). The next waypoint is loaded once the vehicle is nearer than
-//! `Wp_radius` to the current one. That near to the last waypoint the path is completed: speed 0,
-//! then the vehicle lands where it is. Nothing of our tracker is used: no speed limit by a corner's
-//! clearance, no reference that waits, no guided descent. The paper does not state `Wp_radius`.
+//! ([`planner_core::track::deconflict`]). The next waypoint is loaded once the vehicle is nearer
+//! than `Wp_radius` to the current one. That near to the last waypoint the path is completed: speed
+//! 0, then the vehicle lands where it is. Nothing of our tracker is used: no speed limit by a
+//! corner's clearance, no reference that waits, no guided descent. The paper does not state
+//! `Wp_radius`.
 
 use planner_core::flight::Path;
 use planner_core::{Length, Point};
@@ -48,30 +49,4 @@ impl Algorithm2Waypoints {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn waypoints_are_loaded_one_by_one_and_the_last_ends_the_path() {
-        let mut path = Path::<4>::new();
-        for (x, y) in [(0.0, 0.0), (5.0, 0.0), (5.0, 5.0)] {
-            path.push(Point::new(x, y, 1.0), 1.0).unwrap();
-        }
-        let mut waypoints = Algorithm2Waypoints::default();
-        let mut at = |x: f32, y: f32| {
-            waypoints.next_waypoint(&path, &Point::new(x, y, 1.0)).map(|p| (p.x, p.y))
-        };
-        assert_eq!(at(-1.0, 0.0), Some((0.0, 0.0)));
-        assert_eq!(at(-0.41, 0.0), Some((0.0, 0.0)), "outside Wp_radius");
-        assert_eq!(at(-0.39, 0.0), Some((5.0, 0.0)));
-        assert_eq!(at(5.0, 4.9), Some((5.0, 0.0)), "the last one does not count before its turn");
-        assert_eq!(at(5.0, 0.2), Some((5.0, 5.0)));
-        assert_eq!(at(5.0, 4.7), None);
-        assert_eq!(at(0.0, 0.0), None, "completed for good");
-        assert!(waypoints.is_completed());
-        assert_eq!(
-            Algorithm2Waypoints::default().next_waypoint(&Path::<4>::new(), &Point::zeros()),
-            None
-        );
-    }
-}
+mod tests;

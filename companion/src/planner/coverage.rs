@@ -12,10 +12,10 @@ use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat, around};
 use planner_core::detour::{DetourRequest, KeepOutZone};
-use planner_core::field::FieldView;
-use planner_core::field::follow::TerrainFollowing;
 use planner_core::file::CRC32;
 use planner_core::flight::{HeadingMode, PicturePlan, VehiclePlan, WaypointRange};
+use planner_core::map::field::FieldView;
+use planner_core::map::field::follow::TerrainFollowing;
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::ScheduleWorkspace;
 

@@ -12,12 +12,12 @@
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::deconflict::Method;
 use planner_core::file::{CRC32, FileError};
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use planner_core::plan::{GoalMode, Objective, PlanRequest, VehicleTask};
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::ScheduleConfig;
+use planner_core::track::deconflict::Method;
 
 use self::coverage::{CoverageParts, CoverageView};
 use self::numbers::{f32_at, point_at, put_numbers, u16_at, u32_at};

@@ -28,7 +28,7 @@ mod rejoining;
 mod reported;
 
 use planner_core::detour;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use planner_core::{Length, Point};
 
 use self::beside::AreaDetourSearches;

@@ -3,8 +3,9 @@
 //!
 //! Data flow from received bytes to the speed scale: GLOBAL_POSITION_INT →
 //! [`Neighbours::handle_position`] → ENU in [`Neighbour::position`]; TUNNEL →
-//! [`Neighbours::handle_intent`] → [`Neighbour::progress_m`]; [`Neighbours::states_at`] computes
-//! the ages, and `planner_core::deconflict::advise` computes the speed scale from the result.
+//! [`Neighbours::handle_numbered_intent`] → [`Neighbour::progress_m`]; [`Neighbours::states_at`]
+//! computes the ages, and `planner_core::track::deconflict::advise` computes the speed scale from
+//! the result.
 
 mod bounds;
 mod contact;
@@ -23,8 +24,8 @@ mod states;
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use nalgebra::Vector3;
-use planner_core::deconflict::Neighbour;
-use planner_core::frames::{self, Geodetic};
+use planner_core::geo::frames::{self, Geodetic};
+use planner_core::track::deconflict::Neighbour;
 use planner_core::{Length, Point};
 
 pub(crate) use self::bounds::MAX_HOVER_MPS;

@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 use planner_core::detour::{KeepOutZone, ZoneKind};
-use planner_core::frames::{self, Geodetic};
+use planner_core::geo::frames::{self, Geodetic};
 use planner_core::{Length, Point};
 
 use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};

@@ -10,7 +10,7 @@ use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::flight::VehiclePlan;
-use planner_core::frames::{self, Geodetic};
+use planner_core::geo::frames::{self, Geodetic};
 
 use crate::autopilot::AutopilotKind;
 use crate::autopilot::px4;

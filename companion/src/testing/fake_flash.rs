@@ -8,11 +8,11 @@ use std::vec;
 use std::vec::Vec;
 
 use planner_core::Point;
-use planner_core::deconflict::Method;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use planner_core::plan::{GoalMode, VehicleTask};
 use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapHeader};
 use planner_core::schedule::ScheduleConfig;
+use planner_core::track::deconflict::Method;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
@@ -193,7 +193,8 @@ pub fn roadmap(nodes: usize) -> Vec<u8> {
         goals: 1,
     };
     let mut bytes = vec![0; roadmap::encoded_len(nodes, edges.len(), LANDMARKS).unwrap()];
-    let mut workspace = std::boxed::Box::new(planner_core::search::SearchWorkspace::<1024>::new());
+    let mut workspace =
+        std::boxed::Box::new(planner_core::roadmap::search::SearchWorkspace::<1024>::new());
     roadmap::write_with_landmarks(&header, &points, &edges, &[], &mut workspace, &mut bytes)
         .unwrap();
     bytes

@@ -5,7 +5,7 @@ use companion::services::ftp::MAX_DATA;
 use companion::storage::store::window::PieceOutcome;
 use companion::storage::store::{ErasePermission, File, MAX_READ, Store, UploadState};
 
-use planner_core::field;
+use planner_core::map::field;
 
 use crate::flash::{HOST_FLASH_LAYOUT, HostFlash};
 

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, anyhow, bail, ensure};
 use companion::storage::mission_file::{self, MissionView};
 use companion::storage::store::File;
-use planner_core::field::{self, FieldView};
+use planner_core::map::field::{self, FieldView};
 use planner_core::roadmap;
 
 use crate::capacity::{BOARDS, BoardCapacity};

@@ -10,7 +10,7 @@
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
 use planner_core::coverage::pack::Route;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use serde_json::{Value, json};
 
 use super::flight::{FlightPoint, WaypointAction, course_deg};

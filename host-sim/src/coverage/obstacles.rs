@@ -12,7 +12,7 @@ use std::sync::OnceLock;
 
 use planner_core::Point;
 use planner_core::coverage::Flat;
-use planner_core::voxel::Outside;
+use planner_core::map::voxel::Outside;
 
 use self::polygon::{
     Polygon, bounding_box, contains, convex_hull, offset_outward, simplified_outward,

@@ -4,7 +4,7 @@ use planner_core::coverage::area::Area;
 use planner_core::coverage::pack::{Route, RoutePlan, Vehicle};
 use planner_core::coverage::tracks::Tracks;
 use planner_core::coverage::transit::Transit;
-use planner_core::field::follow::TerrainFollowing;
+use planner_core::map::field::follow::TerrainFollowing;
 
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, CoverageMethod};

@@ -5,12 +5,13 @@
 //! and z where boxes have equal cross-sections, so a wall is one box or a few. Over the boxes lies
 //! a bounding volume hierarchy with eight boxes to a node. A search by branch and bound finds the
 //! nearest box: it skips nodes that are no nearer than the nearest box found so far. Its cost does
-//! not grow with the cube of the distance, as that of [`planner_core::segment::segment_clearance`]
-//! does. The result is the same but for rounding: both compute in f32 in cells, with an error of n
-//! · 2⁻²³ in a coordinate of n cells. Memory: 30 bytes a box.
+//! not grow with the cube of the distance, as that of
+//! [`planner_core::map::segment::segment_clearance`] does. The result is the same but for rounding:
+//! both compute in f32 in cells, with an error of n · 2⁻²³ in a coordinate of n cells. Memory: 30
+//! bytes a box.
 
 use planner_core::Point;
-use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+use planner_core::map::voxel::{GridShape, Outside, VoxelGrid};
 use pulp::Arch;
 use rayon::prelude::*;
 

@@ -9,7 +9,7 @@
 //! mission frame. Cost: the cells within the required clearance.
 
 use planner_core::Point;
-use planner_core::voxel::Outside;
+use planner_core::map::voxel::Outside;
 
 use super::VoxelMap;
 
@@ -176,5 +176,4 @@ pub fn nearest_column(
 }
 
 #[cfg(test)]
-#[path = "column_tests.rs"]
 mod tests;

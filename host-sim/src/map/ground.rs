@@ -1,7 +1,7 @@
 //! A map of level ground for missions without a map: free space above a floor.
 
 use planner_core::Point;
-use planner_core::voxel::GridShape;
+use planner_core::map::voxel::GridShape;
 
 use super::error::MapError;
 use super::occupancy::OccupancyMap;

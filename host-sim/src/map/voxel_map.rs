@@ -1,7 +1,7 @@
 //! The bit grids of a map that planner-core queries.
 
 use planner_core::Point;
-use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+use planner_core::map::voxel::{GridShape, Outside, VoxelGrid};
 
 /// The bit grids of a map that planner-core plans on.
 #[derive(Clone, Debug)]
@@ -111,44 +111,4 @@ pub(super) fn brick_masks(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::map::{Occupancy, OccupancyMap, Unknown};
-
-    #[test]
-    fn nodes_lie_in_cells_that_are_entirely_inside_the_box() {
-        let shape =
-            GridShape { dims: [13, 9, 7], min: Point::new(-3.0, 2.0, 0.5), resolution_m: 0.3 };
-        let mut map = OccupancyMap::all_unknown(shape, "sample").unwrap();
-        map.fill([1, 0, 0], shape.dims, Occupancy::Free);
-        map.set([7, 4, 3], Occupancy::Occupied);
-        for unknown in [Unknown::Blocked, Unknown::Free] {
-            let map = map.voxel_map(unknown);
-            let (min, max) = (map.shape.min, map.shape.max());
-            let boxes = [
-                (Point::repeat(-1e9), Point::repeat(1e9)),
-                (min + Point::repeat(0.4), max - Point::repeat(0.5)),
-                (min + Point::new(2.0, -5.0, 0.1), Point::new(max.x + 1.0, max.y - 0.7, 1e9)),
-                (max + Point::repeat(1.0), max + Point::repeat(2.0)),
-                (min - Point::repeat(2.0), min - Point::repeat(1.0)),
-            ];
-            for (low, high) in boxes {
-                let fenced = map.with_nodes_inside(&low, &high);
-                assert_eq!(fenced.grid().words(), map.grid().words());
-                let (never, before) = (fenced.never_sample_grid(), map.never_sample_grid());
-                let [nx, ny, nz] = map.shape.dims;
-                for (i, j, k) in
-                    (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| (i, j, k))))
-                {
-                    let half = Point::repeat(0.5 * map.shape.resolution_m);
-                    let centre = map.shape.center([i, j, k]);
-                    let (from, to) = (centre - half, centre + half);
-                    let inside =
-                        (0..3).all(|a| from[a] >= low[a] - 1e-4 && to[a] <= high[a] + 1e-4);
-                    let want = before.is_occupied([i, j, k]) || !inside;
-                    assert_eq!(never.is_occupied([i, j, k]), want, "{low} {high} {i} {j} {k}");
-                }
-            }
-        }
-    }
-}
+mod tests;

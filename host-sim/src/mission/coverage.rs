@@ -18,8 +18,8 @@ use planner_core::coverage::flights::MAX_PATH_LENGTH_M;
 use planner_core::coverage::pack::TrackUnit;
 use planner_core::coverage::transit::Transit;
 use planner_core::detour::{DetourRequest, KeepOutZone};
-use planner_core::field::FieldView;
 use planner_core::flight::{PathError, WaypointRange};
+use planner_core::map::field::FieldView;
 use planner_core::plan::{PlanError, VehicleTask};
 use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 

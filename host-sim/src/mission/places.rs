@@ -4,11 +4,11 @@ use std::time::Instant;
 
 use anyhow::bail;
 use planner_core::Point;
+use planner_core::map::segment::segment_is_clear;
 use planner_core::plan::VehicleTask;
-use planner_core::prm::PrmConfig;
+use planner_core::roadmap::prm::PrmConfig;
 use planner_core::roadmap::{MAX_EDGE_M, RoadmapHeader};
 use planner_core::schedule::ScheduleConfig;
-use planner_core::segment::segment_is_clear;
 
 use crate::map::VoxelMap;
 use crate::map::column::{ColumnError, ground_below_column, nearest_column};

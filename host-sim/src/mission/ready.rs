@@ -9,7 +9,7 @@ use companion::storage::mission_file::{
 };
 use planner_core::Point;
 use planner_core::flight::VehiclePlan;
-use planner_core::frames::{Geodetic, enu_to_geodetic};
+use planner_core::geo::frames::{Geodetic, enu_to_geodetic};
 use planner_core::plan::{self, GoalMode, Objective, VehicleTask};
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::{ScheduleConfig, ScheduleError};

@@ -14,9 +14,9 @@ use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
 use planner_core::Point;
-use planner_core::prm::PrmConfig;
+use planner_core::map::voxel::GridShape;
 use planner_core::roadmap::Edge;
-use planner_core::voxel::GridShape;
+use planner_core::roadmap::prm::PrmConfig;
 
 use crate::map::{BoxTree, VoxelMap};
 
@@ -244,3 +244,6 @@ fn fewest_corners(
     corners.reverse();
     Some(corners)
 }
+
+#[cfg(test)]
+mod tests;

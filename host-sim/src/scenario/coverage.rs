@@ -6,11 +6,11 @@ pub use companion::storage::mission_file::coverage::HeadingRule;
 use planner_core::coverage::area::{Ring, RingKind};
 use planner_core::coverage::footprint::{Camera, Spacing};
 use planner_core::coverage::{Flat, pack::Heights};
-use planner_core::field::FieldView;
-use planner_core::field::follow::TerrainFollowing;
 use planner_core::file::FileError;
 pub use planner_core::flight::Trigger;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
+use planner_core::map::field::FieldView;
+use planner_core::map::field::follow::TerrainFollowing;
 
 use crate::coverage::obstacles::MapObstacles;
 use crate::terrain::HeightGrid;

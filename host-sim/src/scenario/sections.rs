@@ -13,8 +13,8 @@ use std::path::Path;
 use companion::autopilot::AutopilotKind;
 use companion::config::{GROUND_STATIONS, USUAL_GROUND_STATIONS};
 use planner_core::Point;
-use planner_core::frames::{Geodetic, geodetic_to_enu};
-use planner_core::prm::Sampling;
+use planner_core::geo::frames::{Geodetic, geodetic_to_enu};
+use planner_core::roadmap::prm::Sampling;
 use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
 use toml::de::DeTable;
 

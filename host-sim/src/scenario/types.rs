@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use companion::autopilot::AutopilotKind;
 use companion::config::GROUND_STATIONS;
 use planner_core::Point;
-use planner_core::deconflict::Method;
-use planner_core::frames::Geodetic;
-use planner_core::prm::Sampling;
+use planner_core::geo::frames::Geodetic;
+use planner_core::roadmap::prm::Sampling;
+use planner_core::track::deconflict::Method;
 
 use super::coverage::AreaSection;
 use super::error::ScenarioError;

@@ -8,7 +8,7 @@ use companion::link::frame::{self, Header};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavCmd, MavFrame};
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use super::member::{SimulatedVehicle, is_finished};
 use super::radio::Radio;

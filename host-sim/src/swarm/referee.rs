@@ -7,8 +7,8 @@
 //! passing near it is no violation.
 
 use planner_core::Point;
-use planner_core::segment::point_clearance;
-use planner_core::voxel::VoxelGrid;
+use planner_core::map::segment::point_clearance;
+use planner_core::map::voxel::VoxelGrid;
 
 use crate::coverage::obstacles::MapObstacles;
 use crate::map::edt::ClearanceField;

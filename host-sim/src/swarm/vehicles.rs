@@ -5,7 +5,7 @@ use companion::Config;
 use companion::config::REACHES_ALL_M;
 use planner_core::Point;
 use planner_core::coverage::flights::PLANNED_ACCEL_MPS2;
-use planner_core::frames::enu_to_geodetic;
+use planner_core::geo::frames::enu_to_geodetic;
 use sim_autopilot as autopilot;
 
 use super::board::RemoteCompanion;
@@ -141,15 +141,4 @@ pub fn companion_config(mission: &PreparedMission, id: u8) -> anyhow::Result<Con
 }
 
 #[cfg(test)]
-mod tests {
-    use sim_autopilot::power_ratio_at_speed;
-
-    use crate::coverage::sorties;
-
-    #[test]
-    fn plans_count_on_the_power_that_the_simulated_vehicle_draws() {
-        for speed_mps in (0..=240).map(|step| 0.125 * step as f32) {
-            assert_eq!(sorties::power_ratio_at_speed(speed_mps), power_ratio_at_speed(speed_mps));
-        }
-    }
-}
+mod tests;

@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 use planner_core::coverage::Flat;
-use planner_core::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
+use planner_core::geo::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 

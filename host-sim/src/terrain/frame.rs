@@ -1,7 +1,7 @@
 //! The box and frame in which heights are requested from a file.
 
 use planner_core::coverage::Flat;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 /// What a file's coordinates mean if it states no coordinate system.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,7 +6,7 @@
 //! in the file.
 
 use planner_core::coverage::Flat;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use super::crs::Crs;
 use super::error::TerrainError;

@@ -7,7 +7,7 @@ mod real;
 use std::io::Cursor;
 
 use planner_core::coverage::Flat;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use proptest::prelude::*;
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;

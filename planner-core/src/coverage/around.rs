@@ -17,9 +17,9 @@ use libm::{ceilf, cosf, fabsf, fminf, sinf};
 use super::Flat;
 use super::transit::Transit;
 use crate::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone};
-use crate::field::FieldView;
 use crate::flight::{Path, PathError, Task, VehiclePlan};
-use crate::search::SearchError;
+use crate::map::field::FieldView;
+use crate::roadmap::search::SearchError;
 use crate::{Length, Point};
 
 /// Most nodes of the visibility graph.

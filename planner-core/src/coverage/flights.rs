@@ -14,10 +14,10 @@ use self::builder::{FlightPathBuilder, point_at_height};
 use super::divide;
 use super::lanes::Lane;
 use super::pack::{Route, RouteDirection, RoutePlan, Vehicle, Work};
-use crate::field::follow::TerrainFollowing;
 use crate::flight::{
     Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointOrder, WaypointRange,
 };
+use crate::map::field::follow::TerrainFollowing;
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{
     self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace,

@@ -23,7 +23,7 @@ use super::tracks::Tracks;
 use super::transit::Transit;
 use super::{CoverageError, Flat};
 use crate::assignment::{AssignmentWorkspace, assign};
-use crate::field::follow::TerrainFollowing;
+use crate::map::field::follow::TerrainFollowing;
 
 /// A vehicle as packing sees it: ends of its transits, speeds, weight.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,7 +10,7 @@ use super::lanes::{Lane, LanePattern, Tracks};
 use super::sweep::LaneDirection;
 use super::transit::ZONE_CLEARANCE_M;
 use super::{CoverageError, Flat};
-use crate::geometry::{Length as _, clamp_to};
+use crate::geo::distance::{Length as _, clamp_to};
 use crate::sort;
 
 /// Share of a lane spacing by which rounding may raise a width that is a whole number of lane

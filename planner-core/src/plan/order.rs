@@ -13,10 +13,10 @@ use super::request::{PlanError, PlanRequest, VehicleTask};
 use super::workspace::{PlanWorkspace, SwarmPlan};
 use crate::Point;
 use crate::flight::{Flight, Path, PathError};
+use crate::roadmap::search::{self, SearchError, SearchWorkspace};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::sipp::{self, RouteQuery};
 use crate::schedule::{self, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, ScheduleError};
-use crate::search::{self, SearchError, SearchWorkspace};
 use crate::sort;
 
 /// Schedules all flights, those with the longest path first; if that fails, those with the shortest

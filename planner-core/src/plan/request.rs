@@ -3,8 +3,8 @@
 use crate::SettingError;
 use crate::assignment::AssignmentError;
 use crate::flight::PathError;
+use crate::roadmap::search::SearchError;
 use crate::schedule::{ScheduleConfig, ScheduleError};
-use crate::search::SearchError;
 
 /// What the assignment of goals minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -10,7 +10,7 @@ use rand_pcg::Pcg32;
 
 use super::*;
 use crate::Point;
-use crate::frames::Geodetic;
+use crate::geo::frames::Geodetic;
 use crate::roadmap::{self, Edge, RoadmapHeader};
 use crate::schedule::tests::checker;
 

@@ -4,9 +4,9 @@ use heapless::Vec;
 
 use crate::assignment::AssignmentWorkspace;
 use crate::flight::Flight;
+use crate::roadmap::search::SearchWorkspace;
 use crate::schedule::ScheduleWorkspace;
 use crate::schedule::sipp::SippWorkspace;
-use crate::search::SearchWorkspace;
 
 /// The plan of a whole swarm: flight `i` is that of vehicle `i` of the request. A vehicle without a
 /// goal has a flight too, with [`Task::Stay`](crate::flight::Task::Stay).

@@ -2,8 +2,8 @@
 
 use crate::Point;
 use crate::file::FileError;
-use crate::frames::Geodetic;
-use crate::prm::squared_length;
+use crate::geo::frames::Geodetic;
+use crate::roadmap::prm::squared_length;
 
 /// First eight bytes of a roadmap file.
 pub const MAGIC: [u8; 8] = *b"FLKROAD\n";

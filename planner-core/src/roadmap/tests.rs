@@ -8,8 +8,8 @@ use super::format::{HEIGHT_LEN, LANDMARKS_LEN, WORD_LEN};
 use super::*;
 use crate::Point;
 use crate::file::{CRC32, FileError};
-use crate::frames::Geodetic;
-use crate::search::SearchWorkspace;
+use crate::geo::frames::Geodetic;
+use crate::roadmap::search::SearchWorkspace;
 
 pub(crate) fn header(starts: u16, goals: u16) -> RoadmapHeader {
     RoadmapHeader {

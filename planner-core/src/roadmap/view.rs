@@ -7,7 +7,7 @@ use super::format::{
 };
 use crate::Point;
 use crate::file::{CRC32, FileError};
-use crate::frames::Geodetic;
+use crate::geo::frames::Geodetic;
 
 /// A checked roadmap over borrowed bytes. Copying it copies five slices, not the nodes and edges.
 #[derive(Clone, Copy, Debug)]

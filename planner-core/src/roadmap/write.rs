@@ -9,7 +9,7 @@ use super::format::{
 use super::view::RoadmapView;
 use crate::Point;
 use crate::file::{CRC32, FileError};
-use crate::search::{SearchWorkspace, shortest_path_tree};
+use crate::roadmap::search::{SearchWorkspace, shortest_path_tree};
 
 /// An undirected edge to write.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use libm::fmaxf;
 use super::config::{ScheduleConfig, ScheduleError};
 use crate::Point;
 use crate::flight::{Flight, Waypoint};
-use crate::geometry::segments_distance_sq;
+use crate::geo::distance::segments_distance_sq;
 
 /// Longest timed segment, metres. With shorter ones vehicles follow one another more closely,
 /// longer ones cost less.

@@ -21,8 +21,8 @@ use super::pieces::{
 };
 use super::{ForbiddenIntervals, add_forbidden_interval, first_allowed, last_allowed};
 use crate::flight::{Flight, Path};
+use crate::roadmap::search::heap::{Heap, SETTLED};
 use crate::roadmap::{HalfEdge, RoadmapView};
-use crate::search::heap::{Heap, SETTLED};
 use crate::sort;
 use crate::{Length, Point};
 

@@ -7,7 +7,7 @@
 
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use crate::platform::Platform;
 use crate::wire::PayloadReader;

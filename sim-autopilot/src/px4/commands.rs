@@ -2,7 +2,7 @@
 //! COMMAND_ACKs.
 
 use crate::msg;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use super::Px4Mode;
 use super::firmware::Px4;

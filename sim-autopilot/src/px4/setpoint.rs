@@ -6,7 +6,7 @@
 //! stream counts as lost.
 
 use nalgebra::Vector3;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use crate::geodesy::LocalFrame;
 use crate::wire::PayloadReader;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nalgebra::Vector3;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use sim_autopilot::SimulatedKind;
 
 use super::recording::{Message, Recording, Sample, Setpoint};

@@ -1,7 +1,7 @@
 //! The data of a recorded flight.
 
 use nalgebra::Vector3;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use sim_autopilot::SimulatedKind;
 
 /// Position and velocity of a vehicle at one time, estimated or true.

@@ -9,7 +9,7 @@ use companion::{AUTOPILOT_COMPONENT, COMPANION_COMPONENT, Link};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 use planner_core::Point;
-use planner_core::frames;
+use planner_core::geo::frames;
 
 use super::entropy::Entropy;
 use super::{Flight, ID, Mission, NEIGHBOUR, ORIGIN, intent};

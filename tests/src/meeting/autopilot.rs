@@ -15,7 +15,7 @@ use companion::autopilot::AutopilotKind;
 use companion::autopilot::{ardupilot, px4};
 use companion::link::frame::Framer;
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use crate::setpoints::SetpointCheck;
 

@@ -6,7 +6,7 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, TUNNEL_DATA};
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::frames::{self, Geodetic};
+use planner_core::geo::frames::{self, Geodetic};
 
 use super::packet::ORIGIN;
 use super::scene::Lie;

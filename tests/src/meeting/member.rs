@@ -4,7 +4,7 @@ use companion::link::frame::Framer;
 use companion::{Companion, Config, Instant, RosterEntry, State};
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::frames::{self, Geodetic};
+use planner_core::geo::frames::{self, Geodetic};
 
 use super::autopilot::{Autopilot, Flown};
 use super::oracle::{Heard, VehicleState};

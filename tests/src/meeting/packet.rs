@@ -3,7 +3,7 @@
 use companion::Instant;
 use companion::link::intent::Intent;
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 /// Origin of the mission frame.
 pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };

@@ -50,7 +50,7 @@ const RULES: &[(&[&str], &[&str])] = &[
             "planner-core/src/plan",
             "planner-core/src/plan.rs",
             "planner-core/src/track.rs",
-            "planner-core/src/deconflict.rs",
+            "planner-core/src/track/deconflict.rs",
         ],
     ),
 ];

@@ -1,5 +1,6 @@
 //! Finds files of too many lines, and lines of too many characters. rustfmt breaks lines, but not
-//! in macros that it cannot parse, attributes and comments. Checks the length of ARCHITECTURE.md.
+//! in macros that it cannot parse, attributes and comments. Checks the length of ARCHITECTURE.md,
+//! and where modules stand: `<module>.rs`, with its unit tests in `<module>/tests.rs`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -13,6 +14,8 @@ const LINES: usize = 500;
 const WIDTH: usize = 100;
 /// Most bytes of the map of the code, `ARCHITECTURE.md`.
 const MAP_BYTES: usize = 18_000;
+/// A part of this program, not a file of tests.
+const HOST_TESTS: &str = "host_tests.rs";
 /// Folders that are not searched: they hold no sources of ours.
 const OTHERS: [&str; 2] = ["target", ".git"];
 
@@ -30,7 +33,8 @@ pub fn beyond() -> Result<Vec<(String, Option<&'static str>)>> {
         let text = fs::read_to_string(&file).with_context(|| file.display().to_string())?;
         let name = file.display().to_string();
         let exception = EXCEPTIONS.iter().find(|(of, _)| *of == name);
-        for what in beyond_in(&text).with_context(|| name.clone())? {
+        let misplaced = misplaced_module(&file, &text).map(str::to_owned);
+        for what in beyond_in(&text).with_context(|| name.clone())?.into_iter().chain(misplaced) {
             found.push((format!("{name}{what}"), exception.map(|(_, reason)| *reason)));
         }
     }
@@ -56,6 +60,23 @@ fn find_sources(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// What is wrong with where a module of a file stands. Integration tests share their modules in
+/// `tests/tests/<name>/mod.rs`, since Cargo takes each file beside them for a program.
+fn misplaced_module(file: &Path, text: &str) -> Option<&'static str> {
+    let name = file.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    if file.starts_with("tests/tests") {
+        None
+    } else if name == "mod.rs" {
+        Some(" is to be named after its folder, beside it")
+    } else if name.ends_with("_test.rs") || (name.ends_with("_tests.rs") && name != HOST_TESTS) {
+        Some(" is to be the tests.rs of a module")
+    } else if text.lines().any(|line| !line.starts_with(' ') && line.ends_with("mod tests {")) {
+        Some(" has its unit tests inline: they stand in tests.rs")
+    } else {
+        None
+    }
 }
 
 /// The faults of one file, each as a line to print without the file's name.

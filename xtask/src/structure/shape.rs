@@ -128,8 +128,8 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ),
     ("sim-autopilot/src/inbox.rs", "handle_frame", "one match: an arm for each message"),
     ("sim-autopilot/src/px4/commands.rs", "handle_command", "one match: an arm for each command"),
-    ("sim-autopilot/src/ardupilot/mod.rs", "Copter", FIRMWARE),
-    ("sim-autopilot/src/px4/mod.rs", "Commander", FIRMWARE),
+    ("sim-autopilot/src/ardupilot.rs", "Copter", FIRMWARE),
+    ("sim-autopilot/src/px4.rs", "Commander", FIRMWARE),
     (
         "host-sim/src/coverage/check.rs",
         "count_photographed_cells",

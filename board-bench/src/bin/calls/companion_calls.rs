@@ -20,9 +20,9 @@ use firmware::capacity::BoardCompanion;
 use firmware::capacity::{GATES, VEHICLES};
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::deconflict::Method;
 use planner_core::plan::VehicleTask;
 use planner_core::roadmap::RoadmapView;
+use planner_core::track::deconflict::Method;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 

@@ -7,7 +7,7 @@ use planner_core::Point;
 use planner_core::flight::{
     Gate, HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointOrder, WaypointRange,
 };
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use rand_pcg::Pcg32;
 
 use crate::cases::{random_below, random_between, random_point};

@@ -88,7 +88,7 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
         target_component: crate::COMPANION_COMPONENT,
         ..Default::default()
     };
-    let place = planner_core::frames::enu_to_geodetic(&ORIGIN, &GOAL);
+    let place = planner_core::geo::frames::enu_to_geodetic(&ORIGIN, &GOAL);
     let (lat, lon) = ((place.lat_deg * 1e7) as i32, (place.lon_deg * 1e7) as i32);
     let len = match kind % 14 {
         0 => encode(header, &long(MavCmd::MAV_CMD_MISSION_START, 0.0, 0.0), &mut out),
@@ -331,7 +331,7 @@ proptest::proptest! {
 
 /// The position report of a vehicle that stands at `place`.
 fn stranger(now: Instant, system: u8, sequence: u8, place: Point) -> Vec<u8> {
-    let at = planner_core::frames::enu_to_geodetic(&ORIGIN, &place);
+    let at = planner_core::geo::frames::enu_to_geodetic(&ORIGIN, &place);
     let data = GLOBAL_POSITION_INT_DATA {
         time_boot_ms: now.as_boot_ms(),
         lat: (at.lat_deg * 1e7) as i32,
@@ -464,12 +464,12 @@ fn the_swarm_is_told_where_it_is_and_where_it_goes() {
         bench.swarm.iter().filter_map(|f| Intent::decode(f.padded_payload(), SYSTEM)).collect();
     assert_eq!((places.len(), intents.len()), (5, 5));
     let last = &places[4];
-    let place = planner_core::frames::Geodetic {
+    let place = planner_core::geo::frames::Geodetic {
         lat_deg: f64::from(last.lat) * 1e-7,
         lon_deg: f64::from(last.lon) * 1e-7,
         alt_m: f64::from(last.alt) * 1e-3,
     };
-    let enu = planner_core::frames::geodetic_to_enu(&ORIGIN, &place);
+    let enu = planner_core::geo::frames::geodetic_to_enu(&ORIGIN, &place);
     assert!((enu - bench.enu).norm() < 0.45, "{enu:?} {:?}", bench.enu);
     let intent = &intents[4];
     assert_eq!((intent.mission_crc, intent.plan_crc), (0xC0FFEE, 5));

@@ -445,7 +445,7 @@ fn the_same_number_with_other_parameters_is_another_command_and_a_repeat_is_answ
 /// The ground station reports an obstacle of 0.5 m at `place`.
 fn obstacle(b: &mut Bench, place: Point) {
     use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavFrame};
-    let place = planner_core::frames::enu_to_geodetic(&ORIGIN, &place);
+    let place = planner_core::geo::frames::enu_to_geodetic(&ORIGIN, &place);
     let data = COMMAND_INT_DATA {
         command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
         param1: 0.5,

@@ -2,7 +2,7 @@
 //! first.
 
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{self, MotionBounds, OwnSet, REACTION_S, ReachableSet};
+use planner_core::track::safety::{self, MotionBounds, OwnSet, REACTION_S, ReachableSet};
 use planner_core::{Length, Point};
 
 use super::super::limits::Urgency;

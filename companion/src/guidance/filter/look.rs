@@ -1,9 +1,9 @@
 //! One step of the safety filter: this vehicle's way ahead, compared with all neighbours.
 
 use planner_core::Point;
-use planner_core::deconflict::Method;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{Legs, OwnSet, REACTION_S, ReachableSet};
+use planner_core::track::deconflict::Method;
+use planner_core::track::safety::{Legs, OwnSet, REACTION_S, ReachableSet};
 
 use super::super::limits::{Urgency, filter_bounds};
 use super::super::motion::clamp_to;

@@ -3,8 +3,8 @@
 
 extern crate std;
 
-use planner_core::deconflict::Advice;
 use planner_core::flight::Path;
+use planner_core::track::deconflict::Advice;
 use planner_core::track::{self, ReferenceState, TrackConfig};
 use proptest::prelude::*;
 

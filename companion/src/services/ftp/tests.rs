@@ -9,7 +9,7 @@ use std::vec;
 use std::vec::Vec;
 
 use planner_core::coverage::Flat;
-use planner_core::field::{self, FieldShape, FieldView};
+use planner_core::map::field::{self, FieldShape, FieldView};
 use rand_core::Rng;
 
 use self::world::{Packet, World};

@@ -1,12 +1,12 @@
 //! The settings of a mission file that all vehicles of the mission share.
 
 use planner_core::Point;
-use planner_core::deconflict::Method;
 use planner_core::file::FileError;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use planner_core::plan::GoalMode;
 use planner_core::roadmap::MAX_COORDINATE_M;
 use planner_core::schedule::ScheduleConfig;
+use planner_core::track::deconflict::Method;
 
 use super::error::MissionError;
 use super::numbers::{MAX_SPEED_MPS, in_range, is_positive_up_to};

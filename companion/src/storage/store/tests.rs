@@ -4,7 +4,7 @@ extern crate std;
 use std::vec::Vec;
 
 use planner_core::coverage::Flat;
-use planner_core::field::{self, FieldShape};
+use planner_core::map::field::{self, FieldShape};
 use planner_core::roadmap::RoadmapView;
 use rand_core::Rng;
 

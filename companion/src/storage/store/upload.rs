@@ -6,7 +6,8 @@ use super::flash::{ErasePermission, File};
 use super::upload_state::{UploadError, UploadState};
 use super::window::{PieceOutcome, WINDOW_LEN};
 use crate::storage::mission_file::MissionView;
-use planner_core::{field, roadmap};
+use planner_core::map::field;
+use planner_core::roadmap;
 
 impl Store {
     /// State of the last upload; `None` if there was none, or it was abandoned.

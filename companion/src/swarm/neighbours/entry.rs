@@ -2,8 +2,8 @@
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::deconflict::Neighbour;
-use planner_core::safety::{PlaceOnPoints, PointsReach};
+use planner_core::track::deconflict::Neighbour;
+use planner_core::track::safety::{PlaceOnPoints, PointsReach};
 
 use super::bounds::*;
 use crate::link::echo::MessageDelay;

@@ -2,7 +2,7 @@
 //! and for the others the inputs of their reachable sets.
 
 use planner_core::Point;
-use planner_core::safety::{
+use planner_core::track::safety::{
     MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, OwnSet, PlaceOnPoints, PointsReach,
 };
 

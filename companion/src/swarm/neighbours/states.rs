@@ -1,7 +1,7 @@
 //! The neighbours as the advice sees them: state and age at a given time.
 
-use planner_core::deconflict::Neighbour;
 use planner_core::flight::Gate;
+use planner_core::track::deconflict::Neighbour;
 
 use super::Neighbours;
 use super::bounds::*;

@@ -1,7 +1,7 @@
 extern crate std;
 
 use planner_core::flight::Gate;
-use planner_core::safety::{Braking, Legs, MotionBounds, OwnSet, PointsReach, ReachableSet};
+use planner_core::track::safety::{Braking, Legs, MotionBounds, OwnSet, PointsReach, ReachableSet};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 

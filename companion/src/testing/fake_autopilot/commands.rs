@@ -7,7 +7,7 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::frames;
+use planner_core::geo::frames;
 
 use super::{Bench, ORIGIN, SYSTEM};
 use crate::Link;

@@ -2,11 +2,11 @@
 //! up.
 
 use planner_core::Point;
-use planner_core::deconflict::Method;
 use planner_core::flight::{
     HeadingMode, Path, PicturePlan, Task, Trigger, VehiclePlan, WaypointRange,
 };
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
+use planner_core::track::deconflict::Method;
 
 use super::Plan;
 use crate::planner::coverage::OPEN_FIELD_CLEARANCE_M;

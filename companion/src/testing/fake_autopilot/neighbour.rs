@@ -2,7 +2,7 @@
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, TUNNEL_DATA};
-use planner_core::frames;
+use planner_core::geo::frames;
 
 use super::{Bench, ORIGIN, SYSTEM};
 use crate::Link;

@@ -1,7 +1,7 @@
 //! The tree against distances to every cell, one by one.
 
 use super::*;
-use planner_core::segment::segment_clearance;
+use planner_core::map::segment::segment_clearance;
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;

@@ -8,7 +8,7 @@ use std::path::Path;
 use planner_core::coverage::area::{Ring, RingKind, SAME_VERTEX_M};
 use planner_core::coverage::pack::Heights;
 use planner_core::coverage::{Flat, area as core_area};
-use planner_core::frames::{Geodetic, geodetic_to_enu};
+use planner_core::geo::frames::{Geodetic, geodetic_to_enu};
 
 use self::errors::{area_hint, describe_area_error, faulty_ring, file_hint, overlap_error};
 use self::spacing::{read_camera, read_spacing};

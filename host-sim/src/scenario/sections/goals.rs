@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use planner_core::Point;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 use planner_core::roadmap::MAX_COORDINATE_M;
 
 use super::checks::{

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use companion::margins::TRACKING_M;
 use planner_core::coverage::area::{self, Ring, RingKind};
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use super::checks::VehicleSpans;
 use super::{DEFAULT_ORIGIN, read_map};

@@ -1,7 +1,7 @@
 //! Reads the tables of how a mission is flown: deconfliction, simulation, faults.
 
 use companion::config::SAFETY_DISTANCE_M;
-use planner_core::deconflict::Method;
+use planner_core::track::deconflict::Method;
 
 use super::values::{MAX_ID, read_point};
 use crate::scenario::reader::{Result, Table};

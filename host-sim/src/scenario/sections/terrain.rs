@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use planner_core::coverage::Flat;
 use planner_core::coverage::pack::Heights;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
 
 use super::checks::VehicleSpans;
 use crate::margins;

@@ -1,5 +1,5 @@
 use super::*;
-use planner_core::voxel::{GridShape, Outside};
+use planner_core::map::voxel::{GridShape, Outside};
 
 /// A floor at z < 1 and a wall at x > 8 in a 10 m cube of 1 m cells.
 fn with_monitor(test: impl FnOnce(Referee<'_>)) {

@@ -123,7 +123,7 @@ fn autzen_is_in_feet_and_where_its_system_says() {
         .map(|[x, y, z]| {
             let [lon_deg, lat_deg] = autzen([*x, *y]);
             let place = Geodetic { lat_deg, lon_deg, alt_m: 0.0 };
-            (planner_core::frames::geodetic_to_enu(&origin, &place).xy(), (z * 0.3048) as f32)
+            (planner_core::geo::frames::geodetic_to_enu(&origin, &place).xy(), (z * 0.3048) as f32)
         })
         .collect();
     let cell_m = grid.cell_m();

@@ -6,8 +6,8 @@ use heapless::Vec;
 use super::super::Flat;
 use super::super::transit::Transit;
 use crate::Point;
-use crate::field::follow::TerrainFollowing;
 use crate::flight::{Path, PathError};
+use crate::map::field::follow::TerrainFollowing;
 
 pub(super) fn point_at_height(place: &Flat, height_m: f32) -> Point {
     Point::new(place.x, place.y, height_m)

@@ -7,7 +7,7 @@ use libm::fmaxf;
 use super::Heights;
 use super::{RouteEnds, Vehicle, Work};
 use crate::coverage::Flat;
-use crate::field::follow::TerrainFollowing;
+use crate::map::field::follow::TerrainFollowing;
 
 impl<const L: usize, const N: usize> Work<'_, L, N> {
     /// How far below [`Heights::mission_m`] pictures are taken at `place`, metres: 0 above level

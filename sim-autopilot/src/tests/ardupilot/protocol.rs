@@ -1,6 +1,6 @@
 //! Tests of what the simulated ArduCopter sends without a request, answers and refuses.
 
-use planner_core::frames::Projection;
+use planner_core::geo::frames::Projection;
 
 use super::*;
 

@@ -28,11 +28,11 @@ use host_sim::progress::Progress;
 use host_sim::result::Timing;
 use host_sim::scenario;
 use planner_core::Point;
-use planner_core::frames::Geodetic;
-use planner_core::prm::{self, NodeIndex, PrmConfig, PrmEdge, Sampling, squared_length};
+use planner_core::geo::frames::Geodetic;
+use planner_core::map::voxel::VoxelGrid;
+use planner_core::roadmap::prm::{self, NodeIndex, PrmConfig, PrmEdge, Sampling, squared_length};
+use planner_core::roadmap::search::{RoadmapWithLengths, SearchWorkspace, astar, cost_matrix};
 use planner_core::roadmap::{self, LANDMARKS, RoadmapHeader, RoadmapView};
-use planner_core::search::{RoadmapWithLengths, SearchWorkspace, astar, cost_matrix};
-use planner_core::voxel::VoxelGrid;
 use serde::Deserialize;
 
 use crate::row::Row;

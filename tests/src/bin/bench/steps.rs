@@ -13,7 +13,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use board_bench::cases::{STEP_CASES, StepCase, StepKind};
-use planner_core::deconflict::{Advice, Method};
+use planner_core::track::deconflict::{Advice, Method};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 

@@ -15,7 +15,7 @@ use host_sim::progress::Progress;
 use host_sim::scenario;
 use host_sim::swarm;
 use planner_core::Point;
-use planner_core::voxel::GridShape;
+use planner_core::map::voxel::GridShape;
 
 use crate::row::Row;
 

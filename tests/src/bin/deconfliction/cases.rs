@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use host_sim::map::{Occupancy, OccupancyMap, bt};
 use planner_core::Point;
-use planner_core::voxel::GridShape;
+use planner_core::map::voxel::GridShape;
 
 const CRUISE_MPS: f32 = 2.0;
 /// Edge of a cell of most maps, metres.

@@ -11,7 +11,7 @@ use std::fmt;
 use host_sim::mission::{HostPlan, PreparedMission};
 use host_sim::swarm::SwarmFlight;
 use planner_core::Point;
-use planner_core::segment::segment_is_clear;
+use planner_core::map::segment::segment_is_clear;
 use serde::Serialize;
 
 /// Distance of neighbouring lattice points, metres.

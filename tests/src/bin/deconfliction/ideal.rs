@@ -9,8 +9,8 @@ use host_sim::capacity::WAYPOINTS;
 use host_sim::mission::{HostPlan, PreparedMission};
 use planner_core::Point;
 use planner_core::flight::{Flight, Path};
+use planner_core::map::segment::segment_is_clear;
 use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleWorkspace, earliest_departure};
-use planner_core::segment::segment_is_clear;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 

@@ -6,7 +6,7 @@ use companion::autopilot::px4;
 use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::frames;
+use planner_core::geo::frames;
 
 use super::{Autopilot, PX4_LOSS_S, Target};
 

@@ -15,3 +15,12 @@ fn a_line_is_long_unless_a_string_a_table_or_skipping_makes_it_so() {
     assert_eq!(beyond(&"// a\n".repeat(LINES)), 0);
     assert_eq!(beyond(&"// a\n".repeat(LINES + 1)), 1);
 }
+
+#[test]
+fn a_module_stands_in_the_file_of_its_name_and_its_tests_in_a_file_of_their_own() {
+    let misplaced = |file: &str, text: &str| misplaced_module(Path::new(file), text).is_some();
+    assert!(misplaced("a/src/b/mod.rs", "") && misplaced("a/src/b_tests.rs", ""));
+    assert!(misplaced("a/src/b.rs", "#[cfg(test)]\npub(crate) mod tests {\n}\n"));
+    assert!(!misplaced("a/src/b.rs", "#[cfg(test)]\nmod tests;\n"));
+    assert!(!misplaced("tests/tests/b/mod.rs", "mod tests {\n}\n"));
+}

@@ -7,7 +7,7 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, TUNNEL_DATA};
 use planner_core::detour::DetourRequest;
 use planner_core::flight::{Gate, Path, VehiclePlan};
-use planner_core::frames;
+use planner_core::geo::frames;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 

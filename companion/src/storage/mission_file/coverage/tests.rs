@@ -7,12 +7,12 @@ use std::vec;
 use std::vec::Vec as List;
 
 use planner_core::Point;
-use planner_core::deconflict::Method;
-use planner_core::field::{self, FieldShape, FieldView};
 use planner_core::flight::WaypointRange;
-use planner_core::frames::Geodetic;
+use planner_core::geo::frames::Geodetic;
+use planner_core::map::field::{self, FieldShape, FieldView};
 use planner_core::plan::{GoalMode, SwarmPlan, VehicleTask};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
+use planner_core::track::deconflict::Method;
 use proptest::prelude::*;
 
 use super::*;

@@ -1,0 +1,23 @@
+use super::*;
+use crate::scenario;
+
+#[test]
+fn what_strikes_a_companion_is_refused_where_that_is_elsewhere() {
+    let refused = |companion: &str, kind: &str, whom: &str| {
+        let text = format!(
+            "[map]\nfile = \"builtin:building\"\n[mission]\ngoals = [[8.0, 2.0, 1.5]]\n\
+             [[vehicles]]\nid = 1\nstart = [4.0, 2.0, 1.5]\n{companion}\n\
+             [[vehicles]]\nid = 2\nstart = [4.0, 4.0, 1.5]\n\
+             [[faults]]\nat_s = 1.0\nkind = \"{kind}\"\n{whom}\n"
+        );
+        check(&scenario::parse(&text, "faults.toml").expect("a scenario")).is_err()
+    };
+    let board = "companion = \"tcp:127.0.0.1:5761\"\nradio = \"tcp:127.0.0.1:5762\"";
+    let alone = "companion = \"tcp:127.0.0.1:5761\"";
+    for kind in ["companion-reset", "late-plan", "bad-roadmap"] {
+        assert!(refused(board, kind, "vehicle = 1") && refused(board, kind, ""), "{kind}");
+        assert!(!refused(board, kind, "vehicle = 2") && !refused("", kind, ""), "{kind}");
+    }
+    assert!(refused(alone, "radio-cut", "") && !refused(board, "radio-cut", ""));
+    assert!(!refused(alone, "kill", "vehicle = 1"));
+}
