@@ -192,14 +192,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Processes bytes that a link received up to `now`.
     pub fn handle_bytes(&mut self, link: Link, now: Instant, bytes: &[u8]) {
         self.now = now;
-        let mut input = bytes;
-        let mut relevant = false;
-        while let Some(frame) = self.links.receive(link, now, &mut input) {
-            relevant |= self.handle_frame(link, &frame);
-        }
-        if relevant {
-            self.run_mission_table();
-        }
+        self.receive(link, bytes);
     }
 
     /// Handles the planner's answer to a request of kind `wanted`. An answer that was not requested

@@ -1,4 +1,5 @@
-//! The table of all timers: for each action the time at which it is due.
+//! The table of all timers: for each action the time at which it is due. How old an event is that a
+//! guard reads (when a vehicle was heard, since when a state lasts) the part knows that saw it.
 //!
 //! Three timers wake the shell ([`Timers::next_due`]): the control step, the heartbeats, and the
 //! position and intent to the swarm. The others do not: their action runs in a later call, at or
@@ -41,9 +42,23 @@ pub(crate) enum Timer {
     StopWaitingForMissing,
     /// From then on "EKF origin # km away" may be sent again.
     OriginReport,
+    /// Report that this vehicle still waits for one that has not started.
+    WaitReport,
+    /// Repetition of the camera command that is not acknowledged yet.
+    CameraCommand,
+    /// From then on the shell may be asked again for a division that it has not answered.
+    DivisionRequest,
+    /// Begins the next scan of the path for obstacles.
+    PathScan,
+    /// From then on the shell may be asked again for a path home.
+    HomeSearch,
+    /// From then on the shell may be asked again for a detour back to the path, in a coverage
+    /// mission.
+    RejoinSearch,
 }
 
-const TIMER_COUNT: usize = 15;
+/// Number of timers: the last one's place and one.
+const TIMER_COUNT: usize = Timer::RejoinSearch as usize + 1;
 /// Timers that wake the shell.
 const WAKING_TIMERS: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 

@@ -67,7 +67,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::Connect => self.request_streams(),
             Action::RequestPlan => {
                 self.mission.forget_plan();
-                self.detours.forget_plan();
+                self.detours.forget_plan(&mut self.timers);
                 self.neighbours.forget_plan();
                 self.guidance.reset();
                 let photographed = self.mission.photographed_mut();
@@ -111,7 +111,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::RequestDetourBackToPath => self.request_detour_back_to_path(),
             Action::TurnHome => {
                 self.guidance.cancel_evasion();
-                self.detours.begin_way_home(now);
+                self.detours.begin_way_home(now, &mut self.timers);
             }
             Action::RequestDetourAside => {
                 self.guidance.cancel_evasion();

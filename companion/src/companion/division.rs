@@ -85,7 +85,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let wants = fleet.needs_division() || ((behind || around) && self.is_at_division_start());
         let fingerprint = wants.then(|| fleet.division_hash());
         self.guidance.set_halt_m(halt_m);
-        let requests = |hash| self.mission.should_request_division(hash, now, REQUEST_RETRY);
+        let timers = &mut self.timers;
+        let requests =
+            |hash| self.mission.should_request_division(hash, now, REQUEST_RETRY, timers);
         if fingerprint.is_some_and(requests) {
             // The queue is full only if the shell does not drain; then the request is repeated
             // after `REQUEST_RETRY`.
@@ -315,7 +317,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.guidance.begin_path_at(back_m, self.now);
         }
         match meets {
-            true => self.detours.end_area_detour(),
+            true => self.detours.end_area_detour(&mut self.timers),
             false => self.detours.give_up_plan(),
         }
     }
@@ -362,7 +364,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let place = here.filter(|_| in_air).unwrap_or(self.mission.path_start());
                 if self.mission.accept_division(plan, &place, division) {
                     self.neighbours.forget_plan();
-                    self.detours.forget_plan();
+                    self.detours.forget_plan(&mut self.timers);
                     // From now on places are measured along the new path.
                     match in_air {
                         true => self.guidance.begin_path(self.now),

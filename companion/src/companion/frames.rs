@@ -26,6 +26,18 @@ use crate::swarm::neighbours::relay::Relay;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Handles bytes that a link received up to now. Without bytes the framer gives up a partial
+    /// frame that is too old, and yields the frames behind it.
+    pub(super) fn receive(&mut self, link: Link, mut bytes: &[u8]) {
+        let mut relevant = false;
+        while let Some(frame) = self.links.receive(link, self.now, &mut bytes) {
+            relevant |= self.handle_frame(link, &frame);
+        }
+        if relevant {
+            self.run_mission_table();
+        }
+    }
+
     /// Handles a received frame: passes it to the part that its message is for. Returns whether the
     /// mission table has to be evaluated now.
     pub(super) fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
@@ -155,7 +167,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Handles a private message of another companion, by its payload's kind.
     fn handle_tunnel(&mut self, frame: &Frame) {
         let (payload, id) = (frame.padded_payload(), frame.system);
-        if let Some(relay) = Relay::decode(payload, id) {
+        if let Some(intent) = Intent::decode(payload, id) {
+            self.handle_intent(id, frame.sequence, &intent);
+        } else if let Some(relay) = Relay::decode(payload, id) {
             let ours = self.mission.plan().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
             if ours && relay.mission_crc == self.config.mission_crc {
                 self.neighbours.handle_relay(self.now, id, &relay);
@@ -170,8 +184,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
         } else if let Some(report) = PhotographedReport::decode(payload, id) {
             self.handle_done_report(&report);
-        } else if let Some(intent) = Intent::decode(payload, id) {
-            self.handle_intent(id, frame.sequence, &intent);
         }
     }
 

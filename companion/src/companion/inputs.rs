@@ -134,13 +134,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             descends: self.guidance.is_descending(),
             may_fly_beside: standing
                 && (self.is_undivided() || self.detours.is_beside_plan())
-                && self.detours.may_detour_over_area(&view),
+                && self.detours.may_detour_over_area(&view, &self.timers),
             detour_flown: follow && self.detours.leads_back() && at_end && standing,
             own_plan_ready: self.detours.is_own_plan_ready(),
             own_plan_lost: self.detours.is_own_plan_lost(),
             homeward: self.detours.is_homeward(),
             seeking_home_for: sought_home,
-            stands_to_return: standing && self.detours.home.may_request(now),
+            stands_to_return: standing && self.detours.home.may_request(now, &self.timers),
             in_climb: beneath.takes_off(),
             armed: t.armed,
             armed_unseen: handshake.is_armed_bit_overdue(now),

@@ -9,6 +9,7 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::guidance::GuidanceInputs;
 use crate::mission::State;
+use crate::swarm::detour::Detours;
 use crate::swarm::detour::asking::RetryOutlook;
 use crate::swarm::detour::path_kind::{DetourPurpose, RejoinPlace, RejoinPlaces};
 use crate::swarm::view::DetourView;
@@ -44,12 +45,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Continues the scan of the path for obstacles, and checks whether the other vehicles stand.
     pub(super) fn scan_for_obstacles(&mut self) {
-        let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
+        let Self { now, config, mission, guidance, telemetry, neighbours, detours, timers, .. } =
+            self;
         let own = (neighbours.own_rank(), config.system_id);
         let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.path_source());
         let view =
             DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
-        if let Some(clear_at) = detours.scan_path(&view) {
+        if let Some(clear_at) = detours.scan_path(&view, timers) {
             self.neighbours.mark_path_clear(clear_at);
         }
     }
@@ -116,7 +118,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         match rejoin {
             Some(back) => self.request_detour(DetourPurpose::Rejoin(back)),
             None => {
-                self.detours.note_no_rejoin_place(self.now);
+                Detours::note_no_rejoin_place(self.now, &mut self.timers);
                 self.mission.set_failure(PlanFailure::Unreachable);
             }
         }
@@ -146,7 +148,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let progress_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
         let ground_m = self.mission.plan().map(|plan| self.guidance.ground_m(plan));
         self.mission.switch_to_detour(detour, progress_m, ground_m);
-        self.detours.begin_detour(purpose, progress_m, self.now, self.guidance.last_progress_at());
+        let progress_at = self.guidance.last_progress_at();
+        self.detours.begin_detour(purpose, progress_m, self.now, progress_at, &mut self.timers);
         self.neighbours.mark_avoided(self.now);
         // In the air the vehicle follows the detour from its start. On the pad the climb comes
         // first.
@@ -200,6 +203,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         } else {
             RetryOutlook::Open
         };
-        self.detours.note_failure(self.guidance.along_m(), outlook, self.now);
+        let along_m = self.guidance.along_m();
+        self.detours.note_failure(along_m, outlook, self.now, &mut self.timers);
     }
 }

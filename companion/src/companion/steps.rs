@@ -28,9 +28,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub fn handle_timeout(&mut self, now: Instant) {
         self.now = now;
         for link in [Link::Autopilot, Link::Swarm] {
-            // Without new bytes the framer gives up a partial frame that is too old, and yields the
-            // frames behind it.
-            self.handle_bytes(link, now, &[]);
+            self.receive(link, &[]);
         }
         if self.timers.is_due(Timer::Step, now) {
             self.step();
@@ -125,7 +123,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 _ => PathRelation::Elsewhere,
             },
         };
-        let leaves_path = self.mission.step_task(along, self.now, &mut self.links);
+        let leaves_path =
+            self.mission.step_task(along, self.now, &mut self.timers, &mut self.links);
         // Braking to land, the vehicle goes on along its path, and takes no pictures.
         let photographs = along.place == PathRelation::OnPath
             || (!off_plan && (leaves_path || self.guidance.is_at_end(&self.guidance_inputs())));
@@ -158,7 +157,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             matches!(self.mission.state(), State::Scheduled | State::Follow | State::Blocked);
         let waited = Some(self.guidance.advice.waiting_for).filter(|id| flies && *id != 0);
         let id = waited.filter(|id| self.neighbours.is_not_started(*id)).unwrap_or(0);
-        if self.mission.should_report_wait(id, self.now) {
+        if self.mission.should_report_wait(id, self.now, &mut self.timers) {
             self.links.send_text_with_numbers(
                 Severity::Warning,
                 "Waiting for vehicle #: it has not started",

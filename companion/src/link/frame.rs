@@ -16,11 +16,14 @@
 //! [`PARTIAL_LIFETIME`] after its own first byte. Each byte costs O(1), after false start bytes
 //! O(267).
 
+mod received;
+
 use crc::{CRC_16_MCRF4XX, Crc, Table};
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData};
 
+pub use self::received::Frame;
 use crate::time::{Duration, Instant};
 
 /// Our component id, `MAV_COMP_ID_ONBOARD_COMPUTER`.
@@ -44,55 +47,6 @@ const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.as_micros() / 8;
 /// Most different times of arrival in the buffer: the steps within [`PARTIAL_LIFETIME`], and two
 /// more.
 const MAX_ARRIVALS: usize = 10;
-
-/// A received frame with a correct CRC.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Frame {
-    /// MAVLink version of the frame, 1 or 2.
-    pub version: MavlinkVersion,
-    /// Sequence number that the sender gave it on its link.
-    pub sequence: u8,
-    /// System id of the sender.
-    pub system: u8,
-    /// Component id of the sender.
-    pub component: u8,
-    /// Message id.
-    pub message_id: u32,
-    /// Whether the frame has a signature; it is not verified.
-    pub signed: bool,
-    len: u8,
-    payload: [u8; 255],
-}
-
-impl Frame {
-    /// The payload as received: V2 senders cut trailing zeros.
-    pub fn payload(&self) -> &[u8] {
-        &self.payload[..usize::from(self.len)]
-    }
-
-    /// The payload filled up with zeros to 255 bytes: V2 senders cut trailing zeros.
-    pub fn padded_payload(&self) -> &[u8; 255] {
-        &self.payload
-    }
-
-    /// Writes the frame as V2 with its original sender and sequence number, to forward it, without
-    /// its signature. Returns the bytes written, 0 if `out` is too small or the dialect does not
-    /// know the message id.
-    pub fn encode(&self, out: &mut [u8]) -> usize {
-        let Some(extra) = extra_crc(self.message_id) else { return 0 };
-        let header =
-            Header { system: self.system, component: self.component, sequence: self.sequence };
-        encode_raw(header, self.message_id, extra, self.payload(), out)
-    }
-
-    /// The message, if the frame has the message id of `M` and the crate knows all its enum values.
-    pub fn decode<M: MessageData>(&self) -> Option<M> {
-        if self.message_id != M::ID {
-            return None;
-        }
-        M::deser(self.version, self.payload()).ok()
-    }
-}
 
 /// Counters of a [`Framer`] since it was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -14,6 +14,7 @@ use crate::mission::task::{PathProgress, Tasks};
 use crate::mission::waits::{BarredStart, Waits};
 use crate::mission::{GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
 use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
 
 /// Greatest distance between the first point of a path and the place where it must begin, metres; a
 /// plan beyond it is refused.
@@ -58,9 +59,8 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     division: usize,
     /// Whether the plan after the last division has come and is not flown yet.
     division_plan_ready: bool,
-    /// Open request to the shell for a division: hash of the division's inputs, and when it was
-    /// made.
-    division_requested: Option<(u32, Instant)>,
+    /// Hash of the inputs of the division that the shell was asked for and has not answered.
+    division_requested: Option<u32>,
 }
 
 impl<const W: usize, const G: usize> Mission<W, G> {
@@ -184,8 +184,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// To be called each step with the vehicle that has not started and that this one waits for, 0
     /// for none. Returns whether the wait is to be reported now.
-    pub(crate) fn should_report_wait(&mut self, id: u8, now: Instant) -> bool {
-        self.waits.report.update(id, now)
+    pub(crate) fn should_report_wait(&mut self, id: u8, now: Instant, timers: &mut Timers) -> bool {
+        self.waits.report.update(id, now, timers)
     }
 
     /// To be called each step in which a vehicle or an obstacle bars the start.
@@ -299,17 +299,19 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         fingerprint: u32,
         now: Instant,
         again: Duration,
+        timers: &mut Timers,
     ) -> bool {
-        let waits = self.division_requested.is_some_and(|(_, at)| now - at < again);
-        if !waits {
-            self.division_requested = Some((fingerprint, now));
+        let asks = self.division_requested.is_none() || timers.is_due(Timer::DivisionRequest, now);
+        if asks {
+            self.division_requested = Some(fingerprint);
+            timers.set(Timer::DivisionRequest, now + again);
         }
-        !waits
+        asks
     }
 
     /// Closes the open request for a division. Returns whether it was for the one with this hash.
     pub(crate) fn take_division_request(&mut self, fingerprint: u32) -> bool {
-        self.division_requested.take().is_some_and(|(of, _)| of == fingerprint)
+        self.division_requested.take().is_some_and(|of| of == fingerprint)
     }
 
     /// Number of the fleet's committed divisions that the plan takes into account.
@@ -347,11 +349,13 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         &mut self,
         along: PathProgress,
         now: Instant,
+        timers: &mut Timers,
         links: &mut Links,
     ) -> bool {
-        self.plan
-            .as_ref()
-            .is_some_and(|plan| self.tasks.step(&plan.task, &plan.path, along, now, links))
+        let Some(plan) = &self.plan else { return false };
+        let leaves_path = self.tasks.step(&plan.task, &plan.path, along);
+        self.tasks.send_commands(now, timers, links);
+        leaves_path
     }
 
     /// The photographed waypoints of the area.

@@ -14,6 +14,7 @@ use self::camera::CameraControl;
 use crate::autopilot::telemetry::Ack;
 use crate::link::Links;
 use crate::time::Instant;
+use crate::timers::Timers;
 
 /// State of the commands of the vehicle's task.
 #[derive(Clone, Debug, Default)]
@@ -27,23 +28,23 @@ impl Tasks {
         self.camera.begin_path();
     }
 
-    /// Sends the task's commands to the autopilot that are due at this place of the path. Returns
+    /// Queues the task's commands to the autopilot that are due at this place of the path. Returns
     /// whether the vehicle leaves its path here, and takes no more pictures.
     pub(crate) fn step<const W: usize>(
         &mut self,
         task: &Task,
         path: &Path<W>,
         along: PathProgress,
-        now: Instant,
-        links: &mut Links,
     ) -> bool {
         match task {
-            Task::Stay | Task::Goto(_) => {
-                self.camera.send_current_command(now, links);
-                false
-            }
-            Task::Photograph(photographs) => self.camera.step(photographs, path, along, now, links),
+            Task::Stay | Task::Goto(_) => false,
+            Task::Photograph(photographs) => self.camera.step(photographs, path, along),
         }
+    }
+
+    /// Sends the first queued command to the autopilot, or repeats it.
+    pub(crate) fn send_commands(&mut self, now: Instant, timers: &mut Timers, links: &mut Links) {
+        self.camera.send_current_command(now, timers, links);
     }
 
     /// Handles the autopilot's COMMAND_ACK of a command of the task.

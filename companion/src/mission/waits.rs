@@ -4,6 +4,7 @@
 //! Each call does constant work.
 
 use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
 
 /// Time for which a vehicle waits for one that has not started before it reports that, and between
 /// two reports.
@@ -21,26 +22,21 @@ pub(crate) struct Waits {
     pub(super) barred_start: BarredStart,
 }
 
-/// System id of the vehicle that this one waits for, 0 for none, and since when: since the wait
-/// began or was reported last.
+/// System id of the vehicle that this one waits for, 0 for none.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct WaitReport {
     id: u8,
-    since: Instant,
 }
 
 impl WaitReport {
     /// To be called each step with the vehicle that has not started and that this one waits for, 0
     /// for none. Returns whether the wait is to be reported now, every 30 s (`REPORT_WAIT_AFTER`).
-    pub(crate) fn update(&mut self, id: u8, now: Instant) -> bool {
-        if id != self.id || id == 0 {
-            *self = Self { id, since: now };
+    pub(crate) fn update(&mut self, id: u8, now: Instant, timers: &mut Timers) -> bool {
+        if id != self.id {
+            self.id = id;
+            timers.set(Timer::WaitReport, now + REPORT_WAIT_AFTER);
         }
-        let named = id != 0 && now - self.since >= REPORT_WAIT_AFTER;
-        if named {
-            self.since = now;
-        }
-        named
+        id != 0 && timers.take_due(Timer::WaitReport, now, REPORT_WAIT_AFTER)
     }
 }
 

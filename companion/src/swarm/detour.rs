@@ -41,6 +41,7 @@ use crate::swarm::obstacles::Obstacles;
 use crate::swarm::sweep::IncrementalScan;
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
 
 /// Period of the scans that check whether the path is blocked.
 const BLOCKED_CHECK_EVERY: Duration = Duration::from_millis(500);
@@ -126,8 +127,7 @@ pub(crate) struct Detours {
     all_standing_since: Option<Instant>,
     /// Since when this vehicle claims the turn to fly a detour.
     claimed_since: Option<Instant>,
-    /// When a scan was last due, and when the one under way began.
-    scanned_at: Instant,
+    /// When the scan under way began.
     scan_began: Option<Instant>,
     /// Progress of the scan under way, and whether the last one found an obstacle on the path.
     scan: IncrementalScan,
@@ -145,7 +145,13 @@ struct ScanResult {
 
 impl Detours {
     /// Forgets what concerns an older path; keeps the reported obstacles and `left_plan`.
-    pub(crate) fn forget_plan(&mut self) {
+    pub(crate) fn forget_plan(&mut self, timers: &mut Timers) {
+        self.forget_path(timers);
+        timers.set(Timer::RejoinSearch, Instant::ZERO);
+    }
+
+    fn forget_path(&mut self, timers: &mut Timers) {
+        timers.set(Timer::PathScan, Instant::ZERO);
         let obstacles = core::mem::take(&mut self.obstacles);
         *self = Self { left_plan: self.left_plan, obstacles, ..Self::default() };
         self.obstacles.forget_avoided();
@@ -227,19 +233,20 @@ impl Detours {
     pub(crate) fn may_detour_over_area<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
+        timers: &Timers,
     ) -> bool {
         // Beside its path the vehicle seeks another way back, whatever stopped it.
         (self.obstructed
             || self.is_beside_plan()
             || self.is_stopped_for_long(view, BLOCKED_HINDERED_WITHIN))
             && self.keeps_to_plan_over_area(view)
-            && self.area_searches.may_seek(view.now)
+            && self.area_searches.may_seek(view.now, timers)
     }
 
     /// Ends a detour in a coverage mission: the vehicle flies its own plan, which has come, next.
-    pub(crate) fn end_area_detour(&mut self) {
+    pub(crate) fn end_area_detour(&mut self, timers: &mut Timers) {
         let field_searches = self.area_searches;
-        self.forget_plan();
+        self.forget_path(timers);
         (self.path_kind, self.area_searches) = (PathKind::PlanReady, field_searches);
     }
 
@@ -314,6 +321,7 @@ impl Detours {
     pub(crate) fn scan_path<const V: usize, const W: usize, const G: usize>(
         &mut self,
         view: &DetourView<'_, V, W, G>,
+        timers: &mut Timers,
     ) -> Option<Instant> {
         let now = view.now;
         self.left_plan |= view.config.roster.len() > 1
@@ -328,9 +336,8 @@ impl Detours {
             self.scan_began = None;
             return None;
         }
-        let due = now - self.scanned_at >= BLOCKED_CHECK_EVERY;
+        let due = timers.take_due(Timer::PathScan, now, BLOCKED_CHECK_EVERY);
         if due {
-            self.scanned_at = now;
             self.scan_began.get_or_insert(now);
         }
         let looked = self.take_scan_result(view);

@@ -20,6 +20,7 @@ pub(crate) mod relay;
 mod silence;
 mod standing;
 mod states;
+mod strangers;
 
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
@@ -131,39 +132,6 @@ impl<const V: usize> Neighbours<V> {
 
     fn roster_index(&self, id: u8) -> Option<usize> {
         self.contacts[..self.roster_count].binary_search_by_key(&id, |c| c.id).ok()
-    }
-
-    fn stranger_index(&self, id: u8) -> Option<usize> {
-        let strangers = &self.contacts[self.roster_count..];
-        strangers.iter().position(|c| c.id == id).map(|at| at + self.roster_count)
-    }
-
-    /// Removes the strangers for which `keep` returns false.
-    fn retain_strangers(&mut self, mut keep: impl FnMut(&NeighbourEntry) -> bool) {
-        let mut at = self.roster_count;
-        while let Some(contact) = self.contacts.get(at) {
-            if keep(contact) {
-                at += 1;
-            } else {
-                self.contacts.remove(at);
-            }
-        }
-    }
-
-    /// The entry of a position's sender: that of the roster, else a stranger's, added if it fits.
-    fn entry_for_position(&mut self, id: u8, now: Instant) -> Option<&mut NeighbourEntry> {
-        if let Some(at) = self.active_roster_index(id, now).or_else(|| self.stranger_index(id)) {
-            return self.contacts.get_mut(at);
-        }
-        self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
-        let room = self.contacts.len() - self.roster_count < MAX_STRANGERS;
-        match Some(id).filter(|_| room).and_then(|id| self.add_contact(id, STRANGER_RANK)) {
-            Some(at) => self.contacts.get_mut(at),
-            None => {
-                self.dropped = self.dropped.wrapping_add(1);
-                None
-            }
-        }
     }
 
     /// Handles a neighbour's intent with the sequence number of its frame: only one newer than the

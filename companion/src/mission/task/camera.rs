@@ -21,6 +21,7 @@ use crate::link::Links;
 use crate::link::outbox::Outgoing;
 use crate::link::severity::Severity;
 use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
 
 /// Most camera commands in the queue.
 const MAX_COMMANDS: usize = 4;
@@ -82,10 +83,10 @@ pub(super) struct CameraControl {
     /// [`Trigger::Distance`] the autopilot's trigger is on. `None` elsewhere.
     running: Option<Trigger>,
     commands: Deque<CameraCommand, MAX_COMMANDS>,
-    /// Number of commands sent since the last answer, repetitions included, and (`sent_at`) when
-    /// the first queued command was sent last.
+    /// Number of commands sent since the last answer, repetitions included.
     tries: u8,
-    sent_at: Option<Instant>,
+    /// Whether the first queued command was sent.
+    sent: bool,
     /// Whether a command was dropped or refused: from then on such failures are not reported.
     failed: bool,
     /// The trigger of the picture at or just ahead of this place of the path; `None` if no picture
@@ -94,15 +95,12 @@ pub(super) struct CameraControl {
 }
 
 impl CameraControl {
-    /// Queues the camera commands that are due at this place, and sends the first queued command.
-    /// Returns whether the vehicle leaves its path here, and takes no more pictures.
+    /// Queues the camera commands that are due at this place. Returns whether the vehicle leaves its path here, and takes no more pictures.
     pub(super) fn step<const W: usize>(
         &mut self,
         photographs: &PicturePlan,
         path: &Path<W>,
         along: PathProgress,
-        now: Instant,
-        links: &mut Links,
     ) -> bool {
         let before = core::mem::replace(&mut self.place, along.place);
         if photographs.trigger != Trigger::None {
@@ -122,7 +120,6 @@ impl CameraControl {
                 _ => self.end_early(),
             }
         }
-        self.send_current_command(now, links);
         (before, along.place) == (PathRelation::OnPath, PathRelation::Elsewhere)
     }
 
@@ -224,25 +221,30 @@ impl CameraControl {
         // farthest away. Its tries count for the next command, so that the silence is reported.
         if self.commands.is_full() {
             self.commands.pop_front();
-            self.sent_at = None;
+            self.sent = false;
         }
         let _ = self.commands.push_back(order);
     }
 
     /// Sends the first queued command, and repeats it until it is acknowledged or has been sent
     /// five times.
-    pub(super) fn send_current_command(&mut self, now: Instant, links: &mut Links) {
+    pub(super) fn send_current_command(
+        &mut self,
+        now: Instant,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) {
         let Some(&order) = self.commands.front() else { return };
-        if self.sent_at.is_some_and(|at| now - at < REPEAT_EVERY) {
+        if self.sent && !timers.is_due(Timer::CameraCommand, now) {
             return;
         }
         if self.tries == MAX_TRIES {
             // Where the last tries were those of a command dropped from the full queue, this one
             // was not sent yet.
-            if self.sent_at.is_some() {
+            if self.sent {
                 self.commands.pop_front();
             }
-            (self.tries, self.sent_at) = (0, None);
+            (self.tries, self.sent) = (0, false);
             if !core::mem::replace(&mut self.failed, true) {
                 links.send_text(Severity::Warning, "Camera trigger is not acknowledged");
             }
@@ -250,17 +252,18 @@ impl CameraControl {
         }
         links.push(Link::Autopilot, order.to_message());
         self.tries += 1;
-        self.sent_at = Some(now);
+        self.sent = true;
+        timers.set(Timer::CameraCommand, now + REPEAT_EVERY);
     }
 
     fn drop_current_command(&mut self) {
         self.commands.pop_front();
-        (self.tries, self.sent_at) = (0, None);
+        (self.tries, self.sent) = (0, false);
     }
 
     pub(super) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
-        let waits = self.sent_at.is_some()
-            && self.commands.front().is_some_and(|o| o.mav_command() == ack.command);
+        let waits =
+            self.sent && self.commands.front().is_some_and(|o| o.mav_command() == ack.command);
         if !waits {
             return;
         }

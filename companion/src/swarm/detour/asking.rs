@@ -7,7 +7,8 @@ use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 use planner_core::flight::Waypoint;
 use planner_core::{Length, Point};
 
-use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_MARGIN_M};
+use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_MARGIN_M, DETOUR_RETRY};
+use super::homeward::RETURN_RETRY;
 use super::path_kind::{DetourPurpose, PathKind};
 use super::{
     DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER, TURN_DELAY_S,
@@ -16,6 +17,7 @@ use crate::guidance::evade;
 use crate::mission::State;
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
 
 /// Time from a search that found no landing place aside to the next search, seconds.
 const SIDESTEP_RETRY_S: u64 = 30;
@@ -229,6 +231,7 @@ impl Detours {
         progress_m: f32,
         now: Instant,
         progress_at: Instant,
+        timers: &mut Timers,
     ) {
         let on_detour = self.path_kind.is_detour();
         let stuck = on_detour && now - progress_at > STUCK_AFTER;
@@ -248,26 +251,35 @@ impl Detours {
             area_searches: field_searches,
             ..Self::default()
         };
+        timers.set(Timer::PathScan, now);
     }
 
     /// Notes that there is no free place on the plan's path to return to, so that no detour can be
     /// requested.
-    pub(crate) fn note_no_rejoin_place(&mut self, now: Instant) {
-        self.area_searches.note_failure(now);
+    pub(crate) fn note_no_rejoin_place(now: Instant, timers: &mut Timers) {
+        timers.set(Timer::RejoinSearch, now + DETOUR_RETRY);
     }
 
     /// Notes that the shell found no path from `along_m` metres along the path, and whether to
     /// search again.
-    pub(crate) fn note_failure(&mut self, along_m: f32, outlook: RetryOutlook, now: Instant) {
+    pub(crate) fn note_failure(
+        &mut self,
+        along_m: f32,
+        outlook: RetryOutlook,
+        now: Instant,
+        timers: &mut Timers,
+    ) {
         match self.sought {
             // The path home is sought again after a while.
-            Some(DetourPurpose::Home) => return self.home.note_failure(now),
+            Some(DetourPurpose::Home) => {
+                return timers.set(Timer::HomeSearch, now + RETURN_RETRY);
+            }
             // A failed search for a path aside does not count as a failed search for a detour.
             Some(DetourPurpose::Aside(_) | DetourPurpose::Landing) => {
                 self.no_way_aside_at = Some(now);
                 return;
             }
-            Some(DetourPurpose::Rejoin(_)) => return self.area_searches.note_failure(now),
+            Some(DetourPurpose::Rejoin(_)) => return Self::note_no_rejoin_place(now, timers),
             Some(DetourPurpose::Goal) | None => {}
         }
         self.failed_at = now;

@@ -18,6 +18,7 @@ use planner_core::{Length, Point};
 
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
 
 /// Deviation of a vehicle from its path, metres: a neighbour within the safety distance plus this
 /// of the path blocks it.
@@ -43,7 +44,7 @@ const LOOK_AHEAD_M: f32 = 60.0;
 /// block the detour again.
 pub(super) const DETOUR_MARGIN_M: f32 = 0.5;
 /// Time from a search that found no detour to the next search.
-const DETOUR_RETRY: Duration = Duration::from_secs(30);
+pub(super) const DETOUR_RETRY: Duration = Duration::from_secs(30);
 /// Maximum number of detours while one plan is flown.
 const MAX_DETOURS: u8 = 16;
 /// Maximum number of keep-out zones that are compared with the path.
@@ -58,20 +59,14 @@ const BLOCK_SEARCH_BEYOND_M: f32 = 1.0;
 /// very edge the same zone would block the path again.
 const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 
-/// Searches of a vehicle for detours that lead back to its path in a coverage mission: when one
-/// failed, and how many succeeded.
+/// Searches of a vehicle for detours that lead back to its path in a coverage mission: how many
+/// succeeded.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct AreaDetourSearches {
-    failed_at: Option<Instant>,
     found: u8,
 }
 
 impl AreaDetourSearches {
-    /// Notes that a search found no detour.
-    pub(crate) fn note_failure(&mut self, now: Instant) {
-        self.failed_at = Some(now);
-    }
-
     /// Notes that a detour has come.
     pub(super) fn note_found(&mut self) {
         self.found = self.found.saturating_add(1);
@@ -79,8 +74,8 @@ impl AreaDetourSearches {
 
     /// Whether a detour may be sought now: not within [`DETOUR_RETRY`] of a failure, and
     /// [`MAX_DETOURS`] times at most.
-    pub(super) fn may_seek(&self, now: Instant) -> bool {
-        self.found < MAX_DETOURS && self.failed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
+    pub(super) fn may_seek(&self, now: Instant, timers: &Timers) -> bool {
+        self.found < MAX_DETOURS && timers.is_due(Timer::RejoinSearch, now)
     }
 }
 

@@ -7,9 +7,10 @@
 
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
 
 /// Time from a search that found no path home to the next search.
-const RETURN_RETRY: Duration = Duration::from_secs(5);
+pub(super) const RETURN_RETRY: Duration = Duration::from_secs(5);
 /// Maximum number of turns home in one flight: blocked after the last, a vehicle seeks no further
 /// path home.
 const MAX_RETURNS: u8 = 4;
@@ -19,26 +20,20 @@ const MAX_RETURNS: u8 = 4;
 pub(crate) struct HomewardSearch {
     /// Since when the vehicle has been stopping to seek a path home; `None` if it does not.
     seeks_since: Option<Instant>,
-    /// When a search for the path home last failed.
-    failed_at: Option<Instant>,
     attempts: u8,
 }
 
 impl HomewardSearch {
     /// Begins the search: the vehicle turns home.
-    pub(crate) fn begin(&mut self, now: Instant) {
+    pub(crate) fn begin(&mut self, now: Instant, timers: &mut Timers) {
         let turns = self.attempts.saturating_add(1);
-        *self = Self { seeks_since: Some(now), attempts: turns, ..Self::default() };
+        *self = Self { seeks_since: Some(now), attempts: turns };
+        timers.set(Timer::HomeSearch, now);
     }
 
     /// Ends the search: a path from the shell has come, or the vehicle flies back another way.
     pub(crate) fn cancel(&mut self) {
-        *self = Self { attempts: self.attempts, ..Self::default() };
-    }
-
-    /// Notes that no path home was found.
-    pub(crate) fn note_failure(&mut self, now: Instant) {
-        self.failed_at = Some(now);
+        self.seeks_since = None;
     }
 
     /// Whether the vehicle has turned home and has no path home yet.
@@ -53,8 +48,8 @@ impl HomewardSearch {
 
     /// Whether the shell may be asked for the path home now: not within [`RETURN_RETRY`] of the
     /// last failure.
-    pub(crate) fn may_request(&self, now: Instant) -> bool {
-        self.is_seeking() && self.failed_at.is_none_or(|at| now - at >= RETURN_RETRY)
+    pub(crate) fn may_request(&self, now: Instant, timers: &Timers) -> bool {
+        self.is_seeking() && timers.is_due(Timer::HomeSearch, now)
     }
 
     /// Whether the vehicle can turn home: it is on its path in a coverage mission, and has turned

@@ -7,6 +7,7 @@ use super::{Detours, beside};
 use crate::guidance::PathSource;
 use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
+use crate::timers::Timers;
 
 /// Time for which a vehicle aside waits until the place where it left its path is free, seconds:
 /// less than the time after which it flies home.
@@ -98,9 +99,9 @@ impl Detours {
     }
 
     /// The vehicle turns home: it seeks a path there and gives up the plan's.
-    pub(crate) fn begin_way_home(&mut self, now: Instant) {
+    pub(crate) fn begin_way_home(&mut self, now: Instant, timers: &mut Timers) {
         self.give_up_plan();
-        self.home.begin(now);
+        self.home.begin(now, timers);
     }
 
     /// The vehicle flies back the way that it came: it seeks no path home and gives up the plan's.

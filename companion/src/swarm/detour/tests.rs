@@ -293,7 +293,7 @@ fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
         let along_m = (rng.next_u32() % 20) as f32;
         for _ in 0..rng.next_u32() % 9 {
             now = now + Duration::from_millis(1_000 + u64::from(rng.next_u32() % 29_000));
-            detours.note_failure(along_m, RetryOutlook::Settles, now);
+            detours.note_failure(along_m, RetryOutlook::Settles, now, &mut Timers::default());
             let after = |ms: u64| now + Duration::from_millis(ms);
             let pause_s = TURN_DELAY_S * (2 + u64::from(rng.next_u32() % 6));
             let before = after(1000 * pause_s - 1);
@@ -304,7 +304,7 @@ fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
         let (mut asked, outlook) =
             (0, if rng.next_u32() % 2 == 0 { RetryOutlook::Open } else { RetryOutlook::Closed });
         while !detours.has_given_up() {
-            detours.note_failure(along_m, outlook, now);
+            detours.note_failure(along_m, outlook, now, &mut Timers::default());
             asked += 1;
         }
         assert!((1..=MAX_DETOUR_SEARCHES).contains(&asked), "{asked}");

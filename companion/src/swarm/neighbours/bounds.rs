@@ -127,3 +127,5 @@ pub(super) const FAR_AWAY: Point = Point::new(1e6, 1e6, 1e6);
 pub(super) const NO_PLACE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 /// Greatest height of one vehicle over another, metres.
 pub(super) const MAX_HEIGHT_DIFFERENCE_M: f32 = 1000.0;
+/// Age of a vehicle's own last message up to which relayed reports of that vehicle are ignored.
+pub(super) const HEARD_DIRECTLY_WITHIN: Duration = Duration::from_secs(1);

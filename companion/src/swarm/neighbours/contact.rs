@@ -63,6 +63,22 @@ impl NeighbourEntry {
         })
     }
 
+    /// Progress of the vehicle along the shared plan, metres: as it reports it; unheard for a
+    /// second, the greater of that and what others relayed. `None` if it was last heard off the
+    /// plan.
+    pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
+        let own_m = self.state.progress_m;
+        if self.heard_within(now, HEARD_DIRECTLY_WITHIN)
+            || (own_m.is_none() && self.intent_at.is_some())
+        {
+            return own_m;
+        }
+        match (own_m, self.relayed_m) {
+            (Some(own_m), Some(relayed_m)) => Some(libm::fmaxf(own_m, relayed_m)),
+            (own_m, relayed_m) => own_m.or(relayed_m),
+        }
+    }
+
     /// Progress along the shared plan that the neighbour has surely made, metres: unheard at the
     /// edge of the radio's range it is assumed to fly on as far as its gates were open.
     pub(super) fn passed_m(&self, now: Instant) -> Option<f32> {

@@ -24,8 +24,9 @@
 
 use heapless::Vec;
 
+use super::Neighbours;
+use super::bounds::{HEARD_DIRECTLY_WITHIN, HEARD_WITHIN};
 use super::entry::NeighbourEntry;
-use super::{HEARD_WITHIN, Neighbours};
 use crate::time::{Duration, Instant};
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
@@ -38,8 +39,6 @@ const HEADER_LEN: usize = 12;
 const ITEM_LEN: usize = 11;
 /// Longest TUNNEL payload, bytes.
 pub(crate) const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_RELAYED * ITEM_LEN;
-/// Age of a vehicle's own last message up to which relayed reports of that vehicle are ignored.
-const HEARD_DIRECTLY_WITHIN: Duration = Duration::from_secs(1);
 /// Silence after which a vehicle that others still hear is out of range; shorter silence may be
 /// lost messages.
 const OUT_OF_RANGE_AFTER: Duration = Duration::from_secs(3);
@@ -131,22 +130,6 @@ impl Relay {
 }
 
 impl NeighbourEntry {
-    /// Progress of the vehicle along the shared plan, metres: as it reports it; unheard for a
-    /// second, the greater of that and what others relayed. `None` if it was last heard off the
-    /// plan.
-    pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
-        let own_m = self.state.progress_m;
-        if self.heard_within(now, HEARD_DIRECTLY_WITHIN)
-            || (own_m.is_none() && self.intent_at.is_some())
-        {
-            return own_m;
-        }
-        match (own_m, self.relayed_m) {
-            (Some(own_m), Some(relayed_m)) => Some(libm::fmaxf(own_m, relayed_m)),
-            (own_m, relayed_m) => own_m.or(relayed_m),
-        }
-    }
-
     /// Whether the neighbour is silent, but vehicles that heard it longer than this one lately
     /// relayed that it follows the plan: then it is out of range. A vehicle that all heard up to
     /// the same moment has failed.

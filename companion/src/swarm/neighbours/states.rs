@@ -15,7 +15,7 @@ impl<const V: usize> Neighbours<V> {
     /// does not block the path ([`Self::mark_path_clear`]).
     pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
         self.states.clear();
-        self.retain_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
+        self.forget_silent_strangers(now);
         for contact in &self.contacts {
             let progress_m = contact.passed_m(now);
             let placed_at = contact.position_at;

@@ -108,6 +108,7 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: f64, seed: u64) -> (Vec<f32>
     let mut chance = |share: f64| f64::from(rng.next_u32()) < share * f64::from(u32::MAX);
     let (mut camera, mut links, mut fake) =
         (CameraControl::default(), Links::default(), Fake::default());
+    let mut timers = Timers::default();
     let (mut framer, mut now, mut at_m, mut held) = (Framer::default(), Instant::ZERO, 0.0, 0);
     // At least one try of each command arrives; otherwise the command would be given up and
     // reported.
@@ -128,7 +129,8 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: f64, seed: u64) -> (Vec<f32>
             reference_m: at_m.min(path.length_m()),
             place: if held == 0 { PathRelation::OnPath } else { PathRelation::Elsewhere },
         };
-        camera.step(photographs, &path, along, now, &mut links);
+        camera.step(photographs, &path, along);
+        camera.send_current_command(now, &mut timers, &mut links);
         fake.fly(at_m);
         for frame in sent_frames(&mut links, &mut framer, now) {
             let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
@@ -213,6 +215,7 @@ proptest! {
         let hold_m = photographs.stretches(&path).next().unwrap().picture_at_m(number);
         let (mut camera, mut links, mut fake) =
             (CameraControl::default(), Links::default(), Fake::default());
+        let mut timers = Timers::default();
         let (mut framer, mut now, mut at_m) = (Framer::default(), Instant::ZERO, 0.0_f32);
         let bare = PicturePlan::new(8.0, HeadingMode::Ahead, photographs.trigger);
         for step in 0..800_u32 {
@@ -225,7 +228,8 @@ proptest! {
             let flown = if step < 600 { &photographs } else { &bare };
             let place = PathRelation::OnPath;
             let along = PathProgress { progress_m: at_m, reference_m, place };
-            camera.step(flown, &path, along, now, &mut links);
+            camera.step(flown, &path, along);
+            camera.send_current_command(now, &mut timers, &mut links);
             if step % looks_every == 0 {
                 fake.fly(at_m);
             }
@@ -252,6 +256,7 @@ proptest! {
         let leaves_m = shots.from_m + share * (shots.to_m - shots.from_m);
         let (mut camera, mut links, mut fake) =
             (CameraControl::default(), Links::default(), Fake::default());
+        let mut timers = Timers::default();
         let (mut framer, mut now, mut at_m) = (Framer::default(), Instant::ZERO, 0.0_f32);
         let mut taken_before = 0;
         for _ in 0..800_u32 {
@@ -261,7 +266,8 @@ proptest! {
             at_m += MPS * STEP_S;
             let place = if on_path { PathRelation::OnPath } else { PathRelation::Elsewhere };
             let along = PathProgress { progress_m: at_m, reference_m: at_m, place };
-            camera.step(&photographs, &path, along, now, &mut links);
+            camera.step(&photographs, &path, along);
+            camera.send_current_command(now, &mut timers, &mut links);
             fake.fly(at_m);
             deliver(&mut camera, &mut fake, &mut links, &mut framer, now, at_m);
         }
@@ -280,13 +286,15 @@ fn a_silent_autopilot_is_reported_at_any_speed() {
     let (photographs, path) = (photographs(Trigger::Waypoint), path());
     for mps in [2.0, 5.0, 10.0, 20.0, 40.0, 80.0] {
         let (mut camera, mut links) = (CameraControl::default(), Links::default());
+        let mut timers = Timers::default();
         let (mut framer, mut now, mut texts) = (Framer::default(), Instant::ZERO, 0);
         for step in 0..2000_u16 {
             now = now + Duration::from_millis(50);
             let progress_m = (mps * STEP_S * f32::from(step)).min(path.length_m());
             let place = PathRelation::OnPath;
             let along = PathProgress { progress_m, reference_m: progress_m, place };
-            camera.step(&photographs, &path, along, now, &mut links);
+            camera.step(&photographs, &path, along);
+            camera.send_current_command(now, &mut timers, &mut links);
             for frame in sent_frames(&mut links, &mut framer, now) {
                 texts += usize::from(frame.decode::<STATUSTEXT_DATA>().is_some());
             }
