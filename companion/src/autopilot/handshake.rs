@@ -1,6 +1,6 @@
 //! Arming the autopilot step by step, and which of its refusals are reported as texts.
 
-use crate::autopilot::telemetry::{Ack, Telemetry};
+use crate::autopilot::telemetry::{Ack, MAX_POSITION_AGE, Telemetry};
 use crate::mission::State;
 use crate::time::{Duration, Instant};
 
@@ -45,6 +45,8 @@ pub(crate) struct Handshake {
     /// Whether the landing detector has reported flight while armed, or the vehicle has risen,
     /// since the state `Arming` was entered.
     flown: bool,
+    /// Whether a start that was cancelled had begun its climb: unseen, the vehicle may rise.
+    climb_begun: bool,
     /// Estimated height with which the vehicle was last disarmed, metres.
     disarmed_z_m: f32,
     /// Refusals reported in this state: `MAV_CMD` and `MAV_RESULT`.
@@ -61,6 +63,9 @@ impl Handshake {
         }
         if from == State::PilotReturned {
             self.in_own_mode = true;
+        }
+        if to == State::CancelStart && from != to {
+            self.climb_begun = from.takes_off();
         }
     }
 
@@ -130,6 +135,13 @@ impl Handshake {
     /// since the state `Arming` was entered.
     pub(crate) fn has_flown(&self) -> bool {
         self.flown
+    }
+
+    /// Whether a vehicle whose start is cancelled may be disarmed: it has not risen, and if its
+    /// climb had begun, its position is known now.
+    pub(crate) fn may_disarm_on_pad(&self, now: Instant, telemetry: &Telemetry) -> bool {
+        let seen = telemetry.position_age(now) < MAX_POSITION_AGE;
+        !self.flown && (seen || !self.climb_begun)
     }
 
     /// Notes that HEARTBEAT is missing while the vehicle is to be armed.

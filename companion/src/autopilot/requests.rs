@@ -271,7 +271,9 @@ impl Requests {
             {
                 push(change_to(kind.setpoint_mode()));
             }
-            State::CancelStart if !self.handshake.has_flown() => push(Outgoing::Arm(false)),
+            State::CancelStart if self.handshake.may_disarm_on_pad(s.now, telemetry) => {
+                push(Outgoing::Arm(false));
+            }
             State::TakeOff => {
                 timers.set(Timer::Request, s.now + TAKE_OFF_RETRY_EVERY);
                 push(Outgoing::TakeOff(telemetry.above_home_m + s.climb_m));

@@ -29,6 +29,8 @@ use crate::link::sequence::SequenceFilter;
 use crate::margins;
 use crate::time::{Duration, Instant};
 
+/// Age from which a position counts as unknown.
+pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500);
 const HEARTBEAT: u32 = 0;
 const EXTENDED_SYS_STATE: u32 = 245;
 const FLAG_ARMED: u8 = 0x80;

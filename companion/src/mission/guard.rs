@@ -1,11 +1,10 @@
 //! The guards: conditions of the rows of the mission table.
 
 use super::inputs::GuardInputs;
+pub(crate) use crate::autopilot::telemetry::MAX_POSITION_AGE;
 use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
 use crate::time::Duration;
 
-/// Age from which a position counts as unknown.
-pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500);
 /// Time without progress after which a vehicle at the geofence no longer waits for room below: its
 /// landing is held then, and it flies back.
 const MAX_WAIT_AT_FENCE: Duration = Duration::from_secs(30);
