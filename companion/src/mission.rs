@@ -19,7 +19,7 @@ use self::table::TABLE;
 pub(crate) use self::table::UNFOLLOWED_MOST;
 
 pub use self::guard::Guard;
-pub(crate) use self::guard::MAX_POSITION_AGE;
+pub(crate) use self::guard::{MAX_HEARTBEAT_AGE, MAX_POSITION_AGE};
 pub use self::inputs::GuardInputs;
 use self::row::state_mask;
 pub use self::row::{Action, TransitionRow};

@@ -25,7 +25,7 @@ use crate::quote::quoted_path;
 /// Length of a board's stack, bytes.
 pub const STACK_LEN: usize = 88 << 10;
 /// Wall-clock time without an answer after which a board counts as hung.
-const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
+const BOARD_HUNG_AFTER: Duration = Duration::from_secs(10);
 
 /// Shell command that starts a board. Semihosting prints the board's log to standard output, so the
 /// board's answers use file descriptor 3.
@@ -139,7 +139,7 @@ impl EmulatedBoard {
     /// # Errors
     /// The board does not answer within 10 s, or its process has ended.
     pub fn wait_for_grant(&mut self) -> anyhow::Result<GrantResult> {
-        self.wait_for_grant_within(ANSWER_TIMEOUT)
+        self.wait_for_grant_within(BOARD_HUNG_AFTER)
     }
 
     /// As [`wait_for_grant`](Self::wait_for_grant), with another limit of wall-clock

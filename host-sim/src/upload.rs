@@ -26,7 +26,8 @@ const COMPONENT_ID: u8 = 190;
 /// Longest wait for an answer: the companion may have to erase its flash first, eight sectors of
 /// two seconds each.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
-const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
+/// Period of HEARTBEAT, by which autopilots know that they have to forward messages to the client.
+const CLIENT_HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
 
 const TERMINATE: u8 = 1;
 const RESET: u8 = 2;
@@ -107,7 +108,7 @@ impl FtpClient {
     /// Also sends a HEARTBEAT each second, so that autopilots forward messages to this client.
     fn receive_frames(&mut self) -> anyhow::Result<Vec<Frame>> {
         if self.link.now() >= self.next_heartbeat_at {
-            self.next_heartbeat_at += HEARTBEAT_EVERY;
+            self.next_heartbeat_at += CLIENT_HEARTBEAT_EVERY;
             let beat = HEARTBEAT_DATA {
                 mavtype: MavType::MAV_TYPE_GCS,
                 autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,

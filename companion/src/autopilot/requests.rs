@@ -13,7 +13,7 @@ use crate::link::Links;
 use crate::link::frame::{COMPANION_COMPONENT, Frame};
 use crate::link::outbox::Outgoing;
 use crate::link::severity::Severity;
-use crate::mission::State;
+use crate::mission::{MAX_HEARTBEAT_AGE, State};
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
@@ -28,6 +28,7 @@ pub(crate) const DISARM_EVERY: Duration = Duration::from_millis(9000);
 /// Least time in the state `Land` before the landing mode is requested: the safety filter checks
 /// the column below the vehicle for two steps first.
 const LAND_REQUEST_AFTER: Duration = Duration::from_millis(100);
+/// Time between two requests of one kind to the autopilot, unless another constant says otherwise.
 const REQUEST_RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// Time between two requests to take off: longer than ArduCopter takes to spin up and lift off (2.3
 /// s).
@@ -37,9 +38,6 @@ const TAKE_OFF_RETRY_EVERY: Duration = Duration::from_millis(4000);
 const POSITION_STREAM_TIMEOUT: Duration = Duration::from_millis(1500);
 /// Least time between two requests for all streams.
 const STREAMS_RETRY_EVERY: Duration = Duration::from_millis(2000);
-/// Greatest age of the last HEARTBEAT with which the autopilot counts as heard: HEARTBEAT comes at
-/// 1 Hz, and one late is not yet silence.
-const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 /// Most streams requested in one step while connecting.
 const STREAM_REQUESTS_PER_STEP: usize = 5;
 const GPS_GLOBAL_ORIGIN: u16 = 49;

@@ -22,7 +22,7 @@ const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
 /// metres.
 const AT_HOLD_M: f32 = 0.2;
 /// Time under a pilot's control after which a vehicle counts as having left the mission.
-const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
+const LEFT_WITH_PILOT_AFTER: Duration = Duration::from_secs(20);
 /// Time for which a vehicle on the ground that cannot make a commitment keeps its share while
 /// another one flies.
 pub(super) const CANNOT_START_MOST: Duration = Duration::from_secs(60);
@@ -109,7 +109,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ends = match state {
             Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
             PilotControl | PilotReturned => {
-                self.mission.time_with_pilot(self.now) >= PILOT_KEEPS_AFTER
+                self.mission.time_with_pilot(self.now) >= LEFT_WITH_PILOT_AFTER
             }
             _ => {
                 (off_plan && !beside)

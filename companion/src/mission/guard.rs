@@ -283,7 +283,7 @@ pub enum Guard {
 
 /// Age of the last HEARTBEAT from which the autopilot counts as silent: HEARTBEAT comes at 1 Hz,
 /// and a late one is not yet silence.
-pub(super) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
+pub(crate) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 
 impl Guard {
     /// Whether the condition is met, and where it has a duration, has been met for `limit`.

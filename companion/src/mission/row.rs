@@ -89,6 +89,7 @@ pub struct TransitionRow {
     pub severity: Severity,
 }
 
+/// Least time in a state of a row that acts in the first step in which its guard holds.
 pub(crate) const AT_ONCE: Duration = Duration::from_millis(0);
 
 /// Bit mask with one bit for each of these states.

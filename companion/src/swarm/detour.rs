@@ -74,7 +74,7 @@ const BLOCKED_AGAIN_M: f32 = 2.0;
 /// Time since the safety filter last stopped the vehicle within which it still counts as stopped;
 /// for a blocked vehicle it is [`BLOCKED_HINDERED_WITHIN`], so that a neighbour that sways at the
 /// edge of the path does not make the block begin again and again.
-const HINDERED_WITHIN: Duration = Duration::from_millis(500);
+const UNBLOCKED_HINDERED_WITHIN: Duration = Duration::from_millis(500);
 /// Time without a stop by the safety filter after which a blocked vehicle counts as free.
 const BLOCKED_HINDERED_WITHIN: Duration = Duration::from_secs(3);
 /// Time under a pilot's control after which the vehicle counts as out of the plan: others fly
@@ -385,7 +385,7 @@ impl Detours {
             && !Self::is_freed_over_area(view)
             && self.all_standing_since.is_some_and(|at| now - at > DEAD_END_AFTER);
         let blocked = view.mission.state() == State::Blocked;
-        let free = if blocked { BLOCKED_HINDERED_WITHIN } else { HINDERED_WITHIN };
+        let free = if blocked { BLOCKED_HINDERED_WITHIN } else { UNBLOCKED_HINDERED_WITHIN };
         let stopped = self.is_stopped_for_long(view, free);
         self.blocked =
             !view.guidance.returning && (stuck || astray || dead_end || stopped || self.obstructed);

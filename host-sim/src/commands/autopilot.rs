@@ -20,10 +20,11 @@ use crate::link::{ByteLink, LinkUrl};
 use crate::progress::check_printed;
 use crate::say;
 
+/// Time step of the simulated vehicle: 250 Hz.
 const PHYSICS_STEP: Duration = Duration::from_millis(4);
 /// Greatest time by which the simulation may be behind the wall clock and still catches up. If it
 /// is further behind, it skips the missed steps.
-const MAX_CLOCK_LAG: Duration = Duration::from_secs(1);
+const MAX_PHYSICS_LAG: Duration = Duration::from_secs(1);
 /// Longest datagram that is sent, bytes: fits the MTU of any network.
 const MAX_DATAGRAM: usize = 1400;
 
@@ -130,7 +131,7 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
         autopilot.step(PHYSICS_STEP.as_secs_f32(), ground_up_m);
         next += PHYSICS_STEP;
         let now = Instant::now();
-        if now > next + MAX_CLOCK_LAG {
+        if now > next + MAX_PHYSICS_LAG {
             next = now;
         }
         std::thread::sleep(next.saturating_duration_since(now));

@@ -32,7 +32,8 @@ pub struct Args {
     seed: u64,
 }
 
-const POLL_SLEEP: Duration = Duration::from_millis(1);
+/// Sleep between two polls of the simulated radio.
+const RADIO_POLL_SLEEP: Duration = Duration::from_millis(1);
 
 fn parse_number(text: &str, most: f64) -> Result<f64, String> {
     let sound = text.parse().ok().filter(|value| (0.0..=most).contains(value));
@@ -85,6 +86,6 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 link.send(&packet).with_context(lost)?;
             }
         }
-        sleep(POLL_SLEEP);
+        sleep(RADIO_POLL_SLEEP);
     }
 }

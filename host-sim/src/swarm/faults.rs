@@ -40,7 +40,7 @@ const CORRUPTED_SHARE: f64 = 0.01;
 /// autopilots'.
 const BATTERY_LEFT: f32 = 0.1;
 /// By how much `position-jump` moves the estimate if the fault has no `offset_m`, ENU metres.
-const POSITION_JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
+const DEFAULT_POSITION_JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
 /// By how much `origin-change` moves the EKF origin if the fault has no `offset_m`, ENU metres.
 const ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
 /// Duration of a serial stall or an autopilot's boot if the fault has no `duration_s`, seconds.
@@ -200,7 +200,7 @@ fn begin_fault(
         "serial-stall" => member.stall_serial(spell_us),
         "serial-corrupt" => member.set_serial_corruption(CORRUPTED_SHARE),
         "position-jump" => {
-            member.autopilot.jump_position(&fault.offset_m.unwrap_or(POSITION_JUMP_M));
+            member.autopilot.jump_position(&fault.offset_m.unwrap_or(DEFAULT_POSITION_JUMP_M));
         }
         "origin-change" => {
             member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_CHANGE_M));
@@ -227,7 +227,7 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
         "radio-cut" => world.radio.set_outage(i, RadioOutage::default()),
         "serial-corrupt" => member.set_serial_corruption(corruption),
         "position-jump" => {
-            member.autopilot.jump_position(&-fault.offset_m.unwrap_or(POSITION_JUMP_M));
+            member.autopilot.jump_position(&-fault.offset_m.unwrap_or(DEFAULT_POSITION_JUMP_M));
         }
         "origin-change" => {
             member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_CHANGE_M));

@@ -338,14 +338,13 @@ fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Interval) -> Option<Inte
 /// Range of `u` on the line `v` that is nearer than [`ZONE_CLEARANCE_M`] to an edge: within the
 /// circles around its ends and the lines beside it. `None` if there is none.
 fn range_near_edge((a, b): (Flat, Flat), v: f32) -> Option<Interval> {
-    const CLEAR_M: f32 = ZONE_CLEARANCE_M;
-    if fmaxf(a.y, b.y) < v - CLEAR_M || fminf(a.y, b.y) > v + CLEAR_M {
+    if fmaxf(a.y, b.y) < v - ZONE_CLEARANCE_M || fminf(a.y, b.y) > v + ZONE_CLEARANCE_M {
         return None;
     }
     let [mut low, mut high] = [f32::INFINITY, f32::NEG_INFINITY];
     let mut hold = |u: f32| (low, high) = (fminf(low, u), fmaxf(high, u));
     for end in [a, b] {
-        let square = CLEAR_M * CLEAR_M - (v - end.y) * (v - end.y);
+        let square = ZONE_CLEARANCE_M * ZONE_CLEARANCE_M - (v - end.y) * (v - end.y);
         if square >= 0.0 {
             let half = fpu::sqrtf(square);
             hold(end.x - half);
@@ -353,7 +352,7 @@ fn range_near_edge((a, b): (Flat, Flat), v: f32) -> Option<Interval> {
         }
     }
     let edge = b - a;
-    let beside = Flat::new(-edge.y, edge.x) * (CLEAR_M / edge.length());
+    let beside = Flat::new(-edge.y, edge.x) * (ZONE_CLEARANCE_M / edge.length());
     for from in [a - beside, a + beside] {
         let share = (v - from.y) / edge.y;
         if (0.0..=1.0).contains(&share) {

@@ -1,6 +1,6 @@
 //! Duplicate detection: the outcomes of requests that must not be executed twice.
 //!
-//! A repeated request is recognised by its whole content for [`DUPLICATE_WINDOW`]. MAVSDK repeats
+//! A repeated request is recognised by its whole content for [`REPETITION_WINDOW`]. MAVSDK repeats
 //! with a new sequence number, up to 4 s later. So the outcome of closing a session is sent again
 //! for [`CLOSED_SESSION_WINDOW`] whatever the sequence number, until the client opens the next
 //! session.
@@ -9,7 +9,7 @@ use super::packet::{FtpRequest, NakError, RequestFingerprint, op, request_finger
 use crate::time::{Duration, Instant};
 
 /// Time for which a repetition of an answered request is recognised.
-const DUPLICATE_WINDOW: Duration = Duration::from_secs(3);
+const REPETITION_WINDOW: Duration = Duration::from_secs(3);
 /// Time for which a repeated TerminateSession gets the outcome of the closed session.
 const CLOSED_SESSION_WINDOW: Duration = Duration::from_secs(10);
 /// Most answered requests that are remembered.
@@ -59,11 +59,11 @@ impl DuplicateDetection {
         }
     }
 
-    /// Outcome of this same request if it was answered within the last 3 s (`DUPLICATE_WINDOW`).
+    /// Outcome of this same request if it was answered within the last 3 s (`REPETITION_WINDOW`).
     pub fn previous_outcome(&self, request: &FtpRequest, now: Instant) -> Option<Outcome> {
         let print = request_fingerprint(request);
         let known =
-            |done: &&AnsweredRequest| done.request == print && now - done.at < DUPLICATE_WINDOW;
+            |done: &&AnsweredRequest| done.request == print && now - done.at < REPETITION_WINDOW;
         self.done.iter().flatten().find(known).map(|done| done.outcome)
     }
 

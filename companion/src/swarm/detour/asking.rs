@@ -7,7 +7,7 @@ use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
 use planner_core::flight::Waypoint;
 use planner_core::{Length, Point};
 
-use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_MARGIN_M, DETOUR_RETRY};
+use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_BESIDE_RETRY, DETOUR_MARGIN_M};
 use super::homeward::RETURN_RETRY;
 use super::path_kind::{DetourPurpose, PathKind};
 use super::{
@@ -257,7 +257,7 @@ impl Detours {
     /// Notes that there is no free place on the plan's path to return to, so that no detour can be
     /// requested.
     pub(crate) fn note_no_rejoin_place(now: Instant, timers: &mut Timers) {
-        timers.set(Timer::RejoinSearch, now + DETOUR_RETRY);
+        timers.set(Timer::RejoinSearch, now + DETOUR_BESIDE_RETRY);
     }
 
     /// Notes that the shell found no path from `along_m` metres along the path, and whether to

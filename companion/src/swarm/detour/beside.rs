@@ -44,7 +44,7 @@ const LOOK_AHEAD_M: f32 = 60.0;
 /// block the detour again.
 pub(super) const DETOUR_MARGIN_M: f32 = 0.5;
 /// Time from a search that found no detour to the next search.
-pub(super) const DETOUR_RETRY: Duration = Duration::from_secs(30);
+pub(super) const DETOUR_BESIDE_RETRY: Duration = Duration::from_secs(30);
 /// Maximum number of detours while one plan is flown.
 const MAX_DETOURS: u8 = 16;
 /// Maximum number of keep-out zones that are compared with the path.
@@ -72,7 +72,7 @@ impl AreaDetourSearches {
         self.found = self.found.saturating_add(1);
     }
 
-    /// Whether a detour may be sought now: not within [`DETOUR_RETRY`] of a failure, and
+    /// Whether a detour may be sought now: not within [`DETOUR_BESIDE_RETRY`] of a failure, and
     /// [`MAX_DETOURS`] times at most.
     pub(super) fn may_seek(&self, now: Instant, timers: &Timers) -> bool {
         self.found < MAX_DETOURS && timers.is_due(Timer::RejoinSearch, now)

@@ -10,14 +10,14 @@ use crate::swarm::view::{DetourView, ReportedPlace};
 use crate::time::{Duration, Instant};
 
 /// Age of this vehicle's position above which the velocity reported with it is 0.
-const MAX_POSITION_AGE: Duration = Duration::from_secs(2);
+const VELOCITY_UNKNOWN_AFTER: Duration = Duration::from_secs(2);
 
 impl Detours {
     /// Position and velocity that this vehicle reports to the others, and when they were measured;
     /// velocity 0 after a jump of the position, and with an old position.
     pub(crate) fn reported_place(&self, telemetry: &Telemetry, now: Instant) -> ReportedPlace {
         let t = telemetry;
-        let vague = self.before_jump.is_some() || t.position_age(now) > MAX_POSITION_AGE;
+        let vague = self.before_jump.is_some() || t.position_age(now) > VELOCITY_UNKNOWN_AFTER;
         let (position, at) =
             self.before_jump.unwrap_or((t.position, t.position_at.unwrap_or_default()));
         ReportedPlace { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
