@@ -1,28 +1,53 @@
 //! Makes and checks docs/margins.md, the page of all distances, times, speeds and accelerations
 //! that the code on board, or the planning on the host, decides by.
 //!
-//! It lists every f32 or f64 `const` of planner-core, companion and host-sim whose name ends in
-//! `_M`, `_S`, `_MPS`, `_MPS2` or `_MPS3`: value, doc comment, and the files that use it. Two constants of one name are an
-//! error.
+//! It lists the constants of planner-core, companion and host-sim that are a number, an array, a
+//! tuple, a range or a `Point` with a unit at the end of the name (`UNITS`),
+//! and every constant that is a `Duration`: top-level ones, those of an `impl`, and those within a
+//! function. Each has its value, its doc comment, and the files that use it. A constant without a
+//! reason and two constants of one name are errors. A `usize` is an index or a count, and is not
+//! listed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
+use std::ops::Range;
 use std::path::Path;
 use std::{env, fs};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
+use proc_macro2::Span;
 use syn::visit::{self, Visit};
-use syn::{Expr, ExprLit, Item, Lit, Meta, Type};
+use syn::{Attribute, Expr, ExprLit, GenericArgument, Ident, Item, Lit, Meta, PathArguments, Type};
 
 use super::sources::{Source, Tree};
 
 const PAGE: &str = "docs/margins.md";
 const CRATES: [&str; 3] = ["planner-core", "companion", "host-sim"];
-/// Ends of constants' names, and the unit that each means.
-const UNITS: [(&str, &str); 5] =
-    [("_M", "m"), ("_MPS", "m/s"), ("_MPS2", "m/s²"), ("_MPS3", "m/s³"), ("_S", "s")];
+/// Published figures that the plans are compared with: nothing is decided by them.
+const FIGURES: &str = "host-sim/src/paper/";
+/// Ends of constants' names, and the unit that each means; of two that fit, the first holds.
+const UNITS: [(&str, &str); 12] = [
+    ("_BYTES_PER_S", "byte/s"),
+    ("_PER_S", "1/s"),
+    ("_PER_S2", "1/s²"),
+    ("_M", "m"),
+    ("_CM", "cm"),
+    ("_MM", "mm"),
+    ("_MPS", "m/s"),
+    ("_MPS2", "m/s²"),
+    ("_MPS3", "m/s³"),
+    ("_S", "s"),
+    ("_MS", "ms"),
+    ("_US", "µs"),
+];
+/// Types of one number with a unit.
+const NUMBERS: [&str; 11] =
+    ["f32", "f64", "u8", "u16", "u32", "u64", "i8", "i16", "i32", "i64", "Point"];
+/// Functions that make a `Duration` of a whole number, and how many of it are a second.
+const MAKERS: [(&str, u64); 4] =
+    [("secs", 1), ("from_secs", 1), ("from_millis", 1_000), ("from_micros", 1_000_000)];
 const HEAD: &str = "# Distances, times, speeds and accelerations\n\nEvery one that the code on board (planner-core, companion) \
-or the host (host-sim) decides by, with its\nreason: margins, reserves, leads, windows, limits.\nMade from the sources: `FLOCKMATE_WRITE=1 cargo xtask structure`. How margins \
+or the host (host-sim) decides by, with its\nreason: margins, reserves, leads, windows, limits. A duration is in seconds.\nMade from the sources: `FLOCKMATE_WRITE=1 cargo xtask structure`. How margins \
 add up to an argument is in\n[safety.md](safety.md#margins). What a mission states itself (radius, margin, separation, speeds) is not here.\n";
 
 struct Distance {
@@ -31,6 +56,9 @@ struct Distance {
     reason: String,
     users: Vec<String>,
 }
+
+/// The listed constants, by file and name.
+type Found = BTreeMap<(String, String), Distance>;
 
 /// Compares docs/margins.md with the sources, or writes it where `FLOCKMATE_WRITE` is set. Returns
 /// a line for each fault.
@@ -41,38 +69,19 @@ pub fn check_margins_page() -> Result<Vec<String>> {
             sources.extend(tree.sources);
         }
     }
-    let mut wrong = Vec::new();
-    let mut found: BTreeMap<(String, String), Distance> = BTreeMap::new();
-    let mut names: BTreeMap<String, String> = BTreeMap::new();
+    let mut listing = Listing::default();
     for source in &sources {
         let file = source.path.display().to_string();
-        for item in &source.items {
-            let Item::Const(item) = item else { continue };
-            let number = |kind| matches!(&*item.ty, Type::Path(path) if path.path.is_ident(kind));
-            if !number("f32") && !number("f64") {
-                continue;
-            }
-            let name = item.ident.to_string();
-            let Some((_, unit)) = UNITS.into_iter().find(|(end, _)| name.ends_with(end)) else {
-                continue;
-            };
-            if let Some(other) = names.insert(name.clone(), file.clone()) {
-                wrong.push(format!("{file}: {name} is the name of another one in {other}"));
-            }
-            let text = fs::read_to_string(&source.path)?;
-            let value = written(&text, &name).with_context(|| format!("{file}: {name}"))?;
-            let reason = reason(&item.attrs);
-            if reason.is_empty() {
-                wrong.push(format!("{file}: {name} has no reason"));
-            }
-            found.insert((file.clone(), name), Distance { value, unit, reason, users: Vec::new() });
+        if !file.starts_with(FIGURES) {
+            listing.add(&file, &source.items, &fs::read_to_string(&source.path)?);
         }
     }
+    let Listing { mut found, mut wrong, .. } = listing;
     for source in &sources {
-        let mut used = Used(BTreeMap::new());
+        let mut used = Used(BTreeSet::new());
         source.items.iter().for_each(|item| used.visit_item(item));
         for ((_, name), distance) in &mut found {
-            if used.0.contains_key(name) {
+            if used.0.contains(name) {
                 distance.users.push(short(source));
             }
         }
@@ -88,29 +97,150 @@ pub fn check_margins_page() -> Result<Vec<String>> {
     Ok(wrong)
 }
 
+/// What was found in the files so far.
+#[derive(Default)]
+struct Listing {
+    found: Found,
+    /// The file of each name.
+    files: BTreeMap<String, String>,
+    /// A line for each fault.
+    wrong: Vec<String>,
+}
+
+impl Listing {
+    /// Adds the constants of a file's items; `text` is the whole file.
+    fn add(&mut self, file: &str, items: &[Item], text: &str) {
+        let mut constants = Constants(Vec::new());
+        items.iter().for_each(|item| constants.visit_item(item));
+        for Constant { name, unit, reason, seconds, bytes } in constants.0 {
+            if let Some(other) = self.files.insert(name.clone(), file.to_owned()) {
+                self.wrong.push(format!("{file}: {name} is the name of another one in {other}"));
+            }
+            if reason.is_empty() {
+                self.wrong.push(format!("{file}: {name} has no reason"));
+            }
+            let value = seconds.unwrap_or_else(|| in_one_line(&text[bytes]));
+            let distance = Distance { value, unit, reason, users: Vec::new() };
+            self.found.insert((file.to_owned(), name), distance);
+        }
+    }
+}
+
+/// A constant that the page lists, as it was parsed.
+struct Constant {
+    name: String,
+    unit: &'static str,
+    reason: String,
+    /// The value of a `Duration` in seconds, if a whole number makes it.
+    seconds: Option<String>,
+    /// Bytes of the file that hold the value.
+    bytes: Range<usize>,
+}
+
+/// Collects the constants that the page lists.
+struct Constants(Vec<Constant>);
+
+impl Constants {
+    fn add(&mut self, name: &Ident, kind: &Type, attributes: &[Attribute], value: &Value<'_>) {
+        let name = name.to_string();
+        let Some(unit) = unit(&name, kind) else { return };
+        let seconds = is(kind, "Duration").then(|| seconds(value.is)).flatten();
+        let bytes = value.after.byte_range().end..value.before.byte_range().start;
+        self.0.push(Constant { name, unit, reason: reason(attributes), seconds, bytes });
+    }
+}
+
+/// The value of a constant, between `=` and `;`.
+struct Value<'a> {
+    is: &'a Expr,
+    after: Span,
+    before: Span,
+}
+
+impl<'a> Visit<'a> for Constants {
+    fn visit_item_const(&mut self, item: &'a syn::ItemConst) {
+        let (after, before) = (item.eq_token.spans[0], item.semi_token.spans[0]);
+        self.add(&item.ident, &item.ty, &item.attrs, &Value { is: &item.expr, after, before });
+        visit::visit_item_const(self, item);
+    }
+
+    fn visit_impl_item_const(&mut self, item: &'a syn::ImplItemConst) {
+        let (after, before) = (item.eq_token.spans[0], item.semi_token.spans[0]);
+        self.add(&item.ident, &item.ty, &item.attrs, &Value { is: &item.expr, after, before });
+        visit::visit_impl_item_const(self, item);
+    }
+}
+
+/// The unit of a constant, if the page lists constants of its name and type.
+fn unit(name: &str, kind: &Type) -> Option<&'static str> {
+    if is(kind, "Duration") {
+        return Some("s");
+    }
+    let (_, unit) = UNITS.into_iter().find(|(end, _)| name.ends_with(end))?;
+    is_numeric(kind).then_some(unit)
+}
+
+/// Whether a type holds numbers with a unit only.
+fn is_numeric(kind: &Type) -> bool {
+    match kind {
+        Type::Array(array) => is_numeric(&array.elem),
+        Type::Tuple(tuple) => tuple.elems.iter().all(is_numeric),
+        Type::Path(path) => path.path.segments.last().is_some_and(|last| match &last.arguments {
+            PathArguments::AngleBracketed(inner) if last.ident.to_string().starts_with("Range") => {
+                inner.args.iter().all(|inner| match inner {
+                    GenericArgument::Type(inner) => is_numeric(inner),
+                    _ => false,
+                })
+            }
+            PathArguments::None => NUMBERS.iter().any(|number| last.ident == number),
+            _ => false,
+        }),
+        _ => false,
+    }
+}
+
+/// Whether a type's last name is `name`.
+fn is(kind: &Type, name: &str) -> bool {
+    let Type::Path(path) = kind else { return false };
+    path.path.segments.last().is_some_and(|last| last.ident == name)
+}
+
+/// The seconds of a `Duration` that a whole number makes.
+fn seconds(value: &Expr) -> Option<String> {
+    let Expr::Call(call) = value else { return None };
+    let Expr::Path(maker) = &*call.func else { return None };
+    let maker = &maker.path.segments.last()?.ident;
+    let (_, second) = MAKERS.into_iter().find(|(name, _)| maker == name)?;
+    let Some(Expr::Lit(ExprLit { lit: Lit::Int(number), .. })) = call.args.first() else {
+        return None;
+    };
+    let number: u64 = number.base10_parse().ok()?;
+    let digits = second.ilog10() as usize;
+    let rest = format!("{:0digits$}", number % second);
+    let rest = if digits == 0 { "" } else { rest.trim_end_matches('0') };
+    Some(format!("{}.{}", number / second, if rest.is_empty() { "0" } else { rest }))
+}
+
 /// Collects the identifiers that expressions use.
-struct Used(BTreeMap<String, ()>);
+struct Used(BTreeSet<String>);
 
 impl<'a> Visit<'a> for Used {
     fn visit_expr_path(&mut self, path: &'a syn::ExprPath) {
         if let Some(last) = path.path.segments.last() {
-            self.0.insert(last.ident.to_string(), ());
+            self.0.insert(last.ident.to_string());
         }
         visit::visit_expr_path(self, path);
     }
 }
 
-/// The value of constant `name` as the source's text has it.
-fn written(text: &str, name: &str) -> Option<String> {
-    let (_, rest) = text.split_once(&format!("const {name}: "))?;
-    let (_, rest) = rest.split_once('=')?;
-    let (value, _) = rest.split_once(';')?;
-    Some(value.split_whitespace().collect::<Vec<_>>().join(" "))
+fn in_one_line(text: &str) -> String {
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    line.replace("[ ", "[").replace(", ]", "]").replace(" ]", "]")
 }
 
 /// The doc comment of an item, joined to one line of a Markdown table.
-fn reason(attributes: &[syn::Attribute]) -> String {
-    let line = |attribute: &syn::Attribute| {
+fn reason(attributes: &[Attribute]) -> String {
+    let line = |attribute: &Attribute| {
         let Meta::NameValue(meta) = &attribute.meta else { return None };
         let Expr::Lit(ExprLit { lit: Lit::Str(text), .. }) = &meta.value else { return None };
         attribute.path().is_ident("doc").then(|| text.value().trim().to_owned())
@@ -130,7 +260,7 @@ fn short(source: &Source) -> String {
     path.split_once("/src/").map_or(path.clone(), |(_, file)| file.to_owned())
 }
 
-fn page(found: &BTreeMap<(String, String), Distance>) -> String {
+fn page(found: &Found) -> String {
     let mut page = HEAD.to_owned();
     let mut before = "";
     for ((file, name), distance) in found {
@@ -147,3 +277,6 @@ fn page(found: &BTreeMap<(String, String), Distance>) -> String {
     }
     page
 }
+
+#[cfg(test)]
+mod tests;
