@@ -54,10 +54,6 @@ pub use self::smoother::SetpointStats;
 /// A vehicle this near to its reference, or to the end of a climb or a path, counts as there,
 /// metres.
 const ARRIVED_M: f32 = 0.35;
-/// A vehicle within [`ARRIVED_M`] of its reference reports its progress at most this far short of
-/// the reference, metres: 0.05 m less than gates allow (`PROGRESS_ERROR_M`), since a vehicle stops
-/// a little short of a gate.
-const REPORTED_SHORT_M: f32 = planner_core::flight::PROGRESS_ERROR_M - 0.05;
 /// Speed below which the vehicle stands at the end of its path, m/s.
 const AT_REST_MPS: f32 = 0.5;
 /// Speed below which the setpoint stands, m/s.

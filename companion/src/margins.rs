@@ -36,6 +36,9 @@ pub const MIN_ESTIMATE_ERROR_M: f32 = 0.1;
 /// Ratio of the estimate's error bound to the accuracy that the autopilot reports, which is one
 /// standard deviation.
 pub const ACCURACY_FACTOR: f32 = 3.0;
+/// Distance by which a bound of the estimate's error may exceed the margin left for it, metres:
+/// rounding.
+const ERROR_BOUND_ROUNDING_M: f32 = 1e-4;
 /// Age from which a reported accuracy counts as unknown.
 pub const MAX_ACCURACY_AGE: Duration = Duration::from_secs(3);
 
@@ -57,10 +60,10 @@ pub fn estimate_margin_m(clearance_m: f32, radius_m: f32, tracking_m: f32) -> f3
     clearance_m - radius_m - tracking_m
 }
 
-/// Whether a bound of the estimate's error, metres, is at most the margin left for it, with 0.1 mm
-/// for rounding.
+/// Whether a bound of the estimate's error, metres, is at most the margin left for it, and
+/// [`ERROR_BOUND_ROUNDING_M`].
 pub fn is_bound_within(bound_m: f32, room_m: f32) -> bool {
-    bound_m <= room_m + 1e-4
+    bound_m <= room_m + ERROR_BOUND_ROUNDING_M
 }
 
 /// Share of the cruise speed at which the estimate's error bound, metres, and the tracking error of

@@ -1,13 +1,13 @@
 //! Progress of the vehicle along its flight: climb, path and descent, and which of them are done.
 
-use planner_core::flight::{Path, VehiclePlan};
+use planner_core::flight::{PROGRESS_ERROR_M, Path, VehiclePlan};
 use planner_core::track::deconflict::Method;
 use planner_core::{Length, Point};
 
 use super::motion::clamp_to;
 use super::{
     ARRIVED_M, AT_REST_MPS, CLIMBED_M, DESCENDED_M, Guidance, GuidanceInputs, LAND_AFTER, Phase,
-    REPORTED_SHORT_M, WINDOW_EDGE_M,
+    WINDOW_EDGE_M,
 };
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
@@ -20,6 +20,16 @@ const LAG_WINDOW_ABOVE_MPS: f32 = 2.0;
 /// the setpoint's curve follows the reference by up to 1.2 s, and the vehicle that curve by 0.4 s.
 const LAG_WINDOW_S: f32 = 1.0;
 
+/// Greatest distance before a gate at which the reference of a vehicle that waits there stands,
+/// metres.
+const STOPS_BEFORE_GATE_M: f32 = 0.05;
+/// A vehicle within [`ARRIVED_M`] of its reference reports its progress at most this far short of
+/// the reference, metres: less than gates allow ([`PROGRESS_ERROR_M`]), since a vehicle stops a
+/// little short of a gate.
+const REPORTED_SHORT_M: f32 = PROGRESS_ERROR_M - STOPS_BEFORE_GATE_M;
+/// Distance below the ground of which a vehicle that has landed reports the progress, metres: every
+/// gate that waits for its flight opens.
+const LANDED_BELOW_GROUND_M: f32 = 1.0;
 /// Distance up to a stop below which a vehicle on its pad does not depart, metres.
 const MIN_DEPARTURE_M: f32 = 0.05;
 
@@ -85,9 +95,7 @@ impl Guidance {
         let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
         let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
         if state.has_landed() && self.has_reached_end(path) {
-            // As if one metre below the ground, so that every gate that waits for this flight
-            // opens.
-            return length_m + plan.descent_m + 1.0;
+            return length_m + plan.descent_m + LANDED_BELOW_GROUND_M;
         }
         match self.phase {
             Phase::Climb => -clamp_to(start_z - z, 0.0, plan.climb_m),

@@ -55,6 +55,8 @@ const SETPOINT_STANDSTILL_MPS: f32 = 0.01;
 /// Rate of decay at the end of a stop, 1/s: the deceleration is at most this times the speed that
 /// is left.
 const STOP_DECAY_PER_S: f32 = 4.0;
+/// Distance by which the predicted length of a stop exceeds that of its formula, metres.
+const STOP_MARGIN_M: f32 = 0.02;
 /// Greatest speed of a setpoint that follows a vehicle under other control, m/s: a position that
 /// moves faster is an estimate that jumps.
 const MAX_FOLLOWED_MPS: f32 = 15.0;
@@ -246,7 +248,7 @@ impl SetpointSmoother {
         speed * speed / (2.0 * accel)
             + speed * build_up_s
             + fminf(speed, accel * end_s) * end_s
-            + 0.02
+            + STOP_MARGIN_M
     }
 
     /// Begins setpoints at a place, `unsent_s` after one was sent last. After a gap shorter than

@@ -235,9 +235,11 @@ pub struct GuardInputs {
 /// that one will not leave.
 const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 
-/// Estimated height from which a vehicle is in the air, metres: above
-/// [`MAX_GROUND_HEIGHT_ERROR_M`], so that an estimate at that bound does not alternate.
-const SURELY_IN_AIR_M: f32 = MAX_GROUND_HEIGHT_ERROR_M + 0.5;
+/// Height above [`MAX_GROUND_HEIGHT_ERROR_M`] from which an estimate shows that the vehicle is in
+/// the air, metres: an estimate at that bound does not alternate.
+const IN_AIR_HYSTERESIS_M: f32 = 0.5;
+/// Estimated height from which a vehicle is in the air, metres.
+const SURELY_IN_AIR_M: f32 = MAX_GROUND_HEIGHT_ERROR_M + IN_AIR_HYSTERESIS_M;
 
 impl GuardInputs {
     /// Whether the vehicle can request a path home over the field, and does not seek one yet.

@@ -33,6 +33,9 @@ pub(super) const RECKONED_SPEED_SHARE: f32 = 0.4;
 pub(super) const RECKONED_AFTER_S: f32 = 2.0;
 /// Greatest distance before a closed gate at which an unheard vehicle stands, metres.
 pub(super) const STANDS_SHORT_M: f32 = 0.5;
+/// Least length of path with open gates ahead of a vehicle that falls silent for it to be assumed
+/// to fly on, metres: with less ahead it may be standing there already.
+pub(super) const MIN_OPEN_PATH_M: f32 = 0.5;
 /// Longest time for which an unheard vehicle is assumed to fly on through open gates, seconds.
 pub(super) const MAX_UNHEARD_FLIGHT_S: f32 = 75.0;
 /// Time for which an unheard vehicle stands on its path before it lands.

@@ -59,7 +59,9 @@ impl NeighbourEntry {
     #[inline(never)]
     pub(super) fn flies_plan_unheard(&self) -> bool {
         self.state.progress_m.is_some_and(|progress_m| {
-            self.at_range_edge && self.on_plan() && self.gates_open_up_to_m > progress_m + 0.5
+            self.at_range_edge
+                && self.on_plan()
+                && self.gates_open_up_to_m > progress_m + MIN_OPEN_PATH_M
         })
     }
 
