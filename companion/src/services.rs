@@ -7,10 +7,8 @@
 pub mod ftp;
 pub mod parameters;
 
-use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, MavParamError, MavProtocolCapability, PARAM_REQUEST_LIST_DATA,
-    PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, TIMESYNC_DATA,
+    AUTOPILOT_VERSION_DATA, MavParamError, MavProtocolCapability, TIMESYNC_DATA,
 };
 
 use self::ftp::Ftp;
@@ -45,6 +43,24 @@ impl ReceivedFrame<'_> {
     }
 
     /// Queues an answer, or drops it where its rate limit or the link's queue has no room.
+    /// Whether another component sent the frame.
+    pub(crate) fn is_from_another(&self) -> bool {
+        self.sender_ids() != (self.own, COMPANION_COMPONENT)
+    }
+
+    /// Whether another component sent the frame to this companion. Bytes `at` and `at + 1` of the
+    /// payload are the target's system and component id.
+    pub(crate) fn is_for_companion(&self, at: usize) -> bool {
+        let p = self.frame.padded_payload();
+        self.is_from_another() && (p[at], p[at + 1]) == (self.own, COMPANION_COMPONENT)
+    }
+
+    /// As [`Self::is_for_companion`], or to all components of this vehicle.
+    pub(crate) fn is_for_vehicle(&self, at: usize) -> bool {
+        let p = self.frame.padded_payload();
+        self.is_for_companion(at) || (self.is_from_another() && (p[at], p[at + 1]) == (self.own, 0))
+    }
+
     fn queue_answer(&self, links: &mut Links, kind: AnswerKind, answer: Outgoing) {
         links.queue_answer(self.now, self.link, self.sender, kind, answer);
     }
@@ -130,45 +146,30 @@ impl Services {
         self.ftp.poll_reply(link as usize)
     }
 
-    /// Handles a frame of one of the services; returns whether it was one.
-    pub(crate) fn handle_frame(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) -> bool {
-        let (p, own) = (heard.frame.padded_payload(), (heard.own, COMPANION_COMPONENT));
-        if heard.sender_ids() == own {
-            return false;
+    /// Handles FILE_TRANSFER_PROTOCOL.
+    pub(crate) fn handle_ftp(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) {
+        // An FTP request of another sender gets no answer: there are few sessions.
+        if self.store.is_none() || heard.sender != SenderKind::GroundStation {
+            return;
         }
-        let for_us = |at: usize| p[at] == own.0 && (p[at + 1] == own.1 || p[at + 1] == 0);
-        match heard.frame.message_id {
-            ftp::MESSAGE_ID if (p[1], p[2]) == own => {
-                // An FTP request of another sender gets no answer: there are few sessions.
-                if self.store.is_some() && heard.sender == SenderKind::GroundStation {
-                    if ftp::changes_files(p) {
-                        links.log_sender(
-                            heard.now,
-                            heard.sender,
-                            "File request from #/#",
-                            heard.sender_ids(),
-                        );
-                    }
-                    self.ftp.queue_request(heard.link as usize, heard.now, heard.frame);
-                }
-            }
-            PARAM_REQUEST_LIST_DATA::ID if for_us(0) => {
-                (0..parameters::PARAMETER_COUNT)
-                    .for_each(|index| self.send_parameter(heard, index, links));
-            }
-            PARAM_REQUEST_READ_DATA::ID if for_us(2) => self.handle_parameter_read(heard, links),
-            PARAM_SET_DATA::ID if for_us(4) => self.handle_parameter_set(heard, links),
-            TIMESYNC_DATA::ID => answer_timesync(heard, links),
-            _ => return false,
+        if ftp::changes_files(heard.frame.padded_payload()) {
+            let text = "File request from #/#";
+            links.log_sender(heard.now, heard.sender, text, heard.sender_ids());
         }
-        true
+        self.ftp.queue_request(heard.link as usize, heard.now, heard.frame);
+    }
+
+    /// Answers PARAM_REQUEST_LIST.
+    pub(crate) fn send_parameters(&self, heard: &ReceivedFrame<'_>, links: &mut Links) {
+        (0..parameters::PARAMETER_COUNT).for_each(|index| self.send_parameter(heard, index, links));
     }
 
     pub(crate) fn parameters(&self) -> &Parameters {
         self.store.as_ref().map_or(&self.parameters, Store::parameters)
     }
 
-    fn handle_parameter_read(&self, heard: &ReceivedFrame<'_>, links: &mut Links) {
+    /// Answers PARAM_REQUEST_READ.
+    pub(crate) fn handle_parameter_read(&self, heard: &ReceivedFrame<'_>, links: &mut Links) {
         let p = heard.frame.padded_payload();
         let index = i16::from_le_bytes([p[0], p[1]]);
         let found = match usize::try_from(index) {
@@ -205,7 +206,8 @@ impl Services {
         }
     }
 
-    fn handle_parameter_set(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) {
+    /// Handles PARAM_SET.
+    pub(crate) fn handle_parameter_set(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) {
         let p = heard.frame.padded_payload();
         let (value, kind) = (f32::from_le_bytes([p[0], p[1], p[2], p[3]]), p[22]);
         let found = Parameters::index_of(parameter_name(&p[6..22]));
@@ -253,7 +255,7 @@ fn refuse_parameter(
 
 /// Answers a TIMESYNC request to this vehicle or to all. Bytes 16 and 17 of its payload are the
 /// target's system and component id, 0 for all.
-fn answer_timesync(heard: &ReceivedFrame<'_>, links: &mut Links) {
+pub(crate) fn answer_timesync(heard: &ReceivedFrame<'_>, links: &mut Links) {
     let p = heard.frame.padded_payload();
     let to_our_system =
         (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == COMPANION_COMPONENT);

@@ -70,6 +70,11 @@ pub(crate) struct Timers {
 }
 
 impl Timers {
+    /// When a timer is due.
+    pub(crate) fn due_at(&self, timer: Timer) -> Instant {
+        self.due_at[timer as usize]
+    }
+
     /// Sets when a timer is due, whatever was set before.
     pub(crate) fn set(&mut self, timer: Timer, at: Instant) {
         self.due_at[timer as usize] = at;

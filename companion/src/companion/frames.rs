@@ -20,7 +20,7 @@ use crate::link::outbox::Outgoing;
 use crate::link::roster::RosterReport;
 use crate::link::severity::Severity;
 use crate::link::{OnDemandMessage, rate_limit};
-use crate::services::{ReceivedFrame, ftp};
+use crate::services::{ReceivedFrame, answer_timesync, ftp};
 use crate::swarm::fleet::StartStatus;
 use crate::swarm::neighbours::relay::Relay;
 use crate::timers::Timer;
@@ -56,13 +56,25 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     None => self.handle_autopilot_frame(&heard),
                 }
             }
-            ftp::MESSAGE_ID
-            | PARAM_REQUEST_LIST_DATA::ID
-            | PARAM_REQUEST_READ_DATA::ID
-            | PARAM_SET_DATA::ID
-            | TIMESYNC_DATA::ID => {
-                !self.services.handle_frame(&heard, &mut self.links)
-                    && self.handle_autopilot_frame(&heard)
+            ftp::MESSAGE_ID if heard.is_for_companion(1) => {
+                self.services.handle_ftp(&heard, &mut self.links);
+                false
+            }
+            PARAM_REQUEST_LIST_DATA::ID if heard.is_for_vehicle(0) => {
+                self.services.send_parameters(&heard, &mut self.links);
+                false
+            }
+            PARAM_REQUEST_READ_DATA::ID if heard.is_for_vehicle(2) => {
+                self.services.handle_parameter_read(&heard, &mut self.links);
+                false
+            }
+            PARAM_SET_DATA::ID if heard.is_for_vehicle(4) => {
+                self.services.handle_parameter_set(&heard, &mut self.links);
+                false
+            }
+            TIMESYNC_DATA::ID if heard.is_from_another() => {
+                answer_timesync(&heard, &mut self.links);
+                false
             }
             PARAM_VALUE_DATA::ID => {
                 if self.is_from_autopilot(&heard) {

@@ -16,13 +16,14 @@
 //! [`PARTIAL_LIFETIME`] after its own first byte. Each byte costs O(1), after false start bytes
 //! O(267).
 
+mod encode;
 mod received;
 
-use crc::{CRC_16_MCRF4XX, Crc, Table};
 use heapless::Vec;
-use mavlink::dialects::ardupilotmega::MavMessage;
-use mavlink::{MavlinkVersion, Message, MessageData};
+use mavlink::MavlinkVersion;
 
+pub use self::encode::{Header, encode, encode_message, encode_raw, extra_crc};
+use self::encode::{V2_START, calculate_crc};
 pub use self::received::Frame;
 use crate::time::{Duration, Instant};
 
@@ -36,9 +37,6 @@ pub const PARTIAL_LIFETIME: Duration = Duration::from_millis(100);
 pub const MAX_FRAME_LEN: usize = 267;
 
 const V1_START: u8 = 0xFE;
-const V2_START: u8 = 0xFD;
-/// A deprecated message, the only one of the dialect whose CRC_EXTRA is 0.
-const COMPONENT_INFORMATION: u32 = 395;
 const FLAG_SIGNED: u8 = 0x01;
 const SIGNATURE_LEN: usize = 13;
 /// Resolution of the times of arrival, microseconds: bytes received within one step count as
@@ -278,77 +276,6 @@ impl Framer {
 
 fn is_start(byte: u8) -> bool {
     byte == V1_START || byte == V2_START
-}
-
-/// CRC-16/MCRF4XX of a frame without its start byte, then of its message's CRC_EXTRA. It uses a
-/// table of 8 kB, 16 bytes at a time: on a crowded radio the CRC is most of the work, and the
-/// `mavlink` crate computes it byte by byte.
-fn calculate_crc(frame: &[u8], extra_crc: u8) -> u16 {
-    const CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MCRF4XX);
-    let mut digest = CRC.digest();
-    digest.update(frame);
-    digest.update(&[extra_crc]);
-    digest.finalize()
-}
-
-/// CRC_EXTRA of a message id; `None` if the dialect does not know the id. The crate returns 0 for
-/// unknown ids, which is also the CRC_EXTRA of COMPONENT_INFORMATION.
-pub fn extra_crc(message_id: u32) -> Option<u8> {
-    let extra = MavMessage::extra_crc(message_id);
-    (extra != 0 || message_id == COMPONENT_INFORMATION).then_some(extra)
-}
-
-/// Sender and sequence number of a frame to be sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Header {
-    /// System id of the sender.
-    pub system: u8,
-    /// Component id of the sender.
-    pub component: u8,
-    /// Sequence number of the frame on its link.
-    pub sequence: u8,
-}
-
-/// Writes a message as a V2 frame without trailing zeros. Returns the bytes written, 0 if `out` is
-/// too small; [`MAX_FRAME_LEN`] is always enough.
-pub fn encode<M: MessageData>(header: Header, message: &M, out: &mut [u8]) -> usize {
-    let mut payload = [0; 255];
-    let len = message.ser(MavlinkVersion::V2, &mut payload);
-    encode_raw(header, M::ID, M::EXTRA_CRC, &payload[..len], out)
-}
-
-/// As [`encode`], for any message of the dialect. It links every message's encoder, so it is not
-/// for boards.
-pub fn encode_message(header: Header, message: &MavMessage, out: &mut [u8]) -> usize {
-    let mut payload = [0; 255];
-    let len = message.ser(MavlinkVersion::V2, &mut payload);
-    let id = message.message_id();
-    encode_raw(header, id, MavMessage::extra_crc(id), &payload[..len], out)
-}
-
-/// As [`encode`], for a payload of at most 255 bytes that the caller has encoded, since the crate's
-/// types cannot hold it (such as TUNNEL's private payload types). Trailing zeros are cut.
-pub fn encode_raw(
-    header: Header,
-    message_id: u32,
-    extra_crc: u8,
-    payload: &[u8],
-    out: &mut [u8],
-) -> usize {
-    let used = payload.iter().rposition(|&b| b != 0).map_or(1, |last| last + 1).min(payload.len());
-    let total = 12 + used;
-    if used > 255 || out.len() < total {
-        return 0;
-    }
-    let id = message_id.to_le_bytes();
-    let Header { system, component, sequence } = header;
-    out[..10].copy_from_slice(&[
-        V2_START, used as u8, 0, 0, sequence, system, component, id[0], id[1], id[2],
-    ]);
-    out[10..10 + used].copy_from_slice(&payload[..used]);
-    let crc = calculate_crc(&out[1..10 + used], extra_crc);
-    out[10 + used..total].copy_from_slice(&crc.to_le_bytes());
-    total
 }
 
 #[cfg(test)]

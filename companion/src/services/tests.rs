@@ -5,6 +5,8 @@ use std::vec::Vec;
 
 use mavlink::dialects::ardupilotmega::*;
 
+use mavlink::MessageData;
+
 use super::*;
 use crate::events::Event;
 use crate::link::frame::{self, Framer, Header};

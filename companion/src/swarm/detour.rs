@@ -146,12 +146,8 @@ struct ScanResult {
 impl Detours {
     /// Forgets what concerns an older path; keeps the reported obstacles and `left_plan`.
     pub(crate) fn forget_plan(&mut self, timers: &mut Timers) {
-        self.forget_path(timers);
-        timers.set(Timer::RejoinSearch, Instant::ZERO);
-    }
-
-    fn forget_path(&mut self, timers: &mut Timers) {
         timers.set(Timer::PathScan, Instant::ZERO);
+        timers.set(Timer::RejoinSearch, Instant::ZERO);
         let obstacles = core::mem::take(&mut self.obstacles);
         *self = Self { left_plan: self.left_plan, obstacles, ..Self::default() };
         self.obstacles.forget_avoided();
@@ -245,9 +241,10 @@ impl Detours {
 
     /// Ends a detour in a coverage mission: the vehicle flies its own plan, which has come, next.
     pub(crate) fn end_area_detour(&mut self, timers: &mut Timers) {
-        let field_searches = self.area_searches;
-        self.forget_path(timers);
-        (self.path_kind, self.area_searches) = (PathKind::PlanReady, field_searches);
+        let (searches, next_at) = (self.area_searches, timers.due_at(Timer::RejoinSearch));
+        self.forget_plan(timers);
+        (self.path_kind, self.area_searches) = (PathKind::PlanReady, searches);
+        timers.set(Timer::RejoinSearch, next_at);
     }
 
     /// Whether the requested detour has come and is not flown yet.

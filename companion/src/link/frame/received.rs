@@ -2,7 +2,7 @@
 
 use mavlink::{MavlinkVersion, MessageData};
 
-use super::{Header, encode_raw, extra_crc};
+use super::encode::{Header, encode_raw, extra_crc};
 
 /// A received frame with a correct CRC.
 #[derive(Clone, Debug, PartialEq)]

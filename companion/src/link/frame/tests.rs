@@ -6,6 +6,9 @@ use std::vec::Vec;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, SYSTEM_TIME_DATA};
 use proptest::prelude::*;
 
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::MavMessage;
+
 use super::*;
 
 const HEADER: Header = Header { system: 7, component: 1, sequence: 3 };

@@ -95,7 +95,8 @@ pub(super) struct CameraControl {
 }
 
 impl CameraControl {
-    /// Queues the camera commands that are due at this place. Returns whether the vehicle leaves its path here, and takes no more pictures.
+    /// Queues the camera commands that are due at this place. Returns whether the vehicle leaves
+    /// its path here, and takes no more pictures.
     pub(super) fn step<const W: usize>(
         &mut self,
         photographs: &PicturePlan,

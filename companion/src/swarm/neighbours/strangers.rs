@@ -1,5 +1,5 @@
-//! Strangers: vehicles outside the roster, known by their positions only. A few are kept, until they
-//! are silent for a minute.
+//! Strangers: vehicles outside the roster, known by their positions only. A few are kept, until
+//! they are silent for a minute.
 
 use super::Neighbours;
 use super::bounds::*;
