@@ -96,15 +96,27 @@ pub(crate) fn quiet(state: State) -> GuardInputs {
 /// leads.
 fn page() -> String {
     let mut out = String::from(
-        "# The mission's table\n\nGenerated from `companion/src/mission/table.rs` by the test `the_page_prints_this_table`; \
-         `FLOCKMATE_WRITE=1 cargo test -p companion\nthe_page` writes it. The first row whose `from` holds the state and \
-         whose guard has held as long as `for` says is taken,\ntop to bottom. A text after an interruption (`Interrupted: \
-         Climb`) names the state that is kept; \"the interrupted state\" is the\nway back to it.\n\n## Rows\n\n",
+        "# The mission's table
+
+Generated from `companion/src/mission/table.rs` by the test `the_page_prints_this_table`;
+`FLOCKMATE_WRITE=1 cargo test -p companion the_page` writes it. From the top, the first row is taken
+whose `from` holds the state and whose guard has held for the time in `for`. A text after an
+interruption (`Interrupted: Climb`) names the state that is kept; \"the interrupted state\" is the
+way back to it.
+
+## Rows
+
+",
     );
     out += &printed();
-    out += "\n## Interruptions\n\nWhere each state goes when one thing happens and all else is as it should be; an empty \
-            cell: it stays. A command\nthat leads nowhere is refused, or answered ACCEPTED where it is done already. \
-            (back): the way out leads to the interrupted state.\n\n| state |";
+    out += "
+## Interruptions
+
+Where each state goes when one thing happens and all else is as it should be; an empty cell: it
+stays. A command that leads nowhere is refused, or answered ACCEPTED where it is done already.
+(back): the way out leads to the interrupted state.
+
+| state |";
     INTERRUPTIONS.iter().for_each(|(name, _)| write!(out, " {name} |").unwrap());
     out += "\n|---|";
     INTERRUPTIONS.iter().for_each(|_| out += "---|");

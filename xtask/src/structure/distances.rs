@@ -46,9 +46,14 @@ const NUMBERS: [&str; 11] =
 /// Functions that make a `Duration` of a whole number, and how many of it are a second.
 const MAKERS: [(&str, u64); 4] =
     [("secs", 1), ("from_secs", 1), ("from_millis", 1_000), ("from_micros", 1_000_000)];
-const HEAD: &str = "# Distances, times, speeds and accelerations\n\nEvery one that the code on board (planner-core, companion) \
-or the host (host-sim) decides by, with its\nreason: margins, reserves, leads, windows, limits. A duration is in seconds.\nMade from the sources: `FLOCKMATE_WRITE=1 cargo xtask structure`. How margins \
-add up to an argument is in\n[safety.md](safety.md#margins). What a mission states itself (radius, margin, separation, speeds) is not here.\n";
+const HEAD: &str = "# Distances, times, speeds and accelerations
+
+Every one that the code on board (planner-core, companion) or the host (host-sim) decides by, with
+its reason: margins, reserves, leads, windows, limits. A duration is in seconds. Made from the
+sources: `FLOCKMATE_WRITE=1 cargo xtask structure`. How margins add up to an argument is in
+[safety.md](safety.md#margins). What a mission states itself (radius, margin, separation, speeds) is
+not here.
+";
 
 struct Distance {
     value: String,

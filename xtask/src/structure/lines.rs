@@ -1,6 +1,7 @@
 //! Finds files of too many lines, and lines of too many characters. rustfmt breaks lines, but not
-//! in macros that it cannot parse, attributes and comments. Checks the length of ARCHITECTURE.md,
-//! and where modules stand: `<module>.rs`, with its unit tests in `<module>/tests.rs`.
+//! in macros that it cannot parse, attributes and comments. Checks lines of documents, the length
+//! of ARCHITECTURE.md, and where modules stand: `<module>.rs`, with its unit tests in
+//! `<module>/tests.rs`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,6 +13,8 @@ use proc_macro2::{Delimiter, LineColumn, TokenStream, TokenTree};
 const LINES: usize = 500;
 /// Most characters of a line, as in `rustfmt.toml`.
 const WIDTH: usize = 100;
+/// Least characters of a command in a document that may make its line too long.
+const COMMAND: usize = 60;
 /// Most bytes of the map of the code, `ARCHITECTURE.md`.
 const MAP_BYTES: usize = 18_000;
 /// A part of this program, not a file of tests.
@@ -37,6 +40,11 @@ pub fn beyond() -> Result<Vec<(String, Option<&'static str>)>> {
         for what in beyond_in(&text).with_context(|| name.clone())?.into_iter().chain(misplaced) {
             found.push((format!("{name}{what}"), exception.map(|(_, reason)| *reason)));
         }
+    }
+    for page in find_pages()? {
+        let text = fs::read_to_string(&page).with_context(|| page.display().to_string())?;
+        found
+            .extend(beyond_in_prose(&text).map(|what| (format!("{}{what}", page.display()), None)));
     }
     let map_bytes = fs::read("ARCHITECTURE.md").context("ARCHITECTURE.md")?.len();
     if map_bytes > MAP_BYTES {
@@ -77,6 +85,41 @@ fn misplaced_module(file: &Path, text: &str) -> Option<&'static str> {
     } else {
         None
     }
+}
+
+/// The documents: the Markdown files of the repository, of its crates and of `docs`.
+fn find_pages() -> Result<Vec<PathBuf>> {
+    let mut pages = Vec::new();
+    for folder in fs::read_dir(".")? {
+        let folder = folder?.path();
+        let names = if folder.is_dir() { fs::read_dir(&folder)?.collect() } else { Vec::new() };
+        let within = names.into_iter().map(|entry| entry.map(|entry| entry.path()));
+        for path in within.chain([Ok(folder.clone())]) {
+            let path: PathBuf = path?;
+            if path.extension().is_some_and(|extension| extension == "md") && path.is_file() {
+                pages.push(path);
+            }
+        }
+    }
+    pages.sort();
+    Ok(pages)
+}
+
+/// Lines of prose in a document that are too long, each as a line to print without the file's name.
+/// Tables, blocks of code, addresses and commands of [`COMMAND`] characters cannot be broken.
+fn beyond_in_prose(text: &str) -> impl Iterator<Item = String> + '_ {
+    let mut in_code = false;
+    text.lines().enumerate().filter_map(move |(index, line)| {
+        in_code ^= line.trim_start().starts_with("```");
+        let is_whole = |line: &str| {
+            line.starts_with('|')
+                || line.contains("://")
+                || line.split('`').skip(1).step_by(2).any(|code| code.chars().count() >= COMMAND)
+        };
+        let length = line.chars().count();
+        let long = !in_code && length > WIDTH && !is_whole(line);
+        long.then(|| format!(":{} has {length} characters, more than {WIDTH}", index + 1))
+    })
 }
 
 /// The faults of one file, each as a line to print without the file's name.

@@ -24,3 +24,12 @@ fn a_module_stands_in_the_file_of_its_name_and_its_tests_in_a_file_of_their_own(
     assert!(!misplaced("a/src/b.rs", "#[cfg(test)]\nmod tests;\n"));
     assert!(!misplaced("tests/tests/b/mod.rs", "mod tests {\n}\n"));
 }
+
+#[test]
+fn prose_is_long_unless_it_cannot_be_broken() {
+    let prose = "word ".repeat(30);
+    let count = |text: &str| beyond_in_prose(text).count();
+    assert_eq!(count(&format!("{prose}\n\n- {prose}\n")), 2);
+    assert_eq!(count(&format!("| {prose} |\n```\n{prose}\n```\n{prose}\n")), 1);
+    assert_eq!(count(&format!("Run `{prose}`.\n")), 0);
+}
