@@ -94,12 +94,13 @@ pub(crate) struct SafetyFilter {
 }
 
 /// Direction in which this vehicle flies or is about to fly.
+#[derive(Clone, Copy, PartialEq)]
 enum FlightDirection {
     Stands,
-    /// Along the path, or `back` along it.
-    Path {
-        back: bool,
-    },
+    /// Along the path.
+    Ahead,
+    /// Back along the path.
+    Back,
     /// Straight up or down, to the height `to_m`.
     Vertical {
         to_m: f32,

@@ -226,9 +226,14 @@ impl Visit<'_> for Shape {
     }
 }
 
+/// Whether an argument is a `bool`, or a tuple with one.
 fn is_bool(input: &FnArg) -> bool {
-    matches!(input, FnArg::Typed(input)
-        if matches!(&*input.ty, Type::Path(path) if path.path.is_ident("bool")))
+    let plain = |ty: &Type| matches!(ty, Type::Path(path) if path.path.is_ident("bool"));
+    let FnArg::Typed(input) = input else { return false };
+    match &*input.ty {
+        Type::Tuple(tuple) => tuple.elems.iter().any(plain),
+        ty => plain(ty),
+    }
 }
 
 /// Number of lines between a function's braces.

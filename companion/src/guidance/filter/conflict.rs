@@ -7,7 +7,7 @@ use planner_core::{Length, Point};
 
 use super::super::limits::Urgency;
 use super::super::{Guidance, GuidanceInputs, Phase};
-use super::{FilterConflict, MAX_STOP_FOR_STRANGER};
+use super::{FilterConflict, FlightDirection, MAX_STOP_FOR_STRANGER};
 use crate::autopilot::telemetry::Telemetry;
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
@@ -43,7 +43,7 @@ impl Guidance {
         path: &Path<W>,
         telemetry: &Telemetry,
         bounds: &MotionBounds,
-        (extra_m, back): (f32, bool),
+        (extra_m, way): (f32, FlightDirection),
     ) {
         let velocity_mps = fpu::sqrtf(telemetry.velocity.norm_squared());
         // Beside its path the vehicle flies straight to where it continues on it.
@@ -60,7 +60,7 @@ impl Guidance {
         let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
         let here = self.smoother.position();
         let points = path.waypoints();
-        if back {
+        if way == FlightDirection::Back {
             let next = points.partition_point(|w| w.along_m < along_m);
             let behind = points[..next].iter().rev().map(|w| w.position);
             return set.extend_along(core::iter::once(here).chain(join).chain(behind), fly_m);

@@ -62,7 +62,8 @@ impl Guidance {
                         to_m: ground_m(),
                         speed_mps: (-self.smoother.velocity().z).max(0.0),
                     },
-                    false => FlightDirection::Path { back: self.is_flying_back(&plan.path) },
+                    false if self.is_flying_back(&plan.path) => FlightDirection::Back,
+                    false => FlightDirection::Ahead,
                 }
             }
             _ => FlightDirection::Stands,
@@ -77,7 +78,7 @@ impl Guidance {
             self.filter.reset();
             return;
         }
-        let back = matches!(way, FlightDirection::Path { back: true });
+        let back = way == FlightDirection::Back;
         if back != self.filter.scanned_backwards {
             self.filter.reset_stop();
             self.filter.scanned_backwards = back;
@@ -106,10 +107,10 @@ impl Guidance {
                 let here = Point::new(position.x, position.y, reference_m);
                 set = ReachableSet::vertical(here, end_m);
             }
-            FlightDirection::Path { back } => {
+            FlightDirection::Ahead | FlightDirection::Back => {
                 set = ReachableSet::at(self.smoother.position());
-                let way = (extra_m, back);
-                self.extend_own_set(&mut set, &plan.path, scene.telemetry, &bounds, way);
+                let further = (extra_m, way);
+                self.extend_own_set(&mut set, &plan.path, scene.telemetry, &bounds, further);
             }
             FlightDirection::Stands => return,
         }

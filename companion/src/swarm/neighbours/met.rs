@@ -91,6 +91,17 @@ pub(crate) struct ReachQuery<'a> {
     pub(crate) lands: bool,
 }
 
+/// What may have become of a silent neighbour.
+#[derive(Clone, Copy, Debug)]
+struct SilentFate {
+    /// Whether it counts as dead.
+    dead: bool,
+    /// Whether it has been silent for so long that it lies on the ground.
+    lies: bool,
+    /// Whether it may fly on, since this vehicle hears nobody.
+    may_fly_on: bool,
+}
+
 impl NeighbourEntry {
     /// Whether the neighbour counts as dead, if it may come within reach; `None` if it stays out of
     /// reach wherever it can be, or has no position. Most are far away: this test needs no
@@ -108,12 +119,13 @@ impl NeighbourEntry {
         let across_sq = away.x * away.x + away.y * away.y;
         let age = now - placed_at;
         if age > MAX_HEIGHT_AGE {
-            let lies = age >= down && !self.ground_m.is_nan();
-            let dead = self.rests_silently(age, now);
-            let flies_on = self.may_fly_on_unheard(down, now, reach);
-            let fate = (dead, lies, flies_on);
+            let fate = SilentFate {
+                dead: self.rests_silently(age, now),
+                lies: age >= down && !self.ground_m.is_nan(),
+                may_fly_on: self.may_fly_on_unheard(down, now, reach),
+            };
             let beyond = self.is_silent_out_of_reach(age, fate, across_sq, now, reach);
-            return (!beyond).then_some(dead);
+            return (!beyond).then_some(fate.dead);
         }
         let heard = NeighbourMotion {
             position: self.state.position,
@@ -158,7 +170,7 @@ impl NeighbourEntry {
     fn is_silent_out_of_reach(
         &self,
         age: Duration,
-        (dead, lies, may_fly_on): (bool, bool, bool),
+        SilentFate { dead, lies, may_fly_on }: SilentFate,
         across_sq: f32,
         now: Instant,
         reach: &ReachQuery<'_>,
