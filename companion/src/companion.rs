@@ -2,11 +2,11 @@
 
 mod actions;
 mod board;
+mod detours;
 mod division;
 mod frames;
 mod inputs;
 mod photographed;
-mod replanning;
 mod steps;
 mod transmit;
 
@@ -24,10 +24,10 @@ use crate::guidance::{Guidance, GuidanceInputs, SetpointStats};
 use crate::link::Links;
 use crate::link::frame::Counters;
 use crate::margins;
-use crate::mission::State;
 use crate::mission::course::Mission;
+use crate::replanning::detour::Detours;
 use crate::services::Services;
-use crate::swarm::detour::Detours;
+use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 use crate::timers::Timers;

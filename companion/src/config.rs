@@ -2,6 +2,8 @@
 //! distances.
 
 mod check;
+pub(crate) mod limits;
+pub mod parameters;
 
 use heapless::Vec;
 use planner_core::Point;

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
-use crate::mission::State;
+use crate::state::State;
 
 /// One of the two communication links of a companion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -15,7 +15,6 @@ pub(crate) mod filter;
 mod follower;
 mod hold;
 mod lag;
-pub(crate) mod limits;
 mod motion;
 mod nearest;
 mod orders;
@@ -35,15 +34,15 @@ use planner_core::{Length, Point};
 
 use self::filter::SafetyFilter;
 use self::hold::{FIRST_STANDSTILL, Hold, YIELDING_STANDSTILL};
-use self::limits::{MotionLimits, Settings, Urgency};
 use self::phase::Phase;
 use self::setpoint::position_correction;
 use self::smoother::{ClockPace, SetpointSmoother, TICK_S};
 use self::waypoints::Algorithm2Waypoints;
 use crate::autopilot::limits::AutopilotLimits;
 use crate::config::Config;
+use crate::config::limits::{MotionLimits, Settings, Urgency};
 use crate::guidance::evade::{EvadeSearch, StepBack};
-use crate::mission::State;
+use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 

@@ -58,7 +58,9 @@ pub mod link;
 pub mod margins;
 pub mod mission;
 pub mod planner;
+mod replanning;
 pub mod services;
+mod state;
 pub mod storage;
 pub mod swarm;
 #[cfg(test)]
@@ -70,6 +72,6 @@ pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
 pub use events::{Event, Link, PlanKind, PlanRequests};
 pub use link::frame::{AUTOPILOT_COMPONENT, COMPANION_COMPONENT};
-pub use mission::State;
 pub use mission::photographed::MAX_PHOTOGRAPHED_RANGES;
+pub use state::State;
 pub use time::{Duration, Instant};

@@ -8,9 +8,9 @@
 pub(crate) mod course;
 mod guard;
 mod inputs;
+mod pending;
 pub(crate) mod photographed;
 mod row;
-mod state;
 pub mod table;
 pub(crate) mod task;
 pub(crate) mod waits;
@@ -19,11 +19,10 @@ use self::table::TABLE;
 pub(crate) use self::table::UNFOLLOWED_MOST;
 
 pub use self::guard::Guard;
-pub(crate) use self::guard::{MAX_HEARTBEAT_AGE, MAX_POSITION_AGE};
 pub use self::inputs::GuardInputs;
 use self::row::state_mask;
 pub use self::row::{Action, TransitionRow};
-pub use self::state::{InterruptedStates, State, TargetState};
+pub use crate::state::{InterruptedStates, State, TargetState};
 
 /// Whether the table has a row from `state` with this guard. A command whose guard has none there
 /// is refused.

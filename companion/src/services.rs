@@ -5,15 +5,14 @@
 //! request is in `answer_limits`.
 
 pub mod ftp;
-pub mod parameters;
 
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, MavParamError, MavProtocolCapability, TIMESYNC_DATA,
 };
 
 use self::ftp::Ftp;
-use self::parameters::{ParameterError, Parameters};
 use crate::config::Config;
+use crate::config::parameters::{self, ParameterError, Parameters};
 use crate::events::Link;
 use crate::link::Links;
 use crate::link::answer_limits::{AnswerKind, SenderKind};

@@ -33,7 +33,6 @@ pub mod bound;
 mod cells;
 pub mod divide;
 pub mod exact;
-mod flat;
 pub mod flights;
 pub mod footprint;
 pub mod given;
@@ -49,7 +48,7 @@ pub mod sweep;
 pub mod tracks;
 pub mod transit;
 
-pub use self::flat::Flat;
+pub use crate::geo::Flat;
 
 /// Reason why a coverage plan could not be made.
 #[derive(Clone, Copy, Debug, PartialEq)]

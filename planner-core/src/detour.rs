@@ -2,7 +2,7 @@
 //! on the first one's path. Over a height field, where there is no roadmap,
 //! [`crate::coverage::around`] plans the detour.
 //!
-//! A detour is flown while all other vehicles stand (`companion/src/swarm/detour.rs` waits for
+//! A detour is flown while all other vehicles stand (`companion/src/replanning/detour.rs` waits for
 //! that), so times do not matter. It is the shortest roadmap path from where the vehicle hovers to
 //! its goal that keeps out of every [`KeepOutZone`]. It begins with the rest of the current leg,
 //! forward or back, which is known to be clear of walls. A vehicle that is inside a zone already

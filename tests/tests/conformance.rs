@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use companion::services::parameters;
+use companion::config::parameters;
 use flockmate_tests::{Guard, autopilot, free_port, host_sim, python, shared_data, workspace};
 
 const TIME_LIMIT: Duration = Duration::from_secs(160);

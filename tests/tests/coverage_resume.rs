@@ -11,7 +11,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use companion::services::parameters::Parameters;
+use companion::config::parameters::Parameters;
 use companion::storage::store::{ErasePermission, MAX_READ, Store};
 use flockmate_tests::areas::{self, SMALL_FIELD};
 use flockmate_tests::{covered, host_sim, number};

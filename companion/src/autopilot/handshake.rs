@@ -1,7 +1,7 @@
 //! Arming the autopilot step by step, and which of its refusals are reported as texts.
 
 use crate::autopilot::telemetry::{Ack, MAX_POSITION_AGE, Telemetry};
-use crate::mission::State;
+use crate::state::State;
 use crate::time::{Duration, Instant};
 
 /// Time from a denied arming request to the next arming request.

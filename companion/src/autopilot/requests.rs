@@ -7,13 +7,13 @@ use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
 use crate::autopilot::AutopilotKind;
 use crate::autopilot::handshake::Handshake;
 use crate::autopilot::limits::AutopilotLimits;
-use crate::autopilot::telemetry::{Ack, Telemetry};
+use crate::autopilot::telemetry::{Ack, MAX_HEARTBEAT_AGE, Telemetry};
 use crate::events::Link;
 use crate::link::Links;
 use crate::link::frame::{COMPANION_COMPONENT, Frame};
 use crate::link::outbox::Outgoing;
 use crate::link::severity::Severity;
-use crate::mission::{MAX_HEARTBEAT_AGE, State};
+use crate::state::State;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 

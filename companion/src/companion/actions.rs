@@ -7,7 +7,7 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::severity::Severity;
 use crate::mission::{self, Action, State, TransitionRow};
-use crate::swarm::detour::path_kind::DetourPurpose;
+use crate::replanning::detour::path_kind::DetourPurpose;
 use crate::timers::Timer;
 
 /// Maximum number of transitions of the mission table that one step makes. More would mean that the

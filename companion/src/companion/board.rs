@@ -3,7 +3,7 @@
 use super::Companion;
 use crate::events::Event;
 use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
-use crate::mission::State;
+use crate::state::State;
 use crate::storage::store::{ErasePermission, FlashFault, FlashRequest, Store};
 use crate::time::{Duration, Instant};
 

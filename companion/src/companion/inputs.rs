@@ -4,10 +4,11 @@ use planner_core::{Length, Point};
 
 use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::requests::is_battery_known;
+use crate::autopilot::telemetry::MAX_POSITION_AGE;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
-use crate::mission::{GuardInputs, MAX_POSITION_AGE, State, UNFOLLOWED_MOST};
+use crate::mission::{GuardInputs, State, UNFOLLOWED_MOST};
 use crate::swarm::fleet::{Fleet, MISSED_AFTER};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::time::{Duration, Instant};

@@ -18,8 +18,8 @@ use crate::link::rate_limit::{ARMED_BYTES_PER_S, DISARMED_BYTES_PER_S};
 use crate::link::roster;
 use crate::link::severity::Severity;
 use crate::link::{OnDemandMessage, done};
-use crate::mission::State;
 use crate::services;
+use crate::state::State;
 use crate::swarm::neighbours::relay;
 
 /// Longest time for which a vehicle in a coverage mission flies on along its part after it was last

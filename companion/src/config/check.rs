@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::{CheckedConfig, Config, ConfigError, RosterEntry, box_contains};
 use crate::autopilot::AutopilotKind;
-use crate::guidance::limits::Settings;
+use crate::config::limits::Settings;
 
 impl<const V: usize> Config<V> {
     /// The settings as [`CheckedConfig`], with the vehicle's start, if [`Self::check`] accepts

@@ -6,7 +6,7 @@ use planner_core::track::deconflict::Advice;
 
 use super::{Guidance, Phase};
 use crate::guidance::evade::{self, EvadeTarget, StepBack};
-use crate::mission::State;
+use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 

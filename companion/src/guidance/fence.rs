@@ -13,8 +13,8 @@ use fpu::sqrtf;
 use libm::{fabsf, fmaxf, fminf};
 use planner_core::Point;
 
-use super::limits::{MotionLimits, Urgency};
 use super::motion::{Motion, clamp_length};
+use crate::config::limits::{MotionLimits, Urgency};
 
 /// Distance by which setpoints stay inside the fence, metres: the autopilot's frame rounds a
 /// setpoint by up to 1.4 mm, 30 km from its origin.

@@ -14,7 +14,7 @@
 mod conflict;
 mod look;
 
-use crate::guidance::limits::Urgency;
+use crate::config::limits::Urgency;
 use crate::time::{Duration, Instant};
 
 /// Length of the path ahead that has to be free before a stopped vehicle continues, metres.

@@ -20,8 +20,8 @@
 use libm::fmaxf;
 
 use super::fence::Fence;
-use super::limits::MotionLimits;
 use super::motion::{Motion, clamp_length};
+use crate::config::limits::MotionLimits;
 
 /// Rate of the follower's loop, as a share of jerk over acceleration: a change of velocity dies
 /// away at twice this rate.

@@ -2,12 +2,12 @@
 //! path, lead a landing down.
 
 use super::acknowledged_path::AcknowledgedPath;
-use super::limits::Urgency;
 use super::nearest::nearest_arc_length_m;
 use super::phase::Phase;
 use super::smoother::TICK_S;
 use super::waypoints::Algorithm2Waypoints;
 use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, SETTLED_M, STANDING_SETPOINT_MPS};
+use crate::config::limits::Urgency;
 use crate::time::Instant;
 use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};

@@ -5,7 +5,8 @@ use planner_core::{Length, Point};
 use super::setpoint::Setpoint;
 use super::{Guidance, GuidanceInputs};
 use crate::autopilot::AutopilotKind;
-use crate::mission::{State, task};
+use crate::mission::task;
+use crate::state::State;
 
 impl Guidance {
     /// The setpoint to be sent in this state: none, a stop where the position is unknown, or a

@@ -9,7 +9,7 @@ use super::{
     ARRIVED_M, AT_REST_MPS, CLIMBED_M, DESCENDED_M, Guidance, GuidanceInputs, LAND_AFTER, Phase,
     WINDOW_EDGE_M,
 };
-use crate::mission::State;
+use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 

@@ -5,15 +5,15 @@ use planner_core::track::deconflict::Advice;
 use planner_core::track::{self, Reference, ReferenceState};
 use planner_core::{Length, Point};
 
-use super::limits::JOIN_MPS;
 use super::smoother::TICK_S;
 use super::{
     DESCENDED_M, FENCE_HALVINGS, FENCE_MARGIN_M, GUIDED_LANDING_STALL_TIMEOUT, Guidance,
     GuidanceInputs, LEG_LEAD_M, MIN_LEG_M, Phase, SETTLE_WINDOW_M, TOUCHDOWN_MPS,
 };
 use crate::autopilot::AutopilotKind;
+use crate::config::limits::JOIN_MPS;
 use crate::guidance::evade::{self, StepBack};
-use crate::mission::State;
+use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 

@@ -29,8 +29,8 @@ use libm::{fmaxf, fminf};
 use planner_core::{Length, Point};
 
 use super::fence::Fence;
-use super::limits::{MAX_SMOOTHING_S, MotionLimits, Urgency};
 use super::motion::{Motion, clamp_length};
+use crate::config::limits::{MAX_SMOOTHING_S, MotionLimits, Urgency};
 
 /// Time between two raw points, seconds: the period of the setpoints.
 pub const TICK_S: f32 = 0.05;

@@ -8,7 +8,8 @@ use planner_core::{Length, Point};
 use crate::autopilot::telemetry::Ack;
 use crate::config::PlanFailure;
 use crate::link::Links;
-use crate::link::commands::{self, Command, PendingCommands};
+use crate::link::commands::Command;
+use crate::mission::pending::{self, PendingCommands};
 use crate::mission::photographed::PhotographedWaypoints;
 use crate::mission::task::{PathProgress, Tasks};
 use crate::mission::waits::{BarredStart, Waits};
@@ -206,7 +207,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// Stores an operator's command for the mission table. Returns its `MAV_RESULT`; `None` for a
     /// command that is not one of the mission's.
     pub(crate) fn handle_command(&mut self, inputs: &GuardInputs, command: &Command) -> Option<u8> {
-        commands::apply_command(&mut self.pending, self.state, inputs, command)
+        pending::apply_command(&mut self.pending, self.state, inputs, command)
     }
 
     /// Changes the state as a row says. `after_search` as in

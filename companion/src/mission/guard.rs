@@ -1,7 +1,7 @@
 //! The guards: conditions of the rows of the mission table.
 
 use super::inputs::GuardInputs;
-pub(crate) use crate::autopilot::telemetry::MAX_POSITION_AGE;
+use crate::autopilot::telemetry::{MAX_HEARTBEAT_AGE, MAX_POSITION_AGE};
 use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
 use crate::time::Duration;
 
@@ -280,10 +280,6 @@ pub enum Guard {
     /// No division is under way or outstanding any more.
     NothingToDivide,
 }
-
-/// Age of the last HEARTBEAT from which the autopilot counts as silent: HEARTBEAT comes at 1 Hz,
-/// and a late one is not yet silence.
-pub(crate) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 
 impl Guard {
     /// Whether the condition is met, and where it has a duration, has been met for `limit`.

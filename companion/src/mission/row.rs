@@ -1,8 +1,8 @@
 //! A row of the mission table, and the actions that rows have.
 
 use super::guard::Guard;
-use super::state::{State, TargetState};
 use crate::link::severity::Severity;
+use crate::state::{State, TargetState};
 use crate::time::Duration;
 
 /// What the companion does when a row is taken, in addition to the change of state.

@@ -3,8 +3,8 @@
 
 use super::guard::Guard;
 use super::row::{AT_ONCE, Action, TransitionRow, state_mask};
-use super::state::{State, TargetState};
 use crate::link::severity::Severity;
+use crate::state::{State, TargetState};
 use crate::time::Duration;
 
 pub(crate) const fn secs(secs: u64) -> Duration {

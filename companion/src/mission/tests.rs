@@ -6,9 +6,9 @@ use std::fmt::Write;
 use std::string::String;
 use std::vec::Vec;
 
-use super::guard::MAX_HEARTBEAT_AGE;
 use super::row::AT_ONCE;
 use super::*;
+use crate::autopilot::telemetry::{MAX_HEARTBEAT_AGE, MAX_POSITION_AGE};
 use crate::mission::table::*;
 use crate::time::Duration;
 use Action as A;

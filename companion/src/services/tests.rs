@@ -8,10 +8,10 @@ use mavlink::dialects::ardupilotmega::*;
 use mavlink::MessageData;
 
 use super::*;
+use crate::config::parameters::TABLE;
 use crate::events::Event;
 use crate::link::frame::{self, Framer, Header};
-use crate::mission::State;
-use crate::services::parameters::TABLE;
+use crate::state::State;
 use crate::storage::store::MAX_READ;
 use crate::testing::fake_autopilot::*;
 use crate::testing::fake_flash::{Flash, execute, started};

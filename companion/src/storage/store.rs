@@ -39,7 +39,7 @@ use self::job::FlashJob;
 use self::journal::Journal;
 pub use self::upload_state::{UploadError, UploadState};
 use self::window::UploadReassembly;
-use crate::services::parameters::Parameters;
+use crate::config::parameters::Parameters;
 
 /// Record of the photographed waypoints of an area, as [`crate::mission::photographed`] writes it.
 pub(crate) type PhotographedRecord = heapless::Vec<u8, MAX_PROGRAM>;
@@ -137,7 +137,7 @@ impl Store {
         &mut self,
         index: usize,
         value: f32,
-    ) -> Result<(), crate::services::parameters::ParameterError> {
+    ) -> Result<(), crate::config::parameters::ParameterError> {
         if self.parameters.set(index, value)? {
             self.unsaved = true;
         }

@@ -13,8 +13,8 @@ pub mod follow;
 
 use libm::{floorf, fmaxf, fminf};
 
-use crate::coverage::Flat;
 use crate::file::{CRC32, FileError};
+use crate::geo::Flat;
 
 /// First eight bytes of a height-field file.
 pub const MAGIC: [u8; 8] = *b"FLKFIELD";

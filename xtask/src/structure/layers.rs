@@ -1,5 +1,7 @@
 //! Finds imports that point up: a layer must not know those above it.
 
+use std::path::Path;
+
 use super::imports::{self, Import};
 use super::sources::Tree;
 
@@ -37,20 +39,52 @@ const RULES: &[(&[&str], &[&str])] = &[
             "companion/src/link.rs",
             "companion/src/services",
             "companion/src/services.rs",
-            "companion/src/companion.rs",
         ],
     ),
-    (&["companion/src/link", "companion/src/link.rs"], &["companion/src/companion.rs"]),
-    (&["companion/src/planner", "companion/src/storage"], &["companion/src/companion.rs"]),
-    (&["companion/src/time.rs", "companion/src/timers.rs"], &["mavlink", "companion/src/mission"]),
-    // Plan types stand below what makes and follows plans.
+    (&["companion/src/time.rs", "companion/src/timers.rs"], &["mavlink"]),
+];
+
+/// The layers of a crate, the lowest first. A layer is a module of the crate's root: its file and
+/// the folder beside it.
+type Layers = (&'static str, &'static [&'static str]);
+
+const LAYERS: [Layers; 2] = [
     (
-        &["planner-core/src/flight", "planner-core/src/flight.rs"],
+        "companion/src",
         &[
-            "planner-core/src/plan",
-            "planner-core/src/plan.rs",
-            "planner-core/src/track.rs",
-            "planner-core/src/track/deconflict.rs",
+            "time",
+            "timers",
+            "margins",
+            "state",
+            "events",
+            "link",
+            "autopilot",
+            "config",
+            "storage",
+            "swarm",
+            "mission",
+            "guidance",
+            "replanning",
+            "planner",
+            "services",
+            "companion",
+        ],
+    ),
+    (
+        "planner-core/src",
+        &[
+            "sort",
+            "file",
+            "geo",
+            "map",
+            "flight",
+            "roadmap",
+            "assignment",
+            "schedule",
+            "plan",
+            "track",
+            "detour",
+            "coverage",
         ],
     ),
 ];
@@ -59,22 +93,49 @@ const RULES: &[(&[&str], &[&str])] = &[
 pub fn upward(tree: &Tree) -> Vec<String> {
     let mut found = Vec::new();
     for (at, source) in tree.sources.iter().enumerate() {
-        for (_, above) in RULES.iter().filter(|(below, _)| holds(below, &source.path)) {
-            found.extend(imports::of(tree, at).into_iter().filter_map(|import| {
-                let to = match import {
-                    Import::File(file) => tree.sources[file].path.display().to_string(),
-                    Import::Named(name) => name,
-                };
-                holds(above, to.as_ref())
-                    .then(|| format!("{} imports {to}, which is above it", source.path.display()))
-            }));
+        let above = |to: &Path| {
+            let ruled =
+                RULES.iter().any(|(below, above)| holds(below, &source.path) && holds(above, to));
+            ruled || LAYERS.iter().any(|layers| is_above(layers, &source.path, to))
+        };
+        for import in imports::of(tree, at) {
+            let to = match import {
+                Import::File(file) => tree.sources[file].path.clone(),
+                Import::Named(name) => name.into(),
+            };
+            if above(&to) {
+                let (from, to) = (source.path.display(), to.display());
+                found.push(format!("{from} imports {to}, which is above it"));
+            }
+        }
+        if LAYERS.iter().any(|layers| is_in_no_layer(layers, &source.path)) {
+            found.push(format!("{} is in no layer", source.path.display()));
         }
     }
-    found.dedup();
     found
 }
 
 /// Whether one of the `places` is the file, or a folder above it.
-fn holds(places: &[&str], file: &std::path::Path) -> bool {
+fn holds(places: &[&str], file: &Path) -> bool {
     places.iter().any(|place| file.starts_with(place))
 }
+
+/// Whether both files are in layers of the crate, and `to` in the higher one.
+fn is_above(layers: &Layers, from: &Path, to: &Path) -> bool {
+    matches!((height(layers, from), height(layers, to)), (Some(from), Some(to)) if to > from)
+}
+
+/// Whether a file is in the crate and in none of its layers. The crate's root is in none.
+fn is_in_no_layer(layers: &Layers, file: &Path) -> bool {
+    let root = Path::new(layers.0).join("lib.rs");
+    file.starts_with(layers.0) && file != root && height(layers, file).is_none()
+}
+
+/// Place of a file's layer in the order; `None` for a file in no layer of this crate.
+fn height((folder, order): &Layers, file: &Path) -> Option<usize> {
+    let module = file.strip_prefix(folder).ok()?.iter().next()?;
+    order.iter().position(|layer| Path::new(module).with_extension("") == Path::new(layer))
+}
+
+#[cfg(test)]
+mod tests;

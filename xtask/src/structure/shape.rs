@@ -75,7 +75,6 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "next_raw_point",
         "what one step has at hand; the scene lacks what it changes",
     ),
-    ("companion/src/link/commands.rs", "apply_command", "one match: an arm for each command"),
     (
         "companion/src/link/outbox.rs",
         "write_first",
@@ -87,6 +86,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "a record: a field for each fact that a guard of the table asks for",
     ),
     ("companion/src/mission/guard.rs", "is_met", "one match: an arm for each guard"),
+    ("companion/src/mission/pending.rs", "apply_command", "one match: an arm for each command"),
     (
         "companion/src/planner/coverage.rs",
         "plan_flights",
@@ -105,7 +105,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "one match: an arm for each job and how it went",
     ),
     (
-        "companion/src/swarm/detour.rs",
+        "companion/src/replanning/detour.rs",
         "Detours",
         "what is known of a blocked path, flat: reset as a whole where a path begins",
     ),

@@ -4,11 +4,11 @@
 use board_bench::calls::{Meter, flight};
 use board_bench::cases;
 use companion::config::USUAL_GROUND_STATIONS;
+use companion::config::parameters::{self, Parameters};
 use companion::link::commands;
 use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
 use companion::link::roster::{self, RosterReport};
-use companion::services::parameters::{self, Parameters};
 use companion::storage::mission_file::{
     self, MissionBlock, MissionGoal, MissionHeader, MissionVehicle, MissionView,
 };

@@ -277,7 +277,7 @@ proptest::proptest! {
         let time =
             bench.swarm.iter().filter_map(Frame::decode::<TIMESYNC_DATA>).any(|t| t.ts1 == 4711);
         proptest::prop_assert!(
-            values >= crate::services::parameters::PARAMETER_COUNT && time,
+            values >= crate::config::parameters::PARAMETER_COUNT && time,
             "{values} {time}"
         );
         proptest::prop_assert!(bench.acks.contains(&(512, 0, 255, 190)), "{:?}", bench.acks);

@@ -5,11 +5,11 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::safety::{self, MotionBounds, OwnSet, REACTION_S, ReachableSet};
 use planner_core::{Length, Point};
 
-use super::super::limits::Urgency;
 use super::super::{Guidance, GuidanceInputs, Phase};
 use super::{FilterConflict, FlightDirection, MAX_STOP_FOR_STRANGER};
 use crate::autopilot::telemetry::Telemetry;
-use crate::mission::State;
+use crate::config::limits::Urgency;
+use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::swarm::neighbours::met::{FilterNeighbour, ReachQuery};
 use crate::time::{Duration, Instant};

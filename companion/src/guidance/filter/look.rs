@@ -5,7 +5,6 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::deconflict::Method;
 use planner_core::track::safety::{Legs, OwnSet, REACTION_S, ReachableSet};
 
-use super::super::limits::{Urgency, filter_bounds};
 use super::super::motion::clamp_to;
 use super::super::{Guidance, GuidanceInputs};
 use super::{
@@ -13,7 +12,8 @@ use super::{
     MAX_TURNING_SETPOINT_M, MAX_TURNING_SETPOINT_MPS, RESUME_CLEAR_FOR, RESUME_CLEAR_M,
     STANDSTILL_WITHIN_M, SafetyFilter,
 };
-use crate::mission::State;
+use crate::config::limits::{Urgency, filter_bounds};
+use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 

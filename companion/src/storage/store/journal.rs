@@ -9,7 +9,7 @@
 use super::area::{AreaCondition, append_word_crc};
 use super::flash::{MAX_PROGRAM, WORD};
 use super::records::{Compaction, RecordKind};
-use crate::services::parameters::STORED_LEN;
+use crate::config::parameters::STORED_LEN;
 use core::ops::Range;
 
 /// First bytes of the head of each record.

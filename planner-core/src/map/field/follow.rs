@@ -12,7 +12,7 @@
 use libm::{ceilf, fmaxf, fminf};
 
 use super::FieldView;
-use crate::coverage::Flat;
+use crate::geo::Flat;
 use crate::{Length, Point};
 
 /// Most height samples of one leg; on a longer leg the samples are further apart.

@@ -2,11 +2,11 @@
 
 use planner_core::Point;
 
+use crate::autopilot::telemetry::MAX_POSITION_AGE;
 use crate::autopilot::telemetry::Telemetry;
 use crate::config::Config;
 use crate::guidance::{Guidance, GuidanceInputs};
 use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
-use crate::mission::MAX_POSITION_AGE;
 use crate::mission::course::Mission;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;

@@ -14,8 +14,8 @@ use super::{
     DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER, TURN_DELAY_S,
 };
 use crate::guidance::evade;
-use crate::mission::State;
-use crate::swarm::view::DetourView;
+use crate::replanning::view::DetourView;
+use crate::state::State;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 

@@ -5,7 +5,7 @@
 //!
 //! Constant work.
 
-use crate::swarm::view::DetourView;
+use crate::replanning::view::DetourView;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 

@@ -5,8 +5,8 @@ use planner_core::Point;
 
 use super::Detours;
 use crate::autopilot::telemetry::Telemetry;
-use crate::mission::State;
-use crate::swarm::view::{DetourView, ReportedPlace};
+use crate::replanning::view::{DetourView, ReportedPlace};
+use crate::state::State;
 use crate::time::{Duration, Instant};
 
 /// Age of this vehicle's position above which the velocity reported with it is 0.

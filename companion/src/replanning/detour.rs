@@ -35,11 +35,11 @@ use self::beside::AreaDetourSearches;
 use self::homeward::HomewardSearch;
 use self::path_kind::{DetourPurpose, PathKind};
 use crate::link::commands::{ACCEPTED, Command};
-use crate::mission::State;
+use crate::replanning::obstacles::Obstacles;
+use crate::replanning::view::DetourView;
+use crate::state::State;
 use crate::swarm::neighbours::MAX_HOVER_MPS;
-use crate::swarm::obstacles::Obstacles;
 use crate::swarm::sweep::IncrementalScan;
-use crate::swarm::view::DetourView;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 

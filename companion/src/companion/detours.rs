@@ -8,11 +8,11 @@ use super::Companion;
 use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::guidance::GuidanceInputs;
-use crate::mission::State;
-use crate::swarm::detour::Detours;
-use crate::swarm::detour::asking::RetryOutlook;
-use crate::swarm::detour::path_kind::{DetourPurpose, RejoinPlace, RejoinPlaces};
-use crate::swarm::view::DetourView;
+use crate::replanning::detour::Detours;
+use crate::replanning::detour::asking::RetryOutlook;
+use crate::replanning::detour::path_kind::{DetourPurpose, RejoinPlace, RejoinPlaces};
+use crate::replanning::view::DetourView;
+use crate::state::State;
 
 /// Greatest distance between the end of a detour and the place where the vehicle is to come back to
 /// its path, metres: a detour that ends further away is refused.

@@ -16,7 +16,7 @@ use heapless::Vec;
 use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::{Length, Point};
 
-use crate::swarm::view::DetourView;
+use crate::replanning::view::DetourView;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 

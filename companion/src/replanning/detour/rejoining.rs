@@ -5,7 +5,7 @@
 use super::path_kind::{DetourPurpose, PathKind, RejoinPlace, RejoinPlaces};
 use super::{Detours, beside};
 use crate::guidance::PathSource;
-use crate::swarm::view::DetourView;
+use crate::replanning::view::DetourView;
 use crate::time::{Duration, Instant};
 use crate::timers::Timers;
 
