@@ -324,14 +324,14 @@ impl Guidance {
             }
             self.follow_setpoint(&plan.path, dt_s);
             let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
-            self.stops_at_m = match state {
+            self.stops_at_m = match state.follows_path() {
                 // Also while the vehicle is stopped: the filter checks up to the stop even if that
                 // was advised too late.
-                State::Follow | State::Blocked | State::Replanning => {
+                true => {
                     let least_m = track::braking_distance_m(&self.track, &plan.path, &self.tracker);
                     along_m + self.advice.stop_within_m.max(least_m)
                 }
-                _ => self.setpoint_m + self.smoother.stopping_distance_m(Urgency::Smooth),
+                false => self.setpoint_m + self.smoother.stopping_distance_m(Urgency::Smooth),
             };
         }
         self.step_filter(state, scene, neighbours, now);
@@ -343,7 +343,7 @@ impl Guidance {
             return true;
         }
         let kind = scene.telemetry.kind();
-        let taken = (state.lands() || matches!(state, State::PilotControl | State::Disarm))
+        let taken = (state.lands_or_disarms() || state == State::PilotControl)
             && scene.telemetry.custom_mode != kind.setpoint_mode();
         self.position_unknown |= !known || state == State::PositionLost;
         let flies = scene.telemetry.on_ground == Some(false);

@@ -22,7 +22,8 @@ pub use self::guard::Guard;
 pub use self::inputs::GuardInputs;
 use self::row::state_mask;
 pub use self::row::{Action, TransitionRow};
-pub use crate::state::{InterruptedStates, State, TargetState};
+pub use crate::state::State;
+pub use crate::state::interruption::{InterruptedStates, TargetState};
 
 /// Whether the table has a row from `state` with this guard. A command whose guard has none there
 /// is refused.

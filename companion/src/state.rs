@@ -1,4 +1,6 @@
-//! States of the mission, and which state an interruption resumes.
+//! States of the mission, and the sets of them that decisions are made by.
+
+pub(crate) mod interruption;
 
 /// State of one vehicle's mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -140,10 +142,42 @@ impl State {
         self.is_on_path() || self.prepares_take_off() || self.takes_off()
     }
 
-    /// Whether the vehicle was not started yet.
-    pub(crate) fn is_before_start(self) -> bool {
+    /// What HEARTBEAT says of a vehicle in this state.
+    pub(crate) fn system_status(self) -> SystemStatus {
         use State::*;
-        matches!(self, WaitAutopilot | WaitPosition | Planning | Ready)
+        match self {
+            WaitAutopilot | WaitPosition => SystemStatus::Boot,
+            Planning | Ready | Done | Aborted => SystemStatus::Standby,
+            AutopilotSilent | PositionLost | Failsafe => SystemStatus::Critical,
+            _ => SystemStatus::Active,
+        }
+    }
+
+    /// Whether autopilot, position or plan of the vehicle are still missing.
+    pub(crate) fn is_before_plan(self) -> bool {
+        matches!(self, Self::WaitAutopilot | Self::WaitPosition | Self::Planning)
+    }
+
+    /// Whether the vehicle was not started yet.
+    pub fn is_before_start(self) -> bool {
+        self == Self::Ready || self.is_before_plan()
+    }
+
+    /// Whether nothing is under way: no plan is being computed, and the vehicle was not started or
+    /// its mission has ended.
+    pub(crate) fn is_idle(self) -> bool {
+        (self.is_before_start() && self != Self::Planning) || self.is_over()
+    }
+
+    /// Whether the vehicle waits with its plan on its pad, disarmed: started or not.
+    pub(crate) fn waits_with_plan(self) -> bool {
+        self == Self::Ready || self.waits_on_pad()
+    }
+
+    /// Whether the vehicle waits on its pad, disarmed, and is to fly its plan from there: no detour
+    /// is sought.
+    pub(crate) fn waits_to_fly_plan(self) -> bool {
+        self.waits_with_plan() && !self.waits_for_detour()
     }
 
     /// Whether the vehicle has been started and waits on its pad, disarmed.
@@ -154,6 +188,29 @@ impl State {
     /// Whether the autopilot is being brought to fly: setpoints, mode, arming.
     pub(crate) fn prepares_take_off(self) -> bool {
         matches!(self, Self::Streaming | Self::Engaging | Self::Arming)
+    }
+
+    /// Whether the vehicle has been started, and arming was not requested yet.
+    pub(crate) fn is_before_arming(self) -> bool {
+        self.waits_on_pad() || matches!(self, Self::Streaming | Self::Engaging)
+    }
+
+    /// Whether the vehicle has been started and has not left its pad: before its take-off, or after
+    /// its start was cancelled.
+    pub(crate) fn is_on_pad(self) -> bool {
+        self.waits_on_pad() || self.prepares_take_off() || self == Self::CancelStart
+    }
+
+    /// Whether the vehicle has been started and has not reached its path: it waits on its pad, is
+    /// brought to fly, or rises.
+    pub(crate) fn is_before_path(self) -> bool {
+        self.waits_on_pad() || self.prepares_take_off() || self.takes_off()
+    }
+
+    /// Whether a further MISSION_START changes nothing, since the vehicle is on its way to its path
+    /// or on it.
+    pub(crate) fn flies_mission(self) -> bool {
+        self.is_before_path() || self.is_on_path()
     }
 
     /// Whether the vehicle rises from its pad to the start of its path.
@@ -167,8 +224,32 @@ impl State {
     }
 
     /// Whether the vehicle follows its path, or would if nothing blocked it.
-    pub(crate) fn follows_path(self) -> bool {
+    pub fn follows_path(self) -> bool {
         self == Self::Follow || self.is_blocked()
+    }
+
+    /// Whether the vehicle follows its path, or stands before what blocks it and seeks no other
+    /// path.
+    pub(crate) fn keeps_to_path(self) -> bool {
+        matches!(self, Self::Follow | Self::Blocked)
+    }
+
+    /// Whether the vehicle may be kept by a gate that another vehicle has not passed, on its pad or
+    /// on its path.
+    pub(crate) fn may_wait_at_gate(self) -> bool {
+        self == Self::Scheduled || self.keeps_to_path()
+    }
+
+    /// Whether a vehicle in a coverage mission flies its part, or holds on its path and may fly on:
+    /// for a division, or before what blocks the path.
+    pub(crate) fn flies_its_part(self) -> bool {
+        self == Self::Dividing || self.keeps_to_path()
+    }
+
+    /// Whether the vehicle flies on, as far as others let it, after a pause or its pilot: a further
+    /// command to resume changes nothing.
+    pub(crate) fn has_resumed(self) -> bool {
+        self.advances() || self.is_blocked() || self == Self::Dividing
     }
 
     /// Whether the vehicle stands on its path because something blocks it.
@@ -186,19 +267,96 @@ impl State {
         matches!(self, Self::Land | Self::LandingHeld)
     }
 
+    /// Whether the vehicle brakes to a stop to land, or lands.
+    pub(crate) fn begins_landing(self) -> bool {
+        matches!(self, Self::Stopping | Self::Land)
+    }
+
+    /// Whether the vehicle lands, would if the column below were free, or has landed and waits
+    /// until its motors are disarmed.
+    pub(crate) fn lands_or_disarms(self) -> bool {
+        self.lands() || self == Self::Disarm
+    }
+
+    /// Whether the vehicle takes no part in the mission any more: it stops to land, lands or has
+    /// landed, its mission has ended, or the autopilot's failsafe acts.
+    pub(crate) fn has_left_mission(self) -> bool {
+        self.begins_landing() || self.lands_or_disarms() || self.is_over() || self == Self::Failsafe
+    }
+
     /// Whether the vehicle is on the ground after its flight.
     pub(crate) fn has_landed(self) -> bool {
         matches!(self, Self::Disarm | Self::Done)
     }
 
     /// Whether the mission has ended, well or not.
-    pub(crate) fn is_over(self) -> bool {
+    pub fn is_over(self) -> bool {
         matches!(self, Self::Done | Self::Aborted)
+    }
+
+    /// Whether the companion has given up: the mission was, or the autopilot's own failsafe acts.
+    pub fn has_given_up(self) -> bool {
+        matches!(self, Self::Aborted | Self::Failsafe)
+    }
+
+    /// Whether a pilot or the autopilot's failsafe flies the vehicle.
+    pub(crate) fn is_taken_over(self) -> bool {
+        matches!(self, Self::PilotControl | Self::Failsafe)
+    }
+
+    /// Whether a pilot flies the vehicle, or did and has not let the mission go on.
+    pub fn is_left_to_pilot(self) -> bool {
+        matches!(self, Self::PilotControl | Self::PilotReturned)
     }
 
     /// Whether somebody else flies the vehicle, or did and has not given it back.
     pub(crate) fn is_flown_by_another(self) -> bool {
-        matches!(self, Self::PilotControl | Self::PilotReturned | Self::Failsafe)
+        self.is_left_to_pilot() || self == Self::Failsafe
+    }
+
+    /// Whether the vehicle may stand away from its path before its mission goes on: after its
+    /// pilot, or after its position was lost.
+    pub(crate) fn may_resume_off_path(self) -> bool {
+        matches!(self, Self::PilotReturned | Self::PositionLost)
+    }
+
+    /// Whether a loss interrupts the mission: of the autopilot, of the position, or to a pilot.
+    pub fn is_interrupted_by_loss(self) -> bool {
+        matches!(self, Self::AutopilotSilent | Self::PositionLost) || self.is_left_to_pilot()
+    }
+
+    /// Whether the vehicle stands until its operator resumes, or its autopilot is heard again.
+    pub(crate) fn stands_to_resume(self) -> bool {
+        matches!(self, Self::Paused | Self::AutopilotSilent)
+    }
+
+    /// Whether a pause or a pilot keeps the vehicle until the command to resume, or would: on its
+    /// pad a pause may be pending.
+    pub fn may_need_resume(self) -> bool {
+        matches!(self, Self::PilotReturned | Self::Paused | Self::CancelStart)
+            || self.waits_with_plan()
+    }
+
+    /// Whether a pause is stored in this state until a row of the table can act on it: before the
+    /// climb, and while the mission is interrupted.
+    pub(crate) fn stores_pause(self) -> bool {
+        use State::*;
+        match self {
+            Planning | CancelStart | TakeOff | AutopilotSilent | PositionLost | PilotReturned => {
+                true
+            }
+            _ => self.waits_with_plan(),
+        }
+    }
+
+    /// Whether, once this state is entered, the position is trusted again after a jump.
+    pub(crate) fn trusts_position_again(self) -> bool {
+        matches!(self, Self::Follow | Self::WaitPosition)
+    }
+
+    /// Whether a vehicle in this state may continue its plan while no other vehicle hears it.
+    pub(crate) fn may_continue_unheard(self) -> bool {
+        self.takes_off() || matches!(self, Self::Follow | Self::Alone)
     }
 
     /// Whether a vehicle in this state follows the plan that all share, and its gates.
@@ -206,12 +364,7 @@ impl State {
         use State::*;
         match self {
             Ready | Follow | Paused | Dividing => true,
-            _ => {
-                self.waits_on_pad()
-                    || self.prepares_take_off()
-                    || self.takes_off()
-                    || self.is_blocked()
-            }
+            _ => self.is_before_path() || self.is_blocked(),
         }
     }
 
@@ -221,96 +374,37 @@ impl State {
         use State::*;
         matches!(self, Follow | Paused | Alone | Blocked | Replanning | Dividing)
     }
+
+    /// Whether a vehicle in a coverage mission is on its path and does not hold for a division yet,
+    /// so that it may promise where it will.
+    pub(crate) fn may_promise_hold(self) -> bool {
+        self.is_on_path() && self != Self::Dividing
+    }
+
+    /// Whether the vehicle flies or holds on its path, or brakes along it to land.
+    pub fn moves_along_path(self) -> bool {
+        self.is_on_path() || self == Self::Stopping
+    }
+
+    /// Whether a landing that is requested in this state begins at the reference. In others the
+    /// vehicle is off its path, and the reference may be behind a wall.
+    pub(crate) fn lands_at_reference(self) -> bool {
+        self.moves_along_path() || matches!(self, Self::Land | Self::Disarm)
+    }
 }
 
-/// Target state of a row of the mission table.
+/// What HEARTBEAT says of a vehicle: `MAV_STATE`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TargetState {
-    /// A given state.
-    State(State),
-    /// The state that was interrupted.
-    Interrupted,
+pub(crate) enum SystemStatus {
+    /// The autopilot or its position is not known yet.
+    Boot,
+    /// On the ground, before the start or after the mission.
+    Standby,
+    /// Started.
+    Active,
+    /// The autopilot or the position is lost, or a failsafe acts.
+    Critical,
 }
 
-/// The interrupted states, to which the mission returns. A pause interrupts ([`State::Paused`]),
-/// and so does a loss: a silent autopilot, a lost position, or the pilot. There are two, as a loss
-/// may interrupt a pause.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct InterruptedStates {
-    /// The state that the pause interrupted.
-    pub by_pause: State,
-    /// The state that a silent autopilot, a lost position or the pilot interrupted.
-    pub by_loss: State,
-}
-
-impl Default for InterruptedStates {
-    fn default() -> Self {
-        Self { by_pause: State::Follow, by_loss: State::Follow }
-    }
-}
-
-impl InterruptedStates {
-    /// The state to which [`TargetState::Interrupted`] leads from `state`.
-    pub fn target(&self, state: State) -> State {
-        if state == State::Paused { self.by_pause } else { self.by_loss }
-    }
-
-    /// Stores the state that a change from `from` to `to` interrupts. `after_search`: the state
-    /// that is resumed after a search under way, the landing if it is for a place to land.
-    pub(crate) fn record_interruption(&mut self, from: State, to: State, after_search: State) {
-        use State::*;
-        // These states cannot be resumed half-way: a search begins again in the state before it, a
-        // disarming in the landing, and so does a start that ended with the motors armed.
-        let kept = match from {
-            Replanning => after_search,
-            Arming | CancelStart | Disarm | LandingHeld => Land,
-            other => other,
-        };
-        if Self::is_loss(to) && !Self::is_loss(from) {
-            self.by_loss = kept;
-        } else if to == Paused && from != Paused && !Self::is_loss(from) {
-            self.by_pause = kept;
-        }
-    }
-
-    /// The STATUSTEXT that names the interrupted state; `None` if a change from `from` to `to`
-    /// interrupts none.
-    pub(crate) fn interruption_text(&self, from: State, to: State) -> Option<&'static str> {
-        use State::*;
-        let kept = match to {
-            Paused if matches!(from, PilotReturned | PositionLost) => return Some("Still paused"),
-            Paused | PilotControl | AutopilotSilent | PositionLost if !Self::is_loss(from) => {
-                self.target(to)
-            }
-            _ => return None,
-        };
-        Some(match kept {
-            TakeOff => "Interrupted: TakeOff",
-            Climb => "Interrupted: Climb",
-            Follow => "Interrupted: Follow",
-            Paused => "Interrupted: Paused",
-            Alone => "Interrupted: Alone",
-            Blocked => "Interrupted: Blocked",
-            Dividing => "Interrupted: Dividing",
-            Stopping => "Interrupted: Stopping",
-            Land => "Interrupted: Land",
-            _ => return None,
-        })
-    }
-
-    fn is_loss(state: State) -> bool {
-        use State::*;
-        matches!(state, AutopilotSilent | PositionLost | PilotControl | PilotReturned)
-    }
-
-    /// The state of the flight without pause and loss: `state` itself or the one that they
-    /// interrupted.
-    pub(crate) fn uninterrupted_state(&self, state: State) -> State {
-        use State::*;
-        let state = match state {
-            AutopilotSilent | PositionLost | PilotControl | PilotReturned => self.by_loss,
-            other => other,
-        };
-        if state == Paused { self.by_pause } else { state }
-    }
-}
+#[cfg(test)]
+mod tests;

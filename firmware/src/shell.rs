@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use companion::link::frame::{Framer, MAX_FRAME_LEN};
 use companion::link::severity::Severity;
 use companion::storage::store::{FlashRequest, MAX_READ};
-use companion::{Event, Link, PlanFailure, PlanRequests, State};
+use companion::{Event, Link, PlanFailure, PlanRequests};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -215,7 +215,7 @@ impl Shell {
                 match event {
                     Event::PlanRequested(wanted) => self.plan_requests.add(wanted),
                     Event::RestartRequested => self.request_restart(),
-                    Event::StateChanged { to: State::Done | State::Aborted, .. } => {
+                    Event::StateChanged { to, .. } if to.is_over() => {
                         if let Some(reported) = self.setpoints.take_setpoint_stats(now_ms()) {
                             companion.send_text_with_numbers(
                                 Severity::Info,

@@ -424,7 +424,7 @@ impl<'a> SimulationRun<'a> {
 
 /// Whether a pilot controls the vehicle or has just given it back: this may last for any time.
 fn is_left_to_pilot(member: &SimulatedVehicle) -> bool {
-    matches!(member.state(), State::PilotControl | State::PilotReturned)
+    member.state().is_left_to_pilot()
 }
 
 /// How planning fails on the roadmap file with one bit changed.

@@ -1,6 +1,6 @@
 //! `cargo xtask structure`: checks the sources for import cycles, imports that point up, fields
-//! written outside their module, large structs, long functions, `bool` arguments, long files and
-//! long lines.
+//! written outside their module, written-out sets of states, large structs, long functions, `bool`
+//! arguments, long files and long lines.
 //!
 //! The sources are parsed with `syn`. Any path that names an item of another file is an import of
 //! that file: in a `use`, a type, a call. A `pub use` is an import too, and an item behind one
@@ -13,6 +13,7 @@ mod layers;
 mod lines;
 mod shape;
 mod sources;
+mod states;
 mod writes;
 
 use std::collections::BTreeSet;
@@ -45,13 +46,18 @@ pub fn run() -> Result<()> {
     for tree in Tree::of_crate(Path::new("planner-core"))? {
         records.extend(writes::public_fields(&tree));
     }
+    let state_names = states::state_names()?;
     for name in CRATES {
         for tree in Tree::of_crate(Path::new(name))? {
             for cycle in imports::cycles(&tree) {
                 println!("{name}: import cycle:\n  {}", cycle.join("\n  "));
                 wrong += 1;
             }
-            for place in layers::upward(&tree).into_iter().chain(writes::foreign(&tree, &records)) {
+            let places = layers::upward(&tree)
+                .into_iter()
+                .chain(writes::foreign(&tree, &records))
+                .chain(states::sets(&tree, &state_names));
+            for place in places {
                 println!("{name}: {place}");
                 wrong += 1;
             }

@@ -258,8 +258,8 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
     }
 
     fn flies(&self) -> bool {
-        use companion::State::*;
-        matches!(self.companion.state(), Follow | Blocked | Replanning | Dividing)
+        let state = self.companion.state();
+        state.follows_path() || state == companion::State::Dividing
     }
 
     fn has_area(&self) -> bool {

@@ -147,10 +147,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         self.guidance.end_guided_landing();
         match from {
-            Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping | Land
-            | Disarm => {
-                self.guidance.cancel_evasion();
-            }
+            _ if from.lands_at_reference() => self.guidance.cancel_evasion(),
             LandingHeld => self.guidance.hold_at(position),
             // Off the path the reference may be behind a wall, so the vehicle holds where it is.
             _ => self.guidance.hold_off_path(position),

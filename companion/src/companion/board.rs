@@ -45,14 +45,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Sectors are erased only on the ground, disarmed, and not while a plan is computed on the
     /// roadmap.
     pub(crate) fn erase_permission(&self) -> ErasePermission {
-        let idle = matches!(
-            self.mission.state(),
-            State::WaitAutopilot
-                | State::WaitPosition
-                | State::Ready
-                | State::Done
-                | State::Aborted
-        );
+        let idle = self.mission.state().is_idle();
         let known =
             self.telemetry.kind.is_some() || self.now - Instant::ZERO > AUTOPILOT_MISSING_AFTER;
         match self.mission.state() {

@@ -9,7 +9,6 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::roster::MemberStatus;
 use crate::link::severity::Severity;
-use crate::mission::table::{ON_PAD, STARTED_ON_PAD};
 use crate::replanning::detour::path_kind::RejoinPlace;
 use crate::state::State;
 use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, LEASE, OwnReport};
@@ -97,7 +96,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// This vehicle's report of itself to the fleet.
     fn own_fleet_report(&self) -> OwnReport {
-        use State::*;
         let state = self.mission.state();
         let off_plan = self.guidance.returning
             || self.guidance.ends_away_from_goal
@@ -107,8 +105,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // On a detour that leads back to its path the vehicle keeps its part of the area.
         let beside = self.detours.is_beside_plan();
         let ends = match state {
-            Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
-            PilotControl | PilotReturned => {
+            _ if state.has_left_mission() => true,
+            _ if state.is_left_to_pilot() => {
                 self.mission.time_with_pilot(self.now) >= LEFT_WITH_PILOT_AFTER
             }
             _ => {
@@ -117,7 +115,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                         && self.timers.is_due(Timer::LeaveWithoutCommitment, self.now))
             }
         };
-        let on_pad = matches!(state, Ready | Scheduled | PadReplanning);
+        let on_pad = state.waits_with_plan();
         let along_m = self.guidance.progress_m(state, &self.guidance_inputs());
         let flies = self.guidance.along_m() >= 0.0 && !off_plan;
         // A vehicle that holds above its pad may have overshot the start of its descent a little.
@@ -132,7 +130,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             status: standing,
             waits: self.is_not_started(),
             // By the state: an autopilot may report the ground in flight.
-            airborne: !(self.is_not_started() || ON_PAD.contains(&state) || state.is_over()),
+            airborne: !(self.is_not_started() || state.is_on_pad() || state.is_over()),
             division: self.mission.division_count(),
             progress_dm: if flies {
                 (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16
@@ -142,7 +140,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             commitment_dm: if on_pad { Some(0) } else { self.commitment_dm().filter(|_| flies) },
             // Beside its path the vehicle does not hold: it first flies its own plan to where it
             // promised to hold.
-            holds: on_pad || (state == Dividing && !beside),
+            holds: on_pad || (state == State::Dividing && !beside),
             wants_division: flies && self.wants_division(),
         }
     }
@@ -162,14 +160,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// another vehicle takes part, and this one has no autopilot, position or plan, is away from
     /// its pad, or hears another plan.
     fn cannot_commit(&self) -> bool {
-        use State::*;
         let Some(fleet) = self.neighbours.fleet() else { return false };
         let lacks = match self.mission.state() {
-            WaitAutopilot | WaitPosition | Planning => true,
-            Ready | Scheduled | PadReplanning if !fleet.has_lease(self.now) => return true,
-            Ready => !self.is_at_start() || self.hears_another_plan(),
-            Scheduled | PadReplanning => self.hears_another_plan(),
-            _ => false,
+            state if state.is_before_plan() => true,
+            state if state.waits_with_plan() && !fleet.has_lease(self.now) => return true,
+            State::Ready => !self.is_at_start() || self.hears_another_plan(),
+            state => state.waits_on_pad() && self.hears_another_plan(),
         };
         lacks && self.neighbours.does_another_take_part(self.now, LEASE)
     }
@@ -184,7 +180,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn resumes_too_late(&self) -> bool {
         let resumes = match self.mission.state() {
             State::PilotReturned => self.mission.pending().resume,
-            state => matches!(state, State::Dividing | State::Follow | State::Blocked),
+            state => state.flies_its_part(),
         };
         resumes
             && !self.will_land_off_plan()
@@ -193,7 +189,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether this vehicle was started after it reported that it leaves, and another one flies.
     fn starts_too_late(&self) -> bool {
-        STARTED_ON_PAD.contains(&self.mission.state())
+        self.mission.state().is_before_arming()
             && self
                 .neighbours
                 .fleet()
@@ -228,10 +224,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// vehicles let it fly, and no nearer than it can stop. `None` where it cannot make one, or has
     /// made one.
     fn commitment_dm(&self) -> Option<u16> {
-        use State::*;
         let fleet = self.neighbours.fleet()?;
-        let moves = matches!(self.mission.state(), Follow | Paused | Alone | Blocked | Replanning);
-        if !moves
+        if !self.mission.state().may_promise_hold()
             || !(fleet.is_dividing() || self.wants_division())
             || fleet.commitment_dm().is_some()
         {
@@ -285,9 +279,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// it held.
     fn is_at_division_start(&self) -> bool {
         match self.mission.state() {
-            State::Ready | State::Scheduled => true,
             State::Dividing => self.guidance.is_at_rest_on_raw_point(),
-            _ => false,
+            state => state.waits_to_fly_plan(),
         }
     }
 

@@ -51,11 +51,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (kind, handshake) = (self.autopilot_kind(), self.requests.handshake());
         let offboard = t.custom_mode == kind.setpoint_mode();
         let mode_foreign = match self.mission.state() {
-            State::Scheduled | State::PadReplanning | State::Streaming | State::Engaging => {
+            state if state.is_before_arming() => {
                 !offboard && t.custom_mode != self.mission.mode_at_start()
             }
             // Disarming after a landing, the autopilot may change to another mode by itself.
-            State::Land | State::LandingHeld | State::Disarm => {
+            state if state.lands_or_disarms() => {
                 !offboard && t.custom_mode != kind.land_mode() && t.armed
             }
             _ => !offboard,
@@ -179,19 +179,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     || (self.guidance.is_descending() && on_ground)),
             flies_back: homeward,
             at_goal: self.guidance.is_at_goal(scene) && !self.detours.is_homeward(),
-            near_path: match (beneath, self.mission.state()) {
-                (State::TakeOff | State::Climb, State::PilotReturned | State::PositionLost) => {
-                    self.guidance.is_near_start(scene)
-                }
+            near_path: match self.mission.state() {
+                state if !state.may_resume_off_path() => false,
+                _ if beneath.takes_off() => self.guidance.is_near_start(scene),
                 // Resuming a landing does not depend on a place along the path.
-                (State::Land, State::PilotReturned | State::PositionLost)
-                    if self.mission.interrupted_state() == State::Land =>
-                {
+                _ if beneath == State::Land && self.mission.interrupted_state() == State::Land => {
                     true
                 }
-                (_, State::PilotReturned) => self.guidance.is_near_path(scene, REJOIN_WINDOW_M),
-                (_, State::PositionLost) => self.guidance.is_near_path(scene, LOST_WINDOW_M),
-                _ => false,
+                State::PilotReturned => self.guidance.is_near_path(scene, REJOIN_WINDOW_M),
+                _ => self.guidance.is_near_path(scene, LOST_WINDOW_M),
             },
             battery_low: t.is_battery_below(self.config.battery_low_percent),
             battery_critical: t.is_battery_below(self.config.battery_low_percent / 2),
@@ -266,7 +262,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // A vehicle that flies back, or aside to land, does not stop because no other vehicle hears
         // it: it is about to land anyway. A vehicle that stands does: others assume after a while
         // that it is down.
-        let stands = matches!(state, State::Paused | State::AutopilotSilent);
+        let stands = state.stands_to_resume();
         let is_landing =
             self.guidance.returning || self.detours.lands_at_end() || self.detours.seeks_landing();
         match (is_landing && !stands) || self.is_flying_unheard() {
@@ -323,10 +319,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether a vehicle in this state may continue its plan while no other vehicle hears it: only
     /// where the radio's range is known.
     pub(super) fn may_fly_unheard(&self) -> bool {
-        let follows = matches!(
-            self.mission.state(),
-            State::TakeOff | State::Climb | State::Follow | State::Alone
-        );
+        let follows = self.mission.state().may_continue_unheard();
         let left = self.detours.is_blocked()
             || self.detours.has_left_plan()
             || self.detours.is_on_detour();

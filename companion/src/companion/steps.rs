@@ -153,9 +153,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Reports, by text and event, a vehicle that this one waits for and that was not started.
     fn report_unstarted_vehicle(&mut self) {
-        let flies =
-            matches!(self.mission.state(), State::Scheduled | State::Follow | State::Blocked);
-        let waited = Some(self.guidance.advice.waiting_for).filter(|id| flies && *id != 0);
+        let waits = self.mission.state().may_wait_at_gate();
+        let waited = Some(self.guidance.advice.waiting_for).filter(|id| waits && *id != 0);
         let id = waited.filter(|id| self.neighbours.is_not_started(*id)).unwrap_or(0);
         if self.mission.should_report_wait(id, self.now, &mut self.timers) {
             self.links.send_text_with_numbers(

@@ -19,7 +19,7 @@ use crate::link::roster;
 use crate::link::severity::Severity;
 use crate::link::{OnDemandMessage, done};
 use crate::services;
-use crate::state::State;
+use crate::state::{State, SystemStatus};
 use crate::swarm::neighbours::relay;
 
 /// Longest time for which a vehicle in a coverage mission flies on along its part after it was last
@@ -212,15 +212,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn heartbeat_message(&self) -> HEARTBEAT_DATA {
-        let system_status = match self.mission.state() {
-            State::WaitAutopilot | State::WaitPosition => MavState::MAV_STATE_BOOT,
-            State::Planning | State::Ready | State::Done | State::Aborted => {
-                MavState::MAV_STATE_STANDBY
-            }
-            State::AutopilotSilent | State::PositionLost | State::Failsafe => {
-                MavState::MAV_STATE_CRITICAL
-            }
-            _ => MavState::MAV_STATE_ACTIVE,
+        let system_status = match self.mission.state().system_status() {
+            SystemStatus::Boot => MavState::MAV_STATE_BOOT,
+            SystemStatus::Standby => MavState::MAV_STATE_STANDBY,
+            SystemStatus::Active => MavState::MAV_STATE_ACTIVE,
+            SystemStatus::Critical => MavState::MAV_STATE_CRITICAL,
         };
         HEARTBEAT_DATA {
             custom_mode: self.mission.state() as u32,
@@ -256,7 +252,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         let view = self.detour_view();
         let grounded = match self.mission.state() {
-            Done | Disarm => true,
+            state if state.has_landed() => true,
             // On its path it flies, whatever the landing detector reports.
             state => !self.telemetry.armed || (!state.is_on_path() && view.is_on_ground()),
         };
@@ -385,12 +381,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let mut column = true;
         match self.mission.state() {
             // On the pad too: it may have lifted off before its next intent is heard.
-            Scheduled | PadReplanning | Streaming | Engaging | Arming | TakeOff | Climb => {
+            state if state.is_before_path() => {
                 add(setpoint);
                 first.into_iter().for_each(add);
             }
             // A mission that is over in the air ends in a landing too.
-            Land | LandingHeld | Aborted => {
+            state if state.lands() || state == Aborted => {
                 add(here);
                 add(Point::new(here.x, here.y, self.guidance.ground_m(plan)));
             }
@@ -403,7 +399,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 last.into_iter()
                     .for_each(|last| add(Point::new(last.x, last.y, self.guidance.ground_m(plan))));
             }
-            Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping => {
+            state if state.moves_along_path() => {
                 column = false;
                 add(setpoint);
                 let (from_m, most_m) =

@@ -28,23 +28,22 @@ impl PendingCommands {
     /// Clears the commands that this row has carried out by entering `to`; all of them if the
     /// mission ends or its start is given up.
     pub(crate) fn clear_carried_out(&mut self, row: &TransitionRow, to: State) {
-        use State::*;
         let guard = row.guard;
         self.resume = false;
         if to.is_over() || matches!(row.action, Action::ForgetStart | Action::CancelStart) {
             *self = Self::default();
         }
-        let lands = matches!(to, Land | Stopping);
+        let lands = to.begins_landing();
         let resumed =
-            matches!(guard, Guard::ResumeCommanded | Guard::ResumedOnPath) && to != Paused;
+            matches!(guard, Guard::ResumeCommanded | Guard::ResumedOnPath) && to != State::Paused;
         let returns = matches!(guard, Guard::ReturnCommanded | Guard::ReturnOverField);
         if lands || resumed || returns {
             self.pause = false;
         }
-        if lands || matches!(to, PilotControl | Failsafe) {
+        if lands || to.is_taken_over() {
             self.land = false;
         }
-        if lands || returns || matches!(to, PilotControl | Failsafe) {
+        if lands || returns || to.is_taken_over() {
             self.turn_back = false;
         }
     }
@@ -59,7 +58,7 @@ pub(super) fn apply_command(
     command: &Command,
 ) -> Option<u8> {
     use State::*;
-    let (flag, guard, already): (_, _, &[State]) = match command.command {
+    let (flag, guard, already) = match command.command {
         // MISSION_START before the plan has come is stored; a repeated one changes nothing.
         MISSION_START if state == Planning => {
             pending.start = true;
@@ -74,42 +73,16 @@ pub(super) fn apply_command(
         MISSION_START => (
             &mut pending.start,
             if state == Aborted { Guard::StartAgain } else { Guard::StartCommanded },
-            &[
-                Scheduled,
-                PadReplanning,
-                Streaming,
-                Engaging,
-                Arming,
-                TakeOff,
-                Climb,
-                Follow,
-                Paused,
-                Alone,
-                Blocked,
-                Replanning,
-                Dividing,
-            ],
+            state.flies_mission(),
         ),
         PAUSE_CONTINUE if command.param1 == 0.0 => {
             // Before the climb, and while the mission is interrupted, the pause is stored until a
             // row can act on it.
-            let waits = matches!(
-                state,
-                Planning
-                    | Ready
-                    | Scheduled
-                    | PadReplanning
-                    | CancelStart
-                    | TakeOff
-                    | AutopilotSilent
-                    | PositionLost
-                    | PilotReturned
-            );
-            if waits && (state != CancelStart || pending.start) {
+            if state.stores_pause() && (state != CancelStart || pending.start) {
                 pending.pause = true;
                 return Some(ACCEPTED);
             }
-            (&mut pending.pause, Guard::PauseCommanded, &[Paused])
+            (&mut pending.pause, Guard::PauseCommanded, state == Paused)
         }
         PAUSE_CONTINUE if command.param1 == 1.0 => {
             // Continuing needs a known position to continue from.
@@ -123,23 +96,26 @@ pub(super) fn apply_command(
             }
             let guard =
                 if state == PilotReturned { Guard::ResumedOnPath } else { Guard::ResumeCommanded };
-            (&mut pending.resume, guard, &[Climb, Follow, Blocked, Replanning, Dividing])
+            (&mut pending.resume, guard, state.has_resumed())
         }
         PAUSE_CONTINUE => return Some(DENIED),
-        LAND if matches!(state, Failsafe | Aborted) => {
+        LAND if state.has_given_up() => {
             // With motors off a landing needs nothing. With motors on the row acts only in Offboard
             // or Guided; else a pilot or a failsafe flies the vehicle.
             let acts = inputs.armed && inputs.offboard;
             pending.land = acts;
             return Some(if acts || !inputs.armed { ACCEPTED } else { TEMPORARILY_REJECTED });
         }
-        LAND => (&mut pending.land, Guard::LandCommanded, &[Stopping, Land, Disarm, Done]),
-        RETURN_TO_LAUNCH => (&mut pending.turn_back, Guard::ReturnCommanded, &[Done]),
+        LAND => {
+            let already = state.begins_landing() || state.has_landed();
+            (&mut pending.land, Guard::LandCommanded, already)
+        }
+        RETURN_TO_LAUNCH => (&mut pending.turn_back, Guard::ReturnCommanded, state == Done),
         _ => return None,
     };
     if has_row_for(state, guard) {
         *flag = true;
         return Some(ACCEPTED);
     }
-    Some(if already.contains(&state) { ACCEPTED } else { TEMPORARILY_REJECTED })
+    Some(if already { ACCEPTED } else { TEMPORARILY_REJECTED })
 }

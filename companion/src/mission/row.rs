@@ -2,7 +2,8 @@
 
 use super::guard::Guard;
 use crate::link::severity::Severity;
-use crate::state::{State, TargetState};
+use crate::state::State;
+use crate::state::interruption::TargetState;
 use crate::time::Duration;
 
 /// What the companion does when a row is taken, in addition to the change of state.

@@ -4,7 +4,8 @@
 use super::guard::Guard;
 use super::row::{AT_ONCE, Action, TransitionRow, state_mask};
 use crate::link::severity::Severity;
-use crate::state::{State, TargetState};
+use crate::state::State;
+use crate::state::interruption::TargetState;
 use crate::time::Duration;
 
 pub(crate) const fn secs(secs: u64) -> Duration {

@@ -267,7 +267,7 @@ impl Detours {
         match view.mission.state() {
             State::Done => !view.guidance.is_at_goal(&view.scene) || self.left_plan,
             State::Aborted => view.is_on_ground() || lasted >= ABORT_OVER_AFTER,
-            State::PilotControl | State::PilotReturned => {
+            state if state.is_left_to_pilot() => {
                 view.mission.time_with_pilot(view.now) >= PILOT_KEEPS_AFTER
             }
             _ => false,
@@ -291,7 +291,7 @@ impl Detours {
         let rests = view.telemetry.velocity.length() < MAX_HOVER_MPS;
         let stands = view.guidance.is_standing() && rests;
         match view.mission.state() {
-            State::Scheduled | State::PadReplanning => {
+            state if state.waits_on_pad() => {
                 self.blocked
                     || !view.guidance.filter.column_clear()
                     || view.neighbours.silence_duration(now, view.mission.started_at())
@@ -305,10 +305,10 @@ impl Detours {
             }
             // `stands` is false in a descent, where a blocked vehicle hovers too.
             State::Blocked => view.guidance.is_setpoint_still() && rests,
-            // After a detour the vehicle only waits to be disarmed.
-            State::Land | State::Disarm => self.is_on_detour() && view.is_on_ground(),
             // A held landing goes on by itself once its column is free.
             State::LandingHeld => view.telemetry.velocity.length() < MAX_HOVER_MPS,
+            // After a detour the vehicle only waits to be disarmed.
+            state if state.lands_or_disarms() => self.is_on_detour() && view.is_on_ground(),
             _ => false,
         }
     }
@@ -424,7 +424,7 @@ impl Detours {
     ) -> Option<bool> {
         let Some(plan) = view.mission.plan() else { return Some(false) };
         let here = match view.mission.state() {
-            State::Scheduled | State::PadReplanning => view.mission.pad_position(),
+            state if state.waits_on_pad() => view.mission.pad_position(),
             _ => view.telemetry.position,
         };
         let along_m = view.guidance.along_m();

@@ -41,15 +41,7 @@ impl OperatorCommand {
     fn is_still_needed(self, state: State) -> bool {
         match self {
             // A vehicle before its start needs it too: a pause holds it on its pad.
-            Self::Resume => matches!(
-                state,
-                State::PilotReturned
-                    | State::Paused
-                    | State::Ready
-                    | State::Scheduled
-                    | State::PadReplanning
-                    | State::CancelStart
-            ),
+            Self::Resume => state.may_need_resume(),
             Self::Pause => state != State::Paused,
             Self::Return | Self::Land => true,
         }

@@ -408,12 +408,8 @@ impl SimulatedVehicle {
 
     fn log_entry(&self, now_us: u64, from: State, to: State, text: &str) -> report::LogEvent {
         let level = match to {
-            State::Aborted | State::Failsafe => Level::Error,
-            State::PilotControl
-            | State::PilotReturned
-            | State::AutopilotSilent
-            | State::PositionLost
-            | State::Alone => Level::Warning,
+            _ if to.has_given_up() => Level::Error,
+            _ if to.is_interrupted_by_loss() || to == State::Alone => Level::Warning,
             _ => Level::Info,
         };
         let colon = if text.is_empty() { "" } else { ": " };
@@ -491,10 +487,10 @@ impl SimulatedVehicle {
 
 /// Whether a vehicle in this state was started, so that it may get a part of an area later.
 pub fn is_started(state: State) -> bool {
-    !matches!(state, State::WaitAutopilot | State::WaitPosition | State::Planning | State::Ready)
+    !state.is_before_start()
 }
 
 /// Whether a vehicle in this state does not move any more: its mission is done or aborted.
 pub fn is_finished(state: State) -> bool {
-    matches!(state, State::Done | State::Aborted)
+    state.is_over()
 }

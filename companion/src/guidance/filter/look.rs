@@ -39,22 +39,12 @@ impl Guidance {
         let whole_column = on_pad || state.lands();
         let way = match state {
             _ if on_pad => FlightDirection::Vertical { to_m: top_m(), speed_mps: 0.0 },
-            State::Land | State::LandingHeld => {
-                FlightDirection::Vertical { to_m: ground_m(), speed_mps: 0.0 }
-            }
+            _ if state.lands() => FlightDirection::Vertical { to_m: ground_m(), speed_mps: 0.0 },
             State::Climb => FlightDirection::Vertical {
                 to_m: top_m(),
                 speed_mps: self.smoother.velocity().z.max(0.0),
             },
-            State::Follow
-            | State::Paused
-            | State::Alone
-            | State::Blocked
-            | State::Replanning
-            | State::Dividing
-            | State::Stopping
-                if self.on_path =>
-            {
+            _ if state.moves_along_path() && self.on_path => {
                 // While the vehicle stands in its descent, the filter goes on checking the column
                 // below it for the neighbour that stopped it.
                 match self.is_descending() {

@@ -39,7 +39,7 @@ impl Detours {
                 let on_path = path.and_then(|path| path.point_at(view.guidance.along_m()));
                 self.before_jump = Some((on_path.unwrap_or(view.telemetry.position), view.now));
             }
-            State::Follow | State::WaitPosition => self.before_jump = None,
+            to if to.trusts_position_again() => self.before_jump = None,
             _ => {}
         }
     }

@@ -13,7 +13,8 @@ impl SimulatedVehicle {
         let state = self.state();
         // A board's reported state is up to a second old; the autopilot's landing is known at once.
         let lands = self.board.is_some() && self.autopilot.is_landing();
-        let phase = match (truth.touching, on_path(state) && !lands) {
+        let on_path = state.moves_along_path() || state.is_interrupted_by_loss();
+        let phase = match (truth.touching, on_path && !lands) {
             (touching, _) if self.wrecked => {
                 if touching {
                     RefereePhase::Wreck
@@ -26,29 +27,11 @@ impl SimulatedVehicle {
             _ => RefereePhase::TakeOffOrLanding,
         };
         // A vehicle that stands by command of operator or pilot is not deadlocked.
-        let ordered = matches!(state, State::Paused | State::PilotControl | State::PilotReturned);
+        let ordered = state == State::Paused || state.is_left_to_pilot();
         let progress_m = self
             .board
             .as_ref()
             .map_or_else(|| Some(self.companion.progress_m()), RemoteCompanion::progress_m);
         Observation { position: truth.position, phase, holds_by_command: ordered, progress_m }
     }
-}
-
-fn on_path(state: State) -> bool {
-    use State::*;
-    matches!(
-        state,
-        Follow
-            | Paused
-            | Alone
-            | Blocked
-            | Replanning
-            | Dividing
-            | Stopping
-            | AutopilotSilent
-            | PositionLost
-            | PilotControl
-            | PilotReturned
-    )
 }
