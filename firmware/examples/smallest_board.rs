@@ -21,8 +21,8 @@ use embassy_time::{Duration, Timer};
 use firmware::capacity::{BoardCompanion, VEHICLES, WAYPOINTS};
 use firmware::flash::Flash;
 use firmware::planner::{OwnPlanMemory, Planner, PlanningMemory};
-use firmware::scratch::WorkspaceOverlay;
 use firmware::shell::{OnAutopilot, Shell, wait_for_system_id};
+use firmware::workspace::WorkspaceOverlay;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot};
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
@@ -82,7 +82,7 @@ impl Flash for Ram {
 // Large objects are statics, as on a board.
 static SHELL: Shell = Shell::new();
 static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
-static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
+static WORKSPACE: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static SWARM: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> =
     ConstStaticCell::new(SwarmPlan::new());
 static OWN: ConstStaticCell<OwnPlanMemory> = ConstStaticCell::new(OwnPlanMemory::new());
@@ -100,7 +100,8 @@ async fn board() {
     let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
     companion.attach_store(store);
     SHELL.start(companion);
-    let memory = PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM.take(), own: OWN.take() };
+    let memory =
+        PlanningMemory { workspace: WORKSPACE.take(), swarm: SWARM.take(), own: OWN.take() };
     let mut planner =
         Planner { roadmap: None, field: None, mission: None, system_id, files_checksum: 0, memory };
     let links = join5(

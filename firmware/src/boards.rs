@@ -1,7 +1,7 @@
 //! What differs between boards: registers, clocks, memory. `unsafe` is allowed here (and in
-//! `scratch`).
+//! `workspace`).
 
-use crate::kept::FileWork;
+use crate::crash_record::FileWork;
 
 #[cfg(all(target_os = "none", feature = "board"))]
 pub mod chosen;
@@ -17,12 +17,12 @@ pub mod lock;
 mod mpu;
 #[cfg(all(target_os = "none", feature = "nucleo-h743"))]
 pub mod nucleo_h743;
-#[cfg(all(target_os = "none", feature = "board"))]
-pub mod parts;
 #[cfg(all(target_os = "none", feature = "pico2"))]
 pub mod pico2;
 #[cfg(all(target_os = "none", feature = "qemu"))]
 pub mod qemu;
+#[cfg(all(target_os = "none", feature = "board"))]
+pub mod resources;
 #[cfg(all(target_os = "none", any(feature = "nucleo-h743", feature = "qemu")))]
 pub mod sections;
 #[cfg(all(target_os = "none", feature = "board"))]
@@ -51,7 +51,7 @@ pub fn begin_work(work: FileWork, files: u32) -> bool {
     #[cfg(all(target_os = "none", feature = "board"))]
     return crash::begin_work(work, files);
     #[cfg(not(all(target_os = "none", feature = "board")))]
-    return crate::kept::CrashRecord::default().begin_work(work, files);
+    return crate::crash_record::CrashRecord::default().begin_work(work, files);
 }
 
 /// Records that the work that runs has ended without a crash.

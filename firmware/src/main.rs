@@ -17,16 +17,16 @@ use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{SendSpawner, task};
 use embassy_time::Timer;
 use firmware::boards::chosen::{self, Flash, LAYOUT, Parts, Receiver, Transmitter, Watchdog};
-use firmware::boards::parts::MAX_WARNINGS;
+use firmware::boards::resources::MAX_WARNINGS;
 use firmware::boards::{crash, sleep};
 use firmware::capacity::{BoardCompanion, VEHICLES, WAYPOINTS};
-use firmware::kept::FileWork;
-use firmware::lent::LentFlash;
+use firmware::crash_record::FileWork;
+use firmware::flash_lender::LentFlash;
 use firmware::planner::{OwnPlanMemory, Planner, PlanningMemory};
-use firmware::scratch::WorkspaceOverlay;
 use firmware::shell::{
     CHECK_IN_EVERY, OnAutopilot, SYSTEM_ID_WITHOUT_AUTOPILOT, Shell, wait_for_system_id,
 };
+use firmware::workspace::WorkspaceOverlay;
 use heapless::{String, Vec};
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
@@ -49,7 +49,7 @@ const MISSION_SET_ASIDE: &str = "Mission set aside: it crashed 3 starts in a row
 // `memory.x` places these statics by name in separate memories. Their initial values are all zeros.
 static SHELL: StaticCell<Shell> = StaticCell::new();
 static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
-static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
+static WORKSPACE: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static SWARM_PLAN: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> =
     ConstStaticCell::new(SwarmPlan::new());
 static OWN_PLAN: ConstStaticCell<OwnPlanMemory> = ConstStaticCell::new(OwnPlanMemory::new());
@@ -166,8 +166,11 @@ async fn planner_and_flash_task(
     shell.start(companion);
     let then = if known.is_some() { OnAutopilot::GoOn } else { OnAutopilot::Restart };
     start_links(links, shell, then, autopilot, swarm);
-    let memory =
-        PlanningMemory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
+    let memory = PlanningMemory {
+        workspace: WORKSPACE.take(),
+        swarm: SWARM_PLAN.take(),
+        own: OWN_PLAN.take(),
+    };
     let mut planner = Planner { roadmap, field, mission, system_id, files_checksum: files, memory };
     shell.run_planner_and_flash(&mut planner, &mut flash).await
 }

@@ -17,8 +17,8 @@ use planner_core::roadmap::RoadmapView;
 use crate::boards;
 use crate::capacity::BoardCompanion;
 use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
-use crate::kept::FileWork;
-use crate::scratch::WorkspaceOverlay;
+use crate::crash_record::FileWork;
+use crate::workspace::WorkspaceOverlay;
 
 /// Most keep-out zones of a detour. A vehicle that fell silent may make a dozen zones, any other
 /// vehicle makes one or two. With more zones than these the request fails
@@ -28,7 +28,7 @@ const MAX_ZONES: usize = 4 * VEHICLES;
 /// Memory that the planner works in; the three parts lie in different RAMs of the chip.
 pub struct PlanningMemory<'a> {
     /// Workspace of searches and of coverage planning.
-    pub scratch: &'a mut WorkspaceOverlay,
+    pub workspace: &'a mut WorkspaceOverlay,
     /// Plan of the whole swarm.
     pub swarm: &'a mut SwarmPlan<VEHICLES, WAYPOINTS>,
     /// Plan of this vehicle, and inputs of it.
@@ -149,8 +149,8 @@ impl Planner<'_> {
             };
         }
         let Some(roadmap) = &self.roadmap else { return Err(PlanFailure::RoadmapUnusable) };
-        let PlanningMemory { scratch, swarm, own } = &mut self.memory;
-        let ws = scratch.planner();
+        let PlanningMemory { workspace, swarm, own } = &mut self.memory;
+        let ws = workspace.planner();
         if let Some(request) = detour {
             if own.too_many_zones {
                 return Err(PlanFailure::Capacity);
@@ -182,11 +182,11 @@ fn plan_area_detour<'m>(
     request: &DetourRequest,
     memory: &'m mut PlanningMemory<'_>,
 ) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
-    let PlanningMemory { scratch, own, .. } = memory;
+    let PlanningMemory { workspace, own, .. } = memory;
     if own.too_many_zones {
         return Err(PlanFailure::Capacity);
     }
-    let ws = &mut scratch.coverage_plan().area;
+    let ws = &mut workspace.coverage_plan().area;
     coverage::plan_detour::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, WAYPOINTS, GATES>(
         area,
         field,
@@ -208,8 +208,8 @@ fn plan_area<'m>(
     memory: &'m mut PlanningMemory<'_>,
 ) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
     let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
-    let PlanningMemory { scratch, swarm, own } = memory;
-    let ws = scratch.coverage_plan();
+    let PlanningMemory { workspace, swarm, own } = memory;
+    let ws = workspace.coverage_plan();
     coverage::plan_flights::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
         &Request { mission, view, field, max_gates: GATES, photographed: &own.done },
         own.losses.iter().map(|lots| &lots[..]),

@@ -5,7 +5,7 @@
 //! stands still until the next grant. So its behaviour depends neither on the host's clock nor on
 //! the host's load ([`lock_step`] has the protocol).
 
-mod bank;
+mod flash_image;
 mod probe;
 
 use std::io::{BufReader, Read, Write};
@@ -19,7 +19,7 @@ use anyhow::{Context, bail, ensure};
 use companion::Link as Port;
 use lock_step::{COMMAND_LINE, FromBoard, HEAD, LONGEST, ToBoard};
 
-pub use self::bank::flash_bank_image;
+pub use self::flash_image::flash_bank_image;
 use crate::quote::quoted_path;
 
 /// Length of a board's stack, bytes.

@@ -1,7 +1,7 @@
 //! What was flown, judged and shown after the flight: pictures of a coverage mission, those kept
 //! from flight to flight, and the report page.
 
-pub mod kept;
 pub mod layers;
 pub mod page;
+pub mod picture_store;
 pub mod pictures;

@@ -21,10 +21,10 @@
 mod blocks;
 mod config;
 mod near;
-mod pieces;
 pub mod sipp;
 #[cfg(test)]
 pub(crate) mod tests;
+mod timed_segments;
 
 use heapless::Vec;
 use libm::{fmaxf, fminf};
@@ -33,8 +33,8 @@ use self::blocks::{
     BlockSet, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, segments_in_blocks, set_bit_indices,
 };
 pub use self::config::{ScheduleConfig, ScheduleError};
-pub use self::pieces::{MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS};
-use self::pieces::{TimedSegment, cut_into_segments, is_conflict};
+pub use self::timed_segments::{MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS};
+use self::timed_segments::{TimedSegment, cut_into_segments, is_conflict};
 use crate::flight::{Flight, Gate, PROGRESS_ERROR_M};
 use crate::sort;
 
@@ -306,7 +306,7 @@ fn for_each_gate<const W: usize>(
     mut found: impl FnMut(Gate),
 ) -> Result<(), ScheduleError> {
     // Hovers are left out: wherever a hover conflicts, so do the segments that end and begin there.
-    let moves = |piece: &&TimedSegment| piece.parked || piece.to_m > piece.from_m;
+    let moves = |segment: &&TimedSegment| segment.parked || segment.to_m > segment.from_m;
     let flight = &flights[index];
     for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {
         if ws.blocks.parts_near(cfg, other).next().is_none() {

@@ -21,7 +21,7 @@ mod modes;
 pub mod params;
 pub mod reference;
 pub mod setpoint;
-mod unasked;
+mod unsolicited;
 
 pub use self::modes::CopterMode;
 

@@ -7,12 +7,12 @@
 pub mod autopilot;
 pub mod dice;
 mod forged;
-mod member;
 pub mod oracle;
 mod outcome;
 mod packet;
 mod planner;
 pub mod scene;
+mod vehicle;
 
 use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 use companion::link::intent::Intent;
@@ -25,12 +25,12 @@ use mavlink::dialects::ardupilotmega::{
 use self::autopilot::{Flown, STEP_S};
 use self::dice::Dice;
 use self::forged::{forge, place_of};
-use self::member::Member;
 use self::oracle::Oracle;
 pub use self::outcome::{Outcome, Summary, line, summary};
 use self::packet::{Packet, RadioContent};
 use self::planner::detour_in_the_open;
 use self::scene::{MeetingEvent, Scene, floor_z, landing};
+use self::vehicle::MeetingVehicle;
 use crate::setpoints::SetpointStats;
 
 /// Time for which a meeting goes on after its last event and with all vehicles at rest, seconds.
@@ -48,7 +48,7 @@ const STEP_MS: u64 = 25;
 
 struct World<'a> {
     scene: &'a Scene,
-    members: Vec<Member>,
+    vehicles: Vec<MeetingVehicle>,
     now: Instant,
     dice: Dice,
     trace: Option<Vec<String>>,
@@ -68,7 +68,7 @@ impl<'a> World<'a> {
     fn new(scene: &'a Scene) -> Self {
         Self {
             scene,
-            members: (0..scene.vehicles.len()).map(|i| Member::new(scene, i)).collect(),
+            vehicles: (0..scene.vehicles.len()).map(|i| MeetingVehicle::new(scene, i)).collect(),
             now: Instant::ZERO,
             dice: Dice::new(scene.seed ^ 0x5EED),
             trace: None,
@@ -90,8 +90,8 @@ impl<'a> World<'a> {
                 next += 1;
             }
             self.step();
-            let seen: Vec<_> = self.members.iter().map(|member| member.seen(now_s)).collect();
-            let heard = |a: usize, b: usize| self.members[a].heard[b].clone();
+            let seen: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.seen(now_s)).collect();
+            let heard = |a: usize, b: usize| self.vehicles[a].heard[b].clone();
             oracle.observe(&seen, heard, |place| floor_z(&scene.vehicles, place));
             if self.trace.is_some() && step % 20 == 0 {
                 self.trace_places(now_s);
@@ -99,7 +99,7 @@ impl<'a> World<'a> {
             ended_s = now_s;
             let rest = next == scene.happenings.len()
                 && now_s > scene::START_S + 5.0
-                && self.members.iter().all(Member::rests);
+                && self.vehicles.iter().all(MeetingVehicle::rests);
             rested_s = if rest { rested_s + STEP_S } else { 0.0 };
             if rested_s > AFTERMATH_S {
                 break;
@@ -118,11 +118,11 @@ impl<'a> World<'a> {
 
     fn trace_places(&mut self, now_s: f32) {
         let mut line = format!("{now_s:7.2} s ");
-        for member in &self.members {
-            let (p, v) = (member.autopilot.position, member.autopilot.velocity);
+        for vehicle in &self.vehicles {
+            let (p, v) = (vehicle.autopilot.position, vehicle.autopilot.velocity);
             line += &format!(
                 " | {:?} {:.2} {:.2} {:.2} ({:.1} {:.1} {:.1})",
-                member.companion.state(),
+                vehicle.companion.state(),
                 p.x,
                 p.y,
                 p.z,
@@ -130,16 +130,16 @@ impl<'a> World<'a> {
                 v.y,
                 v.z
             );
-            if let Some(target) = member.autopilot.asked() {
+            if let Some(target) = vehicle.autopilot.asked() {
                 line += &format!(" to {:.2} {:.2} {:.2}", target.x, target.y, target.z);
             }
-            if member.companion.waiting_for() != 0 {
-                line += &format!(" for {}", member.companion.waiting_for());
+            if vehicle.companion.waiting_for() != 0 {
+                line += &format!(" for {}", vehicle.companion.waiting_for());
             }
         }
-        let members = &self.members;
-        for (i, a) in members.iter().enumerate() {
-            for (j, b) in members.iter().enumerate().skip(i + 1) {
+        let vehicles = &self.vehicles;
+        for (i, a) in vehicles.iter().enumerate() {
+            for (j, b) in vehicles.iter().enumerate().skip(i + 1) {
                 let apart_m = (a.autopilot.position - b.autopilot.position).norm();
                 if apart_m < 3.0 {
                     line += &format!(" | {}-{} {apart_m:.2} m", i + 1, j + 1);
@@ -151,69 +151,69 @@ impl<'a> World<'a> {
         }
     }
 
-    fn happens(&mut self, vehicle: usize, what: MeetingEvent) {
-        self.say(vehicle, &format!("{what:?}"));
+    fn happens(&mut self, index: usize, what: MeetingEvent) {
+        self.say(index, &format!("{what:?}"));
         let now = self.now;
-        let member = &mut self.members[vehicle];
-        let airborne = member.autopilot.is_airborne();
+        let vehicle = &mut self.vehicles[index];
+        let airborne = vehicle.autopilot.is_airborne();
         match what {
-            MeetingEvent::Start => self.command(vehicle, MavCmd::MAV_CMD_MISSION_START, 0.0),
-            MeetingEvent::Pause => self.command(vehicle, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
-            MeetingEvent::Resume => self.command(vehicle, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0),
+            MeetingEvent::Start => self.command(index, MavCmd::MAV_CMD_MISSION_START, 0.0),
+            MeetingEvent::Pause => self.command(index, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
+            MeetingEvent::Resume => self.command(index, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0),
             MeetingEvent::Return => {
-                self.command(vehicle, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0);
+                self.command(index, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0);
             }
-            MeetingEvent::Land => self.command(vehicle, MavCmd::MAV_CMD_NAV_LAND, 0.0),
-            MeetingEvent::PilotTakes(velocity) if airborne => member.autopilot.take_over(velocity),
-            MeetingEvent::PilotReturns if airborne => member.autopilot.give_back(now),
-            MeetingEvent::PilotLands if airborne && member.autopilot.flown() == Flown::Other => {
-                member.autopilot.pilot_lands();
+            MeetingEvent::Land => self.command(index, MavCmd::MAV_CMD_NAV_LAND, 0.0),
+            MeetingEvent::PilotTakes(velocity) if airborne => vehicle.autopilot.take_over(velocity),
+            MeetingEvent::PilotReturns if airborne => vehicle.autopilot.give_back(now),
+            MeetingEvent::PilotLands if airborne && vehicle.autopilot.flown() == Flown::Other => {
+                vehicle.autopilot.pilot_lands();
             }
             // The autopilot of a dead companion may still be in Guided (ArduCopter).
-            MeetingEvent::PilotLands if airborne && member.dead => member.autopilot.pilot_lands(),
-            MeetingEvent::Fails(how) if airborne => member.autopilot.fail(how),
+            MeetingEvent::PilotLands if airborne && vehicle.dead => vehicle.autopilot.pilot_lands(),
+            MeetingEvent::Fails(how) if airborne => vehicle.autopilot.fail(how),
             MeetingEvent::PilotTakes(_)
             | MeetingEvent::PilotReturns
             | MeetingEvent::PilotLands
             | MeetingEvent::Fails(_) => {}
-            MeetingEvent::Dies => member.dead = true,
-            MeetingEvent::Cut { sends, hears } => (member.sends, member.hears) = (!sends, !hears),
-            MeetingEvent::Caught(how) if airborne => member.autopilot.catch(how),
+            MeetingEvent::Dies => vehicle.dead = true,
+            MeetingEvent::Cut { sends, hears } => (vehicle.sends, vehicle.hears) = (!sends, !hears),
+            MeetingEvent::Caught(how) if airborne => vehicle.autopilot.catch(how),
             MeetingEvent::Caught(_) => {}
-            MeetingEvent::Healed => (member.sends, member.hears) = (true, true),
+            MeetingEvent::Healed => (vehicle.sends, vehicle.hears) = (true, true),
         }
     }
 
     /// Sends a vehicle a command of the ground station, without loss or delay.
-    fn command(&mut self, vehicle: usize, command: MavCmd, param1: f32) {
-        let member = &mut self.members[vehicle];
-        if member.dead {
+    fn command(&mut self, index: usize, command: MavCmd, param1: f32) {
+        let vehicle = &mut self.vehicles[index];
+        if vehicle.dead {
             return;
         }
         let data = COMMAND_LONG_DATA {
             command,
             param1,
-            target_system: self.scene.vehicles[vehicle].id,
+            target_system: self.scene.vehicles[index].id,
             target_component: COMPANION_COMPONENT,
             ..Default::default()
         };
         let mut out = [0; MAX_FRAME_LEN];
-        let header = Header { system: 255, component: 190, sequence: member.commands };
-        member.commands = member.commands.wrapping_add(1);
+        let header = Header { system: 255, component: 190, sequence: vehicle.commands };
+        vehicle.commands = vehicle.commands.wrapping_add(1);
         let len = frame::encode(header, &data, &mut out);
-        member.companion.handle_bytes(Link::Swarm, self.now, &out[..len]);
-        self.drain(vehicle);
+        vehicle.companion.handle_bytes(Link::Swarm, self.now, &out[..len]);
+        self.drain(index);
     }
 
     fn step(&mut self) {
         let now = self.now;
-        for i in 0..self.members.len() {
-            let floor = floor_z(&self.scene.vehicles, &self.members[i].autopilot.position);
-            let member = &mut self.members[i];
-            let mut bytes = core::mem::take(&mut member.bytes);
-            member.autopilot.step(now, floor, &mut bytes);
+        for i in 0..self.vehicles.len() {
+            let floor = floor_z(&self.scene.vehicles, &self.vehicles[i].autopilot.position);
+            let vehicle = &mut self.vehicles[i];
+            let mut bytes = core::mem::take(&mut vehicle.bytes);
+            vehicle.autopilot.step(now, floor, &mut bytes);
             let mut arrived = Vec::new();
-            member.inbox.retain_mut(|packet| {
+            vehicle.inbox.retain_mut(|packet| {
                 let due = packet.at <= now;
                 if due {
                     let none =
@@ -222,17 +222,17 @@ impl<'a> World<'a> {
                 }
                 !due
             });
-            if member.dead {
+            if vehicle.dead {
                 continue;
             }
             if !bytes.is_empty() {
-                member.companion.handle_bytes(Link::Autopilot, now, &bytes);
+                vehicle.companion.handle_bytes(Link::Autopilot, now, &bytes);
             }
             bytes.clear();
-            member.bytes = bytes;
-            for packet in arrived.into_iter().filter(|_| member.hears) {
-                member.companion.handle_bytes(Link::Swarm, now, &packet.bytes);
-                let heard = &mut member.heard[packet.from];
+            vehicle.bytes = bytes;
+            for packet in arrived.into_iter().filter(|_| vehicle.hears) {
+                vehicle.companion.handle_bytes(Link::Swarm, now, &packet.bytes);
+                let heard = &mut vehicle.heard[packet.from];
                 let now_s = now.as_micros() as f32 * 1e-6;
                 match packet.said {
                     RadioContent::Position(place, velocity, boot_ms) => {
@@ -244,9 +244,9 @@ impl<'a> World<'a> {
                     RadioContent::Other => {}
                 }
             }
-            if member.companion.poll_timeout().is_some_and(|due| due <= now) {
-                member.companion.handle_timeout(now);
-                member.note_stops(now);
+            if vehicle.companion.poll_timeout().is_some_and(|due| due <= now) {
+                vehicle.companion.handle_timeout(now);
+                vehicle.note_stops(now);
             }
             self.drain(i);
         }
@@ -255,26 +255,26 @@ impl<'a> World<'a> {
     fn drain(&mut self, i: usize) {
         let mut buffer = [0; MAX_FRAME_LEN];
         loop {
-            let length = self.members[i].companion.poll_transmit(Link::Autopilot, &mut buffer);
+            let length = self.vehicles[i].companion.poll_transmit(Link::Autopilot, &mut buffer);
             if length == 0 {
                 break;
             }
-            let (now, member) = (self.now, &mut self.members[i]);
-            member.autopilot.check.urgent = member.companion.is_in_urgent_stop();
-            member.autopilot.handle_bytes(now, &buffer[..length], &mut member.bytes);
+            let (now, vehicle) = (self.now, &mut self.vehicles[i]);
+            vehicle.autopilot.check.urgent = vehicle.companion.is_in_urgent_stop();
+            vehicle.autopilot.handle_bytes(now, &buffer[..length], &mut vehicle.bytes);
         }
         loop {
-            let length = self.members[i].companion.poll_transmit(Link::Swarm, &mut buffer);
+            let length = self.vehicles[i].companion.poll_transmit(Link::Swarm, &mut buffer);
             if length == 0 {
                 break;
             }
             self.broadcast(i, &buffer[..length]);
         }
-        while let Some(event) = self.members[i].companion.poll_event() {
+        while let Some(event) = self.vehicles[i].companion.poll_event() {
             match event {
                 Event::PlanRequested(_) => self.plan(i),
                 Event::StateChanged { from, to, text, .. } => {
-                    self.members[i].blocked +=
+                    self.vehicles[i].blocked +=
                         u32::from((from, to) == (State::Follow, State::Blocked));
                     self.say(i, &format!("{from:?} → {to:?} {text}"));
                 }
@@ -288,7 +288,7 @@ impl<'a> World<'a> {
     fn broadcast(&mut self, from: usize, bytes: &[u8]) {
         let now = self.now;
         let mut input = bytes;
-        let Some(mut frame) = self.members[from].framer.next(now, &mut input) else { return };
+        let Some(mut frame) = self.vehicles[from].framer.next(now, &mut input) else { return };
         let mut bytes = bytes.to_vec();
         if let Some((liar, lie)) = self.scene.liar
             && liar == from
@@ -312,17 +312,17 @@ impl<'a> World<'a> {
             }
             RadioContent::Other
         };
-        if !self.members[from].sends {
+        if !self.vehicles[from].sends {
             return;
         }
         let (low, high) = self.scene.delay_s;
-        for to in (0..self.members.len()).filter(|to| *to != from) {
+        for to in (0..self.vehicles.len()).filter(|to| *to != from) {
             let lost = self.dice.chance(self.scene.loss);
             let delay_s = self.dice.real(low, high);
             if !lost {
                 let at = now + companion::Duration::from_micros((delay_s * 1e6) as u64);
                 let packet = Packet { at, from, bytes: bytes.clone(), said: said.clone() };
-                self.members[to].inbox.push(packet);
+                self.vehicles[to].inbox.push(packet);
             }
         }
     }
@@ -330,29 +330,29 @@ impl<'a> World<'a> {
     fn plan(&mut self, i: usize) {
         let own = &self.scene.vehicles[i].plan;
         let mut keep = Vec::new();
-        let member = &mut self.members[i];
-        match member.companion.detour_request(|obstacle| keep.push(obstacle)) {
+        let vehicle = &mut self.vehicles[i];
+        match vehicle.companion.detour_request(|obstacle| keep.push(obstacle)) {
             Some(request) => {
                 let answer = detour_in_the_open(&request, &keep, own);
                 let text = if answer.is_some() { "a way around" } else { "no way around" };
                 let answer = answer.as_ref().ok_or(PlanFailure::Unreachable);
-                member.companion.handle_plan(self.now, PlanKind::Detour, answer);
+                vehicle.companion.handle_plan(self.now, PlanKind::Detour, answer);
                 self.say(i, text);
             }
-            None => member.companion.handle_plan(self.now, PlanKind::Mission, Ok(own)),
+            None => vehicle.companion.handle_plan(self.now, PlanKind::Mission, Ok(own)),
         }
     }
 
     /// Whether a vehicle can neither move away nor land: it is above another one, and something
     /// holds it, or its pilot left it so far from its path that a wall may stand between.
     fn is_held_above_another(&self, i: usize) -> bool {
-        let own = &self.members[i];
+        let own = &self.vehicles[i];
         let place = own.autopilot.position;
-        let below = |other: &Member| {
+        let below = |other: &MeetingVehicle| {
             let away = place - other.autopilot.position;
             away.z > 0.0 && away.xy().norm() < scene::SAFETY_M + LANDING_DRIFT_M
         };
-        let others = self.members.iter().enumerate().filter(|(j, _)| *j != i);
+        let others = self.vehicles.iter().enumerate().filter(|(j, _)| *j != i);
         (own.autopilot.is_caught() || self.was_left_off_path(i))
             && own.companion.state() == State::LandingHeld
             && others.into_iter().any(|(_, other)| below(other))
@@ -360,7 +360,7 @@ impl<'a> World<'a> {
 
     /// Whether a vehicle is where its pilot left it, off its path.
     fn was_left_off_path(&self, i: usize) -> bool {
-        let (autopilot, path) = (&self.members[i].autopilot, &self.scene.vehicles[i].plan.path);
+        let (autopilot, path) = (&self.vehicles[i].autopilot, &self.scene.vehicles[i].plan.path);
         let steps = (path.length_m() / PATH_STEP_M).ceil() as usize;
         let away = |step| Some(path.point_at(step as f32 * PATH_STEP_M)? - autopilot.position);
         autopilot.left_at.is_some_and(|at| (at - autopilot.position).xy().norm() < LEFT_THERE_M)
@@ -373,19 +373,19 @@ impl<'a> World<'a> {
         let mut unfit = Vec::new();
         let (mut stuck, mut held) = (Vec::new(), 0);
         let mut arrived = 0;
-        for (i, member) in self.members.iter().enumerate() {
-            setpoints.merge(&member.autopilot.check.stats);
+        for (i, vehicle) in self.vehicles.iter().enumerate() {
+            setpoints.merge(&vehicle.autopilot.check.stats);
             unfit.extend(
-                member.autopilot.check.faults.iter().map(|(at_s, what)| (i, *at_s, what.clone())),
+                vehicle.autopilot.check.faults.iter().map(|(at_s, what)| (i, *at_s, what.clone())),
             );
-            match member.autopilot.armed || member.autopilot.is_airborne() {
+            match vehicle.autopilot.armed || vehicle.autopilot.is_airborne() {
                 true if self.is_held_above_another(i) => held += 1,
-                true => stuck.push((i, member.companion.state())),
+                true => stuck.push((i, vehicle.companion.state())),
                 false => {}
             }
             let goal = landing(&scene.vehicles[i].plan);
             arrived += usize::from(
-                goal.is_some_and(|goal| (goal - member.autopilot.position).norm() < 0.7),
+                goal.is_some_and(|goal| (goal - vehicle.autopilot.position).norm() < 0.7),
             );
         }
         Outcome {
@@ -404,12 +404,12 @@ impl<'a> World<'a> {
             setpoints,
             unfit,
             arrived,
-            filter_stops: self.members.iter().map(|member| member.stops).sum(),
-            longest_stop_s: self.members.iter().map(|m| m.longest_stop_s).fold(0.0, f32::max),
+            filter_stops: self.vehicles.iter().map(|vehicle| vehicle.stops).sum(),
+            longest_stop_s: self.vehicles.iter().map(|m| m.longest_stop_s).fold(0.0, f32::max),
             most_blocked: self
-                .members
+                .vehicles
                 .iter()
-                .map(|member| member.blocked)
+                .map(|vehicle| vehicle.blocked)
                 .max()
                 .unwrap_or_default(),
             trace: self.trace.unwrap_or_default(),

@@ -10,7 +10,7 @@ use board_bench::cases::{self, StepCase, StepKind};
 use firmware::boards::chosen::{clock, memory};
 use firmware::boards::stack;
 use firmware::capacity::{ROADMAP_NODES, VEHICLES, WAYPOINTS};
-use firmware::scratch::{Planner, WorkspaceOverlay};
+use firmware::workspace::{PlannerWorkspace, WorkspaceOverlay};
 use heapless::Vec;
 use planner_core::plan::{self, Goals, SwarmPlan};
 use planner_core::roadmap::prm::PrmConfig;
@@ -24,7 +24,7 @@ use static_cell::ConstStaticCell;
 
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 
-static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
+static WORKSPACE: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static PLAN: ConstStaticCell<Plan> = ConstStaticCell::new(Plan::new());
 static CASES: ConstStaticCell<cases::Workspace> = ConstStaticCell::new(cases::Workspace::new());
 
@@ -40,11 +40,11 @@ fn main() -> ! {
     let view = print_instructions("parse", || RoadmapView::parse(memory::bank2()))
         .expect("a roadmap lies in bank 2");
     println!("roadmap {} {} {:08x}", view.node_count(), view.half_edge_count(), view.crc());
-    let scratch = SCRATCH.take();
-    measure_plan(&view, scratch.planner());
+    let workspace = WORKSPACE.take();
+    measure_plan(&view, workspace.planner());
     measure_steps();
-    measure_build(scratch, 0.0);
-    measure_build(scratch, cases::CLEARANCE_M);
+    measure_build(workspace, 0.0);
+    measure_build(workspace, cases::CLEARANCE_M);
     let ws = CASES.take();
     for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, ws);
@@ -73,7 +73,7 @@ fn print_instructions<T>(name: &str, work: impl FnOnce() -> T) -> T {
 
 /// Counts the instructions of each step of planning a swarm from the roadmap's starts to its goals:
 /// costs, assignment, paths, schedule.
-fn measure_plan(view: &RoadmapView<'_>, ws: &mut Planner) {
+fn measure_plan(view: &RoadmapView<'_>, ws: &mut PlannerWorkspace) {
     let plan = PLAN.take();
     let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
     let request = cases::plan_request(&vehicles, &descents_m);
@@ -118,10 +118,10 @@ fn measure_steps() {
 }
 
 /// Counts the instructions of building a roadmap from the map, with this clearance.
-fn measure_build(scratch: &mut WorkspaceOverlay, clearance_m: f32) {
+fn measure_build(workspace: &mut WorkspaceOverlay, clearance_m: f32) {
     let (head, words) = memory::measurement_map();
     let grid = cases::voxel_map(&head, words);
-    let builder = scratch.builder();
+    let builder = workspace.builder();
     let config = PrmConfig { clearance_m, ..cases::ROADMAP_CONFIG };
     let name = if clearance_m > 0.0 { "build-with-clearance" } else { "build" };
     print_instructions(name, || builder.build(&grid, &[], &config)).expect("a roadmap");

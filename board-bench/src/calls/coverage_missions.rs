@@ -10,7 +10,7 @@ use companion::storage::mission_file::{
 };
 use companion::swarm::fleet::{DivisionInput, DivisionInputs};
 use firmware::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
-use firmware::scratch::CoveragePlanWorkspace;
+use firmware::workspace::CoveragePlanWorkspace;
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::Flat;

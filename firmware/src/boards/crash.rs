@@ -11,7 +11,7 @@ use heapless::String;
 
 use super::{chosen, stack};
 use crate::chips::{ResetCause, fault};
-use crate::kept::{CrashRecord, FileWork, MAX_TEXT_LEN, RECORD_WORDS};
+use crate::crash_record::{CrashRecord, FileWork, MAX_TEXT_LEN, RECORD_WORDS};
 
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<[u32; RECORD_WORDS]> = MaybeUninit::uninit();

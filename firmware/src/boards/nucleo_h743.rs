@@ -21,7 +21,7 @@ use static_cell::ConstStaticCell;
 
 use self::start::{clock_config, configure_mpu_and_caches};
 use super::limits::WATCHDOG_TIMEOUT_US;
-use super::{executors, parts};
+use super::{executors, resources};
 use crate::chips::h743::{self, ClockSource, Revision};
 
 bind_interrupts!(struct Irqs {
@@ -82,7 +82,7 @@ unsafe fn UART8() {
 }
 
 /// What [`start`] returns on this board.
-pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
+pub type Parts = resources::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts watchdog, clocks, MPU, caches, executors, UARTs and flash. To be called once, after
 /// [`reset_cause`].

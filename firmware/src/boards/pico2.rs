@@ -30,9 +30,9 @@ use heapless::Vec;
 use static_cell::ConstStaticCell;
 
 use super::limits::WATCHDOG_TIMEOUT_US;
-use super::{executors, parts};
+use super::{executors, resources};
 use crate::chips::{ResetCause, rp2350};
-use crate::lent::{FlashLender, LentFlash};
+use crate::flash_lender::{FlashLender, LentFlash};
 
 bind_interrupts!(struct Irqs {
     UART0_IRQ => BufferedInterruptHandler<peripherals::UART0>;
@@ -109,7 +109,7 @@ fn guard_stack() {
 }
 
 /// What [`start`] returns on this board.
-pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
+pub type Parts = resources::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts watchdog, executors, UARTs and flash. To be called once, after [`reset_cause`].
 pub fn start() -> Parts {

@@ -22,7 +22,7 @@ pub use watchdog::Watchdog;
 
 use heapless::Vec;
 
-use super::{mpu, parts};
+use super::{mpu, resources};
 use crate::chips::ResetCause;
 
 /// Why the board was reset: QEMU does not report it.
@@ -36,7 +36,7 @@ pub fn reset() -> ! {
 }
 
 /// What [`start`] returns on this board.
-pub type Parts = parts::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
+pub type Parts = resources::BoardResources<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts MPU, clock, watchdog, executors, UARTs and flash, then lock step if QEMU was started for
 /// it. To be called once.

@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::ensure;
 use lock_step::ToBoard;
 
-use super::bank::{
+use super::flash_image::{
     BANK_IMAGE_MARK, ERASED, FLASH_BANK2_ADDRESS, PROGRAMMED, TORN, WORD_MARKS_ADDRESS,
 };
 use super::{EmulatedBoard, GrantResult, STACK_LEN};

@@ -20,7 +20,7 @@ use crate::progress::Progress;
 use crate::say;
 use crate::shortage;
 use crate::swarm::ground_station::mission_start;
-use crate::swarm::member::is_finished;
+use crate::swarm::simulated_vehicle::is_finished;
 use crate::swarm::vehicles::companion_config;
 
 /// Arguments of `host-sim companion`.

@@ -11,7 +11,7 @@ use super::load;
 use crate::capacity::BoardCapacity;
 use crate::coverage::CoveragePlan;
 use crate::files::ResultFiles;
-use crate::flown::kept::PictureStore;
+use crate::flown::picture_store::PictureStore;
 use crate::flown::{layers, page, pictures};
 use crate::link::LinkUrl;
 use crate::mission::{HostPlan, PreparedMission};

@@ -29,8 +29,8 @@ use planner_core::geo::frames::enu_to_geodetic;
 use sim_autopilot::GpsFix;
 
 use super::ground_station::{GroundStation, OperatorCommand};
-use super::member::{PlanAnswer, SimulatedVehicle};
 use super::radio::{Radio, RadioOutage};
+use super::simulated_vehicle::{PlanAnswer, SimulatedVehicle};
 use crate::report::{Level, LogEvent};
 use crate::scenario::{CompanionHost, FAULT_OBSTACLE, Fault, Scenario};
 

@@ -14,8 +14,8 @@ use companion::link::frame::Framer;
 use companion::time::Instant;
 use planner_core::Point;
 
-use super::member::SimulatedVehicle;
 use super::radio::Radio;
+use super::simulated_vehicle::SimulatedVehicle;
 use crate::link::ByteLink;
 
 /// Message ids passed on from companions: HEARTBEAT, COMMAND_ACK, STATUSTEXT.

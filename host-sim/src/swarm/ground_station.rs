@@ -10,8 +10,8 @@ use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavC
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
 
-use super::member::{SimulatedVehicle, is_finished};
 use super::radio::Radio;
+use super::simulated_vehicle::{SimulatedVehicle, is_finished};
 
 /// MAVLink component id of the ground station: MAV_COMP_ID_MISSIONPLANNER.
 const COMPONENT_ID: u8 = 190;

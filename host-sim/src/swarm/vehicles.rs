@@ -9,8 +9,8 @@ use planner_core::geo::frames::enu_to_geodetic;
 use sim_autopilot as autopilot;
 
 use super::board::RemoteCompanion;
-use super::member::SimulatedVehicle;
 use super::serial::SerialConfig;
+use super::simulated_vehicle::SimulatedVehicle;
 use crate::capacity::VEHICLES;
 use crate::flash::HostFlash;
 use crate::mission::PreparedMission;

@@ -10,7 +10,9 @@ use heapless::Vec;
 use libm::fmaxf;
 
 use super::config::ScheduleConfig;
-use super::pieces::{MAX_TIMED_SEGMENTS, StraightPart, TimedSegment, part_leg_ends, straight_part};
+use super::timed_segments::{
+    MAX_TIMED_SEGMENTS, StraightPart, TimedSegment, part_leg_ends, straight_part,
+};
 use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geo::distance::segments_distance_sq;
@@ -54,10 +56,10 @@ impl SegmentBlock {
     /// The block around consecutive segments. A curve of their length between the same ends
     /// deviates from the straight line by at most half the minor axis of the ellipse with foci at
     /// both ends; that is the radius.
-    fn around_segments(pieces: &[TimedSegment]) -> Self {
-        let (first, last) = (&pieces[0], &pieces[pieces.len() - 1]);
+    fn around_segments(segments: &[TimedSegment]) -> Self {
+        let (first, last) = (&segments[0], &segments[segments.len() - 1]);
         let mut block = Self::around_line(first.from, last.to);
-        pieces.iter().for_each(|piece| block.bounding_box.include(&piece.to, &piece.to));
+        segments.iter().for_each(|segment| block.bounding_box.include(&segment.to, &segment.to));
         let rounding_m = fmaxf(LENGTH_ROUNDING_M, LENGTH_ROUNDING * last.to_m);
         let length_m = last.to_m - first.from_m + rounding_m;
         let bent_sq = length_m * length_m - (last.to - first.from).norm_squared();
@@ -150,10 +152,10 @@ impl Blocks {
     }
 
     /// Builds blocks, groups and the whole box from the timed segments of a flight.
-    pub(super) fn rebuild(&mut self, cfg: &ScheduleConfig, pieces: &[TimedSegment]) {
+    pub(super) fn rebuild(&mut self, cfg: &ScheduleConfig, segments: &[TimedSegment]) {
         self.reach_m = fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M;
         self.blocks.clear();
-        for some in pieces.chunks(SEGMENTS_PER_BLOCK) {
+        for some in segments.chunks(SEGMENTS_PER_BLOCK) {
             let mut block = SegmentBlock::around_segments(some);
             block.bounding_box.widen(self.reach_m);
             // Cannot overflow: there are no more segments than all blocks have room for.
@@ -211,11 +213,11 @@ impl Blocks {
 
     /// The blocks that may be in conflict with these at most [`SEGMENTS_PER_BLOCK`] consecutive
     /// segments of another flight.
-    pub(super) fn blocks_near(&self, pieces: &[TimedSegment]) -> BlockSet {
-        if pieces.is_empty() {
+    pub(super) fn blocks_near(&self, segments: &[TimedSegment]) -> BlockSet {
+        if segments.is_empty() {
             0
         } else {
-            self.blocks_near_block(&SegmentBlock::around_segments(pieces))
+            self.blocks_near_block(&SegmentBlock::around_segments(segments))
         }
     }
 
@@ -245,7 +247,7 @@ impl Blocks {
     pub(super) fn segments_near_line(
         &self,
         near: BlockSet,
-        pieces: &[TimedSegment],
+        segments: &[TimedSegment],
         (from, to): (Point, Point),
         out: &mut Vec<u16, MAX_TIMED_SEGMENTS>,
     ) {
@@ -255,9 +257,9 @@ impl Blocks {
         out.clear();
         for block in set_bit_indices(near) {
             let first = block * SEGMENTS_PER_BLOCK;
-            let end = (first + SEGMENTS_PER_BLOCK).min(pieces.len());
-            for (index, piece) in (first..).zip(pieces.get(first..end).unwrap_or_default()) {
-                if !line.is_line_beyond_face(&piece.from, &piece.to) {
+            let end = (first + SEGMENTS_PER_BLOCK).min(segments.len());
+            for (index, segment) in (first..).zip(segments.get(first..end).unwrap_or_default()) {
+                if !line.is_line_beyond_face(&segment.from, &segment.to) {
                     // Cannot overflow: `out` has room for all segments.
                     let _ = out.push(index as u16);
                 }
@@ -298,11 +300,11 @@ pub(super) fn set_bit_indices(mut bits: BlockSet) -> impl Iterator<Item = usize>
 /// The segments of the blocks `near` with their indices, in ascending order.
 pub(super) fn segments_in_blocks(
     near: BlockSet,
-    pieces: &[TimedSegment],
+    segments: &[TimedSegment],
 ) -> impl Iterator<Item = (usize, &TimedSegment)> {
     set_bit_indices(near).flat_map(|block| {
         let first = block * SEGMENTS_PER_BLOCK;
-        (first..).zip(pieces.chunks(SEGMENTS_PER_BLOCK).nth(block).unwrap_or_default())
+        (first..).zip(segments.chunks(SEGMENTS_PER_BLOCK).nth(block).unwrap_or_default())
     })
 }
 

@@ -6,7 +6,7 @@
 use crate::Length;
 use libm::{fmaxf, fminf};
 
-use super::pieces::TimedSegment;
+use super::timed_segments::TimedSegment;
 use crate::sort;
 
 /// Number of cells along one side of the grid.
@@ -36,28 +36,28 @@ impl SegmentGrid {
         }
     }
 
-    /// Sorts `pieces`, at most `u16::MAX` of them, by their cells, and indexes them.
-    pub(super) fn sort_into_cells(&mut self, pieces: &mut [TimedSegment]) {
+    /// Sorts `segments`, at most `u16::MAX` of them, by their cells, and indexes them.
+    pub(super) fn sort_into_cells(&mut self, segments: &mut [TimedSegment]) {
         let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         self.half_m = 0.0;
-        for piece in &*pieces {
-            let middle = middle(piece);
+        for segment in &*segments {
+            let middle = middle(segment);
             for a in 0..2 {
                 (min[a], max[a]) = (fminf(min[a], middle[a]), fmaxf(max[a], middle[a]));
             }
-            self.half_m = fmaxf(self.half_m, half_length(piece));
+            self.half_m = fmaxf(self.half_m, half_length(segment));
         }
         let extent_m = fmaxf(max[0] - min[0], max[1] - min[1]);
         (self.min, self.cell_m) = (min, fmaxf(extent_m / CELLS_PER_SIDE as f32, MIN_CELL_M));
-        let cell = |piece: &TimedSegment| {
-            let [x, y] = middle(piece);
+        let cell = |segment: &TimedSegment| {
+            let [x, y] = middle(segment);
             self.cell_index(1, y) * CELLS_PER_SIDE + self.cell_index(0, x)
         };
         // The order within a cell does not matter, as long as it is the same on all boards.
-        sort::sort_by(pieces, |a, b| cell(a).cmp(&cell(b)));
+        sort::sort_by(segments, |a, b| cell(a).cmp(&cell(b)));
         self.starts.fill(0);
-        for piece in &*pieces {
-            let [x, y] = middle(piece);
+        for segment in &*segments {
+            let [x, y] = middle(segment);
             self.starts[self.cell_index(1, y) * CELLS_PER_SIDE + self.cell_index(0, x) + 1] += 1;
         }
         for cell in 0..CELLS_PER_SIDE * CELLS_PER_SIDE {
@@ -75,7 +75,7 @@ impl SegmentGrid {
     /// some that may not.
     pub(super) fn candidates_near<'a>(
         &'a self,
-        pieces: &'a [TimedSegment],
+        segments: &'a [TimedSegment],
         own: &TimedSegment,
         apart_m: f32,
     ) -> impl Iterator<Item = &'a TimedSegment> {
@@ -90,17 +90,17 @@ impl SegmentGrid {
         (rows.0..=rows.1).flat_map(move |row| {
             let from = self.starts[row * CELLS_PER_SIDE + columns.0];
             let to = self.starts[row * CELLS_PER_SIDE + columns.1 + 1];
-            &pieces[usize::from(from)..usize::from(to)]
+            &segments[usize::from(from)..usize::from(to)]
         })
     }
 }
 
-fn middle(piece: &TimedSegment) -> [f32; 2] {
-    [(piece.from.x + piece.to.x) * 0.5, (piece.from.y + piece.to.y) * 0.5]
+fn middle(segment: &TimedSegment) -> [f32; 2] {
+    [(segment.from.x + segment.to.x) * 0.5, (segment.from.y + segment.to.y) * 0.5]
 }
 
-fn half_length(piece: &TimedSegment) -> f32 {
-    (piece.to - piece.from).length() * 0.5
+fn half_length(segment: &TimedSegment) -> f32 {
+    (segment.to - segment.from).length() * 0.5
 }
 
 #[cfg(test)]

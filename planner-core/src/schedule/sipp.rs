@@ -15,7 +15,7 @@ use libm::{fmaxf, fminf};
 
 use super::config::{ScheduleConfig, ScheduleError};
 use super::near::SegmentGrid;
-use super::pieces::{
+use super::timed_segments::{
     Leg, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, MIN_PAD_HOLD_S, TimedSegment, WaitingPlaces,
     cut_into_segments, is_conflict, segment_count,
 };
@@ -59,7 +59,7 @@ const NO_STATE: SippState = SippState {
 /// All zero when new.
 pub struct SippWorkspace<const N: usize, const P: usize> {
     /// The scheduled timed segments, with absolute times; sorted by the cells of `cells`.
-    pieces: Vec<TimedSegment, P>,
+    segments: Vec<TimedSegment, P>,
     cells: SegmentGrid,
     states: [SippState; N],
     len: usize,
@@ -76,7 +76,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     /// Creates an empty workspace: all zeros.
     pub const fn new() -> Self {
         Self {
-            pieces: Vec::new(),
+            segments: Vec::new(),
             cells: SegmentGrid::new(),
             states: [NO_STATE; N],
             len: 0,
@@ -165,12 +165,12 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
     let up = Leg::climb(pad, start, flight.climb_m / cfg.vertical_mps);
     let climb = Climb { up, leave_by_s: ws.leave_pad_by_s(cfg, pad, &up, flight.segment_m) };
     let landing = ws.plan_landing(cfg, goal, flight.descent_m)?;
-    let piece_m = flight.segment_m;
+    let segment_m = flight.segment_m;
     // Lower bound of the time from `there` to the goal, seconds: the heuristic of A*.
     let left_s = |there: &Point| (goal - there).length() / cfg.cruise_mps;
 
     ws.add_states(cfg, view, route.from);
-    ws.forbid_departures(cfg, &up, piece_m, (route.not_before_s, climb.leave_by_s));
+    ws.forbid_departures(cfg, &up, segment_m, (route.not_before_s, climb.leave_by_s));
     let leave_s = (route.not_before_s, climb.leave_by_s);
     let hop = StateTransition { node: route.from, parent: None, leave_s, duration_s: up.to_s };
     ws.relax_intervals(&hop, left_s(&start));
@@ -178,7 +178,7 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
         let reached = ws.states[usize::from(state)];
         let leave_s = (reached.arrive_s, reached.until_s);
         if reached.node == route.to {
-            ws.forbid_departures(cfg, &landing.down, piece_m, leave_s);
+            ws.forbid_departures(cfg, &landing.down, segment_m, leave_s);
             let from_s = fmaxf(reached.arrive_s, landing.after_s);
             let land_s = first_allowed(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
             if let Some(land_s) = land_s {
@@ -199,7 +199,7 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
                 ws.forbid_departures(
                     cfg,
                     &leg_at_time_zero(here, there, duration_s),
-                    piece_m,
+                    segment_m,
                     leave_s,
                 );
                 ws.relax_intervals(&hop, left_s(&there));
@@ -238,8 +238,8 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
 ) -> Result<(), ScheduleError> {
     let &RouteQuery { cfg, parked, handover_s, .. } = route;
     ws.handover_s = handover_s;
-    const { assert!(P <= u16::MAX as usize, "cells count pieces in 16 bits") };
-    ws.pieces.clear();
+    const { assert!(P <= u16::MAX as usize, "cells count segments in 16 bits") };
+    ws.segments.clear();
     for other in scheduled {
         cut_into_segments(cfg, other, &mut ws.cut)?;
         for q in &ws.cut {
@@ -248,7 +248,7 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
                 to_s: q.to_s + other.depart_s + handover_s,
                 ..*q
             };
-            ws.pieces.push(absolute).map_err(|_| ScheduleError::SegmentsFull)?;
+            ws.segments.push(absolute).map_err(|_| ScheduleError::SegmentsFull)?;
         }
     }
     for &place in parked {
@@ -257,21 +257,21 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
             to_s: f32::INFINITY,
             ..parked_segment(place)
         };
-        ws.pieces.push(for_ever).map_err(|_| ScheduleError::SegmentsFull)?;
+        ws.segments.push(for_ever).map_err(|_| ScheduleError::SegmentsFull)?;
     }
-    ws.cells.sort_into_cells(&mut ws.pieces);
+    ws.cells.sort_into_cells(&mut ws.segments);
     Ok(())
 }
 
 /// The scheduled timed segments in conflict with `own`, whatever their times.
 fn conflicting_segments<'s>(
     cells: &'s SegmentGrid,
-    pieces: &'s [TimedSegment],
+    segments: &'s [TimedSegment],
     cfg: &'s ScheduleConfig,
     own: &'s TimedSegment,
 ) -> impl Iterator<Item = &'s TimedSegment> {
     let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
-    cells.candidates_near(pieces, own, apart_m).filter(|q| is_conflict(cfg, own, q))
+    cells.candidates_near(segments, own, apart_m).filter(|q| is_conflict(cfg, own, q))
 }
 
 /// Timed segment of a vehicle that is parked at a point; the caller sets the times.
@@ -285,7 +285,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         cfg: &'s ScheduleConfig,
         own: &'s TimedSegment,
     ) -> impl Iterator<Item = &'s TimedSegment> {
-        conflicting_segments(&self.cells, &self.pieces, cfg, own)
+        conflicting_segments(&self.cells, &self.segments, cfg, own)
     }
 
     /// Creates the states of a node, one for each safe interval, unless it has them already.
@@ -295,7 +295,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         }
         let hover = TimedSegment { parked: false, ..parked_segment(view.node(node)) };
         self.forbidden.clear();
-        for q in conflicting_segments(&self.cells, &self.pieces, cfg, &hover) {
+        for q in conflicting_segments(&self.cells, &self.segments, cfg, &hover) {
             add_forbidden_interval(&mut self.forbidden, q.from_s, q.to_s);
         }
         sort::sort_by(&mut self.forbidden, |a, b| a.0.total_cmp(&b.0));
@@ -322,11 +322,11 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     }
 
     /// The latest take-off, seconds, before another vehicle needs the space of the pad.
-    fn leave_pad_by_s(&self, cfg: &ScheduleConfig, pad: Point, up: &Leg, piece_m: f32) -> f32 {
+    fn leave_pad_by_s(&self, cfg: &ScheduleConfig, pad: Point, up: &Leg, segment_m: f32) -> f32 {
         // Held from −∞, so that it is not in conflict with another vehicle's pad.
         let on_pad = TimedSegment { from_s: f32::NEG_INFINITY, ..parked_segment(pad) };
         // The pad is held until the vehicle has flown the first timed segment of its climb.
-        let off_pad_s = fmaxf(up.first_segment(piece_m).1, MIN_PAD_HOLD_S) + self.handover_s;
+        let off_pad_s = fmaxf(up.first_segment(segment_m).1, MIN_PAD_HOLD_S) + self.handover_s;
         let needed_s =
             self.conflicting_segments(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
         needed_s - off_pad_s
@@ -380,7 +380,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         &mut self,
         cfg: &ScheduleConfig,
         leg: &Leg,
-        piece_m: f32,
+        segment_m: f32,
         leave_s: (f32, f32),
     ) {
         self.forbidden.clear();
@@ -395,7 +395,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         };
         let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
         let held_s = self.handover_s;
-        for q in self.cells.candidates_near(&self.pieces, &whole, apart_m) {
+        for q in self.cells.candidates_near(&self.segments, &whole, apart_m) {
             // A segment that ends before, or begins after, all times in question forbids none.
             if q.to_s < leave_s.0
                 || q.from_s - held_s - leg.to_s > leave_s.1
@@ -403,7 +403,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             {
                 continue;
             }
-            for p in leg.segments(0.0, leg.length_m, piece_m) {
+            for p in leg.segments(0.0, leg.length_m, segment_m) {
                 if is_conflict(cfg, &p, q) {
                     add_forbidden_interval(
                         &mut self.forbidden,

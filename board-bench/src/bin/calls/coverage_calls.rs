@@ -2,7 +2,7 @@
 
 use board_bench::calls::coverage_workspace::CoverageWorkspace;
 use board_bench::calls::{Meter, coverage, coverage_flights, coverage_missions};
-use firmware::scratch::CoveragePlanWorkspace;
+use firmware::workspace::CoveragePlanWorkspace;
 use static_cell::ConstStaticCell;
 
 /// Memory of the separate steps. `memory.x` places it by name.

@@ -6,7 +6,7 @@ use firmware::boards::chosen::memory;
 use firmware::capacity::{
     GATES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
 };
-use firmware::scratch::{Planner, WorkspaceOverlay};
+use firmware::workspace::{PlannerWorkspace, WorkspaceOverlay};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
@@ -52,7 +52,7 @@ struct BenchMemory {
     lengths: [f32; 2048],
 }
 
-static SCRATCH: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
+static WORKSPACE: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static BENCH_MEMORY: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMemory {
     plan: Plan::new(),
     small: prm::NodeIndex::new(),
@@ -67,7 +67,7 @@ static BENCH_MEMORY: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMe
 /// results: of its single calls, and of its flights.
 #[inline(never)]
 pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
-    let scratch = SCRATCH.take();
+    let workspace = WORKSPACE.take();
     let beside = BENCH_MEMORY.take();
     let view = meter
         .call("roadmap::RoadmapView::parse", size_of::<RoadmapView<'_>>(), || {
@@ -75,11 +75,11 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
         })
         .expect("a roadmap lies in bank 2");
     measure_frames_and_grids(meter);
-    measure_searches(meter, &view, scratch.planner());
-    measure_assignments(meter, &mut scratch.planner().assignment);
-    measure_plans(meter, &view, scratch.planner(), &mut beside.plan);
-    measure_largest_swarm(meter, &view, scratch.planner(), &mut beside.plan);
-    measure_detours(meter, &view, &mut scratch.planner().search);
+    measure_searches(meter, &view, workspace.planner());
+    measure_assignments(meter, &mut workspace.planner().assignment);
+    measure_plans(meter, &view, workspace.planner(), &mut beside.plan);
+    measure_largest_swarm(meter, &view, workspace.planner(), &mut beside.plan);
+    measure_detours(meter, &view, &mut workspace.planner().search);
     measure_paths(meter);
     let (head, words) = memory::measurement_map();
     let grid = cases::voxel_map(&head, words);
@@ -89,10 +89,10 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
         VoxelGrid::new(shape, Outside::Blocked, words)
     });
     measure_segments(meter, &grid);
-    measure_roadmap_builds(meter, &grid, scratch);
-    let search = &mut scratch.planner().search;
+    measure_roadmap_builds(meter, &grid, workspace);
+    let search = &mut workspace.planner().search;
     measure_host_calls(meter, &grid, search, beside);
-    coverage_calls::measure_coverage(meter, scratch.coverage_plan(), &mut beside.plan)
+    coverage_calls::measure_coverage(meter, workspace.coverage_plan(), &mut beside.plan)
 }
 
 fn random_geodetic(rng: &mut Pcg32) -> Geodetic {
@@ -123,7 +123,7 @@ fn measure_frames_and_grids(meter: &mut impl Meter) {
     }
 }
 
-fn measure_searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner) {
+fn measure_searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut PlannerWorkspace) {
     let mut rng = Pcg32::seed_from_u64(2);
     let nodes = view.node_count();
     let bytes = size_of::<Search>();
@@ -186,10 +186,10 @@ fn measure_assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHI
 fn measure_plans(
     meter: &mut impl Meter,
     view: &RoadmapView<'_>,
-    ws: &mut Planner,
+    ws: &mut PlannerWorkspace,
     plan: &mut Plan,
 ) {
-    let bytes = size_of::<Planner>();
+    let bytes = size_of::<PlannerWorkspace>();
     let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
     let request = cases::plan_request(&vehicles, &descents_m);
     let mut goals = Goals::new();
@@ -236,7 +236,7 @@ fn measure_plans(
 fn measure_largest_swarm(
     meter: &mut impl Meter,
     view: &RoadmapView<'_>,
-    ws: &mut Planner,
+    ws: &mut PlannerWorkspace,
     plan: &mut Plan,
 ) {
     let mut rng = Pcg32::seed_from_u64(4);
@@ -419,11 +419,11 @@ fn measure_segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
 fn measure_roadmap_builds(
     meter: &mut impl Meter,
     grid: &VoxelGrid<'_>,
-    scratch: &mut WorkspaceOverlay,
+    workspace: &mut WorkspaceOverlay,
 ) {
     let bytes = size_of::<prm::NodeIndex<ROADMAP_NODES, ROADMAP_CUBES>>();
     let good = "the building has room";
-    let builder = scratch.builder();
+    let builder = workspace.builder();
     meter
         .call("prm::sample_nodes, 2300", 0, || {
             builder.sample_nodes(grid, &[], &cases::ROADMAP_CONFIG)

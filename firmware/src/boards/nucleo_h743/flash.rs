@@ -33,7 +33,7 @@ use embassy_stm32::pac;
 
 use super::super::mpu;
 use crate::chips::h743;
-use crate::lent::{FlashLender, LentFlash};
+use crate::flash_lender::{FlashLender, LentFlash};
 
 /// Offset of bank 2 from the start of the flash, as embassy-stm32 counts.
 const BANK2_OFFSET: u32 = 1 << 20;

@@ -7,7 +7,7 @@ use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, WORD};
 use embassy_time::{Duration, Timer};
 
 use super::memory::Bank2Use;
-use crate::lent::{FlashLender, LentFlash};
+use crate::flash_lender::{FlashLender, LentFlash};
 
 /// Address of the memory that holds the bank's bytes.
 const BANK_ADDRESS: usize = 0x6000_0000;

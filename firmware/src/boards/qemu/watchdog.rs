@@ -34,11 +34,11 @@ static LAST_FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 /// reset time if that is earlier. Resets the board if the reset time is past. The device's timer
 /// does not count skipped time, so this function does.
 pub fn earlier_of_due_and_reset(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
-    let bites = LAST_FED.borrow(cs).get() + u64::from(2 * RELOAD_COUNTS);
-    if now >= bites {
+    let reset_time = LAST_FED.borrow(cs).get() + u64::from(2 * RELOAD_COUNTS);
+    if now >= reset_time {
         SCB::sys_reset();
     }
-    due.min(bites)
+    due.min(reset_time)
 }
 
 fn note_fed() {

@@ -4,7 +4,7 @@ use std::vec::Vec as List;
 
 use super::*;
 use crate::flight::{Path, Task};
-use crate::schedule::pieces::{cut_into_segments, is_conflict};
+use crate::schedule::timed_segments::{cut_into_segments, is_conflict};
 use proptest::prelude::*;
 
 const CFG: ScheduleConfig = ScheduleConfig {
@@ -22,14 +22,14 @@ fn flight((from, steps): &Steps) -> List<TimedSegment> {
     let mut at = Point::new(from.0, from.1, 1.0);
     let mut way = Point::zeros();
     let mut along_m = 0.0;
-    let piece = |&(x, y, z, on): &(f32, f32, f32, bool)| {
+    let segment = |&(x, y, z, on): &(f32, f32, f32, bool)| {
         way = if on { way } else { Point::new(x, y, z) };
         let (from, from_m) = (at, along_m);
         at += way;
         along_m += way.norm();
         TimedSegment { from, to: at, from_m, to_m: along_m, from_s: 0.0, to_s: 1.0, parked: false }
     };
-    steps.iter().map(piece).collect()
+    steps.iter().map(segment).collect()
 }
 
 fn steps() -> impl Strategy<Value = Steps> {
@@ -102,14 +102,14 @@ proptest! {
             .iter_mut()
             .for_each(|point| (point.0, point.1) = (point.0 + apart.0, point.1 + apart.1));
         let (own, other) = (whole(&own, 1.5), whole(&other, descent_m));
-        let (mut own_pieces, mut other_pieces) = (Vec::new(), Vec::new());
-        cut_into_segments(&CFG, &own, &mut own_pieces).unwrap();
-        cut_into_segments(&CFG, &other, &mut other_pieces).unwrap();
+        let (mut own_segments, mut other_segments) = (Vec::new(), Vec::new());
+        cut_into_segments(&CFG, &own, &mut own_segments).unwrap();
+        cut_into_segments(&CFG, &other, &mut other_segments).unwrap();
         let mut blocks = Blocks::new();
-        blocks.rebuild(&CFG, &own_pieces);
+        blocks.rebuild(&CFG, &own_segments);
         let far = blocks.parts_near(&CFG, &other).next().is_none();
         let meet =
-            other_pieces.iter().any(|q| own_pieces.iter().any(|p| is_conflict(&CFG, p, q)));
+            other_segments.iter().any(|q| own_segments.iter().any(|p| is_conflict(&CFG, p, q)));
         prop_assert!(!(far && meet));
     }
 }

@@ -1,11 +1,11 @@
 use super::*;
 use crate::Point;
 use crate::schedule::ScheduleConfig;
-use crate::schedule::pieces::is_conflict;
+use crate::schedule::timed_segments::is_conflict;
 use heapless::Vec;
 use proptest::prelude::*;
 
-fn piece((x, y, dx, dy): (f32, f32, f32, f32)) -> TimedSegment {
+fn segment((x, y, dx, dy): (f32, f32, f32, f32)) -> TimedSegment {
     let (from, to) = (Point::new(x, y, 1.0), Point::new(x + dx, y + dy, 1.0));
     let to_m = (to - from).norm();
     TimedSegment { from, to, from_m: 0.0, to_m, from_s: 0.0, to_s: 1.0, parked: false }
@@ -28,13 +28,13 @@ proptest! {
             cruise_mps: 2.0,
             vertical_mps: 1.0,
         };
-        let mut pieces: Vec<TimedSegment, 200> = others.into_iter().map(piece).collect();
+        let mut segments: Vec<TimedSegment, 200> = others.into_iter().map(segment).collect();
         let mut cells = SegmentGrid::new();
-        cells.sort_into_cells(&mut pieces);
-        let own = piece(own);
-        let all = pieces.iter().filter(|q| is_conflict(&cfg, &own, q)).count();
+        cells.sort_into_cells(&mut segments);
+        let own = segment(own);
+        let all = segments.iter().filter(|q| is_conflict(&cfg, &own, q)).count();
         let found = cells
-            .candidates_near(&pieces, &own, 2.0)
+            .candidates_near(&segments, &own, 2.0)
             .filter(|q| is_conflict(&cfg, &own, q))
             .count();
         prop_assert_eq!(found, all);

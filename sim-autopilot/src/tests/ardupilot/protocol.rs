@@ -5,7 +5,7 @@ use planner_core::geo::frames::Projection;
 use super::*;
 
 #[test]
-fn unasked_it_says_heartbeat_and_next_to_nothing() {
+fn unsolicited_it_says_heartbeat_and_next_to_nothing() {
     let mut bench = Bench::copter();
     bench.run(30.0);
     let count = |id| bench.of(id).count();
@@ -14,7 +14,7 @@ fn unasked_it_says_heartbeat_and_next_to_nothing() {
     for (_, frame) in &bench.received {
         assert!(
             [0, 1, 22, 111, 253, 49, 242].contains(&frame.message_id),
-            "{} unasked",
+            "{} unsolicited",
             frame.message_id
         );
     }

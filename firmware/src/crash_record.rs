@@ -60,7 +60,7 @@ pub enum FileWork {
 }
 
 /// A kind of work, and the checksum of the files it works on.
-type Task = (FileWork, u32);
+type RunningWork = (FileWork, u32);
 
 /// The record that is kept over a warm reset.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -68,7 +68,7 @@ pub struct CrashRecord {
     end: RunEnd,
     text: String<MAX_TEXT_LEN>,
     /// File work that runs now; `FileWork::None` while none runs.
-    task: Task,
+    running: RunningWork,
     /// For each kind of work: checksum of the files on which it crashed last, and number of starts
     /// in a row that it crashed.
     failed_work: [(u32, u32); WORK_KINDS],
@@ -95,7 +95,7 @@ impl CrashRecord {
         };
         let said = String::try_from(said).ok().filter(|said| !said.is_empty());
         let by_itself = matches!(cause, ResetCause::Watchdog | ResetCause::Unknown);
-        let (work, files) = kept.task;
+        let (work, files) = kept.running;
         for (i, failed) in kept.failed_work.iter_mut().enumerate() {
             if work as usize != i + 1 {
                 // This kind of work ended without a crash in the last run: its count begins again.
@@ -107,7 +107,7 @@ impl CrashRecord {
                 *failed = (files, before.saturating_add(1));
             }
         }
-        (kept.task, kept.completed_work, kept.end) = (Task::default(), 0, RunEnd::Runs);
+        (kept.running, kept.completed_work, kept.end) = (RunningWork::default(), 0, RunEnd::Runs);
         (kept, said)
     }
 
@@ -141,14 +141,14 @@ impl CrashRecord {
     pub fn begin_work(&mut self, work: FileWork, files: u32) -> bool {
         let may = self.may_begin(work, files);
         if may {
-            self.task = (work, files);
+            self.running = (work, files);
         }
         may
     }
 
     /// Notes that the work that runs has ended without a crash.
     pub fn finish_work(&mut self) {
-        let (work, files) = core::mem::take(&mut self.task);
+        let (work, files) = core::mem::take(&mut self.running);
         if let Some(i) = (work as usize).checked_sub(1)
             && self.failed_work[i].0 == files
         {
@@ -164,8 +164,8 @@ impl CrashRecord {
         let head = [
             self.end as u32,
             self.text.len() as u32,
-            self.task.0 as u32,
-            self.task.1,
+            self.running.0 as u32,
+            self.running.1,
             self.completed_work,
         ];
         let failed = self.failed_work.iter().flat_map(|(files, times)| [*files, *times]);
@@ -197,7 +197,7 @@ impl CrashRecord {
         Some(Self {
             end,
             text: String::try_from(text).ok()?,
-            task: (work(words[2])?, words[3]),
+            running: (work(words[2])?, words[3]),
             failed_work: array::from_fn(|i| (words[5 + 2 * i], words[6 + 2 * i])),
             completed_work: words[4],
         })

@@ -25,7 +25,7 @@ const SPEED_MPS: f32 = 2.2;
 type Mate = Companion<VEHICLES, WAYPOINTS, GATES>;
 
 /// A vehicle of a meeting with its companion.
-pub(super) struct Member {
+pub(super) struct MeetingVehicle {
     pub(super) companion: Mate,
     pub(super) autopilot: Autopilot,
     pub(super) inbox: Vec<Packet>,
@@ -61,7 +61,7 @@ fn config(scene: &Scene, i: usize) -> Config<VEHICLES> {
     config
 }
 
-impl Member {
+impl MeetingVehicle {
     pub(super) fn new(scene: &Scene, i: usize) -> Self {
         let vehicle = &scene.vehicles[i];
         let ekf_origin = Geodetic {

@@ -264,20 +264,20 @@ impl Leg {
     }
 
     /// Length in metres and duration in seconds of the leg's first timed segment.
-    pub(super) fn first_segment(&self, piece_m: f32) -> (f32, f32) {
-        let share = 1.0 / fmaxf(segment_count(self.length_m, piece_m) as f32, 1.0);
+    pub(super) fn first_segment(&self, segment_m: f32) -> (f32, f32) {
+        let share = 1.0 / fmaxf(segment_count(self.length_m, segment_m) as f32, 1.0);
         (self.length_m * share, (self.to_s - self.from_s) * share)
     }
 
-    /// The timed segments of the leg, at most `piece_m` long; `from_m` and `to_m` are the arc
+    /// The timed segments of the leg, at most `segment_m` long; `from_m` and `to_m` are the arc
     /// lengths of its ends.
     pub(super) fn segments(
         self,
         from_m: f32,
         to_m: f32,
-        piece_m: f32,
+        segment_m: f32,
     ) -> impl Iterator<Item = TimedSegment> {
-        let parts = segment_count(self.length_m, piece_m);
+        let parts = segment_count(self.length_m, segment_m);
         let at = move |part: u32| {
             if part == parts {
                 // The next leg begins at exactly this point, bit by bit.
@@ -306,8 +306,8 @@ impl Leg {
 }
 
 /// Number of timed segments of a leg; 0 for length 0.
-pub(super) fn segment_count(length_m: f32, piece_m: f32) -> u32 {
-    libm::ceilf(length_m / piece_m) as u32
+pub(super) fn segment_count(length_m: f32, segment_m: f32) -> u32 {
+    libm::ceilf(length_m / segment_m) as u32
 }
 
 /// Whether two timed segments come nearer than the separation, whatever their times are.

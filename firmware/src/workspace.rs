@@ -20,7 +20,7 @@ use crate::capacity::{
 };
 
 /// Workspace for planning a swarm on a roadmap.
-pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
+pub type PlannerWorkspace = PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
 /// Workspace for planning a coverage mission.
 pub struct CoveragePlanWorkspace {
@@ -57,7 +57,7 @@ enum OverlayUse {
 }
 
 union Memory {
-    plan: ManuallyDrop<Planner>,
+    plan: ManuallyDrop<PlannerWorkspace>,
     build: ManuallyDrop<RoadmapBuilder>,
     coverage: ManuallyDrop<CoveragePlanWorkspace>,
 }
@@ -65,7 +65,7 @@ union Memory {
 /// All-zero values of the three types: this constant compiles only if all zeros is a valid value of
 /// each.
 #[expect(dead_code, reason = "made by the compiler alone")]
-const ALL_ZEROS: (Planner, RoadmapBuilder, CoveragePlanWorkspace) = {
+const ALL_ZEROS: (PlannerWorkspace, RoadmapBuilder, CoveragePlanWorkspace) = {
     // SAFETY: the compiler evaluates this and rejects an invalid value.
     unsafe {
         let zeroed = (MaybeUninit::zeroed(), MaybeUninit::zeroed(), MaybeUninit::zeroed());
@@ -77,11 +77,14 @@ impl WorkspaceOverlay {
     /// Empty, in use for planning; its bytes are all zeros, so a static of it lies in .bss and
     /// takes no flash.
     pub const fn new() -> Self {
-        Self { memory: Memory { plan: ManuallyDrop::new(Planner::new()) }, used: OverlayUse::Plan }
+        Self {
+            memory: Memory { plan: ManuallyDrop::new(PlannerWorkspace::new()) },
+            used: OverlayUse::Plan,
+        }
     }
 
     /// The memory as workspace of roadmap plans. It is zeroed if it had another use before.
-    pub fn planner(&mut self) -> &mut Planner {
+    pub fn planner(&mut self) -> &mut PlannerWorkspace {
         self.switch_use(OverlayUse::Plan);
         // SAFETY: `switch_use` zeroed it when the use changed to this one, all zeros is an empty
         // planner, and since then it was written as a planner alone.
