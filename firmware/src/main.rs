@@ -72,11 +72,8 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
 #[entry]
 fn main() -> ! {
     let cause = chosen::reset_cause();
-    #[cfg(any(feature = "nucleo-h743", feature = "qemu"))]
     // SAFETY: no task runs yet, and `reset_cause` has switched the memories' clocks on.
-    unsafe {
-        firmware::boards::sections::zero_sections();
-    }
+    unsafe { chosen::zero_sections() };
     let crashed = crash::take_report(cause);
     let parts = chosen::start();
     let shell: &'static Shell = SHELL.init_with(Shell::new);

@@ -42,6 +42,8 @@ pub use flash::{Flash, LAYOUT};
 pub use start::{reset, reset_cause};
 pub use transmitter::Transmitter;
 
+pub use super::sections::zero_sections;
+
 const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
 /// Bytes of the ring buffer that DMA fills: 22 ms at the autopilot's baud rate. `memory.x` places

@@ -85,6 +85,12 @@ pub fn reset_cause() -> ResetCause {
     rp2350::reset_cause(chip, pac::WATCHDOG.reason().read().0)
 }
 
+/// Does nothing: this board's `memory.x` places no static outside `.bss` but the crash record.
+///
+/// # Safety
+/// None; `unsafe` because it is on boards whose statics it zeroes.
+pub unsafe fn zero_sections() {}
+
 /// Restarts the board at once, by triggering the watchdog.
 pub fn reset() -> ! {
     set_watchdog_resets();

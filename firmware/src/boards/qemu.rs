@@ -20,6 +20,8 @@ pub use sleep::sleep;
 pub use uart::{Receiver, Transmitter};
 pub use watchdog::Watchdog;
 
+pub use super::sections::zero_sections;
+
 use heapless::Vec;
 
 use super::{mpu, resources};
