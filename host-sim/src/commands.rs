@@ -1,9 +1,10 @@
-//! The commands of `host-sim`, one module each; `map` has its command in [`crate::map`].
+//! The commands of `host-sim`, one module each.
 
 pub mod autopilot;
 pub mod companion;
 pub mod cover;
 pub mod fly;
+pub mod map;
 pub mod paper;
 pub mod plan;
 pub mod radio;

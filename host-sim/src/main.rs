@@ -6,22 +6,22 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
-use host_sim::{commands, map, progress, quote, say};
+use host_sim::{commands, progress, quote, say};
 
 /// Plans and flies drone swarms on a computer, with the code that flies on the board.
 #[derive(Parser)]
 #[command(version, about)]
 struct Cli {
     #[command(subcommand)]
-    command: Command,
+    command: HostSimCommand,
 }
 
 #[derive(Subcommand)]
-enum Command {
+enum HostSimCommand {
     /// Fly a built-in mission: ten UAVs go to their goals in a nine-floor building
     Demo(commands::fly::DemoArgs),
     /// Show and convert maps
-    Map(map::command::MapArgs),
+    Map(commands::map::MapArgs),
     /// Build and show roadmap files
     Roadmap(commands::roadmap::Args),
     /// Plan a scenario: roadmap, assignment, paths; no flight
@@ -60,19 +60,19 @@ fn main() -> ExitCode {
     })
 }
 
-fn run(command: Command) -> anyhow::Result<ExitCode> {
+fn run(command: HostSimCommand) -> anyhow::Result<ExitCode> {
     match command {
-        Command::Demo(args) => commands::fly::demo(&args),
-        Command::Map(args) => map::command::run(&args),
-        Command::Roadmap(args) => commands::roadmap::run(&args),
-        Command::Plan(args) => commands::plan::run(&args),
-        Command::Fly(args) => commands::fly::run(&args),
-        Command::Cover(args) => commands::cover::run(&args),
-        Command::Paper(args) => commands::paper::run(&args),
-        Command::Autopilot(args) => commands::autopilot::run(&args),
-        Command::Companion(args) => commands::companion::run(&args),
-        Command::Upload(args) => commands::upload::run(&args),
-        Command::Radio(args) => commands::radio::run(&args),
+        HostSimCommand::Demo(args) => commands::fly::demo(&args),
+        HostSimCommand::Map(args) => commands::map::run(&args),
+        HostSimCommand::Roadmap(args) => commands::roadmap::run(&args),
+        HostSimCommand::Plan(args) => commands::plan::run(&args),
+        HostSimCommand::Fly(args) => commands::fly::run(&args),
+        HostSimCommand::Cover(args) => commands::cover::run(&args),
+        HostSimCommand::Paper(args) => commands::paper::run(&args),
+        HostSimCommand::Autopilot(args) => commands::autopilot::run(&args),
+        HostSimCommand::Companion(args) => commands::companion::run(&args),
+        HostSimCommand::Upload(args) => commands::upload::run(&args),
+        HostSimCommand::Radio(args) => commands::radio::run(&args),
     }
 }
 

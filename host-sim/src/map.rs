@@ -4,7 +4,6 @@ pub mod boxes;
 pub mod bt;
 pub mod building;
 pub mod column;
-pub mod command;
 pub mod edt;
 mod error;
 mod ground;

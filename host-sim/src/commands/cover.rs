@@ -7,18 +7,15 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use anyhow::Context;
-use serde::Serialize;
 
 use crate::coverage::check::{self, CoverageFindings};
-use crate::coverage::sorties::Sortie;
-use crate::coverage::{self, CoveragePlan, SortieFlight, export, page};
+use crate::coverage::result::{CoverResult, cover_result};
+use crate::coverage::{CoveragePlan, SortieFlight, export, page};
 use crate::files::ResultFiles;
 use crate::output;
 use crate::quote::quoted_path;
 use crate::report;
-use crate::result::{
-    self, CoverageResult, RoadmapSize, Safety, Timing, Totals, VehicleResult, rounded,
-};
+use crate::result::{self, CoverageResult, Timing};
 use crate::say;
 use crate::scenario::coverage::CoverageMethod;
 use crate::scenario::{self, DEFAULT_ORIGIN, Scenario};
@@ -37,21 +34,6 @@ pub struct Args {
     /// or exact
     #[arg(long, value_name = "METHOD", value_parser = CoverageMethod::named)]
     method: Option<CoverageMethod>,
-}
-
-/// The `result.json` of `host-sim cover`.
-#[derive(Debug, Serialize)]
-pub(crate) struct CoverResult {
-    command: &'static str,
-    scenario: String,
-    seed: u64,
-    method: &'static str,
-    complete: bool,
-    vehicles: Vec<VehicleResult>,
-    totals: Totals,
-    safety: Safety,
-    roadmap: RoadmapSize,
-    coverage: CoverageResult,
 }
 
 /// Plans the area and writes all files. Exit code 0 if the check finds no fault.
@@ -151,55 +133,6 @@ fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
         }
     }
     Ok(())
-}
-
-/// The `result.json` of a plan and its check.
-pub(crate) fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> CoverResult {
-    let scenario = planned.scenario;
-    let routes = &planned.plan.routes;
-    let makespan_s = planned.sorties.iter().map(Sortie::end_s).fold(0.0, f32::max);
-    let least_m = planned.closest_approach_m;
-    CoverResult {
-        command: "cover",
-        scenario: scenario.path.clone(),
-        seed: scenario.seed,
-        method: planned.method.name(),
-        complete: findings.is_clean(),
-        totals: Totals {
-            path_m: rounded(routes.iter().map(|route| planned.cost_m(route)).sum()),
-            makespan_s: rounded(makespan_s),
-        },
-        safety: Safety {
-            wall_contacts: 0,
-            min_clearance_m: None,
-            min_separation_m: least_m.is_finite().then(|| rounded(least_m)),
-            safety_distance_m: rounded(scenario.deconfliction.safety_distance_m),
-            violations: u32::from(least_m < scenario.deconfliction.safety_distance_m * 0.999),
-            deadlocks: 0,
-        },
-        roadmap: RoadmapSize { nodes: 0, edges: 0, bytes: 0 },
-        coverage: coverage::result::coverage_result(planned, findings),
-        vehicles: vehicle_results(planned),
-    }
-}
-
-fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
-    let vehicles = planned.scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
-        let route = planned.plan.routes.iter().find(|route| usize::from(route.vehicle) == index);
-        VehicleResult {
-            id: vehicle.id,
-            goal: None,
-            reached: false,
-            landed: false,
-            path_m: route.map_or(0.0, |route| rounded(planned.cost_m(route))),
-            flown_m: 0.0,
-            flight_time_s: route.map_or(0.0, |route| {
-                rounded(planned.sorties_of(route).map(|sortie| sortie.route.cost_s).sum())
-            }),
-            end: if route.is_some() { "planned" } else { "stays on the ground" }.to_owned(),
-        }
-    });
-    vehicles.collect()
 }
 
 /// The line about the area: what is photographed of it, and how.

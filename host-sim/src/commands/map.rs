@@ -6,10 +6,8 @@ use std::process::ExitCode;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::occupancy::OccupancyMap;
-use super::octree::Octree;
-use super::{MapError, RESOLUTION_RANGE_M, Source, bt, building};
 use crate::files::ResultFiles;
+use crate::map::{MapError, OccupancyMap, Octree, RESOLUTION_RANGE_M, Source, bt, building};
 use crate::say;
 
 /// Resolution of a built-in map where none is given, metres.

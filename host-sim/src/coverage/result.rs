@@ -1,12 +1,90 @@
-//! The coverage section of `result.json`.
+//! The `result.json` of a coverage plan, and its coverage section.
 
 use planner_core::coverage::pack::Route;
 use planner_core::flight::Trigger;
+use serde::Serialize;
 
 use super::CoveragePlan;
 use super::check::CoverageFindings;
 use super::sorties::Sortie;
-use crate::result::{CoverageResult, RouteResult, SortieResult, TerrainResult, rounded};
+use crate::result::{
+    CoverageResult, RoadmapSize, RouteResult, Safety, SortieResult, TerrainResult, Totals,
+    VehicleResult, rounded,
+};
+
+/// The `result.json` of `host-sim cover`.
+#[derive(Debug, Serialize)]
+pub struct CoverResult {
+    /// `"cover"`.
+    pub command: &'static str,
+    /// Path of the scenario.
+    pub scenario: String,
+    /// Seed of the scenario.
+    pub seed: u64,
+    /// Name of the method that divided the area.
+    pub method: &'static str,
+    /// Whether the check of the pictures found no fault.
+    pub complete: bool,
+    /// A row for each vehicle of the scenario.
+    pub vehicles: Vec<VehicleResult>,
+    /// Length and duration of all flights.
+    pub totals: Totals,
+    /// Separation of the planned flights.
+    pub safety: Safety,
+    /// Always empty: a coverage mission has no roadmap.
+    pub roadmap: RoadmapSize,
+    /// The coverage section.
+    pub coverage: CoverageResult,
+}
+
+/// The `result.json` of a plan and its check.
+pub fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> CoverResult {
+    let scenario = planned.scenario;
+    let routes = &planned.plan.routes;
+    let makespan_s = planned.sorties.iter().map(Sortie::end_s).fold(0.0, f32::max);
+    let least_m = planned.closest_approach_m;
+    CoverResult {
+        command: "cover",
+        scenario: scenario.path.clone(),
+        seed: scenario.seed,
+        method: planned.method.name(),
+        complete: findings.is_clean(),
+        totals: Totals {
+            path_m: rounded(routes.iter().map(|route| planned.cost_m(route)).sum()),
+            makespan_s: rounded(makespan_s),
+        },
+        safety: Safety {
+            wall_contacts: 0,
+            min_clearance_m: None,
+            min_separation_m: least_m.is_finite().then(|| rounded(least_m)),
+            safety_distance_m: rounded(scenario.deconfliction.safety_distance_m),
+            violations: u32::from(least_m < scenario.deconfliction.safety_distance_m * 0.999),
+            deadlocks: 0,
+        },
+        roadmap: RoadmapSize { nodes: 0, edges: 0, bytes: 0 },
+        coverage: coverage_result(planned, findings),
+        vehicles: vehicle_results(planned),
+    }
+}
+
+fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
+    let vehicles = planned.scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
+        let route = planned.plan.routes.iter().find(|route| usize::from(route.vehicle) == index);
+        VehicleResult {
+            id: vehicle.id,
+            goal: None,
+            reached: false,
+            landed: false,
+            path_m: route.map_or(0.0, |route| rounded(planned.cost_m(route))),
+            flown_m: 0.0,
+            flight_time_s: route.map_or(0.0, |route| {
+                rounded(planned.sorties_of(route).map(|sortie| sortie.route.cost_s).sum())
+            }),
+            end: if route.is_some() { "planned" } else { "stays on the ground" }.to_owned(),
+        }
+    });
+    vehicles.collect()
+}
 
 /// Makes the coverage section from a plan and from the check of its pictures.
 pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> CoverageResult {

@@ -17,8 +17,8 @@ use super::cpp_data::{
 };
 use super::cpp_figures;
 use super::cpp_rows::{TableRow, ValueSummary};
-use crate::commands::cover;
 use crate::coverage::check::check_plan;
+use crate::coverage::result::cover_result;
 use crate::coverage::{CoveragePlan, page};
 use crate::files::ResultFiles;
 use crate::report::Figure;
@@ -95,7 +95,7 @@ impl Tables {
     ) -> anyhow::Result<Vec<f64>> {
         let planned = CoveragePlan::new(scenario, method)?;
         let findings = check_plan(&planned);
-        let result = cover::cover_result(&planned, &findings);
+        let result = cover_result(&planned, &findings);
         self.complete &= findings.is_clean();
         let rank =
             f64::from(planned.plan.max_cost_s()) + if findings.is_clean() { 0.0 } else { 1e9 };
@@ -165,7 +165,7 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let scenario = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
     let planned = CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)?;
     let findings = check_plan(&planned);
-    let result = serde_json::to_value(cover::cover_result(&planned, &findings))?;
+    let result = serde_json::to_value(cover_result(&planned, &findings))?;
     let mut page = page::report_data(&planned, &planned.flights(), &findings, result);
     page.figures = paper_figures(&tables)?;
     results.add(output::RESULT_FILES[2], report::page(&page)?.as_bytes())?;

@@ -3,7 +3,7 @@ use crate::map::Occupancy;
 
 /// Planning resamples a map to cells of any size, so `map info` must accept them too.
 #[test]
-fn any_resolution_that_is_planned_on_is_told_about() {
+fn any_resolution_that_is_planned_on_is_shown() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hall.bt");
     let tree = Octree::from_cells(0.1, [32_700, 32_801, 32_768], [70, 41, 33], |[x, _, z]| {
