@@ -76,7 +76,7 @@ pub fn required_distances(
 ) -> RequiredDistances {
     let mut errors: Vec<f32> = vehicles
         .iter()
-        .map(|v| TRACKING_M + max_estimate_error_m(simulation.estimator, v.personality))
+        .map(|v| TRACKING_M + max_estimate_error_m(simulation.estimator, v.autopilot))
         .collect();
     errors.sort_by(|a, b| b.total_cmp(a));
     let worst = |k: usize| errors.get(k).copied().unwrap_or(0.0);
@@ -98,8 +98,8 @@ pub fn min_pad_distance_m(
     vehicles: &[VehicleSection],
 ) -> f32 {
     let own = |v: &VehicleSection| {
-        max_estimate_error_m(simulation.estimator, v.personality)
-            + touchdown_extra_m(simulation.gust_mps, v.personality)
+        max_estimate_error_m(simulation.estimator, v.autopilot)
+            + touchdown_extra_m(simulation.gust_mps, v.autopilot)
     };
     parked_separation_m(simulation, safety_distance_m, vehicles)
         + vehicles.iter().map(own).fold(0.0, f32::max)
@@ -138,7 +138,7 @@ pub fn with_usable_footprint(
     let stray_m = required_distances(simulation, 0.0, vehicles).margin_m;
     let lower_m = vehicles
         .iter()
-        .map(|v| max_height_error_m(simulation.estimator, v.personality))
+        .map(|v| max_height_error_m(simulation.estimator, v.autopilot))
         .fold(0.0, f32::max);
     let share = (1.0 - lower_m / height_m).max(0.0);
     let fastest_mps = vehicles.iter().map(|vehicle| vehicle.speed_max_mps).fold(0.0, f32::max);
@@ -159,7 +159,7 @@ pub fn parked_separation_m(
     vehicles: &[VehicleSection],
 ) -> f32 {
     let estimates =
-        vehicles.iter().map(|v| max_estimate_error_m(simulation.estimator, v.personality));
+        vehicles.iter().map(|v| max_estimate_error_m(simulation.estimator, v.autopilot));
     safety_distance_m
         + PARKED_DEVIATION_M
         + DEVIATION_PER_GUST_S * simulation.gust_mps

@@ -377,7 +377,7 @@ impl<'a> SimulationRun<'a> {
         // subtracted.
         let error_m = margins::max_estimate_error_m(
             scenario.simulation.estimator,
-            scenario.vehicles[i].personality,
+            scenario.vehicles[i].autopilot,
         );
         let nearest_goal_m = self.nearest_goal_m[i] - error_m;
         let flown_m = self.referee.flown_m(i);

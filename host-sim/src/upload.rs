@@ -58,7 +58,7 @@ struct PendingWrite {
     repeated: bool,
 }
 
-struct Answer {
+struct FtpReply {
     sequence: u16,
     session: u8,
     yes: bool,
@@ -174,14 +174,14 @@ impl FtpClient {
         self.send(&out[..length])
     }
 
-    fn receive_answers(&mut self) -> anyhow::Result<Vec<Answer>> {
+    fn receive_answers(&mut self) -> anyhow::Result<Vec<FtpReply>> {
         let (us, frames) = ((self.own_system, COMPONENT_ID), self.receive_frames()?);
         let for_us = frames
             .iter()
             .map(Frame::padded_payload)
             .zip(&frames)
             .filter(|(p, frame)| frame.message_id == MESSAGE_ID && (p[1], p[2]) == us);
-        let read = |p: &[u8; 255]| Answer {
+        let read = |p: &[u8; 255]| FtpReply {
             sequence: u16::from_le_bytes([p[3], p[4]]),
             session: p[5],
             yes: p[6] == ACK,
@@ -192,7 +192,7 @@ impl FtpClient {
     }
 
     /// Sends a request, again and again until it is answered; returns the answer if it is an ACK.
-    fn request_until_answered(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<Answer> {
+    fn request_until_answered(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<FtpReply> {
         let request = self.request_payload(opcode, 0, data);
         let began = self.link.now();
         let mut asked_at = began;
@@ -203,7 +203,7 @@ impl FtpClient {
                 asked_at = self.link.now();
             }
             let sequence = self.sequence;
-            let mine = |a: &Answer| a.sequence == sequence && a.request_opcode == opcode;
+            let mine = |a: &FtpReply| a.sequence == sequence && a.request_opcode == opcode;
             if let Some(answer) = self.receive_answers()?.into_iter().find(mine) {
                 if !answer.yes {
                     bail!("{}", nak_reason(&answer.data));

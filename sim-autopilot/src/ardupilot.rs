@@ -32,6 +32,7 @@ use self::params::CopterTuning;
 use self::reference::CopterReference;
 use self::setpoint::GuidedGoal;
 use super::command::{Arming, CommandOutcome};
+use super::msg::SET_POSITION_TARGET_LOCAL_NED;
 use super::params::Params;
 use super::platform::{ControlDemand, IntegralAction, Platform, SensorReadings};
 use super::port::Sender;
@@ -109,7 +110,7 @@ struct TakeOff {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum ReturnLeg {
+enum RtlLeg {
     Climb { up: f32 },
     Cross { up: f32 },
     Wait { since_us: u64, up: f32 },
@@ -152,7 +153,7 @@ pub struct Copter {
     goal_us: u64,
     reference: CopterReference,
     speed: Option<f32>,
-    leg: ReturnLeg,
+    leg: RtlLeg,
     auto: Auto,
 }
 
@@ -180,7 +181,7 @@ impl Copter {
             goal_us: 0,
             reference: CopterReference::new(Point::zeros(), Point::zeros()),
             speed: None,
-            leg: ReturnLeg::Land,
+            leg: RtlLeg::Land,
             auto: Auto::default(),
         }
     }
@@ -233,7 +234,7 @@ impl Copter {
                 _ if self.takeoff.is_some() => 3,
                 CopterMode::Land => 4,
                 CopterMode::Auto if self.is_landing_in_auto() => 4,
-                CopterMode::Rtl if self.leg == ReturnLeg::Land => 4,
+                CopterMode::Rtl if self.leg == RtlLeg::Land => 4,
                 _ => 2,
             },
             guided: self.mode == CopterMode::Guided,
@@ -253,12 +254,12 @@ impl Copter {
         now_us as f32 >= ORIGIN_SHARE * self.ready_us as f32
     }
 
-    /// Handles a setpoint message (`id` 84 or 86); ignored outside Guided.
+    /// Handles a setpoint message of type `id`; ignored outside Guided.
     pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &PayloadReader<'_>) {
         if self.mode != CopterMode::Guided {
             return;
         }
-        let goal = if id == 84 {
+        let goal = if id == SET_POSITION_TARGET_LOCAL_NED {
             setpoint::read_local_ned(fields, platform)
         } else {
             setpoint::read_global_int(fields, platform)
@@ -313,7 +314,7 @@ impl Copter {
         self.mode = mode;
         self.takeoff = None;
         self.goal = GuidedGoal::STOP;
-        self.leg = ReturnLeg::Climb { up: f32::NAN };
+        self.leg = RtlLeg::Climb { up: f32::NAN };
     }
 
     /// Starts a take-off (NAV_TAKEOFF) to height `up` (mission frame). Refused if not possible.

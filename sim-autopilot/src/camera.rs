@@ -92,11 +92,11 @@ impl CameraTrigger {
     /// announces it. `estimate` is the estimated position, `None` without one.
     pub(super) fn update(
         &mut self,
-        personality: SimulatedKind,
+        autopilot: SimulatedKind,
         truth: Photo,
         estimate: Option<Point>,
     ) -> Option<u32> {
-        let px4 = personality == SimulatedKind::Px4;
+        let px4 = autopilot == SimulatedKind::Px4;
         let looks = truth.time_us >= self.next_poll_us;
         if looks {
             self.next_poll_us += TRIGGER_CHECK_EVERY_US[usize::from(!px4)];

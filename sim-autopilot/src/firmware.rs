@@ -36,8 +36,8 @@ impl Firmware {
     }
 
     /// Default telemetry streams: message id and interval in µs; 0: off until requested.
-    pub(super) fn streams(personality: SimulatedKind) -> &'static [(u32, u32)] {
-        match personality {
+    pub(super) fn streams(autopilot: SimulatedKind) -> &'static [(u32, u32)] {
+        match autopilot {
             SimulatedKind::Px4 => &telemetry::PX4_STREAMS,
             SimulatedKind::Ardupilot => &ardupilot::STREAMS,
         }

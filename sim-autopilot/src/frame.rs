@@ -112,7 +112,7 @@ pub fn write_raw(
 }
 
 /// Result of parsing the start of the buffer.
-enum ParseStatus {
+enum ParsedFront {
     /// An incomplete frame.
     Partial,
     /// No frame begins here.
@@ -141,13 +141,13 @@ impl PortFramer {
             self.drop_first(noise.unwrap_or(self.bytes.len()));
             let first_us = *self.came_us.first()?;
             match parse_front(&self.bytes) {
-                ParseStatus::Whole(total) => {
+                ParsedFront::Whole(total) => {
                     let frame = CheckedFrame::from_bytes(&self.bytes[..total]);
                     self.drop_first(total);
                     return Some(frame);
                 }
-                ParseStatus::Partial if now_us <= first_us + PARTIAL_LIFETIME_US => return None,
-                ParseStatus::Partial | ParseStatus::Noise => self.drop_first(1),
+                ParsedFront::Partial if now_us <= first_us + PARTIAL_LIFETIME_US => return None,
+                ParsedFront::Partial | ParsedFront::Noise => self.drop_first(1),
             }
         }
     }
@@ -158,21 +158,21 @@ impl PortFramer {
     }
 }
 
-fn parse_front(bytes: &[u8]) -> ParseStatus {
+fn parse_front(bytes: &[u8]) -> ParsedFront {
     let header = header_len(bytes);
     if header == V2_HEADER && bytes.get(2).is_some_and(|flags| flags & !FLAG_SIGNED != 0) {
-        return ParseStatus::Noise;
+        return ParsedFront::Noise;
     }
     if bytes.len() < header {
-        return ParseStatus::Partial;
+        return ParsedFront::Partial;
     }
-    let Some(seed) = crc_extra(message_id(bytes)) else { return ParseStatus::Noise };
+    let Some(seed) = crc_extra(message_id(bytes)) else { return ParsedFront::Noise };
     let end = header + usize::from(bytes[1]);
-    let Some(&[low, high]) = bytes.get(end..end + 2) else { return ParseStatus::Partial };
+    let Some(&[low, high]) = bytes.get(end..end + 2) else { return ParsedFront::Partial };
     if calculate_crc(&bytes[1..end], seed) == u16::from_le_bytes([low, high]) {
-        ParseStatus::Whole(end + 2)
+        ParsedFront::Whole(end + 2)
     } else {
-        ParseStatus::Noise
+        ParsedFront::Noise
     }
 }
 

@@ -34,7 +34,7 @@ impl Autopilot {
                     from.system,
                     from.component,
                 );
-                platform.ports[port].send_raw(4, &answer);
+                platform.ports[port].send_raw(msg::PING, &answer);
             }
             msg::SET_MODE if fields.u8(4) == system_id => {
                 firmware.handle_set_mode(platform, from, &fields);
@@ -130,6 +130,6 @@ impl Autopilot {
         payload[6..8].copy_from_slice(&reported.to_le_bytes());
         payload[8..8 + name.len()].copy_from_slice(name.as_bytes());
         payload[24] = value.wire_type();
-        self.platform.ports[port].send_raw(22, &payload);
+        self.platform.ports[port].send_raw(msg::PARAM_VALUE, &payload);
     }
 }

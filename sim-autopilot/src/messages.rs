@@ -3,6 +3,7 @@
 use mavlink::dialects::ardupilotmega as dialect;
 use planner_core::geo::frames::Geodetic;
 
+use super::msg::HEARTBEAT;
 use super::port::Port;
 use super::snapshot::Snapshot;
 use super::vehicle::GRAVITY;
@@ -69,7 +70,10 @@ impl Snapshot {
         // Encoded by hand: MAV_TYPE_QUADROTOR 2, MAV_AUTOPILOT_PX4 12 or _ARDUPILOTMEGA 3, protocol
         // version 3.
         let autopilot = if self.is_px4() { 12 } else { 3 };
-        port.send_raw(0, &[a, b, c, d, 2, autopilot, status.flags, status.system_status, 3]);
+        port.send_raw(
+            HEARTBEAT,
+            &[a, b, c, d, 2, autopilot, status.flags, status.system_status, 3],
+        );
     }
 
     pub(super) fn send_sys_status(&self, port: &mut Port) {

@@ -55,6 +55,7 @@ pub const VIBRATION: u32 = 241;
 pub const HOME_POSITION: u32 = 242;
 pub const MESSAGE_INTERVAL: u32 = 244;
 pub const EXTENDED_SYS_STATE: u32 = 245;
+pub const STATUSTEXT: u32 = 253;
 pub const CAMERA_IMAGE_CAPTURED: u32 = 263;
 pub const PROTOCOL_VERSION: u32 = 300;
 pub const ODOMETRY: u32 = 331;

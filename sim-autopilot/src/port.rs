@@ -4,6 +4,7 @@
 use mavlink::MessageData;
 
 use super::frame::{self, CheckedFrame, MAX_FRAME_LEN, PortFramer};
+use super::msg::{COMMAND_ACK, STATUSTEXT};
 
 /// Component id of an autopilot (MAV_COMP_ID_AUTOPILOT1).
 pub const AUTOPILOT_COMPONENT: u8 = 1;
@@ -203,7 +204,7 @@ impl Port {
     /// Queues a COMMAND_ACK; the command may be unknown to the crate.
     pub fn send_ack(&mut self, ack: PendingAck) {
         let [low, high] = ack.command.to_le_bytes();
-        self.send_raw(77, &[low, high, ack.result, 0, 0, 0, 0, 0, ack.to.0, ack.to.1]);
+        self.send_raw(COMMAND_ACK, &[low, high, ack.result, 0, 0, 0, 0, 0, ack.to.0, ack.to.1]);
     }
 
     /// Queues a STATUSTEXT, cut to 50 bytes.
@@ -212,7 +213,7 @@ impl Port {
         payload[0] = severity;
         let len = text.len().min(50);
         payload[1..=len].copy_from_slice(&text.as_bytes()[..len]);
-        self.send_raw(253, &payload);
+        self.send_raw(STATUSTEXT, &payload);
     }
 
     /// Queues the COMMAND_ACKs that are due.

@@ -69,7 +69,7 @@ impl Snapshot {
             msg::PING => {
                 port.pings = port.pings.wrapping_add(1);
                 let seq = port.pings;
-                port.send_raw(4, &ping_payload(self.time_us, seq, 0, 0));
+                port.send_raw(msg::PING, &ping_payload(self.time_us, seq, 0, 0));
             }
             msg::LINK_NODE_STATUS
             | msg::TIME_ESTIMATE_TO_TARGET
@@ -80,7 +80,7 @@ impl Snapshot {
                 let (current, total) = self.mission;
                 let [[a, b], [c, d]] =
                     [current.min(total.saturating_sub(1)), total].map(u16::to_le_bytes);
-                port.send_raw(42, &[a, b, c, d, 0, 0]);
+                port.send_raw(msg::MISSION_CURRENT, &[a, b, c, d, 0, 0]);
             }
             msg::TIMESYNC => {
                 port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 });
@@ -90,7 +90,7 @@ impl Snapshot {
                 // Two bytes: vtol_state undefined (PX4) or multicopter (ArduCopter), then
                 // landed_state.
                 let vtol = if self.is_px4() { 0 } else { 3 };
-                port.send_raw(245, &[vtol, self.status.landed_state]);
+                port.send_raw(msg::EXTENDED_SYS_STATE, &[vtol, self.status.landed_state]);
             }
             msg::PROTOCOL_VERSION => {
                 // Version 2.00, at least 1.00, at most 2.00; no hashes.
@@ -104,7 +104,7 @@ impl Snapshot {
                 let mut payload = [0; 9];
                 payload[..4].copy_from_slice(&self.status.custom_mode.to_le_bytes());
                 payload[4..8].copy_from_slice(&self.status.intended_mode.to_le_bytes());
-                port.send_raw(436, &payload);
+                port.send_raw(msg::CURRENT_MODE, &payload);
             }
             _ => return false,
         }

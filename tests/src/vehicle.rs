@@ -356,7 +356,7 @@ fn config(mission: &PreparedMission) -> AutopilotConfig {
     let start: Point = geodetic_to_enu(&origin, &pad);
     AutopilotConfig {
         system_id: vehicle.id,
-        autopilot: simulated_kind(vehicle.personality),
+        autopilot: simulated_kind(vehicle.autopilot),
         world_origin: origin,
         ekf_origin: pad,
         start,

@@ -94,7 +94,7 @@ const PADS: [&str; 2] = ["47.3977,8.5463", "47.3981,8.5463"];
 
 /// Plans the polygon of QGroundControl's sample survey for some vehicles, as `cover` does; `None`
 /// where the sample is not there.
-fn survey(personality: &str, vehicles: usize, camera: &str, out: &Path) -> Option<()> {
+fn survey(autopilot: &str, vehicles: usize, camera: &str, out: &Path) -> Option<()> {
     let sample = shared_data("plans/qgroundcontrol_sample_with_survey.plan")?;
     let mut scenario = format!(
         "[area]\nfile = {sample:?}\nheight_m = 8.0\nlayer_m = 2.0\n{camera}\n[mission]\ncruise_mps = 10.0\n"
@@ -102,7 +102,7 @@ fn survey(personality: &str, vehicles: usize, camera: &str, out: &Path) -> Optio
     for (k, pad) in PADS[..vehicles].iter().enumerate() {
         let (latitude, longitude) = pad.split_once(',').expect("two numbers");
         scenario += &format!(
-            "[[vehicles]]\nid = {}\nspeed_max_mps = 10.0\npersonality = \"{personality}\"\n\
+            "[[vehicles]]\nid = {}\nspeed_max_mps = 10.0\npersonality = \"{autopilot}\"\n\
              start = {{ lat_deg = {latitude}, lon_deg = {longitude}, alt_m = 0.0 }}\n",
             k + 1
         );
@@ -116,37 +116,37 @@ fn survey(personality: &str, vehicles: usize, camera: &str, out: &Path) -> Optio
 
 /// MAVSDK and pymavlink read the plan that `cover` wrote; MAVSDK starts its flight, and pymavlink
 /// counts the pictures on a second link.
-fn vehicle_flies(python: &str, out: &Path, vehicle: usize, personality: &str, trigger: &str) {
+fn vehicle_flies(python: &str, out: &Path, vehicle: usize, autopilot_kind: &str, trigger: &str) {
     let address = format!("127.0.0.1:{}", free_port());
     let (id, home) = (vehicle.to_string(), format!("{},488", PADS[vehicle - 1]));
     let mut options = vec!["--home", &home, "--sysid", &id];
-    if personality == "ardupilot" {
+    if autopilot_kind == "ardupilot" {
         options.extend(ARDUPILOT);
     }
     let (_autopilot, at) =
         autopilot(&[&format!("udp:{address}"), "udp-listen:127.0.0.1:0"], &options);
     let urls = [format!("udpin://{address}"), format!("udpout:{}", at[1])];
     let folder = out.display().to_string();
-    run(python, "plan_flight.py", &[&urls[0], &urls[1], &folder, &id, personality, trigger]);
+    run(python, "plan_flight.py", &[&urls[0], &urls[1], &folder, &id, autopilot_kind, trigger]);
 }
 
 /// Flies one vehicle that takes a picture at each waypoint and, at the same time, two that trigger
 /// by distance.
-fn plans_fly(personality: &str) {
+fn plans_fly(autopilot: &str) {
     let Some(python) = python() else { return };
     let (alone, fleet) =
         (tempfile::tempdir().expect("a directory"), tempfile::tempdir().expect("a directory"));
     let by_waypoint = "lane_m = 25.0\nwaypoint_m = 20.0\ntrigger = \"waypoint\"";
-    let Some(()) = survey(personality, 1, by_waypoint, alone.path()) else { return };
+    let Some(()) = survey(autopilot, 1, by_waypoint, alone.path()) else { return };
     // Without a trigger in the scenario pictures are triggered by distance.
-    let Some(()) = survey(personality, 2, "lane_m = 13.0\nwaypoint_m = 9.0", fleet.path()) else {
+    let Some(()) = survey(autopilot, 2, "lane_m = 13.0\nwaypoint_m = 9.0", fleet.path()) else {
         return;
     };
     std::thread::scope(|scope| {
-        scope.spawn(|| vehicle_flies(&python, alone.path(), 1, personality, "waypoint"));
+        scope.spawn(|| vehicle_flies(&python, alone.path(), 1, autopilot, "waypoint"));
         for vehicle in [1, 2] {
             let (python, fleet) = (&python, fleet.path());
-            scope.spawn(move || vehicle_flies(python, fleet, vehicle, personality, "distance"));
+            scope.spawn(move || vehicle_flies(python, fleet, vehicle, autopilot, "distance"));
         }
     });
 }

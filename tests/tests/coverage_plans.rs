@@ -26,13 +26,13 @@ const LATE_M: f32 = 0.05 * CRUISE_MPS;
 /// comes up to one step of 4 ms later. There are no gusts or estimate errors here.
 const GAP_M: f32 = LATE_M + 0.05;
 
-fn scenario(personality: &str, trigger: &str) -> String {
+fn scenario(autopilot: &str, trigger: &str) -> String {
     format!(
         "[area]\npolygon = [[0, 0], [70, 0], [70, 20], [40, 45], [0, 45]]\nheight_m = 20.0\nlane_m = 9.0\n\
          waypoint_m = 8.0\ntrigger = \"{trigger}\"\nno_fly = [[[20, 15], [30, 15], [30, 25], [20, 25]]]\n\
          [mission]\ncruise_mps = {CRUISE_MPS}\n[[vehicles]]\nid = 1\nstart = [-10, -10, 0.3]\n\
-         personality = \"{personality}\"\n[[vehicles]]\nid = 2\nstart = [80, -10, 0.3]\n\
-         personality = \"{personality}\"\n"
+         personality = \"{autopilot}\"\n[[vehicles]]\nid = 2\nstart = [80, -10, 0.3]\n\
+         personality = \"{autopilot}\"\n"
     )
 }
 
@@ -121,21 +121,20 @@ fn fly(
     planned: &CoveragePlan<'_>,
     points: &[FlightPoint],
     items: &[ExportedItem],
-    personality: SimulatedKind,
+    autopilot: SimulatedKind,
 ) -> Vec<Photo> {
     let origin = planned.area_settings.origin;
     let start = points[0].position;
     let config = AutopilotConfig {
-        autopilot: personality,
+        autopilot,
         world_origin: origin,
         ekf_origin: origin,
         start,
         estimator_ready_s: 2.0,
         ..AutopilotConfig::default()
     };
-    let autopilot = Autopilot::new(&config).expect("a sound configuration");
     let mut client = Client {
-        autopilot,
+        autopilot: Autopilot::new(&config).expect("a sound configuration"),
         framer: Framer::new(),
         acks: Vec::new(),
         reached: Vec::new(),
@@ -145,14 +144,14 @@ fn fly(
     // The delay item is left out, as it serves the swarm; ArduPilot's item 0 is home.
     let mut items: Vec<ExportedItem> =
         items.iter().filter(|item| item.command != 93).cloned().collect();
-    if personality == SimulatedKind::Ardupilot {
+    if autopilot == SimulatedKind::Ardupilot {
         items.insert(
             0,
             ExportedItem { command: 16, frame: 0, params: [Some(0.0); 4], place: [0.0; 3] },
         );
     }
     client.upload(&items);
-    if personality == SimulatedKind::Ardupilot {
+    if autopilot == SimulatedKind::Ardupilot {
         client.command(176, 1.0, 4.0);
         client.command(400, 1.0, 0.0);
     }
@@ -171,9 +170,9 @@ fn fly(
     client.run(0.1);
     let off =
         (client.autopilot.true_state().position - points[points.len() - 1].position).xy().norm();
-    assert!(off < 1.0, "{personality:?} came home {off} m off");
+    assert!(off < 1.0, "{autopilot:?} came home {off} m off");
     let all: Vec<u16> =
-        (u16::from(personality == SimulatedKind::Ardupilot)..items.len() as u16).collect();
+        (u16::from(autopilot == SimulatedKind::Ardupilot)..items.len() as u16).collect();
     assert_eq!(client.reached, all, "each item is reported once");
     let photos = client.autopilot.take_photos();
     assert_eq!(client.announced, photos.len(), "each picture is announced");
@@ -213,19 +212,19 @@ fn judge_gaps(photos: &[Photo], wanted: &[&FlightPoint], label: &str) {
 }
 
 /// Flies the plans of a scenario, and judges their pictures.
-fn judge(text: &str, personality: SimulatedKind, trigger: &str) {
+fn judge(text: &str, autopilot: SimulatedKind, trigger: &str) {
     let scenario = scenario::parse(text, "plans").expect("a scenario");
     let planned = CoveragePlan::new(&scenario, CoverageMethod::Binpat).expect("a plan");
     let flights = planned.flights();
     assert_eq!(flights.len(), 2);
     for (sortie, points, _) in &flights {
         let items = export::flight_items(&planned, sortie, points);
-        let photos = fly(&planned, points, &items, personality);
+        let photos = fly(&planned, points, &items, autopilot);
         let wanted: Vec<&FlightPoint> =
             points.iter().filter(|s| matches!(s.action, WaypointAction::Photo(_))).collect();
         assert!(wanted.len() > 10);
         let lanes = 1 + wanted.windows(2).filter(|pair| pair[0].lane != pair[1].lane).count();
-        let label = format!("{personality:?}, {trigger}: {} of {}", photos.len(), wanted.len());
+        let label = format!("{autopilot:?}, {trigger}: {} of {}", photos.len(), wanted.len());
         match trigger {
             "waypoint" => {
                 assert_eq!(photos.len(), wanted.len(), "{label}");
@@ -256,7 +255,7 @@ fn judge(text: &str, personality: SimulatedKind, trigger: &str) {
             }
             _ => assert_eq!(photos.len(), 0, "{label}"),
         }
-        if personality == SimulatedKind::Px4 && trigger == "waypoint" {
+        if autopilot == SimulatedKind::Px4 && trigger == "waypoint" {
             // With the heading of the sweep all pictures look the same way, within the error for
             // which PX4 waits.
             let turned =
@@ -271,9 +270,9 @@ const ALL: [(&str, SimulatedKind); 2] =
 
 #[test]
 fn each_plan_is_flown_and_photographs_what_was_planned() {
-    for (name, personality) in ALL {
+    for (name, autopilot) in ALL {
         for trigger in ["waypoint", "distance", "none"] {
-            judge(&scenario(name, trigger), personality, trigger);
+            judge(&scenario(name, trigger), autopilot, trigger);
         }
     }
 }
@@ -298,10 +297,10 @@ fn plans_above_terrain_are_flown_as_planned() {
     let origin = "origin = { lat_deg = 47.0, lon_deg = 8.0, alt_m = 399.55 }";
     let file = file.display();
     let terrain = format!("{origin}\nterrain = \"{file}\"\nterrain_tolerance_m = 1.0\nheight_m");
-    for (name, personality) in ALL {
+    for (name, autopilot) in ALL {
         for trigger in ["waypoint", "distance", "none"] {
             let text = scenario(name, trigger).replace("height_m", &terrain);
-            judge(&text, personality, trigger);
+            judge(&text, autopilot, trigger);
             let found = scenario::parse(&text, "plans").expect("a scenario");
             let planned = CoveragePlan::new(&found, CoverageMethod::Binpat).expect("a plan");
             let flights = planned.flights();
@@ -321,7 +320,7 @@ fn plans_above_terrain_are_flown_as_planned() {
 /// the ends of lanes within 2 m, and ArduPilot turns while it flies on.
 #[test]
 fn plans_flown_without_a_companion_photograph_the_whole_area() {
-    for (name, personality) in ALL {
+    for (name, autopilot) in ALL {
         for trigger in ["waypoint", "distance"] {
             let camera = "camera = { fov_deg = 73.7, aspect = 1.5 }";
             let text = scenario(name, trigger).replace("lane_m = 9.0\nwaypoint_m = 8.0", camera);
@@ -331,7 +330,7 @@ fn plans_flown_without_a_companion_photograph_the_whole_area() {
             let mut pictures = Vec::new();
             for (sortie, points, _) in &planned.flights() {
                 let items = export::flight_items(&planned, sortie, points);
-                pictures.extend(fly(&planned, points, &items, personality).iter().map(|photo| {
+                pictures.extend(fly(&planned, points, &items, autopilot).iter().map(|photo| {
                     Picture {
                         vehicle: None,
                         t_s: photo.time_us as f32 * 1e-6,
@@ -344,7 +343,7 @@ fn plans_flown_without_a_companion_photograph_the_whole_area() {
             assert_eq!(
                 (found.covered_share, found.first_missing_cell),
                 (1.0, None),
-                "{personality:?}, {trigger}"
+                "{autopilot:?}, {trigger}"
             );
         }
     }

@@ -31,9 +31,9 @@ struct Pair {
 }
 
 impl Pair {
-    fn new(personality: SimulatedKind) -> Self {
+    fn new(autopilot: SimulatedKind) -> Self {
         let config = sim_autopilot::AutopilotConfig {
-            autopilot: personality,
+            autopilot,
             estimator_ready_s: READY_S,
             ..sim_autopilot::AutopilotConfig::default()
         };
@@ -53,8 +53,8 @@ impl Pair {
     }
 
     /// A pair in flight, in the middle of its path.
-    fn following(personality: SimulatedKind) -> Self {
-        let mut pair = Self::new(personality);
+    fn following(autopilot: SimulatedKind) -> Self {
+        let mut pair = Self::new(autopilot);
         pair.until(State::Ready);
         pair.command(191, 300, [0.0; 2]);
         pair.until(State::Follow);
@@ -352,12 +352,12 @@ fn arducopters_ground_station_failsafe_ends_the_mission() {
 
 #[test]
 fn an_autopilot_that_reboots_on_the_ground_is_asked_for_its_streams_again() {
-    for personality in [SimulatedKind::Px4, SimulatedKind::Ardupilot] {
-        let mut pair = Pair::new(personality);
+    for autopilot in [SimulatedKind::Px4, SimulatedKind::Ardupilot] {
+        let mut pair = Pair::new(autopilot);
         pair.until(State::Ready);
         pair.autopilot.reboot();
         pair.run(20.0);
-        assert_eq!(pair.companion.state(), State::Ready, "{personality:?}");
+        assert_eq!(pair.companion.state(), State::Ready, "{autopilot:?}");
         pair.command(191, 300, [0.0; 2]);
         pair.until(State::Done);
         pair.assert_at_goal();

@@ -127,9 +127,9 @@ struct Victims {
 
 impl Victims {
     fn new() -> Self {
-        let autopilot = |personality| {
+        let autopilot = |autopilot| {
             let config = sim_autopilot::AutopilotConfig {
-                autopilot: personality,
+                autopilot,
                 ..sim_autopilot::AutopilotConfig::default()
             };
             Autopilot::new(&config).unwrap()

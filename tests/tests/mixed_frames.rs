@@ -73,9 +73,9 @@ fn scenario_text(rng: &mut Pcg32) -> String {
     for (lane, id) in lanes.iter().zip(ids) {
         let start = by_degrees(Point::new(10.0 + shift(rng), lane + shift(rng), 1.5));
         let (ekf_origin, home) = (around(rng, &origin, 2000.0), around(rng, &origin, 1000.0));
-        let personality = if rng.next_u32().is_multiple_of(2) { "px4" } else { "ardupilot" };
+        let autopilot = if rng.next_u32().is_multiple_of(2) { "px4" } else { "ardupilot" };
         text += &format!(
-            "[[vehicles]]\nid = {id}\nstart = {start}\npersonality = '{personality}'\nekf_origin = {}\nhome = {}\n",
+            "[[vehicles]]\nid = {id}\nstart = {start}\npersonality = '{autopilot}'\nekf_origin = {}\nhome = {}\n",
             toml(&ekf_origin),
             toml(&home)
         );

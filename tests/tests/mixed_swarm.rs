@@ -12,7 +12,7 @@ const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
 fn half_the_demo_by_ardupilot_is_complete_and_clean() {
     let mut scenario = scenario::parse(DEMO, "demo.toml").unwrap();
     for vehicle in scenario.vehicles.iter_mut().filter(|vehicle| vehicle.id % 2 == 0) {
-        vehicle.personality = AutopilotKind::ArduPilot;
+        vehicle.autopilot = AutopilotKind::ArduPilot;
     }
     let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).unwrap();
     let plan = mission.plan().unwrap();

@@ -6,7 +6,7 @@ use cortex_m::peripheral::MPU;
 
 use super::limits::GUARD_LEN;
 use super::stack;
-use crate::chips::mpu::{Access, Region};
+use crate::chips::mpu::{Region, RegionAccess};
 
 /// Value of MPU_CTRL: unit enabled; PRIVDEFENA: addresses outside all regions have the default
 /// memory map; HFNMIENA clear: the unit is off in hard fault handlers, whose stack may reach into
@@ -15,7 +15,7 @@ const MPU_CTRL_ENABLE: u32 = 1 << 2 | 1;
 
 /// The guard below the stack: an access to it is a fault.
 pub(super) fn stack_guard_region() -> Region {
-    Region::new(stack::guard().start, GUARD_LEN, Access::None)
+    Region::new(stack::guard().start, GUARD_LEN, RegionAccess::None)
 }
 
 /// Sets regions 0, 1, …; where two overlap the higher number applies. Then enables the unit. To be

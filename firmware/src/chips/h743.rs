@@ -2,7 +2,7 @@
 //! (errata).
 
 use super::ResetCause;
-use super::mpu::{Access, Region};
+use super::mpu::{Region, RegionAccess};
 
 /// Frequency of the external clock at OSC_IN of the NUCLEO-H743ZI: MCO output of the on-board
 /// ST-LINK (UM1974, "OSC clock"), MHz.
@@ -99,23 +99,24 @@ pub const fn brown_out_level(optsr: u32) -> u8 {
 }
 
 /// SRAM3, which the UARTs' DMA reads and writes: not cached.
-pub const DMA: Region = Region::new(0x3004_0000, 32 << 10, Access::Uncached);
+pub const DMA: Region = Region::new(0x3004_0000, 32 << 10, RegionAccess::Uncached);
 /// Bank 2 of the flash: not cached, because it is programmed at run time and torn words may be
 /// unreadable.
-pub const BANK2: Region = Region::new(0x0810_0000, 1 << 20, Access::Uncached);
+pub const BANK2: Region = Region::new(0x0810_0000, 1 << 20, RegionAccess::Uncached);
 /// The first 256 bytes of the address space (ITCM): no access, so null pointers fault.
-pub const NULL: Region = Region::new(0, 256, Access::None);
+pub const NULL: Region = Region::new(0, 256, RegionAccess::None);
 /// Address range of external memory, 0x6000_0000 to 0xDFFF_FFFF, four eighths of the address space:
 /// no access, else the processor might read speculatively from memory controllers that are off.
 pub const EXTERNAL: Region =
-    Region { base: 0, len_log2: 32, access: Access::None, disabled_eighths: 0b1000_0111 };
+    Region { base: 0, len_log2: 32, access: RegionAccess::None, disabled_eighths: 0b1000_0111 };
 
 /// The sectors of bank 2 that hold a roadmap of `len` bytes at offset `at` of the bank: cached,
 /// read only. An eighth of the bank is one sector of 128 kB, so SRD bits disable the other sectors.
 pub const fn roadmap_region(at: u32, len: u32) -> Region {
     const SECTOR: u32 = 128 << 10;
     let (first, end) = (at / SECTOR, (at + len).div_ceil(SECTOR));
-    let mut region = Region { access: Access::CachedReadOnly, disabled_eighths: 0xFF, ..BANK2 };
+    let mut region =
+        Region { access: RegionAccess::CachedReadOnly, disabled_eighths: 0xFF, ..BANK2 };
     let mut sector = first;
     while sector < end && sector < 8 {
         region.disabled_eighths &= !(1 << sector);

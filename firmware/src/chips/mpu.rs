@@ -3,7 +3,7 @@
 
 /// How code may access a region, and whether its data are cached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
+pub enum RegionAccess {
     /// Every access is a fault, and the processor does no speculative reads.
     None,
     /// Read and write, not cached: data that DMA also writes, or flash words that may be
@@ -21,7 +21,7 @@ pub struct Region {
     /// Binary logarithm of the length in bytes.
     pub len_log2: u32,
     /// Access that the region allows.
-    pub access: Access,
+    pub access: RegionAccess,
     /// SRD bits: a set bit disables the region in that eighth of it. Only for regions of 256 bytes
     /// or more.
     pub disabled_eighths: u8,
@@ -32,7 +32,7 @@ impl Region {
     ///
     /// # Panics
     /// `len` is no power of two of at least 32, or `base` is no multiple of `len`.
-    pub const fn new(base: u32, len: u32, access: Access) -> Self {
+    pub const fn new(base: u32, len: u32, access: RegionAccess) -> Self {
         assert!(
             len.is_power_of_two() && len >= 32,
             "a region's length is a power of two from 32 on"
@@ -53,12 +53,12 @@ impl Region {
         const ENABLE: u32 = 1;
         let attributes = match self.access {
             // AP 0b000: no access; strongly ordered memory, so no speculative reads.
-            Access::None => 0,
+            RegionAccess::None => 0,
             // AP 0b011: read and write; TEX 0b001, C 0, B 0: normal memory, not cached; S: shared
             // with DMA.
-            Access::Uncached => 0b011 << 24 | 0b001 << 19 | 1 << 18,
+            RegionAccess::Uncached => 0b011 << 24 | 0b001 << 19 | 1 << 18,
             // AP 0b110: read only; TEX 0b000, C 1, B 0: normal memory, write-through cache.
-            Access::CachedReadOnly => 0b110 << 24 | 1 << 17,
+            RegionAccess::CachedReadOnly => 0b110 << 24 | 1 << 17,
         };
         XN | attributes | (self.disabled_eighths as u32) << 8 | (self.len_log2 - 1) << 1 | ENABLE
     }

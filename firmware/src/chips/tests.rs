@@ -1,12 +1,12 @@
 //! Values from the manuals, written down by hand.
 
 use super::h743::ClockSource;
-use super::mpu::{Access, Region};
+use super::mpu::{Region, RegionAccess};
 use super::{ResetCause, fault, h743, rp2350};
 
 #[test]
 fn regions_are_as_the_manual_has_them() {
-    let guard = Region::new(0x2000_9000, 4096, Access::None);
+    let guard = Region::new(0x2000_9000, 4096, RegionAccess::None);
     assert_eq!((guard.rbar(7), guard.rasr()), (0x2000_9017, 0x1000_0017));
     // XN, AP 011, TEX 001, S; 2^15 and 2^20 bytes.
     assert_eq!((h743::DMA.rbar(1), h743::DMA.rasr()), (0x3004_0011, 0x130C_001D));

@@ -14,30 +14,32 @@ const CIRCLE_CORNERS: usize = 32;
 const M_PER_DEG: f64 = 111_319.49;
 
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct File {
+#[serde(rename = "File", rename_all = "camelCase")]
+struct PlanFile {
     file_type: String,
     version: u32,
-    mission: Mission,
+    mission: PlanMission,
     #[serde(default)]
-    geo_fence: Fence,
+    geo_fence: PlanGeofence,
 }
 
 #[derive(Deserialize)]
-struct Mission {
+#[serde(rename = "Mission")]
+struct PlanMission {
     #[serde(default)]
-    items: Vec<Item>,
+    items: Vec<PlanItem>,
 }
 
 #[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Item {
+#[serde(rename = "Item", rename_all = "camelCase")]
+struct PlanItem {
     complex_item_type: Option<String>,
     polygon: Option<Vec<[f64; 2]>>,
 }
 
 #[derive(Deserialize, Default)]
-struct Fence {
+#[serde(rename = "Fence")]
+struct PlanGeofence {
     #[serde(default)]
     polygons: Vec<FencePolygon>,
     #[serde(default)]
@@ -64,7 +66,7 @@ struct Circle {
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     const FORMAT: &str = "a plan of QGroundControl";
-    let file: File =
+    let file: PlanFile =
         serde_json::from_str(text).map_err(|error| AreaFileError::malformed(FORMAT, &error))?;
     if file.file_type != "Plan" || file.version != 1 {
         let why = format!(

@@ -36,8 +36,9 @@ pub struct AutopilotArgs {
     #[arg(long, value_name = "URL", required = true)]
     pub listen: Vec<LinkUrl>,
     /// Autopilot to simulate
-    #[arg(long, value_name = "NAME", default_value = "px4", value_parser = autopilot_kind_parser())]
-    pub personality: SimulatedKind,
+    #[arg(long = "personality", value_name = "NAME", default_value = "px4")]
+    #[arg(value_parser = autopilot_kind_parser())]
+    pub autopilot: SimulatedKind,
     /// MAVLink system id
     #[arg(long, value_name = "N", default_value_t = 1)]
     #[arg(value_parser = clap::value_parser!(u8).range(1..))]
@@ -99,7 +100,7 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
     let home = args.home.0;
     let config = AutopilotConfig {
         system_id: args.sysid,
-        autopilot: args.personality,
+        autopilot: args.autopilot,
         world_origin: home,
         ekf_origin: args.origin.map_or(home, |place| place.0),
         start: Point::zeros(),

@@ -196,7 +196,7 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[ExportedItem
         }
         value
     };
-    let firmware = match vehicle.personality {
+    let firmware = match vehicle.autopilot {
         AutopilotKind::Px4 => 12,
         AutopilotKind::ArduPilot => 3,
     };

@@ -51,7 +51,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Octree, MapError> {
     Ok(Octree::from_parts(header.resolution_m, reader.inner))
 }
 
-struct Header {
+struct BtHeader {
     nodes: u64,
     nodes_at: usize,
     resolution_m: f64,
@@ -97,7 +97,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn header(&mut self) -> Result<Header, MapError> {
+    fn header(&mut self) -> Result<BtHeader, MapError> {
         let expected = format!("`{MAGIC}`");
         let (first, at) = self.header_line(&expected)?;
         if !first.starts_with(MAGIC) {
@@ -151,7 +151,7 @@ impl<'a> Reader<'a> {
         }
         match (id, nodes, resolution_m) {
             (true, Some((nodes, nodes_at)), Some(resolution_m)) => {
-                Ok(Header { nodes, nodes_at, resolution_m })
+                Ok(BtHeader { nodes, nodes_at, resolution_m })
             }
             (false, ..) => Err(self.error_at(after_header, "`id OcTree`", "`data`")),
             (_, None, _) => Err(self.error_at(after_header, "`size N`", "`data`")),

@@ -145,7 +145,7 @@ fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     let height_m = pictures_above_ground_m(planned.area_settings);
     for vehicle in &planned.scenario.vehicles {
         let lower_m =
-            margins::max_height_error_m(planned.scenario.simulation.estimator, vehicle.personality);
+            margins::max_height_error_m(planned.scenario.simulation.estimator, vehicle.autopilot);
         let least_m = lower_m + vehicle.radius_m + TRACKING_M;
         if height_m < least_m {
             bail!(

@@ -346,7 +346,7 @@ fn read_vehicle(
         "where its path begins: [east, north, up] in metres, or { lat_deg, lon_deg, alt_m }",
     )?;
     let goal = table.get("goal");
-    let personality = table.one_of(
+    let autopilot = table.one_of(
         "personality",
         AutopilotKind::Px4,
         &[("px4", AutopilotKind::Px4), ("ardupilot", AutopilotKind::ArduPilot)],
@@ -373,7 +373,7 @@ fn read_vehicle(
         speed_max_mps: table.f32("speed_max_mps", 5.0, 0.01..=100.0)?,
         endurance_s: table.optional_f32("endurance_s", 1.0..=1e6)?,
         payload_kg: table.optional_f32("payload_kg", 0.0..=1e4)?,
-        personality,
+        autopilot,
         home: table.get("home").map(|v| read_geodetic(&v)).transpose()?,
         ekf_origin: table.get("ekf_origin").map(|v| read_geodetic(&v)).transpose()?,
         companion,

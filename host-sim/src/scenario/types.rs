@@ -179,7 +179,7 @@ pub struct VehicleSection {
     /// Payload of the vehicle, kg (not supported yet).
     pub payload_kg: Option<f32>,
     /// Autopilot of the vehicle: PX4 or ArduPilot.
-    pub personality: AutopilotKind,
+    pub autopilot: AutopilotKind,
     /// Home of the autopilot; `None`: the place where it arms.
     pub home: Option<Geodetic>,
     /// EKF origin of the autopilot; `None`: the vehicle's pad.

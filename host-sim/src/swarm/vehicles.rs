@@ -78,7 +78,7 @@ fn autopilot_config(
     };
     let mut config = autopilot::AutopilotConfig {
         system_id: vehicle.id,
-        autopilot: simulated_kind(vehicle.personality),
+        autopilot: simulated_kind(vehicle.autopilot),
         world_origin: scenario.map.origin,
         // The EKF origin is where the autopilot was switched on, unless the scenario says
         // otherwise: no two vehicles share it.

@@ -37,7 +37,7 @@ fn parse_coordinate_system(text: &str) -> Result<Crs, TerrainError> {
 }
 
 /// Values of the header, the lines before the heights.
-struct Header {
+struct GridHeader {
     /// Columns and rows.
     size: [usize; 2],
     /// The south-western corner.
@@ -47,7 +47,7 @@ struct Header {
     missing: f64,
 }
 
-impl Header {
+impl GridHeader {
     fn read<'a>(words: &mut Peekable<impl Iterator<Item = &'a str>>) -> Result<Self, TerrainError> {
         let bad = |why: &str| TerrainError::malformed(FORMAT, &why);
         let (mut size, mut corner, mut middle) = ([None; 2], [None; 2], [false; 2]);
@@ -101,7 +101,7 @@ impl Header {
 pub(super) fn parse(text: &str, crs: Crs) -> Result<Raster, TerrainError> {
     let bad = |why: &str| TerrainError::malformed(FORMAT, &why);
     let mut words = text.split_ascii_whitespace().peekable();
-    let Header { size: [columns, rows], low, cell, missing } = Header::read(&mut words)?;
+    let GridHeader { size: [columns, rows], low, cell, missing } = GridHeader::read(&mut words)?;
     let mut heights_m = Vec::with_capacity((columns * rows).min(text.len() / 2 + 1));
     for word in words {
         let value: f64 = word.parse().map_err(|_| bad(&format!("{word} is no height")))?;

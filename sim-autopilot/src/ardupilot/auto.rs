@@ -10,7 +10,7 @@ use planner_core::Point;
 
 use super::auto_state::Auto;
 use super::setpoint::GuidedGoal;
-use super::{Copter, CopterMode, ReturnLeg, TakeOff};
+use super::{Copter, CopterMode, RtlLeg, TakeOff};
 use crate::command::CommandOutcome;
 use crate::itinerary::{LandedState, MissionLeg, interpolate_height};
 use crate::platform::{Platform, SensorReadings};
@@ -46,7 +46,7 @@ impl Copter {
         self.mode == CopterMode::Auto
             && match self.auto.leg {
                 Some(MissionLeg::Land { .. }) => true,
-                Some(MissionLeg::Return) => self.leg == ReturnLeg::Land,
+                Some(MissionLeg::Return) => self.leg == RtlLeg::Land,
                 _ => false,
             }
     }
@@ -89,7 +89,7 @@ impl Copter {
                 _ => None,
             };
             if leg == Some(MissionLeg::Return) {
-                self.leg = ReturnLeg::Climb { up: f32::NAN };
+                self.leg = RtlLeg::Climb { up: f32::NAN };
             }
         }
         self.auto.leg = leg;

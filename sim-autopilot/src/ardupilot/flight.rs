@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::reference::CopterReference;
 use super::setpoint::GuidedGoal;
-use super::{Copter, CopterMode, ReturnLeg, micros_from_s};
+use super::{Copter, CopterMode, RtlLeg, micros_from_s};
 use crate::platform::SensorReadings;
 use crate::shaping::approach_rate;
 use crate::vehicle::Demand;
@@ -124,7 +124,7 @@ impl Copter {
         let home = sensors.home;
         let at = self.reference.position;
         let away = libm::hypotf(home.x - sensors.position.x, home.y - sensors.position.y);
-        if let ReturnLeg::Climb { up } = &mut self.leg
+        if let RtlLeg::Climb { up } = &mut self.leg
             && up.is_nan()
         {
             // Near home the cone `RTL_CONE_SLOPE` limits the climb.
@@ -132,26 +132,26 @@ impl Copter {
             *up = (home.z + height).max(sensors.position.z);
         }
         match self.leg {
-            ReturnLeg::Climb { up } => {
+            RtlLeg::Climb { up } => {
                 if up - sensors.position.z < ARRIVED_M {
-                    self.leg = ReturnLeg::Cross { up };
+                    self.leg = RtlLeg::Cross { up };
                 }
                 GuidedGoal::hold(Point::new(at.x, at.y, up))
             }
-            ReturnLeg::Cross { up } => {
+            RtlLeg::Cross { up } => {
                 if away < ARRIVED_M {
-                    self.leg = ReturnLeg::Wait { since_us: sensors.now_us, up };
+                    self.leg = RtlLeg::Wait { since_us: sensors.now_us, up };
                 }
                 GuidedGoal::hold(Point::new(home.x, home.y, up))
             }
-            ReturnLeg::Wait { since_us, up } => {
+            RtlLeg::Wait { since_us, up } => {
                 if sensors.now_us - since_us >= micros_from_s(self.tuning.return_loiter_s) {
-                    self.leg = ReturnLeg::Land;
+                    self.leg = RtlLeg::Land;
                     self.reference = CopterReference::new(at, self.reference.velocity);
                 }
                 GuidedGoal::hold(Point::new(home.x, home.y, up))
             }
-            ReturnLeg::Land => self.landing_goal(sensors),
+            RtlLeg::Land => self.landing_goal(sensors),
         }
     }
 }

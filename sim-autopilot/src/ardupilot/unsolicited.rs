@@ -2,7 +2,7 @@
 //! home once set, PARAM_VALUE of its runtime.
 
 use super::Copter;
-use crate::msg::{HOME_POSITION, PARAM_VALUE};
+use crate::msg::{HOME_POSITION, PARAM_VALUE, SYS_STATUS};
 use crate::platform::Platform;
 
 /// Period at which ArduCopter updates STAT_RUNTIME and sends it, microseconds.
@@ -14,7 +14,7 @@ impl Copter {
     /// Sends the messages of a boot: a STATUSTEXT and one SYS_STATUS.
     pub fn send_boot_messages(&mut self, platform: &mut Platform) {
         platform.send_text(6, "ArduPilot Ready");
-        platform.send_on_all_ports(1);
+        platform.send_on_all_ports(SYS_STATUS);
     }
 
     /// Sends messages once the estimator gets its origin and its position, and STAT_RUNTIME every

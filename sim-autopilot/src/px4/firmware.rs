@@ -8,7 +8,7 @@ use crate::SimulatedKind;
 use crate::cmd;
 use crate::command::{CommandOutcome, TEMPORARILY_REJECTED};
 use crate::itinerary::{LandedState, MissionLeg};
-use crate::msg::COMMAND_LONG;
+use crate::msg::{COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED};
 use crate::params::Params;
 use crate::platform::{ControlDemand, Platform, SensorReadings};
 use crate::port::Sender;
@@ -130,14 +130,14 @@ impl Px4 {
         }
     }
 
-    /// Handles a setpoint message (`id` 84 or 86); invalid ones are ignored.
+    /// Handles a setpoint message of type `id`; invalid ones are ignored.
     pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &PayloadReader<'_>) {
         let context = setpoint::FrameContext {
             frame: &platform.frame,
             heading: platform.vehicle.state().heading_rad,
             home_alt_m: platform.home.alt_m,
         };
-        let setpoint = if id == 84 {
+        let setpoint = if id == SET_POSITION_TARGET_LOCAL_NED {
             setpoint::read_local_ned(fields, &context)
         } else {
             setpoint::read_global_int(fields, &context)

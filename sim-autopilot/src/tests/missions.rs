@@ -27,9 +27,9 @@ const SURVEY: Plan<'static> = &[
 
 impl Bench {
     fn upload(&mut self, plan: Plan<'_>) {
-        let personality = self.autopilot.platform.config.autopilot;
+        let autopilot = self.autopilot.platform.config.autopilot;
         let home = (16, 0, [0.0; 4], [0.0; 2], 488.0);
-        let home: Plan<'_> = if personality == SimulatedKind::Ardupilot { &[home] } else { &[] };
+        let home: Plan<'_> = if autopilot == SimulatedKind::Ardupilot { &[home] } else { &[] };
         let items: Vec<_> = home.iter().chain(plan).collect();
         let [low, high] = (items.len() as u16).to_le_bytes();
         self.send(44, &[low, high, 1, 1, 0]);
@@ -56,8 +56,8 @@ impl Bench {
     }
 
     /// A bench with an uploaded mission; armed if MISSION_START does not arm (ArduCopter).
-    fn with_mission(personality: SimulatedKind, plan: Plan<'_>) -> Self {
-        let mut bench = match personality {
+    fn with_mission(autopilot: SimulatedKind, plan: Plan<'_>) -> Self {
+        let mut bench = match autopilot {
             SimulatedKind::Px4 => Self::new(),
             SimulatedKind::Ardupilot => Self::armed(),
         };
@@ -80,46 +80,46 @@ const BOTH: [SimulatedKind; 2] = [SimulatedKind::Px4, SimulatedKind::Ardupilot];
 
 #[test]
 fn a_survey_is_flown_photographed_and_ends_at_home() {
-    for personality in BOTH {
-        let mut bench = Bench::with_mission(personality, SURVEY);
-        assert_eq!(bench.start(), [0], "{personality:?}");
+    for autopilot in BOTH {
+        let mut bench = Bench::with_mission(autopilot, SURVEY);
+        assert_eq!(bench.start(), [0], "{autopilot:?}");
         let mode = bench.autopilot.custom_mode();
-        assert_eq!(mode, if personality == SimulatedKind::Px4 { 0x0404_0000 } else { 3 });
+        assert_eq!(mode, if autopilot == SimulatedKind::Px4 { 0x0404_0000 } else { 3 });
         bench.until(10.0, |a| !a.true_state().landed);
         bench.until(120.0, |a| !a.true_state().armed);
         let at = bench.autopilot.true_state().position;
-        assert!(at.xy().norm() < 1.0, "{personality:?} came down at {at}");
+        assert!(at.xy().norm() < 1.0, "{autopilot:?} came down at {at}");
         let photos = bench.autopilot.take_photos();
         assert_eq!(
             photos.len(),
             6,
-            "{personality:?}: at 0, 10, 20, 30, 40 m and one more: {photos:?}"
+            "{autopilot:?}: at 0, 10, 20, 30, 40 m and one more: {photos:?}"
         );
         let (lane, last): (&[Photo], Photo) = (&photos[..5], photos[5]);
         for (k, photo) in lane.iter().enumerate() {
             // As near to the lane as waypoints are passed; late by the distance flown between two
             // checks.
             let off = photo.position - Point::new(0.0, 20.0, 8.3);
-            assert!(off.y.abs() < 2.1 && off.z.abs() < 0.9, "{personality:?}: {off}");
+            assert!(off.y.abs() < 2.1 && off.z.abs() < 0.9, "{autopilot:?}: {off}");
             let along = off.x - 10.0 * k as f32;
-            assert!((-2.1..2.3).contains(&along), "{personality:?}: {along}");
+            assert!((-2.1..2.3).contains(&along), "{autopilot:?}: {along}");
         }
         assert!(
             (last.position - Point::new(43.0, 30.0, 10.3)).norm() < 2.2,
-            "{personality:?} {last:?}"
+            "{autopilot:?} {last:?}"
         );
-        if personality == SimulatedKind::Px4 {
+        if autopilot == SimulatedKind::Px4 {
             assert!(
                 photos.iter().all(|p| (p.heading_rad - 1.57).abs() < 0.22),
                 "PX4 looks as asked: {photos:?}"
             );
         }
-        let home = u16::from(personality == SimulatedKind::Ardupilot);
+        let home = u16::from(autopilot == SimulatedKind::Ardupilot);
         let all: Vec<u16> = (0..SURVEY.len() as u16).map(|k| k + home).collect();
-        assert_eq!(bench.reached(), all, "{personality:?}");
+        assert_eq!(bench.reached(), all, "{autopilot:?}");
         // The next flight begins with the first item.
         bench.autopilot.take_photos();
-        if personality == SimulatedKind::Ardupilot {
+        if autopilot == SimulatedKind::Ardupilot {
             assert_eq!((bench.mode(4.0), bench.arm()), (vec![0], vec![0]));
         }
         assert_eq!(bench.start(), [0]);
@@ -131,9 +131,9 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
 
 #[test]
 fn speed_and_landing_at_a_place_are_flown() {
-    for personality in BOTH {
+    for autopilot in BOTH {
         let mut bench = Bench::with_mission(
-            personality,
+            autopilot,
             &[
                 (22, RELATIVE, [0.0, 0.0, 0.0, f32::NAN], [0.0; 2], 6.0),
                 (178, NONE, [1.0, 2.0, -1.0, 0.0], [0.0; 2], 0.0),
@@ -148,11 +148,11 @@ fn speed_and_landing_at_a_place_are_flown() {
             fastest = fastest.max(a.true_state().velocity.xy().norm());
             !a.true_state().armed
         });
-        assert!((1.7..2.4).contains(&fastest), "{personality:?}: {fastest} m/s of 2");
+        assert!((1.7..2.4).contains(&fastest), "{autopilot:?}: {fastest} m/s of 2");
         let at = bench.autopilot.true_state().position;
         assert!(
             (at.xy() - Point::new(30.0, 12.0, 0.0).xy()).norm() < 0.8,
-            "{personality:?}: {at}, {seconds} s"
+            "{autopilot:?}: {at}, {seconds} s"
         );
         bench.run(0.1);
         assert_eq!(bench.reached().len(), 4);
@@ -161,13 +161,13 @@ fn speed_and_landing_at_a_place_are_flown() {
 
 #[test]
 fn a_mission_that_is_left_goes_on_with_the_item_it_was_at() {
-    for personality in BOTH {
-        let mut bench = Bench::with_mission(personality, SURVEY);
+    for autopilot in BOTH {
+        let mut bench = Bench::with_mission(autopilot, SURVEY);
         bench.start();
         bench.until(90.0, |a| a.true_state().position.x > 15.0);
         let before = bench.reached();
         bench.autopilot.take_over_by_pilot();
-        if personality == SimulatedKind::Px4 {
+        if autopilot == SimulatedKind::Px4 {
             bench.set_mode(4.0, 3.0);
         }
         bench.run(10.0);
@@ -177,7 +177,7 @@ fn a_mission_that_is_left_goes_on_with_the_item_it_was_at() {
         assert_eq!(bench.reached(), before);
         assert_eq!(bench.start(), [0]);
         bench.until(120.0, |a| !a.true_state().armed);
-        assert_eq!(bench.reached().len(), SURVEY.len(), "{personality:?}");
+        assert_eq!(bench.reached().len(), SURVEY.len(), "{autopilot:?}");
     }
 }
 
@@ -200,10 +200,10 @@ fn what_cannot_be_flown_is_refused_and_passed_over() {
     bench.run(5.0);
     assert!(bench.autopilot.true_state().landed);
     // Unknown commands and invalid values are skipped.
-    for personality in BOTH {
+    for autopilot in BOTH {
         let nan = f32::NAN;
         let mut bench = Bench::with_mission(
-            personality,
+            autopilot,
             &[
                 (22, RELATIVE, [nan; 4], [0.0; 2], 5.0),
                 (4711, RELATIVE, [nan; 4], [9.0; 2], 5.0),
@@ -215,12 +215,12 @@ fn what_cannot_be_flown_is_refused_and_passed_over() {
         );
         assert_eq!(bench.start(), [0]);
         bench.run(60.0);
-        assert_eq!(bench.reached().len(), 6, "{personality:?}");
+        assert_eq!(bench.reached().len(), 6, "{autopilot:?}");
         let truth = *bench.autopilot.true_state();
         let off = truth.position - Point::new(9.0, 0.0, 5.3);
         assert!(
             truth.armed && off.norm() < 0.3,
-            "{personality:?}: after the last item it stays: {off}"
+            "{autopilot:?}: after the last item it stays: {off}"
         );
         assert_eq!(bench.autopilot.take_photos(), []);
     }

@@ -27,7 +27,7 @@ const SEND_BUFFER: usize = 1024;
 
 /// Counters of a UART's losses.
 #[derive(Debug, Default)]
-pub struct Counters {
+pub struct LossCounters {
     /// Times that a byte was lost in the device because the last one had not been read.
     pub overruns: AtomicU32,
     /// Bytes lost because the receive buffer was full.
@@ -43,7 +43,7 @@ pub struct Uart {
     received: Pipe<CriticalSectionRawMutex, RECEIVE_BUFFER>,
     sent: Pipe<CriticalSectionRawMutex, SEND_BUFFER>,
     /// Losses since the start.
-    pub counters: Counters,
+    pub counters: LossCounters,
 }
 
 /// UART 0, to the autopilot.
@@ -58,7 +58,7 @@ pub(super) fn of_port(port: u8) -> &'static Uart {
 
 impl Uart {
     const fn new(base: usize, port: u8, transmits: Irq) -> Self {
-        let counters = Counters { overruns: AtomicU32::new(0), dropped: AtomicU32::new(0) };
+        let counters = LossCounters { overruns: AtomicU32::new(0), dropped: AtomicU32::new(0) };
         Self { base, port, transmits, received: Pipe::new(), sent: Pipe::new(), counters }
     }
 

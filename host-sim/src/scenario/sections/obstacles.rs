@@ -129,7 +129,7 @@ impl FlightSettings<'_> {
     /// Height that a path keeps above obstacles below it, metres.
     fn clearance_below_m(&self) -> f32 {
         let lower_m = |vehicle: &VehicleSection| {
-            margins::max_height_error_m(self.simulation.estimator, vehicle.personality)
+            margins::max_height_error_m(self.simulation.estimator, vehicle.autopilot)
         };
         let lower_m = self.vehicles.iter().map(lower_m).fold(0.0, f32::max);
         self.largest_radius_m() + TRACKING_M + lower_m
