@@ -163,11 +163,8 @@ async fn planner_and_flash_task(
     shell.start(companion);
     let then = if known.is_some() { OnAutopilot::GoOn } else { OnAutopilot::Restart };
     start_links(links, shell, then, autopilot, swarm);
-    let memory = PlanningMemory {
-        workspace: WORKSPACE.take(),
-        swarm: SWARM_PLAN.take(),
-        own: OWN_PLAN.take(),
-    };
+    let (workspace, swarm, own) = (WORKSPACE.take(), SWARM_PLAN.take(), OWN_PLAN.take());
+    let memory = PlanningMemory { workspace, swarm, own };
     let mut planner = Planner { roadmap, field, mission, system_id, files_checksum: files, memory };
     shell.run_planner_and_flash(&mut planner, &mut flash).await
 }

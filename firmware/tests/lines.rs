@@ -87,7 +87,7 @@ fn texts(bytes: &[u8]) -> Vec<String> {
 }
 
 #[test]
-fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
+fn errors_of_a_line_are_counted_and_reported_and_what_comes_after_is_heard() {
     let config =
         Config::new(1, Point::zeros(), Geodetic { lat_deg: 47.0, lon_deg: 8.0, alt_m: 500.0 });
     let shell: &'static Shell = Box::leak(Box::new(Shell::new()));
@@ -95,7 +95,7 @@ fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
     let lines = [Line::default(), Line::default()];
     let mut receives = pin!(shell.receive(Link::Autopilot, End(&lines[0]), OnAutopilot::GoOn));
     let mut transmits = pin!(shell.transmit(Link::Autopilot, End(&lines[0])));
-    let mut tells = pin!(shell.transmit(Link::Swarm, End(&lines[1])));
+    let mut transmits_to_swarm = pin!(shell.transmit(Link::Swarm, End(&lines[1])));
     let mut keeps_time = pin!(shell.run_timers());
     let mut run = |ms: u32| {
         let mut cx = Context::from_waker(Waker::noop());
@@ -104,7 +104,7 @@ fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
             // None of the tasks ends.
             assert!(receives.as_mut().poll(&mut cx).is_pending());
             assert!(transmits.as_mut().poll(&mut cx).is_pending());
-            assert!(tells.as_mut().poll(&mut cx).is_pending());
+            assert!(transmits_to_swarm.as_mut().poll(&mut cx).is_pending());
             assert!(keeps_time.as_mut().poll(&mut cx).is_pending());
         }
     };

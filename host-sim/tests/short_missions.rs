@@ -20,7 +20,7 @@ fn reasons(more: &str) -> Vec<String> {
 }
 
 #[test]
-fn too_few_nodes_and_too_wide_a_margin_are_told_apart() {
+fn too_few_nodes_and_too_wide_a_margin_are_distinguished() {
     let few = reasons("[roadmap]\nnodes = 10");
     assert!(
         few.len() == 4 && few[..2].iter().all(|l| l.contains("more roadmap.nodes (10)")),
@@ -50,7 +50,7 @@ fn too_few_nodes_and_too_wide_a_margin_are_told_apart() {
 }
 
 #[test]
-fn a_serial_link_that_fails_a_mission_is_told_with_what_would_do() {
+fn a_serial_link_that_fails_a_mission_is_reported_with_a_remedy() {
     let fly = |more: &str| {
         let mut mission = prepared(more);
         let plan = mission.plan().unwrap();

@@ -37,11 +37,11 @@ pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
     for line in log.lines().filter(|line| line.contains("landing") || line.contains("the way home"))
     {
         let mut words = line.split_whitespace();
-        let (Some(Ok(at_s)), Some(who)) = (words.next().map(str::parse), words.next()) else {
+        let (Some(Ok(at_s)), Some(lost)) = (words.next().map(str::parse), words.next()) else {
             continue;
         };
-        if who != format!("Some({vehicle})") && ended.iter().all(|(first, _)| *first != who) {
-            ended.push((who, at_s));
+        if lost != format!("Some({vehicle})") && ended.iter().all(|(first, _)| *first != lost) {
+            ended.push((lost, at_s));
         }
     }
     ended.iter().fold(0.0, |last, (_, at_s)| last.max(*at_s))

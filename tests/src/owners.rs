@@ -213,7 +213,7 @@ impl Owners {
         let said = wrong.map(|(number, vehicles)| format!("{number} by {vehicles:?}"));
         // A disagreement with a vehicle that was lost does not count: its own flight is over before
         // others take its part.
-        let split = self.disagreed.iter().filter(|(who, _)| !who.iter().any(lost));
+        let split = self.disagreed.iter().filter(|(owners, _)| !owners.iter().any(lost));
         let split = split.map(|(_, said)| said.clone());
         self.faults.iter().cloned().chain(split).chain(said).collect()
     }

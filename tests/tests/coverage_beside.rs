@@ -85,7 +85,7 @@ fn struck(seed: u64) -> (bool, Option<String>) {
 }
 
 #[test]
-fn who_flies_around_and_is_struck_touches_nothing() {
+fn a_vehicle_struck_on_its_detour_touches_nothing() {
     let (from, count) = (number("FLOCKMATE_BESIDE_FROM", 0), number("FLOCKMATE_BESIDE", MISSIONS));
     let all: Vec<_> = (from..from + count).into_par_iter().map(struck).collect();
     let around = all.iter().filter(|(around, _)| *around).count();
@@ -120,7 +120,7 @@ radio_loss = 0.5
 
 /// A stop that is advised too late takes longer than advised: the safety filter counts all of it.
 #[test]
-fn who_flies_fast_stops_before_one_that_hovers() {
+fn a_fast_vehicle_stops_before_one_that_hovers() {
     let one = |at_s: u16| -> Option<String> {
         let text = FAST_FIELD.to_owned() + &fault("companion-reset", f32::from(at_s), 2);
         let (result, log) = covered::fly_text(&text).expect("it can be flown");
@@ -177,7 +177,7 @@ fn met_fast(seed: u64) -> Result<[usize; 2], String> {
 /// At 8 to 15 m/s, too, most vehicles that meet a hovering one fly around it and do not go home.
 /// `FLOCKMATE_FAST=N` flies N missions, `FLOCKMATE_FAST_FROM=SEED` from another seed on.
 #[test]
-fn who_flies_fast_flies_around_one_that_hovers() {
+fn a_fast_vehicle_flies_around_one_that_hovers() {
     let (from, count) = (number("FLOCKMATE_FAST_FROM", 82), number("FLOCKMATE_FAST", 1));
     let all: Vec<_> = (from..from + count).into_par_iter().map(met_fast).collect();
     let wrong: Vec<_> = all.iter().filter_map(|met| met.as_ref().err()).collect();

@@ -247,7 +247,7 @@ fn what_two_vehicles_leave_that_are_lost_at_once_over_a_rough_radio_is_photograp
 /// A vehicle that loses power above its pad falls beside it: others that land there later keep
 /// clear of all places that its fall may have reached.
 #[test]
-fn who_lands_keeps_off_where_another_may_have_fallen() {
+fn a_vehicle_that_lands_keeps_off_where_another_may_have_fallen() {
     let one = |seed: u64| -> Option<(u64, f32, bool)> {
         let mut random = Pcg32::seed_from_u64(seed);
         let count = 3 + (seed % 3) as usize;
@@ -300,7 +300,7 @@ fn who_lands_keeps_off_where_another_may_have_fallen() {
 
 /// One vehicle falls silent and flies on as long as its lease allows, while others land beside it.
 #[test]
-fn who_lands_keeps_off_all_that_an_unheard_vehicle_may_still_fly() {
+fn a_vehicle_that_lands_keeps_off_all_that_an_unheard_one_may_still_fly() {
     let one = |seed: u64| -> Option<(u64, bool)> {
         let mut random = Pcg32::seed_from_u64(seed);
         let count = 3 + (seed % 3) as usize;

@@ -158,7 +158,7 @@ fn a_loss_during_a_division_delays_it_and_lands_nobody() {
 /// A vehicle whose pad is so far away that the others finish sooner without it has no part. It
 /// stays in reserve, and takes over where one of two others is lost.
 #[test]
-fn who_has_no_part_takes_over_from_a_lost_vehicle() {
+fn a_vehicle_without_a_part_takes_over_from_a_lost_one() {
     let draw = |random: &mut Pcg32| {
         let far_m = 600 + random.next_u32() % 300;
         let far = 1 + random.next_u32() as usize % 3;

@@ -308,7 +308,7 @@ fn every_kind_of_fault_has_a_case() {
 
 #[test]
 fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
-    let (seeds, tells) = seeds();
+    let (seeds, prints_log) = seeds();
     let only = std::env::var("FLOCKMATE_FAULT_ONLY").unwrap_or_default();
     let chosen = |case: &Case| case.script.contains(&only);
     let by_seed = |seed: u64| -> Vec<Outcome> {
@@ -334,15 +334,15 @@ fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
                 mission.scenario.faults = case.faults(at_s, struck[0], &plan);
             }
             let flight = fly(&mission, &plan);
-            if tells {
+            if prints_log {
                 print_log(&flight);
             }
             let outcome = judge(case, &flight, at_s, &struck);
-            let tell = |wrong| {
+            let with_scene = |wrong| {
                 format!("seed {seed}, vehicle {struck:?} at {at_s} s, {}: {wrong}", case.script)
             };
-            let notes = outcome.notes.into_iter().map(tell).collect();
-            Outcome { wrong: outcome.wrong.into_iter().map(tell).collect(), notes, ..outcome }
+            let notes = outcome.notes.into_iter().map(with_scene).collect();
+            Outcome { wrong: outcome.wrong.into_iter().map(with_scene).collect(), notes, ..outcome }
         };
         CASES.iter().enumerate().filter(|(_, case)| chosen(case)).map(strike).collect()
     };

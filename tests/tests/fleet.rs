@@ -170,12 +170,12 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
     while (step as f32) * STEP_S < ENDS_S {
         let t_s = step as f32 * STEP_S;
         let now = Instant::from_millis((t_s * 1000.0) as u64);
-        for &(at_s, who, leaves) in &losses {
+        for &(at_s, rank, leaves) in &losses {
             if at_s <= t_s && t_s < at_s + STEP_S {
                 if leaves {
-                    vehicles[who].left_by = true;
+                    vehicles[rank].left_by = true;
                 } else {
-                    (vehicles[who].dead, vehicles[who].down) = (true, true);
+                    (vehicles[rank].dead, vehicles[rank].down) = (true, true);
                 }
             }
         }
@@ -321,7 +321,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             );
         }
     }
-    let lost = |rank: usize| losses.iter().any(|(_, who, _)| *who == rank);
+    let lost = |rank: usize| losses.iter().any(|(_, lost, _)| *lost == rank);
     Outcome {
         wrong,
         agreed_s: agreed_s.filter(|_| clean && losses.len() == 1 && most == usize::MAX),

@@ -27,7 +27,7 @@ fn report(outcomes: &[Outcome]) {
 }
 
 #[test]
-fn nobody_is_stopped_who_passes_at_the_scheduled_separation() {
+fn no_vehicle_that_passes_at_the_scheduled_separation_is_stopped() {
     let outcomes: Vec<Outcome> =
         (0..PASSINGS).into_par_iter().map(|seed| meeting::fly(&scene::passing(seed))).collect();
     report(&outcomes);

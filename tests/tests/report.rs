@@ -340,7 +340,7 @@ fn map_style_and_roadmap_change_the_picture() {
 }
 
 #[test]
-fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
+fn page_of_a_coverage_flight_shows_what_each_vehicle_photographs_after_a_loss() {
     let dir = tempfile::tempdir().expect("a directory");
     let scenario = dir.path().join("lost.toml");
     // One of three loses all power over the area.

@@ -343,9 +343,9 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         self.drain_outputs();
     }
 
-    fn send_states_from(&mut self, rng: &mut Pcg32, who: impl Fn(&SimulatedNeighbour) -> bool) {
+    fn send_states_from(&mut self, rng: &mut Pcg32, sends: impl Fn(&SimulatedNeighbour) -> bool) {
         for i in 0..self.others.len() {
-            if who(&self.others[i]) {
+            if sends(&self.others[i]) {
                 self.send_state_from(i, rng);
             }
         }

@@ -48,7 +48,7 @@ fn every_revision_of_the_h743_has_a_clock_it_can_run_at() {
 }
 
 #[test]
-fn the_h743_tells_its_resets_apart() {
+fn the_h743_distinguishes_its_resets() {
     // RM0433, table of the reset sources: each row's flags.
     let (cpu, d1, d2) = (1 << 17, 1 << 19, 1 << 20);
     let (bor, pin, por, software) = (1 << 21, 1 << 22, 1 << 23, 1 << 24);
@@ -77,7 +77,7 @@ fn the_level_of_the_brown_out_reset_is_read() {
 }
 
 #[test]
-fn the_rp2350_tells_its_resets_apart_and_resets_its_processors() {
+fn the_rp2350_distinguishes_its_resets_and_resets_its_processors() {
     assert_eq!(rp2350::reset_cause(1 << 16, 0), ResetCause::Power);
     assert_eq!(rp2350::reset_cause(1 << 17, 0), ResetCause::BrownOut);
     assert_eq!(rp2350::reset_cause(1 << 18, 0), ResetCause::Key);
@@ -91,7 +91,7 @@ fn the_rp2350_tells_its_resets_apart_and_resets_its_processors() {
 }
 
 #[test]
-fn an_overflow_of_the_stack_is_told_from_other_faults() {
+fn an_overflow_of_the_stack_is_distinguished_from_other_faults() {
     let guard = 0x2000_9000..0x2000_A000;
     let (daccviol, mstkerr, valid, stkof) = (1 << 1, 1 << 4, 1 << 7, 1 << 20);
     assert!(fault::is_overflow(mstkerr, 0, &guard));

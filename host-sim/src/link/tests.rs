@@ -83,7 +83,7 @@ fn a_tcp_client_comes_back_to_a_server_that_restarts() {
 }
 
 #[test]
-fn a_udp_hub_answers_everybody_who_spoke() {
+fn a_udp_hub_answers_every_peer_that_sent() {
     let mut hub = open("udp-listen:127.0.0.1:0");
     let url = format!("udp:{}", hub.local_address().unwrap());
     let (mut a, mut b) = (open(&url), open(&url));

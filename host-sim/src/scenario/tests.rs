@@ -50,7 +50,7 @@ fn changed(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn wrong_scenarios_are_told_where_and_why() {
+fn errors_of_wrong_scenarios_say_where_and_why() {
     let apart = "vehicles 1 and 2 start 1.00 m apart, below the safety distance of 1.5 m";
     let words = "mission.mode must be one of \"unlabelled\", \"labelled\", \"single-goal\", \"coverage\", \
                  \"formation\", \"unlabeled\", \"labeled\"";

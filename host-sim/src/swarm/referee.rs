@@ -362,8 +362,10 @@ impl<'a> Referee<'a> {
             if std::mem::take(&mut vehicle.stuck) && ends && self.retracts_ended_deadlocks {
                 self.deadlocks -= 1;
                 let text = no_progress();
-                if let Some(at) =
-                    self.incidents.iter().rposition(|(_, who, what)| *who == i && *what == text)
+                if let Some(at) = self
+                    .incidents
+                    .iter()
+                    .rposition(|(_, vehicle, what)| *vehicle == i && *what == text)
                 {
                     self.incidents.remove(at);
                 }

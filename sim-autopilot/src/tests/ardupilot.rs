@@ -289,7 +289,7 @@ fn loiter_with_a_low_stick_sinks_and_brake_holds() {
 }
 
 #[test]
-fn the_ground_stations_silence_returns_it_only_if_told_so() {
+fn the_ground_stations_silence_returns_it_only_if_set_so() {
     let ground = Header { system: 255, component: 190, sequence: 0 };
     let beat = |bench: &mut Bench| {
         let mut out = [0; frame::MAX_FRAME_LEN];

@@ -77,7 +77,7 @@ fn a_search_among_all_columns_there_can_be_takes_a_dozen_steps() {
 }
 
 #[test]
-fn it_goes_back_slowly_round_the_corner_and_not_into_who_follows() {
+fn it_goes_back_slowly_round_the_corner_and_not_into_a_follower() {
     let path = path();
     let mut tracker = ReferenceState { along_m: 9.0, ..ReferenceState::default() };
     let mut follower = above(0.0, 0.0, 1.0);

@@ -85,7 +85,7 @@ fn beside_a_lower_id() -> Bench {
 }
 
 #[test]
-fn who_hears_a_lower_system_id_claim_waits_again() {
+fn a_vehicle_that_hears_a_lower_system_id_claim_waits_again() {
     let mut bench = beside_a_lower_id();
     exclude(&mut bench, &sphere(Point::new(14.0, 12.0, 1.5), 0.5));
     let other = |flags: u8| Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | flags, 0.0, 5));
@@ -110,7 +110,7 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
 }
 
 #[test]
-fn who_is_stopped_on_its_way_down_lets_others_fly_around() {
+fn a_vehicle_stopped_on_its_way_down_lets_others_fly_around() {
     let mut bench = beside_a_lower_id();
     while bench.companion.guidance.is_standing() || bench.enu.z > 1.2 {
         bench.run(0.05);
@@ -128,7 +128,7 @@ fn who_is_stopped_on_its_way_down_lets_others_fly_around() {
 }
 
 #[test]
-fn who_died_may_have_been_flown_back_to_its_pad() {
+fn a_vehicle_that_died_may_have_been_flown_back_to_its_pad() {
     let mut bench = Bench::started_with_neighbour(two_vehicles());
     let pad = Point::new(8.0, 40.0, 0.2);
     bench.neighbour = Some((pad, GROUNDED | ON_PLAN, 0.0, 5));
@@ -169,7 +169,7 @@ fn kept_off(flags: u8, positions: Positions) -> Vec<KeepOutZone> {
 }
 
 #[test]
-fn who_lies_where_it_does_not_know_is_kept_off_by_the_foot_of_its_column() {
+fn a_vehicle_that_lies_where_it_does_not_know_is_kept_off_by_the_foot_of_its_column() {
     let known = kept_off(GROUNDED | OUT_OF_PLAN, Positions::Fresh);
     assert!(
         matches!(known[..], [KeepOutZone { kind: ZoneKind::Static, .. }])
@@ -204,7 +204,7 @@ fn the_column_of_one_that_lands_is_deeper_the_older_its_place_is() {
 }
 
 #[test]
-fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
+fn no_vehicle_takes_off_before_a_scan_for_obstacles_on_its_path() {
     for tenth in 0..8 {
         let mut bench = Bench::new(two_vehicles());
         bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
@@ -249,7 +249,7 @@ fn what_was_found_for_one_plan_opens_no_gate_of_the_next() {
 }
 
 #[test]
-fn who_was_flown_around_by_one_plan_is_looked_at_for_the_next() {
+fn a_vehicle_flown_around_by_one_plan_is_looked_at_for_the_next() {
     let mut bench = Bench::new(two_vehicles());
     bench.no_position = true;
     bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));

@@ -203,7 +203,7 @@ proptest::proptest! {
 }
 
 #[test]
-fn silence_is_that_of_those_who_fly() {
+fn silence_is_that_of_the_vehicles_that_fly() {
     let mut table = table();
     let at = Instant::from_millis;
     assert_eq!(
@@ -223,7 +223,7 @@ fn silence_is_that_of_those_who_fly() {
 }
 
 #[test]
-fn who_is_out_opens_gates_only_after_it_was_looked_at() {
+fn a_vehicle_out_of_the_plan_opens_gates_only_after_a_scan() {
     let at = Instant::from_millis;
     let mut table = table();
     let out = |table: &mut Neighbours<4>, now: Instant| table.states_at(now)[0].out_of_plan;
@@ -248,7 +248,7 @@ fn who_is_out_opens_gates_only_after_it_was_looked_at() {
 }
 
 #[test]
-fn who_falls_silent_before_its_place_and_plan_were_heard_opens_gates_too() {
+fn a_vehicle_silent_before_its_place_and_plan_were_heard_opens_gates_too() {
     let mut table = table();
     table.handle_intent(Instant::ZERO, 1, &intent(0, 7, 8), 7, None);
     table.forget_plan();
@@ -311,7 +311,7 @@ proptest::proptest! {
 }
 
 #[test]
-fn deaf_is_who_hears_none_of_those_there_are() {
+fn a_vehicle_is_deaf_that_hears_none_of_those_there_are() {
     let at = |seconds: u64| Instant::from_millis(seconds * 1000);
     assert!(
         !Neighbours::<4>::new(&[], 1, 2.0, 2.0).hears_nobody(at(100)),
@@ -330,7 +330,7 @@ pub(super) fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
 }
 
 #[test]
-fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
+fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
     let braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
     let bounds = MotionBounds { braking, speed_max_mps: 2.0, silent_s: 3.0 };
     let (mut beyond, mut reached, mut missed) = (0, 0, 0);

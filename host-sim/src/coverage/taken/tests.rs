@@ -59,7 +59,7 @@ fn a_picture_that_is_missing_leaves_its_waypoint_out() {
 }
 
 #[test]
-fn who_comes_back_or_after_another_flies_twice_and_who_waits_does_not() {
+fn a_vehicle_that_comes_back_or_after_another_flies_twice_and_one_that_waits_does_not() {
     let again = |from: usize, vehicle: Option<u8>| {
         counted(move |pictures| {
             let more =

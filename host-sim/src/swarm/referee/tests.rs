@@ -99,7 +99,7 @@ fn hovering_on_for_twenty_seconds_is_a_deadlock() {
 }
 
 #[test]
-fn one_that_tells_of_no_progress_makes_some_by_flying_on() {
+fn a_vehicle_that_reports_no_progress_makes_some_by_flying_on() {
     with_monitor(|mut referee| {
         let silent = |x| Observation { progress_m: None, ..at(x, 2.0, 5.0, RefereePhase::Flying) };
         let rests = at(5.0, 5.0, 5.0, RefereePhase::Grounded);

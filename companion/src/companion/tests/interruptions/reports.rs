@@ -29,7 +29,7 @@ fn check(b: &Bench, case: &str) {
 /// A vehicle that stood reported that it stays; once a failsafe or the pilot flies it, it no longer
 /// does.
 #[test]
-fn who_is_taken_where_it_stood_no_longer_reports_that_it_stays() {
+fn a_vehicle_taken_where_it_stood_no_longer_reports_that_it_stays() {
     let mut held = 0;
     for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
         for (&(state, paused_in), by) in
@@ -50,7 +50,7 @@ fn who_is_taken_where_it_stood_no_longer_reports_that_it_stays() {
 
 /// It does not report a detour either, on which it would look for others before it lands.
 #[test]
-fn who_is_taken_on_a_detour_no_longer_reports_it() {
+fn a_vehicle_taken_on_a_detour_no_longer_reports_it() {
     for by in OTHERS_FLY {
         let mut b = reach(AutopilotKind::Px4, State::Blocked, None).expect("it can be blocked");
         b.stuck = false;

@@ -3,7 +3,7 @@
 use planner_core::flight::WaypointRange;
 
 use super::State::*;
-use super::losses::{over_a_field, tells, tunnels};
+use super::losses::{over_a_field, report_status, tunnels};
 use super::*;
 use crate::link::done::{self, PhotographedReport};
 use crate::link::roster::MemberStatus;
@@ -98,7 +98,7 @@ fn only_what_others_on_the_ground_know_changes_the_plan() {
 fn whoever_was_started_keeps_its_plan_when_others_have_landed() {
     for status in [MemberStatus::Finished, MemberStatus::Left] {
         let mut bench = over_a_field(Scheduled);
-        tells(&mut bench, MemberStatus::Alive, status);
+        report_status(&mut bench, MemberStatus::Alive, status);
         knows(&mut bench, 20, 0);
         bench.run(1.0);
         assert_eq!(bench.companion.excluded_waypoints(), [], "{:?}", bench.texts);

@@ -199,7 +199,7 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
 }
 
 #[test]
-fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
+fn a_vehicle_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
     let mut rng = Pcg32::seed_from_u64(11);
     for _ in 0..500 {
         let (apart_m, stray_m) = (uniform(&mut rng, 1.0, 3.0), uniform(&mut rng, 0.0, 6.0));
@@ -229,7 +229,7 @@ fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
 }
 
 #[test]
-fn over_an_area_the_column_of_who_left_it_in_the_air_is_kept_off_for_ten_minutes() {
+fn over_an_area_the_column_of_a_vehicle_that_left_it_in_the_air_is_kept_off_for_ten_minutes() {
     let mut rng = Pcg32::seed_from_u64(12);
     for _ in 0..200 {
         let mut table = joined(0);
