@@ -3,7 +3,7 @@
 //! A command fills [`ReportData`] and calls [`page()`]. The page needs no network: its libraries
 //! are inlined from `assets/vendor`, its own scripts from `assets/report`, and the data is JSON in
 //! a `<script>` element, in which every long array is base64 of little-endian numbers (see
-//! [`pack`]). Positions are ENU metres of the mission frame, times are seconds since the start of
+//! `pack`). Positions are ENU metres of the mission frame, times are seconds since the start of
 //! the simulation.
 
 mod coverage;

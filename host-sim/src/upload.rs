@@ -2,7 +2,7 @@
 //!
 //! Source: MAVLink guide, "File Transfer Protocol". Several WRITE requests are under way at once. A
 //! request without an answer is sent again with the same sequence number. The timeout and the
-//! number of requests under way follow the link ([`retransmission`]).
+//! number of requests under way follow the link (`retransmission`).
 
 mod retransmission;
 

@@ -7,7 +7,7 @@
 //!
 //! Of overlapping candidate frames the first with a correct checksum counts; after a wrong checksum
 //! the search continues behind the candidate's start byte. An incomplete frame is dropped
-//! [`PARTIAL_LIFETIME_US`] after its first byte.
+//! `PARTIAL_LIFETIME_US` after its first byte.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc};

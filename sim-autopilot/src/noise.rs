@@ -5,7 +5,7 @@
 //! since nothing they model changes faster.
 //!
 //! A gust is specified by its peak beyond the mean wind, as in weather reports and MIL-F-8785C's
-//! discrete gust, not by a standard deviation: the peak is [`PEAK_FACTOR`] deviations, and gusts
+//! discrete gust, not by a standard deviation: the peak is `PEAK_FACTOR` deviations, and gusts
 //! are clamped to it.
 
 use rand_core::{Rng, SeedableRng};

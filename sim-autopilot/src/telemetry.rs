@@ -1,7 +1,7 @@
 //! Telemetry of the simulated autopilots. The stream rates here are those that PX4 1.17 was
 //! observed to send on an onboard link without a request; ArduCopter's are in `ardupilot`.
 //!
-//! A message is encoded only when it is due, from a [`Snapshot`] that is taken once for all
+//! A message is encoded only when it is due, from a `Snapshot` that is taken once for all
 //! messages of a step.
 
 use mavlink::dialects::ardupilotmega as dialect;

@@ -3,7 +3,7 @@
 //! departs first; each other departs as soon as its planned flight keeps the separation from all
 //! flights that are already timed.
 //!
-//! Planned positions are compared every [`COMPARISON_STEP_S`], at cruise speed without braking at
+//! Planned positions are compared every `COMPARISON_STEP_S`, at cruise speed without braking at
 //! corners. Real flights deviate from that: on board the safety filter keeps vehicles apart, and
 //! these departures only make it seldom necessary.
 
@@ -30,7 +30,7 @@ pub struct DepartureFlight<'a> {
 
 /// Departure time of each flight, seconds, and the least distance between any two vehicles of which
 /// at least one has departed and not landed, metres; infinite for one vehicle. `None` if some
-/// flight has no departure within [`MAX_GROUND_WAIT_S`] that keeps the separation.
+/// flight has no departure within `MAX_GROUND_WAIT_S` that keeps the separation.
 pub fn plan_departures(
     flights: &[DepartureFlight<'_>],
     separation_m: f32,

@@ -2,8 +2,8 @@
 //! beside the paper's values, and draws the paper's Figs. 8 to 10, 12 and 13 in the report.
 //!
 //! The paper states neither areas nor places of the vehicles, camera, V_a (climb speed), V_d
-//! (descent speed) or Δh (layer spacing). Ours are in [`SHORT_TRACK`], [`LONG_TRACK`], [`CONVEX`],
-//! [`COMPARED_AREAS`] and [`TABLE_4_AREA`]; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as
+//! (descent speed) or Δh (layer spacing). Ours are in `SHORT_TRACK`, `LONG_TRACK`, `CONVEX`,
+//! `COMPARED_AREAS` and `TABLE_4_AREA`; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as
 //! lanes. The paper's times in Tables A1 to A12 were flown in Gazebo; ours are the planned costs
 //! C_k, without turns. CV is 100 · SD / Av in both, with SD the sample standard deviation.
 

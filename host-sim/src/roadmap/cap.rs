@@ -8,7 +8,7 @@
 //! 2. *Near.* Of the other edges, those to each node's nearest neighbours come first, up to
 //!    `NEAREST_EDGE_SHARE` of the room left.
 //! 3. *Far.* The rest of the room goes to the edges whose loss would lengthen the shortest paths
-//!    from [`PATH_SOURCES`] nodes most: the number of paths over an edge, times the extra length of
+//!    from `PATH_SOURCES` nodes most: the number of paths over an edge, times the extra length of
 //!    the detour around it over the edges kept so far. Half of these edges are chosen first: they
 //!    shorten the detours around the others.
 //!

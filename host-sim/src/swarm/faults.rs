@@ -6,11 +6,11 @@
 //! | `kill` | all power gone: silent, falls to the floor below and lies there | never |
 //! | `radio-cut` | cannot send (`tx`), cannot hear (`rx`), or can do neither (`both`, if not given) | hears and sends again |
 //! | `serial-stall` | no byte between companion and autopilot, either way | 3 s if not given |
-//! | `serial-corrupt` | [`CORRUPTED_SHARE`] of all bytes change a bit | as before |
+//! | `serial-corrupt` | `CORRUPTED_SHARE` of all bytes change a bit | as before |
 //! | `position-jump` | the estimate moves by `offset_m`, 5 m east if not given | jumps back |
-//! | `origin-change` | the EKF origin moves by `offset_m`, [`ORIGIN_CHANGE_M`] if not given | moves back |
+//! | `origin-change` | the EKF origin moves by `offset_m`, `ORIGIN_CHANGE_M` if not given | moves back |
 //! | `gps-loss` | no position | position again |
-//! | `battery-low` | [`BATTERY_LEFT`] of the charge is left | never |
+//! | `battery-low` | `BATTERY_LEFT` of the charge is left | never |
 //! | `pilot-takeover` | Position or Brake mode by the pilot's switch | as `pilot-return` |
 //! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station commands the companion to continue | |
 //! | `autopilot-reboot` | motors off, mode and streams reset, silent in its boot | 3 s if not given |
