@@ -54,7 +54,7 @@ fn ids_that_are_none_or_twice_are_refused() {
 proptest! {
     /// The first vehicle of the roster that starts outside the geofence is named in the error.
     #[test]
-    fn who_starts_outside_the_geofence_is_named(
+    fn a_vehicle_that_starts_outside_the_geofence_is_named(
         low in proptest::array::uniform3(-2.0f32..12.0),
         size in proptest::array::uniform3(0.0f32..12.0),
     ) {

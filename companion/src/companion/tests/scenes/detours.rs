@@ -144,7 +144,7 @@ pub(super) fn another_flies_where_it_is_to_fly(scenes: &mut Scenes) {
 /// A vehicle that hovers and sways beside a lane does not make this one stop and continue
 /// repeatedly.
 #[test]
-fn who_sways_beside_the_path_over_a_field_blocks_it_once_or_not() {
+fn a_vehicle_that_sways_beside_the_path_over_a_field_blocks_it_once_or_not() {
     let safety_m = config().safety_distance_m;
     let mut rng = Pcg32::seed_from_u64(9);
     let mut real =

@@ -67,7 +67,7 @@ pub(super) fn at_a_limit(scenes: &mut Scenes) {
 /// on along the fence. The position estimate is exact here, so that its error does not end the
 /// flight.
 #[test]
-fn who_comes_to_the_fence_lands_where_its_path_leaves_it() {
+fn a_vehicle_at_the_fence_lands_where_its_path_leaves_it() {
     let mut rng = Pcg32::new(1, 1);
     let mut draw =
         |low: f32, high: f32| low + (high - low) * (rng.next_u32() >> 8) as f32 / 16_777_216.0;

@@ -55,7 +55,7 @@ pub(super) fn another_plan_is_flown(scenes: &mut Scenes) {
 /// A vehicle that starts late leaves out the same waypoints as those in flight, whatever others on
 /// the ground report.
 #[test]
-fn who_comes_late_takes_the_set_of_those_that_fly() {
+fn a_vehicle_that_comes_late_takes_the_set_of_those_that_fly() {
     let mut bench = over_a_field(Ready);
     knows(&mut bench, 40, 0);
     bench.run(1.0);
