@@ -2,11 +2,11 @@
 //! requests sent to it.
 
 pub mod ardupilot;
+pub(crate) mod arming;
 pub(crate) mod handshake;
 mod kind;
 pub(crate) mod limits;
 pub mod px4;
-pub(crate) mod requests;
 pub mod telemetry;
 
 pub use self::kind::AutopilotKind;

@@ -16,7 +16,7 @@ use heapless::Deque;
 use planner_core::flight::VehiclePlan;
 
 use crate::autopilot::AutopilotKind;
-use crate::autopilot::requests::{RequestContext, Requests};
+use crate::autopilot::handshake::{Handshake, HandshakeContext};
 use crate::autopilot::telemetry::{OriginRange, Telemetry};
 use crate::config::{CheckedConfig, Config, ConfigError, PlanFailure};
 use crate::events::{Event, Link, PlanKind};
@@ -56,7 +56,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) telemetry: Telemetry,
     pub(crate) neighbours: Neighbours<V>,
     pub(crate) detours: Detours,
-    pub(crate) requests: Requests,
+    pub(crate) handshake: Handshake,
     pub(crate) mission: Mission<W, G>,
     pub(crate) guidance: Guidance,
     pub(crate) services: Services,
@@ -103,7 +103,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }),
             neighbours,
             detours: Detours::default(),
-            requests: Requests::default(),
+            handshake: Handshake::default(),
             mission: Mission::new(start),
             guidance: Guidance::new(&config, &AutopilotKind::default().default_limits()),
             services: Services::new(&config),
@@ -244,14 +244,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// State, climb, landing column and time limits, from which the requests to the autopilot are
     /// made.
-    fn request_context(&self) -> RequestContext {
+    fn handshake_context(&self) -> HandshakeContext {
         let in_state = self.mission.time_in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;
         let timeout_s = (margin_m / self.config.cruise_mps)
             .clamp(GUID_TIMEOUT_RANGE_S.0, GUID_TIMEOUT_RANGE_S.1);
         let column_clear =
             self.guidance.filter.column_clear() && !self.guidance.is_guiding_landing();
-        RequestContext {
+        HandshakeContext {
             now: self.now,
             state: self.mission.state(),
             in_state,
@@ -259,21 +259,21 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             guided_timeout_s: timeout_s,
             column_clear,
             may_land: self.must_land()
-                || (column_clear && RequestContext::is_column_checked(in_state)),
+                || (column_clear && HandshakeContext::is_column_checked(in_state)),
         }
     }
 
     /// Starts requesting the telemetry streams; on the ground, disarmed, also the autopilot's
     /// limits; guidance uses the default limits until these are read.
     fn request_streams(&mut self) {
-        let situation = self.request_context();
-        if self.requests.begin_requesting_streams(
+        let situation = self.handshake_context();
+        if self.handshake.begin_requesting_streams(
             &self.telemetry,
             &situation,
             &mut self.timers,
             &mut self.links,
         ) {
-            self.guidance.set_limits(&self.config, self.requests.limits());
+            self.guidance.set_limits(&self.config, self.handshake.limits());
         }
     }
 }

@@ -8,7 +8,6 @@
 //! set back to it, and the flight continues by a straight leg to where the phase was left.
 
 mod acknowledged_path;
-mod brakes;
 pub(crate) mod evade;
 mod fence;
 pub(crate) mod filter;
@@ -25,6 +24,7 @@ mod raw;
 mod scene;
 mod setpoint;
 mod smoother;
+mod stops;
 mod waypoints;
 
 use planner_core::flight::Path;

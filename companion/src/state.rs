@@ -33,7 +33,7 @@ pub enum State {
     /// Stands after DO_PAUSE_CONTINUE 0, on the path or in the climb.
     Paused,
     /// Stands on the path, since no neighbour hears this vehicle or none is heard.
-    Alone,
+    SwarmLinkLost,
     /// HEARTBEAT is missing in flight; the setpoint stops on the path.
     AutopilotSilent,
     /// The position is missing in flight, or jumped; the setpoint stops.
@@ -89,7 +89,7 @@ impl State {
         Self::Climb,
         Self::Follow,
         Self::Paused,
-        Self::Alone,
+        Self::SwarmLinkLost,
         Self::AutopilotSilent,
         Self::PositionLost,
         Self::Land,
@@ -120,7 +120,7 @@ impl State {
                 | Climb
                 | Follow
                 | Paused
-                | Alone
+                | SwarmLinkLost
                 | Blocked
                 | Replanning
                 | Stopping
@@ -356,7 +356,7 @@ impl State {
 
     /// Whether a vehicle in this state may continue its plan while no other vehicle hears it.
     pub(crate) fn may_continue_unheard(self) -> bool {
-        self.takes_off() || matches!(self, Self::Follow | Self::Alone)
+        self.takes_off() || matches!(self, Self::Follow | Self::SwarmLinkLost)
     }
 
     /// Whether a vehicle in this state follows the plan that all share, and its gates.
@@ -372,7 +372,7 @@ impl State {
     /// own mission moves it on.
     pub(crate) fn is_on_path(self) -> bool {
         use State::*;
-        matches!(self, Follow | Paused | Alone | Blocked | Replanning | Dividing)
+        matches!(self, Follow | Paused | SwarmLinkLost | Blocked | Replanning | Dividing)
     }
 
     /// Whether a vehicle in a coverage mission is on its path and does not hold for a division yet,

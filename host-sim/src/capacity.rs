@@ -3,7 +3,7 @@
 
 use companion::storage::mission_file::MissionView;
 use companion::storage::store::FlashLayout;
-use companion::storage::store::area::DATA_OFFSET;
+use companion::storage::store::flash_area::DATA_OFFSET;
 use companion::{Companion, Config};
 use planner_core::roadmap::RoadmapView;
 

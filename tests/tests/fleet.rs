@@ -14,8 +14,8 @@
 
 use std::collections::VecDeque;
 
-use companion::link::roster::{MemberStatus, RosterReport};
-use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport, StartStatus};
+use companion::link::roster::{FlightStatus, RosterReport};
+use companion::swarm::fleet::{Fleet, FleetTimeouts, OwnReport, StartStatus, VehicleReception};
 use companion::time::{Duration, Instant};
 use flockmate_tests::number;
 use flockmate_tests::parts::{WAYPOINT_DM, parts};
@@ -194,7 +194,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             let fresh =
                 |at: Option<Instant>| at.is_some_and(|at| now - at <= Duration::from_secs(1));
             let (heard_at, bits) = (vehicle.heard_at.clone(), vehicle.heard_bits.clone());
-            let hearing = |rank: usize| MemberReception {
+            let hearing = |rank: usize| VehicleReception {
                 heard_at: heard_at[rank],
                 hears_us: bits[rank] >> own & 1 != 0,
                 heard_by_others: (0..count)
@@ -212,9 +212,9 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             }
             let ends = vehicle.left_by || vehicle.down || vehicle.fleet.is_excluded();
             let standing = match (ends, done && !goes_on) {
-                (false, _) => MemberStatus::Alive,
-                (true, false) => MemberStatus::Left,
-                (true, true) => MemberStatus::Finished,
+                (false, _) => FlightStatus::Alive,
+                (true, false) => FlightStatus::Left,
+                (true, true) => FlightStatus::Finished,
             };
             vehicle.down |= ends;
             let stop_dm =
@@ -346,7 +346,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
 /// Whether the vehicle knows that all living vehicles have computed the same division.
 fn has_all_hashes(fleet: &Whole) -> bool {
     let roster = fleet.roster_message(0);
-    roster.hash != 0 && roster.entries.iter().all(|e| e.status != MemberStatus::Alive || e.agrees)
+    roster.hash != 0 && roster.entries.iter().all(|e| e.status != FlightStatus::Alive || e.agrees)
 }
 
 /// Each vehicle's part by the divisions that count, without one under way.
@@ -432,22 +432,22 @@ fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
     let own = OwnReport { commitment_dm: Some(WAYPOINT_DM), ..OwnReport::default() };
     let step = |fleet: &mut Whole, at_s: u64, heard: usize| {
         let now = Instant::from_millis(1000 * at_s);
-        let hears = MemberReception {
+        let hears = VehicleReception {
             heard_at: Some(now),
             hears_us: true,
             hears: u32::MAX,
-            ..MemberReception::default()
+            ..VehicleReception::default()
         };
         fleet.step(
             now,
             &own,
-            |rank| if rank == heard { hears } else { MemberReception::default() },
+            |rank| if rank == heard { hears } else { VehicleReception::default() },
         );
     };
     (1..50).for_each(|at_s| step(&mut fleet, at_s, 0));
     assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM), "vehicle 2 is lost");
     let mut finished = fleet.roster_message(0);
-    finished.entries[2].status = MemberStatus::Finished;
+    finished.entries[2].status = FlightStatus::Finished;
     fleet.handle_roster(2, &finished, StartStatus::Started);
     step(&mut fleet, 50, 2);
     assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM));

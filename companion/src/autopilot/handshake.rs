@@ -1,181 +1,340 @@
-//! Arming the autopilot step by step, and which of its refusals are reported as texts.
+//! Requests to the autopilot, repeated until they have taken effect: streams, EKF origin, limit
+//! parameters, mode, arming, take-off, landing, disarming.
 
-use crate::autopilot::telemetry::{Ack, MAX_POSITION_AGE, Telemetry};
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
+
+use crate::autopilot::AutopilotKind;
+use crate::autopilot::arming::ArmingHandshake;
+use crate::autopilot::limits::AutopilotLimits;
+use crate::autopilot::telemetry::{Ack, MAX_HEARTBEAT_AGE, Telemetry};
+use crate::events::Link;
+use crate::link::Links;
+use crate::link::frame::{COMPANION_COMPONENT, Frame};
+use crate::link::outbox::Outgoing;
+use crate::link::severity::Severity;
 use crate::state::State;
 use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
 
-/// Time from a denied arming request to the next arming request.
-const ARMING_RETRY_EVERY: Duration = Duration::from_millis(1000);
-/// Longest time from the COMMAND_ACK that accepts arming to the first HEARTBEAT (1 Hz) with the
-/// armed bit; also the time to wait for a COMMAND_ACK before arming is requested again.
-const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
-/// Most arming requests in a row without a COMMAND_ACK; after them arming has failed.
-const MAX_ARMING_TRIES: u8 = 2;
-/// Most different refusals (command and result) that are reported in one mission state.
-const MAX_REFUSALS: usize = 4;
-/// Estimated height above the pad from which the vehicle counts as risen, whatever the landing
-/// detector reports, metres; an error of the estimate that was there before arming cancels out.
-const RISEN_M: f32 = 0.25;
+/// Time between two requests for the EKF origin while the autopilot has reported another one in
+/// flight.
+pub(crate) const ORIGIN_RETRY_EVERY: Duration = Duration::from_millis(200);
+/// Time from entering the state `Disarm` to the first request to disarm, and between two such
+/// requests. Autopilots disarm by themselves within 3 s. The report of the ground may be false up
+/// to 2.6 m above it ([`MAX_GROUND_HEIGHT_ERROR_M`](crate::margins::MAX_GROUND_HEIGHT_ERROR_M) and
+/// the estimate's error); at 0.3 m/s, the slowest landing, the vehicle is down before the request.
+pub(crate) const DISARM_EVERY: Duration = Duration::from_millis(9000);
+/// Least time in the state `Land` before the landing mode is requested: the safety filter checks
+/// the column below the vehicle for two steps first.
+const LAND_REQUEST_AFTER: Duration = Duration::from_millis(100);
+/// Time between two requests of one kind to the autopilot, unless another constant says otherwise.
+const REQUEST_RETRY_EVERY: Duration = Duration::from_millis(1000);
+/// Time between two requests to take off: longer than ArduCopter takes to spin up and lift off (2.3
+/// s).
+const TAKE_OFF_RETRY_EVERY: Duration = Duration::from_millis(4000);
+/// Age of the position, while HEARTBEAT still arrives, after which all streams are requested again:
+/// the autopilot has rebooted and forgotten them.
+const POSITION_STREAM_TIMEOUT: Duration = Duration::from_millis(1500);
+/// Least time between two requests for all streams.
+const STREAMS_RETRY_EVERY: Duration = Duration::from_millis(2000);
+/// Most streams requested in one step while connecting.
+const STREAM_REQUESTS_PER_STEP: usize = 5;
+const GPS_GLOBAL_ORIGIN: u16 = 49;
+/// Most PARAM_REQUEST_READ that are sent for all limit parameters together, on one connecting.
+const MAX_LIMIT_REQUESTS: u8 = 80;
+/// Time between two PARAM_REQUEST_READ for limit parameters.
+const LIMIT_REQUEST_EVERY: Duration = Duration::from_millis(150);
+/// `MAV_PARAM_TYPE_REAL32`.
+const PARAM_TYPE_REAL32: u8 = 9;
+/// Age of a stream's last message after which that stream is requested again; the slowest stream,
+/// SYS_STATUS, has a period of 1 s.
+const STREAM_LOST_AFTER: Duration = Duration::from_millis(4000);
+/// Greatest age of the reported battery charge with which a vehicle takes off.
+const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
 
-const NAV_TAKEOFF: u16 = 22;
-const DO_SET_MODE: u16 = 176;
-const ARM_DISARM: u16 = 400;
-/// `MAV_RESULT` ACCEPTED.
-const ACCEPTED: u8 = 0;
-/// `MAV_RESULT` IN_PROGRESS.
-const IN_PROGRESS: u8 = 5;
+/// The companion's situation, from which the requests to its autopilot follow.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HandshakeContext {
+    pub(crate) now: Instant,
+    pub(crate) state: State,
+    /// Time since the mission state was entered.
+    pub(crate) in_state: Duration,
+    /// Height of the climb above the pad, metres.
+    pub(crate) climb_m: f32,
+    /// Value for ArduCopter's `GUID_TIMEOUT`: how long Guided keeps flying the last velocity
+    /// without a further setpoint, seconds.
+    pub(crate) guided_timeout_s: f32,
+    /// Whether no other vehicle is in the vertical column that this vehicle is about to climb or
+    /// descend.
+    pub(crate) column_clear: bool,
+    /// Whether the landing mode may be requested now.
+    pub(crate) may_land: bool,
+}
 
-/// State of arming, disarming and flight modes between the companion and its autopilot.
-#[derive(Clone, Copy, Debug, Default)]
+/// State of the requests to the autopilot.
+#[derive(Clone, Debug)]
 pub(crate) struct Handshake {
-    /// When arming was last requested.
-    requested_at: Option<Instant>,
-    /// Arming requests since the last COMMAND_ACK that denied one.
-    unanswered: u8,
-    /// Whether the autopilot denied the last arming request.
-    denied: bool,
-    /// When the autopilot accepted arming: from then on arming is not requested again.
-    accepted_at: Option<Instant>,
-    /// Whether HEARTBEAT was missing since arming was last requested: meanwhile the vehicle may
-    /// have been armed, and disarmed again by its pilot. Then arming is not requested again.
-    heartbeat_gap: bool,
-    /// Whether the autopilot was switched to Offboard or Guided for this mission, and its HEARTBEAT
-    /// has shown no mode but that and the landing mode since.
-    in_own_mode: bool,
-    /// Whether the landing detector has reported flight while armed, or the vehicle has risen,
-    /// since the state `Arming` was entered.
-    flown: bool,
-    /// Whether a start that was cancelled had begun its climb: unseen, the vehicle may rise.
-    climb_begun: bool,
-    /// Estimated height with which the vehicle was last disarmed, metres.
-    disarmed_z_m: f32,
-    /// Refusals reported in this state: `MAV_CMD` and `MAV_RESULT`.
-    reported: [Option<(u16, u8)>; MAX_REFUSALS],
+    arming: ArmingHandshake,
+    /// The limits that the autopilot's parameters set; its kind's defaults where none was read.
+    limits: AutopilotLimits,
+    /// Which of the limit parameters were read, a bit each (`limits_read`); `limit_requests_left`
+    /// counts the requests for them that may still be sent.
+    limits_read: u16,
+    limit_requests_left: u8,
+    /// Index of the next of the kind's streams to be requested.
+    next_stream: usize,
+}
+
+impl Default for Handshake {
+    fn default() -> Self {
+        let limits = AutopilotKind::default().default_limits();
+        Self {
+            arming: ArmingHandshake::default(),
+            limits,
+            limits_read: 0,
+            limit_requests_left: 0,
+            next_stream: usize::MAX,
+        }
+    }
 }
 
 impl Handshake {
-    /// Clears what belongs to the state `from`; entering `Arming` clears everything.
+    /// State of arming, disarming and flight modes.
+    pub(crate) fn arming(&self) -> &ArmingHandshake {
+        &self.arming
+    }
+
+    /// The limits that the autopilot's parameters set; its kind's defaults where none was read.
+    pub(crate) fn limits(&self) -> &AutopilotLimits {
+        &self.limits
+    }
+
+    /// Clears what belongs to the mission state `from`.
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
-        self.reported = [None; MAX_REFUSALS];
-        if to == State::Arming {
-            let disarmed_z_m = self.disarmed_z_m;
-            *self = Self { in_own_mode: true, disarmed_z_m, ..Self::default() };
-        }
-        if from == State::PilotReturned {
-            self.in_own_mode = true;
-        }
-        if to == State::CancelStart && from != to {
-            self.climb_begun = from.takes_off();
-        }
+        self.arming.reset_for_state(from, to);
     }
 
-    /// Updates [`Self::is_in_own_mode`] and [`Self::has_flown`] from the autopilot's mode, armed
-    /// bit and landing detector.
-    pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry) {
-        let kind = t.kind.unwrap_or_default();
-        let on_ground = t.on_ground != Some(false);
-        self.in_own_mode &=
-            t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
-        if !t.armed {
-            self.disarmed_z_m = t.position.z;
-        } else if !on_ground || t.position.z > self.disarmed_z_m + RISEN_M {
-            self.flown = true;
-        }
-        if state.is_over() && on_ground && !t.armed {
-            self.in_own_mode = false;
-        }
+    /// Updates the handshake from the autopilot's mode, armed bit and landing detector.
+    pub(crate) fn update_mode_and_landed(&mut self, state: State, telemetry: &Telemetry) {
+        self.arming.update_mode_and_landed(state, telemetry);
     }
 
-    /// Whether the autopilot accepted arming 2.5 s (`ARMED_TIMEOUT`) ago or more: HEARTBEAT should
-    /// show the armed bit by now.
-    pub(crate) fn is_armed_bit_overdue(&self, now: Instant) -> bool {
-        self.accepted_at.is_some_and(|at| now - at >= ARMED_TIMEOUT)
-    }
-
-    /// Whether arming has failed for want of an answer: 2.5 s have passed since the last arming
-    /// request, no COMMAND_ACK came, and either two requests were sent or HEARTBEAT was missing
-    /// meanwhile.
-    pub(crate) fn is_arming_unanswered(&self, now: Instant) -> bool {
-        let waited = self.requested_at.is_some_and(|at| now - at >= ARMED_TIMEOUT);
-        let silent = !self.denied && self.accepted_at.is_none();
-        waited && silent && (self.unanswered >= MAX_ARMING_TRIES || self.heartbeat_gap)
-    }
-
-    /// Whether arming has not been requested since the state `Arming` was entered.
-    pub(crate) fn is_arming_unrequested(&self) -> bool {
-        self.requested_at.is_none()
-    }
-
-    /// Whether an arming request is to be sent now; if so, counts it as sent.
-    pub(crate) fn should_request_arming(&mut self, now: Instant, telemetry: &Telemetry) -> bool {
-        let due = match self.requested_at {
-            None => true,
-            Some(at) if self.denied => now - at >= ARMING_RETRY_EVERY,
-            Some(at) => {
-                now - at >= ARMED_TIMEOUT
-                    && self.unanswered < MAX_ARMING_TRIES
-                    && !self.heartbeat_gap
-            }
-        };
-        let asks = due && !telemetry.armed && self.accepted_at.is_none();
-        if asks {
-            (self.requested_at, self.denied, self.heartbeat_gap) = (Some(now), false, false);
-            self.unanswered += 1;
-        }
-        asks
-    }
-
-    /// Whether the autopilot is still in the mode that the companion set: Offboard or Guided, or
-    /// the landing mode after it.
-    pub(crate) fn is_in_own_mode(&self) -> bool {
-        self.in_own_mode
-    }
-
-    /// Whether the landing detector has reported flight while armed, or the vehicle has risen,
-    /// since the state `Arming` was entered.
-    pub(crate) fn has_flown(&self) -> bool {
-        self.flown
-    }
-
-    /// Whether a vehicle whose start is cancelled may be disarmed: it has not risen, and if its
-    /// climb had begun, its position is known now.
-    pub(crate) fn may_disarm_on_pad(&self, now: Instant, telemetry: &Telemetry) -> bool {
-        let seen = telemetry.position_age(now) < MAX_POSITION_AGE;
-        !self.flown && (seen || !self.climb_begun)
-    }
-
-    /// Notes that HEARTBEAT is missing while the vehicle is to be armed.
-    pub(crate) fn note_heartbeat_gap(&mut self) {
-        self.heartbeat_gap = true;
-    }
-
-    /// Handles the autopilot's COMMAND_ACK. Returns a refusal that is to be reported, each command
-    /// and result once in a state: the text, and as its numbers the command and the result.
-    pub(crate) fn handle_ack(
+    /// Requests all streams from the first on, in the following steps. With motors off it also sets
+    /// the limits to their defaults, to be read from the autopilot again, and returns true.
+    /// ArduPilot's `GUID_TIMEOUT` is set too.
+    pub(crate) fn begin_requesting_streams(
         &mut self,
-        state: State,
-        ack: &Ack,
+        telemetry: &Telemetry,
+        s: &HandshakeContext,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) -> bool {
+        self.next_stream = 0;
+        // The limits that bound the setpoints must not change in flight, so they are read before.
+        let reads = !s.state.streams_setpoints() && !telemetry.armed;
+        if reads {
+            self.limits = telemetry.kind().default_limits();
+            (self.limits_read, self.limit_requests_left) = (0, MAX_LIMIT_REQUESTS);
+            timers.set(Timer::Limit, s.now);
+        }
+        timers.set(Timer::Streams, s.now + STREAMS_RETRY_EVERY);
+        if telemetry.kind() == AutopilotKind::ArduPilot {
+            links.push(Link::Autopilot, Outgoing::Parameter("GUID_TIMEOUT", s.guided_timeout_s));
+        }
+        reads
+    }
+
+    /// Requests the next limit parameter that was not read yet, when its time has come.
+    fn request_next_limit(
+        &mut self,
+        kind: AutopilotKind,
         now: Instant,
-    ) -> Option<(&'static str, [u32; 2])> {
-        let refused = !matches!(ack.result, ACCEPTED | IN_PROGRESS);
-        match (state, ack.command) {
-            (State::Arming, ARM_DISARM) if ack.result == ACCEPTED => {
-                self.accepted_at.get_or_insert(now);
+        timers: &mut Timers,
+        links: &mut Links,
+    ) {
+        if self.limit_requests_left == 0 || !timers.is_due(Timer::Limit, now) {
+            return;
+        }
+        let all = kind.limit_parameters();
+        let from = usize::from(self.limit_requests_left);
+        // Parameters are requested in turn, so that one that the autopilot lacks delays no other.
+        let missing = (from..from + all.len())
+            .map(|i| i % all.len())
+            .find(|i| self.limits_read & 1 << i == 0);
+        let Some(limit) = missing.and_then(|i| all.get(i)) else {
+            self.limit_requests_left = 0;
+            return;
+        };
+        self.limit_requests_left -= 1;
+        timers.set(Timer::Limit, now + LIMIT_REQUEST_EVERY);
+        links.push(Link::Autopilot, Outgoing::ReadParameter(limit.name));
+    }
+
+    /// Handles the autopilot's PARAM_VALUE; while armed it is ignored. Returns whether a limit
+    /// changed. It is decoded field by field: a `MAV_PARAM_TYPE` newer than the crate's must not
+    /// hide the value.
+    pub(crate) fn handle_param_value(&mut self, telemetry: &Telemetry, frame: &Frame) -> bool {
+        const ID: core::ops::Range<usize> = 8..24;
+        let p = frame.padded_payload();
+        let value = f32::from_le_bytes([p[0], p[1], p[2], p[3]]);
+        let name = p[ID].split(|b| *b == 0).next().unwrap_or_default();
+        let mut changed = false;
+        for (i, limit) in telemetry.kind().limit_parameters().iter().enumerate() {
+            if limit.name.as_bytes() == name && p[24] == PARAM_TYPE_REAL32 && !telemetry.armed {
+                self.limits_read |= 1 << i;
+                changed |= self.limits.set(limit, value);
             }
-            (State::Arming, ARM_DISARM) if refused => (self.denied, self.unanswered) = (true, 0),
+        }
+        changed
+    }
+
+    /// Sends the requests that are due by time and mission state. Returns whether the limits were
+    /// set to their defaults, so that the caller must use the new ones.
+    pub(crate) fn send_due_requests(
+        &mut self,
+        telemetry: &Telemetry,
+        s: &HandshakeContext,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) -> bool {
+        let (now, kind) = (s.now, telemetry.kind());
+        let heard = telemetry.heartbeat_at.is_some();
+        let silent = telemetry.heartbeat_age(now) > MAX_HEARTBEAT_AGE;
+        if silent && s.state == State::Disarm {
+            // Reports from before the silence no longer count.
+            timers.set(Timer::Request, now + DISARM_EVERY);
+        }
+        if heard {
+            self.request_next_limit(kind, now, timers, links);
+        }
+        let lost = !silent && telemetry.position_age(now) > POSITION_STREAM_TIMEOUT;
+        let limits_reset = lost
+            && timers.is_due(Timer::Streams, now)
+            && self.begin_requesting_streams(telemetry, s, timers, links);
+        let doubts = telemetry.is_origin_doubtful();
+        if heard && (doubts || telemetry.ekf_origin.is_none()) && timers.is_due(Timer::Origin, now)
+        {
+            timers.set(
+                Timer::Origin,
+                now + if doubts { ORIGIN_RETRY_EVERY } else { REQUEST_RETRY_EVERY },
+            );
+            links.push(Link::Autopilot, Outgoing::Request(GPS_GLOBAL_ORIGIN));
+        }
+        for _ in 0..STREAM_REQUESTS_PER_STEP {
+            if let Some(&(id, interval_us)) = kind.streams().get(self.next_stream) {
+                links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
+                self.next_stream += 1;
+            }
+        }
+        if heard && !silent && timers.is_due(Timer::Streams, now) {
+            self.request_lost_streams(telemetry, now, timers, links);
+        }
+        if s.state == State::Arming {
+            if silent {
+                self.arming.note_heartbeat_gap();
+            }
+            if s.column_clear && self.arming.should_request_arming(now, telemetry) {
+                links.push(Link::Autopilot, Outgoing::Arm(true));
+            }
+        } else {
+            self.request_for_state(telemetry, s, timers, links);
+        }
+        limits_reset
+    }
+
+    /// Requests the change of mode, take-off or disarming that the mission state waits for.
+    fn request_for_state(
+        &self,
+        telemetry: &Telemetry,
+        s: &HandshakeContext,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) {
+        let looks = s.state == State::Land && !s.may_land;
+        if looks || !timers.take_due(Timer::Request, s.now, REQUEST_RETRY_EVERY) {
+            return;
+        }
+        let (kind, mode) = (telemetry.kind(), telemetry.custom_mode);
+        let change_to = |custom_mode| {
+            let (main, sub) = kind.mode_params(custom_mode);
+            Outgoing::Mode(main, sub)
+        };
+        let mut push = |request| links.push(Link::Autopilot, request);
+        match s.state {
+            State::Engaging => push(change_to(kind.setpoint_mode())),
+            // The HEARTBEAT at hand may be older than the landing mode that was requested before.
+            State::LandingHeld
+                if s.in_state < MAX_HEARTBEAT_AGE || mode != kind.setpoint_mode() =>
+            {
+                push(change_to(kind.setpoint_mode()));
+            }
+            State::CancelStart if self.arming.may_disarm_on_pad(s.now, telemetry) => {
+                push(Outgoing::Arm(false));
+            }
+            State::TakeOff => {
+                timers.set(Timer::Request, s.now + TAKE_OFF_RETRY_EVERY);
+                push(Outgoing::TakeOff(telemetry.above_home_m + s.climb_m));
+            }
+            State::Land if mode != kind.land_mode() => push(change_to(kind.land_mode())),
+            State::Disarm => {
+                timers.set(Timer::Request, s.now + DISARM_EVERY);
+                push(Outgoing::Arm(false));
+            }
             _ => {}
         }
-        let refusal = Some((ack.command, ack.result));
-        let reports = matches!(ack.command, DO_SET_MODE | ARM_DISARM | NAV_TAKEOFF);
-        if !refused || !reports || self.reported.contains(&refusal) {
-            return None;
-        }
-        *self.reported.iter_mut().find(|slot| slot.is_none())? = refusal;
-        let text = match ack.command {
-            DO_SET_MODE => "Autopilot refuses the mode: # (result #)",
-            ARM_DISARM => "Autopilot refuses to arm or disarm: # (result #)",
-            _ => "Autopilot refuses to take off: # (result #)",
-        };
-        Some((text, [u32::from(ack.command), u32::from(ack.result)]))
     }
+
+    /// Requests again each stream that has been silent for 4 s (`STREAM_LOST_AFTER`) or never came,
+    /// while HEARTBEAT is heard.
+    fn request_lost_streams(
+        &self,
+        telemetry: &Telemetry,
+        now: Instant,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) {
+        let streams = telemetry.kind().streams();
+        if self.next_stream < streams.len() {
+            return;
+        }
+        for &(id, interval_us) in streams.iter().filter(|(_, interval_us)| *interval_us > 0.0) {
+            if telemetry.stream_age(u32::from(id), now) > STREAM_LOST_AFTER {
+                timers.set(Timer::Streams, now + STREAMS_RETRY_EVERY);
+                links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
+            }
+        }
+    }
+
+    /// Handles the autopilot's COMMAND_ACK if it is addressed to this companion or to nobody, and
+    /// reports a refusal on both links; `own` is this vehicle's system id.
+    pub(crate) fn handle_ack(
+        &mut self,
+        ack: &Ack,
+        own: u8,
+        state: State,
+        now: Instant,
+        links: &mut Links,
+    ) {
+        if ack.to != (0, 0) && ack.to != (own, COMPANION_COMPONENT) {
+            return;
+        }
+        if let Some((text, numbers)) = self.arming.handle_ack(state, ack, now) {
+            links.send_text_with_numbers(Severity::Warning, text, numbers);
+        }
+    }
+}
+
+impl HandshakeContext {
+    /// Whether, after this time in the state, the column below has been checked for long enough,
+    /// 0.1 s (`LAND_REQUEST_AFTER`), to request the landing mode if it is clear.
+    pub(crate) fn is_column_checked(in_state: Duration) -> bool {
+        in_state >= LAND_REQUEST_AFTER
+    }
+}
+
+/// Whether SYS_STATUS with the battery's charge was received in the last 5 s (`MAX_BATTERY_AGE`);
+/// also true where the charge is not checked, with `low_percent` ≤ 0.
+pub(crate) fn is_battery_known(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
+    low_percent <= 0 || telemetry.stream_age(SYS_STATUS_DATA::ID, now) <= MAX_BATTERY_AGE
 }

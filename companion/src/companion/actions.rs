@@ -2,7 +2,7 @@
 
 use super::Companion;
 use super::division::CANNOT_START_MOST;
-use crate::autopilot::requests::DISARM_EVERY;
+use crate::autopilot::handshake::DISARM_EVERY;
 use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::severity::Severity;
@@ -33,7 +33,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let after_search = if lands { State::Land } else { State::Blocked };
         let (from, to) =
             self.mission.enter_state(row, self.telemetry.custom_mode, after_search, now);
-        self.requests.reset_for_state(from, to);
+        self.handshake.reset_for_state(from, to);
         self.run_action(from, to, row);
         // Leaving a replanning state ends the search for a detour.
         if from.waits_for_detour() {
@@ -142,7 +142,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let position = self.telemetry.position;
         // Others avoid the place where an unheard vehicle may be on the ground, so setpoints guide
         // it straight down. A held landing continues as it began: by setpoints or the autopilot.
-        if from == Alone || (from == LandingHeld && self.guidance.is_guiding_landing()) {
+        if from == SwarmLinkLost || (from == LandingHeld && self.guidance.is_guiding_landing()) {
             return self.guidance.begin_guided_landing(self.now);
         }
         self.guidance.end_guided_landing();

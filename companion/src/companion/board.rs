@@ -24,7 +24,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Applies the parameters to the settings, and the settings to guidance.
     pub(crate) fn apply_parameters(&mut self) {
         self.services.apply_parameters(&mut self.config);
-        self.guidance.set_limits(&self.config, self.requests.limits());
+        self.guidance.set_limits(&self.config, self.handshake.limits());
     }
 
     /// The next flash operation for the shell; `None` where there is none. Each is returned once;

@@ -9,8 +9,8 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::guidance::GuidanceInputs;
 use crate::replanning::detour::Detours;
-use crate::replanning::detour::asking::RetryOutlook;
 use crate::replanning::detour::path_kind::{DetourPurpose, RejoinPlace, RejoinPlaces};
+use crate::replanning::detour::searches::RetryOutlook;
 use crate::replanning::view::DetourView;
 use crate::state::State;
 

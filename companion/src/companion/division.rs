@@ -7,7 +7,7 @@ use planner_core::{Length, Point};
 use super::Companion;
 use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
-use crate::link::roster::MemberStatus;
+use crate::link::roster::FlightStatus;
 use crate::link::severity::Severity;
 use crate::replanning::detour::path_kind::RejoinPlace;
 use crate::state::State;
@@ -122,9 +122,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let descends = self.guidance.along_m() > self.last_descent_start_m() + AT_HOLD_M;
         let nearly_down = flies && descends && !on_pad && self.division_hold_m().is_none();
         let standing = match ends || nearly_down {
-            true if self.mission.has_all_pictures(along_m) => MemberStatus::Finished,
-            _ if ends => MemberStatus::Left,
-            _ => MemberStatus::Alive,
+            true if self.mission.has_all_pictures(along_m) => FlightStatus::Finished,
+            _ if ends => FlightStatus::Left,
+            _ => FlightStatus::Alive,
         };
         OwnReport {
             status: standing,

@@ -8,7 +8,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::{Companion, REPORT_EVERY};
-use crate::autopilot::requests::ORIGIN_RETRY_EVERY;
+use crate::autopilot::handshake::ORIGIN_RETRY_EVERY;
 use crate::autopilot::telemetry::TelemetryChange;
 use crate::events::Link;
 use crate::link::answer_limits::{AnswerKind, SenderKind};
@@ -115,9 +115,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Handles a parameter of this vehicle's autopilot: its limits may follow from it.
     fn handle_autopilot_parameter(&mut self, frame: &Frame) {
-        let changed = self.requests.handle_param_value(&self.telemetry, frame);
+        let changed = self.handshake.handle_param_value(&self.telemetry, frame);
         if changed && !self.mission.state().streams_setpoints() {
-            self.guidance.set_limits(&self.config, self.requests.limits());
+            self.guidance.set_limits(&self.config, self.handshake.limits());
         }
     }
 
@@ -131,10 +131,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let change = self.telemetry.handle_frame(now, &self.config.origin, frame);
         if let Some(ack) = self.telemetry.take_ack() {
             let state = self.mission.state();
-            self.requests.handle_ack(&ack, heard.own, state, now, &mut self.links);
+            self.handshake.handle_ack(&ack, heard.own, state, now, &mut self.links);
             self.mission.handle_ack(&ack, &mut self.links);
         }
-        self.requests.update_mode_and_landed(self.mission.state(), &self.telemetry);
+        self.handshake.update_mode_and_landed(self.mission.state(), &self.telemetry);
         match change {
             TelemetryChange::OriginDoubted => {
                 self.timers.set_no_later(Timer::Origin, now + ORIGIN_RETRY_EVERY);

@@ -3,7 +3,7 @@
 use planner_core::{Length, Point};
 
 use super::{Companion, HEARTBEAT_EVERY};
-use crate::autopilot::requests::is_battery_known;
+use crate::autopilot::handshake::is_battery_known;
 use crate::autopilot::telemetry::MAX_POSITION_AGE;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
@@ -48,7 +48,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(crate) fn guard_inputs(&self) -> GuardInputs {
         let (t, now, view) = (&self.telemetry, self.now, self.detour_view());
         let scene = &view.scene;
-        let (kind, handshake) = (self.autopilot_kind(), self.requests.handshake());
+        let (kind, handshake) = (self.autopilot_kind(), self.handshake.arming());
         let offboard = t.custom_mode == kind.setpoint_mode();
         let mode_foreign = match self.mission.state() {
             state if state.is_before_arming() => {

@@ -85,14 +85,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.note_barred_start();
         self.run_mission_table();
         self.step_task();
-        let situation = self.request_context();
-        if self.requests.send_due_requests(
+        let situation = self.handshake_context();
+        if self.handshake.send_due_requests(
             &self.telemetry,
             &situation,
             &mut self.timers,
             &mut self.links,
         ) {
-            self.guidance.set_limits(&self.config, self.requests.limits());
+            self.guidance.set_limits(&self.config, self.handshake.limits());
         }
         let flows = self.mission.state().streams_setpoints();
         let every = if flows {

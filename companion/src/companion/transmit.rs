@@ -258,9 +258,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let on_plan = !self.guidance.returning
             && self.mission.state().is_on_plan()
-            // In `Alone` a vehicle that may fly on unheard waits for its gates, so it still follows
-            // the plan.
-            || self.mission.state() == Alone && self.may_fly_unheard()
+            // In `SwarmLinkLost` a vehicle that may fly on unheard waits for its gates, so it still
+            // follows the plan.
+            || self.mission.state() == SwarmLinkLost && self.may_fly_unheard()
             || (self.mission.state().lands() || self.mission.state().has_landed())
                 && self.guidance.is_at_goal(&self.guidance_inputs());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };

@@ -19,7 +19,7 @@ use planner_core::track::ReferenceState;
 use planner_core::track::deconflict::Neighbour;
 use planner_core::{Length, Point};
 
-use crate::swarm::sweep::IncrementalScan;
+use crate::swarm::incremental_scan::IncrementalScan;
 
 /// Drift of the vehicle that descends and sway of the one below, together, metres: kept beyond the
 /// safety distance.

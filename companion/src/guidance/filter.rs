@@ -12,7 +12,7 @@
 //! within reach; more than four of those stop the vehicle.
 
 mod conflict;
-mod look;
+mod step;
 
 use crate::config::limits::Urgency;
 use crate::time::{Duration, Instant};

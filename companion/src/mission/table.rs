@@ -103,7 +103,7 @@ pub(crate) const FLYING: &[State] = &[
     Climb,
     Follow,
     Paused,
-    Alone,
+    SwarmLinkLost,
     Blocked,
     Replanning,
     Dividing,
@@ -113,16 +113,26 @@ pub(crate) const FLYING: &[State] = &[
     PositionLost,
 ];
 /// States of [`FLYING`] in which the autopilot is heard and its position is known.
-pub(crate) const FLYING_WITH_POSITION: &[State] =
-    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping, LandingHeld];
+pub(crate) const FLYING_WITH_POSITION: &[State] = &[
+    TakeOff,
+    Climb,
+    Follow,
+    Paused,
+    SwarmLinkLost,
+    Blocked,
+    Replanning,
+    Dividing,
+    Stopping,
+    LandingHeld,
+];
 /// States of [`FLYING_WITH_POSITION`] on the path, moving or standing: the vehicle can brake along
 /// its path.
 pub(crate) const ON_PATH_WITH_POSITION: &[State] =
-    &[Follow, Paused, Alone, Blocked, Replanning, Dividing];
+    &[Follow, Paused, SwarmLinkLost, Blocked, Replanning, Dividing];
 
 /// States of [`FLYING_WITH_POSITION`] in which no landing has begun.
 pub(crate) const FLYING_BEFORE_LANDING: &[State] =
-    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping];
+    &[TakeOff, Climb, Follow, Paused, SwarmLinkLost, Blocked, Replanning, Dividing, Stopping];
 
 /// States of [`FLYING`] in which the autopilot does not count as silent.
 pub(crate) const FLYING_LINKED: &[State] = &[
@@ -130,7 +140,7 @@ pub(crate) const FLYING_LINKED: &[State] = &[
     Climb,
     Follow,
     Paused,
-    Alone,
+    SwarmLinkLost,
     Blocked,
     Replanning,
     Dividing,
@@ -269,8 +279,8 @@ pub static TABLE: &[TransitionRow] = &[
     info_row(&[Climb],               G::PausedBeforeLiftOff, AT_ONCE, CancelStart, A::RequestDisarming, "Paused on the pad"),
     // PX4 disarms after 10 s on the ground.
     warning_row(&[Climb],            G::BarredBeforeLiftOff, secs(4), CancelStart, A::RequestDisarming, "Vehicle above the pad: start waits"),
-    info_row(&[Climb, Follow, Alone, Blocked, Replanning, Dividing], G::PauseCommanded, AT_ONCE, Paused, A::BrakeOnPath, "Paused"),
-    warning_row(&[Follow, Blocked, Dividing], G::NeighboursSilent, secs(1), Alone, A::BrakeOnPath,      "Neighbours silent: stopping"),
+    info_row(&[Climb, Follow, SwarmLinkLost, Blocked, Replanning, Dividing], G::PauseCommanded, AT_ONCE, Paused, A::BrakeOnPath, "Paused"),
+    warning_row(&[Follow, Blocked, Dividing], G::NeighboursSilent, secs(1), SwarmLinkLost, A::BrakeOnPath,      "Neighbours silent: stopping"),
     // Neighbours assume after a while that an unheard vehicle is down: no state keeps it up longer.
     warning_row(&[Paused, AutopilotSilent], G::NeighboursSilent, secs(20), Land,  A::RequestLandMode,   "Neighbours silent while it stands: landing"),
     warning_row(&[TakeOff, Climb],   G::LeaseLost,       secs(20),   Land,        A::RequestLandMode,   "Neighbours silent in the climb: landing"),
@@ -297,10 +307,10 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Replanning],       G::Elapsed,         secs(5),    Blocked,     A::NoteDetourFailure, "The way around is late"),
     resume_row(&[Paused],            G::ResumeCommanded, AT_ONCE,    A::Rejoin,                         "Resumed"),
     warning_row(&[Paused],           G::Elapsed,         secs(600),  Land,        A::RequestLandMode,   "Paused for 10 min: landing"),
-    info_row(&[Alone],               G::NeighbourHeard,  AT_ONCE,    Follow,      A::FollowPath,        "Neighbours heard again"),
-    info_row(&[Alone],               G::MayFlyUnheard,   AT_ONCE,    Follow,      A::FollowPath,        "Gates open: flying on unheard"),
-    warning_row(&[Alone],            G::OutOfRange,      secs(16),   Land,        A::RequestLandMode,   "Still out of range: landing"),
-    warning_row(&[Alone],            G::Elapsed,         secs(20),   Land,        A::RequestLandMode,   "Neighbours still silent: landing"),
+    info_row(&[SwarmLinkLost],               G::NeighbourHeard,  AT_ONCE,    Follow,      A::FollowPath,        "Neighbours heard again"),
+    info_row(&[SwarmLinkLost],               G::MayFlyUnheard,   AT_ONCE,    Follow,      A::FollowPath,        "Gates open: flying on unheard"),
+    warning_row(&[SwarmLinkLost],            G::OutOfRange,      secs(16),   Land,        A::RequestLandMode,   "Still out of range: landing"),
+    warning_row(&[SwarmLinkLost],            G::Elapsed,         secs(20),   Land,        A::RequestLandMode,   "Neighbours still silent: landing"),
     info_row(&[AutopilotSilent],     G::AutopilotHeard,  AT_ONCE,    PositionLost, A::BrakeOnPath,      "Autopilot heard again"),
     warning_row(&[AutopilotSilent],  G::Elapsed,         secs(60),   Land,        A::RequestLandMode,   "Autopilot still silent: landing"),
     resume_row(&[PositionLost],      G::BackOnPath,      AT_ONCE,    A::Rejoin,                         "Position known again"),

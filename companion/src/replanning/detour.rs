@@ -20,12 +20,12 @@
 //! In a coverage mission there is no roadmap and no turn: a stopped vehicle flies around the
 //! obstacle and back to its path ([`beside`]), or home ([`homeward`]). ENU metres.
 
-pub(crate) mod asking;
 mod beside;
 mod homeward;
 pub(crate) mod path_kind;
 mod rejoining;
 mod reported;
+pub(crate) mod searches;
 
 use planner_core::detour;
 use planner_core::geo::frames::Geodetic;
@@ -38,8 +38,8 @@ use crate::link::commands::{ACCEPTED, Command};
 use crate::replanning::obstacles::Obstacles;
 use crate::replanning::view::DetourView;
 use crate::state::State;
+use crate::swarm::incremental_scan::IncrementalScan;
 use crate::swarm::neighbours::MAX_HOVER_MPS;
-use crate::swarm::sweep::IncrementalScan;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
@@ -371,12 +371,12 @@ impl Detours {
         let near_m = if stands { SWAY_ASIDE_M } else { 0.0 };
         let length_m = view.mission.plan().map_or(0.0, |plan| plan.path.length_m());
         let at_end = view.guidance.along_m() >= length_m - near_m;
-        let astray = match self.path_kind {
+        let off_plan = match self.path_kind {
             _ if self.seeks_landing() => false,
             PathKind::Plan | PathKind::PlanReady => self.left_plan,
             PathKind::Detour(DetourPurpose::Aside(_)) => at_end,
             PathKind::Detour(_) => false,
-            PathKind::Astray => true,
+            PathKind::OffPlan => true,
         };
         let dead_end = self.is_stopped_by_others(view)
             && !Self::is_freed_over_area(view)
@@ -384,8 +384,8 @@ impl Detours {
         let blocked = view.mission.state() == State::Blocked;
         let free = if blocked { BLOCKED_HINDERED_WITHIN } else { UNBLOCKED_HINDERED_WITHIN };
         let stopped = self.is_stopped_for_long(view, free);
-        self.blocked =
-            !view.guidance.returning && (stuck || astray || dead_end || stopped || self.obstructed);
+        self.blocked = !view.guidance.returning
+            && (stuck || off_plan || dead_end || stopped || self.obstructed);
         let along_m = view.guidance.along_m();
         if self.blocked
             && self.blocked_here.is_none_or(|(at_m, _)| along_m > at_m + BLOCKED_AGAIN_M)

@@ -13,14 +13,15 @@
 //! now is not answered: the client repeats it. There is one session at a time, and one request at a
 //! time; others wait in a short queue. A reply that needs the flash is sent when the flash is done.
 
-mod memory;
+mod burst;
+mod duplicates;
 mod packet;
 mod reply;
-mod stream;
 
 use heapless::Deque;
 
-use self::memory::DuplicateDetection;
+use self::burst::{FtpBurst, next_request};
+use self::duplicates::DuplicateDetection;
 #[cfg(test)]
 pub(crate) use self::packet::FTP_TEXTS;
 pub use self::packet::MAX_DATA;
@@ -28,9 +29,8 @@ use self::packet::{
     ACK, EFBIG, EIO, FILE_REMOVED, FtpRequest, HEADER_LEN, NakError, Text, chunk_len,
     format_decimal, is_open, op, upload_text,
 };
-use self::stream::{FtpBurst, next_request};
 use crate::link::frame::Frame;
-use crate::storage::store::window::PieceOutcome;
+use crate::storage::store::reassembly::PieceOutcome;
 use crate::storage::store::{ErasePermission, File, ReadOutcome, Store, UploadError, UploadState};
 use crate::time::{Duration, Instant};
 

@@ -72,7 +72,7 @@ impl InterruptedStates {
             Climb => "Interrupted: Climb",
             Follow => "Interrupted: Follow",
             Paused => "Interrupted: Paused",
-            Alone => "Interrupted: Alone",
+            SwarmLinkLost => "Interrupted: SwarmLinkLost",
             Blocked => "Interrupted: Blocked",
             Dividing => "Interrupted: Dividing",
             Stopping => "Interrupted: Stopping",

@@ -15,30 +15,30 @@
 //! A roadmap is used in place. So the slot that a companion uses since its start is not written
 //! before the next start; a newer roadmap or mission takes effect then.
 
-pub mod area;
 pub mod flash;
+pub mod flash_area;
 mod job;
 mod jobs;
 mod journal;
 mod keeping;
 mod mounting;
+pub mod reassembly;
 mod records;
 mod upload;
 mod upload_state;
-pub mod window;
 
 use core::ops::Range;
 
-use self::area::{AreaCondition, FlashArea, Seal};
 pub(crate) use self::flash::crc32;
 pub use self::flash::{
     ErasePermission, File, FlashFault, FlashLayout, FlashRequest, MAX_PROGRAM, MAX_READ, ReadFlash,
     ReadOutcome, WORD,
 };
+use self::flash_area::{AreaCondition, FlashArea, Seal};
 use self::job::FlashJob;
 use self::journal::Journal;
+use self::reassembly::UploadReassembly;
 pub use self::upload_state::{UploadError, UploadState};
-use self::window::UploadReassembly;
 use crate::config::parameters::Parameters;
 
 /// Record of the photographed waypoints of an area, as [`crate::mission::photographed`] writes it.
@@ -74,7 +74,7 @@ impl Store {
     /// parameters and photographed waypoints. It reads whole slots to check their CRC, so it takes
     /// milliseconds.
     pub fn mount(layout: FlashLayout, flash: &mut impl ReadFlash) -> Self {
-        let slots = [0, 1].map(|i| area::read_condition(&layout, FlashArea::Slot(i), flash));
+        let slots = [0, 1].map(|i| flash_area::read_condition(&layout, FlashArea::Slot(i), flash));
         let mut store = Self {
             layout,
             slots,

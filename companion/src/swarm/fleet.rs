@@ -14,7 +14,7 @@
 use heapless::Vec;
 use planner_core::file::CRC32;
 
-use crate::link::roster::{MemberStatus, RosterReportEntry};
+use crate::link::roster::{FlightStatus, RosterReportEntry};
 use crate::time::{Duration, Instant};
 
 mod division_input;
@@ -55,7 +55,7 @@ pub enum StartStatus {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnReport {
     /// Whether this vehicle takes part in the mission, was lost, has left or has finished.
-    pub status: MemberStatus,
+    pub status: FlightStatus,
     /// Whether this vehicle was not started yet: it may take part again as a new vehicle.
     pub waits: bool,
     /// Whether this vehicle is in the air.
@@ -76,7 +76,7 @@ pub struct OwnReport {
 
 /// Reception of another vehicle: whether this one and others hear it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MemberReception {
+pub struct VehicleReception {
     /// When this vehicle last received an intent from the other one.
     pub heard_at: Option<Instant>,
     /// Whether the other vehicle lately reported that it hears this one.
@@ -88,7 +88,7 @@ pub struct MemberReception {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-struct FleetMember {
+struct FleetVehicle {
     entry: RosterReportEntry,
     /// Whether the member has a part: it was alive when the last division became binding.
     has_part: bool,
@@ -100,9 +100,9 @@ struct FleetMember {
     hash: u32,
 }
 
-impl FleetMember {
+impl FleetVehicle {
     fn takes_part(&self) -> bool {
-        self.has_part && self.entry.status == MemberStatus::Alive
+        self.has_part && self.entry.status == FlightStatus::Alive
     }
 }
 
@@ -110,7 +110,7 @@ impl FleetMember {
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Fleet<const V: usize> {
     own: u8,
-    members: Vec<FleetMember, V>,
+    members: Vec<FleetVehicle, V>,
     /// Inputs of the binding divisions, oldest first.
     divisions: Vec<DivisionInputs<V>, MAX_DIVISIONS>,
     committed_hash: u32,
@@ -147,7 +147,7 @@ pub struct Fleet<const V: usize> {
 impl<const V: usize> Fleet<V> {
     /// A fleet of `count` vehicles (at most `V`), as known to the vehicle of rank `own`.
     pub fn new(own: usize, count: usize, limits: FleetTimeouts) -> Self {
-        let member = FleetMember { has_part: true, ..FleetMember::default() };
+        let member = FleetVehicle { has_part: true, ..FleetVehicle::default() };
         Self {
             own: own as u8,
             members: core::iter::repeat_n(member, count.min(V)).collect(),
@@ -176,7 +176,7 @@ impl<const V: usize> Fleet<V> {
     /// new incarnation number.
     pub fn begin_flight(&mut self, now: Instant) {
         let entry = self.members[usize::from(self.own)].entry;
-        if entry.status != MemberStatus::Alive || self.excluded || !self.divisions.is_empty() {
+        if entry.status != FlightStatus::Alive || self.excluded || !self.divisions.is_empty() {
             self.rejoin((entry.incarnation + 1) % INCARNATIONS);
         }
         self.forget_plan();
@@ -209,9 +209,9 @@ impl<const V: usize> Fleet<V> {
     /// the plan that this vehicle holds. When each other one was heard last stays known: otherwise
     /// all would count as lost.
     fn rejoin(&mut self, incarnation: u8) {
-        let fresh = FleetMember { has_part: true, ..FleetMember::default() };
+        let fresh = FleetVehicle { has_part: true, ..FleetVehicle::default() };
         for member in &mut self.members {
-            *member = FleetMember { heard_at: member.heard_at, ..fresh };
+            *member = FleetVehicle { heard_at: member.heard_at, ..fresh };
         }
         *self = Self {
             members: core::mem::take(&mut self.members),
@@ -232,19 +232,19 @@ impl<const V: usize> Fleet<V> {
         &mut self,
         now: Instant,
         own: &OwnReport,
-        hearing: impl Fn(usize) -> MemberReception,
+        hearing: impl Fn(usize) -> VehicleReception,
     ) {
         (self.airborne, self.down_at, self.any_missing) = (own.airborne, Instant::ZERO, false);
         // This vehicle may not yet have the path of the last division.
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[usize::from(self.own)].entry;
         // The path of a vehicle that has left is no part of its share: its progress does not count.
-        if caught_up && entry.status == MemberStatus::Alive {
+        if caught_up && entry.status == FlightStatus::Alive {
             entry.progress_dm = entry.progress_dm.max(own.progress_dm);
         }
         let status = if caught_up { own.status } else { own.status.in_another_division() };
         entry.status = entry.status.max(status);
-        let takes_off = !own.waits && entry.status == MemberStatus::Alive;
+        let takes_off = !own.waits && entry.status == FlightStatus::Alive;
         let bit = self.own_bit();
         self.in_flight = if takes_off { self.in_flight | bit } else { self.in_flight & !bit };
         self.hear_flight &= !bit;
@@ -259,7 +259,7 @@ impl<const V: usize> Fleet<V> {
             member.heard_itself = lately;
             let (silence, bit) = (now - member.heard_at, 1 << rank.min(31));
             if silence >= MISSED_AFTER && member.has_part {
-                let falls = member.entry.status <= MemberStatus::Lost;
+                let falls = member.entry.status <= FlightStatus::Lost;
                 let down_at = member.heard_at + self.limits.down;
                 self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
             }
@@ -270,7 +270,7 @@ impl<const V: usize> Fleet<V> {
                 self.hear_flight &= !bit;
                 // A majority has counted the vehicle as lost, so it has landed; or its battery is
                 // empty.
-                let lost = member.entry.status == MemberStatus::Lost;
+                let lost = member.entry.status == FlightStatus::Lost;
                 if (lost && silence >= self.limits.down) || silence >= LANDED_AFTER_SILENCE {
                     self.in_flight &= !bit;
                 }
@@ -302,7 +302,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Ranks of the other vehicles that this one knows to be in flight, as bits.
     fn heard_flights(&self) -> u32 {
-        let counts = |rank: &usize| self.members[*rank].entry.status <= MemberStatus::Lost;
+        let counts = |rank: &usize| self.members[*rank].entry.status <= FlightStatus::Lost;
         let known = (0..self.members.len()).filter(counts).fold(0, |bits, rank| bits | 1 << rank);
         self.in_flight & known & !self.own_bit()
     }
@@ -326,10 +326,10 @@ impl<const V: usize> Fleet<V> {
     /// commitment. A commitment binds until a division does, even if the lost vehicle turns out to
     /// have finished: others may already count on it.
     pub fn is_dividing(&self) -> bool {
-        let asks = |m: &FleetMember| match m.entry.status {
-            MemberStatus::Alive => m.entry.commitment_dm.is_some(),
-            MemberStatus::Lost | MemberStatus::Left => true,
-            MemberStatus::Finished => false,
+        let asks = |m: &FleetVehicle| match m.entry.status {
+            FlightStatus::Alive => m.entry.commitment_dm.is_some(),
+            FlightStatus::Lost | FlightStatus::Left => true,
+            FlightStatus::Finished => false,
         };
         let asked = self.members.iter().any(|m| m.has_part && asks(m));
         self.is_alive(usize::from(self.own)) && !self.idle && !self.divisions.is_full() && asked
@@ -343,10 +343,10 @@ impl<const V: usize> Fleet<V> {
     /// Computes the inputs of the division, once all vehicles that live have reported commitments,
     /// and this vehicle has not heard the lost ones for [`SILENT_AFTER`] either.
     fn prepare_division_inputs(&mut self, now: Instant) {
-        let known = |m: &FleetMember| match m.entry.status {
-            MemberStatus::Alive => m.entry.commitment_dm.is_some(),
-            MemberStatus::Lost => now - m.heard_at >= self.limits.silent,
-            MemberStatus::Left | MemberStatus::Finished => true,
+        let known = |m: &FleetVehicle| match m.entry.status {
+            FlightStatus::Alive => m.entry.commitment_dm.is_some(),
+            FlightStatus::Lost => now - m.heard_at >= self.limits.silent,
+            FlightStatus::Left | FlightStatus::Finished => true,
         };
         if !self.has_lease(now) || !self.members.iter().filter(|m| m.has_part).all(known) {
             self.withdraw_inputs();
@@ -354,7 +354,7 @@ impl<const V: usize> Fleet<V> {
             return;
         }
         // A vehicle that has no part since an earlier division gets none in this one.
-        let input = |m: &FleetMember| {
+        let input = |m: &FleetVehicle| {
             if m.has_part { DivisionInput::from_entry(&m.entry) } else { DivisionInput::default() }
         };
         if !self.members.iter().map(input).eq(self.division_inputs.iter().copied()) {
@@ -404,8 +404,8 @@ impl<const V: usize> Fleet<V> {
             let member = &self.members[rank];
             member.hash == self.hash && member.entry.holds
         };
-        let is_down = |m: &FleetMember| {
-            m.entry.status != MemberStatus::Lost || now - m.heard_at >= self.limits.down
+        let is_down = |m: &FleetVehicle| {
+            m.entry.status != FlightStatus::Lost || now - m.heard_at >= self.limits.down
         };
         self.hash != 0
             && self.members.iter().filter(|m| m.has_part).all(is_down)
@@ -445,7 +445,7 @@ impl<const V: usize> Fleet<V> {
         (self.introduced, self.down_at, self.any_missing) = (u32::MAX, Instant::ZERO, false);
         self.lease_at = moved(self.lease_at, Duration::from_micros(2 * lease.as_micros()));
         for member in &mut self.members {
-            let counts = member.has_part && member.entry.status <= MemberStatus::Lost;
+            let counts = member.has_part && member.entry.status <= FlightStatus::Lost;
             member.heard_at = if counts { moved(member.heard_at, silent.max(down)) } else { then };
         }
     }

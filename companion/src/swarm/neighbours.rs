@@ -8,11 +8,11 @@
 //! the result.
 
 mod bounds;
-mod contact;
+mod dead_reckoning;
 mod division;
 mod echoes;
 mod entry;
-pub(crate) mod met;
+pub(crate) mod filter_neighbour;
 mod places;
 mod range;
 mod reach;
@@ -42,9 +42,9 @@ use crate::time::{Duration, Instant};
 /// kept, in entries that the roster leaves free, until they are silent for a minute.
 #[derive(Clone, Debug)]
 pub struct Neighbours<const V: usize> {
-    contacts: Vec<NeighbourEntry, V>,
+    entries: Vec<NeighbourEntry, V>,
     states: Vec<Neighbour, V>,
-    /// Number of roster vehicles in `contacts`, sorted by id; behind them are the strangers.
+    /// Number of roster vehicles in `entries`, sorted by id; behind them are the strangers.
     roster_count: usize,
     dropped: u16,
     /// When the last scan began that found no vehicle out of the plan on the path.
@@ -81,7 +81,7 @@ impl<const V: usize> Neighbours<V> {
     /// of the whole mission, so that all vehicles judge a report alike.
     pub fn new(roster: &[RosterEntry], own_id: u8, slowest_mps: f32, fastest_mps: f32) -> Self {
         let mut table = Self {
-            contacts: Vec::new(),
+            entries: Vec::new(),
             states: Vec::new(),
             roster_count: 0,
             dropped: 0,
@@ -103,10 +103,10 @@ impl<const V: usize> Neighbours<V> {
                 table.own_rank = rank as u16;
             } else {
                 // A roster of at most V entries fits.
-                let _ = table.add_contact(entry.system_id, rank as u16);
+                let _ = table.add_entry(entry.system_id, rank as u16);
             }
         }
-        table.roster_count = table.contacts.len();
+        table.roster_count = table.entries.len();
         table
     }
 
@@ -115,23 +115,23 @@ impl<const V: usize> Neighbours<V> {
         self.dropped
     }
 
-    fn add_contact(&mut self, id: u8, rank: u16) -> Option<usize> {
-        let contact = NeighbourEntry::unheard(id, rank, self.assumed_speed_mps);
-        self.contacts.push(contact).ok()?;
-        Some(self.contacts.len() - 1)
+    fn add_entry(&mut self, id: u8, rank: u16) -> Option<usize> {
+        let entry = NeighbourEntry::unheard(id, rank, self.assumed_speed_mps);
+        self.entries.push(entry).ok()?;
+        Some(self.entries.len() - 1)
     }
 
     /// Index of a vehicle of the roster that has lately sent an intent of our mission.
     fn active_roster_index(&self, id: u8, now: Instant) -> Option<usize> {
         let at = self.roster_index(id)?;
-        self.contacts[at]
+        self.entries[at]
             .intent_at
             .is_some_and(|heard| now - heard < MEMBERSHIP_LIFETIME)
             .then_some(at)
     }
 
     fn roster_index(&self, id: u8) -> Option<usize> {
-        self.contacts[..self.roster_count].binary_search_by_key(&id, |c| c.id).ok()
+        self.entries[..self.roster_count].binary_search_by_key(&id, |c| c.id).ok()
     }
 
     /// Handles a neighbour's intent with the sequence number of its frame: only one newer than the
@@ -146,9 +146,9 @@ impl<const V: usize> Neighbours<V> {
         plan_crc: Option<u32>,
     ) {
         let Some(at) = self.roster_index(intent.system_id) else { return };
-        let contact = &mut self.contacts[at];
-        if contact.sequence.accept_if_new(sequence, now) {
-            contact.intent_sequence = sequence;
+        let entry = &mut self.entries[at];
+        if entry.sequence.accept_if_new(sequence, now) {
+            entry.intent_sequence = sequence;
             self.handle_intent(now, self.own_rank, intent, mission_crc, plan_crc);
         }
     }
@@ -168,22 +168,22 @@ impl<const V: usize> Neighbours<V> {
             alt_m: f64::from(data.alt) * 1e-3,
         };
         let (own, edge_m) = (self.place, self.range_edge_m);
-        let Some(contact) = self.entry_for_position(id, now) else { return };
-        let behind = contact.boot_ms.wrapping_sub(data.time_boot_ms);
-        if !place.is_valid() || (contact.position_at.is_some() && behind < RESTART_MS) {
+        let Some(entry) = self.entry_for_position(id, now) else { return };
+        let behind = entry.boot_ms.wrapping_sub(data.time_boot_ms);
+        if !place.is_valid() || (entry.position_at.is_some() && behind < RESTART_MS) {
             return;
         }
-        contact.boot_ms = data.time_boot_ms;
-        contact.heard_at = Some(now);
-        contact.position_at = Some(now);
-        contact.state.position = frames::geodetic_to_enu(origin, &place);
-        contact.at_range_edge = (contact.state.position - own).norm_squared() >= edge_m * edge_m;
+        entry.boot_ms = data.time_boot_ms;
+        entry.heard_at = Some(now);
+        entry.position_at = Some(now);
+        entry.state.position = frames::geodetic_to_enu(origin, &place);
+        entry.at_range_edge = (entry.state.position - own).norm_squared() >= edge_m * edge_m;
         let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
-        contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
-        contact.speed_mps = contact.state.velocity.length();
-        contact.update_place_on_points();
-        if contact.speed_mps >= MAX_HOVER_MPS {
-            contact.moved_at = now;
+        entry.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
+        entry.speed_mps = entry.state.velocity.length();
+        entry.update_place_on_points();
+        if entry.speed_mps >= MAX_HOVER_MPS {
+            entry.moved_at = now;
         }
     }
 
@@ -204,62 +204,62 @@ impl<const V: usize> Neighbours<V> {
         };
         // A vehicle of the roster is no stranger.
         self.retain_strangers(|c| c.id != intent.system_id);
-        let contact = &mut self.contacts[at];
-        contact.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
+        let entry = &mut self.entries[at];
+        entry.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
         let on_plan = intent.flags & ON_PLAN != 0;
-        let shared = on_plan && contact.shares_plan;
+        let shared = on_plan && entry.shares_plan;
         let follows = on_plan && intent.flags & LANDED == 0 && intent.plan_crc != 0;
-        contact.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
-        (contact.heard_at, contact.intent_at) = (Some(now), Some(now));
-        contact.flags = intent.flags;
-        if contact.reports_any(GROUNDED)
-            && !contact.reports_any(LANDED | OUT_OF_PLAN)
-            && contact.position_at.is_some()
+        entry.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
+        (entry.heard_at, entry.intent_at) = (Some(now), Some(now));
+        entry.flags = intent.flags;
+        if entry.reports_any(GROUNDED)
+            && !entry.reports_any(LANDED | OUT_OF_PLAN)
+            && entry.position_at.is_some()
         {
-            contact.pad = Some(contact.state.position);
+            entry.pad = Some(entry.state.position);
         }
-        let out = contact.reports_any(OUT_OF_PLAN) && contact.position_at.is_some();
-        contact.out_since = contact.out_since.or(Some(now)).filter(|_| out);
+        let out = entry.reports_any(OUT_OF_PLAN) && entry.position_at.is_some();
+        entry.out_since = entry.out_since.or(Some(now)).filter(|_| out);
         // From rank 32 on there is no bit: this vehicle counts as heard by the neighbour.
         if rank >= 32 || intent.heard_bits & (1 << rank) != 0 {
-            contact.hears_us_at = Some(now);
+            entry.hears_us_at = Some(now);
         }
-        contact.heard_bits = intent.heard_bits;
-        contact.points.clone_from(&intent.points);
+        entry.heard_bits = intent.heard_bits;
+        entry.points.clone_from(&intent.points);
         let most = intent.points.len().saturating_sub(1) as u8;
-        contact.unheard_point_count = intent.unheard_point_count.min(most);
-        contact.points_length_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
+        entry.unheard_point_count = intent.unheard_point_count.min(most);
+        entry.points_length_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
-        contact.extent_m = fpu::sqrtf(contact.points_for_now().iter().fold(0.0, most));
-        contact.update_place_on_points();
-        (contact.may_come_down, contact.ground_m) = (intent.may_come_down, intent.ground_m);
-        contact.gates_open_up_to_m =
+        entry.extent_m = fpu::sqrtf(entry.points_for_now().iter().fold(0.0, most));
+        entry.update_place_on_points();
+        (entry.may_come_down, entry.ground_m) = (intent.may_come_down, intent.ground_m);
+        entry.gates_open_up_to_m =
             if shared { intent.gates_open_up_to_m } else { f32::NEG_INFINITY };
-        contact.unheard_delay_s = intent.unheard_delay_s;
-        contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
-        contact.state.progress_m =
-            shared.then(|| contact.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
+        entry.unheard_delay_s = intent.unheard_delay_s;
+        entry.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
+        entry.state.progress_m =
+            shared.then(|| entry.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
     }
 
     /// Number of vehicles in the table, strangers included.
     pub fn len(&self) -> usize {
-        self.contacts.len()
+        self.entries.len()
     }
 
     /// Whether the table has no vehicle.
     pub fn is_empty(&self) -> bool {
-        self.contacts.is_empty()
+        self.entries.is_empty()
     }
 
     /// Forgets what holds only for an older plan: the scan's result, avoided places, relayed
     /// progress and open gates.
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;
-        for contact in &mut self.contacts {
-            (contact.avoided_at, contact.furthest) = (NO_PLACE, None);
-            (contact.relayed_m, contact.relayed_at) = (None, None);
-            contact.gates_open_up_to_m = f32::NEG_INFINITY;
+        for entry in &mut self.entries {
+            (entry.avoided_at, entry.furthest) = (NO_PLACE, None);
+            (entry.relayed_m, entry.relayed_at) = (None, None);
+            entry.gates_open_up_to_m = f32::NEG_INFINITY;
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use anyhow::ensure;
 use companion::services::ftp::MAX_DATA;
-use companion::storage::store::window::PieceOutcome;
+use companion::storage::store::reassembly::PieceOutcome;
 use companion::storage::store::{ErasePermission, File, MAX_READ, Store, UploadState};
 
 use planner_core::map::field;

@@ -409,7 +409,7 @@ impl SimulatedVehicle {
     fn log_entry(&self, now_us: u64, from: State, to: State, text: &str) -> report::LogEvent {
         let level = match to {
             _ if to.has_given_up() => Level::Error,
-            _ if to.is_interrupted_by_loss() || to == State::Alone => Level::Warning,
+            _ if to.is_interrupted_by_loss() || to == State::SwarmLinkLost => Level::Warning,
             _ => Level::Info,
         };
         let colon = if text.is_empty() { "" } else { ": " };

@@ -5,8 +5,8 @@ mod search;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
-use companion::link::roster::{MemberStatus, RosterReport};
-use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport, StartStatus};
+use companion::link::roster::{FlightStatus, RosterReport};
+use companion::swarm::fleet::{Fleet, FleetTimeouts, OwnReport, StartStatus, VehicleReception};
 use companion::time::{Duration, Instant};
 use flockmate_tests::parts::{WAYPOINT_DM, parts};
 
@@ -223,7 +223,7 @@ impl FleetModel {
             self.forget_silent(&mut vehicle);
         }
         let bit = |bits: u32, rank: usize| bits >> rank & 1 != 0;
-        let hearing = |rank: usize| MemberReception {
+        let hearing = |rank: usize| VehicleReception {
             heard_at: bit(vehicle.hears, rank).then_some(now),
             hears_us: heard.iter().any(|(from, m)| *from == rank && bit(m.hears, vehicle.rank)),
             heard_by_others: heard.iter().any(|(from, m)| *from != rank && bit(m.hears, rank)),
@@ -233,9 +233,9 @@ impl FleetModel {
         let done = usize::from(vehicle.along) >= path.len();
         let lands = choice.leaves || vehicle.flight == Flight::Down || vehicle.fleet.is_excluded();
         let standing = match (lands, done && !goes_on) {
-            (false, _) => MemberStatus::Alive,
-            (true, false) => MemberStatus::Left,
-            (true, true) => MemberStatus::Finished,
+            (false, _) => FlightStatus::Alive,
+            (true, false) => FlightStatus::Left,
+            (true, true) => FlightStatus::Finished,
         };
         let promise = vehicle.fleet.commitment_dm();
         let own = OwnReport {
@@ -284,7 +284,7 @@ impl FleetModel {
             *silent =
                 if vehicle.hears >> rank & 1 != 0 { 0 } else { (*silent + 1).min(SILENT as u8) };
             if u64::from(*silent) == SILENT {
-                roster.entries[rank].status = roster.entries[rank].status.max(MemberStatus::Left);
+                roster.entries[rank].status = roster.entries[rank].status.max(FlightStatus::Left);
             }
         }
         for sender in (0..self.count).filter(|rank| *rank != vehicle.rank).take(1) {

@@ -66,7 +66,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "one look at a neighbour, in the order of docs/safety.md",
     ),
     (
-        "companion/src/guidance/filter/look.rs",
+        "companion/src/guidance/filter/step.rs",
         "step_filter",
         "one decision, in the order of docs/safety.md",
     ),

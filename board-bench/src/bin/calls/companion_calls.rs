@@ -13,7 +13,7 @@ use companion::storage::mission_file::{
     self, MissionBlock, MissionGoal, MissionHeader, MissionVehicle, MissionView,
 };
 use companion::storage::store::{FlashFault, FlashRequest, MAX_READ, ReadFlash, Store};
-use companion::swarm::fleet::{Fleet, FleetTimeouts, MemberReception, OwnReport, StartStatus};
+use companion::swarm::fleet::{Fleet, FleetTimeouts, OwnReport, StartStatus, VehicleReception};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
 use firmware::capacity::BoardCompanion;
@@ -180,7 +180,7 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
         // stop and hold.
         let hearing = |rank: usize| {
             let speaks = rank < VEHICLES - usize::from(round / 10);
-            MemberReception {
+            VehicleReception {
                 heard_at: speaks.then_some(now),
                 hears_us: speaks,
                 heard_by_others: speaks,

@@ -444,7 +444,7 @@ fn a_neighbour_heard_again_lets_it_go_on() {
     let mut bench = Bench::started_with_neighbour(two_vehicles());
     bench.run_until(State::Follow, 20.0);
     let neighbour = bench.neighbour.take();
-    bench.run_until(State::Alone, 5.0);
+    bench.run_until(State::SwarmLinkLost, 5.0);
     bench.neighbour = neighbour;
     bench.run_until(State::Done, 60.0);
     assert!(bench.texts.iter().any(|t| t == "Neighbours heard again"));

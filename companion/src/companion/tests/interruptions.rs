@@ -67,7 +67,7 @@ fn bench(kind: AutopilotKind) -> Bench {
 fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<Bench> {
     use State::*;
     let mut b = match state {
-        Alone | Blocked => {
+        SwarmLinkLost | Blocked => {
             let mut b = Bench::started_with_neighbour(two_vehicles());
             b.run_until(Follow, 20.0);
             b.run(1.0);
@@ -81,7 +81,7 @@ fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<
     };
     match state {
         TakeOff if kind == AutopilotKind::Px4 => return None,
-        Alone | Blocked if kind == AutopilotKind::ArduPilot => return None,
+        SwarmLinkLost | Blocked if kind == AutopilotKind::ArduPilot => return None,
         TakeOff => b.run_until(TakeOff, 20.0),
         Climb => {
             b.run_until(Climb, 20.0);
@@ -99,9 +99,9 @@ fn reach(kind: AutopilotKind, state: State, paused_in: Option<State>) -> Option<
             assert_eq!(pause(&mut b), Some(ACCEPTED));
             b.run(3.0);
         }
-        Alone => {
+        SwarmLinkLost => {
             b.neighbour = None;
-            b.run_until(Alone, 5.0);
+            b.run_until(SwarmLinkLost, 5.0);
             b.run(2.0);
         }
         Blocked => {
@@ -134,7 +134,7 @@ const CASES: &[(State, Option<State>)] = &[
     (State::Follow, None),
     (State::Paused, Some(State::Climb)),
     (State::Paused, Some(State::Follow)),
-    (State::Alone, None),
+    (State::SwarmLinkLost, None),
     (State::Blocked, None),
     (State::Land, None),
 ];

@@ -11,7 +11,7 @@ use crate::autopilot::telemetry::Telemetry;
 use crate::config::limits::Urgency;
 use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
-use crate::swarm::neighbours::met::{FilterNeighbour, ReachQuery};
+use crate::swarm::neighbours::filter_neighbour::{FilterNeighbour, ReachQuery};
 use crate::time::{Duration, Instant};
 
 /// Flight time along the other vehicle's points that has to be free before a vehicle that yields
@@ -111,13 +111,13 @@ impl Guidance {
         };
         let follows = !lands && !hears_nobody;
         let mut next = 0;
-        while let Some((i, contact, dead)) = neighbours.next_within(next, now, &reach) {
+        while let Some((i, entry, dead)) = neighbours.next_within(next, now, &reach) {
             next = i + 1;
-            let mut met = contact.filter_neighbour(now);
+            let mut met = entry.filter_neighbour(now);
             if dead {
                 met.count_as_lost();
             }
-            neighbours.apply_silence(contact, now, &mut met);
+            neighbours.apply_silence(entry, now, &mut met);
             let by_gates = met.on_plan && on_plan;
             if met.out_of_range && (by_gates || lands) {
                 // Out of radio range the neighbour is where its gates let it be: away from here.
@@ -127,7 +127,7 @@ impl Guidance {
                 // Gates keep two vehicles on the plan apart, whatever the delay of their messages.
                 met.ignore_delay();
             }
-            if met.lost && !(lands || deaf) && neighbours.may_fly_on_unheard(contact, now, &reach) {
+            if met.lost && !(lands || deaf) && neighbours.may_fly_on_unheard(entry, now, &reach) {
                 // Where no neighbour is heard this vehicle's receiver may have failed: the others
                 // are not lost, they fly on.
                 met.fly_on_for(bounds.silent_s);
@@ -138,8 +138,8 @@ impl Guidance {
                 // vehicle may fly, only for where it may have stopped.
                 met.stop_at_last_position();
             }
-            if follows && contact.flies_all_points_unheard() && !(by_gates || met.lost) {
-                met.limit_to_points(contact, bounds);
+            if follows && entry.flies_all_points_unheard() && !(by_gates || met.lost) {
+                met.limit_to_points(entry, bounds);
             }
             let ahead_s =
                 if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
@@ -155,7 +155,7 @@ impl Guidance {
             // The end of its path in a coverage mission is above its pad; by then it has sought a
             // place aside in vain.
             let at_end = || {
-                contact.flies_all_points_unheard()
+                entry.flies_all_points_unheard()
                     && scene.plan.is_some_and(|p| self.has_reached_end(&p.path))
             };
             let rests = lies && held >= LATE_LANDING_AFTER && (last_place || at_end());
@@ -180,7 +180,7 @@ impl Guidance {
                 |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m, fallen);
             let below = || {
                 floor_m.is_some_and(may_lie_below)
-                    || (comes_down && contact.may_fly_home_near(now, &place, safety_m))
+                    || (comes_down && entry.may_fly_home_near(now, &place, safety_m))
             };
             if silent && !hears_nobody && !met.stranger && below() {
                 return Some(FilterConflict {

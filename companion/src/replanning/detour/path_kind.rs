@@ -52,7 +52,7 @@ pub(crate) enum PathKind {
     /// A path that was requested for this purpose.
     Detour(DetourPurpose),
     /// A path beside the plan's, to which the vehicle does not come back any more.
-    Astray,
+    OffPlan,
 }
 
 impl DetourPurpose {
@@ -78,7 +78,7 @@ impl DetourPurpose {
 }
 
 impl PathKind {
-    /// Purpose of the detour that is flown; `None` on the plan's path, or astray.
+    /// Purpose of the detour that is flown; `None` on the plan's path, or off the plan.
     pub(crate) fn purpose(&self) -> Option<DetourPurpose> {
         match self {
             Self::Detour(purpose) => Some(*purpose),
@@ -88,14 +88,14 @@ impl PathKind {
 
     /// Whether the path is another one than that of the plan.
     pub(crate) fn is_detour(&self) -> bool {
-        matches!(self, Self::Detour(_) | Self::Astray)
+        matches!(self, Self::Detour(_) | Self::OffPlan)
     }
 
     /// The kind of path once the vehicle has given up coming back to its plan.
     pub(crate) fn without_rejoin(self) -> Self {
         match self {
             Self::PlanReady => Self::Plan,
-            Self::Detour(purpose) if purpose.keeps_to_plan() => Self::Astray,
+            Self::Detour(purpose) if purpose.keeps_to_plan() => Self::OffPlan,
             other => other,
         }
     }

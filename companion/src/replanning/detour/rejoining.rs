@@ -93,7 +93,7 @@ impl Detours {
         }
     }
 
-    /// Gives up rejoining the plan's path: a vehicle beside it is from now on astray.
+    /// Gives up rejoining the plan's path: a vehicle beside it is off the plan from now on.
     pub(crate) fn give_up_plan(&mut self) {
         self.path_kind = self.path_kind.without_rejoin();
     }
@@ -130,7 +130,7 @@ impl Detours {
 
     /// Whether the vehicle is beside its plan's path and will not come back to it.
     pub(crate) fn is_own_plan_lost(&self) -> bool {
-        self.path_kind == PathKind::Astray
+        self.path_kind == PathKind::OffPlan
     }
 
     /// Whether the vehicle seeks a landing place aside.

@@ -1,7 +1,7 @@
 extern crate std;
 use std::vec::Vec;
 
-use super::asking::RetryOutlook;
+use super::searches::RetryOutlook;
 use super::*;
 use crate::link::intent::{BLOCKED, FLYING, GROUNDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
 use crate::replanning::obstacles::MAX_OBSTACLES;

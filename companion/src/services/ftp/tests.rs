@@ -13,8 +13,8 @@ use planner_core::map::field::{self, FieldShape, FieldView};
 use rand_core::Rng;
 
 use self::world::{Packet, World};
+use super::burst::PACKETS_PER_BURST;
 use super::packet::{ACK, EFBIG, EIO, NAK, op};
-use super::stream::PACKETS_PER_BURST;
 use super::*;
 use crate::testing::fake_flash::{LAYOUT, bytes_at, roadmap};
 

@@ -169,7 +169,7 @@ pub struct CoverageView<'a> {
 
 /// Time, in addition to that of its descent, after which a vehicle that no other vehicle hears any
 /// more is on the ground, seconds: its lease, age and delay of the last message, the stop, the wait
-/// of the row `Alone`, and the slow end of a descent.
+/// of the row `SwarmLinkLost`, and the slow end of a descent.
 const UNHEARD_DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {

@@ -1,6 +1,6 @@
 //! Jobs of the flash store, each of one or several requests to the flash.
 
-use super::area::{FlashArea, Seal};
+use super::flash_area::{FlashArea, Seal};
 use super::records::JournalRecord;
 
 /// The job that the store executes.

@@ -2,11 +2,11 @@
 //! and continues with the outcome.
 
 use super::Store;
-use super::area::{self, AreaCondition, FlashArea, Seal};
 use super::flash::{
     CRC_START, ErasePermission, File, FlashFault, FlashRequest, MAX_PROGRAM, MAX_READ, ReadOutcome,
     WORD, crc_step,
 };
+use super::flash_area::{self, AreaCondition, FlashArea, Seal};
 use super::job::FlashJob;
 use super::journal;
 use super::records::{Compaction, JournalRecord, RecordSource, RecordStep};
@@ -47,9 +47,9 @@ impl Store {
             FlashJob::Erase { at, .. } => FlashRequest::Erase { at },
             FlashJob::MarkClean(_) | FlashJob::MarkUsed(_) | FlashJob::Seal(..) => {
                 let (at, word) = match self.job {
-                    FlashJob::MarkClean(area) => area::clean_mark(layout, area),
-                    FlashJob::Seal(area, seal) => area::seal_mark(layout, area, &seal),
-                    FlashJob::MarkUsed(area) => area::used_mark(layout, area),
+                    FlashJob::MarkClean(area) => flash_area::clean_mark(layout, area),
+                    FlashJob::Seal(area, seal) => flash_area::seal_mark(layout, area, &seal),
+                    FlashJob::MarkUsed(area) => flash_area::used_mark(layout, area),
                     _ => return None,
                 };
                 self.program_word = word;
@@ -73,7 +73,7 @@ impl Store {
                 FlashRequest::Read { at: slot.data_offset(layout) + done, len: left.min(MAX_READ) }
             }
             FlashJob::SealCheck(area, seal) => {
-                FlashRequest::Read { at: area::seal_mark(layout, area, &seal).0, len: WORD }
+                FlashRequest::Read { at: flash_area::seal_mark(layout, area, &seal).0, len: WORD }
             }
             FlashJob::Record(record) => {
                 let data_at = record.at + WORD as u32 + record.done;
@@ -230,7 +230,7 @@ impl Store {
             }
             (FlashJob::Seal(area, seal), Ok(_)) => self.job = FlashJob::SealCheck(area, seal),
             (FlashJob::SealCheck(area, seal), Ok(bytes)) => {
-                if bytes == area::seal_mark(&self.layout, area, &seal).1 {
+                if bytes == flash_area::seal_mark(&self.layout, area, &seal).1 {
                     self.handle_sealed(area, seal);
                 } else {
                     self.handle_area_failure(area);

@@ -6,8 +6,8 @@
 //! counts. A head that is neither erased nor valid ends the journal: the next record goes to the
 //! other half.
 
-use super::area::{AreaCondition, append_word_crc};
 use super::flash::{MAX_PROGRAM, WORD};
+use super::flash_area::{AreaCondition, append_word_crc};
 use super::records::{Compaction, RecordKind};
 use crate::config::parameters::STORED_LEN;
 use core::ops::Range;

@@ -1,8 +1,8 @@
 //! Writing the records of the journal, and its compaction into the other half when one is full.
 
 use super::Store;
-use super::area::{AreaCondition, FlashArea, Seal};
 use super::flash::{CRC_START, ErasePermission, File, MAX_PROGRAM, WORD, crc_step, crc32};
+use super::flash_area::{AreaCondition, FlashArea, Seal};
 use super::job::FlashJob;
 use super::journal::{self, record_len};
 use super::records::*;

@@ -1,8 +1,8 @@
 //! Reading the journal when the store is mounted.
 
 use super::Store;
-use super::area::{self, FlashArea, has_valid_word_crc, u32_at};
 use super::flash::{MAX_PROGRAM, ReadFlash, WORD};
+use super::flash_area::{self, FlashArea, has_valid_word_crc, u32_at};
 use super::journal::*;
 use super::records::RecordKind;
 
@@ -10,7 +10,7 @@ impl Store {
     pub(super) fn mount_journal(&mut self, flash: &mut impl ReadFlash) {
         let layout = self.layout;
         self.journal.halves =
-            [0, 1].map(|i| area::read_condition(&layout, FlashArea::Half(i), flash));
+            [0, 1].map(|i| flash_area::read_condition(&layout, FlashArea::Half(i), flash));
         let number = |i: &usize| self.journal.halves[*i].seal().map(|seal| seal.sequence);
         let Some(active) = (0..2).filter(|i| number(i).is_some()).max_by_key(number) else {
             return;

@@ -8,7 +8,7 @@ use planner_core::map::field::{self, FieldShape};
 use planner_core::roadmap::RoadmapView;
 use rand_core::Rng;
 
-use super::window::PieceOutcome;
+use super::reassembly::PieceOutcome;
 use super::*;
 use crate::testing::fake_flash::*;
 

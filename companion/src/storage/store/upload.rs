@@ -1,10 +1,10 @@
 //! Upload of a file: from its first piece in the reassembly window to the seal of its slot.
 
 use super::Store;
-use super::area::{AreaCondition, DATA_OFFSET, FlashArea};
 use super::flash::{ErasePermission, File};
+use super::flash_area::{AreaCondition, DATA_OFFSET, FlashArea};
+use super::reassembly::{PieceOutcome, WINDOW_LEN};
 use super::upload_state::{UploadError, UploadState};
-use super::window::{PieceOutcome, WINDOW_LEN};
 use crate::storage::mission_file::MissionView;
 use planner_core::map::field;
 use planner_core::roadmap;

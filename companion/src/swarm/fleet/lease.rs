@@ -1,7 +1,7 @@
 //! The lease of a vehicle, and what silence of the others means.
 
-use super::{Fleet, FleetMember, INCARNATIONS, OwnReport};
-use crate::link::roster::{MemberStatus, RosterReportEntry};
+use super::{Fleet, FleetVehicle, INCARNATIONS, OwnReport};
+use crate::link::roster::{FlightStatus, RosterReportEntry};
 use crate::time::{Duration, Instant};
 
 impl<const V: usize> Fleet<V> {
@@ -16,17 +16,17 @@ impl<const V: usize> Fleet<V> {
 
     /// Ranks of the vehicles that take part, or were lost, as bits.
     pub(super) fn counted_ranks(&self) -> u32 {
-        let counts = |m: &FleetMember| m.has_part && m.entry.status <= MemberStatus::Lost;
+        let counts = |m: &FleetVehicle| m.has_part && m.entry.status <= FlightStatus::Lost;
         let ranks = self.members.iter().enumerate();
         ranks.filter(|(_, m)| counts(m)).fold(0, |bits, (rank, _)| bits | 1 << rank.min(31))
     }
 
     /// Whether the vehicles `among` are a majority of those that take part, or were lost; of two
     /// halves, the one with the lowest rank is.
-    pub(super) fn is_majority(&self, among: impl Fn(usize, &FleetMember) -> bool) -> bool {
+    pub(super) fn is_majority(&self, among: impl Fn(usize, &FleetVehicle) -> bool) -> bool {
         let (mut all, mut these, mut lowest) = (0, 0, false);
         for (rank, member) in self.members.iter().enumerate() {
-            if member.has_part && member.entry.status <= MemberStatus::Lost {
+            if member.has_part && member.entry.status <= FlightStatus::Lost {
                 let is_among = among(rank, member);
                 lowest |= is_among && all == 0;
                 all += 1;
@@ -55,7 +55,7 @@ impl<const V: usize> Fleet<V> {
     /// Whether the others count this vehicle as lost, or have divided its part; false for one that
     /// has finished its part.
     pub fn is_excluded(&self) -> bool {
-        self.excluded && self.members[usize::from(self.own)].entry.status != MemberStatus::Finished
+        self.excluded && self.members[usize::from(self.own)].entry.status != FlightStatus::Finished
     }
 
     /// Whether this vehicle flies its part of the area, or will.
@@ -65,7 +65,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether this vehicle has left the mission and reported that.
     pub(crate) fn has_reported_leaving(&self) -> bool {
-        self.members[usize::from(self.own)].entry.status == MemberStatus::Left
+        self.members[usize::from(self.own)].entry.status == FlightStatus::Left
     }
 
     /// Whether another vehicle takes part, or left a part that is not divided yet.
@@ -77,7 +77,7 @@ impl<const V: usize> Fleet<V> {
     /// Whether another vehicle flies, or has flown and finished, left or was lost since it was
     /// started.
     pub(crate) fn is_flight_under_way(&self) -> bool {
-        let ended = |member: &FleetMember| member.entry.status != MemberStatus::Alive;
+        let ended = |member: &FleetVehicle| member.entry.status != FlightStatus::Alive;
         self.knows_flight() || self.members.iter().any(ended)
     }
 
@@ -96,17 +96,17 @@ impl<const V: usize> Fleet<V> {
     pub(super) fn count_silent_as_lost(&mut self, now: Instant) {
         let silent = self.limits.silent;
         for member in self.members.iter_mut().filter(|m| m.has_part && now - m.heard_at >= silent) {
-            member.entry.status = member.entry.status.max(MemberStatus::Lost);
+            member.entry.status = member.entry.status.max(FlightStatus::Lost);
         }
     }
 
     /// Takes part again, on the ground, after this vehicle could not start or no vehicle heard it,
     /// once it can start and no flight is under way.
-    pub(super) fn rejoin_if_ready(&mut self, now: Instant, own: MemberStatus) {
+    pub(super) fn rejoin_if_ready(&mut self, now: Instant, own: FlightStatus) {
         let RosterReportEntry { incarnation, status, .. } =
             self.members[usize::from(self.own)].entry;
-        if status == MemberStatus::Left
-            && own == MemberStatus::Alive
+        if status == FlightStatus::Left
+            && own == FlightStatus::Alive
             && !self.airborne
             && !self.knows_flight()
             && self.has_lease(now)

@@ -1,8 +1,8 @@
 //! What the vehicles of a fleet report to each other, and how a report changes a vehicle's
 //! knowledge.
 
-use super::{Fleet, FleetMember, INCARNATIONS, StartStatus};
-use crate::link::roster::{MAX_ENTRIES, MemberStatus, RosterReport, RosterReportEntry};
+use super::{Fleet, FleetVehicle, INCARNATIONS, StartStatus};
+use crate::link::roster::{FlightStatus, MAX_ENTRIES, RosterReport, RosterReportEntry};
 
 impl<const V: usize> Fleet<V> {
     /// Handles the roster report of the vehicle of rank `sender`; `own`: whether this vehicle was
@@ -18,7 +18,7 @@ impl<const V: usize> Fleet<V> {
         let same_plan = roster.plan == self.plan;
         if same_plan && roster.divisions > here {
             let status = self.sender_status(sender, roster);
-            if !self.adopt_division(roster, status) && status != MemberStatus::Left {
+            if !self.adopt_division(roster, status) && status != FlightStatus::Left {
                 self.excluded = own == StartStatus::Started;
             }
         }
@@ -40,7 +40,7 @@ impl<const V: usize> Fleet<V> {
                 // The member may have finished its share of a division that the sender does not
                 // know; it reports that itself.
                 if !(behind
-                    && entry.status == MemberStatus::Left
+                    && entry.status == FlightStatus::Left
                     && self.members[rank].heard_itself)
                 {
                     let counts = if same { *entry } else { entry.in_another_division() };
@@ -66,7 +66,7 @@ impl<const V: usize> Fleet<V> {
     /// Status of the sender of a report, as this report or an earlier one says. A division that
     /// only a sender that has left had agreed to before it was cut off excludes nobody: the sender
     /// flew by it until its lease ended, and the others divide what they had heard of the sender.
-    fn sender_status(&self, sender: usize, roster: &RosterReport) -> MemberStatus {
+    fn sender_status(&self, sender: usize, roster: &RosterReport) -> FlightStatus {
         let own = sender.checked_sub(usize::from(roster.first)).and_then(|i| roster.entries.get(i));
         let known = &self.members[sender].entry;
         own.unwrap_or(known).status
@@ -75,12 +75,12 @@ impl<const V: usize> Fleet<V> {
     /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
     /// then the others counted on that. Returns whether it did so. Where the sender has left, by
     /// its `status`, the others may meanwhile have counted on a later hash instead.
-    fn adopt_division(&mut self, roster: &RosterReport, status: MemberStatus) -> bool {
+    fn adopt_division(&mut self, roster: &RosterReport, status: FlightStatus) -> bool {
         let here = self.divisions.len() as u8;
         if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
             return false;
         }
-        let left = status == MemberStatus::Left;
+        let left = status == FlightStatus::Left;
         if roster.committed_hash == self.previous_hash && (self.hash == 0 || !left) {
             (self.division_inputs, self.hash) = (self.previous_inputs.clone(), self.previous_hash);
         }
@@ -163,7 +163,7 @@ impl<const V: usize> Fleet<V> {
         // A vehicle that has left computes no divisions: its hash would soon be outdated.
         let hash = if self.is_alive(usize::from(self.own)) { self.hash } else { 0 };
         let entry =
-            |m: &FleetMember| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
+            |m: &FleetVehicle| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
         RosterReport {
             divisions: self.divisions.len() as u8,
             first: first as u8,

@@ -56,8 +56,8 @@ pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
 /// Silence after which a vehicle in a coverage mission may have landed further along its path than
-/// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `Alone` waits. No vehicle counts as out
-/// of the plan for a shorter silence.
+/// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `SwarmLinkLost` waits. No vehicle counts
+/// as out of the plan for a shorter silence.
 pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 /// Rounding of the length of a path of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;

@@ -7,7 +7,7 @@ use crate::config::Ground;
 use crate::link::intent::{GROUNDED, LANDED, OUT_OF_PLAN};
 use crate::link::roster::{MAX_ENTRIES, RosterReport};
 use crate::swarm::fleet::{
-    Fleet, FleetTimeouts, LEASE_HEARD_WITHIN, MemberReception, OwnReport, StartStatus,
+    Fleet, FleetTimeouts, LEASE_HEARD_WITHIN, OwnReport, StartStatus, VehicleReception,
 };
 use crate::time::{Duration, Instant};
 
@@ -49,21 +49,21 @@ impl<const V: usize> Neighbours<V> {
     /// One step of the fleet, with this vehicle's report and which vehicles hear each other.
     pub(crate) fn step_fleet(&mut self, own: &OwnReport, now: Instant) {
         let Some(fleet) = &mut self.fleet else { return };
-        let roster = &self.contacts[..self.roster_count];
+        let roster = &self.entries[..self.roster_count];
         let lately =
             |c: &&NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN);
         let by_others = roster.iter().filter(lately).fold(0, |bits, c| bits | c.heard_bits);
         let own_rank = usize::from(self.own_rank);
         fleet.step(now, own, |rank| {
-            let contact =
+            let entry =
                 rank.checked_sub(usize::from(rank > own_rank)).and_then(|at| roster.get(at));
             let bit = 1u32.checked_shl(rank as u32).unwrap_or(0);
-            contact.filter(|_| rank != own_rank).map_or(MemberReception::default(), |contact| {
-                MemberReception {
-                    heard_at: contact.intent_at,
-                    hears_us: contact.hears_us_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN),
+            entry.filter(|_| rank != own_rank).map_or(VehicleReception::default(), |entry| {
+                VehicleReception {
+                    heard_at: entry.intent_at,
+                    hears_us: entry.hears_us_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN),
                     heard_by_others: by_others & bit != 0,
-                    hears: contact.heard_bits,
+                    hears: entry.heard_bits,
                 }
             })
         });
@@ -73,7 +73,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn hears_another_plan(&self, now: Instant) -> bool {
         let lately =
             |c: &NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
-        self.contacts[..self.roster_count].iter().any(|c| c.other_plan && lately(c))
+        self.entries[..self.roster_count].iter().any(|c| c.other_plan && lately(c))
     }
 
     /// Whether another vehicle that takes part is in flight, heard within `missed_after`, and none
@@ -89,13 +89,13 @@ impl<const V: usize> Neighbours<V> {
         let heard = |c: &NeighbourEntry| c.heard_at.is_some_and(|at| now - at < missed_after);
         let flies =
             |c: &&NeighbourEntry| heard(c) && !c.reports_any(GROUNDED | LANDED | OUT_OF_PLAN);
-        let mut others = self.contacts[..self.roster_count].iter().filter(flies);
+        let mut others = self.entries[..self.roster_count].iter().filter(flies);
         self.fleet.as_ref().is_some_and(|fleet| others.any(|c| fleet.is_alive(usize::from(c.rank))))
     }
 
     /// Handles another vehicle's roster report; `own`: whether this vehicle was started.
     pub(crate) fn handle_roster(&mut self, id: u8, roster: &RosterReport, own: StartStatus) {
-        let rank = self.roster_index(id).map(|at| usize::from(self.contacts[at].rank));
+        let rank = self.roster_index(id).map(|at| usize::from(self.entries[at].rank));
         if let (Some(fleet), Some(rank)) = (&mut self.fleet, rank) {
             fleet.handle_roster(rank, roster, own);
         }

@@ -13,12 +13,12 @@ impl<const V: usize> Neighbours<V> {
     /// Estimated delay of the messages from the vehicle `id` of the roster.
     pub(crate) fn message_delay(&mut self, id: u8) -> Option<&mut MessageDelay> {
         let at = self.roster_index(id)?;
-        Some(&mut self.contacts[at].message_delay)
+        Some(&mut self.entries[at].message_delay)
     }
 
     /// Greatest message delay of the roster's vehicles, seconds.
     pub(crate) fn max_message_delay_s(&self) -> f32 {
-        self.contacts[..self.roster_count]
+        self.entries[..self.roster_count]
             .iter()
             .fold(0.0, |most, c| libm::fmaxf(most, c.message_delay.delay_s))
     }
@@ -26,7 +26,7 @@ impl<const V: usize> Neighbours<V> {
     /// An echo of a neighbour's last intent, for this vehicle's next intent; the neighbours take
     /// turns.
     pub(crate) fn next_echo(&self, turn: usize, now: Instant) -> Option<IntentEcho> {
-        let contact = self.contacts[..self.roster_count].get(turn % self.roster_count.max(1))?;
-        IntentEcho::new(contact.rank, contact.intent_sequence, now - contact.intent_at?)
+        let entry = self.entries[..self.roster_count].get(turn % self.roster_count.max(1))?;
+        IntentEcho::new(entry.rank, entry.intent_sequence, now - entry.intent_at?)
     }
 }

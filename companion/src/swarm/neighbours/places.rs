@@ -3,7 +3,7 @@
 use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::{Length, Point};
 
-use super::contact::AreaGround;
+use super::dead_reckoning::AreaGround;
 use super::entry::NeighbourEntry;
 use super::{
     GROUNDED, LANDED, MAX_HEIGHT_AGE, MAX_HEIGHT_AGE_S, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE,
@@ -31,10 +31,10 @@ impl<const V: usize> Neighbours<V> {
     /// hears nobody, its own radio has more likely failed: then the others fly on to places unknown
     /// here, and only a stop is assumed.
     #[inline(never)]
-    fn unheard_progress_m(&self, contact: &NeighbourEntry, now: Instant) -> f32 {
-        let lands = !contact.heard_within(now, UNHEARD_LANDING_AFTER);
-        let far = lands && contact.may_fly_on(now) && !self.hears_nobody(now);
-        if far { contact.unheard_distance_m() } else { contact.unheard_stop_m() }
+    fn unheard_progress_m(&self, entry: &NeighbourEntry, now: Instant) -> f32 {
+        let lands = !entry.heard_within(now, UNHEARD_LANDING_AFTER);
+        let far = lands && entry.may_fly_on(now) && !self.hears_nobody(now);
+        if far { entry.unheard_distance_m() } else { entry.unheard_stop_m() }
     }
 
     /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` where it is out
@@ -50,10 +50,10 @@ impl<const V: usize> Neighbours<V> {
             |c: &NeighbourEntry| (c.avoided_at - c.state.position).length() < VAGUE_POSITION_M;
         let unknown =
             |c: &&NeighbourEntry| c.position_at.is_some() && c.is_out_of_plan(now) && !avoided(c);
-        if let Some(contact) = self.contacts.get(i).filter(unknown) {
-            contact.keep_out_zones(
+        if let Some(entry) = self.entries.get(i).filter(unknown) {
+            entry.keep_out_zones(
                 now,
-                [apart_m, self.unheard_progress_m(contact, now)],
+                [apart_m, self.unheard_progress_m(entry, now)],
                 self.area_ground(),
                 &mut visit,
             );
@@ -91,13 +91,13 @@ impl<const V: usize> Neighbours<V> {
         [apart_m, lying_m]: [f32; 2],
         visit: &mut dyn FnMut(KeepOutZone),
     ) {
-        let rostered = self.contacts[..self.roster_count].get(i);
-        if let Some(contact) = rostered.filter(|c| c.position_at.is_some()) {
-            let far_m = if contact.is_on_ground(now, self.down_after) { lying_m } else { apart_m };
-            let reach = [far_m, self.unheard_progress_m(contact, now)];
-            contact.keep_out_zones(now, reach, self.area_ground(), visit);
-            if self.fleet.is_none() && !contact.heard_within(now, MAX_HEIGHT_AGE) {
-                self.silent_zones(contact, now, reach, visit);
+        let rostered = self.entries[..self.roster_count].get(i);
+        if let Some(entry) = rostered.filter(|c| c.position_at.is_some()) {
+            let far_m = if entry.is_on_ground(now, self.down_after) { lying_m } else { apart_m };
+            let reach = [far_m, self.unheard_progress_m(entry, now)];
+            entry.keep_out_zones(now, reach, self.area_ground(), visit);
+            if self.fleet.is_none() && !entry.heard_within(now, MAX_HEIGHT_AGE) {
+                self.silent_zones(entry, now, reach, visit);
             }
         }
     }
@@ -109,27 +109,27 @@ impl<const V: usize> Neighbours<V> {
     #[inline(never)]
     fn silent_zones(
         &self,
-        contact: &NeighbourEntry,
+        entry: &NeighbourEntry,
         now: Instant,
         [apart_m, upto_m]: [f32; 2],
         visit: &mut dyn FnMut(KeepOutZone),
     ) {
         let kind = ZoneKind::Static;
-        if contact.reports_any(GROUNDED | LANDED | OUT_OF_PLAN)
-            || contact.is_on_ground(now, self.down_after)
-            || contact.flies_plan_unheard()
+        if entry.reports_any(GROUNDED | LANDED | OUT_OF_PLAN)
+            || entry.is_on_ground(now, self.down_after)
+            || entry.flies_plan_unheard()
         {
             return;
         }
-        if contact.is_dead(now) {
-            contact.for_each_leg(upto_m, &mut |[from, next], [leg_m, flown_m]| {
+        if entry.is_dead(now) {
+            entry.for_each_leg(upto_m, &mut |[from, next], [leg_m, flown_m]| {
                 let share = if flown_m < leg_m { flown_m / leg_m } else { 1.0 };
                 let to = from + (next - from) * share;
                 visit(KeepOutZone { from, to, radius_m: apart_m, kind });
             });
         } else if !self.hears_nobody(now) {
-            let from = contact.state.position;
-            let far_s = MAX_HEIGHT_AGE_S + 2.0 * contact.message_delay.delay_s;
+            let from = entry.state.position;
+            let far_s = MAX_HEIGHT_AGE_S + 2.0 * entry.message_delay.delay_s;
             let radius_m = apart_m + self.fastest_mps * far_s;
             visit(KeepOutZone { from, to: from, radius_m, kind });
         }
@@ -157,12 +157,8 @@ impl<const V: usize> Neighbours<V> {
     ) {
         let landing =
             |c: &&NeighbourEntry| c.position_at.is_some() && c.may_land_without_avoiding(now);
-        if let Some(contact) = self.contacts.get(i).filter(landing) {
-            contact.landing_columns(
-                now,
-                [apart_m, self.unheard_progress_m(contact, now)],
-                &mut visit,
-            );
+        if let Some(entry) = self.entries.get(i).filter(landing) {
+            entry.landing_columns(now, [apart_m, self.unheard_progress_m(entry, now)], &mut visit);
         }
     }
 
@@ -176,11 +172,11 @@ impl<const V: usize> Neighbours<V> {
         [apart_m, height_m]: [f32; 2],
         mut visit: impl FnMut(KeepOutZone),
     ) {
-        for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
+        for entry in self.entries.iter().filter(|c| c.position_at.is_some()) {
             let mut zone = |from: Point, to: Point, radius_m: f32| {
                 visit(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
             };
-            let from = contact.state.position;
+            let from = entry.state.position;
             zone(from, from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M), apart_m);
             // Landing places are sought at one height, so there a zone is as wide as the distance
             // that a landing keeps.
@@ -188,19 +184,19 @@ impl<const V: usize> Neighbours<V> {
             let mut bar = |[a, b]: [Point; 2], wider_m: f32| {
                 zone(level(a), level(b), apart_m + self.pair_position_error_m + wider_m);
             };
-            if contact.may_fly_on(now) {
-                contact.for_each_leg(contact.unheard_distance_m(), &mut |leg, _| bar(leg, 0.0));
+            if entry.may_fly_on(now) {
+                entry.for_each_leg(entry.unheard_distance_m(), &mut |leg, _| bar(leg, 0.0));
             }
             // A vehicle in the air comes down at its pad; off its plan perhaps also below its
             // place, or at the end of its points.
-            if contact.flies_all_points_unheard() && contact.is_under_way() {
-                contact.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
-                if !contact.reports_any(ON_PLAN) {
+            if entry.flies_all_points_unheard() && entry.is_under_way() {
+                entry.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
+                if !entry.reports_any(ON_PLAN) {
                     bar([from; 2], 0.0);
-                    contact.points.last().into_iter().for_each(|end| bar([*end; 2], 0.0));
+                    entry.points.last().into_iter().for_each(|end| bar([*end; 2], 0.0));
                 }
             }
-            if let Some((leg, aside_m)) = contact.fall(now) {
+            if let Some((leg, aside_m)) = entry.fall(now) {
                 bar(leg, aside_m);
             }
         }
@@ -209,8 +205,8 @@ impl<const V: usize> Neighbours<V> {
     /// Calls `visit` with the column above the last position of neighbour `i`, of radius `apart_m`:
     /// there this vehicle might come down on it.
     pub fn column_above(&self, i: usize, apart_m: f32, mut visit: impl FnMut(KeepOutZone)) {
-        if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
-            let from = contact.state.position;
+        if let Some(entry) = self.entries.get(i).filter(|c| c.position_at.is_some()) {
+            let from = entry.state.position;
             let to = from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M);
             visit(KeepOutZone { from, to, radius_m: apart_m, kind: ZoneKind::Static });
         }
@@ -227,7 +223,7 @@ impl<const V: usize> Neighbours<V> {
         apart_m: f32,
         fallen: Option<Instant>,
     ) -> bool {
-        let Some(contact) = self.contacts.get(i).filter(|c| c.is_under_way()) else { return false };
+        let Some(entry) = self.entries.get(i).filter(|c| c.is_under_way()) else { return false };
         let (mut below, low_m) = (false, floor_m - apart_m);
         let mut near = |a: Point, b: Point, apart_m: f32| {
             let (leg, away) = ((b - a).xy(), (place - a).xy());
@@ -235,14 +231,14 @@ impl<const V: usize> Neighbours<V> {
             let high = a.z > low_m || b.z > low_m;
             below |= high && (away - leg * share).norm_squared() < apart_m * apart_m;
         };
-        contact.for_each_leg(contact.unheard_distance_m(), &mut |[at, next], [leg_m, flown_m]| {
+        entry.for_each_leg(entry.unheard_distance_m(), &mut |[at, next], [leg_m, flown_m]| {
             near(
                 at,
                 if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
                 apart_m,
             );
         });
-        if let Some(([from, to], aside_m)) = fallen.and_then(|now| contact.fall(now)) {
+        if let Some(([from, to], aside_m)) = fallen.and_then(|now| entry.fall(now)) {
             near(from, to, apart_m + aside_m);
         }
         below
@@ -252,21 +248,21 @@ impl<const V: usize> Neighbours<V> {
     /// vertical.
     pub fn any_below(&self, position: &Point, within_m: f32) -> bool {
         let under = |p: &Point| p.z < position.z && (p - position).xy().length() < within_m;
-        self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
+        self.entries.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
     }
 
     /// Notes where the vehicles out of the plan rest now: the detour that begins avoids these
     /// places.
     pub fn mark_avoided(&mut self, now: Instant) {
-        for contact in &mut self.contacts {
-            contact.avoided_at =
-                if contact.is_out_of_plan(now) { contact.state.position } else { NO_PLACE };
+        for entry in &mut self.entries {
+            entry.avoided_at =
+                if entry.is_out_of_plan(now) { entry.state.position } else { NO_PLACE };
         }
     }
 
     /// Forgets the places that a detour avoided: they may block the path again.
     pub(crate) fn forget_avoided(&mut self) {
-        self.contacts.iter_mut().for_each(|contact| contact.avoided_at = NO_PLACE);
+        self.entries.iter_mut().for_each(|entry| entry.avoided_at = NO_PLACE);
     }
 }
 

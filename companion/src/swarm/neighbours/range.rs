@@ -27,6 +27,6 @@ impl<const V: usize> Neighbours<V> {
         let beyond = |c: &NeighbourEntry| {
             c.at_range_edge || c.position_at.is_none() || c.reports_any(LANDED | OUT_OF_PLAN)
         };
-        self.knows_range() && self.contacts[..self.roster_count].iter().all(beyond)
+        self.knows_range() && self.entries[..self.roster_count].iter().all(beyond)
     }
 }

@@ -13,8 +13,8 @@ use super::Neighbours;
 use super::bounds::STANDS_SHORT_M;
 use crate::time::Instant;
 
-/// Longest time for which an unheard vehicle waits before a gate, seconds: less than row `Alone` of
-/// the mission table waits.
+/// Longest time for which an unheard vehicle waits before a gate, seconds: less than row
+/// `SwarmLinkLost` of the mission table waits.
 const UNHEARD_GATE_WAIT_S: f32 = 14.0;
 
 impl<const V: usize> Neighbours<V> {
@@ -42,7 +42,7 @@ impl<const V: usize> Neighbours<V> {
         if self.has_passed(gate, now) {
             return Some(0.0);
         }
-        self.contacts[self.roster_index(gate.id)?].time_until_passed_s(gate.until_m, now)
+        self.entries[self.roster_index(gate.id)?].time_until_passed_s(gate.until_m, now)
     }
 }
 

@@ -162,7 +162,7 @@ impl<const V: usize> Neighbours<V> {
     /// rank on that no longer fitted into the last message.
     pub(crate) fn next_relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
         let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
-        let roster = &self.contacts[..self.roster_count];
+        let roster = &self.entries[..self.roster_count];
         let speaking = || roster.iter().filter(|c| c.heard_within(now, HEARD_WITHIN));
         // A relay goes to all, even if one neighbour alone does not hear the vehicle.
         let missed = |c: &NeighbourEntry| {
@@ -171,10 +171,10 @@ impl<const V: usize> Neighbours<V> {
         let first = roster.partition_point(|c| c.rank < self.relay_next);
         let mut next = self.relay_next;
         let turn = roster[first..].iter().chain(&roster[..first]);
-        for contact in turn.filter(|c| c.rank < 32 && missed(c)) {
-            let Some(item) = contact.progress_to_relay(now) else { continue };
+        for entry in turn.filter(|c| c.rank < 32 && missed(c)) {
+            let Some(item) = entry.progress_to_relay(now) else { continue };
             if relay.items.push(item).is_err() {
-                next = contact.rank;
+                next = entry.rank;
                 break;
             }
         }
@@ -185,33 +185,33 @@ impl<const V: usize> Neighbours<V> {
     /// Handles a relay of our plan from the vehicle `from` (system id) of the roster.
     pub(crate) fn handle_relay(&mut self, now: Instant, from: u8, relay: &Relay) {
         let Some(by) = self.active_roster_index(from, now) else { return };
-        let hop_us = (self.contacts[by].message_delay.delay_s * 1e6) as u64;
+        let hop_us = (self.entries[by].message_delay.delay_s * 1e6) as u64;
         for item in &relay.items {
             let Some(at) = self.in_ranks(item.rank) else { continue };
-            let (fastest_mps, contact) = (self.fastest_mps, &mut self.contacts[at]);
-            if contact.heard_within(now, HEARD_DIRECTLY_WITHIN) {
+            let (fastest_mps, entry) = (self.fastest_mps, &mut self.entries[at]);
+            if entry.heard_within(now, HEARD_DIRECTLY_WITHIN) {
                 continue;
             }
-            let known_m = contact.relayed_m.unwrap_or(f32::NEG_INFINITY);
+            let known_m = entry.relayed_m.unwrap_or(f32::NEG_INFINITY);
             let newest_m =
-                libm::fmaxf(known_m, contact.state.progress_m.unwrap_or(f32::NEG_INFINITY));
+                libm::fmaxf(known_m, entry.state.progress_m.unwrap_or(f32::NEG_INFINITY));
             if item.progress_m > newest_m {
                 // Relayed progress is believed to grow no faster than progress that the vehicle
                 // reports itself.
-                let believed_m = contact.plausible_progress_m(item.progress_m, fastest_mps, now);
-                contact.relayed_m = Some(libm::fmaxf(believed_m, known_m));
+                let believed_m = entry.plausible_progress_m(item.progress_m, fastest_mps, now);
+                entry.relayed_m = Some(libm::fmaxf(believed_m, known_m));
                 // Gates and delay belong to this progress.
-                contact.gates_open_up_to_m = item.gates_open_up_to_m;
-                contact.unheard_delay_s = item.unheard_delay_s.saturating_add(HOP_DELAY_S);
+                entry.gates_open_up_to_m = item.gates_open_up_to_m;
+                entry.unheard_delay_s = item.unheard_delay_s.saturating_add(HOP_DELAY_S);
             }
             let age_us = u64::from(item.age) * AGE_TICK_US + HOP_AGE_US.max(hop_us);
             let then = Instant::from_micros(now.as_micros().saturating_sub(age_us));
-            contact.relayed_at = contact.relayed_at.max(Some(then).filter(|_| item.age < u8::MAX));
+            entry.relayed_at = entry.relayed_at.max(Some(then).filter(|_| item.age < u8::MAX));
         }
     }
 
     fn in_ranks(&self, rank: u8) -> Option<usize> {
-        self.contacts[..self.roster_count].binary_search_by_key(&u16::from(rank), |c| c.rank).ok()
+        self.entries[..self.roster_count].binary_search_by_key(&u16::from(rank), |c| c.rank).ok()
     }
 }
 

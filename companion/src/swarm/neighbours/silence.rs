@@ -8,7 +8,7 @@ impl<const V: usize> Neighbours<V> {
     /// Vehicles heard within 0.8 s, a bit for each rank below 32.
     pub fn heard_bits(&self, now: Instant) -> u32 {
         let heard =
-            self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
+            self.entries.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
         heard.fold(0, |bits, c| bits | 1 << c.rank)
     }
 
@@ -16,7 +16,7 @@ impl<const V: usize> Neighbours<V> {
     #[inline(never)]
     pub(crate) fn hears_nobody(&self, now: Instant) -> bool {
         self.roster_count > 0
-            && self.contacts[..self.roster_count]
+            && self.entries[..self.roster_count]
                 .iter()
                 .all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }
@@ -25,7 +25,7 @@ impl<const V: usize> Neighbours<V> {
     /// this vehicle.
     pub fn linked_within(&self, now: Instant, span: Duration) -> bool {
         let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
-        let roster = &self.contacts[..self.roster_count];
+        let roster = &self.entries[..self.roster_count];
         roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
     }
 
@@ -36,7 +36,7 @@ impl<const V: usize> Neighbours<V> {
         if self.are_all_at_rest() {
             return Duration::default();
         }
-        let others = || self.contacts[..self.roster_count].iter();
+        let others = || self.entries[..self.roster_count].iter();
         let heard = others().filter_map(|c| c.heard_at).max().unwrap_or(since);
         let hears_us = others().filter_map(|c| c.hears_us_at).max().unwrap_or(since);
         now - heard.min(hears_us).max(since)

@@ -10,7 +10,7 @@ impl<const V: usize> Neighbours<V> {
     /// Whether all vehicles of the roster last reported that they have landed or are out of the
     /// plan, or have been silent for `down_after`, when a lost vehicle is on the ground.
     pub(crate) fn are_all_down(&self, now: Instant) -> bool {
-        self.contacts[..self.roster_count]
+        self.entries[..self.roster_count]
             .iter()
             .all(|c| c.reports_any(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down_after))
     }
@@ -18,23 +18,21 @@ impl<const V: usize> Neighbours<V> {
     /// Whether a vehicle of the roster counts as dead, but may still be in the air: silent for less
     /// than `down_after`, it last reported itself neither on the ground nor out of the plan.
     pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
-        self.contacts[..self.roster_count]
-            .iter()
-            .any(|c| c.comes_down_unheard(now, self.down_after))
+        self.entries[..self.roster_count].iter().any(|c| c.comes_down_unheard(now, self.down_after))
     }
 
     /// Whether the vehicle `id` counts as dead, but may still be in the air; false for an id
     /// outside the roster.
     pub(crate) fn comes_down_unheard(&self, id: u8, now: Instant) -> bool {
         let at = self.roster_index(id);
-        at.is_some_and(|at| self.contacts[at].comes_down_unheard(now, self.down_after))
+        at.is_some_and(|at| self.entries[at].comes_down_unheard(now, self.down_after))
     }
 
     /// Whether the vehicle `id` has landed, or is out of the plan; false for an id outside the
     /// roster.
     pub(crate) fn is_at_rest(&self, id: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
-            self.contacts[at].reports_any(LANDED) || self.contacts[at].is_out_of_plan(now)
+            self.entries[at].reports_any(LANDED) || self.entries[at].is_out_of_plan(now)
         })
     }
 
@@ -45,34 +43,34 @@ impl<const V: usize> Neighbours<V> {
             c.heard_at.is_none()
                 || (c.reports_any(GROUNDED) && !c.reports_any(LANDED | OUT_OF_PLAN))
         };
-        self.roster_index(id).is_some_and(|at| waits(&self.contacts[at]))
+        self.roster_index(id).is_some_and(|at| waits(&self.entries[at]))
     }
 
     /// Whether every other vehicle of the roster is out of the plan, recently reported that it
     /// waits or has landed, or descends at the end of a detour.
     pub fn are_all_waiting(&self, now: Instant) -> bool {
-        self.contacts[..self.roster_count].iter().all(|c| c.is_waiting(now))
+        self.entries[..self.roster_count].iter().all(|c| c.is_waiting(now))
     }
 
     /// Whether every other vehicle of the roster is out of the plan, waits, or claims the turn.
     pub fn are_all_standing(&self, now: Instant) -> bool {
-        self.contacts[..self.roster_count].iter().all(|c| c.is_waiting(now) || c.claims_turn(now))
+        self.entries[..self.roster_count].iter().all(|c| c.is_waiting(now) || c.claims_turn(now))
     }
 
     /// Whether a vehicle with a lower system id than `id` claims the turn to fly a detour.
     pub fn is_turn_claimed_before(&self, id: u8, now: Instant) -> bool {
-        self.contacts.iter().any(|c| c.id < id && c.claims_turn(now))
+        self.entries.iter().any(|c| c.id < id && c.claims_turn(now))
     }
 
     /// Number of vehicles with a lower system id than `id` that report a blocked path.
     pub fn blocked_count_before(&self, id: u8) -> u64 {
-        self.contacts.iter().filter(|c| c.id < id && c.reports_any(BLOCKED)).count() as u64
+        self.entries.iter().filter(|c| c.id < id && c.reports_any(BLOCKED)).count() as u64
     }
 
     /// Whether every other vehicle of the roster last reported that it has landed or is out of the
     /// plan; true where there is none.
     pub fn are_all_at_rest(&self) -> bool {
-        self.contacts[..self.roster_count].iter().all(|c| c.reports_any(LANDED | OUT_OF_PLAN))
+        self.entries[..self.roster_count].iter().all(|c| c.reports_any(LANDED | OUT_OF_PLAN))
     }
 }
 

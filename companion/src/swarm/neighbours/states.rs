@@ -16,25 +16,25 @@ impl<const V: usize> Neighbours<V> {
     pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
         self.states.clear();
         self.forget_silent_strangers(now);
-        for contact in &self.contacts {
-            let progress_m = contact.passed_m(now);
-            let placed_at = contact.position_at;
-            let dead = contact.is_dead(self.clear_at);
+        for entry in &self.entries {
+            let progress_m = entry.passed_m(now);
+            let placed_at = entry.position_at;
+            let dead = entry.is_dead(self.clear_at);
             if placed_at.is_none() && progress_m.is_none() && !dead {
                 continue;
             }
             let state = Neighbour {
                 // Of a vehicle known only by relays, only the progress is known.
-                position: placed_at.map_or(FAR_AWAY, |_| contact.state.position),
+                position: placed_at.map_or(FAR_AWAY, |_| entry.state.position),
                 age_s: placed_at.map_or(0.0, |at| (now - at).as_secs_f32()),
-                rank: contact.rank,
+                rank: entry.rank,
                 progress_m,
-                grounded: contact.state.grounded || dead,
-                out_of_plan: contact.out_since.is_some_and(|since| since <= self.clear_at) || dead,
-                detours: contact.reports_any(ON_DETOUR),
-                ..contact.state
+                grounded: entry.state.grounded || dead,
+                out_of_plan: entry.out_since.is_some_and(|since| since <= self.clear_at) || dead,
+                detours: entry.reports_any(ON_DETOUR),
+                ..entry.state
             };
-            // Cannot overflow: there are as many slots as contacts.
+            // Cannot overflow: there are as many slots as entries.
             let _ = self.states.push(state);
         }
         &self.states
@@ -42,8 +42,8 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether `gate` is open for good: its vehicle has passed it, or is out of the plan.
     pub(crate) fn has_passed(&self, gate: &Gate, now: Instant) -> bool {
-        let contact = self.roster_index(gate.id).map(|at| &self.contacts[at]);
-        contact.is_some_and(|c| {
+        let entry = self.roster_index(gate.id).map(|at| &self.entries[at]);
+        entry.is_some_and(|c| {
             let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);
             passed
                 || c.out_since.is_some_and(|since| since <= self.clear_at)
@@ -53,6 +53,6 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether the vehicle `id` was last heard to follow the shared plan; true for an unknown id.
     pub(crate) fn follows_plan(&self, id: u8) -> bool {
-        self.contacts.iter().find(|c| c.state.id == id).is_none_or(NeighbourEntry::on_plan)
+        self.entries.iter().find(|c| c.state.id == id).is_none_or(NeighbourEntry::on_plan)
     }
 }

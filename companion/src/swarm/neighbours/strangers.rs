@@ -14,12 +14,12 @@ impl<const V: usize> Neighbours<V> {
         now: Instant,
     ) -> Option<&mut NeighbourEntry> {
         if let Some(at) = self.active_roster_index(id, now).or_else(|| self.stranger_index(id)) {
-            return self.contacts.get_mut(at);
+            return self.entries.get_mut(at);
         }
         self.forget_silent_strangers(now);
-        let room = self.contacts.len() - self.roster_count < MAX_STRANGERS;
-        match Some(id).filter(|_| room).and_then(|id| self.add_contact(id, STRANGER_RANK)) {
-            Some(at) => self.contacts.get_mut(at),
+        let room = self.entries.len() - self.roster_count < MAX_STRANGERS;
+        match Some(id).filter(|_| room).and_then(|id| self.add_entry(id, STRANGER_RANK)) {
+            Some(at) => self.entries.get_mut(at),
             None => {
                 self.dropped = self.dropped.wrapping_add(1);
                 None
@@ -28,18 +28,18 @@ impl<const V: usize> Neighbours<V> {
     }
 
     fn stranger_index(&self, id: u8) -> Option<usize> {
-        let strangers = &self.contacts[self.roster_count..];
+        let strangers = &self.entries[self.roster_count..];
         strangers.iter().position(|c| c.id == id).map(|at| at + self.roster_count)
     }
 
     /// Removes the strangers for which `keep` returns false.
     pub(super) fn retain_strangers(&mut self, mut keep: impl FnMut(&NeighbourEntry) -> bool) {
         let mut at = self.roster_count;
-        while let Some(contact) = self.contacts.get(at) {
-            if keep(contact) {
+        while let Some(entry) = self.entries.get(at) {
+            if keep(entry) {
                 at += 1;
             } else {
-                self.contacts.remove(at);
+                self.entries.remove(at);
             }
         }
     }

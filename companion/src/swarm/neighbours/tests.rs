@@ -5,7 +5,7 @@ use planner_core::track::safety::{Braking, Legs, MotionBounds, OwnSet, PointsRea
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use super::met::ReachQuery;
+use super::filter_neighbour::ReachQuery;
 use super::*;
 use crate::link::intent::BLOCKED;
 
@@ -275,7 +275,7 @@ proptest::proptest! {
         speed_mps in 0.0f32..2.0,
         begin_m in -30.0f32..0.0,
     ) {
-        let place_of = |table: &Neighbours<4>| table.contacts[1].state.progress_m;
+        let place_of = |table: &Neighbours<4>| table.entries[1].state.progress_m;
         let (mut honest, mut lying) = (joined(0), joined(0));
         let reported = |progress_m| Intent { progress_m, ..intent(ON_PLAN, 1, 2) };
         let (mut last, mut heard_ms) = (None::<(f32, Instant)>, 0);
@@ -340,26 +340,26 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             Point::new(uniform(rng, -m, m), uniform(rng, -m, m), uniform(rng, -m, m))
         };
         let mut table = joined(0);
-        let contact = &mut table.contacts[1];
-        contact.state.position = near(rng, 10.0);
+        let entry = &mut table.entries[1];
+        entry.state.position = near(rng, 10.0);
         let fastest_mps = [2.0, 15.0][rng.next_u32() as usize % 2];
-        contact.state.velocity = near(rng, fastest_mps);
-        contact.speed_mps = contact.state.velocity.norm();
-        contact.flags = rng.next_u32() as u8;
-        contact.may_come_down = rng.next_u32().is_multiple_of(2);
-        contact.ground_m = [f32::NAN, -3.0][rng.next_u32() as usize % 2];
-        contact.state.progress_m = [None, Some(1.0)][rng.next_u32() as usize % 2];
-        contact.message_delay.delay_s = uniform(rng, 0.0, 1.0);
+        entry.state.velocity = near(rng, fastest_mps);
+        entry.speed_mps = entry.state.velocity.norm();
+        entry.flags = rng.next_u32() as u8;
+        entry.may_come_down = rng.next_u32().is_multiple_of(2);
+        entry.ground_m = [f32::NAN, -3.0][rng.next_u32() as usize % 2];
+        entry.state.progress_m = [None, Some(1.0)][rng.next_u32() as usize % 2];
+        entry.message_delay.delay_s = uniform(rng, 0.0, 1.0);
         let beside_m = [0.3, 3.0][rng.next_u32() as usize % 2];
-        let from = contact.state.position + near(rng, beside_m);
-        contact.points = (0..rng.next_u32() % 9).map(|_| from + near(rng, 3.0)).collect();
-        contact.points_length_m = [0.0, -1.0][rng.next_u32() as usize % 2];
-        contact.unheard_point_count =
-            (rng.next_u32() % 9).min(contact.points.len().saturating_sub(1) as u32) as u8;
-        let first = contact.points.first().copied().unwrap_or_default();
+        let from = entry.state.position + near(rng, beside_m);
+        entry.points = (0..rng.next_u32() % 9).map(|_| from + near(rng, 3.0)).collect();
+        entry.points_length_m = [0.0, -1.0][rng.next_u32() as usize % 2];
+        entry.unheard_point_count =
+            (rng.next_u32() % 9).min(entry.points.len().saturating_sub(1) as u32) as u8;
+        let first = entry.points.first().copied().unwrap_or_default();
         let extent_m = |p: &Point| (p - first).norm();
-        contact.extent_m = contact.points_for_now().iter().map(extent_m).fold(0.0, f32::max);
-        contact.update_place_on_points();
+        entry.extent_m = entry.points_for_now().iter().map(extent_m).fold(0.0, f32::max);
+        entry.update_place_on_points();
         let now = Instant::from_millis(200_000);
         let ages_ms = [100, 900, 1500, 5000, 46_000, 80_000];
         let age = |rng: &mut Pcg32| {
@@ -367,11 +367,11 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             Instant::from_millis(200_000 - ms)
         };
         let placed_at = age(rng);
-        contact.position_at = Some(placed_at);
-        contact.intent_at = Some(age(rng));
-        contact.heard_at = contact.position_at.max(contact.intent_at);
-        contact.relayed_at = Some(age(rng)).filter(|_| seed % 3 == 0);
-        contact.moved_at = age(rng);
+        entry.position_at = Some(placed_at);
+        entry.intent_at = Some(age(rng));
+        entry.heard_at = entry.position_at.max(entry.intent_at);
+        entry.relayed_at = Some(age(rng)).filter(|_| seed % 3 == 0);
+        entry.moved_at = age(rng);
         let lands = seed % 2 == 0;
         let stopped = rng.next_u32().is_multiple_of(3);
         let place = near(rng, 14.0);
@@ -388,10 +388,10 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             holds_lease: false,
             lands,
         };
-        let dead = table.contacts[1].rests_silently(now - placed_at, now);
-        let mut met = table.contacts[1].filter_neighbour(now);
+        let dead = table.entries[1].rests_silently(now - placed_at, now);
+        let mut met = table.entries[1].filter_neighbour(now);
         met.lost = dead;
-        table.apply_silence(&table.contacts[1], now, &mut met);
+        table.apply_silence(&table.entries[1], now, &mut met);
         if met.on_plan && reach.on_plan {
             met.motion.delay_s = 0.0;
         }
@@ -406,9 +406,9 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             met.motion.rests_within_m = 0.0;
         }
         let by_gates = met.on_plan && reach.on_plan;
-        let leased = table.contacts[1].flies_all_points_unheard();
+        let leased = table.entries[1].flies_all_points_unheard();
         if leased && !(lands || by_gates || met.lost || reach.hears_nobody) {
-            met.limit_to_points(&table.contacts[1], &bounds);
+            met.limit_to_points(&table.entries[1], &bounds);
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
         let reach_m = reach.within_m + met.motion.reach_m(&bounds, ahead_s);
@@ -443,7 +443,7 @@ fn nobody_falls_up() {
         table.handle_intent(Instant::from_millis(500), 1, &reported, 1, None);
         table.handle_position(Instant::from_millis(500), &ORIGIN, 9, &place(50, 0));
         // Where the position says it is.
-        let from = table.contacts[1].state.position;
+        let from = table.entries[1].state.position;
         let mut place = Point::from_fn(|_, _| uniform(&mut rng, -6.0, 6.0));
         place.z = uniform(&mut rng, 0.0, 30.0);
         let floor_m = place.z - uniform(&mut rng, 0.5, 20.0);
@@ -458,7 +458,7 @@ fn nobody_falls_up() {
             above += 1;
             // Whatever of its way is beside the column is too far below the floor.
             let (mut nearest, mut at) = (f32::INFINITY, from);
-            let mut left_m = table.contacts[1].unheard_distance_m();
+            let mut left_m = table.entries[1].unheard_distance_m();
             for next in &points {
                 let leg_m = (next - at).norm();
                 let share = (left_m / leg_m).clamp(0.0, 1.0);

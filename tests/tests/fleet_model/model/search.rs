@@ -1,6 +1,6 @@
 //! The model as Stateright searches it.
 
-use companion::swarm::fleet::{MemberReception, OwnReport};
+use companion::swarm::fleet::{OwnReport, VehicleReception};
 use stateright::{Model, Property};
 
 use super::{FleetModel, Flight, Known, MOST, NOW, Radio, State, Vehicle};
@@ -19,7 +19,7 @@ impl Model for FleetModel {
                 let mut vehicle = Vehicle { flight: Flight::Flies, stands, ..self.dead(rank, 0) };
                 vehicle.fleet.begin_flight(NOW);
                 // All heard each other when they took off.
-                let heard = MemberReception {
+                let heard = VehicleReception {
                     heard_at: Some(NOW),
                     hears_us: true,
                     heard_by_others: true,

@@ -77,7 +77,7 @@ impl Watch {
                 b.enu.z,
                 self.log
             );
-            let flown = b.companion.requests.handshake().has_flown();
+            let flown = b.companion.handshake.arming().has_flown();
             assert!(
                 (command, param1) != (ARM, 0.0) || state != State::CancelStart || !flown,
                 "disarmed after it has flown: {:#?} {:?}",
@@ -94,7 +94,7 @@ impl Watch {
         self.commands = b.commands.len();
         // The companion knows of the arming by the armed bit or by the ack.
         let acked =
-            b.companion.requests.handshake().is_armed_bit_overdue(b.now + Duration::from_secs(9));
+            b.companion.handshake.arming().is_armed_bit_overdue(b.now + Duration::from_secs(9));
         self.armed_once |= b.companion.telemetry.armed || (acked && state == State::Arming);
         let flies_on =
             matches!(state, State::TakeOff | State::Climb | State::Follow | State::Arming);

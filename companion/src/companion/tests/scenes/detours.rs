@@ -18,11 +18,11 @@ fn blocked(b: &mut Bench) {
 
 pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
     let unheard = |b: &mut Bench| b.neighbour = None;
-    scenes.play(accompanied(Follow, 1.0), unheard, Alone, 5.0);
+    scenes.play(accompanied(Follow, 1.0), unheard, SwarmLinkLost, 5.0);
     scenes.play(accompanied(Follow, 1.0), unheard, Aborted, 60.0);
     let for_a_while = |b: &mut Bench| {
         b.neighbour = None;
-        b.run_until(Alone, 5.0);
+        b.run_until(SwarmLinkLost, 5.0);
         b.neighbour = on_pad(ON_PLAN);
     };
     scenes.play(accompanied(Follow, 1.0), for_a_while, Done, 60.0);
@@ -45,7 +45,7 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
     for (clear_m, end) in [(50.0, Done), (5.0, Aborted)] {
         let out_of_range = |b: &mut Bench| {
             b.neighbour = None;
-            b.run_until(Alone, 10.0);
+            b.run_until(SwarmLinkLost, 10.0);
         };
         scenes.play(gated_until(clear_m), out_of_range, end, 60.0);
     }

@@ -21,7 +21,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
         // The other vehicle, which shows this one that its receiver works.
         let heard = Intent { system_id: 3, ..intent(0, 1, 2) };
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 40_000));
-        let from = table.contacts[1].state.position;
+        let from = table.entries[1].state.position;
         let mut at = from;
         let count = 2 + rng.next_u32() % 7;
         let points: heapless::Vec<Point, MAX_POINTS> = (0..count)
@@ -94,10 +94,10 @@ fn where_a_vehicle_may_have_fallen_nobody_lands() {
         let reported = Intent { points, ground_m: 0.0, ..intent(0, 1, 2) };
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 0));
         table.handle_intent(Instant::ZERO, 1, &reported, 1, Some(2));
-        let contact = &mut table.contacts[1];
-        (contact.state.position, contact.state.velocity) = (from, velocity);
+        let entry = &mut table.entries[1];
+        (entry.state.position, entry.state.velocity) = (from, velocity);
         if case % 4 == 0 {
-            contact.flags |= OUT_OF_PLAN;
+            entry.flags |= OUT_OF_PLAN;
         }
         // The fall as it is simulated: drag slows the vehicle, and half of the wind's speed carries
         // it.
@@ -138,21 +138,21 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
     let mut at_the_end = 0;
     for case in 0..5000 {
         let mut table = joined(0);
-        let contact = &mut table.contacts[1];
-        contact.message_delay.delay_s = uniform(&mut rng, 0.0, 0.5);
-        let mut at = contact.state.position;
-        contact.points = (0..1 + rng.next_u32() % 8)
+        let entry = &mut table.entries[1];
+        entry.message_delay.delay_s = uniform(&mut rng, 0.0, 0.5);
+        let mut at = entry.state.position;
+        entry.points = (0..1 + rng.next_u32() % 8)
             .map(|_| {
                 at += Point::from_fn(|_, _| uniform(&mut rng, -4.0, 4.0));
                 at
             })
             .collect();
-        let upto_m = contact.unheard_stop_m();
+        let upto_m = entry.unheard_stop_m();
         let mut places = std::vec::Vec::new();
-        contact.for_each_place(upto_m, &mut |place, _| places.push(place));
+        entry.for_each_place(upto_m, &mut |place, _| places.push(place));
         let flown_m = upto_m * uniform(&mut rng, 0.0, 1.2).min(1.0);
-        let (mut left_m, mut from) = (flown_m, contact.state.position);
-        for next in &contact.points {
+        let (mut left_m, mut from) = (flown_m, entry.state.position);
+        for next in &entry.points {
             let leg: Point = next - from;
             let share = (left_m / leg.norm()).min(1.0);
             from += leg * share;
@@ -177,7 +177,7 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
         let flags = [0, OUT_OF_PLAN, GROUNDED, GROUNDED | OUT_OF_PLAN]
             [(uniform(&mut rng, 0.0, 3.999)) as usize];
         let mut table = joined(0);
-        table.contacts[0].flags = GROUNDED;
+        table.entries[0].flags = GROUNDED;
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
         table.handle_intent(Instant::ZERO, 1, &intent(flags, 1, 2), 1, Some(2));
         let silent_s = uniform(&mut rng, 1.0, 120.0);
@@ -215,7 +215,7 @@ fn a_vehicle_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             let away = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0)
                 .normalize();
             let truly_m = apart_m + if in_air { stray_m } else { 0.0 };
-            let here = table.contacts[1].state.position;
+            let here = table.entries[1].state.position;
             let near = here + away * (0.99 * truly_m);
             let mut free = true;
             table.for_each_place(Instant::from_millis(100), [apart_m; 2], |off| {
@@ -240,7 +240,7 @@ fn over_an_area_the_column_of_a_vehicle_that_left_it_in_the_air_is_kept_off_for_
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
         let reported = Intent { ground_m: -30.0, ..intent(OUT_OF_PLAN, 1, 2) };
         table.handle_intent(Instant::ZERO, 1, &reported, 1, Some(2));
-        let here = table.contacts[1].state.position;
+        let here = table.entries[1].state.position;
         let below = here - Point::new(0.0, 0.0, uniform(&mut rng, 3.0, here.z + 25.0));
         let silent_s = uniform(&mut rng, 1.0, 1200.0);
         let (mut kept, mut lies) = (false, false);

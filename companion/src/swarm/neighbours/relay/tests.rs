@@ -190,7 +190,7 @@ fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
         let mut far_to_others = false;
         for _ in 0..60 {
             swarm.step(&[true; 8], &lost);
-            let far = |of: usize| swarm.tables[of].contacts[0].is_reported_out_of_range(swarm.now);
+            let far = |of: usize| swarm.tables[of].entries[0].is_reported_out_of_range(swarm.now);
             assert!(!far(1), "it was heard until it failed");
             far_to_others |= far(2);
         }
@@ -286,14 +286,14 @@ fn a_vehicle_that_fails_is_lost_in_time_though_messages_are_late() {
                     let table = &mut swarm.tables[*to];
                     table.handle_intent(now, sequence, intent, MISSION, Some(PLAN));
                     let by = table.roster_index(intent.system_id).expect("of the roster");
-                    table.contacts[by].message_delay.delay_s = delay_ms as f32 * 1e-3;
+                    table.entries[by].message_delay.delay_s = delay_ms as f32 * 1e-3;
                     table.handle_relay(now, intent.system_id, relay);
                 }
                 *due > now
             });
         }
         for of in [1, 2] {
-            assert!(swarm.tables[of].contacts[0].is_dead(swarm.now), "{case}: {delay_ms} ms");
+            assert!(swarm.tables[of].entries[0].is_dead(swarm.now), "{case}: {delay_ms} ms");
         }
     }
 }

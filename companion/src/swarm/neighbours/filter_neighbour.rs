@@ -62,9 +62,9 @@ impl<'a> FilterNeighbour<'a> {
         self.motion.rests_within_m = 0.0;
     }
 
-    /// The neighbour, `contact`, flies no further than along the points that it reported.
-    pub(crate) fn limit_to_points(&mut self, contact: &'a NeighbourEntry, bounds: &MotionBounds) {
-        contact.limit_to_points(&mut self.motion, bounds);
+    /// The neighbour, `entry`, flies no further than along the points that it reported.
+    pub(crate) fn limit_to_points(&mut self, entry: &'a NeighbourEntry, bounds: &MotionBounds) {
+        entry.limit_to_points(&mut self.motion, bounds);
     }
 }
 
@@ -328,7 +328,7 @@ impl<const V: usize> Neighbours<V> {
                 |at: Instant| now - at > UNHEARD_BEFORE_ARMING && now - at < MAY_LAND_AFTER;
             flies && beside && c.position_at.is_some_and(lately)
         };
-        self.contacts[..self.roster_count].iter().find(missed).map(|c| c.id)
+        self.entries[..self.roster_count].iter().find(missed).map(|c| c.id)
     }
 
     /// The first neighbour from index `from` on, inclusive, that has a position and may be within
@@ -340,9 +340,9 @@ impl<const V: usize> Neighbours<V> {
         reach: &ReachQuery<'_>,
     ) -> Option<(usize, &NeighbourEntry, bool)> {
         // A loop: a board takes a third longer for the chain of iterators.
-        for (i, contact) in self.contacts.iter().enumerate().skip(from) {
-            if let Some(dead) = contact.dead_if_within_reach(self.down_after, now, reach) {
-                return Some((i, contact, dead));
+        for (i, entry) in self.entries.iter().enumerate().skip(from) {
+            if let Some(dead) = entry.dead_if_within_reach(self.down_after, now, reach) {
+                return Some((i, entry, dead));
             }
         }
         None
@@ -352,11 +352,11 @@ impl<const V: usize> Neighbours<V> {
     /// ([`NeighbourEntry::may_fly_on_unheard`]).
     pub(crate) fn may_fly_on_unheard(
         &self,
-        contact: &NeighbourEntry,
+        entry: &NeighbourEntry,
         now: Instant,
         reach: &ReachQuery<'_>,
     ) -> bool {
-        contact.may_fly_on_unheard(self.down_after, now, reach)
+        entry.may_fly_on_unheard(self.down_after, now, reach)
     }
 
     /// Changes `met`, made by [`NeighbourEntry::filter_neighbour`], if the neighbour's position is
@@ -365,21 +365,21 @@ impl<const V: usize> Neighbours<V> {
     #[inline(always)]
     pub(crate) fn apply_silence<'a>(
         &'a self,
-        contact: &'a NeighbourEntry,
+        entry: &'a NeighbourEntry,
         now: Instant,
         met: &mut FilterNeighbour<'a>,
     ) {
-        let placed_for = contact.placed_for(now);
+        let placed_for = entry.placed_for(now);
         // Most are heard.
         if placed_for >= MAX_HEIGHT_AGE {
-            self.change_to_silent(contact, placed_for, now, met);
+            self.change_to_silent(entry, placed_for, now, met);
         }
     }
 
     #[inline(never)]
     fn change_to_silent<'a>(
         &'a self,
-        contact: &'a NeighbourEntry,
+        entry: &'a NeighbourEntry,
         placed_for: Duration,
         now: Instant,
         met: &mut FilterNeighbour<'a>,
@@ -388,7 +388,7 @@ impl<const V: usize> Neighbours<V> {
         let placed_s = motion.age_s;
         // If only an intent is fresh, its first point, the setpoint, stands for the position.
         let heard_at =
-            contact.intent_at.filter(|_| placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
+            entry.intent_at.filter(|_| placed_s > MAX_HEIGHT_AGE_S && !entry.points.is_empty());
         let heard_s = heard_at
             .map(|at| (now - at).as_secs_f32())
             .filter(|heard_s| *heard_s < MAX_HEIGHT_AGE_S);
@@ -396,24 +396,23 @@ impl<const V: usize> Neighbours<V> {
         // Silent for `down_after`, or grounded without a position of its own, the neighbour lies on
         // the ground below; before that it rests in the zone that detours stay clear of.
         let down = placed_for >= self.down_after
-            || (contact.reports_any(GROUNDED) && contact.lacks_position());
-        let lies = down && (dead || contact.reports_any(GROUNDED)) && !contact.ground_m.is_nan();
-        if let Some(first) = contact.points.first().filter(|_| by_intent) {
+            || (entry.reports_any(GROUNDED) && entry.lacks_position());
+        let lies = down && (dead || entry.reports_any(GROUNDED)) && !entry.ground_m.is_nan();
+        if let Some(first) = entry.points.first().filter(|_| by_intent) {
             motion.position = *first;
         }
         // A neighbour silent in its climb may have flown to the climb's top, or just above it.
-        let top = if age_s > MAX_HEIGHT_AGE_S && !lies { contact.climb_top_m() } else { None };
-        let mut highest_m = contact.ground_m;
+        let top = if age_s > MAX_HEIGHT_AGE_S && !lies { entry.climb_top_m() } else { None };
+        let mut highest_m = entry.ground_m;
         if lies {
             let field = self.area_ground();
-            highest_m =
-                field.map_or(contact.ground_m, |g| contact.max_ground_m(g, &motion.position));
+            highest_m = field.map_or(entry.ground_m, |g| entry.max_ground_m(g, &motion.position));
             motion.position.z = libm::fminf(highest_m, motion.position.z);
         } else if let Some(top) = top {
             motion.position.z = top;
         }
         motion.grounded = (motion.grounded && top.is_none()) || lies;
-        let floor_m = contact.floor_m(motion.position.z);
+        let floor_m = entry.floor_m(motion.position.z);
         // A dead neighbour that flew along its points stopped on them, and rests in the zone that
         // detours stay clear of.
         motion.age_s = age_s;
@@ -422,27 +421,27 @@ impl<const V: usize> Neighbours<V> {
             motion.delay_s = if dead { 0.0 } else { UNHEARD_BEYOND_TOP_S };
         }
         if dead {
-            motion.points = &contact.points;
+            motion.points = &entry.points;
             motion.points_reach.most_m = f32::INFINITY;
             if top.is_none() {
-                motion.rests_within_m = contact.unheard_distance_m();
+                motion.rests_within_m = entry.unheard_distance_m();
             }
         }
         if top.is_some() || lies {
             motion.points = &[];
         }
         if by_intent || lies || top.is_some() {
-            let (place, extent_m) = (PlaceOnPoints::Unknown, contact.extent_m);
+            let (place, extent_m) = (PlaceOnPoints::Unknown, entry.extent_m);
             motion.place_on_points = place;
             motion.points_reach =
                 PointsReach::new(&motion.position, motion.points, &place, extent_m);
         }
         let column =
-            (dead || contact.has_column()) && (!motion.grounded || (lies && highest_m > floor_m));
+            (dead || entry.has_column()) && (!motion.grounded || (lies && highest_m > floor_m));
         motion.column_to_m = column.then_some(floor_m);
-        met.out_of_range = contact.is_out_of_range(now);
-        let stands = now - contact.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S;
+        met.out_of_range = entry.is_out_of_range(now);
+        let stands = now - entry.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S;
         met.stands = motion.grounded || stands;
-        met.before_climb = top.map(|_| contact.state.position);
+        met.before_climb = top.map(|_| entry.state.position);
     }
 }

@@ -40,8 +40,9 @@ impl Guidance {
 
     /// Moves the place where the vehicle waits back along its path, out of the columns of vehicles
     /// that descend: the advised stop if it is ahead of the reference, else `back_to_m`. In
-    /// `Alone`, before it lands, the vehicle steps back from above vehicles that may lie below, and
-    /// to the end of the part of its path that others know; never beyond where they last heard it.
+    /// `SwarmLinkLost`, before it lands, the vehicle steps back from above vehicles that may lie
+    /// below, and to the end of the part of its path that others know; never beyond where they last
+    /// heard it.
     pub(super) fn evade<const V: usize, const W: usize>(
         &mut self,
         state: State,
@@ -56,7 +57,7 @@ impl Guidance {
             self.acknowledged_path.from_m =
                 along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
         }
-        let (alone, follows) = (state == State::Alone, state == State::Follow);
+        let (alone, follows) = (state == State::SwarmLinkLost, state == State::Follow);
         // A vehicle in its climb or descent, or on its way aside, is not moved.
         let waits = state.is_on_path()
             && matches!(self.phase, Phase::Path | Phase::Join)
@@ -93,12 +94,14 @@ impl Guidance {
         self.no_better_place = nowhere;
     }
 
-    /// Place along its path up to which others expect a vehicle in `Alone`, metres: gates that
-    /// opened since may have let it fly beyond what it could report. ∞ in any other state, in a
-    /// coverage mission, and where the radio's range is known, so that others expect it further on.
+    /// Place along its path up to which others expect a vehicle in `SwarmLinkLost`, metres: gates
+    /// that opened since may have let it fly beyond what it could report. ∞ in any other state, in
+    /// a coverage mission, and where the radio's range is known, so that others expect it further
+    /// on.
     fn expected_up_to_m<const V: usize>(&self, state: State, neighbours: &Neighbours<V>) -> f32 {
-        let expected =
-            state == State::Alone && neighbours.fleet().is_none() && !neighbours.knows_range();
+        let expected = state == State::SwarmLinkLost
+            && neighbours.fleet().is_none()
+            && !neighbours.knows_range();
         if expected {
             self.acknowledged_path.from_m.max(self.acknowledged_path.to_m)
         } else {

@@ -1,0 +1,181 @@
+//! Arming the autopilot step by step, and which of its refusals are reported as texts.
+
+use crate::autopilot::telemetry::{Ack, MAX_POSITION_AGE, Telemetry};
+use crate::state::State;
+use crate::time::{Duration, Instant};
+
+/// Time from a denied arming request to the next arming request.
+const ARMING_RETRY_EVERY: Duration = Duration::from_millis(1000);
+/// Longest time from the COMMAND_ACK that accepts arming to the first HEARTBEAT (1 Hz) with the
+/// armed bit; also the time to wait for a COMMAND_ACK before arming is requested again.
+const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
+/// Most arming requests in a row without a COMMAND_ACK; after them arming has failed.
+const MAX_ARMING_TRIES: u8 = 2;
+/// Most different refusals (command and result) that are reported in one mission state.
+const MAX_REFUSALS: usize = 4;
+/// Estimated height above the pad from which the vehicle counts as risen, whatever the landing
+/// detector reports, metres; an error of the estimate that was there before arming cancels out.
+const RISEN_M: f32 = 0.25;
+
+const NAV_TAKEOFF: u16 = 22;
+const DO_SET_MODE: u16 = 176;
+const ARM_DISARM: u16 = 400;
+/// `MAV_RESULT` ACCEPTED.
+const ACCEPTED: u8 = 0;
+/// `MAV_RESULT` IN_PROGRESS.
+const IN_PROGRESS: u8 = 5;
+
+/// State of arming, disarming and flight modes between the companion and its autopilot.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ArmingHandshake {
+    /// When arming was last requested.
+    requested_at: Option<Instant>,
+    /// Arming requests since the last COMMAND_ACK that denied one.
+    unanswered: u8,
+    /// Whether the autopilot denied the last arming request.
+    denied: bool,
+    /// When the autopilot accepted arming: from then on arming is not requested again.
+    accepted_at: Option<Instant>,
+    /// Whether HEARTBEAT was missing since arming was last requested: meanwhile the vehicle may
+    /// have been armed, and disarmed again by its pilot. Then arming is not requested again.
+    heartbeat_gap: bool,
+    /// Whether the autopilot was switched to Offboard or Guided for this mission, and its HEARTBEAT
+    /// has shown no mode but that and the landing mode since.
+    in_own_mode: bool,
+    /// Whether the landing detector has reported flight while armed, or the vehicle has risen,
+    /// since the state `Arming` was entered.
+    flown: bool,
+    /// Whether a start that was cancelled had begun its climb: unseen, the vehicle may rise.
+    climb_begun: bool,
+    /// Estimated height with which the vehicle was last disarmed, metres.
+    disarmed_z_m: f32,
+    /// Refusals reported in this state: `MAV_CMD` and `MAV_RESULT`.
+    reported: [Option<(u16, u8)>; MAX_REFUSALS],
+}
+
+impl ArmingHandshake {
+    /// Clears what belongs to the state `from`; entering `Arming` clears everything.
+    pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
+        self.reported = [None; MAX_REFUSALS];
+        if to == State::Arming {
+            let disarmed_z_m = self.disarmed_z_m;
+            *self = Self { in_own_mode: true, disarmed_z_m, ..Self::default() };
+        }
+        if from == State::PilotReturned {
+            self.in_own_mode = true;
+        }
+        if to == State::CancelStart && from != to {
+            self.climb_begun = from.takes_off();
+        }
+    }
+
+    /// Updates [`Self::is_in_own_mode`] and [`Self::has_flown`] from the autopilot's mode, armed
+    /// bit and landing detector.
+    pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry) {
+        let kind = t.kind.unwrap_or_default();
+        let on_ground = t.on_ground != Some(false);
+        self.in_own_mode &=
+            t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
+        if !t.armed {
+            self.disarmed_z_m = t.position.z;
+        } else if !on_ground || t.position.z > self.disarmed_z_m + RISEN_M {
+            self.flown = true;
+        }
+        if state.is_over() && on_ground && !t.armed {
+            self.in_own_mode = false;
+        }
+    }
+
+    /// Whether the autopilot accepted arming 2.5 s (`ARMED_TIMEOUT`) ago or more: HEARTBEAT should
+    /// show the armed bit by now.
+    pub(crate) fn is_armed_bit_overdue(&self, now: Instant) -> bool {
+        self.accepted_at.is_some_and(|at| now - at >= ARMED_TIMEOUT)
+    }
+
+    /// Whether arming has failed for want of an answer: 2.5 s have passed since the last arming
+    /// request, no COMMAND_ACK came, and either two requests were sent or HEARTBEAT was missing
+    /// meanwhile.
+    pub(crate) fn is_arming_unanswered(&self, now: Instant) -> bool {
+        let waited = self.requested_at.is_some_and(|at| now - at >= ARMED_TIMEOUT);
+        let silent = !self.denied && self.accepted_at.is_none();
+        waited && silent && (self.unanswered >= MAX_ARMING_TRIES || self.heartbeat_gap)
+    }
+
+    /// Whether arming has not been requested since the state `Arming` was entered.
+    pub(crate) fn is_arming_unrequested(&self) -> bool {
+        self.requested_at.is_none()
+    }
+
+    /// Whether an arming request is to be sent now; if so, counts it as sent.
+    pub(crate) fn should_request_arming(&mut self, now: Instant, telemetry: &Telemetry) -> bool {
+        let due = match self.requested_at {
+            None => true,
+            Some(at) if self.denied => now - at >= ARMING_RETRY_EVERY,
+            Some(at) => {
+                now - at >= ARMED_TIMEOUT
+                    && self.unanswered < MAX_ARMING_TRIES
+                    && !self.heartbeat_gap
+            }
+        };
+        let asks = due && !telemetry.armed && self.accepted_at.is_none();
+        if asks {
+            (self.requested_at, self.denied, self.heartbeat_gap) = (Some(now), false, false);
+            self.unanswered += 1;
+        }
+        asks
+    }
+
+    /// Whether the autopilot is still in the mode that the companion set: Offboard or Guided, or
+    /// the landing mode after it.
+    pub(crate) fn is_in_own_mode(&self) -> bool {
+        self.in_own_mode
+    }
+
+    /// Whether the landing detector has reported flight while armed, or the vehicle has risen,
+    /// since the state `Arming` was entered.
+    pub(crate) fn has_flown(&self) -> bool {
+        self.flown
+    }
+
+    /// Whether a vehicle whose start is cancelled may be disarmed: it has not risen, and if its
+    /// climb had begun, its position is known now.
+    pub(crate) fn may_disarm_on_pad(&self, now: Instant, telemetry: &Telemetry) -> bool {
+        let seen = telemetry.position_age(now) < MAX_POSITION_AGE;
+        !self.flown && (seen || !self.climb_begun)
+    }
+
+    /// Notes that HEARTBEAT is missing while the vehicle is to be armed.
+    pub(crate) fn note_heartbeat_gap(&mut self) {
+        self.heartbeat_gap = true;
+    }
+
+    /// Handles the autopilot's COMMAND_ACK. Returns a refusal that is to be reported, each command
+    /// and result once in a state: the text, and as its numbers the command and the result.
+    pub(crate) fn handle_ack(
+        &mut self,
+        state: State,
+        ack: &Ack,
+        now: Instant,
+    ) -> Option<(&'static str, [u32; 2])> {
+        let refused = !matches!(ack.result, ACCEPTED | IN_PROGRESS);
+        match (state, ack.command) {
+            (State::Arming, ARM_DISARM) if ack.result == ACCEPTED => {
+                self.accepted_at.get_or_insert(now);
+            }
+            (State::Arming, ARM_DISARM) if refused => (self.denied, self.unanswered) = (true, 0),
+            _ => {}
+        }
+        let refusal = Some((ack.command, ack.result));
+        let reports = matches!(ack.command, DO_SET_MODE | ARM_DISARM | NAV_TAKEOFF);
+        if !refused || !reports || self.reported.contains(&refusal) {
+            return None;
+        }
+        *self.reported.iter_mut().find(|slot| slot.is_none())? = refusal;
+        let text = match ack.command {
+            DO_SET_MODE => "Autopilot refuses the mode: # (result #)",
+            ARM_DISARM => "Autopilot refuses to arm or disarm: # (result #)",
+            _ => "Autopilot refuses to take off: # (result #)",
+        };
+        Some((text, [u32::from(ack.command), u32::from(ack.result)]))
+    }
+}
