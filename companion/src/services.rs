@@ -41,7 +41,6 @@ impl ReceivedFrame<'_> {
         (self.frame.system, self.frame.component)
     }
 
-    /// Queues an answer, or drops it where its rate limit or the link's queue has no room.
     /// Whether another component sent the frame.
     pub(crate) fn is_from_another(&self) -> bool {
         self.sender_ids() != (self.own, COMPANION_COMPONENT)
@@ -60,6 +59,7 @@ impl ReceivedFrame<'_> {
         self.is_for_companion(at) || (self.is_from_another() && (p[at], p[at + 1]) == (self.own, 0))
     }
 
+    /// Queues an answer, or drops it where its rate limit or the link's queue has no room.
     fn queue_answer(&self, links: &mut Links, kind: AnswerKind, answer: Outgoing) {
         links.queue_answer(self.now, self.link, self.sender, kind, answer);
     }

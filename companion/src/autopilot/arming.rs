@@ -1,6 +1,6 @@
 //! Arming the autopilot step by step, and which of its refusals are reported as texts.
 
-use crate::autopilot::telemetry::{Ack, MAX_POSITION_AGE, Telemetry};
+use crate::autopilot::telemetry::{Ack, MAX_AGE_ON_PAD, Telemetry};
 use crate::state::State;
 use crate::time::{Duration, Instant};
 
@@ -138,9 +138,9 @@ impl ArmingHandshake {
     }
 
     /// Whether a vehicle whose start is cancelled may be disarmed: it has not risen, and if its
-    /// climb had begun, its position is known now.
+    /// climb had begun, its position is new.
     pub(crate) fn may_disarm_on_pad(&self, now: Instant, telemetry: &Telemetry) -> bool {
-        let seen = telemetry.position_age(now) < MAX_POSITION_AGE;
+        let seen = telemetry.position_age(now) < MAX_AGE_ON_PAD;
         !self.flown && (seen || !self.climb_begun)
     }
 

@@ -32,6 +32,8 @@ use crate::time::{Duration, Instant};
 /// Age of the last HEARTBEAT from which the autopilot counts as silent: HEARTBEAT comes at 1 Hz,
 /// and a late one is not yet silence.
 pub(crate) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
+/// Age of a position from which a vehicle may have risen unseen: positions come at 30 Hz.
+pub(crate) const MAX_AGE_ON_PAD: Duration = Duration::from_millis(150);
 /// Age from which a position counts as unknown.
 pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500);
 const HEARTBEAT: u32 = 0;

@@ -1,6 +1,6 @@
 //! The inputs of the guards of the mission table.
 
-use crate::autopilot::telemetry::MAX_POSITION_AGE;
+use crate::autopilot::telemetry::MAX_AGE_ON_PAD;
 use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
 use crate::time::Duration;
 
@@ -247,10 +247,10 @@ impl GuardInputs {
         self.can_fly_home && self.seeking_home_for.is_none()
     }
 
-    /// Whether the vehicle surely has not left the ground: its position is known, the landing
+    /// Whether the vehicle surely has not left the ground: its position is new, the landing
     /// detector has not reported flight, and the vehicle does not rise.
     pub(super) fn is_before_lift_off(&self) -> bool {
-        self.position_age < MAX_POSITION_AGE && self.on_ground && !self.vertical && !self.has_flown
+        self.position_age < MAX_AGE_ON_PAD && self.on_ground && !self.vertical && !self.has_flown
     }
 
     /// Whether the vehicle is in the air, whatever the landing detector reports.

@@ -14,7 +14,7 @@ const CIRCLE_CORNERS: usize = 32;
 const M_PER_DEG: f64 = 111_319.49;
 
 #[derive(Deserialize)]
-#[serde(rename = "File", rename_all = "camelCase")]
+#[serde(rename_all = "camelCase")]
 struct PlanFile {
     file_type: String,
     version: u32,
@@ -24,21 +24,19 @@ struct PlanFile {
 }
 
 #[derive(Deserialize)]
-#[serde(rename = "Mission")]
 struct PlanMission {
     #[serde(default)]
     items: Vec<PlanItem>,
 }
 
 #[derive(Deserialize)]
-#[serde(rename = "Item", rename_all = "camelCase")]
+#[serde(rename_all = "camelCase")]
 struct PlanItem {
     complex_item_type: Option<String>,
     polygon: Option<Vec<[f64; 2]>>,
 }
 
 #[derive(Deserialize, Default)]
-#[serde(rename = "Fence")]
 struct PlanGeofence {
     #[serde(default)]
     polygons: Vec<FencePolygon>,
