@@ -176,7 +176,8 @@ pub struct Guidance {
     evade_search: EvadeSearch,
     /// Whether the vehicle keeps out of the column below a vehicle that descends.
     pub evading: bool,
-    /// Distance ahead on the path at which the vehicle stops, by advice or to evade, metres.
+    /// Distance ahead on the path at which the vehicle stops, by the deconfliction's advice or to
+    /// evade, metres.
     wait_distance_m: f32,
     /// Place along the path where the vehicle holds for a division, metres; ∞ for none.
     halt_m: f32,

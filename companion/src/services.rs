@@ -135,7 +135,9 @@ impl Services {
     /// Handles the outcome of the flash operation: the bytes read, none for an erasure or a
     /// program.
     pub(crate) fn handle_flash(&mut self, outcome: Result<&[u8], FlashFault>) {
-        if let Some(answer) = self.store.as_mut().and_then(|store| store.handle_outcome(outcome)) {
+        if let Some(answer) =
+            self.store.as_mut().and_then(|store| store.handle_flash_outcome(outcome))
+        {
             self.ftp.handle_read_outcome(answer);
         }
     }

@@ -309,7 +309,7 @@ impl State {
         matches!(self, Self::PilotControl | Self::PilotReturned)
     }
 
-    /// Whether somebody else flies the vehicle, or did and has not given it back.
+    /// Whether somebody else flies the vehicle, or did and has not let the mission go on.
     pub(crate) fn is_flown_by_another(self) -> bool {
         self.is_left_to_pilot() || self == Self::Failsafe
     }

@@ -51,7 +51,7 @@ pub fn planned_page(
     })
 }
 
-/// Files in `--out` of every command with a mission result: result, times, page.
+/// Files in `--out` of every command with a mission result: result, timing, HTML report.
 pub const RESULT_FILES: [&str; 3] = ["result.json", "timing.json", "report.html"];
 
 /// Adds the three files of [`RESULT_FILES`] to `results`.

@@ -275,7 +275,7 @@ impl<'a> SimulationRun<'a> {
                 if wanted == PlanKind::Mission {
                     self.done = member.companion.excluded_waypoints().to_vec();
                 }
-                member.answer_plan(now_us, wanted, own.as_deref().map_err(|failure| *failure));
+                member.hand_over_plan(now_us, wanted, own.as_deref().map_err(|failure| *failure));
             }
             places[i] = member.autopilot.true_state().position;
             let flight = &plan.flights[i];

@@ -2,20 +2,21 @@
 //! longitude, without trigonometry in every step.
 //!
 //! The exact conversion goes through latitude and longitude, by the autopilot's own projection
-//! (`planner_core::geo::frames`). Within 100 m a linear map deviates from it by d² / 2R < 1 mm. So
-//! a linear map about a point near the vehicle is used; it is renewed when the vehicle is 50 m
-//! away, and points farther than 100 m are converted exactly.
+//! (`planner_core::geo::frames`). Within 100 m a linear approximation deviates from it by d² / 2R <
+//! 1 mm. So a linear approximation about a point near the vehicle is used; it is renewed when the
+//! vehicle is 50 m away, and points farther than 100 m are converted exactly.
 
 use nalgebra::{Matrix3, Vector3};
 use planner_core::Point;
 use planner_core::geo::frames::{self, Geodetic, Projection};
 
-/// Distance of the vehicle from the linear map's centre at which the map is renewed, metres.
-const RENEW_MAP_M: f64 = 50.0;
-/// Distance from the linear map's centre beyond which a point is converted exactly, metres.
+/// Distance of the vehicle from the linear approximation's centre at which it is renewed, metres.
+const RENEW_BEYOND_M: f64 = 50.0;
+/// Distance from the linear approximation's centre beyond which a point is converted exactly,
+/// metres.
 const LINEAR_WITHIN_M: f64 = 100.0;
-/// Half of the distance over which the linear map's slopes are computed, metres: a power of two, so
-/// that the points are exact in f32.
+/// Half of the distance over which the linear approximation's slopes are computed, metres: a power
+/// of two, so that the points are exact in f32.
 const SLOPE_HALF_SPAN_M: f64 = 64.0;
 
 /// Conversions between one autopilot's frame (EKF origin and projection) and the mission frame.
@@ -34,7 +35,7 @@ pub struct LocalFrame {
 }
 
 impl LocalFrame {
-    /// Conversions with a linear map about `near` (ENU metres).
+    /// Conversions with a linear approximation about `near` (ENU metres).
     pub fn new(
         projection: Projection,
         world_origin: Geodetic,
@@ -67,10 +68,10 @@ impl LocalFrame {
         self.linearise(self.centre);
     }
 
-    /// Renews the linear map if `enu` is more than 50 m from its centre; to be called in every
-    /// step.
+    /// Renews the linear approximation if `enu` is more than 50 m from its centre; to be called in
+    /// every step.
     pub fn recentre(&mut self, enu: &Vector3<f64>) {
-        if (enu - self.centre).norm_squared() > RENEW_MAP_M * RENEW_MAP_M {
+        if (enu - self.centre).norm_squared() > RENEW_BEYOND_M * RENEW_BEYOND_M {
             self.linearise(*enu);
         }
     }

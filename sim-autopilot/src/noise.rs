@@ -5,7 +5,7 @@
 //! since nothing they model changes faster.
 //!
 //! A gust is specified by its peak beyond the mean wind, as in weather reports and MIL-F-8785C's
-//! discrete gust, not by a standard deviation: the peak is `PEAK_FACTOR` deviations, and gusts
+//! discrete gust, not by a standard deviation: the peak is `GUST_PEAK_FACTOR` deviations, and gusts
 //! are clamped to it.
 
 use rand_core::{Rng, SeedableRng};
@@ -20,7 +20,7 @@ const GUST_TAU_S: f32 = 2.5;
 /// Ratio of a gust's peak to its standard deviation: about 3 for gusts of 3 s in 10 minutes (WMO,
 /// Harper, Kepert and Ginger, Guidelines for converting between various wind averaging periods,
 /// 2010, §2).
-const PEAK_FACTOR: f32 = 3.0;
+const GUST_PEAK_FACTOR: f32 = 3.0;
 /// Ratio of vertical to horizontal gusts near the ground (MIL-F-8785C, low altitude).
 const VERTICAL_SHARE: f32 = 0.5;
 /// Time constant of the slow position error, seconds: GPS multipath and ionosphere.
@@ -99,7 +99,7 @@ impl Disturbance {
     /// deviation of the position estimate (m). 0 switches gusts or errors off.
     pub fn new(mean_wind: Point, gust_peak_mps: f32, position_noise_m: f32, seed: u64) -> Self {
         let mut random = Gaussian::new(seed);
-        let sigma = gust_peak_mps / PEAK_FACTOR;
+        let sigma = gust_peak_mps / GUST_PEAK_FACTOR;
         let sigma = Point::new(sigma, sigma, VERTICAL_SHARE * sigma);
         let gust =
             (gust_peak_mps > 0.0).then(|| OrnsteinUhlenbeck::new(sigma, GUST_TAU_S, &mut random));

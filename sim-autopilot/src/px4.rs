@@ -270,7 +270,7 @@ impl Commander {
         self.failsafe = None;
         self.phase = FlightPhase::Ground;
         self.cruise = None;
-        if self.intended_mode.ends_with_flight() {
+        if self.intended_mode.is_left_on_disarm() {
             self.intended_mode = self.after_disarm;
         }
         CommandOutcome::Done
@@ -299,7 +299,7 @@ impl Commander {
     /// Enters the mode as a pilot's switch does, even if it cannot run.
     pub fn force_mode(&mut self, mode: Px4Mode, sensors: &SensorReadings) {
         self.intended_mode = mode;
-        if !mode.ends_with_flight() {
+        if !mode.is_left_on_disarm() {
             self.after_disarm = mode;
         }
         if mode != Px4Mode::Takeoff {
@@ -421,7 +421,7 @@ impl Commander {
         let stream_lost = self.intended_mode == Px4Mode::Offboard
             && !self.is_setpoint_stream_fresh(sensors.now_us, tuning);
         let battery_out =
-            sensors.battery < tuning.battery_critical && !self.intended_mode.ends_with_flight();
+            sensors.battery < tuning.battery_critical && !self.intended_mode.is_left_on_disarm();
         let action = if !self.position_ok {
             (self.intended_mode != Px4Mode::Land).then_some(Px4Mode::Land)
         } else if stream_lost {

@@ -162,7 +162,7 @@ fn set_parameter(dir: &Path, name: &str, value: f32) {
         let mut read = [0; MAX_READ];
         while let Some(request) = store.poll_request(ErasePermission::Allowed) {
             let outcome = flash.execute_request(request, &mut read);
-            store.handle_outcome(outcome);
+            store.handle_flash_outcome(outcome);
         }
     }
 }

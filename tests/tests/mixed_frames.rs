@@ -132,7 +132,7 @@ fn fly(seed: u64) -> Errors {
             member.step(step, i, &mission, &mut radio, &places, &mut log).expect("it has no board");
             if let Some(wanted) = member.next_plan_request() {
                 let own = mission.own_plan(&plan, i).expect("few gates");
-                member.answer_plan(now_us, wanted, Ok(&own));
+                member.hand_over_plan(now_us, wanted, Ok(&own));
             }
             let truth = member.autopilot.true_state().position;
             places[i] = truth;

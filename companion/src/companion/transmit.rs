@@ -264,7 +264,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || (self.mission.state().lands() || self.mission.state().has_landed())
                 && self.guidance.is_at_goal(&self.guidance_inputs());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
-        let out = self.detours.is_out_of_plan(&view);
+        let out = self.detours.is_own_vehicle_out_of_plan(&view);
         let flies = if grounded { intent::GROUNDED } else { intent::FLYING };
         flies
             | flag(intent::LANDED, self.mission.state() == Done)

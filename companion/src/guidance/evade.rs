@@ -57,7 +57,7 @@ pub enum EvadeTarget {
     Nowhere,
 }
 
-/// Whether a vehicle can step back from below one that descends.
+/// Whether a vehicle may make its next step back along the path, away from below one that descends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StepBack {
     /// It can, or need not.
@@ -69,7 +69,7 @@ pub enum StepBack {
 /// Search for the nearest waiting place that is outside all landing columns, over several steps.
 #[derive(Clone, Debug, Default)]
 pub struct EvadeSearch {
-    sweep: IncrementalScan,
+    scan: IncrementalScan,
     /// Place along the path where the search began, metres, and the number of places from there
     /// back that were found inside a column.
     from_m: Option<f32>,
@@ -94,7 +94,7 @@ impl EvadeSearch {
         let from_m =
             self.from_m.filter(|from_m| wait_m <= from_m + PLACE_STEP_M).unwrap_or_else(|| {
                 self.covered_places = 0;
-                self.sweep.restart();
+                self.scan.restart();
                 wait_m
             });
         self.from_m = Some(from_m);
@@ -110,7 +110,7 @@ impl EvadeSearch {
             };
             budget = budget.saturating_sub(PLACE_COST);
             match self
-                .sweep
+                .scan
                 .continue_scan(neighbours, &mut budget, 1, &visit, |column| column.contains(&place))
             {
                 None => return,

@@ -321,8 +321,8 @@ impl SetpointSmoother {
         }
     }
 
-    /// Restarts the curve at the setpoint, which has to stand, or nearly: the follower brings it to
-    /// rest within its own limits.
+    /// Restarts the curve at the setpoint, which has to be slow: the follower brings it to rest
+    /// within its own limits.
     pub(crate) fn forget_curve(&mut self) {
         self.steps = [Point::zeros(); HISTORY_LEN];
         self.average_steps = [Point::zeros(); 3];

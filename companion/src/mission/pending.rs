@@ -25,8 +25,8 @@ pub(crate) struct PendingCommands {
 }
 
 impl PendingCommands {
-    /// Clears the commands that this row has carried out by entering `to`; all of them if the
-    /// mission ends or its start is given up.
+    /// Clears the commands that this row of the table has carried out by entering `to`, and a
+    /// resume; all of them if the mission ends or its start is given up.
     pub(crate) fn clear_carried_out(&mut self, row: &TransitionRow, to: State) {
         let guard = row.guard;
         self.resume = false;

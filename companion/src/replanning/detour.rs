@@ -77,11 +77,6 @@ const BLOCKED_AGAIN_M: f32 = 2.0;
 const UNBLOCKED_HINDERED_WITHIN: Duration = Duration::from_millis(500);
 /// Time without a stop by the safety filter after which a blocked vehicle counts as free.
 const BLOCKED_HINDERED_WITHIN: Duration = Duration::from_secs(3);
-/// Time under a pilot's control after which the vehicle counts as out of the plan: others fly
-/// around it.
-const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
-/// Time in `Aborted` after which a vehicle that reports no landing is out of the plan.
-const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 /// Time after which a vehicle on its pad that no other vehicle hears reports that it waits.
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Sway, metres: a stopped vehicle this near to the end of a path aside counts as at the end.
@@ -257,23 +252,6 @@ impl Detours {
         self.left_at_m
     }
 
-    /// Whether this vehicle is out of the plan: done away from its goal or after leaving the plan,
-    /// aborted, or flown by its pilot for [`PILOT_KEEPS_AFTER`].
-    pub(crate) fn is_out_of_plan<const V: usize, const W: usize, const G: usize>(
-        &self,
-        view: &DetourView<'_, V, W, G>,
-    ) -> bool {
-        let lasted = view.mission.time_in_state(view.now);
-        match view.mission.state() {
-            State::Done => !view.guidance.is_at_goal(&view.scene) || self.left_plan,
-            State::Aborted => view.is_on_ground() || lasted >= ABORT_OVER_AFTER,
-            state if state.is_left_to_pilot() => {
-                view.mission.time_with_pilot(view.now) >= PILOT_KEEPS_AFTER
-            }
-            _ => false,
-        }
-    }
-
     /// Whether this vehicle stands until another one moves, and does not claim the turn itself.
     pub(crate) fn is_waiting<const V: usize, const W: usize, const G: usize>(
         &self,
@@ -322,7 +300,7 @@ impl Detours {
     ) -> Option<Instant> {
         let now = view.now;
         self.left_plan |= view.config.roster.len() > 1
-            && self.is_out_of_plan(view)
+            && self.is_own_vehicle_out_of_plan(view)
             && view.mission.plan().is_some();
         let on_ground = view.mission.state().waits_on_pad();
         let stopped = view.mission.state().is_blocked();
@@ -444,7 +422,9 @@ impl Detours {
             cost as u16,
             |source, visit| match new.get(source) {
                 Some(obstacle) => visit(*obstacle),
-                None => neighbours.for_each_new_zone_of(source - new.len(), now, apart_m, visit),
+                None => {
+                    neighbours.for_each_unavoided_zone_of(source - new.len(), now, apart_m, visit);
+                }
             },
             // In a coverage mission only the path just ahead counts: the vehicle goes on taking
             // pictures until it is near the obstacle.

@@ -225,7 +225,7 @@ impl Ftp {
                         // The erasure for this session may have taken longer than [`SESSION_IDLE`].
                         self.session =
                             self.session.map(|session| Session { used_at: self.now, ..session });
-                        self.finish(&request, Ok(()));
+                        self.reply_and_remember(&request, Ok(()));
                     }
                 }
             }
@@ -245,7 +245,7 @@ impl Ftp {
         if let Some(session) = self.session.take() {
             self.text = Some(upload_text(session.file, result));
         }
-        self.finish(request, result.map_err(NakError::from));
+        self.reply_and_remember(request, result.map_err(NakError::from));
     }
 
     fn begin_request(&mut self, request: &FtpRequest, store: &mut Store, erasing: ErasePermission) {
@@ -278,7 +278,7 @@ impl Ftp {
                 }
                 Ok(_) => {
                     self.session = None;
-                    self.finish(request, Ok(()));
+                    self.reply_and_remember(request, Ok(()));
                 }
                 Err(no) => {
                     let closed = self.duplicates.previous_close_outcome(request, self.now);
@@ -291,7 +291,7 @@ impl Ftp {
                 }) {
                     self.drop_session(store);
                 }
-                self.finish(request, Ok(()));
+                self.reply_and_remember(request, Ok(()));
             }
             op::LIST => self.handle_list(request, store),
             op::OPEN_READ => {
@@ -323,7 +323,7 @@ impl Ftp {
                     Some(file) => {
                         store.remove_file(file);
                         self.text = Some(FILE_REMOVED);
-                        self.finish(request, Ok(()));
+                        self.reply_and_remember(request, Ok(()));
                     }
                     None => self.nak(request, NakError::NotFound),
                 }

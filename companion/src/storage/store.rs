@@ -2,9 +2,9 @@
 //! journal with the mission file, the parameters and the photographed waypoints of an area.
 //!
 //! Flash is I/O: the store requests ([`Store::poll_request`]) that one sector be erased, one block
-//! programmed or some bytes read, and gets the outcome later ([`Store::handle_outcome`]). So a slow
-//! erasure never delays setpoints, and the same code runs on a board's flash, an emulated flash, or
-//! memory on the host.
+//! programmed or some bytes read, and gets the outcome later ([`Store::handle_flash_outcome`]). So
+//! a slow erasure never delays setpoints, and the same code runs on a board's flash, an emulated
+//! flash, or memory on the host.
 //!
 //! A file is either complete or absent. It is written into an erased area and read back; the area's
 //! seal is written last ([`area`]). A power loss at any byte leaves what was sealed before. Areas

@@ -165,7 +165,7 @@ pub fn run(
     for _ in 0..100_000 {
         let Some(request) = store.poll_request(erasing) else { return Ok(()) };
         let outcome = execute(flash, request, erasing, &mut read)?;
-        store.handle_outcome(outcome.map(|len| &read[..len]));
+        store.handle_flash_outcome(outcome.map(|len| &read[..len]));
     }
     panic!("it asks for ever");
 }

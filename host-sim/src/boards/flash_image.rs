@@ -33,7 +33,7 @@ pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8
         let mut read = [0; MAX_READ];
         while let Some(request) = store.poll_request(ErasePermission::Allowed) {
             let outcome = flash.execute_request(request, &mut read);
-            store.handle_outcome(outcome);
+            store.handle_flash_outcome(outcome);
         }
     };
     settle(&mut store);

@@ -68,7 +68,8 @@ impl EmulatedBoard {
         self.wait_for_grant_within(timeout)
     }
 
-    /// Writes the image `bank` into the board's flash bank, with its word marks.
+    /// Writes the image `bank` into the board's flash bank, with the mark of each word: erased or
+    /// programmed.
     ///
     /// # Errors
     /// The QEMU process has ended, or the image has not the length of a bank.

@@ -438,7 +438,7 @@ impl SimulatedVehicle {
     }
 
     /// Gives the companion the plan that it requested, or the failure.
-    pub fn answer_plan(
+    pub fn hand_over_plan(
         &mut self,
         now_us: u64,
         wanted: PlanKind,

@@ -88,7 +88,8 @@ impl<const L: usize, const K: usize> LossesWorkspace<L, K> {
         Ok((&self.remaining, self.done.ranges()))
     }
 
-    /// Waypoints that are photographed or promised: ascending, by their numbers on the whole path.
+    /// Ranges of the waypoints that are photographed, or that a vehicle will still photograph
+    /// before it holds: ascending, by their numbers on the path over the whole area.
     pub fn done(&self) -> &[WaypointRange] {
         self.done.ranges()
     }

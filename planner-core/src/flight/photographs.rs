@@ -120,7 +120,8 @@ impl<'p> PictureStretch<'p> {
         ground_m
     }
 
-    /// Arc length of picture `k` (from 0), metres; that of the last picture if `k` is too large.
+    /// Arc length along the path of picture `k` of this stretch (from 0), metres; that of the last
+    /// picture if `k` is too large.
     pub fn picture_at_m(&self, k: u32) -> f32 {
         let mut left_m = self.step_m * k as f32;
         for piece in straight_pieces(self.corners) {

@@ -247,7 +247,7 @@ pub fn dijkstra_all<const N: usize>(
     passable: impl Fn(u16, &HalfEdge) -> bool,
     ws: &mut SearchWorkspace<N>,
 ) -> Result<(), SearchError> {
-    start_search(graph.view(), from, ws)?;
+    reset_for_search(graph.view(), from, ws)?;
     let mut gains = [0; 256];
     while let Some(node) = ws.heap.pop() {
         relax_edges(graph, node, &passable, |_| 0.0, ws, &mut gains);
@@ -286,7 +286,7 @@ pub(crate) fn shortest_path_tree<const N: usize>(
     from: u16,
     ws: &mut SearchWorkspace<N>,
 ) -> Result<(), SearchError> {
-    start_search(view, from, ws)?;
+    reset_for_search(view, from, ws)?;
     let mut gains = [0; 256];
     while let Some(node) = ws.heap.pop() {
         relax_edges(view, node, &|_, _| true, |_| 0.0, ws, &mut gains);
@@ -373,7 +373,7 @@ fn search<const N: usize>(
     for &target in targets {
         check_node(view, target)?;
     }
-    start_search(view, from, ws)?;
+    reset_for_search(view, from, ws)?;
     let mut gains = [0; 256];
     let informed = targets.len() <= MAX_GUIDED_TARGETS;
     for &target in targets {
@@ -400,7 +400,7 @@ fn search<const N: usize>(
 }
 
 /// Resets the workspace for a search that starts at node `from`, at distance 0.
-fn start_search<const N: usize>(
+fn reset_for_search<const N: usize>(
     view: &RoadmapView<'_>,
     from: u16,
     ws: &mut SearchWorkspace<N>,

@@ -59,7 +59,7 @@ impl Px4Mode {
     }
 
     /// Whether a disarmed vehicle leaves this mode for the one requested before.
-    pub(super) fn ends_with_flight(self) -> bool {
+    pub(super) fn is_left_on_disarm(self) -> bool {
         matches!(self, Self::Return | Self::Takeoff | Self::Land)
     }
 

@@ -101,7 +101,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ),
     (
         "companion/src/storage/store/jobs.rs",
-        "handle_outcome",
+        "handle_flash_outcome",
         "one match: an arm for each job and how it went",
     ),
     (

@@ -32,7 +32,7 @@ impl HomewardSearch {
     }
 
     /// Ends the search: a path from the shell has come, or the vehicle flies back another way.
-    pub(crate) fn cancel(&mut self) {
+    pub(crate) fn end(&mut self) {
         self.seeks_since = None;
     }
 

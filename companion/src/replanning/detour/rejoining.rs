@@ -107,7 +107,7 @@ impl Detours {
     /// The vehicle flies back the way that it came: it seeks no path home and gives up the plan's.
     pub(crate) fn begin_way_back(&mut self) {
         self.give_up_plan();
-        self.home.cancel();
+        self.home.end();
     }
 
     /// Makes the plan's path the one flown, if it has come again from the shell.

@@ -1,5 +1,6 @@
-//! The position that this vehicle reports to the others. After a jump of the autopilot's position
-//! estimate it is the place on the path from before the jump, until the estimate is trusted again.
+//! What this vehicle reports of itself: whether it is out of the plan, and its position. After a
+//! jump of the autopilot's position estimate it is the place on the path from before the jump,
+//! until the estimate is trusted again.
 
 use planner_core::Point;
 
@@ -11,6 +12,12 @@ use crate::time::{Duration, Instant};
 
 /// Age of this vehicle's position above which the velocity reported with it is 0.
 const VELOCITY_UNKNOWN_AFTER: Duration = Duration::from_secs(2);
+
+/// Time under a pilot's control after which the vehicle counts as out of the plan: others fly
+/// around it.
+const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
+/// Time in `Aborted` after which a vehicle that reports no landing is out of the plan.
+const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 
 impl Detours {
     /// Position and velocity that this vehicle reports to the others, and when they were measured;
@@ -41,6 +48,23 @@ impl Detours {
             }
             to if to.trusts_position_again() => self.before_jump = None,
             _ => {}
+        }
+    }
+
+    /// Whether this vehicle is out of the plan: done away from its goal or after leaving the plan,
+    /// aborted, or flown by its pilot for [`PILOT_KEEPS_AFTER`].
+    pub(crate) fn is_own_vehicle_out_of_plan<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &DetourView<'_, V, W, G>,
+    ) -> bool {
+        let lasted = view.mission.time_in_state(view.now);
+        match view.mission.state() {
+            State::Done => !view.guidance.is_at_goal(&view.scene) || self.left_plan,
+            State::Aborted => view.is_on_ground() || lasted >= ABORT_OVER_AFTER,
+            state if state.is_left_to_pilot() => {
+                view.mission.time_with_pilot(view.now) >= PILOT_KEEPS_AFTER
+            }
+            _ => false,
         }
     }
 }

@@ -238,7 +238,7 @@ impl Detours {
         let fruitless = if stuck { self.detours_without_progress.saturating_add(1) } else { 0 };
         self.obstacles.avoid_requested();
         let Self { mut home, area_searches: mut field_searches, .. } = *self;
-        home.cancel();
+        home.end();
         field_searches.note_found();
         *self = Self {
             obstacles: core::mem::take(&mut self.obstacles),

@@ -6,7 +6,11 @@ use super::{Ftp, Reply};
 impl Ftp {
     /// Sets ACK or NAK as the reply to `request`, and remembers `result`: a repetition of the
     /// request is answered alike, not executed again.
-    pub(super) fn finish(&mut self, request: &FtpRequest, result: Result<(), NakError>) {
+    pub(super) fn reply_and_remember(
+        &mut self,
+        request: &FtpRequest,
+        result: Result<(), NakError>,
+    ) {
         self.duplicates.remember(request, result, self.now);
         self.respond(request, result);
     }

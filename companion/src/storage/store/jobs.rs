@@ -13,9 +13,9 @@ use super::records::{Compaction, JournalRecord, RecordSource, RecordStep};
 use super::upload_state::{UploadError, UploadState};
 
 impl Store {
-    /// The next request to the shell; [`Self::handle_outcome`] must get its outcome before the next
-    /// one. `None` if there is nothing to do or a request is open. `erasing` says whether areas may
-    /// be erased. A flash that stalls the processor is only read while it is `Forbidden`.
+    /// The next request to the shell; [`Self::handle_flash_outcome`] must get its outcome before
+    /// the next one. `None` if there is nothing to do or a request is open. `erasing` says whether
+    /// areas may be erased. A flash that stalls the processor is only read while it is `Forbidden`.
     pub fn poll_request(&mut self, erasing: ErasePermission) -> Option<FlashRequest<'_>> {
         if self.request_pending {
             return None;
@@ -182,7 +182,7 @@ impl Store {
 
     /// Handles the outcome of the last request. Returns the outcome of a caller's read or CRC once
     /// that has ended.
-    pub fn handle_outcome<'a>(
+    pub fn handle_flash_outcome<'a>(
         &mut self,
         outcome: Result<&'a [u8], FlashFault>,
     ) -> Option<ReadOutcome<'a>> {

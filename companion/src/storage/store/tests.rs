@@ -147,7 +147,7 @@ fn run_armed(store: &mut Store, flash: &mut Flash) {
         assert!(matches!(request, FlashRequest::Read { .. }), "{request:?} while armed");
         let outcome = execute(flash, request, ErasePermission::Forbidden, &mut read)
             .expect("the power is on");
-        store.handle_outcome(outcome.map(|len| &read[..len]));
+        store.handle_flash_outcome(outcome.map(|len| &read[..len]));
     }
 }
 
@@ -269,7 +269,7 @@ fn a_read_goes_first_between_two_sectors() {
         }
         let outcome = execute(&mut flash, request, ErasePermission::Allowed, &mut read)
             .expect("the power is on");
-        if let Some(answer) = store.handle_outcome(outcome.map(|len| &read[..len])) {
+        if let Some(answer) = store.handle_flash_outcome(outcome.map(|len| &read[..len])) {
             assert_eq!(answer, ReadOutcome::Bytes(&road[..100]));
             given += 1;
         }
@@ -398,7 +398,7 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
                 };
                 let nothing = [0; MAX_READ];
                 let len = if let FlashRequest::Read { len, .. } = request { len } else { 0 };
-                store.handle_outcome(if bad { Err(FlashFault) } else { Ok(&nothing[..len]) });
+                store.handle_flash_outcome(if bad { Err(FlashFault) } else { Ok(&nothing[..len]) });
             }
             match store.upload_state() {
                 Some(UploadState::Taking)
@@ -463,7 +463,7 @@ fn a_record_whose_head_did_not_come_out_is_written_again() {
                 flash.bytes[at + 20] ^= 1;
             }
         }
-        store.handle_outcome(outcome.map(|len| &read[..len]));
+        store.handle_flash_outcome(outcome.map(|len| &read[..len]));
     }
     assert!(heads > 1, "{heads}");
     assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))));

@@ -39,7 +39,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` where it is out
     /// of the plan, unless the present detour already avoids that place.
-    pub fn for_each_new_zone_of(
+    pub fn for_each_unavoided_zone_of(
         &self,
         i: usize,
         now: Instant,

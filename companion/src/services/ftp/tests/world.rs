@@ -152,7 +152,7 @@ impl World {
             };
             let outcome =
                 execute(&mut self.flash, request, self.erasing, &mut read).expect("no power cut");
-            if let Some(answer) = self.store.handle_outcome(outcome.map(|len| &read[..len])) {
+            if let Some(answer) = self.store.handle_flash_outcome(outcome.map(|len| &read[..len])) {
                 self.ftp.handle_read_outcome(answer);
             }
         }

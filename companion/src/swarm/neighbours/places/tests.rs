@@ -55,7 +55,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
                 .for_each_landing_zone(now, [apart_m, place.z], |off| ends |= off.contains(&place));
             let low = place - Point::new(0.0, 0.0, 20.0);
             table.landing_column(1, now, apart_m, |off| columns |= off.contains(&low));
-            table.for_each_new_zone_of(1, now, apart_m, |off| columns |= off.contains(&low));
+            table.for_each_unavoided_zone_of(1, now, apart_m, |off| columns |= off.contains(&low));
             assert!(
                 ends && (columns || silent_s < 40.0),
                 "{silent_s} s, {points:?}, {here:?}: {ends} {columns}"
@@ -244,7 +244,7 @@ fn over_an_area_the_column_of_a_vehicle_that_left_it_in_the_air_is_kept_off_for_
         let below = here - Point::new(0.0, 0.0, uniform(&mut rng, 3.0, here.z + 25.0));
         let silent_s = uniform(&mut rng, 1.0, 1200.0);
         let (mut kept, mut lies) = (false, false);
-        table.for_each_new_zone_of(
+        table.for_each_unavoided_zone_of(
             1,
             Instant::from_millis((1000.0 * silent_s) as u64),
             2.0,
