@@ -61,7 +61,7 @@ pub fn estimate_margin_m(clearance_m: f32, radius_m: f32, tracking_m: f32) -> f3
 }
 
 /// Whether a bound of the estimate's error, metres, is at most the margin left for it, and
-/// [`ERROR_BOUND_ROUNDING_M`].
+/// `ERROR_BOUND_ROUNDING_M`.
 pub fn is_bound_within(bound_m: f32, room_m: f32) -> bool {
     bound_m <= room_m + ERROR_BOUND_ROUNDING_M
 }

@@ -168,7 +168,8 @@ impl<const V: usize> Neighbours<V> {
             alt_m: f64::from(data.alt) * 1e-3,
         };
         let (own, edge_m) = (self.place, self.range_edge_m);
-        let Some(entry) = self.entry_for_position(id, now) else { return };
+        let at = self.active_roster_index(id, now).or_else(|| self.stranger_entry(id, now));
+        let Some(entry) = at.and_then(|at| self.entries.get_mut(at)) else { return };
         let behind = entry.boot_ms.wrapping_sub(data.time_boot_ms);
         if !place.is_valid() || (entry.position_at.is_some() && behind < RESTART_MS) {
             return;

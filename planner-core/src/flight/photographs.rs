@@ -58,27 +58,27 @@ pub struct PictureStretch<'p> {
 /// A straight part of a stretch: arc length of its beginning, and its length along the path and
 /// over ground, metres.
 #[derive(Clone, Copy)]
-struct StraightPiece {
+struct StraightSegment {
     begin_m: f32,
     length_m: f32,
     ground_m: f32,
 }
 
 /// The straight parts between these waypoints.
-fn straight_pieces(corners: &[Waypoint]) -> impl Iterator<Item = StraightPiece> {
+fn straight_segments(corners: &[Waypoint]) -> impl Iterator<Item = StraightSegment> {
     corners.windows(2).map(|ends| {
         let (begin_m, length_m) = (ends[0].along_m, ends[1].along_m - ends[0].along_m);
         let step = ends[1].position - ends[0].position;
         // A level part is as long over ground as along the path, to the bit.
         let ground_m = if step.z == 0.0 { length_m } else { step.xy().length() };
-        StraightPiece { begin_m, length_m, ground_m }
+        StraightSegment { begin_m, length_m, ground_m }
     })
 }
 
 impl<'p> PictureStretch<'p> {
     fn new(corners: &'p [Waypoint], count: u32) -> Option<Self> {
         let (from_m, to_m) = (corners.first()?.along_m, corners.last()?.along_m);
-        let ground_m: f32 = straight_pieces(corners).map(|piece| piece.ground_m).sum();
+        let ground_m: f32 = straight_segments(corners).map(|segment| segment.ground_m).sum();
         let step_m = if count > 1 { ground_m / (count - 1) as f32 } else { 0.0 };
         Some(Self { from_m, to_m, step_m, count, corners })
     }
@@ -110,12 +110,12 @@ impl<'p> PictureStretch<'p> {
     /// Distance over ground from the beginning of the stretch to arc length `along_m`, metres.
     fn ground_m(&self, along_m: f32) -> f32 {
         let mut ground_m = 0.0;
-        for piece in straight_pieces(self.corners) {
-            let left_m = along_m - piece.begin_m;
-            if left_m < piece.length_m {
-                return ground_m + left_m * (piece.ground_m / piece.length_m);
+        for segment in straight_segments(self.corners) {
+            let left_m = along_m - segment.begin_m;
+            if left_m < segment.length_m {
+                return ground_m + left_m * (segment.ground_m / segment.length_m);
             }
-            ground_m += piece.ground_m;
+            ground_m += segment.ground_m;
         }
         ground_m
     }
@@ -124,11 +124,11 @@ impl<'p> PictureStretch<'p> {
     /// picture if `k` is too large.
     pub fn picture_at_m(&self, k: u32) -> f32 {
         let mut left_m = self.step_m * k as f32;
-        for piece in straight_pieces(self.corners) {
-            if left_m < piece.ground_m {
-                return piece.begin_m + left_m * (piece.length_m / piece.ground_m);
+        for segment in straight_segments(self.corners) {
+            if left_m < segment.ground_m {
+                return segment.begin_m + left_m * (segment.length_m / segment.ground_m);
             }
-            left_m -= piece.ground_m;
+            left_m -= segment.ground_m;
         }
         self.to_m
     }

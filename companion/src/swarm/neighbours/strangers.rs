@@ -7,24 +7,19 @@ use super::entry::NeighbourEntry;
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
-    /// The entry of a position's sender: that of the roster, else a stranger's, added if it fits.
-    pub(super) fn entry_for_position(
-        &mut self,
-        id: u8,
-        now: Instant,
-    ) -> Option<&mut NeighbourEntry> {
-        if let Some(at) = self.active_roster_index(id, now).or_else(|| self.stranger_index(id)) {
-            return self.entries.get_mut(at);
+    /// Index of the entry of the stranger `id`, added if it fits.
+    pub(super) fn stranger_entry(&mut self, id: u8, now: Instant) -> Option<usize> {
+        let known = self.stranger_index(id);
+        if known.is_some() {
+            return known;
         }
         self.forget_silent_strangers(now);
         let room = self.entries.len() - self.roster_count < MAX_STRANGERS;
-        match Some(id).filter(|_| room).and_then(|id| self.add_entry(id, STRANGER_RANK)) {
-            Some(at) => self.entries.get_mut(at),
-            None => {
-                self.dropped = self.dropped.wrapping_add(1);
-                None
-            }
+        let added = Some(id).filter(|_| room).and_then(|id| self.add_entry(id, STRANGER_RANK));
+        if added.is_none() {
+            self.dropped = self.dropped.wrapping_add(1);
         }
+        added
     }
 
     fn stranger_index(&self, id: u8) -> Option<usize> {
