@@ -132,6 +132,8 @@ pub struct Guidance {
     raw_point_at_rest: bool,
     /// Whether the position was lost, so that setpoints carried no place.
     position_unknown: bool,
+    /// Whether setpoints lead to a place: the position was known in the last step.
+    leads_to_place: bool,
     /// Whether in the last step a pilot or the autopilot flew, and setpoints followed the vehicle.
     autopilot_took_over: bool,
     /// Time since a setpoint with a place was sent, seconds.
@@ -220,6 +222,7 @@ impl Guidance {
             waypoints: Algorithm2Waypoints::default(),
             raw_point_at_rest: true,
             position_unknown: false,
+            leads_to_place: false,
             autopilot_took_over: false,
             unsent_s: 0.0,
             advice: NO_ADVICE_YET,
@@ -337,7 +340,8 @@ impl Guidance {
         }
         self.step_filter(state, scene, neighbours, now);
         let urgency = self.filter.urgency(now);
-        let known = scene.telemetry.position_at.is_some();
+        let known = scene.is_place_known(state, now);
+        self.leads_to_place = known && state != State::PositionLost;
         if !state.streams_setpoints() {
             self.smoother.end_stream();
             self.forget_waiting();
@@ -361,8 +365,11 @@ impl Guidance {
             }
             self.forget_leg();
             self.position_unknown = false;
+        } else if self.leads_to_place && state.needs_new_position() {
+            // Known again, the position may be far from the last setpoint.
+            self.hold_at(position);
         }
-        let sends = known && state != State::PositionLost;
+        let sends = self.leads_to_place;
         if !self.smoother.has_setpoint() || taken {
             self.guides_landing = false;
             self.sent_acceleration = Point::zeros();

@@ -314,6 +314,12 @@ impl State {
         self.is_left_to_pilot() || self == Self::Failsafe
     }
 
+    /// Whether setpoints lead to a place only while the position is new: a pilot or the autopilot's
+    /// own mode may fly the vehicle away unseen.
+    pub(crate) fn needs_new_position(self) -> bool {
+        self.is_left_to_pilot() || self.lands_or_disarms()
+    }
+
     /// Whether the vehicle may stand away from its path before its mission goes on: after its
     /// pilot, or after its position was lost.
     pub(crate) fn may_resume_off_path(self) -> bool {

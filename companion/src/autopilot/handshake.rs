@@ -1,9 +1,6 @@
 //! Requests to the autopilot, repeated until they have taken effect: streams, EKF origin, limit
 //! parameters, mode, arming, take-off, landing, disarming.
 
-use mavlink::MessageData;
-use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
-
 use crate::autopilot::AutopilotKind;
 use crate::autopilot::arming::ArmingHandshake;
 use crate::autopilot::limits::AutopilotLimits;
@@ -50,6 +47,9 @@ const PARAM_TYPE_REAL32: u8 = 9;
 /// Age of a stream's last message after which that stream is requested again; the slowest stream,
 /// SYS_STATUS, has a period of 1 s.
 const STREAM_LOST_AFTER: Duration = Duration::from_millis(4000);
+/// Most requests for a landing mode in one state while HEARTBEAT is silent: as many as lost messages
+/// may take, since a pilot may fly the vehicle by now.
+const MAX_UNHEARD_MODE_REQUESTS: u8 = 3;
 /// Greatest age of the reported battery charge with which a vehicle takes off.
 const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
 
@@ -84,6 +84,8 @@ pub(crate) struct Handshake {
     limit_requests_left: u8,
     /// Index of the next of the kind's streams to be requested.
     next_stream: usize,
+    /// Number of changes of mode requested in this state while HEARTBEAT was silent.
+    unheard_mode_requests: u8,
 }
 
 impl Default for Handshake {
@@ -95,6 +97,7 @@ impl Default for Handshake {
             limits_read: 0,
             limit_requests_left: 0,
             next_stream: usize::MAX,
+            unheard_mode_requests: 0,
         }
     }
 }
@@ -113,6 +116,7 @@ impl Handshake {
     /// Clears what belongs to the mission state `from`.
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
         self.arming.reset_for_state(from, to);
+        self.unheard_mode_requests = 0;
     }
 
     /// Updates the handshake from the autopilot's mode, armed bit and landing detector.
@@ -243,9 +247,10 @@ impl Handshake {
         limits_reset
     }
 
-    /// Requests the change of mode, take-off or disarming that the mission state waits for.
+    /// Requests the change of mode, take-off or disarming that the mission state waits for. A mode
+    /// is requested a few times only while HEARTBEAT is silent: a pilot may fly the vehicle.
     fn request_for_state(
-        &self,
+        &mut self,
         telemetry: &Telemetry,
         s: &HandshakeContext,
         timers: &mut Timers,
@@ -260,6 +265,15 @@ impl Handshake {
             let (main, sub) = kind.mode_params(custom_mode);
             Outgoing::Mode(main, sub)
         };
+        let heard = telemetry.heartbeat_age(s.now);
+        if heard < MAX_HEARTBEAT_AGE {
+            self.unheard_mode_requests = 0;
+        } else if s.state.lands() {
+            if self.unheard_mode_requests >= MAX_UNHEARD_MODE_REQUESTS {
+                return;
+            }
+            self.unheard_mode_requests += 1;
+        }
         let mut push = |request| links.push(Link::Autopilot, request);
         match s.state {
             State::Engaging => push(change_to(kind.setpoint_mode())),
@@ -276,7 +290,10 @@ impl Handshake {
                 timers.set(Timer::Request, s.now + TAKE_OFF_RETRY_EVERY);
                 push(Outgoing::TakeOff(telemetry.above_home_m + s.climb_m));
             }
-            State::Land if mode != kind.land_mode() => push(change_to(kind.land_mode())),
+            // A HEARTBEAT from before this state may show the landing mode of an earlier landing.
+            State::Land if mode != kind.land_mode() || heard > s.in_state => {
+                push(change_to(kind.land_mode()));
+            }
             State::Disarm => {
                 timers.set(Timer::Request, s.now + DISARM_EVERY);
                 push(Outgoing::Arm(false));
@@ -333,8 +350,7 @@ impl HandshakeContext {
     }
 }
 
-/// Whether SYS_STATUS with the battery's charge was received in the last 5 s (`MAX_BATTERY_AGE`);
-/// also true where the charge is not checked, with `low_percent` ≤ 0.
+/// Whether the battery's charge was reported in the last 5 s (`MAX_BATTERY_AGE`); also true where the charge is not checked, with `low_percent` ≤ 0.
 pub(crate) fn is_battery_known(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
-    low_percent <= 0 || telemetry.stream_age(SYS_STATUS_DATA::ID, now) <= MAX_BATTERY_AGE
+    low_percent <= 0 || telemetry.battery_at.is_some_and(|at| now - at <= MAX_BATTERY_AGE)
 }

@@ -121,6 +121,8 @@ pub struct Telemetry {
     pub on_ground: Option<bool>,
     /// Battery charge in percent, −1 unknown.
     pub battery_percent: i8,
+    /// When the charge was last reported.
+    pub(crate) battery_at: Option<Instant>,
     /// Height above home, metres; ArduCopter's NAV_TAKEOFF takes its height from there.
     pub above_home_m: f32,
     /// Where an EKF origin is accepted.
@@ -268,6 +270,7 @@ impl Telemetry {
                     // Unknown (−1) does not replace a known charge.
                     if status.battery_remaining >= 0 {
                         self.battery_percent = status.battery_remaining;
+                        self.battery_at = Some(now);
                     }
                     TelemetryChange::Updated
                 }

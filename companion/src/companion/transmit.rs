@@ -251,8 +251,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn intent_flags(&self) -> u8 {
         use State::*;
         let view = self.detour_view();
+        let flown_again = view.is_flown_after_mission();
         let grounded = match self.mission.state() {
-            state if state.has_landed() => true,
+            state if state.has_landed() => !flown_again,
             // On its path it flies, whatever the landing detector reports.
             state => !self.telemetry.armed || (!state.is_on_path() && view.is_on_ground()),
         };
@@ -267,7 +268,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let out = self.detours.is_own_vehicle_out_of_plan(&view);
         let flies = if grounded { intent::GROUNDED } else { intent::FLYING };
         flies
-            | flag(intent::LANDED, self.mission.state() == Done)
+            | flag(intent::LANDED, self.mission.state() == Done && !flown_again)
             | flag(intent::ON_PLAN, on_plan && self.mission.plan().is_some())
             | flag(intent::OUT_OF_PLAN, out)
             | flag(intent::WAITING, self.detours.is_waiting(&view))

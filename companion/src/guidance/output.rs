@@ -21,7 +21,8 @@ impl Guidance {
         }
         let smoother = &self.smoother;
         let still = Point::zeros();
-        if scene.telemetry.position_at.is_none() || state == State::PositionLost {
+        let unknown = scene.telemetry.position_at.is_none() || state == State::PositionLost;
+        if unknown || (!self.leads_to_place && state.needs_new_position()) {
             return Setpoint::Stop(if smoother.has_setpoint() {
                 smoother.velocity()
             } else {

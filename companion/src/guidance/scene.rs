@@ -2,7 +2,9 @@
 
 use planner_core::flight::VehiclePlan;
 
-use crate::autopilot::telemetry::Telemetry;
+use crate::autopilot::telemetry::{MAX_POSITION_AGE, Telemetry};
+use crate::state::State;
+use crate::time::Instant;
 
 /// Inputs of guidance in a step, other than its own state.
 pub struct GuidanceInputs<'a, const W: usize, const G: usize> {
@@ -37,6 +39,15 @@ impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
     ) -> Self {
         let plan = plan.filter(|plan| !plan.path.waypoints().is_empty());
         Self { plan, telemetry, rank, id, source }
+    }
+
+    /// Whether the vehicle's position is known: once known it counts as such, but in states in which
+    /// somebody else may fly the vehicle only while it is new.
+    pub(crate) fn is_place_known(&self, state: State, now: Instant) -> bool {
+        match state.needs_new_position() {
+            true => self.telemetry.position_age(now) < MAX_POSITION_AGE,
+            false => self.telemetry.position_at.is_some(),
+        }
     }
 
     /// Whether the path is a detour, not that of the shared plan.

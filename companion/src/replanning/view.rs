@@ -8,6 +8,7 @@ use crate::config::Config;
 use crate::guidance::{Guidance, GuidanceInputs};
 use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
 use crate::mission::course::Mission;
+use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
@@ -40,6 +41,11 @@ impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
     pub(crate) fn is_on_ground(&self) -> bool {
         self.telemetry.on_ground == Some(true)
             && (!self.telemetry.armed || self.height_m() < MAX_GROUND_HEIGHT_ERROR_M)
+    }
+
+    /// Whether a pilot flies the vehicle again after its mission has ended with a landing.
+    pub(crate) fn is_flown_after_mission(&self) -> bool {
+        self.mission.state() == State::Done && self.telemetry.armed && !self.is_on_ground()
     }
 }
 

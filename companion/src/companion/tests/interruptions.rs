@@ -17,6 +17,7 @@ use planner_core::Point;
 
 mod carried;
 mod false_ground;
+mod old_values;
 mod random;
 mod reported_ground;
 mod reports;

@@ -59,7 +59,11 @@ impl Detours {
     ) -> bool {
         let lasted = view.mission.time_in_state(view.now);
         match view.mission.state() {
-            State::Done => !view.guidance.is_at_goal(&view.scene) || self.left_plan,
+            State::Done => {
+                !view.guidance.is_at_goal(&view.scene)
+                    || self.left_plan
+                    || view.is_flown_after_mission()
+            }
             State::Aborted => view.is_on_ground() || lasted >= ABORT_OVER_AFTER,
             state if state.is_left_to_pilot() => {
                 view.mission.time_with_pilot(view.now) >= PILOT_KEEPS_AFTER

@@ -21,6 +21,10 @@ struct Watch {
     landing: bool,
     /// Number of ticks in a mode of the pilot's, with the autopilot heard.
     piloted: u32,
+    /// Number of requests for a mode or to arm since the autopilot was last heard.
+    unheard_acts: u32,
+    /// Number of ticks since the position was last heard.
+    unknown: u32,
     /// Whether an arming request has taken effect since the last start or resume.
     armed_once: bool,
     /// Whether the start that a pause on the pad ended was resumed before the disarming: the next
@@ -31,7 +35,7 @@ struct Watch {
 
 impl Watch {
     fn tick(&mut self, b: &mut Bench) {
-        let (before, armed) = (b.setpoints.len(), b.armed);
+        let (before, armed, was) = (b.setpoints.len(), b.armed, b.state());
         let low = b.companion.telemetry.position.z < 0.8;
         b.tick();
         let sent = b.setpoints.len() > before;
@@ -60,12 +64,28 @@ impl Watch {
             self.log
         );
         let foreign = !ours && b.mode != b.kind.land_mode() && b.armed && !b.silent;
+        let foreign_unheard = !ours && b.mode != b.kind.land_mode() && b.armed;
         self.piloted = if foreign { self.piloted + 1 } else { 0 };
+        self.unheard_acts = if b.silent { self.unheard_acts } else { 0 };
+        self.unknown = if b.silent || b.no_position { self.unknown + 1 } else { 0 };
+        if let Some((_, place, mask)) = b.setpoints[before..].last()
+            && state.is_left_to_pilot()
+            && was == state
+        {
+            assert!(
+                self.unknown < 14 || mask & 7 == 7,
+                "led to {place:?} from {:?} in {state:?}: {:#?}",
+                b.enu,
+                self.log
+            );
+        }
         if self.resumed && !b.companion.telemetry.armed {
             (self.resumed, self.armed_once) = (false, false);
         }
         for &(command, param1, ..) in &b.commands[self.commands..] {
             let acts = matches!(command, SET_MODE | TAKE_OFF) || (command, param1) == (ARM, 1.0);
+            self.unheard_acts += u32::from(acts && b.silent && foreign_unheard);
+            assert!(self.unheard_acts <= 6, "acts unheard in {state:?}: {:#?}", self.log);
             assert!(
                 self.piloted < 30 || !acts,
                 "{command} under the pilot in {state:?}: {:#?}",
@@ -177,6 +197,8 @@ proptest::proptest! {
             commands: 0,
             landing: false,
             piloted: 0,
+            unheard_acts: 0,
+            unknown: 0,
             armed_once: false,
             resumed: false,
             log: Vec::new(),
