@@ -2,7 +2,8 @@
 //!
 //! A board has a clock (embassy-time's driver), two UARTs (embedded-io-async), a flash for files
 //! and parameters, and executors for the tasks. `src/boards/pico2` is the same on a chip: links and
-//! setpoints run in an interrupt above planning, and a watchdog is fed while `Shell::is_checked_in`.
+//! setpoints run in an interrupt above planning, and a watchdog is fed while
+//! `Shell::is_checked_in`.
 //!
 //! `cargo run -p firmware --example smallest_board`
 

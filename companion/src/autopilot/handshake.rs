@@ -47,8 +47,8 @@ const PARAM_TYPE_REAL32: u8 = 9;
 /// Age of a stream's last message after which that stream is requested again; the slowest stream,
 /// SYS_STATUS, has a period of 1 s.
 const STREAM_LOST_AFTER: Duration = Duration::from_millis(4000);
-/// Most requests for a landing mode in one state while HEARTBEAT is silent: as many as lost messages
-/// may take, since a pilot may fly the vehicle by now.
+/// Most requests for a landing mode in one state while HEARTBEAT is silent: as many as lost
+/// messages may take, since a pilot may fly the vehicle by now.
 const MAX_UNHEARD_MODE_REQUESTS: u8 = 3;
 /// Greatest age of the reported battery charge with which a vehicle takes off.
 const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
@@ -350,7 +350,8 @@ impl HandshakeContext {
     }
 }
 
-/// Whether the battery's charge was reported in the last 5 s (`MAX_BATTERY_AGE`); also true where the charge is not checked, with `low_percent` ≤ 0.
+/// Whether the battery's charge was reported in the last 5 s (`MAX_BATTERY_AGE`); also true where
+/// the charge is not checked, with `low_percent` ≤ 0.
 pub(crate) fn is_battery_known(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
     low_percent <= 0 || telemetry.battery_at.is_some_and(|at| now - at <= MAX_BATTERY_AGE)
 }

@@ -41,8 +41,8 @@ impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
         Self { plan, telemetry, rank, id, source }
     }
 
-    /// Whether the vehicle's position is known: once known it counts as such, but in states in which
-    /// somebody else may fly the vehicle only while it is new.
+    /// Whether the vehicle's position is known: once known it counts as such, but in states in
+    /// which somebody else may fly the vehicle only while it is new.
     pub(crate) fn is_place_known(&self, state: State, now: Instant) -> bool {
         match state.needs_new_position() {
             true => self.telemetry.position_age(now) < MAX_POSITION_AGE,

@@ -7,10 +7,10 @@
 //! flash, or memory on the host.
 //!
 //! A file is either complete or absent. It is written into an erased area and read back; the area's
-//! seal is written last ([`flash_area`]). A power loss at any byte leaves what was sealed before. Areas
-//! not in use are erased ahead of time, once the vehicle is known to be disarmed, so that an upload
-//! finds one ready. The crate `sequential-storage` was considered: its operations are futures that
-//! own the flash driver, and cannot be executed one request at a time.
+//! seal is written last ([`flash_area`]). A power loss at any byte leaves what was sealed before.
+//! Areas not in use are erased ahead of time, once the vehicle is known to be disarmed, so that an
+//! upload finds one ready. The crate `sequential-storage` was considered: its operations are
+//! futures that own the flash driver, and cannot be executed one request at a time.
 //!
 //! A roadmap is used in place. So the slot that a companion uses since its start is not written
 //! before the next start; a newer roadmap or mission takes effect then.
