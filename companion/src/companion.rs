@@ -89,9 +89,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             config.fastest_mps.max(config.climb_mps),
         );
         if let Some(down_s) = config.lost_vehicle_down_s {
-            let stray_m =
+            let pair_error_m =
                 margins::pair_position_error_m(config.required_clearance_m, config.radius_m);
-            neighbours.form_fleet(down_s, config.ground, stray_m);
+            neighbours.form_fleet(down_s, config.ground, pair_error_m);
         }
         Self {
             now: Instant::ZERO,

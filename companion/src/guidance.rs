@@ -341,7 +341,8 @@ impl Guidance {
         self.step_filter(state, scene, neighbours, now);
         let urgency = self.filter.urgency(now);
         let known = scene.is_place_known(state, now);
-        self.leads_to_place = known && state != State::PositionLost;
+        let leads = known && state != State::PositionLost;
+        let led_before = core::mem::replace(&mut self.leads_to_place, leads);
         if !state.streams_setpoints() {
             self.smoother.end_stream();
             self.forget_waiting();
@@ -353,6 +354,14 @@ impl Guidance {
         self.position_unknown |= !known || state == State::PositionLost;
         let flies = scene.telemetry.on_ground == Some(false);
         let taken_before = core::mem::replace(&mut self.autopilot_took_over, taken);
+        if taken && !known {
+            // The velocity of the last setpoint is not the vehicle's any more.
+            self.smoother.end_stream();
+        } else if leads && !led_before && state.needs_new_position() {
+            // Known again, the position may be far from the last setpoint.
+            self.smoother.resume_at(position, self.unsent_s);
+            self.forget_leg();
+        }
         if known && (taken || taken_before || !self.smoother.has_setpoint()) {
             // Another autopilot mode flies or just flew, or there is no setpoint yet: the setpoint
             // begins at the vehicle's position, or takes its velocity.
@@ -365,11 +374,8 @@ impl Guidance {
             }
             self.forget_leg();
             self.position_unknown = false;
-        } else if self.leads_to_place && state.needs_new_position() {
-            // Known again, the position may be far from the last setpoint.
-            self.hold_at(position);
         }
-        let sends = self.leads_to_place;
+        let sends = leads;
         if !self.smoother.has_setpoint() || taken {
             self.guides_landing = false;
             self.sent_acceleration = Point::zeros();

@@ -26,6 +26,17 @@
 
 use crate::time::Duration;
 
+/// Time for which a vehicle of a coverage mission photographs on after a majority last reported
+/// that they hear it, seconds.
+pub(crate) const LEASE_S: u64 = 20;
+/// Time after which a vehicle notices that it is unheard, seconds: the greatest age of the report
+/// that renewed its lease.
+pub(crate) const UNHEARD_NOTICED_S: f32 = 1.8;
+/// Delay of the messages by which a lease is renewed, seconds.
+pub(crate) const LEASE_DELAY_S: f32 = 2.0;
+/// Time under a pilot's control after which a vehicle counts as having left the plan and the
+/// mission: others fly around it and take over its part.
+pub(crate) const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 /// Lateral tracking error at cruise speed, by the vehicle's own estimate, metres.
 pub const TRACKING_M: f32 = 0.25;
 /// Lateral tracking error at a crawl, metres.

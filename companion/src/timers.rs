@@ -55,10 +55,14 @@ pub(crate) enum Timer {
     /// From then on the shell may be asked again for a detour back to the path, in a coverage
     /// mission.
     RejoinSearch,
+    /// From then on a mode may be requested again of an autopilot whose HEARTBEAT is silent.
+    UnheardMode,
+    /// From then on "Battery charge unknown" may be sent again.
+    ChargeReport,
 }
 
 /// Number of timers: the last one's place and one.
-const TIMER_COUNT: usize = Timer::RejoinSearch as usize + 1;
+const TIMER_COUNT: usize = Timer::ChargeReport as usize + 1;
 /// Timers that wake the shell.
 const WAKING_TIMERS: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 

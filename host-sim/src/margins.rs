@@ -135,7 +135,7 @@ pub fn with_usable_footprint(
     simulation: &Simulation,
     vehicles: &[VehicleSection],
 ) -> Spacing {
-    let stray_m = required_distances(simulation, 0.0, vehicles).margin_m;
+    let error_m = required_distances(simulation, 0.0, vehicles).margin_m;
     let lower_m = vehicles
         .iter()
         .map(|v| max_height_error_m(simulation.estimator, v.autopilot))
@@ -143,8 +143,8 @@ pub fn with_usable_footprint(
     let share = (1.0 - lower_m / height_m).max(0.0);
     let fastest_mps = vehicles.iter().map(|vehicle| vehicle.speed_max_mps).fold(0.0, f32::max);
     let late_m = TRIGGER_DELAY_S * cruise_mps.min(fastest_mps);
-    let along_m = spacing.footprint.along_m * share - 2.0 * (stray_m + late_m);
-    let across_m = spacing.footprint.across_m * share - 2.0 * stray_m;
+    let along_m = spacing.footprint.along_m * share - 2.0 * (error_m + late_m);
+    let across_m = spacing.footprint.across_m * share - 2.0 * error_m;
     let footprint = Footprint {
         along_m: along_m.max(spacing.waypoint_m),
         across_m: across_m.max(spacing.lane_m),

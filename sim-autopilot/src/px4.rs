@@ -71,7 +71,7 @@ enum ReturnLeg {
 
 /// State of AUTO.MISSION.
 #[derive(Clone, Copy, Debug, Default)]
-struct MissionProgress {
+struct MissionFlight {
     /// Whether a mission is stored.
     ready: bool,
     /// Leg of the mission that is flown; `None` outside AUTO.MISSION.
@@ -105,7 +105,7 @@ pub struct Commander {
     /// Descent rate in Land, and the time of its last update, microseconds.
     descent: Option<(u64, JerkLimitedRate)>,
     position_ok: bool,
-    mission: MissionProgress,
+    mission: MissionFlight,
 }
 
 impl Default for Commander {
@@ -138,7 +138,7 @@ impl Commander {
             leg: ReturnLeg::Descend,
             descent: None,
             position_ok: true,
-            mission: MissionProgress::default(),
+            mission: MissionFlight::default(),
         }
     }
 

@@ -38,8 +38,8 @@ const CRATES: [&str; 10] = [
 ];
 
 /// Prints every import cycle, every foreign write, and every struct, function, file or line beyond
-/// the limits. An error
-/// if one of them has no listed reason, or if docs/margins.md does not match the sources.
+/// the limits. An error if one of them has no listed reason, or if docs/margins.md does not match
+/// the sources.
 pub fn run() -> Result<()> {
     let (mut wrong, mut beyond) = (0, Vec::new());
     let mut records = BTreeSet::new();

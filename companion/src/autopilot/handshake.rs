@@ -47,9 +47,9 @@ const PARAM_TYPE_REAL32: u8 = 9;
 /// Age of a stream's last message after which that stream is requested again; the slowest stream,
 /// SYS_STATUS, has a period of 1 s.
 const STREAM_LOST_AFTER: Duration = Duration::from_millis(4000);
-/// Most requests for a landing mode in one state while HEARTBEAT is silent: as many as lost
-/// messages may take, since a pilot may fly the vehicle by now.
-const MAX_UNHEARD_MODE_REQUESTS: u8 = 3;
+/// Times from one request for a mode to the next while HEARTBEAT is silent, seconds: after the last
+/// none is made, since a pilot may fly the vehicle by now. At 50 % loss one in 16 loses them all.
+const UNHEARD_MODE_RETRY_S: [u64; 3] = [1, 5, 20];
 /// Greatest age of the reported battery charge with which a vehicle takes off.
 const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
 
@@ -84,7 +84,7 @@ pub(crate) struct Handshake {
     limit_requests_left: u8,
     /// Index of the next of the kind's streams to be requested.
     next_stream: usize,
-    /// Number of changes of mode requested in this state while HEARTBEAT was silent.
+    /// Number of changes of mode requested since HEARTBEAT fell silent.
     unheard_mode_requests: u8,
 }
 
@@ -116,7 +116,6 @@ impl Handshake {
     /// Clears what belongs to the mission state `from`.
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
         self.arming.reset_for_state(from, to);
-        self.unheard_mode_requests = 0;
     }
 
     /// Updates the handshake from the autopilot's mode, armed bit and landing detector.
@@ -205,6 +204,10 @@ impl Handshake {
         let (now, kind) = (s.now, telemetry.kind());
         let heard = telemetry.heartbeat_at.is_some();
         let silent = telemetry.heartbeat_age(now) > MAX_HEARTBEAT_AGE;
+        if !silent {
+            self.unheard_mode_requests = 0;
+            timers.set(Timer::UnheardMode, now);
+        }
         if silent && s.state == State::Disarm {
             // Reports from before the silence no longer count.
             timers.set(Timer::Request, now + DISARM_EVERY);
@@ -266,13 +269,8 @@ impl Handshake {
             Outgoing::Mode(main, sub)
         };
         let heard = telemetry.heartbeat_age(s.now);
-        if heard < MAX_HEARTBEAT_AGE {
-            self.unheard_mode_requests = 0;
-        } else if s.state.lands() {
-            if self.unheard_mode_requests >= MAX_UNHEARD_MODE_REQUESTS {
-                return;
-            }
-            self.unheard_mode_requests += 1;
+        if heard > MAX_HEARTBEAT_AGE && s.state.lands() {
+            return self.request_mode_unheard(kind, s, timers, links);
         }
         let mut push = |request| links.push(Link::Autopilot, request);
         match s.state {
@@ -300,6 +298,28 @@ impl Handshake {
             }
             _ => {}
         }
+    }
+
+    /// Requests the mode of a landing, or of one that is held, a few times while HEARTBEAT is
+    /// silent.
+    fn request_mode_unheard(
+        &mut self,
+        kind: AutopilotKind,
+        s: &HandshakeContext,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) {
+        let made = usize::from(self.unheard_mode_requests);
+        let retry_s = UNHEARD_MODE_RETRY_S.get(made).copied().unwrap_or_default();
+        let may = made <= UNHEARD_MODE_RETRY_S.len();
+        if !may || !timers.take_due(Timer::UnheardMode, s.now, Duration::from_secs(retry_s)) {
+            return;
+        }
+        self.unheard_mode_requests += 1;
+        let holds = s.state == State::LandingHeld;
+        let (main, sub) =
+            kind.mode_params(if holds { kind.setpoint_mode() } else { kind.land_mode() });
+        links.push(Link::Autopilot, Outgoing::Mode(main, sub));
     }
 
     /// Requests again each stream that has been silent for 4 s (`STREAM_LOST_AFTER`) or never came,

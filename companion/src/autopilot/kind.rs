@@ -16,13 +16,16 @@ pub enum AutopilotKind {
     ArduPilot,
 }
 
+const MAV_AUTOPILOT_PX4: u8 = 12;
+const MAV_AUTOPILOT_ARDUPILOTMEGA: u8 = 3;
+
 impl AutopilotKind {
     /// The kind by HEARTBEAT's `autopilot` field (`MAV_AUTOPILOT`): 12 PX4, 3 ArduPilot. `None` for
     /// any other, also for 8, a component that is no flight controller.
     pub fn from_heartbeat(autopilot: u8) -> Option<Self> {
         match autopilot {
-            12 => Some(Self::Px4),
-            3 => Some(Self::ArduPilot),
+            MAV_AUTOPILOT_PX4 => Some(Self::Px4),
+            MAV_AUTOPILOT_ARDUPILOTMEGA => Some(Self::ArduPilot),
             _ => None,
         }
     }

@@ -429,7 +429,7 @@ impl Telemetry {
             return TelemetryChange::None;
         };
         let Some(ekf_origin) = self.ekf_origin.filter(|_| !rebooted) else {
-            return if rebooted { self.lose_position(now) } else { TelemetryChange::None };
+            return if rebooted { self.lose_origin(now) } else { TelemetryChange::None };
         };
         let ned = Vector3::new(f64::from(d.x), f64::from(d.y), f64::from(d.z));
         let geodetic = frames::ned_to_geodetic(kind.projection(), &ekf_origin, &ned);
@@ -443,7 +443,7 @@ impl Telemetry {
             }
             let led_to = self.position + self.velocity * dt_s;
             if (position - led_to).length() > POSITION_JUMP_M + POSITION_JUMP_MPS * dt_s {
-                return self.lose_position(now);
+                return self.lose_origin(now);
             }
         }
         (self.position_read_at, self.position_boot_ms) = (Some(now), d.time_boot_ms);
@@ -457,7 +457,7 @@ impl Telemetry {
         TelemetryChange::Updated
     }
 
-    fn lose_position(&mut self, now: Instant) -> TelemetryChange {
+    fn lose_origin(&mut self, now: Instant) -> TelemetryChange {
         self.ekf_origin = None;
         self.position_at = None;
         self.position_read_at = None;

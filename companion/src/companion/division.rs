@@ -9,6 +9,7 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::roster::FlightStatus;
 use crate::link::severity::Severity;
+use crate::margins::PILOT_KEEPS_AFTER;
 use crate::replanning::detour::path_kind::RejoinPlace;
 use crate::state::State;
 use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, LEASE, OwnReport};
@@ -20,8 +21,6 @@ const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
 /// A vehicle within this distance before the place where it promised to hold has reached it,
 /// metres.
 const AT_HOLD_M: f32 = 0.2;
-/// Time under a pilot's control after which a vehicle counts as having left the mission.
-const LEFT_WITH_PILOT_AFTER: Duration = Duration::from_secs(20);
 /// Time for which a vehicle on the ground that cannot make a commitment keeps its share while
 /// another one flies.
 pub(super) const CANNOT_START_MOST: Duration = Duration::from_secs(60);
@@ -107,7 +106,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ends = match state {
             _ if state.has_left_mission() => true,
             _ if state.is_left_to_pilot() => {
-                self.mission.time_with_pilot(self.now) >= LEFT_WITH_PILOT_AFTER
+                self.mission.time_with_pilot(self.now) >= PILOT_KEEPS_AFTER
             }
             _ => {
                 (off_plan && !beside)

@@ -7,7 +7,7 @@ use crate::autopilot::handshake::is_battery_known;
 use crate::autopilot::telemetry::MAX_POSITION_AGE;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
-use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
+use crate::margins::{LEASE_S, MAX_GROUND_HEIGHT_ERROR_M};
 use crate::mission::{GuardInputs, State, UNFOLLOWED_MOST};
 use crate::swarm::fleet::{Fleet, MISSED_AFTER};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
@@ -22,7 +22,7 @@ const LANDING_DRIFT_M: f32 = 1.0;
 const STANDING_DRIFT_M: f32 = 0.3;
 /// Time since the last renewal of its lease after which a vehicle in a coverage mission counts as
 /// unheard: 1 s before the lease ends. The row `NeighboursSilent` stops the vehicle 1 s later.
-const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
+const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(LEASE_S - 1);
 /// Height above the pad below which a climb is not interrupted by a pause, metres: lower, an
 /// autopilot may take a hovering vehicle for landed, and disarm it.
 const MIN_PAUSE_HEIGHT_M: f32 = 1.0;

@@ -14,7 +14,8 @@ use crate::swarm::fleet::Fleet;
 use crate::time::Duration;
 use crate::timers::Timer;
 
-/// Period at which the photographed waypoints are noted, stored and counted.
+/// Period at which the photographed waypoints are noted and stored, and their number is sent on
+/// both links.
 const NOTE_EVERY: Duration = Duration::from_millis(1000);
 /// Time within which each vehicle on the ground has heard the reports of the others: they come each
 /// second, and half of the messages may be lost.

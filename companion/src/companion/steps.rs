@@ -1,6 +1,7 @@
 //! What is done in time: the control step, and the messages that are sent periodically.
 
 use super::{Companion, HEARTBEAT_EVERY, REPORT_EVERY};
+use crate::autopilot::handshake::is_battery_known;
 use crate::events::{Event, Link};
 use crate::guidance::GuidanceInputs;
 use crate::link::OnDemandMessage;
@@ -15,12 +16,33 @@ use crate::timers::Timer;
 /// Period of setpoints and of control steps in flight: 20 Hz, twice the least rate that PX4 needs
 /// in practice.
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
+/// Period of the report that a start waits for the battery's charge.
+const CHARGE_REPORT_EVERY: Duration = Duration::from_secs(30);
 /// Period of steps in the states that stream no setpoints: before take-off and after landing.
 const IDLE_STEP_EVERY: Duration = Duration::from_millis(200);
 /// Period at which a vehicle of a coverage mission sends its roster message to the swarm.
 const ROSTER_EVERY: Duration = Duration::from_millis(500);
 /// Period at which a vehicle sends its roster message to the swarm while a division is under way.
 const ROSTER_EVERY_DIVIDING: Duration = Duration::from_millis(200);
+
+/// How fast the accuracy of the position estimate lets the vehicle fly.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum EstimatePace {
+    Stop,
+    Slower,
+    Nominal,
+}
+
+impl EstimatePace {
+    /// The pace by its share of the nominal speed.
+    fn of(share: f32) -> Self {
+        match share {
+            share if share >= 1.0 => Self::Nominal,
+            share if share > 0.0 => Self::Slower,
+            _ => Self::Stop,
+        }
+    }
+}
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Runs the control step and makes the periodic messages that are due at `now`: to be called
@@ -144,6 +166,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let due = self.mission.departure_due(self.now) && self.guidance.may_depart();
         let waits =
             due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
+        let least = self.config.battery_low_percent;
+        if waits
+            && !is_battery_known(&self.telemetry, least, self.now)
+            && self.timers.take_due(Timer::ChargeReport, self.now, CHARGE_REPORT_EVERY)
+        {
+            self.links.send_text(Severity::Warning, "Battery charge unknown: start waits");
+        }
         if waits && (!self.guidance.filter.column_clear() || self.detours.is_blocked()) {
             self.mission.note_start_barred(self.now);
         } else {
@@ -183,8 +212,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let before = self.guidance.set_estimate_speed_share(pace);
         self.mission.note_estimate_speed_share(pace, now);
-        let kind = |pace: f32| if pace >= 1.0 { 2 } else { u8::from(pace > 0.0) };
-        if kind(before) == kind(pace) || !self.mission.state().streams_setpoints() {
+        let now_allowed = EstimatePace::of(pace);
+        if EstimatePace::of(before) == now_allowed || !self.mission.state().streams_setpoints() {
             return;
         }
         // In whole centimetres, rounded up; a bound above 100 m stands for an unknown accuracy.
@@ -195,11 +224,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             margins::TRACKING_M,
         );
         let room_cm = libm::fmaxf(room_m * 100.0, 0.0) as u32;
-        let (severity, text) = match kind(pace) {
-            2 => (Severity::Info, "Estimate within # cm again"),
-            1 => (Severity::Warning, "Estimate within # cm, margin # cm: slower"),
-            _ if bound_m > 100.0 => (Severity::Warning, "Estimate of unknown accuracy: stopping"),
-            _ => (Severity::Warning, "Estimate within # cm, margin # cm: stopping"),
+        let (severity, text) = match now_allowed {
+            EstimatePace::Nominal => (Severity::Info, "Estimate within # cm again"),
+            EstimatePace::Slower => {
+                (Severity::Warning, "Estimate within # cm, margin # cm: slower")
+            }
+            EstimatePace::Stop if bound_m > 100.0 => {
+                (Severity::Warning, "Estimate of unknown accuracy: stopping")
+            }
+            EstimatePace::Stop => {
+                (Severity::Warning, "Estimate within # cm, margin # cm: stopping")
+            }
         };
         self.links.send_text_with_numbers(severity, text, [cm, room_cm]);
     }

@@ -18,6 +18,7 @@ use crate::link::rate_limit::{ARMED_BYTES_PER_S, DISARMED_BYTES_PER_S};
 use crate::link::roster;
 use crate::link::severity::Severity;
 use crate::link::{OnDemandMessage, done};
+use crate::margins::{LEASE_DELAY_S, LEASE_S, UNHEARD_NOTICED_S};
 use crate::services;
 use crate::state::{State, SystemStatus};
 use crate::swarm::neighbours::relay;
@@ -25,7 +26,7 @@ use crate::swarm::neighbours::relay;
 /// Longest time for which a vehicle in a coverage mission flies on along its part after it was last
 /// heard, seconds: its lease of 20 s, 1.8 s for the age of the report that renewed it, 2 s of
 /// message delay, and half of the longest stop.
-const LEASE_FLIGHT_S: f32 = 20.0 + 1.8 + 2.0 + 2.5;
+const LEASE_FLIGHT_S: f32 = LEASE_S as f32 + UNHEARD_NOTICED_S + LEASE_DELAY_S + 2.5;
 /// Bit of `type_mask` in SET_POSITION_TARGET_LOCAL_NED: the yaw is ignored.
 const MASK_YAW_IGNORED: u16 = 0x400;
 

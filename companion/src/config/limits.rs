@@ -8,6 +8,7 @@ use planner_core::{Point, SettingError};
 
 use crate::autopilot::limits::{AutopilotLimits, Limit};
 use crate::config::Config;
+use crate::margins::UNHEARD_NOTICED_S;
 
 /// Greatest jerk of a setpoint, m/s³, unless the autopilot's limit is lower.
 pub const MAX_JERK_MPS3: f32 = 4.0;
@@ -22,8 +23,6 @@ const MAX_SETPOINT_ACCEL_FACTOR: f32 = 1.5;
 pub(crate) const MAX_SMOOTHING_S: f32 = 1.2;
 /// Least time that is assumed until a vehicle that no other one hears has stopped, seconds.
 const UNHEARD_STOPPED_S: f32 = 3.0;
-/// Time after which a vehicle notices that it is unheard, and brakes, seconds.
-const UNHEARD_NOTICED_S: f32 = 1.8;
 /// Least limit of the speed on a straight leg (climb, join, descent), m/s.
 pub(crate) const JOIN_MPS: f32 = 1.0;
 

@@ -12,8 +12,8 @@ use crate::mission::{Action, Guard, GuardInputs, State, TransitionRow, has_row_f
 pub(crate) struct PendingCommands {
     /// MISSION_START, until the mission ends.
     pub(crate) start: bool,
-    /// DO_PAUSE_CONTINUE 0, until the operator resumes or the vehicle lands. On the pad it prevents
-    /// the take-off.
+    /// DO_PAUSE_CONTINUE 0, until the operator resumes or turns the vehicle back, it lands, or its
+    /// mission or start ends. On the pad it prevents the take-off.
     pub(crate) pause: bool,
     /// DO_PAUSE_CONTINUE 1, until the mission changes its state.
     pub(crate) resume: bool,

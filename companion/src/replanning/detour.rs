@@ -72,11 +72,11 @@ const STUCK_AFTER: Duration = Duration::from_secs(20);
 /// Progress since the last block after which a further block counts as a new one, metres.
 const BLOCKED_AGAIN_M: f32 = 2.0;
 /// Time since the safety filter last stopped the vehicle within which it still counts as stopped;
-/// for a blocked vehicle it is [`BLOCKED_HINDERED_WITHIN`], so that a neighbour that sways at the
-/// edge of the path does not make the block begin again and again.
-const UNBLOCKED_HINDERED_WITHIN: Duration = Duration::from_millis(500);
+/// for a blocked vehicle it is [`STOP_COUNTS_FOR_WHILE_BLOCKED`], so that a neighbour that sways at
+/// the edge of the path does not make the block begin again and again.
+const STOP_COUNTS_FOR: Duration = Duration::from_millis(500);
 /// Time without a stop by the safety filter after which a blocked vehicle counts as free.
-const BLOCKED_HINDERED_WITHIN: Duration = Duration::from_secs(3);
+const STOP_COUNTS_FOR_WHILE_BLOCKED: Duration = Duration::from_secs(3);
 /// Time after which a vehicle on its pad that no other vehicle hears reports that it waits.
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Sway, metres: a stopped vehicle this near to the end of a path aside counts as at the end.
@@ -204,8 +204,8 @@ impl Detours {
         beside::first_rejoin_m(view, self.obstacles.all())
     }
 
-    /// Whether the vehicle, in the air in a coverage mission, is on its plan's path, or on a detour
-    /// that leads back to that path.
+    /// Whether the vehicle, in a coverage mission, flies its plan onwards, past the climb: on its
+    /// path or on a detour back to it. False on its way home, and once it has left the plan.
     pub(crate) fn keeps_to_plan_over_area<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -229,7 +229,7 @@ impl Detours {
         // Beside its path the vehicle seeks another way back, whatever stopped it.
         (self.obstructed
             || self.is_beside_plan()
-            || self.is_stopped_for_long(view, BLOCKED_HINDERED_WITHIN))
+            || self.is_stopped_for_long(view, STOP_COUNTS_FOR_WHILE_BLOCKED))
             && self.keeps_to_plan_over_area(view)
             && self.area_searches.may_seek(view.now, timers)
     }
@@ -328,10 +328,10 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> Option<ScanResult> {
         let began = self.scan_began?;
-        let in_the_way = self.continue_path_scan(view)?;
+        let obstructed = self.continue_path_scan(view)?;
         self.scan_began = None;
-        self.obstructed = in_the_way;
-        Some(ScanResult { clear_at: (!in_the_way).then_some(began) })
+        self.obstructed = obstructed;
+        Some(ScanResult { clear_at: (!obstructed).then_some(began) })
     }
 
     /// Decides whether the vehicle is blocked, since when no other one has moved, and whether this
@@ -360,7 +360,7 @@ impl Detours {
             && !Self::is_freed_over_area(view)
             && self.all_standing_since.is_some_and(|at| now - at > DEAD_END_AFTER);
         let blocked = view.mission.state() == State::Blocked;
-        let free = if blocked { BLOCKED_HINDERED_WITHIN } else { UNBLOCKED_HINDERED_WITHIN };
+        let free = if blocked { STOP_COUNTS_FOR_WHILE_BLOCKED } else { STOP_COUNTS_FOR };
         let stopped = self.is_stopped_for_long(view, free);
         self.blocked = !view.guidance.returning
             && (stuck || off_plan || dead_end || stopped || self.obstructed);

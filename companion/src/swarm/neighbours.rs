@@ -209,7 +209,8 @@ impl<const V: usize> Neighbours<V> {
         entry.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
         let on_plan = intent.flags & ON_PLAN != 0;
         let shared = on_plan && entry.shares_plan;
-        let follows = on_plan && intent.flags & LANDED == 0 && intent.plan_crc != 0;
+        let flies_plan = on_plan && intent.flags & (LANDED | OUT_OF_PLAN) == 0;
+        let follows = flies_plan && intent.plan_crc != 0;
         entry.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
         (entry.heard_at, entry.intent_at) = (Some(now), Some(now));
         entry.flags = intent.flags;

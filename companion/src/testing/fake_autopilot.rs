@@ -68,6 +68,8 @@ pub struct Bench {
     /// Vertical speed that the autopilot reports, m/s upwards.
     pub climbs_mps: f32,
     pub silent: bool,
+    /// Whether HEARTBEAT alone is lost.
+    pub no_heartbeat: bool,
     pub no_position: bool,
     /// Horizontal accuracy that ESTIMATOR_STATUS reports, metres; `None`: the message is not sent.
     pub accuracy_m: Option<f32>,
@@ -152,6 +154,7 @@ impl Bench {
             height_error_m: 0.0,
             climbs_mps: 0.0,
             silent: false,
+            no_heartbeat: false,
             no_position: false,
             accuracy_m: Some(0.02),
             pos_horiz_variance: 0.1,

@@ -7,6 +7,9 @@
 ))]
 compile_error!("a build is for exactly one board: nucleo-h743, pico2 or qemu");
 
+#[cfg(not(any(feature = "nucleo-h743", feature = "pico2", feature = "qemu")))]
+compile_error!("a build for a board names it: nucleo-h743, pico2 or qemu");
+
 #[cfg(feature = "nucleo-h743")]
 pub use super::nucleo_h743::*;
 #[cfg(feature = "pico2")]

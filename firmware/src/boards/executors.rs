@@ -9,7 +9,7 @@ static PLANS: InterruptExecutor = InterruptExecutor::new();
 
 /// Starts the executor of links and setpoints in the interrupt `irq`, which no device uses and
 /// whose priority is set. To be called once.
-pub(super) fn start_links(irq: impl InterruptNumber) -> SendSpawner {
+pub(super) fn start_links_executor(irq: impl InterruptNumber) -> SendSpawner {
     LINKS.start(irq)
 }
 
@@ -18,7 +18,7 @@ pub(super) fn start_plans(irq: impl InterruptNumber) -> SendSpawner {
     PLANS.start(irq)
 }
 
-/// Body of the handler of the interrupt given to [`start_links`].
+/// Body of the handler of the interrupt given to [`start_links_executor`].
 ///
 /// # Safety
 /// Only that handler may call it: the executor exists once its interrupt is enabled.

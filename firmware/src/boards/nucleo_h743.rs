@@ -126,7 +126,7 @@ pub fn start() -> Parts {
     let sends = Transmitter::new(sends, DMA_RADIO_OUT.take());
     let swarm = (receives.into_ring_buffered(DMA_RADIO_IN.take()), sends);
     Parts {
-        links: executors::start_links(interrupt::UART7),
+        links: executors::start_links_executor(interrupt::UART7),
         plans: executors::start_plans(interrupt::UART8),
         autopilot,
         swarm,

@@ -149,7 +149,7 @@ pub fn start() -> Parts {
     let autopilot = (receives, sends);
     let (sends, receives) = swarm.split();
     Parts {
-        links: executors::start_links(interrupt::SWI_IRQ_0),
+        links: executors::start_links_executor(interrupt::SWI_IRQ_0),
         plans: executors::start_plans(interrupt::SWI_IRQ_1),
         autopilot,
         swarm: (receives, sends),

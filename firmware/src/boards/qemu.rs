@@ -48,7 +48,7 @@ pub fn start() -> Parts {
     let mut watchdog = Watchdog(());
     watchdog.start();
     let parts = Parts {
-        links: vectors::start_links(),
+        links: vectors::start_links_executor(),
         plans: vectors::start_plans(),
         autopilot: uart::AUTOPILOT.start(interrupts::Irq::Uart0Rx),
         swarm: uart::SWARM.start(interrupts::Irq::Uart1Rx),

@@ -74,13 +74,13 @@ pub(super) fn prepare(
     }
     // Over fields vehicles have to keep clear only of each other: each may deviate from its path by
     // half of what the separation leaves beyond the safety distance.
-    let stray_m = scenario.deconfliction.separation_m - scenario.deconfliction.safety_distance_m;
+    let margin_m = scenario.deconfliction.separation_m - scenario.deconfliction.safety_distance_m;
     let tasks = scenario
         .vehicles
         .iter()
         .map(|v| VehicleTask {
             id: v.id,
-            required_clearance_m: v.radius_m + stray_m / 2.0,
+            required_clearance_m: v.radius_m + margin_m / 2.0,
             climb_m: top_m,
             goal: None,
         })

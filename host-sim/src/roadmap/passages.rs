@@ -159,7 +159,7 @@ impl<'a> CellSearch<'a> {
 
     /// Of the cell that holds `place` and its neighbours, those to whose centres a clear straight
     /// segment leads from `place`.
-    fn cells_seen_from(&self, place: &Point) -> Vec<usize> {
+    fn adjacent_cells_in_sight(&self, place: &Point) -> Vec<usize> {
         let Some(cell) = self.shape.cell_of(place) else { return Vec::new() };
         let sees =
             |next: &[u32; 3]| is_clear(self.tree, place, &self.centre(*next), self.required_m);
@@ -169,7 +169,7 @@ impl<'a> CellSearch<'a> {
     /// The points of a shortest path over cell centres, `from` and `to` included; `None` if there
     /// is none.
     fn shortest_cell_path(&self, from: &Point, to: &Point) -> Option<Vec<Point>> {
-        let ends: BTreeSet<usize> = self.cells_seen_from(to).into_iter().collect();
+        let ends: BTreeSet<usize> = self.adjacent_cells_in_sight(to).into_iter().collect();
         let grid = self.map.grid();
         let never_sample = self.map.never_sample_grid();
         let cells = self.shape.dims.iter().map(|&d| d as usize).product();
@@ -177,7 +177,7 @@ impl<'a> CellSearch<'a> {
         let mut open = BinaryHeap::new();
         // `f32` is not `Ord`; non-negative floats order like their bits.
         let rank = |cost_m: f32, at: &Point| Reverse((cost_m + (to - at).norm()).to_bits());
-        for index in self.cells_seen_from(from) {
+        for index in self.adjacent_cells_in_sight(from) {
             let centre = self.centre(self.cell(index));
             cost[index] = (centre - from).norm();
             open.push((rank(cost[index], &centre), index));

@@ -39,7 +39,7 @@ impl TomlText<'_> {
         }
     }
 
-    pub(super) fn with_hint(
+    pub(super) fn error_with_hint(
         &self,
         span: &TomlSpan,
         why: impl Into<String>,
@@ -210,9 +210,11 @@ impl<'a> Table<'a> {
                 Some((given, _)) => {
                     self.unknown_key_error(given, Some(format!("did you mean `{key}`?")))
                 }
-                None => {
-                    self.text.with_hint(&self.span, format!("{} is missing", self.path(key)), hint)
-                }
+                None => self.text.error_with_hint(
+                    &self.span,
+                    format!("{} is missing", self.path(key)),
+                    hint,
+                ),
             }
         })
     }

@@ -82,12 +82,12 @@ struct Common {
 fn read_common(
     text: TomlText<'_>,
     root: &Table<'_>,
-    (stray_m, limit_s): (f32, f32),
+    (pair_error_m, limit_s): (f32, f32),
 ) -> Result<Common> {
     let seed = root.integer_in_range("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
     let deconfliction = deconfliction.unwrap_or_else(|| empty_table(text, "deconfliction"));
-    let deconfliction = read_deconfliction(&deconfliction, stray_m)?;
+    let deconfliction = read_deconfliction(&deconfliction, pair_error_m)?;
     let simulation = root.get("simulation").map(|v| v.table()).transpose()?;
     let estimator_span = simulation.as_ref().and_then(|t| t.get("estimator")).map(|v| v.span);
     let simulation =
@@ -280,7 +280,7 @@ fn read_place(value: &TomlValue<'_>, origin: Option<&Geodetic>) -> Result<Point>
             "add `origin = { lat_deg = …, lon_deg = …, alt_m = … }` to [map], or give metres";
         let why =
             format!("{} is given by latitude and longitude, but map.origin is missing", value.name);
-        return Err(value.text.with_hint(&value.span, why, hint));
+        return Err(value.text.error_with_hint(&value.span, why, hint));
     };
     let place = geodetic_to_enu(origin, &position);
     if place.xy().norm() > MAX_COORDINATE_M {
@@ -293,7 +293,7 @@ fn read_place(value: &TomlValue<'_>, origin: Option<&Geodetic>) -> Result<Point>
             MAX_COORDINATE_M / 1e3
         );
         let hint = "check the order of latitude and longitude, and the `origin` of [area] or [map]: metres are about it";
-        return Err(value.text.with_hint(&value.span, why, hint));
+        return Err(value.text.error_with_hint(&value.span, why, hint));
     }
     Ok(place)
 }

@@ -346,7 +346,11 @@ impl SimulatedVehicle {
                     log.push(report::LogEvent { t_s, vehicle, level: Level::Info, text });
                 }
                 Event::StateChanged { from, to, text, warning } => {
-                    self.note_warning(from, to, Some(text).filter(|t| warning && !t.is_empty()));
+                    self.update_last_warning(
+                        from,
+                        to,
+                        Some(text).filter(|t| warning && !t.is_empty()),
+                    );
                     log.push(self.log_entry(now_us, from, to, text));
                 }
             }
@@ -398,7 +402,7 @@ impl SimulatedVehicle {
         self.killed || now_us < self.boots_until_us
     }
 
-    fn note_warning(&mut self, from: State, to: State, warning: Option<&'static str>) {
+    fn update_last_warning(&mut self, from: State, to: State, warning: Option<&'static str>) {
         if warning.is_some() {
             self.last_warning = warning;
         } else if to == State::Follow || from == State::Aborted {

@@ -6,22 +6,29 @@ use super::imports::{self, Import};
 use super::sources::Tree;
 
 /// Files of the parts of host-sim that plan; they know no simulation.
-const PLANNING: [&str; 15] = [
+const PLANNING: [&str; 22] = [
     "host-sim/src/area",
+    "host-sim/src/area.rs",
     "host-sim/src/capacity.rs",
     "host-sim/src/coverage",
+    "host-sim/src/coverage.rs",
     "host-sim/src/map",
+    "host-sim/src/map.rs",
     "host-sim/src/margins.rs",
     "host-sim/src/mission",
     "host-sim/src/mission.rs",
     "host-sim/src/output.rs",
     "host-sim/src/paper",
+    "host-sim/src/paper.rs",
     "host-sim/src/report",
+    "host-sim/src/report.rs",
     "host-sim/src/result.rs",
     "host-sim/src/roadmap",
     "host-sim/src/roadmap.rs",
     "host-sim/src/scenario",
+    "host-sim/src/scenario.rs",
     "host-sim/src/terrain",
+    "host-sim/src/terrain.rs",
 ];
 
 /// Which files must not import which crates and files.

@@ -51,8 +51,8 @@ impl Detours {
             .is_some_and(|purpose| purpose.is_aside() || purpose.keeps_to_plan())
     }
 
-    /// Whether the vehicle flies a detour in a coverage mission after which it comes back to its
-    /// plan.
+    /// Whether the vehicle flies, in a coverage mission, a detour back to its plan's path, or aside
+    /// with a place there to come back to.
     pub(crate) fn is_beside_plan(&self) -> bool {
         self.path_kind.purpose().is_some_and(|purpose| purpose.keeps_to_plan())
     }

@@ -6,6 +6,7 @@ use planner_core::Point;
 
 use super::Detours;
 use crate::autopilot::telemetry::Telemetry;
+use crate::margins::PILOT_KEEPS_AFTER;
 use crate::replanning::view::{DetourView, ReportedPlace};
 use crate::state::State;
 use crate::time::{Duration, Instant};
@@ -13,9 +14,6 @@ use crate::time::{Duration, Instant};
 /// Age of this vehicle's position above which the velocity reported with it is 0.
 const VELOCITY_UNKNOWN_AFTER: Duration = Duration::from_secs(2);
 
-/// Time under a pilot's control after which the vehicle counts as out of the plan: others fly
-/// around it.
-const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 /// Time in `Aborted` after which a vehicle that reports no landing is out of the plan.
 const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 

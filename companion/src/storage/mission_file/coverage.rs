@@ -14,6 +14,7 @@ use planner_core::flight::Trigger;
 use super::error::MissionError;
 use super::numbers::{MAX_SPEED_MPS, f32_at, is_positive_up_to, put_numbers, u16_at, u32_at};
 pub use crate::config::Ground;
+use crate::margins::{LEASE_DELAY_S, LEASE_S, UNHEARD_NOTICED_S};
 
 /// Bytes of the block before the first vehicle's share.
 const HEAD_LEN: usize = 60;
@@ -170,7 +171,7 @@ pub struct CoverageView<'a> {
 /// Time, in addition to that of its descent, after which a vehicle that no other vehicle hears any
 /// more is on the ground, seconds: its lease, age and delay of the last message, the stop, the wait
 /// of the row `SwarmLinkLost`, and the slow end of a descent.
-const UNHEARD_DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
+const UNHEARD_DOWN_S: f32 = LEASE_S as f32 + UNHEARD_NOTICED_S + LEASE_DELAY_S + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {
     /// Time, seconds, after which a vehicle that no other vehicle hears any more is on the ground,

@@ -1,10 +1,11 @@
 //! The time limits of a fleet.
 
+use crate::margins::LEASE_S;
 use crate::time::Duration;
 
 /// Time for which a vehicle continues photographing after a majority last reported that they hear
 /// it.
-pub const LEASE: Duration = Duration::from_secs(20);
+pub const LEASE: Duration = Duration::from_secs(LEASE_S);
 /// Greatest age of a neighbour's report that renews the lease.
 pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);
 /// Silence of a vehicle after which it counts as lost, and the others divide its share of the area.

@@ -35,7 +35,8 @@ impl NeighbourEntry {
         now - heard_at >= dead && self.relayed_at.is_none_or(|at| now - at >= dead)
     }
 
-    /// Whether the neighbour is heard, but has reported no valid position for 3 s.
+    /// Whether the neighbour was last heard 3 s or more after its last valid position; false if it
+    /// never reported one.
     pub(super) fn lacks_position(&self) -> bool {
         self.heard_at
             .zip(self.position_at)

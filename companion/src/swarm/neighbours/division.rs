@@ -23,10 +23,10 @@ impl<const V: usize> Neighbours<V> {
 
     /// Makes the mission a coverage mission, with a fleet that divides what a vehicle leaves.
     /// `down_s`: silence after which a lost vehicle is on the ground, seconds; `ground`: heights of
-    /// ground that is not level; `stray_m`: distance by which two vehicles may be nearer than their
-    /// estimates say, metres.
-    pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, stray_m: f32) {
-        (self.ground, self.pair_position_error_m) = (ground, stray_m);
+    /// ground that is not level; `pair_error_m`: distance by which two vehicles may be nearer than
+    /// their estimates say, metres.
+    pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, pair_error_m: f32) {
+        (self.ground, self.pair_position_error_m) = (ground, pair_error_m);
         self.down_after = DOWN_AFTER.max(Duration::from_millis((down_s * 1000.0) as u64));
         let down = Duration::from_millis((down_s * 1000.0) as u64);
         self.fleet = Some(Fleet::new(

@@ -34,11 +34,11 @@ pub(crate) const PAYLOAD_TYPE: u16 = 0xF10D;
 /// Maximum number of vehicles relayed in one message.
 const MAX_RELAYED: usize = 10;
 const VERSION: u8 = 3;
-const TUNNEL_HEAD: usize = 5;
+const TUNNEL_HEADER_LEN: usize = 5;
 const HEADER_LEN: usize = 12;
 const ITEM_LEN: usize = 11;
 /// Longest TUNNEL payload, bytes.
-pub(crate) const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_RELAYED * ITEM_LEN;
+pub(crate) const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_RELAYED * ITEM_LEN;
 /// Silence after which a vehicle that others still hear is out of range; shorter silence may be
 /// lost messages.
 const OUT_OF_RANGE_AFTER: Duration = Duration::from_secs(3);
@@ -84,7 +84,7 @@ impl Relay {
         let len = HEADER_LEN + ITEM_LEN * self.items.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
         (out[2], out[3], out[4]) = (0, 0, len as u8);
-        let body = &mut out[TUNNEL_HEAD..];
+        let body = &mut out[TUNNEL_HEADER_LEN..];
         body[..4].copy_from_slice(&[VERSION, system_id, self.items.len() as u8, 0]);
         body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
@@ -94,13 +94,13 @@ impl Relay {
             to[6..10].copy_from_slice(&item.gates_open_up_to_m.to_le_bytes());
             to[10] = item.unheard_delay_s;
         }
-        TUNNEL_HEAD + len
+        TUNNEL_HEADER_LEN + len
     }
 
     /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not a sound
     /// relay.
     pub(crate) fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
-        let body = padded[TUNNEL_HEAD..].get(..usize::from(padded[4]))?;
+        let body = padded[TUNNEL_HEADER_LEN..].get(..usize::from(padded[4]))?;
         let is_ours = u16::from_le_bytes([padded[0], padded[1]]) == PAYLOAD_TYPE;
         if !is_ours || body.len() < HEADER_LEN || body[0] != VERSION || body[1] != sender {
             return None;

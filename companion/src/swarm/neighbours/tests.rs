@@ -476,3 +476,17 @@ fn nobody_falls_up() {
     }
     assert!(below > 100 && above > 20, "{below} {above}");
 }
+
+/// A vehicle that its pilot flies after its mission reports its old plan still, and is no reason to
+/// wait for its plan.
+#[test]
+fn a_vehicle_out_of_the_plan_follows_no_other_plan() {
+    let mut table = table();
+    let now = Instant::from_millis(100);
+    for (flags, other) in
+        [(ON_PLAN, true), (ON_PLAN | OUT_OF_PLAN, false), (ON_PLAN | LANDED, false)]
+    {
+        table.handle_intent(now, 1, &intent(flags, 1, 9), 1, Some(2));
+        assert_eq!(table.hears_another_plan(now), other, "{flags:#x}");
+    }
+}

@@ -63,8 +63,10 @@ impl Bench {
         let count = self.now.as_micros() / 50_000;
         if count.is_multiple_of(20) {
             let bytes = self.heartbeat();
-            self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
-            self.drain();
+            if !self.no_heartbeat {
+                self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
+                self.drain();
+            }
             if self.kind == AutopilotKind::Px4
                 && let Some(pos_horiz_accuracy) = self.accuracy_m
             {

@@ -57,9 +57,9 @@ unsafe extern "C" fn plans() {
 }
 
 /// Starts the executor of links and setpoints. To be called once.
-pub fn start_links() -> SendSpawner {
+pub fn start_links_executor() -> SendSpawner {
     interrupts::set_priority(Irq::Links, interrupts::LINKS);
-    executors::start_links(Irq::Links)
+    executors::start_links_executor(Irq::Links)
 }
 
 /// Starts the executor of plans and flash. To be called once.

@@ -173,7 +173,7 @@ fn check_heights(
         "vehicle {} stands {:.1} m above the origin, pictures are taken at {height_m:.1} m",
         vehicle.id, vehicle.start.z
     );
-    Err(text.with_hint(&spans.start, why, ORIGIN_HINT))
+    Err(text.error_with_hint(&spans.start, why, ORIGIN_HINT))
 }
 
 /// Reads `[mission]` of a coverage mission, which has no goals.
@@ -276,7 +276,7 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
         }
         (None, None) => {
             let hint = "add `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
-            return Err(table.text.with_hint(&table.span, "area.file is missing", hint));
+            return Err(table.text.error_with_hint(&table.span, "area.file is missing", hint));
         }
         (Some(file), None) => {
             let path = folder.join(file.str()?);
@@ -294,7 +294,7 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
                 let why =
                     "area.polygon is in degrees, and area.coordinates is \"metres\"".to_owned();
                 let hint = "give [x, y] in metres, or leave `coordinates` out";
-                return Err(table.text.with_hint(&polygon.span, why, hint));
+                return Err(table.text.error_with_hint(&polygon.span, why, hint));
             }
             let polygons = Polygons { outers: vec![ring], ..Polygons::default() };
             (polygons, coordinates, polygon.span.clone())
@@ -308,7 +308,7 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
             if own == Coordinates::Wgs84 && coordinates == Coordinates::Metres {
                 let hint = "give [x, y] in metres";
                 let why = format!("{} is in degrees and the area in metres", item.name);
-                return Err(table.text.with_hint(&item.span, why, hint));
+                return Err(table.text.error_with_hint(&item.span, why, hint));
             }
             rings.push(ring);
         }
@@ -363,7 +363,7 @@ fn rings_in_mission_frame(
     coordinates: Coordinates,
     origin: &Geodetic,
 ) -> Result<(Vec<Flat>, Vec<Ring>)> {
-    let bad = |why: String, hint: &str| Err(table.text.with_hint(source, why, hint));
+    let bad = |why: String, hint: &str| Err(table.text.error_with_hint(source, why, hint));
     let border = if table.get("file").is_some() { "area.file" } else { "area.polygon" };
     let (mut vertices, mut rings) = (Vec::new(), Vec::new());
     let kinds = [
@@ -410,7 +410,7 @@ fn rings_in_mission_frame(
             let (why, hint) = (describe_area_error(error, &rings), area_hint(error));
             match faulty_ring(error, &rings).and_then(|ring| ring_span(table, &rings, ring)) {
                 Some((key, span)) => {
-                    Err(table.text.with_hint(&span, format!("area.{key}: {why}"), hint))
+                    Err(table.text.error_with_hint(&span, format!("area.{key}: {why}"), hint))
                 }
                 None => bad(format!("{border}: {why}"), hint),
             }

@@ -48,7 +48,7 @@ pub(super) fn check_margins(
     let hint = "docs/simulating.md adds up margin and separation; \"rtk\" errs by 0.1 m";
     let why =
         format!("estimates as wrong as the recorded ones leave no room: {}", lacks.join("; "));
-    Err(text.with_hint(span, why, hint))
+    Err(text.error_with_hint(span, why, hint))
 }
 
 pub(super) fn check_apart(
@@ -92,7 +92,7 @@ pub(super) fn check_goals_apart(
                 let needed_m =
                     margins::parked_separation_m(simulation, safety_distance_m, vehicles);
                 let hint = format!("vehicles that land at both need {needed_m:.2} m between them");
-                return Err(table.text.with_hint(&span, why, hint));
+                return Err(table.text.error_with_hint(&span, why, hint));
             }
         }
     }
@@ -141,7 +141,7 @@ pub(super) fn check_goals(
         let Some(goal) = vehicle.goal else {
             let hint = "add `goal = N`, an index into mission.goals from 0";
             let why = format!("vehicle {} has no goal in a labelled mission", vehicle.id);
-            return Err(text.with_hint(&spans.table, why, hint));
+            return Err(text.error_with_hint(&spans.table, why, hint));
         };
         let span = spans.goal.as_ref().unwrap_or(&spans.table);
         if goal >= mission.goals.len() {

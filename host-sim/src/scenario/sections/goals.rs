@@ -95,7 +95,11 @@ fn check_mode(
     match mode {
         MissionMode::Coverage if root.get("area").is_none() => {
             let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`, and leave out [map]";
-            return Err(text.with_hint(span, "mission.mode \"coverage\" needs an [area]", hint));
+            return Err(text.error_with_hint(
+                span,
+                "mission.mode \"coverage\" needs an [area]",
+                hint,
+            ));
         }
         MissionMode::Formation => {
             unsupported.push(unsupported_error(text, span, "this mission.mode"));
@@ -153,7 +157,7 @@ fn read_mission(
     if takes_goals && goals.is_empty() {
         let span = given.or(file).map_or(table.span.clone(), |v| v.span);
         let hint = "add `goals = [[east, north, up], …]` in metres, or `goals_file = \"FILE\"`, to [mission]";
-        return Err(table.text.with_hint(&span, "mission.goals is missing or empty", hint));
+        return Err(table.text.error_with_hint(&span, "mission.goals is missing or empty", hint));
     }
     if mode == MissionMode::SingleGoal && goals.len() != 1 {
         let span = given.or(file).map_or(table.span.clone(), |v| v.span);

@@ -68,7 +68,7 @@ impl MapBesideArea {
              lon_deg = {lon_deg}, \
              alt_m = {alt_m} }}` in [map] says so; without area.origin, map.origin is that of both"
         );
-        Err(text.with_hint(&self.span, why, hint))
+        Err(text.error_with_hint(&self.span, why, hint))
     }
 
     /// Reads the map, and adds its obstacles to the area as no-fly zones.
@@ -81,7 +81,11 @@ impl MapBesideArea {
         self.check_origin(text, &area.origin)?;
         if area.terrain.is_some() {
             let hint = "leave out [map], or area.terrain where the ground is level";
-            return Err(text.with_hint(&self.span, "[map] beside area.terrain: not yet", hint));
+            return Err(text.error_with_hint(
+                &self.span,
+                "[map] beside area.terrain: not yet",
+                hint,
+            ));
         }
         let map = map::load(&self.map.file, self.map.resolution_m)
             .map_err(|error| text.error(&self.span, format!("map.file: {error}")))?;
@@ -103,7 +107,7 @@ impl MapBesideArea {
                  obstacles; at most {MAX_CORNERS} can be used"
             );
             let hint = "a larger map.resolution_m or a greater area.height_m makes fewer";
-            text.with_hint(&self.span, why, hint)
+            text.error_with_hint(&self.span, why, hint)
         })?;
         for zone in zones {
             area.vertices.extend(zone);
@@ -122,8 +126,8 @@ impl FlightSettings<'_> {
     fn clearance_m(&self) -> f32 {
         let Deconfliction { separation_m, safety_distance_m, .. } = *self.deconfliction;
         let walls_m = margins::required_distances(self.simulation, 0.0, self.vehicles).margin_m;
-        let stray_m = (separation_m - safety_distance_m) / 2.0;
-        self.largest_radius_m() + stray_m.max(walls_m).max(self.roadmap.safety_margin_m)
+        let margin_m = (separation_m - safety_distance_m) / 2.0;
+        self.largest_radius_m() + margin_m.max(walls_m).max(self.roadmap.safety_margin_m)
     }
 
     /// Height that a path keeps above obstacles below it, metres.
@@ -152,7 +156,7 @@ impl FlightSettings<'_> {
             );
             let hint =
                 "a start further away; the map's ground must be at the height of the ground here";
-            return Err(text.with_hint(&spans.start, why, hint));
+            return Err(text.error_with_hint(&spans.start, why, hint));
         }
         Ok(())
     }

@@ -9,9 +9,9 @@ use crate::scenario::types::{
     Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, PositionErrors, Simulation,
 };
 
-/// Reads `[deconfliction]`. The default of `separation_m` is the safety distance plus `stray_m`, by
-/// which two vehicles together deviate from their paths, metres.
-pub(super) fn read_deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
+/// Reads `[deconfliction]`. The default of `separation_m` is the safety distance plus
+/// `pair_error_m`, by which two vehicles together deviate from their paths, metres.
+pub(super) fn read_deconfliction(table: &Table<'_>, pair_error_m: f32) -> Result<Deconfliction> {
     let methods =
         [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
     let method = table.one_of("method", Method::Priority, &methods)?;
@@ -19,7 +19,7 @@ pub(super) fn read_deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deco
     let safety_distance_m = table.f32("safety_distance_m", SAFETY_DISTANCE_M, 0.01..=1000.0)?;
     let separation_m = table.f32(
         "separation_m",
-        safety_distance_m + stray_m,
+        safety_distance_m + pair_error_m,
         f64::from(safety_distance_m)..=1000.0,
     )?;
     let deconfliction = Deconfliction { method, safety_distance_m, separation_m };

@@ -62,12 +62,12 @@ impl UnreadTerrain {
     fn terrain_error(&self, text: TomlText<'_>, error: &TerrainError) -> ScenarioError {
         let path = quoted_path(&self.path);
         match error {
-            TerrainError::System { what, hint } => text.with_hint(
+            TerrainError::System { what, hint } => text.error_with_hint(
                 &self.span,
                 format!("area.terrain: {path} is in {what}, which cannot be used"),
                 *hint,
             ),
-            TerrainError::Nowhere(hint) => text.with_hint(
+            TerrainError::Nowhere(hint) => text.error_with_hint(
                 &self.span,
                 format!("area.terrain: {path} does not say where it is"),
                 *hint,
@@ -83,7 +83,7 @@ impl UnreadTerrain {
                     }
                     _ => "export it again as ESRI ASCII grid, GeoTIFF, LAS or LAZ",
                 };
-                text.with_hint(&self.span, format!("area.terrain: {path} {other}"), hint)
+                text.error_with_hint(&self.span, format!("area.terrain: {path} {other}"), hint)
             }
         }
     }
@@ -94,7 +94,7 @@ impl UnreadTerrain {
         let height_m = grid.height_at(&Flat::zeros());
         let hint = "another area.origin, or a file that holds it";
         height_m.map(f64::from).ok_or_else(|| {
-            text.with_hint(
+            text.error_with_hint(
                 &self.span,
                 "area.terrain has no height at the mission's origin".to_owned(),
                 hint,
@@ -136,7 +136,7 @@ impl UnreadTerrain {
                 FieldError::High(_) => "area.origin needs an alt_m near the ground",
                 _ => "the file must hold the area, all pads and some metres around them",
             };
-            text.with_hint(&self.span, why, hint)
+            text.error_with_hint(&self.span, why, hint)
         })?;
         for (vehicle, spans) in vehicles {
             let ground_m = grid.height_at(&vehicle.start.xy()).unwrap_or(0.0);
@@ -150,7 +150,7 @@ impl UnreadTerrain {
                     "there the ground is {ground_m:.1} m above the origin, alt_m = {:.1}",
                     area.origin.alt_m + f64::from(ground_m)
                 );
-                return Err(text.with_hint(&spans.start, why, up));
+                return Err(text.error_with_hint(&spans.start, why, up));
             }
             vehicle.start.z = ground_m;
         }
@@ -163,7 +163,7 @@ impl UnreadTerrain {
         let top_m = terrain.following(area.height_m).map_or(0.0, |following| following.top_m());
         if top_m <= 0.0 {
             let hint = format!("area.origin alt_m = {:.1} is above it", area.origin.alt_m);
-            return Err(text.with_hint(
+            return Err(text.error_with_hint(
                 &self.span,
                 "area.terrain lies below the origin".to_owned(),
                 hint,

@@ -89,7 +89,11 @@ pub(super) fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result
             _ => {
                 let hint =
                     "add `camera = { fov_deg = 73.7, aspect = 1.5 }`, or lane_m and waypoint_m";
-                return Err(table.text.with_hint(&table.span, "area.camera is missing", hint));
+                return Err(table.text.error_with_hint(
+                    &table.span,
+                    "area.camera is missing",
+                    hint,
+                ));
             }
         },
     };
