@@ -268,19 +268,24 @@ impl Handshake {
             let (main, sub) = kind.mode_params(custom_mode);
             Outgoing::Mode(main, sub)
         };
-        let heard = telemetry.heartbeat_age(s.now);
-        if heard > MAX_HEARTBEAT_AGE && s.state.lands() {
-            return self.request_mode_unheard(kind, s, timers, links);
+        let heartbeat_age = telemetry.heartbeat_age(s.now);
+        let needs_mode = match s.state {
+            // A HEARTBEAT from before this state may show the landing mode of an earlier landing.
+            State::Land => mode != kind.land_mode() || heartbeat_age > s.in_state,
+            // The HEARTBEAT at hand may be older than the landing mode that was requested before.
+            State::LandingHeld => s.in_state < MAX_HEARTBEAT_AGE || mode != kind.setpoint_mode(),
+            _ => false,
+        };
+        if heartbeat_age > MAX_HEARTBEAT_AGE && s.state.lands() {
+            if needs_mode {
+                self.request_mode_unheard(kind, s, timers, links);
+            }
+            return;
         }
         let mut push = |request| links.push(Link::Autopilot, request);
         match s.state {
             State::Engaging => push(change_to(kind.setpoint_mode())),
-            // The HEARTBEAT at hand may be older than the landing mode that was requested before.
-            State::LandingHeld
-                if s.in_state < MAX_HEARTBEAT_AGE || mode != kind.setpoint_mode() =>
-            {
-                push(change_to(kind.setpoint_mode()));
-            }
+            State::LandingHeld if needs_mode => push(change_to(kind.setpoint_mode())),
             State::CancelStart if self.arming.may_disarm_on_pad(s.now, telemetry) => {
                 push(Outgoing::Arm(false));
             }
@@ -288,10 +293,7 @@ impl Handshake {
                 timers.set(Timer::Request, s.now + TAKE_OFF_RETRY_EVERY);
                 push(Outgoing::TakeOff(telemetry.above_home_m + s.climb_m));
             }
-            // A HEARTBEAT from before this state may show the landing mode of an earlier landing.
-            State::Land if mode != kind.land_mode() || heard > s.in_state => {
-                push(change_to(kind.land_mode()));
-            }
+            State::Land if needs_mode => push(change_to(kind.land_mode())),
             State::Disarm => {
                 timers.set(Timer::Request, s.now + DISARM_EVERY);
                 push(Outgoing::Arm(false));

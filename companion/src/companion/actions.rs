@@ -95,7 +95,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.hold_after_pilot(position, self.mission.plan());
             }
             Action::HoldHere => self.guidance.hold_at(position),
-            Action::HoldOver => self.timers.set(Timer::Request, now),
+            Action::HoldOver => {
+                self.timers.set(Timer::Request, now);
+                self.timers.set(Timer::UnheardMode, now);
+            }
             Action::RequestOffboard | Action::RequestArming | Action::RequestTakeOff => {
                 self.timers.set(Timer::Request, now);
             }

@@ -236,7 +236,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         !self.has_goal() && self.neighbours.fleet().is_some_and(needed)
     }
 
-    fn has_goal(&self) -> bool {
+    pub(super) fn has_goal(&self) -> bool {
         self.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
     }
 

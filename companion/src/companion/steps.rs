@@ -168,6 +168,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
         let least = self.config.battery_low_percent;
         if waits
+            && self.has_goal()
             && !is_battery_known(&self.telemetry, least, self.now)
             && self.timers.take_due(Timer::ChargeReport, self.now, CHARGE_REPORT_EVERY)
         {

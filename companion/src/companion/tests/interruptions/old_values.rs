@@ -76,6 +76,24 @@ fn a_pilot_who_is_not_heard_is_overridden_a_few_times_at_most() {
     }
 }
 
+/// The landing mode was confirmed, then HEARTBEAT is lost, and the pilot takes over: the mode is
+/// not requested again.
+#[test]
+fn a_confirmed_landing_is_not_requested_again_unheard() {
+    for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
+        let mut b = reach(kind, State::Land, None).expect("it can land");
+        assert_eq!(b.mode, kind.land_mode());
+        b.no_heartbeat = true;
+        let before = b.commands.len();
+        for _ in 0..56 {
+            (b.mode, b.status) = (pilot_mode(kind), 3);
+            b.tick();
+        }
+        let acts = b.commands[before..].iter().filter(|c| [SET_MODE, ARM].contains(&c.0));
+        assert_eq!((b.state(), acts.count()), (State::Land, 0), "{kind:?}");
+    }
+}
+
 /// A pilot flies the vehicle again after its mission has ended: it reports that it flies, off its
 /// plan, until it is down again.
 #[test]
