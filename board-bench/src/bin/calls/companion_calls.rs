@@ -54,10 +54,15 @@ pub fn measure_companion_calls(meter: &mut impl Meter) {
     measure_mission_parsing(meter);
     measure_fleet_agreement(meter);
     measure_parameters(meter);
-    let companion = BoardCompanion::new(flight::config()).expect("the settings are good");
+    measure_grounded_companion(meter);
+}
+
+/// Counts the calls of a companion on the ground, with its flash.
+#[inline(never)]
+fn measure_grounded_companion(meter: &mut impl Meter) {
     let flash = RamFlash(memory::take_spare_memory().expect("it is taken once"));
     GroundedCompanion {
-        companion,
+        companion: BoardCompanion::new(flight::config()).expect("the settings are good"),
         flash,
         meter,
         now: Instant::ZERO + Duration::from_secs(11),
