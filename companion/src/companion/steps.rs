@@ -16,7 +16,10 @@ use crate::timers::Timer;
 /// Period of setpoints and of control steps in flight: 20 Hz, twice the least rate that PX4 needs
 /// in practice.
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
-/// Period of the report that a start waits for the battery's charge.
+/// Time after a start at which it is reported that it waits for the battery's charge: an autopilot
+/// that was just found reports it within a second.
+const CHARGE_REPORT_AFTER: Duration = Duration::from_secs(5);
+/// Period of that report.
 const CHARGE_REPORT_EVERY: Duration = Duration::from_secs(30);
 /// Period of steps in the states that stream no setpoints: before take-off and after landing.
 const IDLE_STEP_EVERY: Duration = Duration::from_millis(200);
@@ -169,6 +172,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let least = self.config.battery_low_percent;
         if waits
             && self.has_goal()
+            && self.mission.time_in_state(self.now) >= CHARGE_REPORT_AFTER
             && !is_battery_known(&self.telemetry, least, self.now)
             && self.timers.take_due(Timer::ChargeReport, self.now, CHARGE_REPORT_EVERY)
         {

@@ -125,6 +125,11 @@ fn a_vehicle_flown_after_its_landing_is_not_reported_as_landed() {
 fn an_unknown_charge_is_not_a_known_one() {
     for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
         let mut b = bench(kind);
+        b.start();
+        b.run_until(State::Follow, 20.0);
+        let waits = b.texts.iter().any(|text| text.starts_with("Battery charge unknown"));
+        assert!(!waits, "{kind:?}, charge reported: {:?}", b.texts);
+        let mut b = bench(kind);
         b.battery = -1;
         b.run(6.0);
         b.start();
