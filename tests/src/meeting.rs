@@ -406,6 +406,11 @@ impl<'a> World<'a> {
             arrived,
             filter_stops: self.vehicles.iter().map(|vehicle| vehicle.stops).sum(),
             longest_stop_s: self.vehicles.iter().map(|m| m.longest_stop_s).fold(0.0, f32::max),
+            longest_unheard_stop_s: self
+                .vehicles
+                .iter()
+                .map(|m| m.longest_unheard_stop_s)
+                .fold(0.0, f32::max),
             most_blocked: self
                 .vehicles
                 .iter()

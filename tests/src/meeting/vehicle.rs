@@ -17,6 +17,9 @@ const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 
 /// Time without any message after which a vehicle counts as deaf, seconds: it has stopped, and
 /// lands after 20 s.
 const DEAF_S: f32 = 20.0;
+/// Time within which a neighbour's position was received for the safety filter to expect it on its
+/// reported points, seconds; later it may be anywhere within a ball (SPEC §4).
+const HEARD_S: f32 = 1.0;
 /// Speed above which a vehicle does not count as stopped, m/s.
 const MOVES_MPS: f32 = 0.7;
 /// Speed limit of setpoints, m/s: the nominal speed plus the excess of a setpoint that catches up.
@@ -36,10 +39,15 @@ pub(super) struct MeetingVehicle {
     pub(super) hears: bool,
     pub(super) bytes: Vec<u8>,
     pub(super) commands: u8,
-    /// Number of stops by the safety filter, and since when the last one lasts (`stopped_since`).
+    /// Number of stops by the safety filter.
     pub(super) stops: u32,
-    pub(super) stopped_since: Option<Instant>,
+    /// Since when the present stop lasts, and whether some neighbour was silent for longer than
+    /// [`HEARD_S`] in it.
+    pub(super) stopped: Option<(Instant, bool)>,
+    /// Longest stop by the safety filter in which all neighbours were heard, seconds, and the longest
+    /// one in which one was silent.
     pub(super) longest_stop_s: f32,
+    pub(super) longest_unheard_stop_s: f32,
     /// Number of times that its companion found its path blocked.
     pub(super) blocked: u32,
 }
@@ -98,24 +106,34 @@ impl MeetingVehicle {
             bytes: Vec::new(),
             commands: 0,
             stops: 0,
-            stopped_since: None,
+            stopped: None,
             longest_stop_s: 0.0,
+            longest_unheard_stop_s: 0.0,
             blocked: 0,
         }
     }
 
-    /// Updates the length of the longest stop by the filter: a stop ends when the companion waits
-    /// for no vehicle any more, or the vehicle flies again.
+    /// Updates the length of the longest stop by the filter: a stop ends when the filter stops for
+    /// no neighbour any more (a wait at a gate may follow), or the vehicle flies again.
     pub(super) fn note_stops(&mut self, now: Instant) {
         let stops = self.companion.filter_stop_count();
         if core::mem::replace(&mut self.stops, stops) != stops {
-            self.stopped_since.get_or_insert(now);
-        } else if self.companion.waiting_for() == 0 || self.autopilot.velocity.norm() > MOVES_MPS {
-            self.stopped_since = None;
+            self.stopped.get_or_insert((now, false));
+        } else if self.companion.query_filter(now) == 0
+            || self.autopilot.velocity.norm() > MOVES_MPS
+        {
+            self.stopped = None;
         }
-        if let Some(since) = self.stopped_since {
-            self.longest_stop_s = self.longest_stop_s.max((now - since).as_secs_f32());
-        }
+        let Some((since, unheard)) = &mut self.stopped else { return };
+        let now_s = now.as_micros() as f32 * 1e-6;
+        let silent =
+            |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s > HEARD_S);
+        *unheard |= self.heard.iter().any(silent);
+        let longest_s = match unheard {
+            true => &mut self.longest_unheard_stop_s,
+            false => &mut self.longest_stop_s,
+        };
+        *longest_s = longest_s.max((now - *since).as_secs_f32());
     }
 
     pub(super) fn seen(&self, now_s: f32) -> VehicleState {

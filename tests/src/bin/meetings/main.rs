@@ -84,7 +84,12 @@ fn main() {
     println!("{sum}");
     let stops: u32 = outcomes.iter().map(|outcome| outcome.filter_stops).sum();
     let longest_s = outcomes.iter().map(|outcome| outcome.longest_stop_s).fold(0.0, f32::max);
-    println!("{stops} stops by the safety filter, the longest {longest_s:.2} s");
+    let unheard_s =
+        outcomes.iter().map(|outcome| outcome.longest_unheard_stop_s).fold(0.0, f32::max);
+    println!(
+        "{stops} stops by the safety filter, the longest {longest_s:.2} s, or {unheard_s:.2} s \
+         where a neighbour was silent for more than a second"
+    );
     let mut blocked: Vec<_> = outcomes.iter().map(|o| (o.most_blocked, o.seed)).collect();
     blocked.sort_unstable();
     println!(
