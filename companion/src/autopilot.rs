@@ -5,6 +5,7 @@ pub mod ardupilot;
 pub(crate) mod arming;
 pub(crate) mod handshake;
 mod kind;
+mod landed;
 pub(crate) mod limits;
 pub mod px4;
 pub mod telemetry;

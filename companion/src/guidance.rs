@@ -352,7 +352,7 @@ impl Guidance {
         let taken = (state.lands_or_disarms() || state == State::PilotControl)
             && scene.telemetry.custom_mode != kind.setpoint_mode();
         self.position_unknown |= !known || state == State::PositionLost;
-        let flies = scene.telemetry.on_ground == Some(false);
+        let flies = scene.telemetry.reports_flight();
         let taken_before = core::mem::replace(&mut self.autopilot_took_over, taken);
         if taken && !known {
             // The velocity of the last setpoint is not the vehicle's any more.

@@ -208,7 +208,8 @@ fn play(
         if telemetry.heartbeat_at.is_some() && seen.modes.last() != Some(&telemetry.custom_mode) {
             seen.modes.push(telemetry.custom_mode);
         }
-        if let Some(on_ground) = telemetry.on_ground.filter(|on| seen.grounded.last() != Some(on)) {
+        let on_ground = telemetry.reports_ground(now);
+        if (on_ground || telemetry.reports_flight()) && seen.grounded.last() != Some(&on_ground) {
             seen.grounded.push(on_ground);
         }
         let Some(heard) = &entry.frame else { continue };

@@ -15,7 +15,7 @@ const MAX_ARMING_TRIES: u8 = 2;
 const MAX_REFUSALS: usize = 4;
 /// Estimated height above the pad from which the vehicle counts as risen, whatever the landing
 /// detector reports, metres; an error of the estimate that was there before arming cancels out.
-const RISEN_M: f32 = 0.25;
+pub(super) const RISEN_M: f32 = 0.25;
 
 const NAV_TAKEOFF: u16 = 22;
 const DO_SET_MODE: u16 = 176;
@@ -71,12 +71,13 @@ impl ArmingHandshake {
 
     /// Updates [`Self::is_in_own_mode`] and [`Self::has_flown`] from the autopilot's mode, armed
     /// bit and landing detector.
-    pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry) {
+    pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry, now: Instant) {
         let kind = t.kind.unwrap_or_default();
-        let on_ground = t.on_ground != Some(false);
+        let on_ground = !t.reports_flight();
         self.in_own_mode &=
             t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
-        if !t.armed {
+        // Between two HEARTBEATs the vehicle may be armed, and rise, unseen.
+        if !t.armed && t.heartbeat_at == Some(now) {
             self.disarmed_z_m = t.position.z;
         } else if !on_ground || t.position.z > self.disarmed_z_m + RISEN_M {
             self.flown = true;

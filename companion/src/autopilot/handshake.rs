@@ -119,8 +119,8 @@ impl Handshake {
     }
 
     /// Updates the handshake from the autopilot's mode, armed bit and landing detector.
-    pub(crate) fn update_mode_and_landed(&mut self, state: State, telemetry: &Telemetry) {
-        self.arming.update_mode_and_landed(state, telemetry);
+    pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry, now: Instant) {
+        self.arming.update_mode_and_landed(state, t, now);
     }
 
     /// Requests all streams from the first on, in the following steps. With motors off it also sets

@@ -24,6 +24,7 @@ use planner_core::{Length, Point};
 
 use crate::autopilot::AutopilotKind;
 use crate::autopilot::ardupilot;
+use crate::autopilot::landed::LandedReport;
 use crate::link::frame::Frame;
 use crate::link::sequence::SequenceFilter;
 use crate::margins;
@@ -116,9 +117,8 @@ pub struct Telemetry {
     pub armed: bool,
     /// `MAV_STATE`.
     pub system_status: u8,
-    /// Whether the landing detector reports the vehicle on the ground; `None` before its first
-    /// report.
-    pub on_ground: Option<bool>,
+    /// The landing detector's last report; `None` before the first.
+    pub(super) landed: Option<LandedReport>,
     /// Battery charge in percent, −1 unknown.
     pub battery_percent: i8,
     /// When the charge was last reported.
@@ -261,7 +261,8 @@ impl Telemetry {
             EXTENDED_SYS_STATE => {
                 let landed = frame.padded_payload()[1];
                 if landed != 0 {
-                    self.on_ground = Some(landed == LANDED_STATE_ON_GROUND);
+                    let on_ground = landed == LANDED_STATE_ON_GROUND;
+                    self.landed = Some(LandedReport { on_ground, at: now, z_m: self.position.z });
                 }
                 TelemetryChange::Updated
             }

@@ -134,7 +134,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.handshake.handle_ack(&ack, heard.own, state, now, &mut self.links);
             self.mission.handle_ack(&ack, &mut self.links);
         }
-        self.handshake.update_mode_and_landed(self.mission.state(), &self.telemetry);
+        self.handshake.update_mode_and_landed(self.mission.state(), &self.telemetry, now);
         match change {
             TelemetryChange::OriginDoubted => {
                 self.timers.set_no_later(Timer::Origin, now + ORIGIN_RETRY_EVERY);

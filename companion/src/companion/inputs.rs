@@ -63,7 +63,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let beneath = self.mission.uninterrupted_state();
         let area = self.config.lost_vehicle_down_s.is_some();
         let follow = self.mission.state() == State::Follow;
-        let on_ground = t.on_ground == Some(true);
+        let on_ground = t.reports_ground(now);
         let fence = self.config.geofence;
         let standing = self.guidance.is_standing() && t.velocity.length() < MAX_HOVER_MPS;
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
@@ -157,8 +157,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             has_flown: handshake.has_flown(),
             vertical: t.position_age(now) < MAX_POSITION_AGE
                 && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,
-            airborne: t.armed && t.on_ground == Some(false),
-            lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
+            airborne: t.armed && t.reports_flight(),
+            lifted_off: !kind.takes_off_by_command() || t.reports_flight(),
             gates_open: self.has_goal()
                 && self.guidance.may_depart()
                 && self.guidance.filter.column_clear()

@@ -39,7 +39,7 @@ impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
     /// Whether the landing detector reports the ground, and the motors are off or the estimated
     /// height agrees.
     pub(crate) fn is_on_ground(&self) -> bool {
-        self.telemetry.on_ground == Some(true)
+        self.telemetry.reports_ground(self.now)
             && (!self.telemetry.armed || self.height_m() < MAX_GROUND_HEIGHT_ERROR_M)
     }
 

@@ -70,6 +70,8 @@ pub struct Bench {
     pub silent: bool,
     /// Whether HEARTBEAT alone is lost.
     pub no_heartbeat: bool,
+    /// Whether EXTENDED_SYS_STATE alone is lost.
+    pub no_landed_state: bool,
     pub no_position: bool,
     /// Horizontal accuracy that ESTIMATOR_STATUS reports, metres; `None`: the message is not sent.
     pub accuracy_m: Option<f32>,
@@ -155,6 +157,7 @@ impl Bench {
             climbs_mps: 0.0,
             silent: false,
             no_heartbeat: false,
+            no_landed_state: false,
             no_position: false,
             accuracy_m: Some(0.02),
             pos_horiz_variance: 0.1,

@@ -165,7 +165,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         // In the air the mission may continue: a pilot may hand the vehicle back.
         let t = companion.telemetry();
         let heard = t.heartbeat_age(now()) < MAX_AUTOPILOT_SILENCE;
-        let flies = t.armed && t.on_ground == Some(false) && heard;
+        let flies = t.armed && t.reports_flight() && heard;
         if !is_finished(state) || flies {
             finished_at = None;
         } else if finished_at.get_or_insert_with(Clock::now).elapsed() > REPORT_END_FOR {

@@ -78,7 +78,7 @@ impl Bench {
                 self.send(&status);
             }
         }
-        if count.is_multiple_of(4) && self.sends(245) {
+        if count.is_multiple_of(4) && self.sends(245) && !self.no_landed_state {
             let landed_state = if self.reports_ground() {
                 MavLandedState::MAV_LANDED_STATE_ON_GROUND
             } else {
