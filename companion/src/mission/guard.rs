@@ -21,6 +21,8 @@ pub enum Guard {
     PositionKnown,
     /// The position is older than the limit.
     NoPosition,
+    /// The position is older than the limit, and the state has lasted longer.
+    StillNoPosition,
     /// The position jumped, or the EKF origin changed, within the last second.
     PositionJumped,
     /// Motors armed, and the landing detector reports flight.
@@ -289,6 +291,7 @@ impl Guard {
             Self::NoHeartbeat => i.heartbeat_age > limit,
             Self::PositionKnown => i.position_age < MAX_POSITION_AGE,
             Self::NoPosition => i.position_age > limit,
+            Self::StillNoPosition => i.position_age.min(i.in_state) > limit,
             Self::PositionJumped => i.jumped,
             Self::FoundFlying => i.airborne,
             Self::PlanReady => i.plan_ready,

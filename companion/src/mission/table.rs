@@ -176,6 +176,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Disarm, Failsafe], G::NoHeartbeat,     secs(60),   Aborted,     A::ForgetStart,       "Autopilot lost"),
     warning_row(&[Land],             G::NoHeartbeat,     secs(120),  Aborted,     A::ForgetStart,       "Autopilot lost"),
     warning_row(&[PilotReturned],    G::NoHeartbeat,     secs(60),   Land,        A::RequestLandMode,   "Autopilot still silent: landing"),
+    warning_row(&[PilotReturned],    G::StillNoPosition, secs(20),   Land,        A::RequestLandMode,   "Position still lost: landing"),
     warning_row(&[Planning, Ready, Scheduled, PadReplanning], G::NoPosition, secs(2), WaitPosition, A::ForgetStart, "Position lost: start cancelled"),
     warning_row(&[Streaming, Engaging], G::NoPosition,   secs(1),    Aborted,     A::ForgetStart,       "Position lost: start cancelled"),
     warning_row(&[Arming],           G::NoPosition,      secs(1),    CancelStart, A::CancelStart,       "Position lost: start cancelled"),

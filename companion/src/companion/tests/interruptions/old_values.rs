@@ -138,3 +138,45 @@ fn an_unknown_charge_is_not_a_known_one() {
         assert!(!b.armed && b.commands.iter().all(|c| (c.0, c.1) != (ARM, 1.0)), "{:?}", b.texts);
     }
 }
+
+/// HEARTBEAT and the landing detector's report are lost while arming is requested: a vehicle that
+/// rises meanwhile is not disarmed in the air.
+#[test]
+fn a_vehicle_that_rises_unheard_before_its_climb_is_not_disarmed() {
+    for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
+        for tenths in 0..20 {
+            let mut b = bench(kind);
+            b.refused.push(ARM);
+            b.start();
+            b.run_until(State::Arming, 12.0);
+            b.run(tenths as f32 * 0.1);
+            b.refused.clear();
+            (b.no_heartbeat, b.no_landed_state, b.stuck, b.armed) = (true, true, true, true);
+            for _ in 0..120 {
+                b.mode = pilot_mode(kind);
+                b.enu.z = (b.enu.z + 0.05).min(3.0);
+                let before = b.commands.len();
+                let z_m = b.enu.z;
+                b.tick();
+                let disarms = b.commands[before..].iter().any(|c| (c.0, c.1) == (ARM, 0.0));
+                assert!(!disarms || z_m <= HARMLESS_M, "{kind:?} {tenths}: at {z_m} m");
+                (b.armed, b.stuck) = (true, true);
+            }
+        }
+    }
+}
+
+/// A pilot gives the vehicle back while its position is lost: it does not hover without a limit.
+#[test]
+fn a_vehicle_given_back_without_a_position_lands() {
+    for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
+        let mut b = reach(kind, State::Follow, None).expect("it flies");
+        b.mode = pilot_mode(kind);
+        b.run_until(State::PilotControl, 2.0);
+        b.no_position = true;
+        b.run(5.0);
+        b.mode = kind.setpoint_mode();
+        b.run(100.0);
+        assert!(b.on_ground() && !b.armed, "{kind:?} {:?}: {:?}", b.state(), b.texts);
+    }
+}
