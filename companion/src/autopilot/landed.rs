@@ -1,5 +1,5 @@
-//! The landing detector's last report (EXTENDED_SYS_STATE), and how long it holds: its stream may end
-//! while the vehicle stands on its pad.
+//! The landing detector's last report (EXTENDED_SYS_STATE), and how long it holds: its stream may
+//! end while the vehicle stands on its pad.
 
 use crate::autopilot::arming::RISEN_M;
 use crate::autopilot::telemetry::{MAX_POSITION_AGE, Telemetry};

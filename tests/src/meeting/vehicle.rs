@@ -44,8 +44,8 @@ pub(super) struct MeetingVehicle {
     /// Since when the present stop lasts, and whether some neighbour was silent for longer than
     /// [`HEARD_S`] in it.
     pub(super) stopped: Option<(Instant, bool)>,
-    /// Longest stop by the safety filter in which all neighbours were heard, seconds, and the longest
-    /// one in which one was silent.
+    /// Longest stop by the safety filter in which all neighbours were heard, seconds, and the
+    /// longest one in which one was silent.
     pub(super) longest_stop_s: f32,
     pub(super) longest_unheard_stop_s: f32,
     /// Number of times that its companion found its path blocked.
