@@ -33,7 +33,7 @@ use crate::time::{Duration, Instant};
 use crate::timers::Timers;
 
 /// Least time between two warnings that a setpoint is held, or that a far EKF origin is not used.
-const REPORT_EVERY: Duration = Duration::from_secs(5);
+const WARNING_EVERY: Duration = Duration::from_secs(5);
 /// Period of HEARTBEAT.
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 /// Limits of the value that the companion sets for ArduCopter's `GUID_TIMEOUT`, the time without

@@ -33,7 +33,7 @@ use planner_core::track::{self, ReferenceState, TrackConfig};
 use planner_core::{Length, Point};
 
 use self::filter::SafetyFilter;
-use self::hold::{FIRST_STANDSTILL, Hold, YIELDING_STANDSTILL};
+use self::hold::{GOING_FIRST_STANDSTILL, Hold, YIELDING_STANDSTILL};
 use self::phase::Phase;
 use self::setpoint::position_correction;
 use self::smoother::{ClockPace, SetpointSmoother, TICK_S};
@@ -85,7 +85,7 @@ const SETTLE_WINDOW_M: f32 = 3.0;
 const WINDOW_EDGE_M: f32 = 0.01;
 /// A setpoint within this distance of the reference along the path has reached it, metres: after
 /// the averages a setpoint that stands is still millimetres off.
-const SETTLED_M: f32 = 0.05;
+const SETPOINT_AT_REFERENCE_M: f32 = 0.05;
 /// Advance of the reference along the path that counts as progress, metres.
 const MIN_PROGRESS_M: f32 = 0.25;
 /// Distance before the geofence at which the raw point stops, metres: the setpoint may deviate by
@@ -96,7 +96,7 @@ const FENCE_HALVINGS: usize = 8;
 /// Upper bound of `low_height_m`, the height above the ground from which a guided descent is slow,
 /// or an autopilot that is not led to the ground lands by itself, metres; the margin to walls is
 /// another upper bound.
-const MAX_LAND_HANDOVER_M: f32 = 1.2;
+const MAX_LOW_HEIGHT_M: f32 = 1.2;
 /// Greatest speed of a guided descent near the ground, m/s: that of ArduCopter's landing.
 const TOUCHDOWN_MPS: f32 = 0.5;
 /// A leg shorter than this counts as flown, metres.
@@ -257,7 +257,7 @@ impl Guidance {
             lowest_ground_m: config.ground.map_or(f32::INFINITY, |ground| ground.low_m),
             low_height_m: libm::fminf(
                 config.required_clearance_m - config.radius_m,
-                MAX_LAND_HANDOVER_M,
+                MAX_LOW_HEIGHT_M,
             ),
             sent_acceleration: Point::zeros(),
         }
@@ -314,8 +314,8 @@ impl Guidance {
                 path: &plan.path,
                 detours: scene.is_on_detour(),
             };
-            self.advice =
-                deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.states_at(now));
+            let others = neighbours.states_with_age(now);
+            self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, others);
             if self.on_path {
                 self.advice.stop_within_m =
                     self.advice.stop_within_m.min((self.halt_m - along_m).max(0.0));
@@ -323,7 +323,7 @@ impl Guidance {
         }
         if let Some(plan) = scene.plan {
             let next = plan.gates.get(self.gates_open);
-            if next.is_some_and(|gate| neighbours.has_passed(gate, now)) {
+            if next.is_some_and(|gate| neighbours.is_open_for_good(gate, now)) {
                 self.gates_open += 1;
             }
             self.follow_setpoint(&plan.path, dt_s);
@@ -408,7 +408,7 @@ impl Guidance {
             && state.is_on_path()
             && self.smoother.is_standing();
         let yields = self.filter.is_yielding() || state != State::Follow;
-        let patience = if yields { YIELDING_STANDSTILL } else { FIRST_STANDSTILL };
+        let patience = if yields { YIELDING_STANDSTILL } else { GOING_FIRST_STANDSTILL };
         self.hold_changed |= match holds {
             true => self.hold.stand(patience, neighbours.max_message_delay_s(), now),
             false => self.hold.end(),
@@ -422,9 +422,9 @@ impl Guidance {
             self.forget_leg();
         }
         let lag_share = self.lag_share(scene.telemetry, now);
-        let share = if moves { lag_share } else { self.standing_share() };
+        let share = if moves { lag_share } else { self.standing_speed_share() };
         let mut back = StepBack::Free;
-        let dt_s = if self.smoother.resumes_from_last() { self.unsent_s } else { dt_s };
+        let dt_s = if self.smoother.makes_up_for_gap() { self.unsent_s } else { dt_s };
         // Advice was computed once for this step: its stop stays at one place while the raw points
         // move on.
         let stops_at_m = advised_at_m + advice.stop_within_m;
@@ -450,7 +450,7 @@ impl Guidance {
             };
             self.smoother.push_raw_point(raw);
         }
-        self.mark_trapped(back, now);
+        self.update_trapped(back, now);
         let sound = self.smoother.make_setpoint();
         let correction = if flies && state != State::PilotControl && known {
             position_correction(

@@ -182,7 +182,7 @@ impl Links {
 
     /// Queues a text about something that a sender did, with its system and component id as
     /// numbers.
-    pub(crate) fn log_sender(
+    pub(crate) fn send_text_with_sender(
         &mut self,
         now: Instant,
         sender: SenderKind,
@@ -194,8 +194,13 @@ impl Links {
     }
 
     /// Queues a text with the sender of a command that took effect.
-    pub(crate) fn log_command(&mut self, now: Instant, sender: SenderKind, command: &Command) {
-        self.log_sender(now, sender, command.log_text(), command.from);
+    pub(crate) fn send_command_text(
+        &mut self,
+        now: Instant,
+        sender: SenderKind,
+        command: &Command,
+    ) {
+        self.send_text_with_sender(now, sender, command.log_text(), command.from);
     }
 
     /// The answer given lately to the same command frame, of which this is a duplicate;

@@ -56,7 +56,7 @@ pub const MAX_ACCURACY_AGE: Duration = Duration::from_secs(3);
 /// Greatest estimated height above the plan's ground at which a landing detector's report of the
 /// ground is believed, and greatest distance in height from the pad at which a vehicle takes off,
 /// metres. On the ground real estimates were up to 1.1 m off.
-pub(crate) const MAX_GROUND_HEIGHT_ERROR_M: f32 = 1.5;
+pub(crate) const MAX_HEIGHT_ERROR_ON_GROUND_M: f32 = 1.5;
 
 /// Distance by which two vehicles in a coverage mission may be nearer than their estimates say,
 /// metres: for each of the two, the part of the clearance that is left for its estimate. Where no

@@ -42,7 +42,7 @@ impl ReceivedFrame<'_> {
     }
 
     /// Whether another component sent the frame.
-    pub(crate) fn is_from_another(&self) -> bool {
+    pub(crate) fn is_from_another_component(&self) -> bool {
         self.sender_ids() != (self.own, COMPANION_COMPONENT)
     }
 
@@ -50,13 +50,14 @@ impl ReceivedFrame<'_> {
     /// payload are the target's system and component id.
     pub(crate) fn is_for_companion(&self, at: usize) -> bool {
         let p = self.frame.padded_payload();
-        self.is_from_another() && (p[at], p[at + 1]) == (self.own, COMPANION_COMPONENT)
+        self.is_from_another_component() && (p[at], p[at + 1]) == (self.own, COMPANION_COMPONENT)
     }
 
     /// As [`Self::is_for_companion`], or to all components of this vehicle.
     pub(crate) fn is_for_vehicle(&self, at: usize) -> bool {
         let p = self.frame.padded_payload();
-        self.is_for_companion(at) || (self.is_from_another() && (p[at], p[at + 1]) == (self.own, 0))
+        self.is_for_companion(at)
+            || (self.is_from_another_component() && (p[at], p[at + 1]) == (self.own, 0))
     }
 
     /// Queues an answer, or drops it where its rate limit or the link's queue has no room.
@@ -155,7 +156,7 @@ impl Services {
         }
         if ftp::changes_files(heard.frame.padded_payload()) {
             let text = "File request from #/#";
-            links.log_sender(heard.now, heard.sender, text, heard.sender_ids());
+            links.send_text_with_sender(heard.now, heard.sender, text, heard.sender_ids());
         }
         self.ftp.queue_request(heard.link as usize, heard.now, heard.frame);
     }
@@ -227,7 +228,12 @@ impl Services {
         };
         self.unapplied |= result.is_ok();
         if result.is_ok() {
-            links.log_sender(heard.now, heard.sender, "Parameter set from #/#", heard.sender_ids());
+            links.send_text_with_sender(
+                heard.now,
+                heard.sender,
+                "Parameter set from #/#",
+                heard.sender_ids(),
+            );
         }
         // Also after a refusal the value in use is sent, for tools that do not know PARAM_ERROR.
         if let Some(index) = found {

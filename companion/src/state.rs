@@ -209,7 +209,7 @@ impl State {
 
     /// Whether a further MISSION_START changes nothing, since the vehicle is on its way to its path
     /// or on it.
-    pub(crate) fn flies_mission(self) -> bool {
+    pub(crate) fn is_mission_under_way(self) -> bool {
         self.is_before_path() || self.is_on_path()
     }
 
@@ -332,7 +332,7 @@ impl State {
     }
 
     /// Whether the vehicle stands until its operator resumes, or its autopilot is heard again.
-    pub(crate) fn stands_to_resume(self) -> bool {
+    pub(crate) fn stands_until_resumed(self) -> bool {
         matches!(self, Self::Paused | Self::AutopilotSilent)
     }
 
@@ -388,14 +388,14 @@ impl State {
     }
 
     /// Whether the vehicle flies or holds on its path, or brakes along it to land.
-    pub fn moves_along_path(self) -> bool {
+    pub fn is_on_path_or_stopping(self) -> bool {
         self.is_on_path() || self == Self::Stopping
     }
 
     /// Whether a landing that is requested in this state begins at the reference. In others the
     /// vehicle is off its path, and the reference may be behind a wall.
     pub(crate) fn lands_at_reference(self) -> bool {
-        self.moves_along_path() || matches!(self, Self::Land | Self::Disarm)
+        self.is_on_path_or_stopping() || matches!(self, Self::Land | Self::Disarm)
     }
 }
 

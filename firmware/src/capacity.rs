@@ -32,7 +32,7 @@ pub const LANES: usize = halved_on_small_board(512);
 pub const AREA_VERTICES: usize = 256;
 /// Most convex corners of a coverage mission's no-fly zones, around which transits lead: 4 bytes
 /// for each pair of corners, and 8 for each corner.
-pub const AREA_CORNERS: usize = 32;
+pub const NO_FLY_CORNERS: usize = 32;
 
 /// A companion with this board's capacities.
 pub type BoardCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;

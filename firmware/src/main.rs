@@ -268,8 +268,8 @@ async fn timer_task(shell: &'static Shell) {
     shell.run_timers().await
 }
 
-/// Feeds the watchdog every 100 ms as long as [`Shell::is_checked_in`], and restarts the board when
-/// a restart is due.
+/// Feeds the watchdog every 100 ms as long as [`Shell::may_feed_watchdog`], and restarts the board
+/// when a restart is due.
 #[task]
 async fn watchdog_task(shell: &'static Shell, mut watchdog: Watchdog) {
     loop {
@@ -277,7 +277,7 @@ async fn watchdog_task(shell: &'static Shell, mut watchdog: Watchdog) {
         if shell.is_restart_due() {
             crash::restart();
         }
-        if shell.is_checked_in() {
+        if shell.may_feed_watchdog() {
             watchdog.feed();
         }
     }

@@ -16,7 +16,7 @@ use planner_core::roadmap::RoadmapView;
 
 use crate::boards;
 use crate::capacity::BoardCompanion;
-use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
+use crate::capacity::{AREA_VERTICES, GATES, LANES, NO_FLY_CORNERS, VEHICLES, WAYPOINTS};
 use crate::crash_record::FileWork;
 use crate::workspace::WorkspaceOverlay;
 
@@ -187,7 +187,7 @@ fn plan_area_detour<'m>(
         return Err(PlanFailure::Capacity);
     }
     let ws = &mut workspace.coverage_plan().area;
-    coverage::plan_detour::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, WAYPOINTS, GATES>(
+    coverage::plan_detour::<AREA_VERTICES, LANES, VEHICLES, NO_FLY_CORNERS, WAYPOINTS, GATES>(
         area,
         field,
         request,
@@ -210,7 +210,7 @@ fn plan_area<'m>(
     let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
     let PlanningMemory { workspace, swarm, own } = memory;
     let ws = workspace.coverage_plan();
-    coverage::plan_flights::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
+    coverage::plan_flights::<AREA_VERTICES, LANES, VEHICLES, NO_FLY_CORNERS, VEHICLES, WAYPOINTS>(
         &Request { mission, view, field, max_gates: GATES, photographed: &own.done },
         own.losses.iter().map(|lots| &lots[..]),
         &mut ws.area,

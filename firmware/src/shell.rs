@@ -185,7 +185,7 @@ impl Shell {
     }
 
     /// Stores the companion; to be called before any task of the links or timers is spawned. Before
-    /// this call [`Self::is_checked_in`] is true for the first [`START_TIMEOUT_MS`] only.
+    /// this call [`Self::may_feed_watchdog`] is true for the first [`START_TIMEOUT_MS`] only.
     pub fn start(&self, companion: &'static mut BoardCompanion) {
         self.companion.lock(|held| *held.borrow_mut() = Some(companion));
         (0..TASK_COUNT).for_each(|task| self.check_in(task));
@@ -404,11 +404,11 @@ impl Shell {
 
     /// Whether the watchdog may be fed: all tasks checked in within 0.4 s, and while setpoints are
     /// streamed the last was sent within 0.4 s; before [`Self::start`], for the first 20 s.
-    pub fn is_checked_in(&self) -> bool {
-        self.is_checked_in_at(now_ms())
+    pub fn may_feed_watchdog(&self) -> bool {
+        self.may_feed_watchdog_at(now_ms())
     }
 
-    fn is_checked_in_at(&self, now_ms: u32) -> bool {
+    fn may_feed_watchdog_at(&self, now_ms: u32) -> bool {
         if !self.started.load(Ordering::Relaxed) {
             return now_ms < START_TIMEOUT_MS;
         }

@@ -79,13 +79,13 @@ pub fn parse(text: &str, format: AreaFormat) -> Result<Polygons, AreaFileError> 
         .iter_mut()
         .chain(&mut polygons.holes)
         .chain(&mut polygons.no_fly)
-        .for_each(open_ring);
+        .for_each(remove_repeated_vertices);
     let count = polygons.vertex_count();
     if count > MAX_VERTICES { Err(AreaFileError::TooManyVertices(count)) } else { Ok(polygons) }
 }
 
 /// Removes each vertex that equals the one before it, and a last vertex that equals the first.
-pub fn open_ring(ring: &mut RingXy) {
+pub fn remove_repeated_vertices(ring: &mut RingXy) {
     ring.dedup();
     while ring.len() > 1 && ring.first() == ring.last() {
         ring.pop();

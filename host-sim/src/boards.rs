@@ -20,7 +20,7 @@ use companion::Link as Port;
 use lock_step::{COMMAND_LINE, FromBoard, HEAD, LONGEST, ToBoard};
 
 pub use self::flash_image::flash_bank_image;
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 
 /// Length of a board's stack, bytes.
 pub const STACK_LEN: usize = 88 << 10;
@@ -73,7 +73,7 @@ impl EmulatedBoard {
         ensure!(
             program.is_file(),
             "no firmware: {}\nhint: `cargo xtask build --board qemu` builds it",
-            quoted_path(program)
+            printable_path(program)
         );
         let mut qemu = Command::new("sh");
         qemu.args(["-c", START_COMMAND, "sh"])
@@ -104,7 +104,7 @@ impl EmulatedBoard {
         ensure!(
             board.wait_for_grant()?.restarted,
             "the firmware is none for lock step: {}",
-            quoted_path(program)
+            printable_path(program)
         );
         Ok(board)
     }

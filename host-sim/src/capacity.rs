@@ -59,7 +59,7 @@ pub struct BoardCapacity {
 }
 
 /// Most convex corners of an area's no-fly zones; the same on every board.
-pub const BOARD_CORNERS: usize = 32;
+pub const BOARD_NO_FLY_CORNERS: usize = 32;
 
 const fn roadmap_bytes(layout: &FlashLayout) -> usize {
     (layout.slot_len - DATA_OFFSET) as usize

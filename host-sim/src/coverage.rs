@@ -31,7 +31,7 @@ use planner_core::coverage::{CoverageError, Flat, exact, powell};
 use planner_core::geo::frames::{Geodetic, enu_to_geodetic};
 use planner_core::map::field::follow::TerrainFollowing;
 
-pub use self::planned::{CoveragePlan, MAX_CORNERS, MAX_LANES, MAX_VEHICLES};
+pub use self::planned::{CoveragePlan, MAX_LANES, MAX_NO_FLY_CORNERS, MAX_VEHICLES};
 use self::sorties::{BATTERY_SWAP_S, LaneTooLong, Sortie, USABLE_CHARGE};
 use crate::area::MAX_VERTICES;
 use crate::scenario::coverage::{AreaSection, CoverageMethod, ORIGIN_HINT};
@@ -303,7 +303,7 @@ fn terrain_following(wanted: &AreaSection) -> anyhow::Result<Option<TerrainFollo
 fn build_tracks(
     wanted: &AreaSection,
     area: &Area<'_>,
-    transit: &Transit<'_, MAX_CORNERS>,
+    transit: &Transit<'_, MAX_NO_FLY_CORNERS>,
     search_steps: u32,
 ) -> Result<Box<Tracks<MAX_LANES>>, CoverageError> {
     let (angle_deg, margin_m) = (wanted.angle_deg, wanted.margin_m);
@@ -425,7 +425,7 @@ pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
                 states: &mut states,
             };
             exact::plan_exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)?;
-            shares_of_exact_plan(work, plan)
+            imitate_exact_plan(work, plan)
         }
     }
 }
@@ -433,7 +433,7 @@ pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
 /// Shares with which BINPAT cuts the path where the exact division does; `exact` then becomes
 /// BINPAT's plan. `None` if BINPAT cuts elsewhere, or assigns the parts to vehicles so that they
 /// take longer: companions plan by shares alone, so they cannot fly the exact plan.
-fn shares_of_exact_plan<const L: usize, const N: usize, const K: usize>(
+fn imitate_exact_plan<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     exact: &mut RoutePlan<K>,
 ) -> Result<Option<Vec<f32>>, CoverageError> {
@@ -474,7 +474,7 @@ fn explain_error(error: CoverageError, wanted: &AreaSection, vehicles: usize) ->
         }
         CoverageError::NoFlyFull => {
             format!(
-                "no-fly zones have more than {MAX_CORNERS} convex corners\nhint: draw them with fewer"
+                "no-fly zones have more than {MAX_NO_FLY_CORNERS} convex corners\nhint: draw them with fewer"
             )
         }
         CoverageError::NothingToCover if wanted.obstacles.is_some() => {

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 
 /// Longest text file that is read, bytes: a scenario, a list of goals or an area.
 pub const MAX_TEXT_BYTES: u64 = 1 << 20;
@@ -78,7 +78,7 @@ impl ResultFiles {
         let results =
             Self { dir: dir.into(), made: missing.map(PathBuf::from).collect(), files: Vec::new() };
         fs::create_dir_all(dir)
-            .with_context(|| format!("cannot make a directory: {}", quoted_path(dir)))?;
+            .with_context(|| format!("cannot make a directory: {}", printable_path(dir)))?;
         for name in names {
             results.output_path(name)?;
         }
@@ -94,8 +94,8 @@ impl ResultFiles {
         // A path `a/` means a directory, although its `file_name` is `a`.
         let slash = path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         let name = path.file_name().and_then(|name| name.to_str()).filter(|_| !slash);
-        let name =
-            name.with_context(|| format!("cannot write: {}: it names no file", quoted_path(path)))?;
+        let name = name
+            .with_context(|| format!("cannot write: {}: it names no file", printable_path(path)))?;
         Self::open(path.parent().unwrap_or(Path::new(".")), &[name])
     }
 
@@ -103,7 +103,7 @@ impl ResultFiles {
     /// inside the directory. Fails if an existing file there cannot be written.
     fn output_path(&self, name: &str) -> anyhow::Result<PathBuf> {
         let path = self.dir.join(name);
-        let cannot = || format!("cannot write: {}", quoted_path(&path));
+        let cannot = || format!("cannot write: {}", printable_path(&path));
         match fs::canonicalize(&path) {
             Ok(real) => {
                 regular_file_len(&real).with_context(cannot)?;
@@ -125,7 +125,7 @@ impl ResultFiles {
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
         let made = builder.tempfile_in(&self.dir);
-        made.with_context(|| format!("cannot write to: {}", quoted_path(&self.dir)))
+        made.with_context(|| format!("cannot write to: {}", printable_path(&self.dir)))
     }
 
     /// Writes one more result to a temporary file; [`Self::commit`] renames it to `name`.
@@ -136,7 +136,7 @@ impl ResultFiles {
         let target = self.output_path(name)?;
         let mut file = self.temporary_file()?;
         let written = file.write_all(bytes).and_then(|()| file.flush());
-        written.with_context(|| format!("cannot write: {}", quoted_path(&target)))?;
+        written.with_context(|| format!("cannot write: {}", printable_path(&target)))?;
         self.files.push((file, target));
         Ok(())
     }
@@ -169,7 +169,7 @@ impl ResultFiles {
                     .rev()
                     .for_each(|(target, before)| undo_rename(&target, before));
                 return Err(error)
-                    .with_context(|| format!("cannot write: {}", quoted_path(&target)));
+                    .with_context(|| format!("cannot write: {}", printable_path(&target)));
             }
         }
         self.made.clear();

@@ -9,7 +9,7 @@ use anyhow::{Context, bail};
 use companion::storage::store::{FlashFault, FlashLayout, FlashRequest, MAX_READ, ReadFlash};
 
 use crate::files;
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 
 /// Flash layout of a companion on the host: that of the STM32H743 board.
 pub const HOST_FLASH_LAYOUT: FlashLayout = FlashLayout::H743;
@@ -29,7 +29,7 @@ impl HostFlash {
     pub fn open(path: Option<&Path>) -> anyhow::Result<Self> {
         let mut bytes = vec![0xFF; HOST_FLASH_LAYOUT.len() as usize];
         let Some(path) = path else { return Ok(Self { bytes, file: None }) };
-        let failed = || format!("cannot keep a flash: {}", quoted_path(path));
+        let failed = || format!("cannot keep a flash: {}", printable_path(path));
         if path.exists() {
             files::regular_file_len(path).with_context(failed)?;
         }
@@ -43,7 +43,7 @@ impl HostFlash {
             length => {
                 bail!(
                     "no flash image: {}: it has {length} bytes, not {}",
-                    quoted_path(path),
+                    printable_path(path),
                     HOST_FLASH_LAYOUT.len()
                 )
             }

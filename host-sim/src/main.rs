@@ -54,8 +54,11 @@ fn main() -> ExitCode {
     let done = done.and_then(|code| progress::check_printed().map(|()| code));
     done.unwrap_or_else(|error| {
         // If stderr cannot be written either, the exit code alone reports the error.
-        let _ =
-            writeln!(std::io::stderr(), "error: {}", quote::quote_message(&format!("{error:#}")));
+        let _ = writeln!(
+            std::io::stderr(),
+            "error: {}",
+            quote::printable_message(&format!("{error:#}"))
+        );
         ExitCode::from(BAD_INPUT)
     })
 }
@@ -96,7 +99,7 @@ fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
         bail!("no command given\nhint: `{help}` lists them");
     }
-    let text = quote::quote_arguments(&error.to_string(), arguments.into_iter().skip(1));
+    let text = quote::with_printable_arguments(&error.to_string(), arguments.into_iter().skip(1));
     let mut lines = text.lines().map(str::trim);
     let what: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
     // clap's tip how to pass `-x` as a value is dropped: that is never what was meant.

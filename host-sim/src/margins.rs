@@ -5,7 +5,7 @@
 //! |---|---|
 //! | margin to walls, beyond the hull | tracking + estimate + gust |
 //! | separation of two paths | safety distance + 2 (tracking + estimate) |
-//! | separation to parked vehicle | safety distance + [`PARKED_DEVIATION_M`] + estimate + gust |
+//! | separation to parked vehicle | safety distance + [`DEVIATION_BESIDE_PARKED_M`] + estimate + gust |
 //! | tracking | [`companion::margins::TRACKING_M`] |
 //! | estimate, `rtk` | part of the tracking: at most 0.1 m |
 //! | estimate, `recorded`, PX4 | 0.65 m |
@@ -42,7 +42,7 @@ pub const PAIR_DEVIATION_M: f32 = 0.5;
 pub const PAIR_DEVIATION_COVERAGE_M: f32 = 2.4;
 /// Deviation of a flying vehicle from its path that is added to the separation from a parked
 /// vehicle, metres.
-pub const PARKED_DEVIATION_M: f32 = 0.25;
+pub const DEVIATION_BESIDE_PARKED_M: f32 = 0.25;
 /// Further deviation of one vehicle per m/s of peak gust, seconds. Gusts do not push two vehicles
 /// towards each other at the same time, so it is added only for one vehicle beside a parked one or
 /// a wall.
@@ -50,7 +50,7 @@ pub const DEVIATION_PER_GUST_S: f32 = 0.05;
 
 /// Greatest horizontal distance of a position estimate from the truth, beyond the part that the
 /// tracking margin covers, metres.
-pub fn max_estimate_error_m(estimator: PositionErrors, autopilot: AutopilotKind) -> f32 {
+pub fn estimate_error_margin_m(estimator: PositionErrors, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
         (PositionErrors::Perfect | PositionErrors::Rtk, _) => 0.0,
         (PositionErrors::Recorded, AutopilotKind::Px4) => 0.65,
@@ -76,7 +76,7 @@ pub fn required_distances(
 ) -> RequiredDistances {
     let mut errors: Vec<f32> = vehicles
         .iter()
-        .map(|v| TRACKING_M + max_estimate_error_m(simulation.estimator, v.autopilot))
+        .map(|v| TRACKING_M + estimate_error_margin_m(simulation.estimator, v.autopilot))
         .collect();
     errors.sort_by(|a, b| b.total_cmp(a));
     let worst = |k: usize| errors.get(k).copied().unwrap_or(0.0);
@@ -98,7 +98,7 @@ pub fn min_pad_distance_m(
     vehicles: &[VehicleSection],
 ) -> f32 {
     let own = |v: &VehicleSection| {
-        max_estimate_error_m(simulation.estimator, v.autopilot)
+        estimate_error_margin_m(simulation.estimator, v.autopilot)
             + touchdown_extra_m(simulation.gust_mps, v.autopilot)
     };
     parked_separation_m(simulation, safety_distance_m, vehicles)
@@ -159,9 +159,9 @@ pub fn parked_separation_m(
     vehicles: &[VehicleSection],
 ) -> f32 {
     let estimates =
-        vehicles.iter().map(|v| max_estimate_error_m(simulation.estimator, v.autopilot));
+        vehicles.iter().map(|v| estimate_error_margin_m(simulation.estimator, v.autopilot));
     safety_distance_m
-        + PARKED_DEVIATION_M
+        + DEVIATION_BESIDE_PARKED_M
         + DEVIATION_PER_GUST_S * simulation.gust_mps
         + estimates.fold(0.0, f32::max)
 }

@@ -46,7 +46,7 @@ fn descents_m(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::R
             // Slots around a single goal are reported under that goal's line of the scenario.
             let places = &scenario.mission.goal_places;
             let place = places.get(i).or(places.first());
-            places::height_over_ground(scenario, map, &format!("goal {i}"), place, goal, largest_m)
+            places::climb_height_m(scenario, map, &format!("goal {i}"), place, goal, largest_m)
         })
         .collect()
 }

@@ -6,7 +6,7 @@ use planner_core::Point;
 
 use crate::files::ResultFiles;
 use crate::mission::{HostPlan, PreparedMission};
-use crate::report::{self, MapSurface, ReportData, RoadmapLines, VehicleTrack};
+use crate::report::{self, MapSurface, ReportData, ReportVehicle, RoadmapLines};
 use crate::result::{self, MissionResult, Timing};
 use crate::say;
 use crate::scenario::Scenario;
@@ -22,7 +22,7 @@ pub fn planned_page(
         .vehicles
         .iter()
         .zip(&plan.flights)
-        .map(|(vehicle, flight)| VehicleTrack {
+        .map(|(vehicle, flight)| ReportVehicle {
             id: vehicle.id,
             radius_m: vehicle.radius_m,
             color: None,

@@ -23,7 +23,7 @@ pub fn quoted(text: &str) -> String {
 }
 
 /// As [`quoted`], for a path; bytes that are not UTF-8 become `�`.
-pub fn quoted_path(path: &Path) -> String {
+pub fn printable_path(path: &Path) -> String {
     quoted(&path.to_string_lossy())
 }
 
@@ -51,14 +51,14 @@ fn shortened(text: &str, most: usize) -> String {
 
 /// A whole error message as it is printed: line ends stay, all other control characters are
 /// escaped, and each line is cut to 600 characters.
-pub fn quote_message(text: &str) -> String {
+pub fn printable_message(text: &str) -> String {
     let lines: Vec<String> =
         text.lines().map(|line| shortened(&escaped(line), MAX_ERROR_CHARS)).collect();
     lines.join("\n")
 }
 
 /// An error message about the command line; each of the arguments that appears in it is quoted.
-pub fn quote_arguments(text: &str, arguments: impl Iterator<Item = String>) -> String {
+pub fn with_printable_arguments(text: &str, arguments: impl Iterator<Item = String>) -> String {
     let mut text = text.to_owned();
     for argument in arguments {
         let value = argument.split_once('=').map_or("", |(_, value)| value);
@@ -68,7 +68,7 @@ pub fn quote_arguments(text: &str, arguments: impl Iterator<Item = String>) -> S
             }
         }
     }
-    quote_message(&text)
+    printable_message(&text)
 }
 
 #[cfg(test)]

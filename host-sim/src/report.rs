@@ -18,8 +18,8 @@ use anyhow::Context;
 
 pub use coverage::{CoverageLayers, ReportDivision, ReportPart, WaypointTransfer};
 pub use data::{
-    AreaOutline, Curve, Level, LogEvent, OutlineKind, Plot, PlotLimit, ReportData, RoadmapLines,
-    SphereObstacle, VehicleTrack, vehicle_color,
+    AreaOutline, Curve, Level, LogEvent, OutlineKind, Plot, PlotLimit, ReportData, ReportVehicle,
+    RoadmapLines, SphereObstacle, vehicle_color,
 };
 pub use figures::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
 pub use surface::{FACE_LIMIT, MapSurface};

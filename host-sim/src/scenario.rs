@@ -17,7 +17,7 @@ mod types;
 use std::path::{Path, PathBuf};
 
 use crate::files;
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 pub use companion::autopilot::AutopilotKind;
 pub use error::{ScenarioError, SourcePlace};
 pub use planner_core::roadmap::prm::Sampling;
@@ -37,12 +37,12 @@ pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
 
 /// A scenario file's text, its name for errors, and its folder.
 fn text(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
-    let name = quoted_path(path);
+    let name = printable_path(path);
     let fail = |why: String| ScenarioError { file: name.clone(), place: None, why, hint: None };
     let text = files::read_text(path).map_err(|e| {
         let toml = path.with_extension("toml");
         let hint = (!path.exists() && toml.is_file())
-            .then(|| format!("did you mean `{}`?", quoted_path(&toml)));
+            .then(|| format!("did you mean `{}`?", printable_path(&toml)));
         ScenarioError { hint, ..fail(format!("cannot read it: {e}")) }
     })?;
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
@@ -60,6 +60,6 @@ fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError
     let text = reader::TomlText { file, text };
     sections::read_root(text, |root| match root.get("area") {
         Some(_) => sections::area::read_coverage_scenario(text, root, folder),
-        None => sections::goals::goals_mission(text, root, folder),
+        None => sections::goals::read_goals_scenario(text, root, folder),
     })
 }

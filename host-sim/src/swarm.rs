@@ -47,7 +47,7 @@ use crate::shortage;
 /// Distance from its goal within which a vehicle counts as having reached it, metres.
 const REACHED_M: f32 = 0.5;
 /// Horizontal distance from its pad beyond which a vehicle has left it, metres.
-const OFF_PAD_M: f32 = 2.0;
+const AWAY_FROM_PAD_M: f32 = 2.0;
 /// Simulated time after the last vehicle is done, before the simulation ends, seconds.
 const AFTERMATH_S: f64 = 1.0;
 /// Time without any armed vehicle, after all faults, after which no vehicle is expected to fly any
@@ -176,10 +176,10 @@ fn simulate(
     let took_s = began.elapsed().as_secs_f64();
     run.members.iter_mut().try_for_each(SimulatedVehicle::print_stack_use)?;
     let result = run.result(command);
-    run.log_losses(&result);
+    run.log_trouble_and_incidents(&result);
     let tracks = (0..run.members.len()).map(|i| run.referee.track(i).to_vec()).collect();
     let lost_s = run.members.iter().map(|m| m.lost_s.map(|t_s| t_s as f32)).collect();
-    let pictures = run.members.iter_mut().flat_map(SimulatedVehicle::take_pictures).collect();
+    let pictures = run.members.iter_mut().flat_map(SimulatedVehicle::drain_pictures).collect();
     let SimulationRun { referee, log, done, divisions, t_s, .. } = run;
     let divisions = divisions.into_divisions();
     Ok(SwarmFlight {
@@ -267,7 +267,7 @@ impl<'a> SimulationRun<'a> {
         self.script.step(now_us, &mut world, log)?;
         for (i, member) in members.iter_mut().enumerate() {
             member.step(step, i, mission, radio, places, log)?;
-            if let Some(wanted) = member.next_plan_request() {
+            if let Some(wanted) = member.take_plan_request() {
                 let own = match member.planner {
                     PlanAnswer::BadRoadmap => plan_on_damaged(&mission.roadmap_or_field_file),
                     _ => mission.answer_plan_request(plan, i, wanted, &mut member.companion),
@@ -291,7 +291,7 @@ impl<'a> SimulationRun<'a> {
                     Some(_) => nearest_m.min(off.norm()),
                     // A flight in a coverage mission ends above its own pad, so the distance counts
                     // from its return on.
-                    None if off.xy().norm() > OFF_PAD_M => f32::INFINITY,
+                    None if off.xy().norm() > AWAY_FROM_PAD_M => f32::INFINITY,
                     None => nearest_m.min(off.xy().norm()),
                 };
             }
@@ -375,7 +375,7 @@ impl<'a> SimulationRun<'a> {
         let scenario = &self.mission.scenario;
         // The vehicle cannot correct the error of its position estimate, so that error is
         // subtracted.
-        let error_m = margins::max_estimate_error_m(
+        let error_m = margins::estimate_error_margin_m(
             scenario.simulation.estimator,
             scenario.vehicles[i].autopilot,
         );
@@ -387,7 +387,7 @@ impl<'a> SimulationRun<'a> {
     /// Whether the vehicle flew to the end of its path and landed, or had no flight to make.
     fn has_completed_task(&self, i: usize, vehicle: &VehicleResult) -> bool {
         let flight = &self.plan.flights[i];
-        !has_flight(&self.members[i], flight) || (vehicle.reached && vehicle.landed)
+        !has_flight_to_make(&self.members[i], flight) || (vehicle.reached && vehicle.landed)
     }
 
     /// Whether a fault struck the vehicle and its flight is over: it has no power, never took off,
@@ -403,7 +403,7 @@ impl<'a> SimulationRun<'a> {
 
     /// Logs the fault of the serial link of each vehicle that did not complete its task, and the
     /// referee's incidents.
-    fn log_losses(&mut self, result: &MissionResult) {
+    fn log_trouble_and_incidents(&mut self, result: &MissionResult) {
         let scenario = &self.mission.scenario;
         for (i, (member, vehicle)) in self.members.iter().zip(&result.vehicles).enumerate() {
             if let (false, Some(text)) =
@@ -441,7 +441,7 @@ fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
 
 /// Whether the vehicle took off, or the plan gives it a flight that earlier flights did not
 /// complete.
-fn has_flight(
+fn has_flight_to_make(
     member: &SimulatedVehicle,
     flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,
 ) -> bool {
@@ -459,7 +459,7 @@ fn vehicle_result(
     // A flight in a coverage mission ends where it began: only a landing shows that it is over.
     let landed = member.landed_s.is_some();
     let reached = nearest_goal_m <= REACHED_M && (landed || flight.task.goal().is_some());
-    let end = match (has_flight(member, flight), member.state()) {
+    let end = match (has_flight_to_make(member, flight), member.state()) {
         (false, _) => "no goal".to_owned(),
         // Its estimate was at the goal, its true position was not.
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),

@@ -33,7 +33,7 @@ pub use self::field::{FieldConfig, FieldError, encode_field};
 pub use self::frame::{TerrainFrame, WithoutCrs};
 pub use self::grid::{BoxHeights, HeightGrid};
 pub use self::limits::{MAX_BYTES, MAX_CELLS};
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 
 /// Reads a file of heights into a grid in the mission frame.
 ///
@@ -49,7 +49,7 @@ pub fn read(path: &Path, frame: &TerrainFrame<'_>) -> Result<HeightGrid, Terrain
         _ => return Err(TerrainError::Format),
     };
     match grid.count() {
-        0 => Err(TerrainError::Elsewhere(quoted_path(path))),
+        0 => Err(TerrainError::Elsewhere(printable_path(path))),
         _ => Ok(grid),
     }
 }

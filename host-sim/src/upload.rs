@@ -19,7 +19,7 @@ use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 use self::retransmission::Retransmission;
 use crate::link::ByteLink;
 
-/// MAVLink system id of the client, unless [`FtpClient::from_ground_station`] sets another one.
+/// MAVLink system id of the client, unless [`FtpClient::with_own_system`] sets another one.
 const DEFAULT_SYSTEM_ID: u8 = 255;
 /// MAVLink component id of the client: MAV_COMP_ID_MISSIONPLANNER.
 const COMPONENT_ID: u8 = 190;
@@ -91,7 +91,7 @@ impl FtpClient {
 
     /// The client with `own_system` as its MAVLink system id instead of 255.
     #[must_use]
-    pub fn from_ground_station(self, own_system: u8) -> Self {
+    pub fn with_own_system(self, own_system: u8) -> Self {
         Self { own_system, ..self }
     }
 

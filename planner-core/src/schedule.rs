@@ -45,7 +45,7 @@ const MAX_INTERVALS: usize = 128;
 const OFF_PAD_HEIGHT_M: f32 = 0.02;
 /// Distance beyond the end of its descent from which a vehicle counts as having left the descent,
 /// metres: only one that stands on the ground reports that progress.
-const BEYOND_DESCENT_M: f32 = 0.01;
+const BEYOND_DESCENT_END_M: f32 = 0.01;
 
 /// Memory of [`earliest_departure`] and [`gates`].
 #[derive(Debug, Default)]
@@ -229,7 +229,7 @@ fn progress_when_left_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) ->
     if q.to_m < flight.path.length_m() + flight.descent_m {
         fmaxf(q.to_m - PROGRESS_ERROR_M, OFF_PAD_HEIGHT_M - flight.climb_m)
     } else {
-        q.to_m + BEYOND_DESCENT_M
+        q.to_m + BEYOND_DESCENT_END_M
     }
 }
 

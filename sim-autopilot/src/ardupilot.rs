@@ -51,7 +51,7 @@ const LAND_DETECTOR_S: f32 = 1.6;
 /// Time from landed to disarmed in LAND and RTL, seconds: 0.4 s seen; HEARTBEAT shows it at 0.8 s.
 const LAND_DISARM_S: f32 = 0.4;
 /// Time by which ArduCopter disarms earlier than `DISARM_DELAY`, seconds: 9.94 s of 10 seen.
-const DISARM_EARLY_S: f32 = 0.06;
+const IDLE_DISARM_EARLY_S: f32 = 0.06;
 /// Delay of the ground-station failsafe beyond `FS_GCS_TIMEOUT`, seconds: 5.1 s of 5 seen.
 const GCS_REACTION_S: f32 = 0.1;
 /// Time from the loss of the position to the EKF failsafe, seconds (`EKF_CHECK_ITERATIONS_MAX` and
@@ -61,7 +61,7 @@ const ESTIMATOR_REACTION_S: f32 = 1.5;
 const BOOT_TO_ATTITUDE_S: f32 = 5.8;
 /// Time from boot until the estimator has an origin, as a share of the time until it has a
 /// position: 20 of 41.6 s seen.
-const ORIGIN_SHARE: f32 = 0.48;
+const BOOT_TO_ORIGIN_SHARE: f32 = 0.48;
 /// Time from boot until HEARTBEAT reports STANDBY, seconds.
 const BOOT_TO_STANDBY_S: f32 = 3.0;
 
@@ -251,7 +251,7 @@ impl Copter {
     }
 
     fn origin_known(&self, now_us: u64) -> bool {
-        now_us as f32 >= ORIGIN_SHARE * self.ready_us as f32
+        now_us as f32 >= BOOT_TO_ORIGIN_SHARE * self.ready_us as f32
     }
 
     /// Handles a setpoint message of type `id`; ignored outside Guided.
@@ -338,7 +338,7 @@ impl Copter {
         dt_s: f32,
     ) -> ControlDemand {
         let now_us = sensors.now_us;
-        self.send_progress_messages(platform, now_us);
+        self.send_unsolicited_messages(platform, now_us);
         if self.armed {
             self.update_failsafe(platform, sensors);
             self.update_timers(platform, sensors);
@@ -347,7 +347,7 @@ impl Copter {
         if !self.armed {
             // A vehicle disarmed in the air falls; it has landed when it touches the ground.
             self.landed |= sensors.touching;
-            return self.idle_command();
+            return self.idle_demand();
         }
         if self.landed
             && let Some(takeoff) = self.takeoff
@@ -361,7 +361,7 @@ impl Copter {
             self.reference = CopterReference::new(sensors.position, Point::zeros());
         }
         if self.landed {
-            return self.idle_command();
+            return self.idle_demand();
         }
         let demand = self.demand(sensors, dt_s);
         self.detect_landing(sensors, &demand);
@@ -374,7 +374,7 @@ impl Copter {
     }
 
     /// Output while the motors are off or idle.
-    fn idle_command(&self) -> ControlDemand {
+    fn idle_demand(&self) -> ControlDemand {
         ControlDemand {
             motors: MotorState::Idle,
             integral: IntegralAction::Clear,
@@ -424,7 +424,7 @@ impl Copter {
         if !self.landed || self.takeoff.is_some() {
             self.since.idle_us = sensors.now_us;
         } else {
-            let delay = self.tuning.disarm_delay_s - DISARM_EARLY_S;
+            let delay = self.tuning.disarm_delay_s - IDLE_DISARM_EARLY_S;
             let landing = matches!(self.mode, CopterMode::Land | CopterMode::Rtl)
                 || self.is_landing_in_auto();
             if landing && since(self.since.landed_us) >= micros_from_s(LAND_DISARM_S)

@@ -11,7 +11,7 @@
 //! counted from 0) or CAMERA_FEEDBACK (180, ArduPilot, counted from 1). Source:
 //! `camera_trigger.cpp`, `AP_Camera_Backend.cpp`.
 //!
-//! The true position of each picture is kept for a referee ([`super::Autopilot::take_photos`]).
+//! The true position of each picture is kept for a referee ([`super::Autopilot::drain_photos`]).
 
 use planner_core::Point;
 
@@ -74,7 +74,7 @@ impl CameraTrigger {
     }
 
     /// Returns the photos since the last call.
-    pub(super) fn take_photos(&mut self) -> Vec<Photo> {
+    pub(super) fn drain_photos(&mut self) -> Vec<Photo> {
         core::mem::take(&mut self.photos)
     }
 

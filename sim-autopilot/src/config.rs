@@ -3,7 +3,7 @@
 use planner_core::Point;
 use planner_core::geo::frames::{Geodetic, Projection};
 
-use super::estimator::EstimateErrors;
+use super::estimator::EstimateErrorState;
 use super::vehicle::VehicleLimits;
 use crate::{EstimatorErrors, SimulatedKind};
 
@@ -119,7 +119,7 @@ impl AutopilotConfig {
     /// Constant error of the estimated height over the flight, metres. If the GPS receiver set the
     /// EKF origin, the origin's altitude has the same error.
     pub fn height_error_m(&self) -> f32 {
-        EstimateErrors::new(self.estimator, self.autopilot, self.vehicle_seed()).height_m()
+        EstimateErrorState::new(self.estimator, self.autopilot, self.vehicle_seed()).height_m()
     }
 }
 

@@ -74,7 +74,7 @@ fn error_models(
 
 /// Errors of one vehicle's estimate (estimated minus true).
 #[derive(Clone, Debug)]
-pub struct EstimateErrors {
+pub struct EstimateErrorState {
     random: Gaussian,
     axes: [ErrorModel; 3],
     drift: Point,
@@ -87,7 +87,7 @@ pub struct EstimateErrors {
     pub rate: Point,
 }
 
-impl EstimateErrors {
+impl EstimateErrorState {
     /// Stationary errors: the first values have the same distribution as later ones.
     pub fn new(estimator: EstimatorErrors, autopilot: SimulatedKind, seed: u64) -> Self {
         let mut random = Gaussian::new(seed ^ 0x0E57_1A7E);

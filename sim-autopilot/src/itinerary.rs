@@ -19,7 +19,7 @@ use super::command::ReceivedCommand;
 use super::mission::{MissionItem, MissionProgress};
 use super::msg::{MISSION_CURRENT, MISSION_ITEM_REACHED};
 use super::platform::{Platform, SensorReadings};
-use super::vehicle::wrap_pi;
+use super::vehicle::wrap_pi_once;
 use crate::SimulatedKind;
 
 /// Horizontal distance at which a waypoint is reached, metres: `NAV_ACC_RAD` of PX4's multicopters,
@@ -233,7 +233,7 @@ impl Platform {
             MissionLeg::To { at, heading, stay_s, reached_m } => {
                 let off = at - sensors.position;
                 // NaN: no heading to wait for.
-                let turned = wrap_pi(heading - sensors.heading).abs() < MAX_YAW_ERROR_RAD;
+                let turned = wrap_pi_once(heading - sensors.heading).abs() < MAX_YAW_ERROR_RAD;
                 let turned =
                     turned || heading.is_nan() || self.config.autopilot == SimulatedKind::Ardupilot;
                 if libm::hypotf(off.x, off.y) <= reached_m

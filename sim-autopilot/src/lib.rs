@@ -103,8 +103,8 @@ impl Autopilot {
 
     /// Every picture taken since the last call, with the true position and heading at that time.
     /// The camera is fixed to the body and looks straight down.
-    pub fn take_photos(&mut self) -> Vec<Photo> {
-        self.platform.camera.take_photos()
+    pub fn drain_photos(&mut self) -> Vec<Photo> {
+        self.platform.camera.drain_photos()
     }
 
     /// `custom_mode` of HEARTBEAT: the flight mode in use, a failsafe's included.
@@ -289,8 +289,8 @@ impl Autopilot {
         };
         let gps = if noise > 0.0 {
             (
-                noise * platform.disturbance.sensor_noise(),
-                noise * platform.disturbance.sensor_noise(),
+                noise * platform.disturbance.unit_sensor_noise(),
+                noise * platform.disturbance.unit_sensor_noise(),
                 platform.gps_ok,
             )
         } else {
@@ -372,7 +372,7 @@ impl Autopilot {
     }
 
     /// Adds `offset` (ENU metres) to the position estimate from now on.
-    pub fn jump_position(&mut self, offset: &Point) {
+    pub fn jump_estimated_position(&mut self, offset: &Point) {
         self.platform.position_offset += offset;
     }
 
@@ -406,7 +406,7 @@ impl Autopilot {
     /// Sets PX4's failsafe after a loss of setpoints to Land (`COM_OBL_RC_ACT` 4), for flights
     /// under a ceiling: PX4's default is to climb and return. ArduCopter has no such parameter; it
     /// brakes.
-    pub fn land_on_stream_loss(&mut self) {
+    pub fn land_on_offboard_loss(&mut self) {
         if self.platform.config.autopilot == SimulatedKind::Px4 {
             self.set_parameter("COM_OBL_RC_ACT", 4).expect("PX4 has this parameter");
         }

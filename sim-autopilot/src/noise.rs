@@ -30,7 +30,7 @@ const BIAS_TAU_S: f32 = 60.0;
 const JITTER_TAU_S: f32 = 1.0;
 /// Velocity error for each metre of position error, 1/s: PX4's estimate drifts by 0.1 m/s where it
 /// is 0.5 m wrong.
-const VELOCITY_SHARE: f32 = 0.2;
+const VELOCITY_ERROR_PER_METRE: f32 = 0.2;
 
 /// Generator of Gaussian numbers. It sums four uniform 16-bit numbers (Irwin–Hall): mean 0,
 /// variance 1, no value beyond 3.5 σ, and no transcendental function whose result could differ
@@ -110,7 +110,7 @@ impl Disturbance {
                 OrnsteinUhlenbeck::new(all(half), BIAS_TAU_S, &mut random),
                 OrnsteinUhlenbeck::new(all(half), JITTER_TAU_S, &mut random),
                 OrnsteinUhlenbeck::new(
-                    all(VELOCITY_SHARE * position_noise_m),
+                    all(VELOCITY_ERROR_PER_METRE * position_noise_m),
                     JITTER_TAU_S,
                     &mut random,
                 ),
@@ -152,7 +152,7 @@ impl Disturbance {
     }
 
     /// A random number for sensor noise: mean 0, standard deviation 1.
-    pub fn sensor_noise(&mut self) -> f32 {
+    pub fn unit_sensor_noise(&mut self) -> f32 {
         self.random.sample()
     }
 }

@@ -7,7 +7,7 @@ use planner_core::geo::frames::{self, Geodetic};
 use super::camera::{CameraTrigger, Photo};
 use super::command::{ACCEPTED, CommandOutcome, ReceivedCommand, message_id};
 use super::config::AutopilotConfig;
-use super::estimator::EstimateErrors;
+use super::estimator::EstimateErrorState;
 use super::geodesy::LocalFrame;
 use super::mission::Missions;
 use super::msg::{GPS_GLOBAL_ORIGIN, HOME_POSITION, MESSAGE_INTERVAL};
@@ -82,7 +82,7 @@ pub struct Platform {
     next_noise_us: u64,
     pub(super) vehicle: Multicopter,
     pub(super) disturbance: Disturbance,
-    pub(super) errors: EstimateErrors,
+    pub(super) errors: EstimateErrorState,
     pub(super) position_offset: Point,
     /// Error of the velocity estimate (estimated minus true) that a replay imposes, ENU m/s.
     pub(super) velocity_bias: Point,
@@ -125,7 +125,7 @@ impl Platform {
                 config.position_noise_m,
                 seed,
             ),
-            errors: EstimateErrors::new(config.estimator, config.autopilot, seed),
+            errors: EstimateErrorState::new(config.estimator, config.autopilot, seed),
             position_offset: Point::zeros(),
             velocity_bias: Point::zeros(),
             height_error_rate: 0.0,

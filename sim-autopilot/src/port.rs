@@ -145,7 +145,7 @@ impl Port {
     }
 
     /// Whether the send queue has room for one more frame; if not, counts the frame as dropped.
-    fn reserve_frame(&mut self) -> bool {
+    fn admit_frame(&mut self) -> bool {
         if self.sent == self.queue.len() {
             self.queue.clear();
             self.sent = 0;
@@ -172,14 +172,14 @@ impl Port {
 
     /// Queues another sender's frame with its ids and sequence number unchanged.
     pub fn forward_frame(&mut self, frame: &CheckedFrame) {
-        if self.reserve_frame() {
+        if self.admit_frame() {
             frame.write(&mut self.queue);
         }
     }
 
     /// Queues a message.
     pub fn send<M: MessageData>(&mut self, message: &M) {
-        if self.reserve_frame() {
+        if self.admit_frame() {
             let sender = self.next_sender();
             frame::write_message(sender, message, &mut self.queue);
         }
@@ -195,7 +195,7 @@ impl Port {
 
     /// Queues a message that the dialect does not know; `seed` is its CRC_EXTRA.
     pub fn send_with_crc_extra(&mut self, id: u32, seed: u8, payload: &[u8]) {
-        if self.reserve_frame() {
+        if self.admit_frame() {
             let sender = self.next_sender();
             frame::write_raw(sender, id, seed, payload, &mut self.queue);
         }

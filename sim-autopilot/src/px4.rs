@@ -39,12 +39,12 @@ use crate::GpsFix;
 const LOSS_REACTION_S: f32 = 0.15;
 /// Fraction of the thrust ramp after which the land detector reports a take-off: in recordings
 /// after 0.9 to 1.0 s of 3 s, before the vehicle lifts.
-const IN_AIR_SHARE: f32 = 0.31;
+const IN_AIR_RAMP_SHARE: f32 = 0.31;
 /// Least commanded descent rate at which the land detector can report a landing, m/s: 1.1 times the
 /// default of `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`). PX4 checks only the velocity setpoint:
 /// with a position setpoint alone it reports itself in the air even on the ground, however far
 /// below the setpoint lies.
-const MIN_LAND_RATE_MPS: f32 = 0.275;
+const LAND_DETECTOR_DESCENT_MPS: f32 = 0.275;
 /// Factor on `MPC_LAND_CRWL` that gives the descent rate seen in recordings: 0.22 m/s at a
 /// parameter of 0.3 m/s.
 const CRAWL_FACTOR: f32 = 0.75;
@@ -394,7 +394,7 @@ impl Commander {
                 // (`TakeoffHandling::updateRamp`).
                 let floor = -crate::vehicle::GRAVITY / tuning.gains.velocity_p[1].max(0.1);
                 let limit = floor + progress * (demand.climb_max - floor);
-                if self.landed && progress >= IN_AIR_SHARE {
+                if self.landed && progress >= IN_AIR_RAMP_SHARE {
                     self.landed = false;
                     self.flown_since_arming = true;
                 }
@@ -471,7 +471,7 @@ impl Commander {
     fn detect_landing(&mut self, sensors: &SensorReadings, demand: &Demand, tuning: &Px4Tuning) {
         // Outside Offboard the crawl is simulated slower than PX4 commands it (`CRAWL_FACTOR`).
         let share = if self.mode() == Px4Mode::Offboard { 1.0 } else { CRAWL_FACTOR };
-        let wants_down = -demand.velocity.z >= share * MIN_LAND_RATE_MPS;
+        let wants_down = -demand.velocity.z >= share * LAND_DETECTOR_DESCENT_MPS;
         if !sensors.touching || !wants_down {
             self.touching_us = None;
             return;

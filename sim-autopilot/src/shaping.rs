@@ -11,7 +11,7 @@ pub fn approach_rate(error: f32, gain: f32, limit: f32) -> f32 {
 }
 
 /// Gain with which a [`JerkLimitedRate`] approaches its target at the end, 1/s.
-const RAMP_END_RATE_PER_S: f32 = 6.0;
+const RAMP_END_GAIN_PER_S: f32 = 6.0;
 
 /// A rate that changes within limits of its first and second derivative, as in PX4's
 /// `VelocitySmoothing`.
@@ -27,7 +27,7 @@ impl JerkLimitedRate {
     /// Advances `dt` seconds towards `rate`, with at most `change` m/s² and `jerk` m/s³.
     pub fn advance(&mut self, rate: f32, change: f32, jerk: f32, dt: f32) {
         let wanted =
-            approach_rate(rate - self.rate, RAMP_END_RATE_PER_S, jerk).clamp(-change, change);
+            approach_rate(rate - self.rate, RAMP_END_GAIN_PER_S, jerk).clamp(-change, change);
         self.derivative += (wanted - self.derivative).clamp(-jerk * dt, jerk * dt);
         self.rate += self.derivative * dt;
     }

@@ -402,7 +402,7 @@ fn the_same_seed_flies_the_same_flight_bit_for_bit() {
 #[test]
 fn a_jump_of_the_estimate_moves_the_vehicle_the_other_way() {
     let mut bench = Bench::hovering(5.0);
-    bench.autopilot.jump_position(&Point::new(3.0, 0.0, 0.0));
+    bench.autopilot.jump_estimated_position(&Point::new(3.0, 0.0, 0.0));
     bench.run(12.0);
     assert!(
         (bench.autopilot.true_state().position.x + 3.0).abs() < 0.2,

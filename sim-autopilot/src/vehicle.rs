@@ -213,7 +213,7 @@ impl Multicopter {
 
     /// Sets the heading of a vehicle at rest, radians clockwise from north.
     pub fn set_heading(&mut self, heading_rad: f32) {
-        self.state.heading_rad = wrap_pi(heading_rad);
+        self.state.heading_rad = wrap_pi_once(heading_rad);
     }
 
     /// Sets the remaining battery charge, 0 to 1.
@@ -306,10 +306,11 @@ impl Multicopter {
             if demand.heading_rate.is_nan() { 0.0 } else { demand.heading_rate.clamp(-max, max) }
         } else {
             // Gain `MC_YAW_P` 2.8; the filter below stands for the attitude controller.
-            (2.8 * wrap_pi(demand.heading - self.state.heading_rad)).clamp(-max, max)
+            (2.8 * wrap_pi_once(demand.heading - self.state.heading_rad)).clamp(-max, max)
         };
         self.state.heading_rate += (rate - self.state.heading_rate) * (dt / (dt + 0.1));
-        self.state.heading_rad = wrap_pi(self.state.heading_rad + self.state.heading_rate * dt);
+        self.state.heading_rad =
+            wrap_pi_once(self.state.heading_rad + self.state.heading_rate * dt);
     }
 
     /// Moves the body for one step of `dt` seconds. `ground_up_m` is the height of the ground below
@@ -364,7 +365,7 @@ impl Multicopter {
 }
 
 /// The angle within ±π. Correct for angles within ±3π, which adding a bounded rate never exceeds.
-pub fn wrap_pi(angle: f32) -> f32 {
+pub fn wrap_pi_once(angle: f32) -> f32 {
     use core::f32::consts::{PI, TAU};
     if angle > PI {
         angle - TAU

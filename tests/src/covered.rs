@@ -85,7 +85,7 @@ pub fn flight(
 ) -> anyhow::Result<SwarmFlight> {
     let plan = mission.plan()?;
     let mut flight = swarm::fly(mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())?;
-    if let Some(places) = pictures::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
+    if let Some(places) = pictures::track_points_as_pictures(&mission.scenario, &flight.tracks)? {
         flight.pictures = places;
     }
     pictures.iter_mut().for_each(|picture| picture.t_s = 0.0);

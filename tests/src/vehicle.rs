@@ -124,7 +124,7 @@ impl Vehicle {
         let mut config = config(mission);
         config.seed = seed;
         let mut autopilot = Autopilot::new(&config).expect("the scenario is good");
-        autopilot.land_on_stream_loss();
+        autopilot.land_on_offboard_loss();
         Self {
             board,
             autopilot,

@@ -1,6 +1,6 @@
 //! If a board cannot hold an area's mission, planning reports it, before anything is uploaded.
 
-use host_sim::capacity::{BOARD_CORNERS, BOARDS};
+use host_sim::capacity::{BOARD_NO_FLY_CORNERS, BOARDS};
 use host_sim::coverage::CoveragePlan;
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
@@ -59,7 +59,7 @@ fn vertices_zones_and_lanes_beyond_a_boards_are_named() {
         for excess in excess(&field(&area, 20.0, 2, -8.0)).0 {
             assert_eq!(
                 excess.is_some_and(|why| why.contains("corners")),
-                2 * corners > BOARD_CORNERS
+                2 * corners > BOARD_NO_FLY_CORNERS
             );
         }
     }

@@ -101,7 +101,7 @@ impl Lengths {
 /// vehicles and layers, by brute force.
 fn brute_force(
     lengths: &Lengths,
-    work: &Work<'_, { host_sim::coverage::MAX_LANES }, { host_sim::coverage::MAX_CORNERS }>,
+    work: &Work<'_, { host_sim::coverage::MAX_LANES }, { host_sim::coverage::MAX_NO_FLY_CORNERS }>,
     from: usize,
     vehicles: &[usize],
     layers: &[u8],

@@ -174,7 +174,7 @@ fn fly(
     let all: Vec<u16> =
         (u16::from(autopilot == SimulatedKind::Ardupilot)..items.len() as u16).collect();
     assert_eq!(client.reached, all, "each item is reported once");
-    let photos = client.autopilot.take_photos();
+    let photos = client.autopilot.drain_photos();
     assert_eq!(client.announced, photos.len(), "each picture is announced");
     photos
 }

@@ -14,7 +14,7 @@
 
 use std::collections::VecDeque;
 
-use companion::link::roster::{FlightStatus, RosterReport};
+use companion::link::roster::{RosterReport, ShareStatus};
 use companion::swarm::fleet::{Fleet, FleetTimeouts, OwnReport, StartStatus, VehicleReception};
 use companion::time::{Duration, Instant};
 use flockmate_tests::number;
@@ -212,9 +212,9 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             }
             let ends = vehicle.left_by || vehicle.down || vehicle.fleet.is_excluded();
             let standing = match (ends, done && !goes_on) {
-                (false, _) => FlightStatus::Alive,
-                (true, false) => FlightStatus::Left,
-                (true, true) => FlightStatus::Finished,
+                (false, _) => ShareStatus::Alive,
+                (true, false) => ShareStatus::Left,
+                (true, true) => ShareStatus::Finished,
             };
             vehicle.down |= ends;
             let stop_dm =
@@ -346,7 +346,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
 /// Whether the vehicle knows that all living vehicles have computed the same division.
 fn has_all_hashes(fleet: &Whole) -> bool {
     let roster = fleet.roster_message(0);
-    roster.hash != 0 && roster.entries.iter().all(|e| e.status != FlightStatus::Alive || e.agrees)
+    roster.hash != 0 && roster.entries.iter().all(|e| e.status != ShareStatus::Alive || e.agrees)
 }
 
 /// Each vehicle's part by the divisions that count, without one under way.
@@ -447,7 +447,7 @@ fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
     (1..50).for_each(|at_s| step(&mut fleet, at_s, 0));
     assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM), "vehicle 2 is lost");
     let mut finished = fleet.roster_message(0);
-    finished.entries[2].status = FlightStatus::Finished;
+    finished.entries[2].status = ShareStatus::Finished;
     fleet.handle_roster(2, &finished, StartStatus::Started);
     step(&mut fleet, 50, 2);
     assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM));

@@ -38,7 +38,7 @@ impl Pair {
             ..sim_autopilot::AutopilotConfig::default()
         };
         let mut autopilot = Autopilot::new(&config).unwrap();
-        autopilot.land_on_stream_loss();
+        autopilot.land_on_offboard_loss();
         Self {
             autopilot,
             companion: Companion::new(Config::new(1, START, config.world_origin)).unwrap(),

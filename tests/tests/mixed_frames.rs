@@ -130,7 +130,7 @@ fn fly(seed: u64) -> Errors {
         let now_us = (step + 1) * STEP_US;
         for (i, member) in members.iter_mut().enumerate() {
             member.step(step, i, &mission, &mut radio, &places, &mut log).expect("it has no board");
-            if let Some(wanted) = member.next_plan_request() {
+            if let Some(wanted) = member.take_plan_request() {
                 let own = mission.own_plan(&plan, i).expect("few gates");
                 member.hand_over_plan(now_us, wanted, Ok(&own));
             }

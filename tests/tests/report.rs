@@ -13,8 +13,8 @@ use std::time::Duration;
 use flockmate_tests::areas::SMALL_FIELD;
 use flockmate_tests::{Guard, chromium, host_sim};
 use host_sim::report::{
-    Curve, Level, LogEvent, MapSurface, Plot, PlotLimit, ReportData, RoadmapLines, TrackPoint,
-    VehicleTrack, page as page_of, vehicle_color,
+    Curve, Level, LogEvent, MapSurface, Plot, PlotLimit, ReportData, ReportVehicle, RoadmapLines,
+    TrackPoint, page as page_of, vehicle_color,
 };
 use planner_core::Point;
 use planner_core::map::voxel::{GridShape, Outside, VoxelGrid};
@@ -48,7 +48,7 @@ fn building() -> MapSurface {
 }
 
 /// A vehicle that follows `path` at 1 m/s.
-fn vehicle(id: u8, path: Vec<Point>) -> VehicleTrack {
+fn vehicle(id: u8, path: Vec<Point>) -> ReportVehicle {
     let mut track = vec![TrackPoint { t_s: 0.0, position: path[0] }];
     for leg in path.windows(2) {
         let from = track.last().expect("at least the start").t_s;
@@ -60,7 +60,7 @@ fn vehicle(id: u8, path: Vec<Point>) -> VehicleTrack {
         }));
     }
     let (start, goal) = (path[0], path.last().copied());
-    VehicleTrack {
+    ReportVehicle {
         id,
         radius_m: 0.3,
         color: None,

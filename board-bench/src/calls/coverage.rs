@@ -2,7 +2,7 @@
 //! after a loss, and areas at a board's capacities. Their results go into a checksum, by which a
 //! test compares board and host bit by bit.
 
-use firmware::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
+use firmware::capacity::{AREA_VERTICES, GATES, LANES, NO_FLY_CORNERS, VEHICLES, WAYPOINTS};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::area::{Area, Ring, RingKind};
@@ -241,7 +241,7 @@ fn measure_division(
 /// zones.
 fn measure_ways_home(
     meter: &mut impl Meter,
-    transit: &Transit<'_, AREA_CORNERS>,
+    transit: &Transit<'_, NO_FLY_CORNERS>,
     sum: &mut Checksum,
 ) {
     let mut own = VehiclePlan::<WAYPOINTS, GATES>::new();
@@ -281,12 +281,12 @@ fn measure_ways_home(
 }
 
 /// No-fly zones of the largest area.
-const ZONES: usize = AREA_CORNERS / 4;
+const ZONES: usize = NO_FLY_CORNERS / 4;
 
 /// The vertices and rings of an area with as many vertices and corners of no-fly zones as a board
 /// holds.
 fn largest_area() -> (Vec<Flat, AREA_VERTICES>, Vec<Ring, { ZONES + 1 }>) {
-    const OUTER: usize = AREA_VERTICES - AREA_CORNERS;
+    const OUTER: usize = AREA_VERTICES - NO_FLY_CORNERS;
     let mut vertices: Vec<Flat, AREA_VERTICES> = Vec::new();
     for k in 0..OUTER {
         let (sin, cos) = libm::sincosf(core::f32::consts::TAU * k as f32 / OUTER as f32);
@@ -312,7 +312,7 @@ fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, su
     let (vertices, rings) = largest_area();
     let area =
         meter.call("area::Area::new, 256", 0, || Area::new(&vertices, &rings)).expect("an area");
-    let mut transit = Transit::<AREA_CORNERS>::empty();
+    let mut transit = Transit::<NO_FLY_CORNERS>::empty();
     let bytes = size_of_val(&transit);
     meter
         .call("transit::Transit::set_area, 32 corners", bytes, || transit.set_area(area))
@@ -324,7 +324,7 @@ fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, su
             meter.call("transit::Transit::is_line_clear", 0, || transit.is_line_clear(&from, &to));
         let far_m =
             meter.call("transit::Transit::distance_m", 0, || transit.distance_m(&from, &to));
-        let mut corners: Vec<Flat, AREA_CORNERS> = Vec::new();
+        let mut corners: Vec<Flat, NO_FLY_CORNERS> = Vec::new();
         meter
             .call("transit::Transit::shortest_path", 0, || {
                 transit.shortest_path(&from, &to, &mut corners)

@@ -2,7 +2,7 @@
 //! division after a loss; whole plans are in [`super::coverage_missions`]. The results go into a
 //! checksum, by which a test compares board and host bit by bit.
 
-use firmware::capacity::{AREA_CORNERS, GATES, VEHICLES, WAYPOINTS};
+use firmware::capacity::{GATES, NO_FLY_CORNERS, VEHICLES, WAYPOINTS};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::coverage::Flat;
@@ -163,7 +163,7 @@ fn measure_division(
     out: &mut Flights,
     sum: &mut u32,
 ) {
-    let mut transit = Transit::<AREA_CORNERS>::empty();
+    let mut transit = Transit::<NO_FLY_CORNERS>::empty();
     transit.set_area(case.area).expect("they fit");
     let CoverageWorkspace { tracks, build, powell, plan: routes, losses, schedule, .. } = lent;
     let pack = &mut powell.pack;
@@ -184,7 +184,7 @@ fn measure_division(
         unit: TrackUnit::Waypoint,
         following: None,
     };
-    losses.start_plan(tracks, &transit, &[]).expect("nothing is done");
+    losses.reset_with_done(tracks, &transit, &[]).expect("nothing is done");
     pack::binpat(&work, pack, routes).expect("routes");
     let manner = CaptureSettings { waypoint_m: case.lane_m, ..FLIGHT_INPUTS.capture };
     let flight_inputs = FlightInputs { pads: &pads, capture: manner, ..FLIGHT_INPUTS };

@@ -9,7 +9,7 @@ use companion::storage::mission_file::{
     self, MAX_BYTES, MissionBlock, MissionHeader, MissionKind, MissionVehicle, MissionView,
 };
 use companion::swarm::fleet::{DivisionInput, DivisionInputs};
-use firmware::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
+use firmware::capacity::{AREA_VERTICES, GATES, LANES, NO_FLY_CORNERS, VEHICLES, WAYPOINTS};
 use firmware::workspace::CoveragePlanWorkspace;
 use heapless::Vec;
 use planner_core::Point;
@@ -185,7 +185,7 @@ impl Board<'_> {
                     AREA_VERTICES,
                     LANES,
                     VEHICLES,
-                    AREA_CORNERS,
+                    NO_FLY_CORNERS,
                     VEHICLES,
                     WAYPOINTS,
                 >(

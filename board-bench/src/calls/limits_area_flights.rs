@@ -295,8 +295,8 @@ fn call_divisions(
         [(0, 0), (1, 3), (all, all), (3, 1), (0, u32::MAX), (u32::MAX, u32::MAX), (0, all)]
     {
         let done = [WaypointRange { first, end }];
-        let begun = to.call("losses::LossesWorkspace::start_plan", || {
-            memory.losses.start_plan(good.tracks, good.transit, &done).is_ok()
+        let begun = to.call("losses::LossesWorkspace::reset_with_done", || {
+            memory.losses.reset_with_done(good.tracks, good.transit, &done).is_ok()
         });
         to.add_count(usize::from(begun));
         let done = to.call("losses::LossesWorkspace::done", || memory.losses.done().len());
@@ -311,7 +311,10 @@ fn call_divisions(
             for statuses in
                 [&[fate, hit, fate][..], &[hit; VEHICLES], &[lost, hit, lost], &[hit, fate], &[]]
             {
-                memory.losses.start_plan(good.tracks, good.transit, &[]).expect("nothing is done");
+                memory
+                    .losses
+                    .reset_with_done(good.tracks, good.transit, &[])
+                    .expect("nothing is done");
                 flights::plan_flights(good, routes, &FLIGHT_INPUTS, memory.schedule, memory.out)
                     .expect("as before");
                 let mut routes = routes.clone();

@@ -53,8 +53,8 @@ pub(super) fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
             let reach_m =
                 to.call("safety::NeighbourMotion::reach_m", || heard.reach_m(&bounds, hard));
             to.add(reach_m);
-            let beyond = || place_on_points.flown_beyond_m();
-            let more_m = to.call("place::PlaceOnPoints::flown_beyond_m", beyond);
+            let beyond = || place_on_points.place_uncertainty_m();
+            let more_m = to.call("place::PlaceOnPoints::place_uncertainty_m", beyond);
             to.add(more_m);
             let other = to.call("safety::NeighbourMotion::reachable_set", || {
                 heard.reachable_set(&bounds, hard)

@@ -1,6 +1,7 @@
 //! Arming the autopilot step by step, and which of its refusals are reported as texts.
 
-use crate::autopilot::telemetry::{Ack, MAX_AGE_ON_PAD, Telemetry};
+use crate::autopilot::landed::RISEN_M;
+use crate::autopilot::telemetry::{Ack, MAX_POSITION_AGE_ON_PAD, Telemetry};
 use crate::state::State;
 use crate::time::{Duration, Instant};
 
@@ -12,10 +13,7 @@ const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
 /// Most arming requests in a row without a COMMAND_ACK; after them arming has failed.
 const MAX_ARMING_TRIES: u8 = 2;
 /// Most different refusals (command and result) that are reported in one mission state.
-const MAX_REFUSALS: usize = 4;
-/// Estimated height above the pad from which the vehicle counts as risen, whatever the landing
-/// detector reports, metres; an error of the estimate that was there before arming cancels out.
-pub(super) const RISEN_M: f32 = 0.25;
+const MAX_REPORTED_REFUSALS: usize = 4;
 
 const NAV_TAKEOFF: u16 = 22;
 const DO_SET_MODE: u16 = 176;
@@ -50,13 +48,13 @@ pub(crate) struct ArmingHandshake {
     /// Estimated height with which the vehicle was last disarmed, metres.
     disarmed_z_m: f32,
     /// Refusals reported in this state: `MAV_CMD` and `MAV_RESULT`.
-    reported: [Option<(u16, u8)>; MAX_REFUSALS],
+    reported: [Option<(u16, u8)>; MAX_REPORTED_REFUSALS],
 }
 
 impl ArmingHandshake {
     /// Clears what belongs to the state `from`; entering `Arming` clears everything.
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
-        self.reported = [None; MAX_REFUSALS];
+        self.reported = [None; MAX_REPORTED_REFUSALS];
         if to == State::Arming {
             let disarmed_z_m = self.disarmed_z_m;
             *self = Self { in_own_mode: true, disarmed_z_m, ..Self::default() };
@@ -141,7 +139,7 @@ impl ArmingHandshake {
     /// Whether a vehicle whose start is cancelled may be disarmed: it has not risen, and if its
     /// climb had begun, its position is new.
     pub(crate) fn may_disarm_on_pad(&self, now: Instant, telemetry: &Telemetry) -> bool {
-        let seen = telemetry.position_age(now) < MAX_AGE_ON_PAD;
+        let seen = telemetry.position_age(now) < MAX_POSITION_AGE_ON_PAD;
         !self.flown && (seen || !self.climb_begun)
     }
 

@@ -19,8 +19,9 @@ use crate::timers::{Timer, Timers};
 pub(crate) const ORIGIN_RETRY_EVERY: Duration = Duration::from_millis(200);
 /// Time from entering the state `Disarm` to the first request to disarm, and between two such
 /// requests. Autopilots disarm by themselves within 3 s. The report of the ground may be false up
-/// to 2.6 m above it ([`MAX_GROUND_HEIGHT_ERROR_M`](crate::margins::MAX_GROUND_HEIGHT_ERROR_M) and
-/// the estimate's error); at 0.3 m/s, the slowest landing, the vehicle is down before the request.
+/// to 2.6 m above it
+/// ([`MAX_HEIGHT_ERROR_ON_GROUND_M`](crate::margins::MAX_HEIGHT_ERROR_ON_GROUND_M) and the
+/// estimate's error); at 0.3 m/s, the slowest landing, the vehicle is down before the request.
 pub(crate) const DISARM_EVERY: Duration = Duration::from_millis(9000);
 /// Least time in the state `Land` before the landing mode is requested: the safety filter checks
 /// the column below the vehicle for two steps first.
@@ -374,6 +375,10 @@ impl HandshakeContext {
 
 /// Whether the battery's charge was reported in the last 5 s (`MAX_BATTERY_AGE`); also true where
 /// the charge is not checked, with `low_percent` ≤ 0.
-pub(crate) fn is_battery_known(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
+pub(crate) fn is_battery_known_or_unchecked(
+    telemetry: &Telemetry,
+    low_percent: i8,
+    now: Instant,
+) -> bool {
     low_percent <= 0 || telemetry.battery_at.is_some_and(|at| now - at <= MAX_BATTERY_AGE)
 }

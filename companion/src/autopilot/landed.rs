@@ -1,10 +1,11 @@
 //! The landing detector's last report (EXTENDED_SYS_STATE), and how long it holds: its stream may
 //! end while the vehicle stands on its pad.
 
-use crate::autopilot::arming::RISEN_M;
-use crate::autopilot::telemetry::{MAX_POSITION_AGE, Telemetry};
 use crate::time::{Duration, Instant};
 
+/// Estimated height above the pad from which the vehicle counts as risen, whatever the landing
+/// detector reports, metres; an error of the estimate that was there before arming cancels out.
+pub(super) const RISEN_M: f32 = 0.25;
 /// Age up to which a report of the ground holds whatever the position: reports come at 5 Hz.
 const SURELY_VALID_FOR: Duration = Duration::from_millis(400);
 /// Age up to which a report of the ground holds while the vehicle has not risen since.
@@ -21,18 +22,11 @@ pub(super) struct LandedReport {
     pub(super) z_m: f32,
 }
 
-impl Telemetry {
-    /// Whether the landing detector last reported flight.
-    pub fn reports_flight(&self) -> bool {
-        self.landed.is_some_and(|report| !report.on_ground)
-    }
-
-    /// Whether the landing detector reports the ground: its last report says so, and is new, or the
-    /// vehicle has not risen since.
-    pub fn reports_ground(&self, now: Instant) -> bool {
-        let Some(report) = self.landed.filter(|report| report.on_ground) else { return false };
-        let rests =
-            self.position_age(now) < MAX_POSITION_AGE && self.position.z < report.z_m + RISEN_M;
-        now - report.at <= if rests { VALID_ON_PAD_FOR } else { SURELY_VALID_FOR }
+impl LandedReport {
+    /// Whether the report says that the vehicle is on the ground, and still holds: it is new, or
+    /// the vehicle, at the estimated height `z_m` now, has not risen since. NaN: unknown height.
+    pub(super) fn holds_ground(&self, z_m: f32, now: Instant) -> bool {
+        let rests = z_m < self.z_m + RISEN_M;
+        self.on_ground && now - self.at <= if rests { VALID_ON_PAD_FOR } else { SURELY_VALID_FOR }
     }
 }

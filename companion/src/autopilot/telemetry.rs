@@ -34,7 +34,7 @@ use crate::time::{Duration, Instant};
 /// and a late one is not yet silence.
 pub(crate) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 /// Age of a position from which a vehicle may have risen unseen: positions come at 30 Hz.
-pub(crate) const MAX_AGE_ON_PAD: Duration = Duration::from_millis(150);
+pub(crate) const MAX_POSITION_AGE_ON_PAD: Duration = Duration::from_millis(150);
 /// Age from which a position counts as unknown.
 pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500);
 const HEARTBEAT: u32 = 0;
@@ -194,10 +194,23 @@ impl Telemetry {
         time_since(self.position_at, now)
     }
 
+    /// Whether the landing detector last reported flight.
+    pub fn reports_flight(&self) -> bool {
+        self.landed.is_some_and(|report| !report.on_ground)
+    }
+
+    /// Whether the landing detector reports the ground; an old report counts for 3 s, while the
+    /// vehicle has not risen.
+    pub fn reports_ground(&self, now: Instant) -> bool {
+        let known = self.position_age(now) < MAX_POSITION_AGE;
+        let z_m = if known { self.position.z } else { f32::NAN };
+        self.landed.is_some_and(|report| report.holds_ground(z_m, now))
+    }
+
     /// Bound of the error of the estimated position, metres: three times the reported accuracy
     /// (`ACCURACY_FACTOR`), and at least `vouched_m`, which the operator vouches for (`FLK_EST_M`).
     /// Infinite while no recent accuracy is known.
-    pub(crate) fn estimate_bound_m(&self, now: Instant, vouched_m: f32) -> f32 {
+    pub(crate) fn estimate_error_bound_m(&self, now: Instant, vouched_m: f32) -> f32 {
         match self.accuracy {
             Some((accuracy_m, at)) if now - at <= margins::MAX_ACCURACY_AGE => {
                 libm::fmaxf(margins::ACCURACY_FACTOR * accuracy_m, vouched_m)

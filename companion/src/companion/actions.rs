@@ -1,7 +1,7 @@
 //! Runs the mission table: the row that applies, and its action.
 
 use super::Companion;
-use super::division::CANNOT_START_MOST;
+use super::division::CANNOT_COMMIT_MOST;
 use crate::autopilot::handshake::DISARM_EVERY;
 use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
@@ -60,7 +60,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     pub(super) fn run_action(&mut self, from: State, to: State, row: &TransitionRow) {
         let now = self.now;
-        self.save_place_before_jump(to);
+        self.update_place_before_jump(to);
         let position = self.telemetry.position;
         match row.action {
             Action::None | Action::ForgetStart => {}
@@ -80,7 +80,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     if fleet.has_reported_leaving() {
                         // The vehicle takes part again: it leaves its share at the earliest after
                         // this time, since others have to hear it first.
-                        self.timers.set(Timer::LeaveWithoutCommitment, now + CANNOT_START_MOST);
+                        self.timers.set(Timer::LeaveWithoutCommitment, now + CANNOT_COMMIT_MOST);
                     }
                     fleet.begin_flight(now);
                     self.detours.begin_flight();
@@ -89,12 +89,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             Action::HoldHere if to == State::Streaming => {
                 self.mission.leave_pad();
-                self.guidance.hold_at(position);
+                self.guidance.stop_and_hold(position);
             }
             Action::HoldHere if to == State::PilotReturned => {
                 self.guidance.hold_after_pilot(position, self.mission.plan());
             }
-            Action::HoldHere => self.guidance.hold_at(position),
+            Action::HoldHere => self.guidance.stop_and_hold(position),
             Action::HoldOver => {
                 self.timers.set(Timer::Request, now);
                 self.timers.set(Timer::UnheardMode, now);
@@ -131,7 +131,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::BrakeOnPath => self.guidance.cancel_evasion(),
             Action::Rejoin => self.resume_interrupted_state(from, to),
             Action::TurnBack => {
-                self.detours.begin_way_back();
+                self.detours.begin_turn_back();
                 let along_m = self.guidance.progress_m(from, &self.guidance_inputs());
                 let guidance = &mut self.guidance;
                 self.mission.reverse_path(along_m, |path| guidance.reverse_path(path, now));
@@ -151,7 +151,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.end_guided_landing();
         match from {
             _ if from.lands_at_reference() => self.guidance.cancel_evasion(),
-            LandingHeld => self.guidance.hold_at(position),
+            LandingHeld => self.guidance.stop_and_hold(position),
             // Off the path the reference may be behind a wall, so the vehicle holds where it is.
             _ => self.guidance.hold_off_path(position),
         }

@@ -9,7 +9,7 @@ use crate::time::{Duration, Instant};
 
 /// Time since the start after which a companion that has heard no autopilot may erase flash: no
 /// autopilot is connected that could be armed.
-const AUTOPILOT_MISSING_AFTER: Duration = Duration::from_secs(10);
+const ERASE_WITHOUT_AUTOPILOT_AFTER: Duration = Duration::from_secs(10);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Attaches a flash that keeps files and parameters, and applies the parameters stored there.
@@ -46,8 +46,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// roadmap.
     pub(crate) fn erase_permission(&self) -> ErasePermission {
         let idle = self.mission.state().is_idle();
-        let known =
-            self.telemetry.kind.is_some() || self.now - Instant::ZERO > AUTOPILOT_MISSING_AFTER;
+        let known = self.telemetry.kind.is_some()
+            || self.now - Instant::ZERO > ERASE_WITHOUT_AUTOPILOT_AFTER;
         match self.mission.state() {
             _ if self.telemetry.armed => ErasePermission::Forbidden,
             _ if idle && known => ErasePermission::Allowed,

@@ -34,13 +34,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Remembers the position from before a jump, if the new state `to` is one that a jump leads
     /// to.
-    pub(super) fn save_place_before_jump(&mut self, to: State) {
+    pub(super) fn update_place_before_jump(&mut self, to: State) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
         let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.path_source());
         let view =
             DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
-        detours.save_place_before_jump(to, &view);
+        detours.update_place_before_jump(to, &view);
     }
 
     /// Continues the scan of the path for obstacles, and checks whether the other vehicles stand.
@@ -198,7 +198,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.mission.set_failure(failure);
         let outlook = if self.neighbours.any_comes_down_unheard(self.now) {
             RetryOutlook::Settles
-        } else if failure != PlanFailure::Late && self.neighbours.are_all_down(self.now) {
+        } else if failure != PlanFailure::Late && self.neighbours.are_all_out_or_down(self.now) {
             RetryOutlook::Closed
         } else {
             RetryOutlook::Open

@@ -7,7 +7,7 @@ use planner_core::{Length, Point};
 use super::Companion;
 use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
-use crate::link::roster::FlightStatus;
+use crate::link::roster::ShareStatus;
 use crate::link::severity::Severity;
 use crate::margins::PILOT_KEEPS_AFTER;
 use crate::replanning::detour::path_kind::RejoinPlace;
@@ -23,7 +23,7 @@ const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
 const AT_HOLD_M: f32 = 0.2;
 /// Time for which a vehicle on the ground that cannot make a commitment keeps its share while
 /// another one flies.
-pub(super) const CANNOT_START_MOST: Duration = Duration::from_secs(60);
+pub(super) const CANNOT_COMMIT_MOST: Duration = Duration::from_secs(60);
 /// Time for which a vehicle waits above its pad for missing vehicles: twice the time after which a
 /// missing one counts as lost, or leaves for want of a lease. A false report keeps no vehicle in
 /// the air for longer.
@@ -31,9 +31,9 @@ const WAIT_FOR_MISSING_MOST: Duration = Duration::from_secs(180);
 /// Time after the last lost vehicle is down within which a division must become binding.
 const DIVIDES_WITHIN: Duration = Duration::from_secs(60);
 /// Used in place of the plan's CRC where the planner cannot divide the rest of the area.
-const UNDIVIDED: u32 = u32::MAX;
+const DIVISION_IMPOSSIBLE: u32 = u32::MAX;
 /// Time after which an unanswered request for a division is sent to the shell again.
-const REQUEST_RETRY: Duration = Duration::from_secs(30);
+const DIVISION_RETRY_EVERY: Duration = Duration::from_secs(30);
 
 fn to_decimetres(along_m: f32) -> Option<u16> {
     let dm = libm::ceilf(along_m * 10.0);
@@ -55,7 +55,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return;
         }
         if !self.cannot_commit() {
-            self.timers.set(Timer::LeaveWithoutCommitment, now + CANNOT_START_MOST);
+            self.timers.set(Timer::LeaveWithoutCommitment, now + CANNOT_COMMIT_MOST);
         }
         if self.mission.state() != State::Dividing {
             self.timers.set(Timer::DivisionDue, now);
@@ -85,10 +85,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.set_halt_m(halt_m);
         let timers = &mut self.timers;
         let requests =
-            |hash| self.mission.should_request_division(hash, now, REQUEST_RETRY, timers);
+            |hash| self.mission.should_request_division(hash, now, DIVISION_RETRY_EVERY, timers);
         if fingerprint.is_some_and(requests) {
             // The queue is full only if the shell does not drain; then the request is repeated
-            // after `REQUEST_RETRY`.
+            // after `DIVISION_RETRY_EVERY`.
             let _ = self.events.push_back(Event::PlanRequested(PlanKind::Division));
         }
     }
@@ -106,7 +106,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ends = match state {
             _ if state.has_left_mission() => true,
             _ if state.is_left_to_pilot() => {
-                self.mission.time_with_pilot(self.now) >= PILOT_KEEPS_AFTER
+                self.mission.time_since_pilot_takeover(self.now) >= PILOT_KEEPS_AFTER
             }
             _ => {
                 (off_plan && !beside)
@@ -121,9 +121,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let descends = self.guidance.along_m() > self.last_descent_start_m() + AT_HOLD_M;
         let nearly_down = flies && descends && !on_pad && self.division_hold_m().is_none();
         let standing = match ends || nearly_down {
-            true if self.mission.has_all_pictures(along_m) => FlightStatus::Finished,
-            _ if ends => FlightStatus::Left,
-            _ => FlightStatus::Alive,
+            true if self.mission.has_all_pictures(along_m) => ShareStatus::Finished,
+            _ if ends => ShareStatus::Left,
+            _ => ShareStatus::Alive,
         };
         OwnReport {
             status: standing,
@@ -166,7 +166,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             State::Ready => !self.is_at_start() || self.hears_another_plan(),
             state => state.waits_on_pad() && self.hears_another_plan(),
         };
-        lacks && self.neighbours.does_another_take_part(self.now, LEASE)
+        lacks && self.neighbours.is_another_in_flight(self.now, LEASE)
     }
 
     /// Whether this vehicle is on its pad and was not started: it may take part as a new vehicle.
@@ -266,7 +266,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether no division is under way, and this vehicle flies by the last binding one.
-    pub(super) fn is_undivided(&self) -> bool {
+    pub(super) fn is_division_settled(&self) -> bool {
         self.neighbours.fleet().is_none_or(|fleet| {
             let flown = fleet.division_count() == self.mission.division_count()
                 && !self.mission.is_division_plan_ready();
@@ -284,7 +284,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Takes up its own plan again beyond the obstacle that it flew around.
-    fn resume_own_plan(&mut self, plan: &VehiclePlan<W, G>) {
+    fn resume_plan_beyond_detour(&mut self, plan: &VehiclePlan<W, G>) {
         let Some(RejoinPlace { along_m: back_m, position }) = self.detours.rejoin() else {
             return;
         };
@@ -331,7 +331,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // All vehicles fail alike: each keeps its part, and the waypoints of the lost vehicle
             // are left.
             Err(_) if fleet.needs_division() => {
-                fleet.set_hash_from_plan(UNDIVIDED);
+                fleet.set_hash_from_plan(DIVISION_IMPOSSIBLE);
                 self.links.send_text(Severity::Warning, "What is left cannot be divided");
             }
             Err(_) if may_take && self.detours.is_beside_plan() => {
@@ -347,7 +347,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     && division == self.mission.division_count()
                     && self.detours.is_beside_plan() =>
             {
-                self.resume_own_plan(plan);
+                self.resume_plan_beyond_detour(plan);
             }
             Ok(plan) if may_take && division > self.mission.division_count() => {
                 let in_air = self.mission.state() == State::Dividing;

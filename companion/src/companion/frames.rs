@@ -7,7 +7,7 @@ use mavlink::dialects::ardupilotmega::{
     PARAM_SET_DATA, PARAM_VALUE_DATA, TIMESYNC_DATA, TUNNEL_DATA,
 };
 
-use super::{Companion, REPORT_EVERY};
+use super::{Companion, WARNING_EVERY};
 use crate::autopilot::handshake::ORIGIN_RETRY_EVERY;
 use crate::autopilot::telemetry::TelemetryChange;
 use crate::events::Link;
@@ -72,7 +72,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.services.handle_parameter_set(&heard, &mut self.links);
                 false
             }
-            TIMESYNC_DATA::ID if heard.is_from_another() => {
+            TIMESYNC_DATA::ID if heard.is_from_another_component() => {
                 answer_timesync(&heard, &mut self.links);
                 false
             }
@@ -141,7 +141,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.telemetry.origin_moved
             }
             TelemetryChange::OriginFar(km) => {
-                if self.timers.take_due(Timer::OriginReport, now, REPORT_EVERY) {
+                if self.timers.take_due(Timer::OriginReport, now, WARNING_EVERY) {
                     let text = "EKF origin # km away: not used";
                     self.links.send_text_with_numbers(Severity::Warning, text, [km, 0]);
                 }
@@ -216,7 +216,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
         let delay_s = echo.and_then(|echo| self.links.message_delay_s(&echo, self.now));
         if let Some(sent) = echo.and_then(|echo| self.links.sent_intents().note_arrival(&echo)) {
-            self.guidance.note_reported_way(sent.at, sent.ends_m);
+            self.guidance.note_acknowledged_path(sent.at, sent.ends_m);
         }
         if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.message_delay(id)) {
             late.update(delay_s);
@@ -276,7 +276,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let restarts = command.command == commands::REBOOT && result == ACCEPTED;
         if restarts || *self.mission.pending() != before || self.detours.obstacle_count() != known {
-            self.links.log_command(self.now, sender, command);
+            self.links.send_command_text(self.now, sender, command);
         }
         command.to_our_system.then_some(result)
     }

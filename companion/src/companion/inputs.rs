@@ -3,11 +3,11 @@
 use planner_core::{Length, Point};
 
 use super::{Companion, HEARTBEAT_EVERY};
-use crate::autopilot::handshake::is_battery_known;
+use crate::autopilot::handshake::is_battery_known_or_unchecked;
 use crate::autopilot::telemetry::MAX_POSITION_AGE;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
-use crate::margins::{LEASE_S, MAX_GROUND_HEIGHT_ERROR_M};
+use crate::margins::{LEASE_S, MAX_HEIGHT_ERROR_ON_GROUND_M};
 use crate::mission::{GuardInputs, State, UNFOLLOWED_MOST};
 use crate::swarm::fleet::{Fleet, MISSED_AFTER};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
@@ -22,7 +22,7 @@ const LANDING_DRIFT_M: f32 = 1.0;
 const STANDING_DRIFT_M: f32 = 0.3;
 /// Time since the last renewal of its lease after which a vehicle in a coverage mission counts as
 /// unheard: 1 s before the lease ends. The row `NeighboursSilent` stops the vehicle 1 s later.
-const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(LEASE_S - 1);
+const UNHEARD_AFTER: Duration = Duration::from_secs(LEASE_S - 1);
 /// Height above the pad below which a climb is not interrupted by a pause, metres: lower, an
 /// autopilot may take a hovering vehicle for landed, and disarm it.
 const MIN_PAUSE_HEIGHT_M: f32 = 1.0;
@@ -32,7 +32,7 @@ const RESERVE_UNHEARD_MOST: Duration = Duration::from_secs(300);
 /// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle in a coverage mission may be away
 /// from a setpoint that stands; then it lands. Gusts push it further there than walls would allow
 /// indoors.
-const MAX_SWAY_OVER_AREA: Duration = Duration::from_secs(60);
+const EXTRA_SWAY_TIME: Duration = Duration::from_secs(60);
 /// Greatest distance from its setpoint at which that additional time applies, metres.
 const MAX_SWAY_M: f32 = 2.0;
 /// An unheard vehicle stops if its next closed gate is less than this ahead, metres.
@@ -75,7 +75,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (over_field, sought_home) =
             (self.detours.home.can_turn(&view), self.detours.home.seeking_for(now));
         let sways = area && self.guidance.lead_m(t) < MAX_SWAY_M;
-        let sways_for = if sways { MAX_SWAY_OVER_AREA } else { Duration::default() };
+        let sways_for = if sways { EXTRA_SWAY_TIME } else { Duration::default() };
         let unfollowed_for = self.guidance.unfollowed_for(now).saturating_sub(sways_for);
         let (at_end, homeward) = (self.guidance.is_at_end(scene), self.is_homeward());
         let blocked_for = self.detours.blocked_for(now);
@@ -100,7 +100,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
             unfollowed_for,
             blocked_for,
-            neighbour_age: self.neighbour_age(),
+            unlinked_for: self.unlinked_for(),
             division_overdue: self.timers.is_due(Timer::DivisionDue, now),
             way_free: self.is_flying_unheard(),
             out_of_range: self.neighbours.are_all_out_of_range(),
@@ -110,7 +110,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plans_differ: self.hears_another_plan(),
             holds_to_divide: self.is_holding_for_division(),
             division_ready: self.mission.is_division_plan_ready(),
-            undivided: self.is_undivided() && !self.detours.is_off_own_path(),
+            division_settled: self.is_division_settled() && !self.detours.is_off_own_path(),
             plan_ready: self.mission.plan().is_some(),
             plan_failed: self.mission.plan_failure().is_some(),
             roadmap_bad: self.mission.plan_failure() == Some(PlanFailure::RoadmapUnusable),
@@ -134,7 +134,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             can_fly_home: over_field,
             descends: self.guidance.is_descending(),
             may_fly_beside: standing
-                && (self.is_undivided() || self.detours.is_beside_plan())
+                && (self.is_division_settled() || self.detours.is_beside_plan())
                 && self.detours.may_detour_over_area(&view, &self.timers),
             detour_flown: follow && self.detours.leads_back() && at_end && standing,
             own_plan_ready: self.detours.is_own_plan_ready(),
@@ -165,12 +165,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && self.mission.departure_due(now)
                 && !self.hears_another_plan()
                 && !self.mission.pending().pause
-                && is_battery_known(t, self.config.battery_low_percent, now)
+                && is_battery_known_or_unchecked(t, self.config.battery_low_percent, now)
                 && !self.detours.is_blocked()
                 && self.neighbours.is_path_clear_since(self.mission.entered_at())
                 && match self.neighbours.fleet() {
                     Some(fleet) => fleet.takes_part() && self.is_linked(),
-                    None => self.is_linked() || self.neighbours.are_all_at_rest(),
+                    None => self.is_linked() || self.neighbours.are_all_landed_or_out(),
                 },
             climb_done: self.mission.state() == State::Climb && self.guidance.is_climb_done(scene),
             // The ground may be higher than the plan says: a reported landing ends the descent.
@@ -194,7 +194,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             column_blocked_for: self.guidance.filter.column_blocked_for(now),
             column_blocked_for_good_for: self.guidance.filter.column_blocked_for_good_for(now),
             start_barred_for: self.mission.start_barred_for(now),
-            others_fly: self.neighbours.does_another_fly_its_part(now, MISSED_AFTER),
+            others_fly: self.neighbours.may_leave_part_to_others(now, MISSED_AFTER),
             column_clear_for: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
             can_turn_back: can_leave
@@ -205,7 +205,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.neighbours.hears_nobody(now),
             pad_blocked_for: self.pad_blocked_for(),
             way_back_blocked_for: self.way_back_blocked_for(),
-            path_barred: follow && self.guidance.is_path_barred(scene),
+            join_barred: follow && self.guidance.is_join_barred(scene),
             // Over an area the search checks the way from where the vehicle is.
             can_land_aside: can_leave && (joins || area) && self.detours.can_land_aside(&view),
             seeks_landing: self.detours.seeks_landing(),
@@ -244,16 +244,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn is_at_start(&self) -> bool {
         let pad = self.mission.path_start() - Point::new(0.0, 0.0, self.mission.climb_m());
         let away = self.telemetry.position - pad;
-        let height_tolerance_m = self.config.start_tolerance_m.min(MAX_GROUND_HEIGHT_ERROR_M);
+        let height_tolerance_m = self.config.start_tolerance_m.min(MAX_HEIGHT_ERROR_ON_GROUND_M);
         away.xy().length() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m
     }
 
     /// Time for which this vehicle has been unheard; zero while it may fly on unheard. In a
     /// coverage mission it counts from 1 s before the end of the lease.
-    fn neighbour_age(&self) -> Duration {
+    fn unlinked_for(&self) -> Duration {
         let (now, state) = (self.now, self.mission.state());
         if let Some(fleet) = self.neighbours.fleet() {
-            let age = fleet.unheard_for(now).saturating_sub(UNHEARD_STOP_AFTER);
+            let age = fleet.unheard_for(now).saturating_sub(UNHEARD_AFTER);
             // On the pad the age counts from the entry into the state, so that the warning row that
             // enters `Scheduled` again is not taken in each step.
             let on_pad = state == State::Scheduled;
@@ -262,13 +262,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // A vehicle that flies back, or aside to land, does not stop because no other vehicle hears
         // it: it is about to land anyway. A vehicle that stands does: others assume after a while
         // that it is down.
-        let stands = state.stands_to_resume();
+        let stands = state.stands_until_resumed();
         let is_landing =
             self.guidance.returning || self.detours.lands_at_end() || self.detours.seeks_landing();
         match (is_landing && !stands) || self.is_flying_unheard() {
             true => Duration::default(),
-            false if stands => self.neighbours.silence_duration(now, Instant::ZERO),
-            false => self.neighbours.silence_duration(now, self.mission.entered_at()),
+            false if stands => self.neighbours.unlinked_duration(now, Instant::ZERO),
+            false => self.neighbours.unlinked_duration(now, self.mission.entered_at()),
         }
     }
 
@@ -276,7 +276,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// vehicle from moving on because of a vehicle that comes down unheard. Such a descent takes
     /// longer than the limits for hindrances, and leaves room once it ends.
     fn counted_hindrance(&self, hindered_for: Duration) -> Duration {
-        hindered_for.min(self.guidance.filter.time_since_fall(self.now))
+        hindered_for.min(self.guidance.filter.time_since_blocked_by_descent(self.now))
     }
 
     /// Time for which other vehicles have barred the descent to its pad, or the path there.

@@ -8,7 +8,7 @@ use super::Companion;
 use crate::events::Link;
 use crate::link::OnDemandMessage;
 use crate::link::done::{self, PhotographedReport};
-use crate::mission::photographed::{FlightStage, PlansWith};
+use crate::mission::photographed::{FlightStage, PlanningPartners};
 use crate::state::State;
 use crate::swarm::fleet::Fleet;
 use crate::time::Duration;
@@ -36,14 +36,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether this vehicle stands on its pad before its take-off, where it has to compute the same
     /// plan as the others.
-    fn plans_with_others(&self) -> bool {
+    fn is_before_take_off(&self) -> bool {
         self.is_not_started() || self.mission.state() == State::Scheduled
     }
 
     /// How far this vehicle's flight is.
     fn flight_stage(&self) -> FlightStage {
         match self.mission.state() {
-            _ if self.plans_with_others() => FlightStage::OnPad,
+            _ if self.is_before_take_off() => FlightStage::OnPad,
             state if state.is_over() => FlightStage::Over,
             _ => FlightStage::UnderWay,
         }
@@ -100,12 +100,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ours = report.mission_crc == self.config.mission_crc
             && self.config.roster.iter().any(|entry| entry.system_id == report.system_id);
         if ours && self.is_area_mission() && self.config.skips_photographed {
-            let under_way = || self.neighbours.fleet().is_some_and(Fleet::is_flight_under_way);
+            let under_way = || self.neighbours.fleet().is_some_and(Fleet::has_flight_begun);
             let planning = match self.mission.state() {
-                _ if !self.plans_with_others() => PlansWith::Nobody,
+                _ if !self.is_before_take_off() => PlanningPartners::Nobody,
                 // Once started, it keeps its part of a flight in which others fly or have flown.
-                State::Scheduled if under_way() => PlansWith::ThoseInFlight,
-                _ => PlansWith::All,
+                State::Scheduled if under_way() => PlanningPartners::ThoseInFlight,
+                _ => PlanningPartners::All,
             };
             self.mission.photographed_mut().handle_report(report, planning, self.now);
         }

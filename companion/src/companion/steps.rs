@@ -1,7 +1,7 @@
 //! What is done in time: the control step, and the messages that are sent periodically.
 
-use super::{Companion, HEARTBEAT_EVERY, REPORT_EVERY};
-use crate::autopilot::handshake::is_battery_known;
+use super::{Companion, HEARTBEAT_EVERY, WARNING_EVERY};
+use crate::autopilot::handshake::is_battery_known_or_unchecked;
 use crate::events::{Event, Link};
 use crate::guidance::GuidanceInputs;
 use crate::link::OnDemandMessage;
@@ -97,7 +97,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.detours.path_source(),
         );
         if !self.guidance.step(self.mission.state(), &scene, &mut self.neighbours, now, dt_s)
-            && self.timers.take_due(Timer::HeldReport, now, REPORT_EVERY)
+            && self.timers.take_due(Timer::HeldReport, now, WARNING_EVERY)
         {
             self.links.send_text(Severity::Warning, "Setpoint out of limits: holding");
         }
@@ -173,7 +173,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if waits
             && self.has_goal()
             && self.mission.time_in_state(self.now) >= CHARGE_REPORT_AFTER
-            && !is_battery_known(&self.telemetry, least, self.now)
+            && !is_battery_known_or_unchecked(&self.telemetry, least, self.now)
             && self.timers.take_due(Timer::ChargeReport, self.now, CHARGE_REPORT_EVERY)
         {
             self.links.send_text(Severity::Warning, "Battery charge unknown: start waits");
@@ -205,7 +205,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// into the margin to walls, and reports a change.
     pub(super) fn check_estimate_error(&mut self) {
         let (now, config) = (self.now, &self.config);
-        let bound_m = self.telemetry.estimate_bound_m(now, config.estimate_m);
+        let bound_m = self.telemetry.estimate_error_bound_m(now, config.estimate_m);
         // A bound as good as the best receiver's refuses nothing: the operator chose the margin.
         let pace = match bound_m <= margins::MIN_ESTIMATE_ERROR_M {
             true => 1.0,

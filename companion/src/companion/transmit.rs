@@ -85,7 +85,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if link == Link::Swarm && !self.may_send_by_radio() {
             return 0;
         }
-        let relayed = if link == Link::Swarm { self.relay_neighbours(out) } else { 0 };
+        let relayed = if link == Link::Swarm { self.transmit_relay(out) } else { 0 };
         let length = if relayed > 0 { relayed } else { self.transmit_answer(link, out) };
         if link == Link::Swarm {
             self.links.take_radio_tokens(length);
@@ -110,7 +110,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Writes a message that relays the progress of vehicles that some neighbour does not hear,
     /// while more than half of the radio's token bucket is left for answers. Returns its length, 0
     /// for none.
-    fn relay_neighbours(&mut self, out: &mut [u8]) -> usize {
+    fn transmit_relay(&mut self, out: &mut [u8]) -> usize {
         if !self.links.is_radio_bucket_half_full()
             || !self.links.take_due(Link::Swarm, OnDemandMessage::Relay)
         {
@@ -401,7 +401,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 last.into_iter()
                     .for_each(|last| add(Point::new(last.x, last.y, self.guidance.ground_m(plan))));
             }
-            state if state.moves_along_path() => {
+            state if state.is_on_path_or_stopping() => {
                 column = false;
                 add(setpoint);
                 let (from_m, most_m) =

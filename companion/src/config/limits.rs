@@ -24,7 +24,7 @@ pub(crate) const MAX_SMOOTHING_S: f32 = 1.2;
 /// Least time that is assumed until a vehicle that no other one hears has stopped, seconds.
 const UNHEARD_STOPPED_S: f32 = 3.0;
 /// Least limit of the speed on a straight leg (climb, join, descent), m/s.
-pub(crate) const JOIN_MPS: f32 = 1.0;
+pub(crate) const MIN_LEG_SPEED_MPS: f32 = 1.0;
 
 /// With how much jerk a setpoint may brake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,7 +138,7 @@ impl Settings {
             ..TrackConfig::default()
         };
         let leg_track = TrackConfig {
-            cruise_mps: limits.max_speed_mps().min(JOIN_MPS.max(limits.climb_mps)),
+            cruise_mps: limits.max_speed_mps().min(MIN_LEG_SPEED_MPS.max(limits.climb_mps)),
             climb_mps: limits.climb_mps,
             descend_mps: limits.descend_mps,
             ..track

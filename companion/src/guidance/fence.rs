@@ -21,13 +21,13 @@ use crate::config::limits::{MotionLimits, Urgency};
 const FRAME_ROUNDING_M: f32 = 2e-3;
 /// Distance before the fence at which the follower turns, metres: steps of finite length overshoot
 /// by millimetres.
-const TURN_BEFORE_FENCE_M: f32 = 0.02;
+const FOLLOWER_FENCE_MARGIN_M: f32 = 0.02;
 /// Share of the jerk limit with which an axis may brake, and share with which its stops are
 /// planned.
-const JERK_SHARES: [f32; 2] = [0.577, 0.48];
+const BRAKE_PLAN_JERK_SHARES: [f32; 2] = [0.577, 0.48];
 /// Share of the acceleration limit with which an axis may brake, and share with which its stops are
 /// planned: horizontally, then vertically.
-const ACCEL_SHARES: [[f32; 2]; 2] = [[0.7, 0.65], [1.0, 0.9]];
+const BRAKE_PLAN_ACCEL_SHARES: [[f32; 2]; 2] = [[0.7, 0.65], [1.0, 0.9]];
 /// Number of bisection steps between a jerk that is safe and one that is not.
 const STEP_HALVINGS: usize = 8;
 
@@ -112,8 +112,9 @@ impl Fence {
                 // reaches it.
                 let (ahead, pace, push) = next(jerk[axis]);
                 let away = if walls.can_stop_below_high(ahead, pace, push) { 1.0 } else { -1.0 };
-                let part = JERK_SHARES[0] * most_mps3;
-                let accel_most = limits.max_accel_mps2[axis / 2] * ACCEL_SHARES[axis / 2][0];
+                let part = BRAKE_PLAN_JERK_SHARES[0] * most_mps3;
+                let accel_most =
+                    limits.max_accel_mps2[axis / 2] * BRAKE_PLAN_ACCEL_SHARES[axis / 2][0];
                 hardest[axis] =
                     away * fmaxf(fminf(part, (accel_most - away * accel) / dt_s), -part);
                 let wanted = fmaxf(fminf(jerk[axis], part), -part);
@@ -144,7 +145,7 @@ impl Fence {
     /// comes no nearer to the fence.
     fn axis_walls(&self, axis: usize, place: f32, brake: BrakingLimits) -> AxisBounds {
         let (low, high) = (self.low[axis], self.high[axis]);
-        let before_m = fminf(TURN_BEFORE_FENCE_M, 0.25 * (high - low));
+        let before_m = fminf(FOLLOWER_FENCE_MARGIN_M, 0.25 * (high - low));
         AxisBounds { low: fminf(low + before_m, place), high: fmaxf(high - before_m, place), brake }
     }
 }
@@ -170,8 +171,8 @@ impl AxisBounds {
 /// Acceleration and jerk with which the stops of an axis are planned.
 fn axis_brake(limits: &MotionLimits, axis: usize) -> BrakingLimits {
     BrakingLimits {
-        accel_mps2: ACCEL_SHARES[axis / 2][1] * limits.max_accel_mps2[axis / 2],
-        jerk_mps3: JERK_SHARES[1] * limits.jerk(Urgency::Smooth),
+        accel_mps2: BRAKE_PLAN_ACCEL_SHARES[axis / 2][1] * limits.max_accel_mps2[axis / 2],
+        jerk_mps3: BRAKE_PLAN_JERK_SHARES[1] * limits.jerk(Urgency::Smooth),
     }
 }
 

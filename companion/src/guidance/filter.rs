@@ -37,7 +37,7 @@ const MAX_TURNING_SETPOINT_MPS: f32 = 0.05;
 const MAX_TURNING_SETPOINT_M: f32 = 0.03;
 /// A vehicle nearer than this to its advised stop counts as standing there, metres: a little more
 /// than the distance that advice looks ahead.
-const STANDSTILL_WITHIN_M: f32 = 0.6;
+const AT_ADVISED_STOP_M: f32 = 0.6;
 /// A vehicle that the filter kept from continuing within this time still counts as hindered.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
 /// Time without a hindrance by the filter after which the next one begins a new count.
@@ -88,7 +88,7 @@ pub(crate) struct SafetyFilter {
     hindered_yields: bool,
     /// When the filter last kept the vehicle from continuing because of a neighbour that comes down
     /// unheard.
-    fall_at: Instant,
+    blocked_by_descent_at: Instant,
     /// Number of times that the filter stopped the vehicle.
     activations: u32,
 }
@@ -191,8 +191,8 @@ impl SafetyFilter {
 
     /// Time since the filter last kept the vehicle from continuing because of a neighbour that
     /// comes down unheard, and so is soon out of this vehicle's path.
-    pub(crate) fn time_since_fall(&self, now: Instant) -> Duration {
-        now - self.fall_at
+    pub(crate) fn time_since_blocked_by_descent(&self, now: Instant) -> Duration {
+        now - self.blocked_by_descent_at
     }
 
     /// Whether no other vehicle could be in the landing column in the last step.

@@ -5,7 +5,7 @@
 //! points ahead of its setpoint. It does not move again until [`HOLD_REPORT_LIFETIME`] and the
 //! delay of its messages have passed since the last such report, by when the others have heard new
 //! points. The vehicle that yields reports its hold at once, the other one only after standing for
-//! [`FIRST_STANDSTILL`], so that it goes first.
+//! [`GOING_FIRST_STANDSTILL`], so that it goes first.
 //!
 //! ENU metres.
 
@@ -17,7 +17,7 @@ const HOLD_REPORT_LIFETIME: Duration = Duration::from_millis(1000);
 pub(super) const YIELDING_STANDSTILL: Duration = Duration::from_millis(300);
 /// Time of standing after which a vehicle that goes first reports that it holds: time for the
 /// others to stop.
-pub(super) const FIRST_STANDSTILL: Duration = Duration::from_secs(4);
+pub(super) const GOING_FIRST_STANDSTILL: Duration = Duration::from_secs(4);
 
 /// Whether the vehicle reports that it holds, and when it last did.
 #[derive(Clone, Copy, Debug, Default)]

@@ -22,7 +22,7 @@ impl Guidance {
 
     /// Share of the nominal speed at which the setpoint advances while the vehicle is not to fly
     /// on: at rest it holds; before the take-off it follows the position estimate.
-    pub(super) fn standing_share(&self) -> f32 {
+    pub(super) fn standing_speed_share(&self) -> f32 {
         if self.raw_point_at_rest { 1.0 } else { 0.0 }
     }
 

@@ -6,7 +6,7 @@ use super::nearest::nearest_arc_length_m;
 use super::phase::Phase;
 use super::smoother::TICK_S;
 use super::waypoints::Algorithm2Waypoints;
-use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, SETTLED_M, STANDING_SETPOINT_MPS};
+use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, SETPOINT_AT_REFERENCE_M, STANDING_SETPOINT_MPS};
 use crate::config::limits::Urgency;
 use crate::time::Instant;
 use planner_core::Point;
@@ -16,7 +16,7 @@ use planner_core::track::ReferenceState;
 impl Guidance {
     /// Holds from now on: where the setpoint comes to a stop; at `point` where there is no
     /// setpoint, or the position was lost.
-    pub fn hold_at(&mut self, point: Point) {
+    pub fn stop_and_hold(&mut self, point: Point) {
         // After a lost position the setpoint begins where the vehicle is.
         let lost = core::mem::take(&mut self.position_unknown) && self.unsent_s > 0.0;
         if lost || !self.smoother.has_setpoint() {
@@ -33,7 +33,7 @@ impl Guidance {
         point: Point,
         plan: Option<&VehiclePlan<W, G>>,
     ) {
-        self.hold_at(point);
+        self.stop_and_hold(point);
         self.forget_leg();
         let Some(path) = plan.map(|plan| &plan.path) else { return };
         let away = |end: Point| (end - point).xy().norm_squared() > ARRIVED_M * ARRIVED_M;
@@ -131,7 +131,7 @@ impl Guidance {
     /// Whether the setpoint has reached the reference, at which a path aside begins: a setpoint
     /// that was stopped short of the reference would first have to fly on.
     pub(crate) fn is_setpoint_at_reference(&self) -> bool {
-        libm::fabsf(self.tracker.along_m - self.setpoint_m) < SETTLED_M
+        libm::fabsf(self.tracker.along_m - self.setpoint_m) < SETPOINT_AT_REFERENCE_M
     }
 
     /// Whether the setpoint stands, in a descent too.
@@ -162,10 +162,10 @@ impl Guidance {
         (self.guides_landing, self.progress_at) = (true, now);
     }
 
-    /// Holds as [`Self::hold_at`] for a landing that does not begin on the path: no straight way
-    /// from there to the path is known to be free of walls.
+    /// Holds as [`Self::stop_and_hold`] for a landing that does not begin on the path: no straight
+    /// way from there to the path is known to be free of walls.
     pub(crate) fn hold_off_path(&mut self, point: Point) {
-        self.hold_at(point);
+        self.stop_and_hold(point);
         self.lands_off_path = true;
     }
 
@@ -182,7 +182,7 @@ impl Guidance {
     /// Resumes the climb after an interruption, from the setpoint, or from the vehicle where there
     /// is none.
     pub fn resume_climb(&mut self, position: &Point, now: Instant) {
-        self.hold_at(*position);
+        self.stop_and_hold(*position);
         self.followed_at = now;
         self.phase = Phase::Climb;
     }
@@ -195,7 +195,7 @@ impl Guidance {
         position: &Point,
         now: Instant,
     ) {
-        self.hold_at(*position);
+        self.stop_and_hold(*position);
         self.followed_at = now;
         let (path, place) = (&plan.path, self.smoother.position());
         let below = path.point_at(path.length_m()).is_some_and(|end| {

@@ -29,7 +29,7 @@ const STOPS_BEFORE_GATE_M: f32 = 0.05;
 const REPORTED_SHORT_M: f32 = PROGRESS_ERROR_M - STOPS_BEFORE_GATE_M;
 /// Distance below the ground of which a vehicle that has landed reports the progress, metres: every
 /// gate that waits for its flight opens.
-const LANDED_BELOW_GROUND_M: f32 = 1.0;
+const LANDED_EXTRA_PROGRESS_M: f32 = 1.0;
 /// Distance up to a stop below which a vehicle on its pad does not depart, metres.
 const MIN_DEPARTURE_M: f32 = 0.05;
 
@@ -81,10 +81,10 @@ impl Guidance {
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> f32 {
-        self.flown_distance_m(state, scene).max(self.reported_m)
+        self.measured_progress_m(state, scene).max(self.reported_m)
     }
 
-    pub(super) fn flown_distance_m<const W: usize, const G: usize>(
+    pub(super) fn measured_progress_m<const W: usize, const G: usize>(
         &self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
@@ -95,7 +95,7 @@ impl Guidance {
         let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
         let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
         if state.has_landed() && self.has_reached_end(path) {
-            return length_m + plan.descent_m + LANDED_BELOW_GROUND_M;
+            return length_m + plan.descent_m + LANDED_EXTRA_PROGRESS_M;
         }
         match self.phase {
             Phase::Climb => -clamp_to(start_z - z, 0.0, plan.climb_m),
@@ -339,7 +339,7 @@ impl Guidance {
     }
 
     /// Whether the vehicle is to join its path, but cannot.
-    pub(crate) fn is_path_barred<const W: usize, const G: usize>(
+    pub(crate) fn is_join_barred<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {

@@ -11,7 +11,7 @@ use super::{
     GuidanceInputs, LEG_LEAD_M, MIN_LEG_M, Phase, SETTLE_WINDOW_M, TOUCHDOWN_MPS,
 };
 use crate::autopilot::AutopilotKind;
-use crate::config::limits::JOIN_MPS;
+use crate::config::limits::MIN_LEG_SPEED_MPS;
 use crate::guidance::evade::{self, StepBack};
 use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
@@ -90,7 +90,7 @@ impl Guidance {
         if self.phase == Phase::Join && (leg.length_m() < MIN_LEG_M || self.is_leg_done()) {
             // A leg back up a descent may end beside the path: another leg joins it.
             let beside_m = (target - raw).length();
-            let joined = beside_m < MIN_LEG_M + JOIN_MPS * TICK_S;
+            let joined = beside_m < MIN_LEG_M + MIN_LEG_SPEED_MPS * TICK_S;
             (self.phase, self.leg) = (if joined { Phase::Path } else { Phase::Join }, None);
         }
         reference.map_or(raw, |reference| reference.position)
@@ -124,7 +124,7 @@ impl Guidance {
         let mut advice = *advice;
         if let Some(to_m) = self.back_to_m {
             let safety_m = self.deconflict.safety_distance_m;
-            let near = neighbours.states_at(now);
+            let near = neighbours.states_with_age(now);
             // The reference steps back only if the filter has checked the path backwards and found
             // it free.
             let free = self.filter.scans_backwards() && !self.filter.is_stopped();

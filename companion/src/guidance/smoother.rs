@@ -51,7 +51,7 @@ const CLOCK_JERK_SHARE: f32 = 0.7;
 /// the rest.
 const END_JERK_SHARE: f32 = 0.4;
 /// A setpoint slower than this stands, m/s.
-const SETPOINT_STANDSTILL_MPS: f32 = 0.01;
+const FULL_STOP_MPS: f32 = 0.01;
 /// Rate of decay at the end of a stop, 1/s: the deceleration is at most this times the speed that
 /// is left.
 const STOP_DECAY_PER_S: f32 = 4.0;
@@ -228,7 +228,7 @@ impl SetpointSmoother {
 
     /// Whether the setpoint stands.
     pub(crate) fn is_standing(&self) -> bool {
-        self.velocity().norm_squared() < SETPOINT_STANDSTILL_MPS * SETPOINT_STANDSTILL_MPS
+        self.velocity().norm_squared() < FULL_STOP_MPS * FULL_STOP_MPS
     }
 
     /// Length of a stop of the setpoint that begins now, metres: while the braking builds up, and
@@ -236,7 +236,7 @@ impl SetpointSmoother {
     pub(crate) fn stopping_distance_m(&self, urgency: Urgency) -> f32 {
         let velocity = self.velocity();
         let speed = sqrtf(velocity.norm_squared());
-        if speed < SETPOINT_STANDSTILL_MPS {
+        if speed < FULL_STOP_MPS {
             return 0.0;
         }
         let accel = self.limits.accel_along(&(velocity / speed));
@@ -294,7 +294,7 @@ impl SetpointSmoother {
     }
 
     /// Whether the next step makes up for a gap, and is as long as the time since the last sending.
-    pub(crate) fn resumes_from_last(&self) -> bool {
+    pub(crate) fn makes_up_for_gap(&self) -> bool {
         self.resumes
     }
 

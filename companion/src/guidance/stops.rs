@@ -27,7 +27,7 @@ const NOT_TRAPPED_MPS: f32 = 0.5;
 impl Guidance {
     /// Notes that another vehicle has acknowledged the intent sent at `sent_at`, whose points lead
     /// to `ends_m` along the path.
-    pub(crate) fn note_reported_way(&mut self, sent_at: Instant, ends_m: f32) {
+    pub(crate) fn note_acknowledged_path(&mut self, sent_at: Instant, ends_m: f32) {
         if sent_at > self.acknowledged_path.since {
             self.acknowledged_path.to_m = ends_m;
         }
@@ -129,7 +129,7 @@ impl Guidance {
 
     /// Notes whether the vehicle is trapped below one that descends: no place back along the path
     /// is better, or the way back is barred. `step_back`: that of this step's raw points.
-    pub(super) fn mark_trapped(&mut self, step_back: StepBack, now: Instant) {
+    pub(super) fn update_trapped(&mut self, step_back: StepBack, now: Instant) {
         let barred = step_back == StepBack::Barred
             || (self.filter.scans_backwards() && self.filter.is_stopped());
         if self.no_better_place || (self.back_to_m.is_some() && barred) {

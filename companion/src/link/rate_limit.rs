@@ -5,7 +5,7 @@
 //! State is sent at a fixed rate ([`state_bytes_per_s`]; in a coverage mission also
 //! [`COVERAGE_BYTES_PER_S`]). Everything else (acks, texts, parameters, files, messages requested
 //! by REQUEST_MESSAGE) takes tokens from a bucket that fills with time. So in any t seconds the
-//! radio gets at most t times the sum of these rates, plus [`MAX_SAVED_BYTES`], plus one frame,
+//! radio gets at most t times the sum of these rates, plus [`MAX_BURST_BYTES`], plus one frame,
 //! whatever is requested.
 
 use crate::link::frame::MAX_FRAME_LEN;
@@ -22,7 +22,7 @@ pub const DISARMED_BYTES_PER_S: u32 = 4500;
 /// and on the ground a report of photographed waypoints.
 pub const COVERAGE_BYTES_PER_S: u32 = 5 * (145 + 85) / 2 + 30 + 141;
 /// Capacity of the token bucket, bytes: a list of all parameters, or five texts.
-pub const MAX_SAVED_BYTES: u32 = 1000;
+pub const MAX_BURST_BYTES: u32 = 1000;
 /// Bytes of a GLOBAL_POSITION_INT with its frame: the tokens that a requested message takes when it
 /// is requested. AUTOPILOT_VERSION is longer, and takes its own length when it is sent.
 pub(crate) const POSITION_BYTES: usize = 40;
@@ -49,7 +49,7 @@ const MICROBYTES_PER_BYTE: i64 = 1_000_000;
 
 impl Default for RadioTokenBucket {
     fn default() -> Self {
-        Self { tokens: i64::from(MAX_SAVED_BYTES) * MICROBYTES_PER_BYTE, at: Instant::ZERO }
+        Self { tokens: i64::from(MAX_BURST_BYTES) * MICROBYTES_PER_BYTE, at: Instant::ZERO }
     }
 }
 
@@ -63,13 +63,13 @@ impl RadioTokenBucket {
         let passed_us = (now - self.at).as_micros().min(3_600_000_000) as i64;
         self.at = now;
         self.tokens =
-            (self.tokens + passed_us * rate).min(i64::from(MAX_SAVED_BYTES) * MICROBYTES_PER_BYTE);
+            (self.tokens + passed_us * rate).min(i64::from(MAX_BURST_BYTES) * MICROBYTES_PER_BYTE);
         self.tokens > 0
     }
 
     /// Whether the bucket is more than half full, as of the last call of [`Self::may_send`].
     pub(crate) fn is_half_full(&self) -> bool {
-        self.tokens > i64::from(MAX_SAVED_BYTES / 2) * MICROBYTES_PER_BYTE
+        self.tokens > i64::from(MAX_BURST_BYTES / 2) * MICROBYTES_PER_BYTE
     }
 
     /// Takes the tokens of a sent frame.

@@ -40,7 +40,7 @@ pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_ENTRIES * ENTRY_
 /// that is later in this list counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
-pub enum FlightStatus {
+pub enum ShareStatus {
     /// The vehicle flies its share of the area, or will.
     #[default]
     Alive,
@@ -53,7 +53,7 @@ pub enum FlightStatus {
     Finished,
 }
 
-impl FlightStatus {
+impl ShareStatus {
     const ALL: [Self; 4] = [Self::Alive, Self::Lost, Self::Left, Self::Finished];
 
     /// The status that counts in another plan or division than the one that it was reported of. A
@@ -70,7 +70,7 @@ pub struct RosterReportEntry {
     /// count.
     pub incarnation: u8,
     /// Whether the vehicle takes part.
-    pub status: FlightStatus,
+    pub status: ShareStatus,
     /// Progress of the vehicle along its own path, decimetres.
     pub progress_dm: u16,
     /// The vehicle's commitment: place along its path up to which it flies before it holds for the
@@ -173,7 +173,7 @@ impl RosterReport {
             let set = |at: u8| b[0] >> at & 1 != 0;
             RosterReportEntry {
                 incarnation: b[0] >> 5,
-                status: FlightStatus::ALL[usize::from(b[0] & 3)],
+                status: ShareStatus::ALL[usize::from(b[0] & 3)],
                 progress_dm: u16::from_le_bytes([b[1], b[2]]),
                 commitment_dm: set(2).then(|| u16::from_le_bytes([b[3], b[4]])),
                 holds: set(3),

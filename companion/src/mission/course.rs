@@ -113,7 +113,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Time since a pilot last took the vehicle over.
-    pub(crate) fn time_with_pilot(&self, now: Instant) -> Duration {
+    pub(crate) fn time_since_pilot_takeover(&self, now: Instant) -> Duration {
         now - self.pilot_since
     }
 

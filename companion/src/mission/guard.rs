@@ -2,7 +2,7 @@
 
 use super::inputs::GuardInputs;
 use crate::autopilot::telemetry::{MAX_HEARTBEAT_AGE, MAX_POSITION_AGE};
-use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
+use crate::margins::MAX_HEIGHT_ERROR_ON_GROUND_M;
 use crate::time::Duration;
 
 /// Time without progress after which a vehicle at the geofence no longer waits for room below: its
@@ -349,7 +349,7 @@ impl Guard {
             Self::PathDone => i.path_done,
             Self::Stalled => i.stalled_for >= limit,
             Self::Unfollowed => i.unfollowed_for >= limit,
-            Self::PathBarred => i.path_barred && i.in_state >= limit,
+            Self::PathBarred => i.join_barred && i.in_state >= limit,
             Self::PauseCommanded => i.pause && !i.lifting_off,
             Self::ResumeCommanded => i.resume,
             Self::BackOnPath => i.position_age < MAX_POSITION_AGE && i.near_path,
@@ -388,8 +388,8 @@ impl Guard {
             Self::OutsideGeofence => {
                 i.outside && (i.room_below || i.stalled_for > MAX_WAIT_AT_FENCE)
             }
-            Self::NeighboursSilent => i.neighbour_age > limit,
-            Self::LeaseLost => i.area && i.neighbour_age > limit,
+            Self::NeighboursSilent => i.unlinked_for > limit,
+            Self::LeaseLost => i.area && i.unlinked_for > limit,
             Self::NotDivided => i.in_state >= limit && i.division_overdue,
             Self::PausedBeforeLiftOff => i.pause && i.is_before_lift_off(),
             Self::BarredBeforeLiftOff => i.hindered_for >= limit && i.is_before_lift_off(),
@@ -397,7 +397,7 @@ impl Guard {
             Self::OutOfRange => i.out_of_range && i.in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,
             Self::OnGround => {
-                i.on_ground && !i.vertical && i.landing && i.height_m < MAX_GROUND_HEIGHT_ERROR_M
+                i.on_ground && !i.vertical && i.landing && i.height_m < MAX_HEIGHT_ERROR_ON_GROUND_M
             }
             Self::PathBlocked => i.blocked,
             Self::PathClear => !i.blocked,
@@ -413,7 +413,7 @@ impl Guard {
             Self::PlansDiffer => i.plans_differ && i.in_state >= limit,
             Self::HoldsToDivide => i.holds_to_divide,
             Self::DivisionReady => i.division_ready,
-            Self::NothingToDivide => i.undivided,
+            Self::NothingToDivide => i.division_settled,
         }
     }
 }

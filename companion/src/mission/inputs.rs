@@ -1,7 +1,7 @@
 //! The inputs of the guards of the mission table.
 
-use crate::autopilot::telemetry::MAX_AGE_ON_PAD;
-use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
+use crate::autopilot::telemetry::MAX_POSITION_AGE_ON_PAD;
+use crate::margins::MAX_HEIGHT_ERROR_ON_GROUND_M;
 use crate::time::Duration;
 
 /// Snapshot of the vehicle, of pending commands, of neighbours and of the plan, by which the guards
@@ -26,7 +26,7 @@ pub struct GuardInputs {
     pub blocked_for: Duration,
     /// Time for which this vehicle has heard no neighbour, or none has reported that it hears this
     /// vehicle, in this state; zero once all have landed or left the plan.
-    pub neighbour_age: Duration,
+    pub unlinked_for: Duration,
     /// Whether all lost vehicles must have been down for a minute: a division under way is then
     /// overdue.
     pub division_overdue: bool,
@@ -52,7 +52,7 @@ pub struct GuardInputs {
     /// Whether this vehicle's plan after the last division has come and is not flown yet.
     pub division_ready: bool,
     /// Whether no division is under way or outstanding, nor this vehicle's own plan after a detour.
-    pub undivided: bool,
+    pub division_settled: bool,
     /// Whether the shell has returned the requested plan.
     pub plan_ready: bool,
     /// Whether the shell answered the request for a plan or detour with a failure.
@@ -191,7 +191,7 @@ pub struct GuardInputs {
     /// area, where that one may only be silent, zero.
     pub way_back_blocked_for: Duration,
     /// Whether the vehicle is to join its path, but no way there is known to be free of walls.
-    pub path_barred: bool,
+    pub join_barred: bool,
     /// Whether a place aside to land at may be sought, from the path or over an area.
     pub can_land_aside: bool,
     /// Whether a place aside to land at is being sought.
@@ -235,11 +235,11 @@ pub struct GuardInputs {
 /// that one will not leave.
 const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 
-/// Height above [`MAX_GROUND_HEIGHT_ERROR_M`] from which an estimate shows that the vehicle is in
-/// the air, metres: an estimate at that bound does not alternate.
+/// Height above [`MAX_HEIGHT_ERROR_ON_GROUND_M`] from which an estimate shows that the vehicle is
+/// in the air, metres: an estimate at that bound does not alternate.
 const IN_AIR_HYSTERESIS_M: f32 = 0.5;
 /// Estimated height from which a vehicle is in the air, metres.
-const SURELY_IN_AIR_M: f32 = MAX_GROUND_HEIGHT_ERROR_M + IN_AIR_HYSTERESIS_M;
+const SURELY_IN_AIR_M: f32 = MAX_HEIGHT_ERROR_ON_GROUND_M + IN_AIR_HYSTERESIS_M;
 
 impl GuardInputs {
     /// Whether the vehicle can request a path home over the field, and does not seek one yet.
@@ -250,7 +250,10 @@ impl GuardInputs {
     /// Whether the vehicle surely has not left the ground: its position is new, the landing
     /// detector has not reported flight, and the vehicle does not rise.
     pub(super) fn is_before_lift_off(&self) -> bool {
-        self.position_age < MAX_AGE_ON_PAD && self.on_ground && !self.vertical && !self.has_flown
+        self.position_age < MAX_POSITION_AGE_ON_PAD
+            && self.on_ground
+            && !self.vertical
+            && !self.has_flown
     }
 
     /// Whether the vehicle is in the air, whatever the landing detector reports.

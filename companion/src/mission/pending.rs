@@ -73,7 +73,7 @@ pub(super) fn apply_command(
         MISSION_START => (
             &mut pending.start,
             if state == Aborted { Guard::StartAgain } else { Guard::StartCommanded },
-            state.flies_mission(),
+            state.is_mission_under_way(),
         ),
         PAUSE_CONTINUE if command.param1 == 0.0 => {
             // Before the climb, and while the mission is interrupted, the pause is stored until a

@@ -39,7 +39,7 @@ pub(crate) enum FlightStage {
 
 /// Whose plans the next plan of this vehicle has to fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum PlansWith {
+pub(crate) enum PlanningPartners {
     /// Nobody's: it has its plan, and flies it or has flown it.
     Nobody,
     /// Those of the vehicles in flight.
@@ -185,12 +185,12 @@ impl PhotographedWaypoints {
     pub(crate) fn handle_report(
         &mut self,
         report: &PhotographedReport,
-        planning: PlansWith,
+        planning: PlanningPartners,
         now: Instant,
     ) {
         if report.is_left_out_by_plan {
-            if planning != PlansWith::Nobody {
-                self.adopt_plan_of(report, now);
+            if planning != PlanningPartners::Nobody {
+                self.adopt_left_out_waypoints(report, now);
             }
             return;
         }
@@ -199,7 +199,7 @@ impl PhotographedWaypoints {
             return;
         }
         let follows = self.followed_at.is_some_and(|at| now - at <= FLIGHT_REPORT_LIFETIME);
-        let plans = planning == PlansWith::All && !report.flies && !follows;
+        let plans = planning == PlanningPartners::All && !report.flies && !follows;
         if newer > 0 {
             self.round = report.round;
             self.known.clear();
@@ -218,7 +218,7 @@ impl PhotographedWaypoints {
 
     /// Leaves out of the next plan the waypoints that are left out by the plan of a vehicle that
     /// has already started.
-    fn adopt_plan_of(&mut self, report: &PhotographedReport, now: Instant) {
+    fn adopt_left_out_waypoints(&mut self, report: &PhotographedReport, now: Instant) {
         self.followed_at = Some(now);
         if self.left_out_by_plan.ranges() != &report.ranges[..] {
             self.left_out_by_plan.clear();

@@ -77,7 +77,7 @@ const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 
 /// Time for which the column above the pad may be occupied after the gates have opened, before
 /// arming; then the start goes back to waiting. Meanwhile arming is not requested.
-const COLUMN_BLOCKED_MOST: Duration = Duration::from_millis(200);
+const MAX_PAD_COLUMN_BLOCKED: Duration = Duration::from_millis(200);
 /// Time for which a vehicle may not reach its setpoint while the setpoint does not move on; then
 /// something holds the vehicle or carries it away, and it lands.
 pub(crate) const UNFOLLOWED_MOST: Duration = secs(20);
@@ -135,7 +135,7 @@ pub(crate) const FLYING_BEFORE_LANDING: &[State] =
     &[TakeOff, Climb, Follow, Paused, SwarmLinkLost, Blocked, Replanning, Dividing, Stopping];
 
 /// States of [`FLYING`] in which the autopilot does not count as silent.
-pub(crate) const FLYING_LINKED: &[State] = &[
+pub(crate) const FLYING_WITH_AUTOPILOT: &[State] = &[
     TakeOff,
     Climb,
     Follow,
@@ -172,7 +172,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Streaming, Engaging], G::NoHeartbeat,  secs(3),    Aborted,     A::ForgetStart,       "Autopilot silent: start cancelled"),
     warning_row(&[Arming],           G::NoHeartbeat,     secs(3),    CancelStart, A::CancelStart,       "Autopilot silent: start cancelled"),
     warning_row(&[CancelStart],      G::NoHeartbeat,     secs(60),   Aborted,     A::ForgetStart,       "Autopilot lost"),
-    warning_row(FLYING_LINKED,       G::NoHeartbeat,     secs(3),    AutopilotSilent, A::BrakeOnPath,   "Autopilot silent: stopping"),
+    warning_row(FLYING_WITH_AUTOPILOT,       G::NoHeartbeat,     secs(3),    AutopilotSilent, A::BrakeOnPath,   "Autopilot silent: stopping"),
     warning_row(&[Disarm, Failsafe], G::NoHeartbeat,     secs(60),   Aborted,     A::ForgetStart,       "Autopilot lost"),
     warning_row(&[Land],             G::NoHeartbeat,     secs(120),  Aborted,     A::ForgetStart,       "Autopilot lost"),
     warning_row(&[PilotReturned],    G::NoHeartbeat,     secs(60),   Land,        A::RequestLandMode,   "Autopilot still silent: landing"),
@@ -189,7 +189,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Arming],           G::AwayFromPad,     AT_ONCE,    CancelStart, A::CancelStart,       "Not at its start: start cancelled"),
     warning_row(&[Arming],           G::ChargeLow,       AT_ONCE,    CancelStart, A::CancelStart,       "Battery low: start cancelled"),
     warning_row(&[Arming],           G::Outside,         AT_ONCE,    CancelStart, A::CancelStart,       "Outside the geofence: start cancelled"),
-    warning_row(FLYING_LINKED,       G::OriginMoved,     AT_ONCE,    Land,        A::RequestLandMode,   "EKF origin moved: landing"),
+    warning_row(FLYING_WITH_AUTOPILOT,       G::OriginMoved,     AT_ONCE,    Land,        A::RequestLandMode,   "EKF origin moved: landing"),
     warning_row(&[PilotReturned],    G::OriginMoved,     AT_ONCE,    Land,        A::RequestLandMode,   "EKF origin moved: landing"),
     warning_row(FLYING_WITH_POSITION,        G::PositionJumped,  AT_ONCE,    PositionLost, A::BrakeOnPath,      "Position jumped: stopping"),
     warning_row(FLYING_WITH_POSITION,        G::NoPosition,      secs(1),    PositionLost, A::BrakeOnPath,      "Position lost: stopping"),
@@ -246,12 +246,12 @@ pub static TABLE: &[TransitionRow] = &[
     info_row(&[Scheduled],           G::GatesOpen,       AT_ONCE,    Streaming,   A::HoldHere,          ""),
     info_row(&[Scheduled],           G::ReserveEnds,     AT_ONCE,    Done,        A::ForgetStart,       "No goal for this vehicle: staying"),
     warning_row(&[Scheduled],        G::StartBarred,     START_BARRED_MOST, Aborted, A::ForgetStart,    "Start barred for 3 min: others take its part"),
-    warning_row(&[Streaming, Engaging], G::ColumnBlocked, COLUMN_BLOCKED_MOST, Scheduled, A::None,      "Vehicle above the pad: start waits"),
+    warning_row(&[Streaming, Engaging], G::ColumnBlocked, MAX_PAD_COLUMN_BLOCKED, Scheduled, A::None,      "Vehicle above the pad: start waits"),
     info_row(&[Streaming],           G::Elapsed,         secs(1),    Engaging,    A::RequestOffboard,   ""),
     info_row(&[Engaging],            G::Offboard,        AT_ONCE,    Arming,      A::RequestArming,     "Setpoints followed: arming"),
     warning_row(&[Engaging],         G::Elapsed,         secs(5),    Aborted,     A::ForgetStart,       "Setpoint mode refused: mission aborted"),
     info_row(&[Arming],              G::Armed,           AT_ONCE,    TakeOff,     A::RequestTakeOff,    "Taking off"),
-    warning_row(&[Arming],           G::ArmingHeld,      COLUMN_BLOCKED_MOST, Scheduled, A::None,          "Vehicle above the pad: start waits"),
+    warning_row(&[Arming],           G::ArmingHeld,      MAX_PAD_COLUMN_BLOCKED, Scheduled, A::None,          "Vehicle above the pad: start waits"),
     warning_row(&[Arming],           G::ArmedUnseen,     AT_ONCE,    CancelStart, A::CancelStart,       "Disarmed by someone else: start cancelled"),
     warning_row(&[Arming],           G::ArmingUnanswered, AT_ONCE,   CancelStart, A::CancelStart,       "Arming not answered: start cancelled"),
     warning_row(&[Arming],           G::Elapsed,         secs(20),   CancelStart, A::CancelStart,       "Arming refused: mission aborted"),

@@ -63,7 +63,7 @@ const INTERRUPTIONS: &[(&str, Shows)] = &[
     ("battery low", |i| (i.battery_low, i.room_below) = (true, true)),
     ("battery critical", |i| (i.battery_low, i.battery_critical) = (true, true)),
     ("outside the fence", |i| (i.outside, i.room_below) = (true, true)),
-    ("neighbours silent", |i| i.neighbour_age = Duration::from_secs(11)),
+    ("neighbours silent", |i| i.unlinked_for = Duration::from_secs(11)),
 ];
 
 /// Inputs of a state in which nothing happens.
@@ -251,7 +251,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::BackAtStart => (i.path_done, i.flies_back) = (true, true),
         G::PathDone => i.path_done = true,
         G::Unfollowed => i.unfollowed_for = long,
-        G::PathBarred => (i.path_barred, i.in_state) = (true, long),
+        G::PathBarred => (i.join_barred, i.in_state) = (true, long),
         G::Stalled => i.stalled_for = long,
         G::PauseCommanded => i.pause = true,
         G::ResumeCommanded => i.resume = true,
@@ -291,8 +291,8 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
         G::BatteryLow => (i.battery_low, i.room_below) = (true, true),
         G::OutsideGeofence => (i.outside, i.room_below) = (true, true),
-        G::NeighboursSilent => i.neighbour_age = long,
-        G::LeaseLost => (i.area, i.neighbour_age) = (true, long),
+        G::NeighboursSilent => i.unlinked_for = long,
+        G::LeaseLost => (i.area, i.unlinked_for) = (true, long),
         G::NotDivided => (i.in_state, i.division_overdue) = (long, true),
         G::PausedBeforeLiftOff => (i.pause, i.on_ground) = (true, true),
         G::BarredBeforeLiftOff => (i.hindered_for, i.on_ground) = (long, true),
@@ -312,7 +312,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::PlansDiffer => (i.plans_differ, i.in_state) = (true, long),
         G::HoldsToDivide => i.holds_to_divide = true,
         G::DivisionReady => i.division_ready = true,
-        G::NothingToDivide => i.undivided = true,
+        G::NothingToDivide => i.division_settled = true,
     }
     i
 }

@@ -380,7 +380,7 @@ pub fn plan_flights<
         following,
     };
     if known == 0 {
-        let (left, done) = ws.losses.start_plan(tracks, transit, request.photographed)?;
+        let (left, done) = ws.losses.reset_with_done(tracks, transit, request.photographed)?;
         let work = Work { tracks: left, ..whole };
         match header.parts {
             PartEligibility::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,

@@ -63,10 +63,10 @@ const DETOUR_RETRY_S: u64 = 10;
 /// vehicle that it waits for has found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(15);
 /// Number of failed searches, and detours without progress, after which a vehicle seeks no further
-/// detour; one search fewer is enough if they failed in one place over [`GIVE_UP_AFTER_S`].
+/// detour; one search fewer is enough if they failed in one place over [`EARLY_GIVE_UP_AFTER_S`].
 const MAX_DETOUR_SEARCHES: u8 = 3;
 /// Time since the first failed search in one place after which one search fewer is enough, s.
-const GIVE_UP_AFTER_S: u64 = 60;
+const EARLY_GIVE_UP_AFTER_S: u64 = 60;
 /// Time without progress on a detour, or under a stop by the safety filter, that counts as a block.
 const STUCK_AFTER: Duration = Duration::from_secs(20);
 /// Progress since the last block after which a further block counts as a new one, metres.
@@ -80,7 +80,7 @@ const STOP_COUNTS_FOR_WHILE_BLOCKED: Duration = Duration::from_secs(3);
 /// Time after which a vehicle on its pad that no other vehicle hears reports that it waits.
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Sway, metres: a stopped vehicle this near to the end of a path aside counts as at the end.
-const SWAY_ASIDE_M: f32 = 0.5;
+const ASIDE_END_TOLERANCE_M: f32 = 0.5;
 
 /// What blocks the path ahead, and the detour that is requested or flown.
 #[derive(Clone, Debug, Default)]
@@ -105,7 +105,7 @@ pub(crate) struct Detours {
     /// Number of failed searches for a detour to the goal since another vehicle last moved.
     failures: u8,
     /// Whether a further search is useless: no other vehicle will move any more, or searches from
-    /// this place have failed for [`GIVE_UP_AFTER_S`].
+    /// this place have failed for [`EARLY_GIVE_UP_AFTER_S`].
     no_retry: bool,
     /// Number of failed searches from about the same place; that place along the path, metres; and
     /// the times of the first of them and of the last failed search anywhere.
@@ -272,7 +272,7 @@ impl Detours {
             state if state.waits_on_pad() => {
                 self.blocked
                     || !view.guidance.filter.column_clear()
-                    || view.neighbours.silence_duration(now, view.mission.started_at())
+                    || view.neighbours.unlinked_duration(now, view.mission.started_at())
                         >= UNHEARD_ON_PAD_AFTER
                     || (held && !view.guidance.may_depart())
             }
@@ -346,7 +346,7 @@ impl Detours {
             && now - view.guidance.last_progress_at() > STUCK_AFTER;
         // A vehicle that stands at the end of a path aside may have swayed back a little.
         let stands = view.mission.state().is_blocked();
-        let near_m = if stands { SWAY_ASIDE_M } else { 0.0 };
+        let near_m = if stands { ASIDE_END_TOLERANCE_M } else { 0.0 };
         let length_m = view.mission.plan().map_or(0.0, |plan| plan.path.length_m());
         let at_end = view.guidance.along_m() >= length_m - near_m;
         let off_plan = match self.path_kind {

@@ -6,7 +6,7 @@ use crate::autopilot::telemetry::MAX_POSITION_AGE;
 use crate::autopilot::telemetry::Telemetry;
 use crate::config::Config;
 use crate::guidance::{Guidance, GuidanceInputs};
-use crate::margins::MAX_GROUND_HEIGHT_ERROR_M;
+use crate::margins::MAX_HEIGHT_ERROR_ON_GROUND_M;
 use crate::mission::course::Mission;
 use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
@@ -40,7 +40,7 @@ impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
     /// height agrees.
     pub(crate) fn is_on_ground(&self) -> bool {
         self.telemetry.reports_ground(self.now)
-            && (!self.telemetry.armed || self.height_m() < MAX_GROUND_HEIGHT_ERROR_M)
+            && (!self.telemetry.armed || self.height_m() < MAX_HEIGHT_ERROR_ON_GROUND_M)
     }
 
     /// Whether a pilot flies the vehicle again after its mission has ended with a landing.

@@ -27,7 +27,7 @@ pub(crate) use self::packet::FTP_TEXTS;
 pub use self::packet::MAX_DATA;
 use self::packet::{
     ACK, EFBIG, EIO, FILE_REMOVED, FtpRequest, HEADER_LEN, NakError, Text, chunk_len,
-    format_decimal, is_open, op, upload_text,
+    format_decimal, op, opens_session, upload_text,
 };
 use crate::link::frame::Frame;
 use crate::storage::store::reassembly::PieceOutcome;
@@ -250,7 +250,7 @@ impl Ftp {
 
     fn begin_request(&mut self, request: &FtpRequest, store: &mut Store, erasing: ErasePermission) {
         if let Some(done) = self.duplicates.previous_outcome(request, self.now) {
-            if !is_open(request) || done.is_err() {
+            if !opens_session(request) || done.is_err() {
                 self.respond(request, done);
             } else if let Some(session) =
                 self.session.filter(|session| session.opened_by.is_same_request(request))
@@ -260,7 +260,7 @@ impl Ftp {
             }
             return;
         }
-        if is_open(request) {
+        if opens_session(request) {
             self.duplicates.forget_closed(request.client);
         }
         if matches!(

@@ -145,7 +145,7 @@ impl Store {
     }
 
     /// Whether a parameter was set whose record has not been written yet.
-    pub fn is_unsaved(&self) -> bool {
+    pub fn has_unsaved_parameters(&self) -> bool {
         self.unsaved
     }
 

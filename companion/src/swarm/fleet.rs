@@ -14,7 +14,7 @@
 use heapless::Vec;
 use planner_core::file::CRC32;
 
-use crate::link::roster::{FlightStatus, RosterReportEntry};
+use crate::link::roster::{RosterReportEntry, ShareStatus};
 use crate::time::{Duration, Instant};
 
 mod division_input;
@@ -55,7 +55,7 @@ pub enum StartStatus {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OwnReport {
     /// Whether this vehicle takes part in the mission, was lost, has left or has finished.
-    pub status: FlightStatus,
+    pub status: ShareStatus,
     /// Whether this vehicle was not started yet: it may take part again as a new vehicle.
     pub waits: bool,
     /// Whether this vehicle is in the air.
@@ -102,7 +102,7 @@ struct FleetVehicle {
 
 impl FleetVehicle {
     fn takes_part(&self) -> bool {
-        self.has_part && self.entry.status == FlightStatus::Alive
+        self.has_part && self.entry.status == ShareStatus::Alive
     }
 }
 
@@ -176,7 +176,7 @@ impl<const V: usize> Fleet<V> {
     /// new incarnation number.
     pub fn begin_flight(&mut self, now: Instant) {
         let entry = self.members[usize::from(self.own)].entry;
-        if entry.status != FlightStatus::Alive || self.excluded || !self.divisions.is_empty() {
+        if entry.status != ShareStatus::Alive || self.excluded || !self.divisions.is_empty() {
             self.rejoin((entry.incarnation + 1) % INCARNATIONS);
         }
         self.forget_plan();
@@ -239,12 +239,12 @@ impl<const V: usize> Fleet<V> {
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[usize::from(self.own)].entry;
         // The path of a vehicle that has left is no part of its share: its progress does not count.
-        if caught_up && entry.status == FlightStatus::Alive {
+        if caught_up && entry.status == ShareStatus::Alive {
             entry.progress_dm = entry.progress_dm.max(own.progress_dm);
         }
         let status = if caught_up { own.status } else { own.status.in_another_division() };
         entry.status = entry.status.max(status);
-        let takes_off = !own.waits && entry.status == FlightStatus::Alive;
+        let takes_off = !own.waits && entry.status == ShareStatus::Alive;
         let bit = self.own_bit();
         self.in_flight = if takes_off { self.in_flight | bit } else { self.in_flight & !bit };
         self.hear_flight &= !bit;
@@ -259,7 +259,7 @@ impl<const V: usize> Fleet<V> {
             member.heard_itself = lately;
             let (silence, bit) = (now - member.heard_at, 1 << rank.min(31));
             if silence >= MISSED_AFTER && member.has_part {
-                let falls = member.entry.status <= FlightStatus::Lost;
+                let falls = member.entry.status <= ShareStatus::Lost;
                 let down_at = member.heard_at + self.limits.down;
                 self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
             }
@@ -270,7 +270,7 @@ impl<const V: usize> Fleet<V> {
                 self.hear_flight &= !bit;
                 // A majority has counted the vehicle as lost, so it has landed; or its battery is
                 // empty.
-                let lost = member.entry.status == FlightStatus::Lost;
+                let lost = member.entry.status == ShareStatus::Lost;
                 if (lost && silence >= self.limits.down) || silence >= LANDED_AFTER_SILENCE {
                     self.in_flight &= !bit;
                 }
@@ -280,7 +280,7 @@ impl<const V: usize> Fleet<V> {
         if self.is_majority(|rank, _| linked >> rank & 1 != 0) {
             self.lease_at = now;
         }
-        self.idle = own.waits && !self.knows_flight();
+        self.idle = own.waits && !self.is_another_in_flight();
         if self.idle {
             self.forget_earlier_flight(now);
         }
@@ -296,13 +296,13 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether another vehicle is in flight, as far as this one has heard, or as a vehicle that it
     /// hears has heard. A vehicle that fell silent in flight may still fly.
-    fn knows_flight(&self) -> bool {
+    fn is_another_in_flight(&self) -> bool {
         self.heard_flights() | self.hear_flight & !self.own_bit() != 0
     }
 
     /// Ranks of the other vehicles that this one knows to be in flight, as bits.
     fn heard_flights(&self) -> u32 {
-        let counts = |rank: &usize| self.members[*rank].entry.status <= FlightStatus::Lost;
+        let counts = |rank: &usize| self.members[*rank].entry.status <= ShareStatus::Lost;
         let known = (0..self.members.len()).filter(counts).fold(0, |bits, rank| bits | 1 << rank);
         self.in_flight & known & !self.own_bit()
     }
@@ -327,9 +327,9 @@ impl<const V: usize> Fleet<V> {
     /// have finished: others may already count on it.
     pub fn is_dividing(&self) -> bool {
         let asks = |m: &FleetVehicle| match m.entry.status {
-            FlightStatus::Alive => m.entry.commitment_dm.is_some(),
-            FlightStatus::Lost | FlightStatus::Left => true,
-            FlightStatus::Finished => false,
+            ShareStatus::Alive => m.entry.commitment_dm.is_some(),
+            ShareStatus::Lost | ShareStatus::Left => true,
+            ShareStatus::Finished => false,
         };
         let asked = self.members.iter().any(|m| m.has_part && asks(m));
         self.is_alive(usize::from(self.own)) && !self.idle && !self.divisions.is_full() && asked
@@ -344,9 +344,9 @@ impl<const V: usize> Fleet<V> {
     /// and this vehicle has not heard the lost ones for [`SILENT_AFTER`] either.
     fn prepare_division_inputs(&mut self, now: Instant) {
         let known = |m: &FleetVehicle| match m.entry.status {
-            FlightStatus::Alive => m.entry.commitment_dm.is_some(),
-            FlightStatus::Lost => now - m.heard_at >= self.limits.silent,
-            FlightStatus::Left | FlightStatus::Finished => true,
+            ShareStatus::Alive => m.entry.commitment_dm.is_some(),
+            ShareStatus::Lost => now - m.heard_at >= self.limits.silent,
+            ShareStatus::Left | ShareStatus::Finished => true,
         };
         if !self.has_lease(now) || !self.members.iter().filter(|m| m.has_part).all(known) {
             self.withdraw_inputs();
@@ -405,7 +405,7 @@ impl<const V: usize> Fleet<V> {
             member.hash == self.hash && member.entry.holds
         };
         let is_down = |m: &FleetVehicle| {
-            m.entry.status != FlightStatus::Lost || now - m.heard_at >= self.limits.down
+            m.entry.status != ShareStatus::Lost || now - m.heard_at >= self.limits.down
         };
         self.hash != 0
             && self.members.iter().filter(|m| m.has_part).all(is_down)
@@ -445,7 +445,7 @@ impl<const V: usize> Fleet<V> {
         (self.introduced, self.down_at, self.any_missing) = (u32::MAX, Instant::ZERO, false);
         self.lease_at = moved(self.lease_at, Duration::from_micros(2 * lease.as_micros()));
         for member in &mut self.members {
-            let counts = member.has_part && member.entry.status <= FlightStatus::Lost;
+            let counts = member.has_part && member.entry.status <= ShareStatus::Lost;
             member.heard_at = if counts { moved(member.heard_at, silent.max(down)) } else { then };
         }
     }

@@ -3,9 +3,9 @@
 //!
 //! Data flow from received bytes to the speed scale: GLOBAL_POSITION_INT →
 //! [`Neighbours::handle_position`] → ENU in [`Neighbour::position`]; TUNNEL →
-//! [`Neighbours::handle_numbered_intent`] → [`Neighbour::progress_m`]; [`Neighbours::states_at`]
-//! computes the ages, and `planner_core::track::deconflict::advise` computes the speed scale from
-//! the result.
+//! [`Neighbours::handle_numbered_intent`] → [`Neighbour::progress_m`];
+//! [`Neighbours::states_with_age`] computes the ages, and `planner_core::track::deconflict::advise`
+//! computes the speed scale from the result.
 
 mod bounds;
 mod dead_reckoning;

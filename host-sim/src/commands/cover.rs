@@ -13,7 +13,7 @@ use crate::coverage::result::{CoverResult, cover_result};
 use crate::coverage::{CoveragePlan, SortieFlight, export, page};
 use crate::files::ResultFiles;
 use crate::output;
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 use crate::report;
 use crate::result::{self, CoverageResult, Timing};
 use crate::say;
@@ -71,7 +71,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     remove_stale(&args.out, &written)?;
     print(&result, &findings, &args.out);
     print_origin(&planned);
-    print_batteries(&planned);
+    print_unchecked_batteries(&planned);
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -129,7 +129,7 @@ fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
         if entry.file_type()?.is_file() && name.to_str().is_some_and(stale) {
             let path = entry.path();
             fs::remove_file(&path)
-                .with_context(|| format!("cannot remove: {}", quoted_path(&path)))?;
+                .with_context(|| format!("cannot remove: {}", printable_path(&path)))?;
         }
     }
     Ok(())
@@ -221,7 +221,7 @@ fn print_origin(planned: &CoveragePlan<'_>) {
 
 /// Prints the longest flight of the vehicles without `endurance_s`, for which nothing can check
 /// whether a battery lasts.
-fn print_batteries(planned: &CoveragePlan<'_>) {
+fn print_unchecked_batteries(planned: &CoveragePlan<'_>) {
     let unknown = planned.sorties.iter().filter(|sortie| {
         planned.scenario.vehicles[usize::from(sortie.route.vehicle)].endurance_s.is_none()
     });

@@ -17,7 +17,7 @@ use crate::link::LinkUrl;
 use crate::mission::{HostPlan, PreparedMission};
 use crate::output;
 use crate::progress::Progress;
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 use crate::report::Level;
 use crate::say;
 use crate::scenario::{self, CompanionHost, Scenario};
@@ -136,7 +136,7 @@ fn set_board_links(
 /// Gives each companion a file in this directory for its flash.
 fn keep_flashes(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(dir)
-        .with_context(|| format!("cannot keep flashes: {}", quoted_path(dir)))?;
+        .with_context(|| format!("cannot keep flashes: {}", printable_path(dir)))?;
     for vehicle in &mut scenario.vehicles {
         ensure!(
             matches!(vehicle.companion, CompanionHost::InProcess { .. }),
@@ -195,7 +195,7 @@ fn check_emulated_boards(mission: &PreparedMission, plan: &HostPlan) -> anyhow::
 
 /// Prints whether the flight was given up at its time limit, its errors, and how fast it was
 /// simulated.
-fn print_course(flight: &SwarmFlight, limit_s: f32) {
+fn print_errors_and_speed(flight: &SwarmFlight, limit_s: f32) {
     let aloft = flight.result.vehicles.iter().filter(|vehicle| !vehicle.landed).count();
     if aloft > 0 && flight.simulated_s >= f64::from(limit_s) {
         say!("given up   at simulation.time_limit_s = {limit_s} s, {aloft} not landed");
@@ -222,7 +222,7 @@ fn add_earlier_pictures(
     let done: u32 = flight.done.iter().map(|range| range.end - range.first).sum();
     let planned = CoveragePlan::plan_as_companions(&mission.scenario)?;
     if done > 0 && done < planned.tracks.waypoint_count() {
-        kept.add_to(&mut flight.pictures);
+        kept.prepend_to(&mut flight.pictures);
     }
     Ok(())
 }
@@ -250,7 +250,7 @@ fn plan_and_fly(
         }
         None => swarm::fly(&mission, &plan, command, shown.pace, &progress)?,
     };
-    if let Some(places) = pictures::lane_points_as_pictures(&mission.scenario, &flight.tracks)? {
+    if let Some(places) = pictures::track_points_as_pictures(&mission.scenario, &flight.tracks)? {
         flight.pictures = places;
     }
     if let Some(kept) = &kept {
@@ -280,6 +280,6 @@ fn plan_and_fly(
     output::add(&mut results, &flight.result, &mission.timing, page)?;
     results.commit()?;
     output::print_summary(&flight.result, out);
-    print_course(&flight, mission.scenario.simulation.time_limit_s);
+    print_errors_and_speed(&flight, mission.scenario.simulation.time_limit_s);
     Ok(if flight.result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

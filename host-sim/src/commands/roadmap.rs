@@ -12,7 +12,7 @@ use crate::capacity::BoardCapacity;
 use crate::files::{self, ResultFiles};
 use crate::mission::PreparedMission;
 use crate::progress::Progress;
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 use crate::say;
 
 /// Arguments of `host-sim roadmap`.
@@ -58,9 +58,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         }
         RoadmapAction::Info { file } => {
             let bytes = files::read(file, files::MAX_BINARY_BYTES)
-                .with_context(|| format!("cannot read: {}", quoted_path(file)))?;
-            let view =
-                parse(&bytes).with_context(|| format!("not a roadmap: {}", quoted_path(file)))?;
+                .with_context(|| format!("cannot read: {}", printable_path(file)))?;
+            let view = parse(&bytes)
+                .with_context(|| format!("not a roadmap: {}", printable_path(file)))?;
             print(&view);
         }
     }

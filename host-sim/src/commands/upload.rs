@@ -13,7 +13,7 @@ use crate::capacity::{BOARDS, BoardCapacity};
 use crate::files;
 use crate::link::LinkUrl;
 use crate::progress::Progress;
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 use crate::say;
 use crate::upload::FtpClient;
 
@@ -47,13 +47,13 @@ pub struct Args {
 /// The file is no roadmap, field or mission or does not fit the board, no companion is heard, the
 /// companion refuses the file, or the link fails.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let path = quoted_path(&args.file);
+    let path = printable_path(&args.file);
     let bytes = files::read(&args.file, files::MAX_BINARY_BYTES)
         .with_context(|| format!("cannot read: {path}"))?;
     let board = args.board.unwrap_or(&BOARDS[0]);
     let file = file_kind(&bytes, board).with_context(|| format!("not for upload: {path}"))?;
     let mut client =
-        FtpClient::new(args.link.open()?, args.id).from_ground_station(args.ground_station);
+        FtpClient::new(args.link.open()?, args.id).with_own_system(args.ground_station);
     let system = client.wait_for_companion()?;
     let bar = Progress::on_terminal().begin_counted_stage("upload", bytes.len() as u64);
     client

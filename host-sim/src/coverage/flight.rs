@@ -12,7 +12,7 @@ use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::pack::Route;
 
-use super::{CoveragePlan, MAX_CORNERS};
+use super::{CoveragePlan, MAX_NO_FLY_CORNERS};
 use crate::scenario::coverage::Trigger;
 
 /// A corner of the path within this distance of a picture counts as at the picture's position,
@@ -186,7 +186,11 @@ fn add_picture_points(
 }
 
 /// Corners of the shortest way around no-fly zones between two points; empty for a straight way.
-fn corners_between(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> Fixed<Flat, MAX_CORNERS> {
+fn corners_between(
+    planned: &CoveragePlan<'_>,
+    from: &Flat,
+    to: &Flat,
+) -> Fixed<Flat, MAX_NO_FLY_CORNERS> {
     let mut corners = Fixed::new();
     // The planner found a finite length of the way between any two points of a plan, so this never
     // fails.

@@ -17,7 +17,7 @@ use planner_core::map::voxel::Outside;
 use self::polygon::{
     Polygon, bounding_box, contains, convex_hull, offset_outward, simplified_outward,
 };
-use crate::capacity::BOARD_CORNERS;
+use crate::capacity::BOARD_NO_FLY_CORNERS;
 use crate::map::{ClearanceField, OccupancyMap, Unknown, VoxelMap};
 
 /// Height above the ground up to which the map's cells count as ground, metres.
@@ -90,7 +90,7 @@ impl MapObstacles {
 
     /// Horizontal distance from a vehicle that climbs from `place` to the nearest obstacle beside
     /// or above it, metres; `None` if no obstacle is nearer than the clearance.
-    pub fn distance_beside_climb(&self, place: &Point) -> Option<f32> {
+    pub fn obstacle_beside_climb_m(&self, place: &Point) -> Option<f32> {
         let shape = &self.map.shape;
         let half = Flat::repeat(shape.resolution_m / 2.0);
         let distance_m = |cell: [u32; 3]| {
@@ -126,7 +126,7 @@ impl MapObstacles {
         let corners = |zones: &[Vec<Flat>]| own + zones.iter().map(Vec::len).sum::<usize>();
         let counts = drawn.each_ref().map(|zones| corners(zones));
         let fits = |limit: usize| counts.iter().position(|count| *count <= limit);
-        match fits(BOARD_CORNERS).or_else(|| fits(most)) {
+        match fits(BOARD_NO_FLY_CORNERS).or_else(|| fits(most)) {
             Some(index) => Ok(drawn.into_iter().nth(index).unwrap_or_default()),
             None => Err(TooManyCorners(counts[OUTLINES.len() - 1])),
         }

@@ -8,7 +8,7 @@ use planner_core::coverage::area::RingKind;
 use super::check::CoverageFindings;
 use super::flight::FlightPoint;
 use super::{CoveragePlan, SortieFlight, parts};
-use crate::report::{AreaOutline, Curve, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
+use crate::report::{AreaOutline, Curve, OutlineKind, Plot, ReportData, ReportVehicle, TrackPoint};
 
 /// Spacing of the points of a height profile along a path, metres.
 const PROFILE_SPACING_M: f32 = 5.0;
@@ -30,7 +30,7 @@ pub fn report_data(
             position: point.position,
         };
         let track: Vec<TrackPoint> = passed.map(at).collect();
-        VehicleTrack {
+        ReportVehicle {
             id: vehicle.id,
             radius_m: vehicle.radius_m,
             color: None,

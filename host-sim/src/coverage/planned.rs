@@ -14,7 +14,7 @@ pub const MAX_VEHICLES: usize = 32;
 /// Most lanes over an area that the host plans.
 pub const MAX_LANES: usize = 8192;
 /// Most convex corners of no-fly zones that the host plans around.
-pub const MAX_CORNERS: usize = 256;
+pub const MAX_NO_FLY_CORNERS: usize = 256;
 
 /// One flight of a vehicle on one battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +57,7 @@ pub struct CoveragePlan<'a> {
     /// All lanes, in the order of the path.
     pub tracks: Box<Tracks<MAX_LANES>>,
     /// Shortest ways around no-fly zones.
-    pub transit: Box<Transit<'a, MAX_CORNERS>>,
+    pub transit: Box<Transit<'a, MAX_NO_FLY_CORNERS>>,
     /// Routes of the vehicles that fly, in the order of the path.
     pub plan: RoutePlan<MAX_VEHICLES>,
     /// The shares (W in paper CPP) by which companions divide the path into these routes, one for

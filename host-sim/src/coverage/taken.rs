@@ -77,8 +77,8 @@ pub fn count_missed_and_repeated(planned: &CoveragePlan<'_>, pictures: &[Picture
     let tolerance = Tolerance::of_plan(planned);
     let lanes = planned.tracks.lanes();
     let left: u64 =
-        lanes.iter().map(|lane| count_left_on_lane(planned, lane, pictures, &tolerance)).sum();
-    (left, count_flown_twice(lanes, planned.tracks.waypoint_count(), pictures))
+        lanes.iter().map(|lane| count_missed_on_lane(planned, lane, pictures, &tolerance)).sum();
+    (left, count_repeated(lanes, planned.tracks.waypoint_count(), pictures))
 }
 
 /// Distance of a point along a lane from its first waypoint, and distance beside the lane, metres.
@@ -92,7 +92,7 @@ fn along_and_cross_track(lane: &Lane, place: &Flat) -> (f32, f32) {
     }
 }
 
-fn count_left_on_lane(
+fn count_missed_on_lane(
     planned: &CoveragePlan<'_>,
     lane: &Lane,
     pictures: &[Picture],
@@ -129,7 +129,7 @@ fn nearest_waypoint(lanes: &[Lane], place: &Flat) -> Option<u32> {
     lanes.iter().map(nearest).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(number, _)| number)
 }
 
-fn count_flown_twice(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
+fn count_repeated(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
     let mut passes = vec![0_u32; waypoints as usize];
     let mut vehicles: Vec<Option<u8>> = pictures.iter().map(|picture| picture.vehicle).collect();
     vehicles.sort_unstable();

@@ -61,16 +61,16 @@ pub fn flown_layers(
             parts: flights
                 .iter()
                 .filter(|flight| flight.task.leaves_pad())
-                .map(flight_part)
+                .map(report_part)
                 .collect(),
-            taken: reassigned_waypoints(&before, &own),
+            taken: waypoint_transfers(&before, &own),
         });
         before = own;
     }
     Ok(parts::coverage_layers(planned, shown, pictures))
 }
 
-fn flight_part(flight: &Flight<WAYPOINTS>) -> ReportPart {
+fn report_part(flight: &Flight<WAYPOINTS>) -> ReportPart {
     let path = &flight.path;
     let (mut lanes, mut waypoints) = (Vec::<Point>::new(), 0);
     if let Task::Photograph(photographs) = &flight.task {
@@ -97,7 +97,7 @@ fn waypoint_owners(flights: &[Flight<WAYPOINTS>]) -> WaypointOwners {
 }
 
 /// Counts the waypoints that went from one vehicle to another, for each pair of vehicles.
-fn reassigned_waypoints(before: &WaypointOwners, now: &WaypointOwners) -> Vec<WaypointTransfer> {
+fn waypoint_transfers(before: &WaypointOwners, now: &WaypointOwners) -> Vec<WaypointTransfer> {
     let mut counts = BTreeMap::<(u8, u8), u32>::new();
     for (number, to) in now {
         if let Some(from) = before.get(number).filter(|from| *from != to) {

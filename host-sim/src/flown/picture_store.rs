@@ -8,7 +8,7 @@ use planner_core::Point;
 
 use crate::coverage::check::Picture;
 use crate::files::{self, ResultFiles};
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 
 /// Name of the file with the pictures taken so far.
 const FILE_NAME: &str = "pictures.json";
@@ -31,7 +31,7 @@ impl PictureStore {
         let path = dir.join(FILE_NAME);
         let mut before = Vec::new();
         if path.exists() {
-            let bad = || format!("no pictures of earlier flights: {}", quoted_path(&path));
+            let bad = || format!("no pictures of earlier flights: {}", printable_path(&path));
             let text = files::read(&path, files::MAX_BINARY_BYTES).with_context(bad)?;
             let rows: Vec<PictureRow> = serde_json::from_slice(&text).with_context(bad)?;
             // Pictures of earlier flights count as taken at time 0, before this flight.
@@ -49,7 +49,7 @@ impl PictureStore {
     /// Inserts the pictures of earlier flights before those of this flight, which continued them. A
     /// flight may continue even if the earlier pictures already show the whole area: a companion's
     /// journal may be some waypoints behind.
-    pub fn add_to(&self, pictures: &mut Vec<Picture>) {
+    pub fn prepend_to(&self, pictures: &mut Vec<Picture>) {
         pictures.splice(..0, self.before.iter().copied());
     }
 

@@ -29,7 +29,7 @@ pub struct FlightFindings {
 ///
 /// # Errors
 /// As [`CoveragePlan::new`].
-pub fn lane_points_as_pictures(
+pub fn track_points_as_pictures(
     scenario: &Scenario,
     tracks: &[Vec<(f32, Point)>],
 ) -> anyhow::Result<Option<Vec<Picture>>> {

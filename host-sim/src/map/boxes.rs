@@ -26,7 +26,7 @@ const MAX_BOXES_PER_THREAD: usize = 512;
 const SPLIT_BINS: usize = 16;
 /// Distance from a segment within which nodes are assumed to be opened when the tree is built,
 /// metres: the clearance of most edges is less.
-const OPEN_NODE_WITHIN_M: f32 = 0.6;
+const ASSUMED_CLEARANCE_M: f32 = 0.6;
 
 /// A box of the cells `low..high` along x, y and z.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -138,7 +138,7 @@ impl BoxTree {
     /// Builds the tree over a map. Cost: O(bricks + boxes · log boxes).
     pub fn new(grid: &VoxelGrid<'_>) -> Self {
         let nodes =
-            build_nodes(&mut boxes_of_map(grid), OPEN_NODE_WITHIN_M / grid.shape().resolution_m);
+            build_nodes(&mut boxes_of_map(grid), ASSUMED_CLEARANCE_M / grid.shape().resolution_m);
         Self { shape: *grid.shape(), outside: grid.outside(), nodes, arch: Arch::new() }
     }
 
@@ -259,7 +259,8 @@ fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellB
     } else {
         // No border between bins leaves a third on either side: splits at the median along the axis
         // with the largest extent.
-        let spread = |axis: usize| centre_extent(boxes, axis).map_or(0, |(low, high)| high - low);
+        let spread =
+            |axis: usize| twice_center_range(boxes, axis).map_or(0, |(low, high)| high - low);
         let axis = (0..3).max_by_key(|&axis| spread(axis)).unwrap_or(0);
         middle = boxes.len() / 2;
         boxes.select_nth_unstable_by_key(middle, |b| b.center(axis));
@@ -268,7 +269,7 @@ fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellB
 }
 
 /// Least and greatest value of twice the boxes' centres along an axis; `None` without boxes.
-fn centre_extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
+fn twice_center_range(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
     let centers = || boxes.iter().map(|b| b.center(axis));
     Some((centers().min()?, centers().max()?))
 }
@@ -276,7 +277,7 @@ fn centre_extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
 /// Function from a box to its bin, 0 to [`SPLIT_BINS`] − 1, along an axis; `None` if all centres
 /// coincide along it.
 fn bin_of_box(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
-    let (low, high) = centre_extent(boxes, axis)?;
+    let (low, high) = twice_center_range(boxes, axis)?;
     (low < high).then_some(move |b: &CellBox| {
         (b.center(axis) - low) as usize * (SPLIT_BINS - 1) / (high - low) as usize
     })

@@ -77,7 +77,7 @@ pub fn ground_below_column(
         return Err(ColumnError::TooLow { ground_m });
     }
     let (place, distance_m, unknown) =
-        nearest_above(map, point, below, ground_m + radius_m, required_m);
+        nearest_to_column(map, point, below, ground_m + radius_m, required_m);
     if f64::from(required_m) < distance_m {
         return Ok(ground_m);
     }
@@ -87,7 +87,7 @@ pub fn ground_below_column(
 /// Obstacle nearest to the vertical segment from `low_m` up to `point`: its nearest point, its
 /// distance, and whether it is unknown. Obstacles are the blocked cells above layer `ground` within
 /// `reach_m`, and, where the outside is blocked, the faces of the map but the lowest.
-fn nearest_above(
+fn nearest_to_column(
     map: &VoxelMap,
     point: &Point,
     ground: u32,

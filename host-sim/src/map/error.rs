@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::quote::{quoted, quoted_path};
+use crate::quote::{printable_path, quoted};
 
 /// Reason why a map could not be read, generated or written.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
     /// The operating system reported an error.
-    #[error("cannot {action} the map: {}", quoted_path(file))]
+    #[error("cannot {action} the map: {}", printable_path(file))]
     Io {
         /// What failed: "read" or "write".
         action: &'static str,
@@ -20,7 +20,7 @@ pub enum MapError {
     /// The bytes of the file do not follow its format.
     #[error(
         "malformed map: {}: byte {offset}: expected {expected}, found {found}",
-        quoted_path(file)
+        printable_path(file)
     )]
     Malformed {
         /// Path of the file.

@@ -25,9 +25,11 @@ use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 
 use super::ready::{HostPlan, OwnPlan, PreparedMission, schedule_config};
 use crate::area::MAX_VERTICES;
-use crate::capacity::{BOARD_CORNERS, BoardCapacity, GATES, VEHICLES, WAYPOINTS, on_heap};
+use crate::capacity::{BOARD_NO_FLY_CORNERS, BoardCapacity, GATES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::sorties::{self, USABLE_CHARGE};
-use crate::coverage::{CoveragePlan, MAX_CORNERS, MAX_LANES, MAX_VEHICLES as COVERAGE_VEHICLES};
+use crate::coverage::{
+    CoveragePlan, MAX_LANES, MAX_NO_FLY_CORNERS, MAX_VEHICLES as COVERAGE_VEHICLES,
+};
 use crate::scenario::coverage::{CoverageMethod, Terrain};
 use crate::scenario::{self, Scenario};
 use crate::{map, margins};
@@ -66,7 +68,7 @@ pub(super) fn prepare(
         })
         .collect();
     check_batteries(&planned)?;
-    check_height(&planned)?;
+    check_picture_height(&planned)?;
     let top_m = TAKEOFF_HEIGHT_M.min(pictures_above_ground_m(planned.area_settings));
     drop(planned);
     for vehicle in &mut scenario.vehicles {
@@ -141,7 +143,7 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
 
 /// Refuses pictures so low that a vehicle whose estimate is too high by the greatest error could
 /// touch the ground.
-fn check_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
+fn check_picture_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     let height_m = pictures_above_ground_m(planned.area_settings);
     for vehicle in &planned.scenario.vehicles {
         let lower_m =
@@ -262,7 +264,7 @@ impl PreparedMission {
             MAX_VERTICES,
             MAX_LANES,
             COVERAGE_VEHICLES,
-            MAX_CORNERS,
+            MAX_NO_FLY_CORNERS,
             VEHICLES,
             WAYPOINTS,
         >(
@@ -320,7 +322,7 @@ impl PreparedMission {
             MAX_VERTICES,
             MAX_LANES,
             COVERAGE_VEHICLES,
-            MAX_CORNERS,
+            MAX_NO_FLY_CORNERS,
             WAYPOINTS,
             GATES,
         >(view, self.height_field(), request, obstacles, &mut ws, &mut own)?;
@@ -337,10 +339,10 @@ impl PreparedMission {
         let (vertices, rings): (Vec<_>, Vec<_>) =
             (view.vertices().collect(), view.rings().collect());
         let zones = Area::new(&vertices, &rings)
-            .map(|area| Transit::<BOARD_CORNERS>::empty().set_area(area));
+            .map(|area| Transit::<BOARD_NO_FLY_CORNERS>::empty().set_area(area));
         if matches!(zones, Ok(Err(_))) {
             return Some(format!(
-                "more convex corners of no-fly zones, {} holds {BOARD_CORNERS}",
+                "more convex corners of no-fly zones, {} holds {BOARD_NO_FLY_CORNERS}",
                 board.name
             ));
         }

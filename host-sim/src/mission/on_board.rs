@@ -21,7 +21,7 @@ impl PreparedMission {
             MissionKind::Goals => board
                 .roadmap_excess(&self.roadmap_view())
                 .or_else(of_mission)
-                .or_else(|| self.plan_limit_exceeded(plan, board)),
+                .or_else(|| self.plan_mismatch_on_board(plan, board)),
             MissionKind::Coverage(area) => {
                 let gates = |i| self.own_plan(plan, i).map_or(usize::MAX, |own| own.gates.len());
                 let most = (0..self.tasks.len()).map(gates).max().unwrap_or(0);
@@ -34,7 +34,7 @@ impl PreparedMission {
 
     /// Plans with the capacities of a board: `None` if the plan's CRC equals that of `plan`, else a
     /// text that says why not.
-    fn plan_limit_exceeded(&self, plan: &HostPlan, board: &BoardCapacity) -> Option<String> {
+    fn plan_mismatch_on_board(&self, plan: &HostPlan, board: &BoardCapacity) -> Option<String> {
         const H743: BoardCapacity = NUCLEO_H743;
         let planned = if board.nodes == H743.nodes {
             self.plan_crc_on_board::<{ H743.nodes }, { H743.vehicles }, { H743.timed_segments }>(

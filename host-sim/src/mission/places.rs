@@ -22,7 +22,7 @@ const SLOT_GRID_M: f32 = 0.25;
 /// Height of a start or goal above the hull centre of a vehicle of `radius_m` that stands on the
 /// ground below it, metres. Fails if the vertical flight between the two is nearer to an obstacle
 /// than the required clearance; the error then suggests the nearest place that has the clearance.
-pub(super) fn height_over_ground(
+pub(super) fn climb_height_m(
     scenario: &Scenario,
     map: &VoxelMap,
     what: &str,
@@ -91,14 +91,7 @@ pub(super) fn vehicle_tasks(
         Ok(VehicleTask {
             id: vehicle.id,
             required_clearance_m: vehicle.radius_m + scenario.roadmap.safety_margin_m,
-            climb_m: height_over_ground(
-                scenario,
-                map,
-                &what,
-                place,
-                &vehicle.start,
-                vehicle.radius_m,
-            )?,
+            climb_m: climb_height_m(scenario, map, &what, place, &vehicle.start, vehicle.radius_m)?,
             goal: vehicle.goal.map(|goal| goal as u16),
         })
     };

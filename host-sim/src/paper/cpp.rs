@@ -12,8 +12,8 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 use super::cpp_data::{
-    COSTS_M, FLIGHT_TIMES_TABLES, LONG_TRACK_COLUMNS, MEAN_LARGEST_TIME_S, PLANNING_S, REAL_S,
-    SHORT_TRACK_COLUMNS, TABLE_4_COSTS_M,
+    FLIGHT_TIMES_TABLES, LONG_TRACK_COLUMNS, MEAN_LARGEST_TIME_S, PLANNING_S, REAL_FLIGHT_TIMES_S,
+    SHORT_TRACK_COLUMNS, TABLE_2_COSTS_M, TABLE_4_COSTS_M,
 };
 use super::cpp_figures;
 use super::cpp_rows::{TableRow, ValueSummary};
@@ -193,7 +193,7 @@ fn paper_figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
 
 fn table_2(tables: &mut Tables) -> anyhow::Result<()> {
     let scenario = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
-    for (method, theirs) in METHODS.into_iter().zip(COSTS_M) {
+    for (method, theirs) in METHODS.into_iter().zip(TABLE_2_COSTS_M) {
         let ours = tables.plan_costs(&scenario, method, "m")?;
         tables.add("2", method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
     }
@@ -268,7 +268,7 @@ fn flown(tables: &mut Tables) -> anyhow::Result<()> {
 
 fn table_6(tables: &mut Tables) -> anyhow::Result<()> {
     let scenario = paper_scenario(SHORT_TRACK, &in_a_row(3), 10.0, 20.0)?;
-    for (method, theirs) in METHODS.into_iter().zip(REAL_S) {
+    for (method, theirs) in METHODS.into_iter().zip(REAL_FLIGHT_TIMES_S) {
         let ours = tables.plan_costs(&scenario, method, "s")?;
         tables.add("6", method, (10.0, 20.0), "s", [ours, theirs.to_vec()]);
     }

@@ -181,7 +181,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
 ];
 
 /// Table 2: distance costs of three vehicles, metres, by method.
-pub(super) const COSTS_M: [[f64; 3]; 3] =
+pub(super) const TABLE_2_COSTS_M: [[f64; 3]; 3] =
     [[963.81, 944.65, 644.58], [928.75, 900.34, 789.27], [908.75, 911.77, 904.72]];
 
 /// Table 3: planning times, seconds, by method, for 2 to 7 vehicles.
@@ -201,5 +201,5 @@ pub(super) const MEAN_LARGEST_TIME_S: [[f64; 3]; 2] =
     [[300.42, 330.08, 322.0], [795.58, 754.25, 735.42]];
 
 /// Table 6: flight times of three real vehicles, seconds, by method.
-pub(super) const REAL_S: [[f64; 3]; 3] =
+pub(super) const REAL_FLIGHT_TIMES_S: [[f64; 3]; 3] =
     [[289.0, 305.0, 276.0], [279.0, 298.0, 268.0], [285.0, 282.0, 271.0]];

@@ -16,7 +16,7 @@ fn short_plain_text_stays_as_it_is() {
 fn arguments_are_quoted_inside_a_message() {
     let arguments = ["--id=\x07".to_owned(), "y".repeat(1000)];
     let text = format!("error: invalid value '\x07' or '{}'", arguments[1]);
-    let message = quote_arguments(&text, arguments.into_iter());
+    let message = with_printable_arguments(&text, arguments.into_iter());
     assert!(message.starts_with("error: invalid value '\\u{7}' or 'yyy"), "{message}");
     assert!(message.chars().count() < 240, "{message}");
 }
@@ -30,7 +30,7 @@ proptest! {
             "{short:?}"
         );
         prop_assert!(
-            quote_message(&text).lines().all(
+            printable_message(&text).lines().all(
                 |l| l.chars().count() <= MAX_ERROR_CHARS && !l.chars().any(is_control_code)
             )
         );

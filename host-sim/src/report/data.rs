@@ -25,7 +25,7 @@ pub struct ReportData {
     /// Nodes and edges of the roadmap; `None` where the mission has no roadmap.
     pub roadmap: Option<RoadmapLines>,
     /// Vehicles in the order of the page's table of vehicles.
-    pub vehicles: Vec<VehicleTrack>,
+    pub vehicles: Vec<ReportVehicle>,
     /// Borders on the ground: area, holes and no-fly zones of a coverage mission.
     pub outlines: Vec<AreaOutline>,
     /// Divisions of the area and pictures; `None` outside coverage missions.
@@ -79,7 +79,7 @@ pub struct RoadmapLines {
 
 /// One vehicle: its goal, its planned path and its flown track.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct VehicleTrack {
+pub struct ReportVehicle {
     /// MAVLink system id.
     pub id: u8,
     /// Radius of the body, metres.
@@ -184,7 +184,7 @@ pub struct Curve {
 /// The colour of the `index`-th vehicle, sRGB: ten that differ clearly on a dark ground, then the
 /// same at 78 % and at 60 % of their brightness, then from the first again.
 pub fn vehicle_color(index: usize) -> [u8; 3] {
-    const ROUND: [[u8; 3]; 10] = [
+    const PALETTE: [[u8; 3]; 10] = [
         [77, 163, 255],
         [255, 149, 64],
         [87, 211, 128],
@@ -196,6 +196,6 @@ pub fn vehicle_color(index: usize) -> [u8; 3] {
         [163, 204, 82],
         [214, 160, 120],
     ];
-    let percent = [100, 78, 60][(index / ROUND.len()) % 3];
-    ROUND[index % ROUND.len()].map(|c| (u16::from(c) * percent / 100) as u8)
+    let percent = [100, 78, 60][(index / PALETTE.len()) % 3];
+    PALETTE[index % PALETTE.len()].map(|c| (u16::from(c) * percent / 100) as u8)
 }

@@ -125,7 +125,7 @@ impl<'a> TomlValue<'a> {
         let all: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
         let error = self.error(&format!("must be one of {}", all.join(", ")));
         Err(ScenarioError {
-            hint: nearest_word(given, words.iter().map(|(word, _)| *word)),
+            hint: nearest_word_hint(given, words.iter().map(|(word, _)| *word)),
             ..error
         })
     }
@@ -279,12 +279,15 @@ impl<'a> Table<'a> {
         let known = self.known.borrow();
         let unknown = self.table.iter().filter(|(key, _)| !known.contains(&key.get_ref().as_ref()));
         let Some((key, _)) = unknown.min_by_key(|(key, _)| key.span().start) else { return Ok(()) };
-        Err(self.unknown_key_error(key, nearest_word(key.get_ref(), known.iter().copied())))
+        Err(self.unknown_key_error(key, nearest_word_hint(key.get_ref(), known.iter().copied())))
     }
 }
 
 /// A hint with the word nearest to `given`, or with all words if none is near.
-fn nearest_word<'w>(given: &str, words: impl Iterator<Item = &'w str> + Clone) -> Option<String> {
+fn nearest_word_hint<'w>(
+    given: &str,
+    words: impl Iterator<Item = &'w str> + Clone,
+) -> Option<String> {
     let given = given.to_lowercase();
     let score = |word: &&str| strsim::jaro_winkler(&given, word);
     let best = words.clone().max_by(|a, b| score(a).total_cmp(&score(b)))?;

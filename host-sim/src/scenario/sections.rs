@@ -20,7 +20,7 @@ use toml::de::DeTable;
 
 use self::checks::VehicleSpans;
 use self::simulation::{read_deconfliction, read_fault, read_simulation};
-use self::values::{MAX_ID, read_point};
+use self::values::{MAX_VEHICLE_ID, read_point};
 use super::error::ScenarioError;
 use super::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
 use super::types::{
@@ -323,7 +323,7 @@ fn read_vehicles(
         let table = item.table()?;
         let id_value =
             table.required("id", "each vehicle has its own MAVLink system id, 1 to 250")?;
-        let id = id_value.integer_in_range(1..=MAX_ID)? as u8;
+        let id = id_value.integer_in_range(1..=MAX_VEHICLE_ID)? as u8;
         if vehicles.iter().any(|(v, _)| v.id == id) {
             return Err(id_value.error(&format!("is {id}, which another vehicle already has")));
         }

@@ -118,7 +118,7 @@ impl RemoteCompanion {
     ///
     /// # Errors
     /// The board is gone.
-    pub fn stack_used(&mut self) -> anyhow::Result<Option<usize>> {
+    pub fn max_stack_used(&mut self) -> anyhow::Result<Option<usize>> {
         let BoardConnection::LockStep(LockStep { board, runs, .. }) = &mut self.ends else {
             return Ok(None);
         };

@@ -8,7 +8,7 @@
 //! | `serial-stall` | no byte between companion and autopilot, either way | 3 s if not given |
 //! | `serial-corrupt` | `CORRUPTED_SHARE` of all bytes change a bit | as before |
 //! | `position-jump` | the estimate moves by `offset_m`, 5 m east if not given | jumps back |
-//! | `origin-change` | the EKF origin moves by `offset_m`, `ORIGIN_CHANGE_M` if not given | moves back |
+//! | `origin-change` | the EKF origin moves by `offset_m`, `DEFAULT_ORIGIN_CHANGE_M` if not given | moves back |
 //! | `gps-loss` | no position | position again |
 //! | `battery-low` | `BATTERY_LEFT` of the charge is left | never |
 //! | `pilot-takeover` | Position or Brake mode by the pilot's switch | as `pilot-return` |
@@ -42,7 +42,7 @@ const BATTERY_LEFT: f32 = 0.1;
 /// By how much `position-jump` moves the estimate if the fault has no `offset_m`, ENU metres.
 const DEFAULT_POSITION_JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
 /// By how much `origin-change` moves the EKF origin if the fault has no `offset_m`, ENU metres.
-const ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
+const DEFAULT_ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
 /// Duration of a serial stall or an autopilot's boot if the fault has no `duration_s`, seconds.
 const DEFAULT_FAULT_S: f32 = 3.0;
 
@@ -200,10 +200,12 @@ fn begin_fault(
         "serial-stall" => member.stall_serial(spell_us),
         "serial-corrupt" => member.set_serial_corruption(CORRUPTED_SHARE),
         "position-jump" => {
-            member.autopilot.jump_position(&fault.offset_m.unwrap_or(DEFAULT_POSITION_JUMP_M));
+            member
+                .autopilot
+                .jump_estimated_position(&fault.offset_m.unwrap_or(DEFAULT_POSITION_JUMP_M));
         }
         "origin-change" => {
-            member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_CHANGE_M));
+            member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(DEFAULT_ORIGIN_CHANGE_M));
         }
         "gps-loss" => member.autopilot.set_gps_fix(GpsFix::Lost),
         "battery-low" => member.autopilot.set_battery(BATTERY_LEFT),
@@ -227,10 +229,12 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
         "radio-cut" => world.radio.set_outage(i, RadioOutage::default()),
         "serial-corrupt" => member.set_serial_corruption(corruption),
         "position-jump" => {
-            member.autopilot.jump_position(&-fault.offset_m.unwrap_or(DEFAULT_POSITION_JUMP_M));
+            member
+                .autopilot
+                .jump_estimated_position(&-fault.offset_m.unwrap_or(DEFAULT_POSITION_JUMP_M));
         }
         "origin-change" => {
-            member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_CHANGE_M));
+            member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(DEFAULT_ORIGIN_CHANGE_M));
         }
         "gps-loss" => member.autopilot.set_gps_fix(GpsFix::Held),
         "pilot-takeover" => return_from_pilot(i, now_us, world),

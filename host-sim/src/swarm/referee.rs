@@ -19,7 +19,7 @@ const CONTACT_ROUNDING_M: f32 = 1e-3;
 /// Time without progress in flight that counts as a deadlock, seconds.
 const DEADLOCK_S: f64 = 20.0;
 /// Least increase of arc length along the path that counts as progress, metres.
-const ENDS_DEADLOCK_M: f32 = 0.1;
+const COUNTS_AS_PROGRESS_M: f32 = 0.1;
 /// Distance from its last place of progress at which a vehicle that reports no progress counts as
 /// moving, metres: more than it sways in hover.
 const OFF_HOVER_M: f32 = 1.0;
@@ -349,7 +349,7 @@ impl<'a> Referee<'a> {
             vehicle.best_progress_m = progress_m - OFF_HOVER_M;
         }
         let moved = match now.progress_m {
-            Some(progress_m) => progress_m > vehicle.best_progress_m + ENDS_DEADLOCK_M,
+            Some(progress_m) => progress_m > vehicle.best_progress_m + COUNTS_AS_PROGRESS_M,
             None => (now.position - vehicle.progressed_at).norm() > OFF_HOVER_M,
         };
         if now.phase != RefereePhase::Flying || now.holds_by_command || moved {

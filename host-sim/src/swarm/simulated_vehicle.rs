@@ -134,7 +134,7 @@ impl SimulatedVehicle {
     /// The board is gone.
     pub fn print_stack_use(&mut self) -> anyhow::Result<()> {
         let (id, board) = (self.system_id(), self.board.as_mut());
-        if let Some(used) = board.map(RemoteCompanion::stack_used).transpose()?.flatten() {
+        if let Some(used) = board.map(RemoteCompanion::max_stack_used).transpose()?.flatten() {
             say!("board {id}: stack: {used} of {STACK_LEN} bytes used");
         }
         Ok(())
@@ -437,7 +437,7 @@ impl SimulatedVehicle {
 
     /// Removes and returns the companion's most urgent plan request; `None` if there is none, or if
     /// requests are not answered (`late-plan`).
-    pub fn next_plan_request(&self) -> Option<PlanKind> {
+    pub fn take_plan_request(&self) -> Option<PlanKind> {
         if self.planner == PlanAnswer::Late { None } else { self.plan_requests.take() }
     }
 
@@ -477,7 +477,7 @@ impl SimulatedVehicle {
     }
 
     /// Removes and returns the photos that the autopilot has taken since the last call.
-    pub fn take_pictures(&mut self) -> Vec<Picture> {
+    pub fn drain_pictures(&mut self) -> Vec<Picture> {
         let vehicle = Some(self.system_id());
         let picture = |photo: Photo| Picture {
             vehicle,
@@ -485,7 +485,7 @@ impl SimulatedVehicle {
             position: photo.position,
             heading: std::f32::consts::FRAC_PI_2 - photo.heading_rad,
         };
-        self.autopilot.take_photos().into_iter().map(picture).collect()
+        self.autopilot.drain_photos().into_iter().map(picture).collect()
     }
 }
 

@@ -17,9 +17,9 @@ use crate::mission::PreparedMission;
 use crate::scenario::{AutopilotKind, CompanionHost, PositionErrors, VehicleSection};
 
 /// Radio range from which on a simulated radio counts as reaching every vehicle, metres.
-const UNLIMITED_RANGE_M: f32 = 500.0;
+const UNLIMITED_RADIO_RANGE_M: f32 = 500.0;
 /// Least radio range that a companion's settings may have, metres.
-const MIN_RANGE_M: f32 = 1.0;
+const MIN_RADIO_RANGE_M: f32 = 1.0;
 
 /// The vehicles of a mission on their pads, in the order of the scenario.
 ///
@@ -42,7 +42,7 @@ pub fn vehicles_on_pads(mission: &PreparedMission) -> anyhow::Result<Vec<Simulat
             let config = autopilot_config(mission, vehicle, task.climb_m);
             let companion = companion_config(mission, vehicle.id)?;
             let mut member = SimulatedVehicle::new(&config, companion, serial, scenario.seed)?;
-            member.autopilot.land_on_stream_loss();
+            member.autopilot.land_on_offboard_loss();
             match &vehicle.companion {
                 CompanionHost::InProcess { flash: None } => {}
                 CompanionHost::InProcess { flash: Some(file) } => {
@@ -133,7 +133,7 @@ pub fn companion_config(mission: &PreparedMission, id: u8) -> anyhow::Result<Con
     // The operator sets this radio range; from 500 m on, radio silence is never explained by
     // distance.
     let radio_range_m = match scenario.simulation.radio_range_m {
-        range_m if range_m < UNLIMITED_RANGE_M => range_m.max(MIN_RANGE_M),
+        range_m if range_m < UNLIMITED_RADIO_RANGE_M => range_m.max(MIN_RADIO_RANGE_M),
         _ => REACHES_ALL_M,
     };
     let method = scenario.deconfliction.method;

@@ -90,7 +90,7 @@ pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, 
     for row in 0..rows {
         for column in 0..columns {
             let place = low + Flat::new(column as f32, row as f32) * cell_m;
-            let found = grid.heights_in_box(&(place - around), &(place + around));
+            let found = grid.highest_in_box(&(place - around), &(place + around));
             let height_m = match found.highest_m {
                 Some(height_m) if !found.holes => height_m,
                 _ => return Err(FieldError::Hole(place.x, place.y)),

@@ -17,7 +17,7 @@ use crate::files;
 
 const FORMAT: &str = "a GeoTIFF";
 /// Longest strip or tile that is decoded, bytes.
-const MAX_CHUNK: usize = 1 << 27;
+const MAX_CHUNK_BYTES: usize = 1 << 27;
 
 pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     let length = files::regular_file_len(path)?;
@@ -42,8 +42,8 @@ fn malformed(error: TiffError) -> TerrainError {
 
 pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = MAX_CHUNK;
-    limits.intermediate_buffer_size = MAX_CHUNK;
+    limits.decoding_buffer_size = MAX_CHUNK_BYTES;
+    limits.intermediate_buffer_size = MAX_CHUNK_BYTES;
     limits.ifd_value_size = 1 << 24;
     let mut decoder = Decoder::new(file).map_err(malformed)?.with_limits(limits);
     let (columns, rows) = decoder.dimensions().map_err(malformed)?;

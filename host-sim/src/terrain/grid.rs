@@ -103,12 +103,12 @@ impl HeightGrid {
 
     /// Keeps the heights so far as those at the cells' centres; cells may then be raised above
     /// them.
-    pub(super) fn keep_centre_heights(&mut self) {
+    pub(super) fn save_centre_heights(&mut self) {
         self.centre_heights_m.clone_from(&self.heights_m);
     }
 
     /// Greatest height in the cells that a box touches, and whether any of these has none.
-    pub fn heights_in_box(&self, low: &Flat, high: &Flat) -> BoxHeights {
+    pub fn highest_in_box(&self, low: &Flat, high: &Flat) -> BoxHeights {
         let index = |at: f32, from: f32| ((at - from) / self.cell_m).floor();
         let mut found = BoxHeights::default();
         let mut ranges = [(0, 0); 2];

@@ -72,7 +72,7 @@ impl Raster {
                 }
             }
         }
-        grid.keep_centre_heights();
+        grid.save_centre_heights();
         for row in rows.0..rows.1 {
             for column in columns.0..columns.1 {
                 let height_m = self.heights_m[row * self.columns + column];

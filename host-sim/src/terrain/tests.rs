@@ -109,7 +109,7 @@ proptest! {
                 }
             }
             want.holes |= (0..2).any(|a| low[a] < corner[a] || high[a] > corner[a] + sides[a]);
-            prop_assert_eq!(grid.heights_in_box(&low, &high), want);
+            prop_assert_eq!(grid.highest_in_box(&low, &high), want);
         }
     }
 
@@ -141,7 +141,7 @@ proptest! {
                     ];
                     let place = raster.crs.to_mission(&origin, at).unwrap();
                     let reach = Flat::repeat(grid.cell_m());
-                    let near = grid.heights_in_box(&(place - reach), &(place + reach));
+                    let near = grid.highest_in_box(&(place - reach), &(place + reach));
                     if value != 99.0 {
                         prop_assert!(near.highest_m.unwrap() >= value * unit_m - 1e-3);
                     }

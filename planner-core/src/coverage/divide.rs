@@ -43,7 +43,7 @@ pub fn remaining_lanes<const L: usize, const N: usize>(
     if left.lanes.is_empty() {
         return Err(CoverageError::NothingToCover);
     }
-    left.measure_lengths(transit)
+    left.number_and_measure(transit)
 }
 
 /// Whether the ranges are in ascending order and do not overlap.

@@ -62,7 +62,7 @@ pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
     // Upper bound of T: BINPAT's division is possible. Lower bound: 0 s.
     binpat(work, pack, out)?;
     let mut table = DivisionTable { work, ws, count, waypoints };
-    table.fill_lengths();
+    table.fill_transit_lengths();
     let (mut low, mut high) = (0.0, out.max_cost_s() * (1.0 + TIME_RESOLUTION));
     if table.fill_states(high) {
         table.write_plan(out);
@@ -87,7 +87,7 @@ struct DivisionTable<'t, 'w, 'm, const L: usize, const N: usize> {
 }
 
 impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
-    fn fill_lengths(&mut self) {
+    fn fill_transit_lengths(&mut self) {
         for (v, vehicle) in self.work.vehicles.iter().enumerate() {
             for i in 0..self.waypoints {
                 let Some(place) = self.work.tracks.waypoint(i as u32) else { continue };

@@ -54,7 +54,7 @@ pub fn order_given_lanes<const L: usize, const N: usize>(
     }
     let count = out.lanes.len();
     order::order_lanes(&mut out.lanes, count, transit, search_steps);
-    out.number_waypoints(spacing, transit)
+    out.space_waypoints(spacing, transit)
 }
 
 #[cfg(test)]

@@ -125,7 +125,7 @@ impl<const L: usize> Tracks<L> {
 
     /// Sets the number of waypoints of each lane by the spacing, numbers them, and computes lengths
     /// along the path.
-    pub(super) fn number_waypoints<const N: usize>(
+    pub(super) fn space_waypoints<const N: usize>(
         &mut self,
         spacing: &Spacing,
         transit: &Transit<'_, N>,
@@ -141,11 +141,11 @@ impl<const L: usize> Tracks<L> {
                 fmaxf(steps, 1.0) as u32 + 1
             };
         }
-        self.measure_lengths(transit)
+        self.number_and_measure(transit)
     }
 
     /// Numbers the waypoints that each lane already has, and computes lengths along the path.
-    pub(super) fn measure_lengths<const N: usize>(
+    pub(super) fn number_and_measure<const N: usize>(
         &mut self,
         transit: &Transit<'_, N>,
     ) -> Result<(), CoverageError> {

@@ -21,7 +21,7 @@ use crate::schedule::{ScheduleError, ScheduleWorkspace};
 /// Most separate ranges of waypoints that are photographed or promised.
 const MAX_DONE_RANGES: usize = 128;
 /// Most times that vehicles exchange their routes where no take-off times keep them apart.
-const MAX_EXCHANGES: usize = 3;
+const MAX_ROUTE_ROTATIONS: usize = 3;
 
 /// Status of one vehicle at a division. All vehicles agree on it before the area is divided again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -65,7 +65,7 @@ impl<const L: usize, const K: usize> LossesWorkspace<L, K> {
     ///
     /// # Errors
     /// Those of [`divide::remaining_lanes`]; [`CoverageError::LanesFull`] for too many ranges.
-    pub fn start_plan<'a, const N: usize>(
+    pub fn reset_with_done<'a, const N: usize>(
         &'a mut self,
         tracks: &'a Tracks<L>,
         transit: &Transit<'_, N>,
@@ -186,13 +186,13 @@ pub fn redivide_work<
         held_layers: ws.held_layers,
         ..*flight_inputs
     };
-    let mut exchanges = routes.routes.len().min(MAX_EXCHANGES + 1);
+    let mut exchanges = routes.routes.len().min(MAX_ROUTE_ROTATIONS + 1);
     loop {
         exchanges = exchanges.saturating_sub(1);
         match flights::plan_flights(&work, routes, &flight_inputs, schedule, out) {
             // Two vehicles that hold close to each other may each bar the other's path.
             Err(PlanError::Schedule(_, ScheduleError::Blocked)) if exchanges > 0 => {
-                exchange_routes(&work, routes)?;
+                rotate_routes(&work, routes)?;
             }
             done => return Ok(done?),
         }
@@ -200,7 +200,7 @@ pub fn redivide_work<
 }
 
 /// Gives each route the vehicle of the next one, and the last that of the first.
-fn exchange_routes<const L: usize, const N: usize, const K: usize>(
+fn rotate_routes<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     routes: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {

@@ -338,7 +338,7 @@ pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
     let count = work.vehicles.len();
     cbinpack(work.tracks, work.unit, &ws.shares[..count], &mut ws.ends[..count]);
     assign_bins(work, bins, ws, out)?;
-    set_layers(work, out);
+    set_layers_and_costs(work, out);
     Ok(())
 }
 
@@ -464,7 +464,7 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
 
 /// Gives the lowest layer to the route that takes longest over ground, the next one to the second
 /// longest, and so on; then sets the costs.
-pub(super) fn set_layers<const L: usize, const N: usize, const K: usize>(
+pub(super) fn set_layers_and_costs<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     plan: &mut RoutePlan<K>,
 ) {

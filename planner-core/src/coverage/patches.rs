@@ -39,8 +39,14 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
         let wide = (high - low) / STRIP_PARTS as f32;
         for step in 0..STRIP_PARTS / 2 {
             let (lower, upper) = (low + step as f32 * wide, high - step as f32 * wide);
-            lay_missing_lanes_of(strips, (strip as u16, low), [lower, lower + wide], ws, out)?;
-            lay_missing_lanes_of(strips, (strip as u16, high), [upper - wide, upper], ws, out)?;
+            lay_missing_lanes_in_part(strips, (strip as u16, low), [lower, lower + wide], ws, out)?;
+            lay_missing_lanes_in_part(
+                strips,
+                (strip as u16, high),
+                [upper - wide, upper],
+                ws,
+                out,
+            )?;
         }
     }
     Ok(())
@@ -48,7 +54,7 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
 
 /// Adds lanes for an eighth of a strip, `span`, until no ground of it is left or all lines are
 /// tried. `border` is the strip's border nearer to the eighth.
-fn lay_missing_lanes_of<const L: usize, const V: usize>(
+fn lay_missing_lanes_in_part<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     (strip, border): (u16, f32),
     span: Interval,
@@ -62,7 +68,7 @@ fn lay_missing_lanes_of<const L: usize, const V: usize>(
             break;
         }
         let count = out.lanes.len();
-        strips.lay_missing(strip, v, ws, out)?;
+        strips.lay_shortest_lanes(strip, v, ws, out)?;
         if out.lanes.len() > count {
             compute_uncovered(strips, span, out, ws)?;
         }
@@ -111,7 +117,7 @@ fn compute_uncovered<const L: usize, const V: usize>(
 ) -> Result<(), CoverageError> {
     strips.compute_needed(span, ws)?;
     strips.subtract_no_fly_zones(span, ws)?;
-    let along = strips.picture_half_width();
+    let along = strips.half_picture_along_m();
     for lane in tracks.lanes().iter().filter(|lane| covers_band(strips, lane.from.y, span)) {
         ws.needed.remove([lane.from.x - along, lane.to.x + along])?;
     }

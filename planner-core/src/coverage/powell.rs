@@ -27,7 +27,7 @@ impl PowellConfig {
 }
 
 /// Number of intervals into which a line search divides the whole line.
-const LINE_POINTS: u32 = 8;
+const LINE_INTERVALS: u32 = 8;
 /// Times that a line search halves its step around the best point found so far.
 const STEP_HALVINGS: u32 = 7;
 /// The search ends with a round that lowers the cost by less than this share of the cost.
@@ -165,8 +165,8 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
             return Ok(cost);
         };
         let mut best = (cost, 0.0);
-        let step = (high - low) / LINE_POINTS as f32;
-        for k in 0..=LINE_POINTS {
+        let step = (high - low) / LINE_INTERVALS as f32;
+        for k in 0..=LINE_INTERVALS {
             self.evaluate_at(&from, line, low + step * k as f32, &mut best)?;
         }
         let mut step = step;

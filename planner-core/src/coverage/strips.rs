@@ -199,7 +199,7 @@ impl<'a> Strips<'a> {
 
     /// Lays lanes along the line `v` that photograph what is in `ws.needed`, and are no longer than
     /// necessary.
-    pub(super) fn lay_missing<const L: usize, const V: usize>(
+    pub(super) fn lay_shortest_lanes<const L: usize, const V: usize>(
         &self,
         strip: u16,
         v: f32,
@@ -259,7 +259,7 @@ impl<'a> Strips<'a> {
     /// border, and further where a part would otherwise be beyond the first or last image. The
     /// first is greater than the last if one image between both shows all.
     fn lane_extent(&self, need: &Interval, borders: &[f32]) -> Interval {
-        let reach = self.picture_half_width();
+        let reach = self.half_picture_along_m();
         let inside = borders.iter().filter(|u| (need[0]..=need[1]).contains(u));
         inside.fold([need[0] + reach, need[1] - reach], |[from, to], u| {
             [fminf(from, *u), fmaxf(to, *u)]
@@ -270,7 +270,7 @@ impl<'a> Strips<'a> {
     /// footprint's side, less a margin for rounding. Where images overlap, the margin is such that
     /// a cell (a tenth of the lane spacing) that a border cuts is entirely in one image: two
     /// neighbouring images overlap by more than that.
-    pub(super) fn picture_half_width(&self) -> f32 {
+    pub(super) fn half_picture_along_m(&self) -> f32 {
         let spacing = self.pattern.spacing;
         let half = spacing.footprint.along_m / 2.0;
         let cell_m = spacing.lane_m / 10.0;

@@ -69,5 +69,5 @@ pub fn build_lanes<const L: usize, const V: usize, const N: usize>(
         return Err(CoverageError::NothingToCover);
     }
     order::order_lanes(&mut out.lanes, count, transit, pattern.search_steps);
-    out.number_waypoints(&pattern.spacing, transit)
+    out.space_waypoints(&pattern.spacing, transit)
 }

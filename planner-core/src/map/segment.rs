@@ -45,7 +45,7 @@ use crate::map::voxel::VoxelGrid;
 
 /// From this clearance on, in cells, the f32 distance check alone finds every obstacle that the
 /// segment touches, whatever the rounding. Below, the exact check runs first.
-pub(crate) const TOUCH_CHECK_BELOW_CELLS: f32 = 0.25;
+pub(crate) const TOUCH_CHECK_CLEARANCE_CELLS: f32 = 0.25;
 
 /// Whether the segment from `a` to `b` stays strictly farther than `clearance_m` from every
 /// obstacle.
@@ -63,7 +63,7 @@ pub fn segment_is_clear(grid: &VoxelGrid<'_>, a: &Point, b: &Point, clearance_m:
     if !(clearance_m > 0.0 && clearance_m.is_finite()) {
         return false;
     }
-    if clearance_m < TOUCH_CHECK_BELOW_CELLS * grid.shape().resolution_m
+    if clearance_m < TOUCH_CHECK_CLEARANCE_CELLS * grid.shape().resolution_m
         && snapped_segment_touches(grid, &from, &to)
     {
         return false;

@@ -22,8 +22,8 @@ use crate::roadmap::{HalfEdge, RoadmapView, decode_target};
 pub(crate) mod heap;
 use heap::{Heap, SETTLED};
 
-/// Half-edges that are compared in one call of [`Graph::find_improvements`]; a node rarely has
-/// more.
+/// Half-edges that are compared in one call of [`Graph::find_possible_improvements`]; a node rarely
+/// has more.
 const HALF_EDGE_CHUNK: usize = 64;
 /// Indices into a chunk of half-edges. 256 entries, so that a `u8` index needs no bounds check.
 type HalfEdgeIndices = [u8; 256];
@@ -119,7 +119,7 @@ pub trait Graph {
     ///
     /// Most half-edges shorten no path: the target is settled, or has a shorter path. Written
     /// without branches, which could not be predicted.
-    fn find_improvements<const N: usize>(
+    fn find_possible_improvements<const N: usize>(
         &self,
         first: usize,
         half_edges: &[[u8; 4]],
@@ -141,7 +141,7 @@ impl Graph for RoadmapView<'_> {
     }
 
     #[inline]
-    fn find_improvements<const N: usize>(
+    fn find_possible_improvements<const N: usize>(
         &self,
         _first: usize,
         half_edges: &[[u8; 4]],
@@ -200,7 +200,7 @@ impl Graph for RoadmapWithLengths<'_> {
     }
 
     #[inline]
-    fn find_improvements<const N: usize>(
+    fn find_possible_improvements<const N: usize>(
         &self,
         first: usize,
         half_edges: &[[u8; 4]],
@@ -435,7 +435,8 @@ fn relax_edges<const N: usize>(
     let (first, row) = view.half_edge_row(node);
     for (chunk, half_edges) in row.chunks(HALF_EDGE_CHUNK).enumerate() {
         let first = first + chunk * HALF_EDGE_CHUNK;
-        let count = graph.find_improvements(first, half_edges, &here, reached, distance, gains);
+        let count =
+            graph.find_possible_improvements(first, half_edges, &here, reached, distance, gains);
         for &place in gains.iter().take(count) {
             let (k, target) =
                 (first + usize::from(place), decode_target(&half_edges[usize::from(place)]));

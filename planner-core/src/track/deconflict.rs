@@ -128,7 +128,7 @@ const BRAKING_OVERSHOOT_S: f32 = 0.2;
 const BRAKING_OVERSHOOT_ABOVE_MPS: f32 = 3.0;
 /// Greatest speed past a neighbour that hovers nearer than a stop from cruise speed requires, m/s:
 /// a stop from this speed overshoots by 0.4 m, and detours keep 0.5 m beyond the safety distance.
-const PASSING_MPS: f32 = 5.0;
+const MAX_PASSING_MPS: f32 = 5.0;
 /// Greatest speed of a neighbour that hovers, m/s.
 const HOVERING_MPS: f32 = 1.0;
 
@@ -212,14 +212,14 @@ fn advise_by_priority<const W: usize>(
         };
         let Some(distance_m) = conflict_m(cfg.cruise_mps) else { continue };
         let hovers = n.velocity.norm_squared() <= HOVERING_MPS * HOVERING_MPS;
-        if hovers && cfg.cruise_mps > PASSING_MPS && conflict_m(PASSING_MPS).is_none() {
+        if hovers && cfg.cruise_mps > MAX_PASSING_MPS && conflict_m(MAX_PASSING_MPS).is_none() {
             slow_within_m = fminf(slow_within_m, distance_m);
         } else {
             stop(distance_m, n.id);
         }
     }
     let braking = |within_m: f32| 2.0 * cfg.accel_mps2 * fmaxf(within_m, 0.0);
-    let slow_mps_sq = PASSING_MPS * PASSING_MPS + braking(slow_within_m);
+    let slow_mps_sq = MAX_PASSING_MPS * MAX_PASSING_MPS + braking(slow_within_m);
     let allowed_mps = sqrtf(fminf(braking(advice.stop_within_m), slow_mps_sq));
     advice.speed_scale = fminf(allowed_mps / cfg.cruise_mps, 1.0);
     advice
@@ -271,7 +271,7 @@ impl PathSamples {
             let room_m = least_m - apart_m - DISTANCE_ROUNDING_M;
             let comes_near = || {
                 let from = if last.0 == i { last.1 } else { away(i, &self.points[i - 1]) };
-                min_squared_distance(&from, &to).is_some_and(|square| square < near)
+                closest_approach_sq(&from, &to).is_some_and(|square| square < near)
             };
             if to.norm_squared() < near || room_m < look_m && comes_near() {
                 return Some(i as f32 * self.step_m);
@@ -286,7 +286,7 @@ impl PathSamples {
 
 /// Square of the least distance from the origin to the segment between two points, if that is
 /// inside the segment; `None` if the least distance is at one of the segment's ends.
-fn min_squared_distance(from: &Point, to: &Point) -> Option<f32> {
+fn closest_approach_sq(from: &Point, to: &Point) -> Option<f32> {
     let step = to - from;
     let ahead = to.dot(&step);
     if ahead <= 0.0 {

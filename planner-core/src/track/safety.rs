@@ -191,7 +191,7 @@ impl NeighbourMotion<'_> {
             let ahead = core::iter::once(nearest).chain(ahead.iter().copied());
             set.extend_along(
                 ahead,
-                joint.flown_beyond_m() + self.distance_until_stop_m(bounds, ahead_s),
+                joint.place_uncertainty_m() + self.distance_until_stop_m(bounds, ahead_s),
             );
         } else {
             let share = if self.speed_mps > 0.0 {

@@ -19,7 +19,7 @@ impl Copter {
 
     /// Sends messages once the estimator gets its origin and its position, and STAT_RUNTIME every
     /// 30 s.
-    pub(super) fn send_progress_messages(&mut self, platform: &mut Platform, now_us: u64) {
+    pub(super) fn send_unsolicited_messages(&mut self, platform: &mut Platform, now_us: u64) {
         if !self.reported_origin_and_position[0] && self.origin_known(now_us) {
             self.reported_origin_and_position[0] = true;
             platform.announce_origin();

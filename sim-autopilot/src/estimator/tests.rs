@@ -9,7 +9,7 @@ struct FlightErrors {
 }
 
 fn flight(estimator: EstimatorErrors, autopilot: SimulatedKind, seed: u64) -> FlightErrors {
-    let mut errors = EstimateErrors::new(estimator, autopilot, seed);
+    let mut errors = EstimateErrorState::new(estimator, autopilot, seed);
     let (mut positions, mut across_v, mut up_v) = (Vec::new(), 0.0, 0.0);
     for _ in 0..3000 {
         errors.advance();

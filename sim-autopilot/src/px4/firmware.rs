@@ -19,7 +19,7 @@ use crate::wire::PayloadReader;
 /// Gimbal commands that PX4 was recorded to send when a failsafe starts: take control (1001), point
 /// ahead (1000, DO_GIMBAL_MANAGER_PITCHYAW), release control (1001, DO_GIMBAL_MANAGER_CONFIGURE).
 /// They go to component 0, a broadcast, and are not answered.
-const GIMBAL: [(u16, [f32; 5]); 3] = [
+const FAILSAFE_GIMBAL_COMMANDS: [(u16, [f32; 5]); 3] = [
     (1001, [1.0, 1.0, -1.0, -1.0, 0.0]),
     (1000, [f32::NAN, f32::NAN, f32::NAN, f32::NAN, 2.0]),
     (1001, [-3.0, -3.0, -1.0, -1.0, 0.0]),
@@ -69,7 +69,7 @@ impl Px4 {
         let failed = self.commander.in_failsafe();
         let order = self.commander.update(sensors, &self.tuning);
         if self.commander.in_failsafe() && !failed {
-            turn_gimbal(platform);
+            send_gimbal_commands(platform);
         }
         order
     }
@@ -148,8 +148,8 @@ impl Px4 {
     }
 }
 
-fn turn_gimbal(platform: &mut Platform) {
-    for (command, params) in GIMBAL {
+fn send_gimbal_commands(platform: &mut Platform) {
+    for (command, params) in FAILSAFE_GIMBAL_COMMANDS {
         let mut payload = [0; 33];
         for (k, param) in params.iter().enumerate() {
             payload[4 * k..4 * k + 4].copy_from_slice(&param.to_le_bytes());

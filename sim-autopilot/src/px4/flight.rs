@@ -28,7 +28,7 @@ const GROUND_DISTANCE_LAG_S: f32 = 0.2;
 impl Commander {
     /// Initialises a mode that is entered: stopping point, heading, first leg of a return.
     pub(super) fn enter_mode(&mut self, mode: Px4Mode, sensors: &SensorReadings) {
-        self.hold_point = sensors.position + glide::stopping_point(&sensors.velocity);
+        self.hold_point = sensors.position + glide::stopping_offset(&sensors.velocity);
         self.glide = SmoothedApproach::new(sensors.now_us, &sensors.position, &sensors.velocity);
         self.hold_heading = sensors.heading;
         self.leg = ReturnLeg::Climb { up: f32::NAN };

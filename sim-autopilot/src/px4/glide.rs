@@ -15,7 +15,7 @@ const MAX_STEP_S: f32 = 0.1;
 
 /// Horizontal offset from the vehicle to the point at which PX4 stops it, metres, from its velocity
 /// (m/s). With 1.85 m/s recorded vehicles moved 0.9 m in the first second and 1.1 to 1.7 m in all.
-pub fn stopping_point(velocity: &Point) -> Point {
+pub fn stopping_offset(velocity: &Point) -> Point {
     let speed = libm::hypotf(velocity.x, velocity.y);
     Point::new(velocity.x, velocity.y, 0.0) * (speed / (2.0 * AUTO_ACCEL_MPS2) + BRAKING_DELAY_S)
 }

@@ -21,7 +21,7 @@ const FRAME_GLOBAL_RELATIVE_ALT_INT: u8 = 6;
 const MASK_FORCE: u16 = 0x200;
 const MASK_YAW: u16 = 0x400;
 const MASK_YAW_RATE: u16 = 0x800;
-const MASK_NOTHING: u16 = 0x1ff;
+const MASK_ALL_AXES: u16 = 0x1ff;
 
 /// A setpoint in the mission frame; NaN: no demand on that axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,7 +144,7 @@ fn setpoint_from_fields(
     acceleration: Vector3<f64>,
     context: &FrameContext<'_>,
 ) -> Option<OffboardSetpoint> {
-    if mask & MASK_NOTHING == MASK_NOTHING || mask & MASK_FORCE != 0 {
+    if mask & MASK_ALL_AXES == MASK_ALL_AXES || mask & MASK_FORCE != 0 {
         return None;
     }
     let velocity = map_keeping_nan(velocity, |ned| context.frame.enu_velocity_from_ned(ned));

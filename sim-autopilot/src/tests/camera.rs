@@ -52,7 +52,7 @@ fn across(a: &Photo, b: &Photo) -> f32 {
 fn fly_north(bench: &mut Bench, metres: f32, seconds: f64) -> Vec<Photo> {
     bench.stream(20.0, setpoint(POSITION, 1, [metres, 0.0, -10.0], [0.0; 3], 0.0));
     bench.run(seconds);
-    bench.autopilot.take_photos()
+    bench.autopilot.drain_photos()
 }
 
 #[test]
@@ -83,7 +83,7 @@ fn by_distance_it_photographs_where_it_says_and_at_that_distance() {
                 .hypot(place[1] - f64::from(photo.position.y));
             assert!(off < 0.02, "{autopilot:?}: {off} m off");
         }
-        assert_eq!(bench.autopilot.take_photos(), [], "they are handed over once");
+        assert_eq!(bench.autopilot.drain_photos(), [], "they are handed over once");
         // Switched off: no more.
         bench.command(DISTANCE, [0.0; 7]);
         assert_eq!(fly_north(&mut bench, 0.0, 15.0), []);
@@ -121,7 +121,7 @@ fn at_once_it_photographs_at_once_and_knows_how_it_was_turned() {
                 bench.of(77).any(|(_, f)| f.padded_payload()[..3] == [203, 0, 0]),
                 "203 is accepted"
             );
-            let taken = bench.autopilot.take_photos();
+            let taken = bench.autopilot.drain_photos();
             assert_eq!(taken.len(), photos, "{autopilot:?}, parameter 5 is {parameter}");
             for photo in taken {
                 assert!((photo.heading_rad - 1.0).abs() < 0.02, "{photo:?}");
@@ -131,7 +131,7 @@ fn at_once_it_photographs_at_once_and_knows_how_it_was_turned() {
         // lane.
         bench.command(DISTANCE, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
         bench.run(0.1);
-        assert_eq!(bench.autopilot.take_photos().len(), 1);
+        assert_eq!(bench.autopilot.drain_photos().len(), 1);
     }
 }
 
@@ -153,9 +153,9 @@ fn a_reboot_forgets_the_distance_and_keeps_what_was_photographed() {
     bench.command(DISTANCE, [5.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0]);
     bench.run(0.1);
     bench.autopilot.reboot();
-    assert_eq!(bench.autopilot.take_photos().len(), 1);
+    assert_eq!(bench.autopilot.drain_photos().len(), 1);
     bench.run(1.0);
-    assert_eq!(bench.autopilot.take_photos(), []);
+    assert_eq!(bench.autopilot.drain_photos(), []);
 }
 
 #[test]
@@ -168,18 +168,18 @@ fn it_turns_to_a_commanded_yaw_the_short_way_at_a_bounded_rate() {
             for mask in [0x9F8, 0x9C0] {
                 bench.stream(20.0, setpoint(mask, 1, [0.0, 0.0, -10.0], [0.0; 3], yaw));
                 let from = bench.autopilot.true_state().heading_rad;
-                let way = vehicle::wrap_pi(yaw - from).abs();
+                let way = vehicle::wrap_pi_once(yaw - from).abs();
                 let (mut turned, mut fastest) = (0.0, 0.0_f32);
                 for _ in 0..1500 {
                     let before = bench.autopilot.true_state().heading_rad;
                     bench.run(0.004);
                     let truth = bench.autopilot.true_state();
-                    turned += vehicle::wrap_pi(truth.heading_rad - before).abs();
+                    turned += vehicle::wrap_pi_once(truth.heading_rad - before).abs();
                     fastest = fastest.max(truth.heading_rate.abs());
                 }
                 let truth = bench.autopilot.true_state();
                 assert!(
-                    vehicle::wrap_pi(truth.heading_rad - yaw).abs() < 0.02,
+                    vehicle::wrap_pi_once(truth.heading_rad - yaw).abs() < 0.02,
                     "{autopilot:?} {yaw}"
                 );
                 assert!(fastest <= 1.001 * most, "{autopilot:?}: {fastest} rad/s of {most}");

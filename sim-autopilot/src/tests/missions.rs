@@ -89,7 +89,7 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
         bench.until(120.0, |a| !a.true_state().armed);
         let at = bench.autopilot.true_state().position;
         assert!(at.xy().norm() < 1.0, "{autopilot:?} came down at {at}");
-        let photos = bench.autopilot.take_photos();
+        let photos = bench.autopilot.drain_photos();
         assert_eq!(
             photos.len(),
             6,
@@ -118,14 +118,14 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
         let all: Vec<u16> = (0..SURVEY.len() as u16).map(|k| k + home).collect();
         assert_eq!(bench.reached(), all, "{autopilot:?}");
         // The next flight begins with the first item.
-        bench.autopilot.take_photos();
+        bench.autopilot.drain_photos();
         if autopilot == SimulatedKind::Ardupilot {
             assert_eq!((bench.mode(4.0), bench.arm()), (vec![0], vec![0]));
         }
         assert_eq!(bench.start(), [0]);
         bench.until(10.0, |a| !a.true_state().landed);
         bench.until(120.0, |a| !a.true_state().armed);
-        assert_eq!(bench.autopilot.take_photos().len(), 6);
+        assert_eq!(bench.autopilot.drain_photos().len(), 6);
     }
 }
 
@@ -222,6 +222,6 @@ fn what_cannot_be_flown_is_refused_and_passed_over() {
             truth.armed && off.norm() < 0.3,
             "{autopilot:?}: after the last item it stays: {off}"
         );
-        assert_eq!(bench.autopilot.take_photos(), []);
+        assert_eq!(bench.autopilot.drain_photos(), []);
     }
 }

@@ -98,7 +98,7 @@ impl Recording {
         let mut last = (0.0, Point::zeros());
         let config = self.config();
         let mut autopilot = Autopilot::new(&config).expect("a recorded place is one");
-        autopilot.land_on_stream_loss();
+        autopilot.land_on_offboard_loss();
         let ground_m = config.start.z - config.vehicle.radius_m;
         let clock = if self.autopilot == SimulatedKind::Px4 { PX4_CLOCK } else { 1.0 };
         let (mut setpoints, mut messages) =

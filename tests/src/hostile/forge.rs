@@ -4,7 +4,7 @@
 use companion::autopilot::AutopilotKind;
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::MAX_POINTS;
-use companion::link::roster::{self, FlightStatus, RosterReport, RosterReportEntry};
+use companion::link::roster::{self, RosterReport, RosterReportEntry, ShareStatus};
 use companion::{AUTOPILOT_COMPONENT, COMPANION_COMPONENT, Link};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
@@ -202,8 +202,8 @@ const EDGES: [f32; 10] = [
 
 /// Fills a payload with a roster report like those of the neighbour; returns its length.
 fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
-    const ALL: [FlightStatus; 4] =
-        [FlightStatus::Alive, FlightStatus::Lost, FlightStatus::Left, FlightStatus::Finished];
+    const ALL: [ShareStatus; 4] =
+        [ShareStatus::Alive, ShareStatus::Lost, ShareStatus::Left, ShareStatus::Finished];
     let entry = |bits: u64| RosterReportEntry {
         incarnation: bits as u8 & 7,
         status: ALL[(bits >> 3) as usize % 4],

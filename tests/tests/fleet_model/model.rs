@@ -5,7 +5,7 @@ mod search;
 use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, Mutex};
 
-use companion::link::roster::{FlightStatus, RosterReport};
+use companion::link::roster::{RosterReport, ShareStatus};
 use companion::swarm::fleet::{Fleet, FleetTimeouts, OwnReport, StartStatus, VehicleReception};
 use companion::time::{Duration, Instant};
 use flockmate_tests::parts::{WAYPOINT_DM, parts};
@@ -233,9 +233,9 @@ impl FleetModel {
         let done = usize::from(vehicle.along) >= path.len();
         let lands = choice.leaves || vehicle.flight == Flight::Down || vehicle.fleet.is_excluded();
         let standing = match (lands, done && !goes_on) {
-            (false, _) => FlightStatus::Alive,
-            (true, false) => FlightStatus::Left,
-            (true, true) => FlightStatus::Finished,
+            (false, _) => ShareStatus::Alive,
+            (true, false) => ShareStatus::Left,
+            (true, true) => ShareStatus::Finished,
         };
         let promise = vehicle.fleet.commitment_dm();
         let own = OwnReport {
@@ -284,7 +284,7 @@ impl FleetModel {
             *silent =
                 if vehicle.hears >> rank & 1 != 0 { 0 } else { (*silent + 1).min(SILENT as u8) };
             if u64::from(*silent) == SILENT {
-                roster.entries[rank].status = roster.entries[rank].status.max(FlightStatus::Left);
+                roster.entries[rank].status = roster.entries[rank].status.max(ShareStatus::Left);
             }
         }
         for sender in (0..self.count).filter(|rank| *rank != vehicle.rank).take(1) {

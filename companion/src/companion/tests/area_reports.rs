@@ -14,7 +14,7 @@ use super::divisions::{FAR_AWAY, bytes, over_a_field_with, own_roster};
 use super::*;
 use crate::Link;
 use crate::link::frame::{self, Frame, Header};
-use crate::link::roster::{self, FlightStatus, RosterReport};
+use crate::link::roster::{self, RosterReport, ShareStatus};
 
 /// Seconds over which messages are counted.
 const COUNTED_S: usize = 20;
@@ -56,12 +56,12 @@ fn rosters_go_out_twice_a_second_in_flight_and_five_times_while_dividing() {
         assert_eq!(report.entries.len(), 3);
         b.stuck = false;
         let mut leaves = own_roster(&b);
-        leaves.entries[2].status = FlightStatus::Left;
+        leaves.entries[2].status = ShareStatus::Left;
         b.companion.handle_bytes(Link::Swarm, b.now, &bytes(&leaves, 0));
         b.run_until(Dividing, 40.0);
         let (dividing, report) = counted_rosters(&mut b, Dividing);
         assert!(dividing.len().abs_diff(5 * COUNTED_S) <= 1, "{} at {swarm_hz} Hz", dividing.len());
-        assert_eq!(report.entries[2].status, FlightStatus::Left);
+        assert_eq!(report.entries[2].status, ShareStatus::Left);
         // Length of a roster report of three vehicles by the table of docs/coverage.md.
         assert!(flying.iter().chain(&dividing).all(|length| *length == 50), "{dividing:?}");
     }

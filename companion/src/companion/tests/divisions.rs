@@ -16,7 +16,7 @@ use super::*;
 use crate::autopilot::AutopilotKind;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::intent::{FLYING, GROUNDED, ON_PLAN, OUT_OF_PLAN};
-use crate::link::roster::{self, FlightStatus, RosterReport, RosterReportEntry};
+use crate::link::roster::{self, RosterReport, RosterReportEntry, ShareStatus};
 use crate::{Link, RosterEntry};
 
 /// Vehicle 77 far away from the path.
@@ -107,12 +107,12 @@ impl Other {
                 agrees: true,
                 ..known.entries[1]
             };
-            known.entries[2].status = FlightStatus::Left;
+            known.entries[2].status = ShareStatus::Left;
             let own = mine.entries[0];
             if known.divisions == 0
                 && mine.hash != 0
                 && own.holds
-                && own.status == FlightStatus::Alive
+                && own.status == ShareStatus::Alive
             {
                 self.counts_after = self.counts_after.saturating_sub(1);
             }
@@ -166,7 +166,7 @@ impl Watch {
             !behind || !flies || guidance.along_m() <= held_m + 0.3,
             "on another's part, held {held_m} m: {said}"
         );
-        let left = fleet.roster_message(0).entries[0].status == FlightStatus::Left;
+        let left = fleet.roster_message(0).entries[0].status == ShareStatus::Left;
         assert!(!left || !flies, "flies on though it left: {said}");
         // On the way back there are no gates.
         self.near &= b.neighbour != FAR_AWAY;
@@ -391,8 +391,8 @@ fn lie() -> impl proptest::strategy::Strategy<Value = Lie> {
 
 impl Lie {
     fn reported(&self, b: &Bench) -> RosterReport {
-        const ALL: [FlightStatus; 4] =
-            [FlightStatus::Alive, FlightStatus::Lost, FlightStatus::Left, FlightStatus::Finished];
+        const ALL: [ShareStatus; 4] =
+            [ShareStatus::Alive, ShareStatus::Lost, ShareStatus::Left, ShareStatus::Finished];
         let mut roster = own_roster(b);
         roster.system_id = self.system_id;
         roster.mission_crc = if self.crc { roster.mission_crc } else { 7 };

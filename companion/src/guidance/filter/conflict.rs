@@ -93,8 +93,10 @@ impl Guidance {
         // Like a landing, a guided descent in a coverage mission checks for unheard vehicles on the
         // ground.
         let comes_down = lands || (self.is_descending() && neighbours.fleet().is_some());
-        let floor_m =
-            scene.plan.filter(|_| comes_down).map(|plan| self.landing_height_m(state, scene, plan));
+        let floor_m = scene
+            .plan
+            .filter(|_| comes_down)
+            .map(|plan| self.lowest_possible_ground_m(state, scene, plan));
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
         let most_apart_m = (safety_m + OVERSHOOT_MARGIN_M.max(neighbours.pair_position_error_m()))
@@ -180,7 +182,7 @@ impl Guidance {
                 |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m, fallen);
             let below = || {
                 floor_m.is_some_and(may_lie_below)
-                    || (comes_down && entry.may_fly_home_near(now, &place, safety_m))
+                    || (comes_down && entry.may_return_to_pad_near(now, &place, safety_m))
             };
             if silent && !hears_nobody && !met.stranger && below() {
                 return Some(FilterConflict {

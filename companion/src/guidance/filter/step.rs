@@ -8,9 +8,9 @@ use planner_core::track::safety::{Legs, OwnSet, REACTION_S, ReachableSet};
 use super::super::motion::clamp_to;
 use super::super::{Guidance, GuidanceInputs};
 use super::{
-    FilterConflict, FlightDirection, GROUND_BELOW_PAD_M, MAX_STOP_FOR_STRANGER,
+    AT_ADVISED_STOP_M, FilterConflict, FlightDirection, GROUND_BELOW_PAD_M, MAX_STOP_FOR_STRANGER,
     MAX_TURNING_SETPOINT_M, MAX_TURNING_SETPOINT_MPS, RESUME_CLEAR_FOR, RESUME_CLEAR_M,
-    STANDSTILL_WITHIN_M, SafetyFilter,
+    SafetyFilter,
 };
 use crate::config::limits::{Urgency, filter_bounds};
 use crate::state::State;
@@ -33,7 +33,7 @@ impl Guidance {
             return;
         };
         let position = &scene.telemetry.position;
-        let ground_m = || self.landing_height_m(state, scene, plan);
+        let ground_m = || self.lowest_possible_ground_m(state, scene, plan);
         let top_m = || plan.path.point_at(0.0).map_or(position.z, |p| p.z);
         let on_pad = state == State::Scheduled || state.prepares_take_off();
         let whole_column = on_pad || state.lands();
@@ -44,7 +44,7 @@ impl Guidance {
                 to_m: top_m(),
                 speed_mps: self.smoother.velocity().z.max(0.0),
             },
-            _ if state.moves_along_path() && self.on_path => {
+            _ if state.is_on_path_or_stopping() && self.on_path => {
                 // While the vehicle stands in its descent, the filter goes on checking the column
                 // below it for the neighbour that stopped it.
                 match self.is_descending() {
@@ -137,7 +137,7 @@ impl Guidance {
                     self.filter.note_hindered(now);
                 }
                 if neighbours.comes_down_unheard(found.id, now) {
-                    self.filter.fall_at = now;
+                    self.filter.blocked_by_descent_at = now;
                 }
                 self.filter.blocker = found.id;
                 (self.filter.blocker_is_stranger, self.filter.blocker_rests) =
@@ -155,13 +155,13 @@ impl Guidance {
                     self.filter.reset_stop();
                 }
             }
-            None => self.count_standstill(state, scene, neighbours, now),
+            None => self.note_hindered_by_advice(state, scene, neighbours, now),
         }
     }
 
     /// Least height that the ground below the vehicle may have, ENU up, metres; never above the
     /// vehicle.
-    pub(super) fn landing_height_m<const W: usize, const G: usize>(
+    pub(super) fn lowest_possible_ground_m<const W: usize, const G: usize>(
         &self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
@@ -206,7 +206,7 @@ impl Guidance {
 
     /// Counts a stop by advice as a stop by the filter if the vehicle stands right before a
     /// neighbour for which no gate nearby waits.
-    fn count_standstill<const V: usize, const W: usize, const G: usize>(
+    fn note_hindered_by_advice<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
@@ -217,17 +217,17 @@ impl Guidance {
         let along_m = self.tracker.along_m;
         let gate = |plan: &VehiclePlan<W, G>| {
             let near = |at_m: f32| {
-                (along_m - STANDSTILL_WITHIN_M..along_m + STANDSTILL_WITHIN_M).contains(&at_m)
+                (along_m - AT_ADVISED_STOP_M..along_m + AT_ADVISED_STOP_M).contains(&at_m)
             };
             plan.gates.iter().any(|gate| gate.id == id && near(gate.at_m))
         };
         if state.follows_path()
             && id != 0
-            && self.advice.stop_within_m.min(self.wait_distance_m) < STANDSTILL_WITHIN_M
+            && self.advice.stop_within_m.min(self.wait_distance_m) < AT_ADVISED_STOP_M
             && !scene.plan.is_some_and(gate)
         {
             (self.filter.yields, self.filter.blocker_rests) =
-                (id < scene.id, neighbours.is_at_rest(id, now));
+                (id < scene.id, neighbours.is_landed_or_out(id, now));
             self.filter.note_hindered(now);
         }
     }

@@ -126,7 +126,7 @@ const HZ: u8 = 5;
 
 #[test]
 fn the_radio_gets_no_more_whatever_is_asked() {
-    let saved = MAX_SAVED_BYTES + MAX_FRAME_LEN as u32;
+    let saved = MAX_BURST_BYTES + MAX_FRAME_LEN as u32;
     let mut ground = Greedy::new(Bench::new(config()));
     ground.bench.run_until(State::Ready, 6.0);
     ground.run(20);
@@ -179,7 +179,7 @@ fn rosters_go_out_whatever_is_asked_and_are_counted() {
     assert_eq!(air.bench.state(), State::Follow);
     assert!((39..=41).contains(&air.rosters), "{}", air.rosters);
     let most = state_bytes_per_s(HZ) + COVERAGE_BYTES_PER_S + ARMED_BYTES_PER_S;
-    assert!(air.bytes() <= 20 * most + MAX_SAVED_BYTES + MAX_FRAME_LEN as u32, "{}", air.bytes());
+    assert!(air.bytes() <= 20 * most + MAX_BURST_BYTES + MAX_FRAME_LEN as u32, "{}", air.bytes());
 }
 
 /// The table of docs/coverage.md, and the reports of [`COVERAGE_BYTES_PER_S`].
@@ -229,7 +229,7 @@ fn what_is_owed_is_paid_back_by_time() {
         rate_limit.take_tokens(MAX_FRAME_LEN);
         sent += MAX_FRAME_LEN as u32;
     }
-    assert!((MAX_SAVED_BYTES..=MAX_SAVED_BYTES + MAX_FRAME_LEN as u32).contains(&sent));
+    assert!((MAX_BURST_BYTES..=MAX_BURST_BYTES + MAX_FRAME_LEN as u32).contains(&sent));
     assert!(!rate_limit.may_send(at(10), ARMED_BYTES_PER_S));
     assert!(rate_limit.may_send(at(1100), ARMED_BYTES_PER_S));
     assert!(rate_limit.may_send(at(u64::from(u32::MAX)), ARMED_BYTES_PER_S), "and never overflows");

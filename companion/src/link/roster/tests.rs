@@ -23,7 +23,7 @@ proptest! {
             .map(|&(incarnation, standing, done_dm, promise_dm, [holds, agrees])| {
                 RosterReportEntry {
                     incarnation,
-                    status: FlightStatus::ALL[standing],
+                    status: ShareStatus::ALL[standing],
                     progress_dm: done_dm,
                     commitment_dm: promise_dm,
                     holds,

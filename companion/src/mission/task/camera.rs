@@ -35,7 +35,7 @@ const HELD_WITHIN_M: f32 = 0.3;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;
 /// Shortest horizontal length of a stretch from which a heading is computed, metres.
-const MIN_STRETCH_M: f32 = 0.1;
+const MIN_HEADING_STRETCH_M: f32 = 0.1;
 
 const DO_DIGICAM_CONTROL: u16 = 203;
 const DO_SET_CAM_TRIGG_DIST: u16 = 206;
@@ -293,7 +293,7 @@ pub(super) fn heading<const W: usize>(
     let mut found = None;
     for shots in photographs.stretches(path) {
         let way = path.point_at(shots.to_m)? - path.point_at(shots.from_m)?;
-        if way.xy().length() > MIN_STRETCH_M {
+        if way.xy().length() > MIN_HEADING_STRETCH_M {
             found = Some(atan2f(way.y, way.x));
         }
         if shots.to_m >= along_m && found.is_some() {

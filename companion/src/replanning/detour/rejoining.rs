@@ -105,7 +105,7 @@ impl Detours {
     }
 
     /// The vehicle flies back the way that it came: it seeks no path home and gives up the plan's.
-    pub(crate) fn begin_way_back(&mut self) {
+    pub(crate) fn begin_turn_back(&mut self) {
         self.give_up_plan();
         self.home.end();
     }

@@ -31,7 +31,7 @@ impl Detours {
     /// To be called on entering state `to`. `PositionLost` because of a jump: keeps the reference's
     /// place on the path as the one to report. `Follow` or `WaitPosition`: the position is trusted
     /// again.
-    pub(crate) fn save_place_before_jump<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn update_place_before_jump<const V: usize, const W: usize, const G: usize>(
         &mut self,
         to: State,
         view: &DetourView<'_, V, W, G>,
@@ -64,7 +64,7 @@ impl Detours {
             }
             State::Aborted => view.is_on_ground() || lasted >= ABORT_OVER_AFTER,
             state if state.is_left_to_pilot() => {
-                view.mission.time_with_pilot(view.now) >= PILOT_KEEPS_AFTER
+                view.mission.time_since_pilot_takeover(view.now) >= PILOT_KEEPS_AFTER
             }
             _ => false,
         }

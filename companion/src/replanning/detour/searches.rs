@@ -11,7 +11,7 @@ use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_BESIDE_RETRY, DETOUR_MARGIN_M
 use super::homeward::RETURN_RETRY;
 use super::path_kind::{DetourPurpose, PathKind};
 use super::{
-    DETOUR_RETRY_S, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER, TURN_DELAY_S,
+    DETOUR_RETRY_S, Detours, EARLY_GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER, TURN_DELAY_S,
 };
 use crate::guidance::evade;
 use crate::replanning::view::DetourView;
@@ -23,11 +23,11 @@ use crate::timers::{Timer, Timers};
 const SIDESTEP_RETRY_S: u64 = 30;
 /// Time for which a landing was held, after which a vehicle that hears no other one seeks a landing
 /// place aside.
-const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
+const HELD_LANDING_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
 /// Distance along the path up to which two failed searches count as in one place, metres.
 const SAME_SEARCH_PLACE_M: f32 = 1.0;
 /// Distance within which a setpoint is on its path, metres.
-const ON_PATH_M: f32 = 0.1;
+const SETPOINT_ON_PATH_M: f32 = 0.1;
 
 /// Whether a search that found no detour may succeed later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,7 @@ impl Detours {
 
     /// Whether this vehicle may search for a landing place beside its path: its task leaves the
     /// pad; it hears another vehicle, all others rest, or its landing has been held for
-    /// [`UNHEARD_SIDESTEP_AFTER`]; and no search aside failed within [`SIDESTEP_RETRY_S`].
+    /// [`HELD_LANDING_SIDESTEP_AFTER`]; and no search aside failed within [`SIDESTEP_RETRY_S`].
     pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -83,8 +83,8 @@ impl Detours {
         let retries = |at: Instant| view.now - at >= Duration::from_secs(SIDESTEP_RETRY_S);
         view.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
             && (!view.neighbours.hears_nobody(view.now)
-                || view.neighbours.are_all_at_rest()
-                || view.guidance.filter.column_blocked_for(view.now) >= UNHEARD_SIDESTEP_AFTER)
+                || view.neighbours.are_all_landed_or_out()
+                || view.guidance.filter.column_blocked_for(view.now) >= HELD_LANDING_SIDESTEP_AFTER)
             && self.no_way_aside_at.is_none_or(retries)
     }
 
@@ -147,7 +147,7 @@ impl Detours {
         let (guidance, config) = (view.guidance, view.config);
         let spare_m = leg_ahead(view)?[0].clearance_m - config.required_clearance_m;
         let checked = config.lost_vehicle_down_s.is_some()
-            || guidance.setpoint_off_path_m(&view.scene) <= spare_m.max(ON_PATH_M);
+            || guidance.setpoint_off_path_m(&view.scene) <= spare_m.max(SETPOINT_ON_PATH_M);
         match checked && self.seeks_landing() && guidance.is_setpoint_still() {
             true => Some(guidance.setpoint_position()),
             false => view.mission.plan()?.path.point_at(guidance.along_m()),
@@ -209,7 +209,7 @@ impl Detours {
         let off_m = plan.path.point_at(along_m).map_or(0.0, |on| (on - here).length());
         let over_area = view.config.lost_vehicle_down_s.is_some();
         // From beside the leg the first way to its end has that much less room.
-        let off_m = if over_area || off_m <= ON_PATH_M { 0.0 } else { off_m };
+        let off_m = if over_area || off_m <= SETPOINT_ON_PATH_M { 0.0 } else { off_m };
         Some(DetourRequest {
             aside: sought.is_aside(),
             here,
@@ -297,7 +297,7 @@ impl Detours {
         }
         self.failures = self.failures.saturating_add(1);
         self.failures_here = self.failures_here.saturating_add(1);
-        let long = now - self.failed_since >= Duration::from_secs(GIVE_UP_AFTER_S);
+        let long = now - self.failed_since >= Duration::from_secs(EARLY_GIVE_UP_AFTER_S);
         let often = long && self.failures_here >= MAX_DETOUR_SEARCHES - 1;
         self.no_retry = often || outlook == RetryOutlook::Closed;
     }

@@ -150,7 +150,7 @@ impl FtpRequest {
 }
 
 /// Whether the request opens a session.
-pub fn is_open(request: &FtpRequest) -> bool {
+pub fn opens_session(request: &FtpRequest) -> bool {
     matches!(request.opcode, op::OPEN_READ | op::CREATE | op::OPEN_WRITE)
 }
 

@@ -77,7 +77,7 @@ impl Store {
             }
             FlashJob::Record(record) => {
                 let data_at = record.at + WORD as u32 + record.done;
-                let left = (record.total_len() - record.done) as usize;
+                let left = (record.step_len() - record.done) as usize;
                 match (record.step, record.source) {
                     (RecordStep::Head, _) => {
                         self.program_word =
@@ -334,7 +334,7 @@ impl Store {
     }
 
     /// Gives up the job that serves an upload; the outcome of an open request is then ignored.
-    pub(super) fn drop_job(&mut self) {
+    pub(super) fn drop_upload_job(&mut self) {
         match self.job {
             FlashJob::MarkUsed(area @ FlashArea::Slot(_)) => {
                 *self.condition_mut(area) = AreaCondition::Dirty;

@@ -15,7 +15,7 @@ impl Store {
         if let Some(compaction) = self.journal.compacting.clone() {
             return Some(self.continue_compaction(compaction));
         }
-        let closing = self.is_mission_closing();
+        let closing = self.is_mission_upload_closing();
         if self.journal.failures >= MAX_JOURNAL_TRIES {
             if closing {
                 self.end_upload(Err(UploadError::Flash));
@@ -54,7 +54,7 @@ impl Store {
     }
 
     /// Whether an uploaded mission file is about to be stored.
-    fn is_mission_closing(&self) -> bool {
+    fn is_mission_upload_closing(&self) -> bool {
         self.upload == Some((File::Mission, UploadState::Closing))
     }
 
@@ -97,7 +97,7 @@ impl Store {
                     ErasePermission::NotYet => return None,
                     ErasePermission::Forbidden => UploadError::Armed,
                 };
-                if self.is_mission_closing() {
+                if self.is_mission_upload_closing() {
                     self.end_upload(Err(refused));
                 }
                 None
@@ -171,7 +171,7 @@ impl Store {
                 record.done += bytes.len() as u32;
             }
         }
-        if record.done < record.total_len() {
+        if record.done < record.step_len() {
             self.job = FlashJob::Record(record);
         } else if record.step != RecordStep::Verify {
             self.job =

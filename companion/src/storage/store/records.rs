@@ -36,7 +36,7 @@ pub struct JournalRecord {
 
 impl JournalRecord {
     /// Bytes that the current step processes: the data, when the record is read back also its head.
-    pub fn total_len(&self) -> u32 {
+    pub fn step_len(&self) -> u32 {
         if self.step == RecordStep::Verify { WORD as u32 + self.len } else { self.len }
     }
 }

@@ -165,11 +165,11 @@ fn a_flash_that_stalls_only_reads_while_armed() {
     // A parameter is stored once the vehicle is disarmed.
     store.set_parameter(0, 3.5).unwrap();
     run_armed(&mut store, &mut flash);
-    assert!(store.is_unsaved());
+    assert!(store.has_unsaved_parameters());
     assert!(store.request_read(File::Mission, 0, 10), "what is there can be read");
     run_armed(&mut store, &mut flash);
     run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
-    assert!(!store.is_unsaved());
+    assert!(!store.has_unsaved_parameters());
     // Armed at any moment of an upload: nothing is programmed until the vehicle is disarmed again.
     let pieces: Vec<_> = road.chunks(239).collect();
     for armed_at in 0..=pieces.len() {
@@ -210,9 +210,9 @@ fn nothing_is_erased_while_armed() {
     );
     store.set_parameter(0, 2.5).unwrap();
     run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
-    assert!(store.is_unsaved(), "there is no clean half to keep it in yet");
+    assert!(store.has_unsaved_parameters(), "there is no clean half to keep it in yet");
     run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
-    assert!(!store.is_unsaved());
+    assert!(!store.has_unsaved_parameters());
     // With areas erased ahead of time, parameters and a roadmap are stored while armed.
     store.set_parameter(0, 3.5).unwrap();
     run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();

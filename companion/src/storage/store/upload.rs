@@ -79,7 +79,7 @@ impl Store {
     /// Abandons an upload, unless its file is already being stored.
     pub fn abandon_upload(&mut self) {
         if !matches!(self.upload, Some((_, UploadState::Closing))) {
-            self.drop_job();
+            self.drop_upload_job();
             self.mark_open_slot_dirty();
             self.upload = None;
         }

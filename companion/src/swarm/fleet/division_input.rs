@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 
-use crate::link::roster::{FlightStatus, RosterReportEntry};
+use crate::link::roster::{RosterReportEntry, ShareStatus};
 
 /// Input of a division for one vehicle: as [`planner_core::coverage::losses::VehicleStatus`], in
 /// decimetres.
@@ -22,11 +22,11 @@ impl DivisionInput {
     /// The input of a vehicle, from its entry in the roster report.
     pub fn from_entry(entry: &RosterReportEntry) -> Self {
         let along_dm = match entry.status {
-            FlightStatus::Alive => entry.commitment_dm.unwrap_or(entry.progress_dm),
-            FlightStatus::Lost | FlightStatus::Left => entry.progress_dm,
-            FlightStatus::Finished => Self::WHOLE_PATH,
+            ShareStatus::Alive => entry.commitment_dm.unwrap_or(entry.progress_dm),
+            ShareStatus::Lost | ShareStatus::Left => entry.progress_dm,
+            ShareStatus::Finished => Self::WHOLE_PATH,
         };
-        Self { alive: entry.status == FlightStatus::Alive, along_dm }
+        Self { alive: entry.status == ShareStatus::Alive, along_dm }
     }
 
     /// `along_dm` in metres; infinite for [`DivisionInput::WHOLE_PATH`].

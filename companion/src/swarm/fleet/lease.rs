@@ -1,7 +1,7 @@
 //! The lease of a vehicle, and what silence of the others means.
 
 use super::{Fleet, FleetVehicle, INCARNATIONS, OwnReport};
-use crate::link::roster::{FlightStatus, RosterReportEntry};
+use crate::link::roster::{RosterReportEntry, ShareStatus};
 use crate::time::{Duration, Instant};
 
 impl<const V: usize> Fleet<V> {
@@ -16,7 +16,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Ranks of the vehicles that take part, or were lost, as bits.
     pub(super) fn counted_ranks(&self) -> u32 {
-        let counts = |m: &FleetVehicle| m.has_part && m.entry.status <= FlightStatus::Lost;
+        let counts = |m: &FleetVehicle| m.has_part && m.entry.status <= ShareStatus::Lost;
         let ranks = self.members.iter().enumerate();
         ranks.filter(|(_, m)| counts(m)).fold(0, |bits, (rank, _)| bits | 1 << rank.min(31))
     }
@@ -26,7 +26,7 @@ impl<const V: usize> Fleet<V> {
     pub(super) fn is_majority(&self, among: impl Fn(usize, &FleetVehicle) -> bool) -> bool {
         let (mut all, mut these, mut lowest) = (0, 0, false);
         for (rank, member) in self.members.iter().enumerate() {
-            if member.has_part && member.entry.status <= FlightStatus::Lost {
+            if member.has_part && member.entry.status <= ShareStatus::Lost {
                 let is_among = among(rank, member);
                 lowest |= is_among && all == 0;
                 all += 1;
@@ -55,7 +55,7 @@ impl<const V: usize> Fleet<V> {
     /// Whether the others count this vehicle as lost, or have divided its part; false for one that
     /// has finished its part.
     pub fn is_excluded(&self) -> bool {
-        self.excluded && self.members[usize::from(self.own)].entry.status != FlightStatus::Finished
+        self.excluded && self.members[usize::from(self.own)].entry.status != ShareStatus::Finished
     }
 
     /// Whether this vehicle flies its part of the area, or will.
@@ -65,7 +65,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether this vehicle has left the mission and reported that.
     pub(crate) fn has_reported_leaving(&self) -> bool {
-        self.members[usize::from(self.own)].entry.status == FlightStatus::Left
+        self.members[usize::from(self.own)].entry.status == ShareStatus::Left
     }
 
     /// Whether another vehicle takes part, or left a part that is not divided yet.
@@ -76,9 +76,9 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether another vehicle flies, or has flown and finished, left or was lost since it was
     /// started.
-    pub(crate) fn is_flight_under_way(&self) -> bool {
-        let ended = |member: &FleetVehicle| member.entry.status != FlightStatus::Alive;
-        self.knows_flight() || self.members.iter().any(ended)
+    pub(crate) fn has_flight_begun(&self) -> bool {
+        let ended = |member: &FleetVehicle| member.entry.status != ShareStatus::Alive;
+        self.is_another_in_flight() || self.members.iter().any(ended)
     }
 
     /// When the last of the vehicles that have been silent for `MISSED_AFTER`, and so may be lost,
@@ -96,19 +96,19 @@ impl<const V: usize> Fleet<V> {
     pub(super) fn count_silent_as_lost(&mut self, now: Instant) {
         let silent = self.limits.silent;
         for member in self.members.iter_mut().filter(|m| m.has_part && now - m.heard_at >= silent) {
-            member.entry.status = member.entry.status.max(FlightStatus::Lost);
+            member.entry.status = member.entry.status.max(ShareStatus::Lost);
         }
     }
 
     /// Takes part again, on the ground, after this vehicle could not start or no vehicle heard it,
     /// once it can start and no flight is under way.
-    pub(super) fn rejoin_if_ready(&mut self, now: Instant, own: FlightStatus) {
+    pub(super) fn rejoin_if_ready(&mut self, now: Instant, own: ShareStatus) {
         let RosterReportEntry { incarnation, status, .. } =
             self.members[usize::from(self.own)].entry;
-        if status == FlightStatus::Left
-            && own == FlightStatus::Alive
+        if status == ShareStatus::Left
+            && own == ShareStatus::Alive
             && !self.airborne
-            && !self.knows_flight()
+            && !self.is_another_in_flight()
             && self.has_lease(now)
         {
             self.rejoin((incarnation + 1) % INCARNATIONS);

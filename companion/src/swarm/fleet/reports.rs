@@ -2,7 +2,7 @@
 //! knowledge.
 
 use super::{Fleet, FleetVehicle, INCARNATIONS, StartStatus};
-use crate::link::roster::{FlightStatus, MAX_ENTRIES, RosterReport, RosterReportEntry};
+use crate::link::roster::{MAX_ENTRIES, RosterReport, RosterReportEntry, ShareStatus};
 
 impl<const V: usize> Fleet<V> {
     /// Handles the roster report of the vehicle of rank `sender`; `own`: whether this vehicle was
@@ -18,7 +18,7 @@ impl<const V: usize> Fleet<V> {
         let same_plan = roster.plan == self.plan;
         if same_plan && roster.divisions > here {
             let status = self.sender_status(sender, roster);
-            if !self.adopt_division(roster, status) && status != FlightStatus::Left {
+            if !self.adopt_division(roster, status) && status != ShareStatus::Left {
                 self.excluded = own == StartStatus::Started;
             }
         }
@@ -33,15 +33,13 @@ impl<const V: usize> Fleet<V> {
                 self.handle_own_entry(entry, own);
             } else if rank < self.members.len() {
                 if rank == sender {
-                    self.introduce(sender, entry.incarnation, own);
+                    self.take_first_incarnation(sender, entry.incarnation, own);
                 }
                 let behind =
                     same_plan && roster.divisions < self.divisions.len() as u8 && rank != sender;
                 // The member may have finished its share of a division that the sender does not
                 // know; it reports that itself.
-                if !(behind
-                    && entry.status == FlightStatus::Left
-                    && self.members[rank].heard_itself)
+                if !(behind && entry.status == ShareStatus::Left && self.members[rank].heard_itself)
                 {
                     let counts = if same { *entry } else { entry.in_another_division() };
                     self.merge_entry(rank, &counts, own);
@@ -66,7 +64,7 @@ impl<const V: usize> Fleet<V> {
     /// Status of the sender of a report, as this report or an earlier one says. A division that
     /// only a sender that has left had agreed to before it was cut off excludes nobody: the sender
     /// flew by it until its lease ended, and the others divide what they had heard of the sender.
-    fn sender_status(&self, sender: usize, roster: &RosterReport) -> FlightStatus {
+    fn sender_status(&self, sender: usize, roster: &RosterReport) -> ShareStatus {
         let own = sender.checked_sub(usize::from(roster.first)).and_then(|i| roster.entries.get(i));
         let known = &self.members[sender].entry;
         own.unwrap_or(known).status
@@ -75,12 +73,12 @@ impl<const V: usize> Fleet<V> {
     /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
     /// then the others counted on that. Returns whether it did so. Where the sender has left, by
     /// its `status`, the others may meanwhile have counted on a later hash instead.
-    fn adopt_division(&mut self, roster: &RosterReport, status: FlightStatus) -> bool {
+    fn adopt_division(&mut self, roster: &RosterReport, status: ShareStatus) -> bool {
         let here = self.divisions.len() as u8;
         if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
             return false;
         }
-        let left = status == FlightStatus::Left;
+        let left = status == ShareStatus::Left;
         if roster.committed_hash == self.previous_hash && (self.hash == 0 || !left) {
             (self.division_inputs, self.hash) = (self.previous_inputs.clone(), self.previous_hash);
         }
@@ -93,7 +91,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Takes a sender's incarnation as it is the first time that it reports itself: this vehicle,
     /// just switched on, knew none, and could not tell a newer one from an older one.
-    fn introduce(&mut self, sender: usize, incarnation: u8, own: StartStatus) {
+    fn take_first_incarnation(&mut self, sender: usize, incarnation: u8, own: StartStatus) {
         let bit = 1 << sender.min(31);
         if self.introduced & bit == 0 && self.members[sender].entry.incarnation != incarnation {
             self.take_newer_incarnation(sender, incarnation, own);
@@ -124,7 +122,7 @@ impl<const V: usize> Fleet<V> {
     /// not, and both be a majority. Before that flight and after it, it is a new vehicle.
     fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, own: StartStatus) {
         let started = own == StartStatus::Started;
-        let (alive, flight) = (self.is_alive(usize::from(self.own)), self.knows_flight());
+        let (alive, flight) = (self.is_alive(usize::from(self.own)), self.is_another_in_flight());
         if started && !alive && !flight && !self.airborne {
             // The flight in which this vehicle left is over, and another one begins.
             self.forget_plan();
@@ -140,7 +138,7 @@ impl<const V: usize> Fleet<V> {
     /// Handles the entry about this vehicle in another one's report; `start`: whether it was
     /// started.
     fn handle_own_entry(&mut self, entry: &RosterReportEntry, start: StartStatus) {
-        let flies = self.knows_flight();
+        let flies = self.is_another_in_flight();
         let own = &mut self.members[usize::from(self.own)].entry;
         let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
         let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.status > own.status);

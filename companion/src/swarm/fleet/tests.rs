@@ -30,7 +30,7 @@ struct Vehicle {
     on: bool,
     waits: bool,
     on_pad: bool,
-    status: FlightStatus,
+    status: ShareStatus,
     progress_dm: u16,
     division: usize,
     heard_at: [Option<Instant>; MOST],
@@ -46,7 +46,7 @@ impl Vehicle {
             on: true,
             waits: true,
             on_pad: true,
-            status: FlightStatus::Alive,
+            status: ShareStatus::Alive,
             progress_dm: 0,
             division: 0,
             heard_at: [None; MOST],
@@ -101,7 +101,7 @@ impl Swarm {
         let vehicle = &mut self.vehicles[own];
         vehicle.fleet.begin_flight(vehicle.clock(self.now));
         vehicle.fleet.set_plan(plan_crc);
-        (vehicle.waits, vehicle.on_pad, vehicle.status) = (true, true, FlightStatus::Alive);
+        (vehicle.waits, vehicle.on_pad, vehicle.status) = (true, true, ShareStatus::Alive);
         (vehicle.progress_dm, vehicle.division) = (0, 0);
     }
 
@@ -115,7 +115,7 @@ impl Swarm {
     }
 
     /// The vehicle ends its flight, and lands.
-    fn end(&mut self, own: usize, status: FlightStatus) {
+    fn end(&mut self, own: usize, status: ShareStatus) {
         (self.vehicles[own].status, self.vehicles[own].on_pad) = (status, true);
     }
 
@@ -169,15 +169,15 @@ impl Swarm {
             let hash = v.fleet.division_hash();
             v.fleet.set_hash_from_plan(hash);
         }
-        if v.status == FlightStatus::Alive && v.fleet.division_count() > v.division {
+        if v.status == ShareStatus::Alive && v.fleet.division_count() > v.division {
             (v.division, v.progress_dm) = (v.fleet.division_count(), 0);
         }
-        if !v.on_pad && v.fleet.has_lease(now) && v.status == FlightStatus::Alive {
+        if !v.on_pad && v.fleet.has_lease(now) && v.status == ShareStatus::Alive {
             let most_dm = v.fleet.commitment_dm().unwrap_or(u16::MAX).max(v.progress_dm);
             v.progress_dm = (v.progress_dm + STEP_DM).min(most_dm);
         }
-        if !v.waits && v.status == FlightStatus::Alive && v.fleet.is_excluded() {
-            (v.status, v.on_pad) = (FlightStatus::Left, true);
+        if !v.waits && v.status == ShareStatus::Alive && v.fleet.is_excluded() {
+            (v.status, v.on_pad) = (ShareStatus::Left, true);
         }
     }
 
@@ -214,7 +214,7 @@ impl Swarm {
             swarm.run_s(gap_s);
             let next = swarm.below(last as u32 + 1) as usize;
             let finished = swarm.below(4) == 0;
-            let status = if finished { FlightStatus::Finished } else { FlightStatus::Left };
+            let status = if finished { ShareStatus::Finished } else { ShareStatus::Left };
             swarm.end(order.swap_remove(next), status);
         }
         swarm.run_s(10);
@@ -254,9 +254,9 @@ fn one_that_left_before_the_start_takes_part_again_by_its_plan() {
     let mut swarm = Swarm::new(3, 0.0, 1);
     (0..3).for_each(|own| swarm.plan(own, PLANS[0]));
     swarm.run_s(60);
-    (swarm.links[2], swarm.vehicles[2].status) = (0, FlightStatus::Left);
+    (swarm.links[2], swarm.vehicles[2].status) = (0, ShareStatus::Left);
     swarm.run_s(30);
-    (swarm.links[2], swarm.vehicles[2].status) = (u32::MAX, FlightStatus::Alive);
+    (swarm.links[2], swarm.vehicles[2].status) = (u32::MAX, ShareStatus::Alive);
     swarm.run_s(READY_S);
     for vehicle in &swarm.vehicles {
         assert!((0..3).all(|rank| vehicle.fleet.is_alive(rank)), "{:?}", vehicle.fleet);
@@ -264,7 +264,7 @@ fn one_that_left_before_the_start_takes_part_again_by_its_plan() {
     (0..3).for_each(|own| swarm.start(own));
     swarm.vehicles.iter_mut().for_each(|vehicle| vehicle.on_pad = false);
     swarm.run_s(20);
-    swarm.end(0, FlightStatus::Left);
+    swarm.end(0, ShareStatus::Left);
     swarm.run_s(20);
     assert_eq!([1, 2].map(|own| swarm.inputs(own).len()), [1, 1], "they divide");
 }
@@ -283,7 +283,7 @@ fn a_vehicle_that_hears_no_majority_is_missed_until_it_leaves() {
         swarm.links[deaf] = 0;
         swarm.run_s(3);
         assert_eq!(missed(&swarm), (deaf, count) != (0, 2), "{deaf} of {count}");
-        swarm.end(deaf, FlightStatus::Left);
+        swarm.end(deaf, ShareStatus::Left);
         swarm.run_s(2);
         assert!(!missed(&swarm) && swarm.vehicles[other].fleet.is_dividing(), "{deaf} of {count}");
     }
@@ -304,14 +304,14 @@ proptest! {
         let cut = rank % (count - 1);
         let mut swarm = Swarm::flying(count, loss, seed, PLANS[0]);
         swarm.run_s(20);
-        swarm.end(count - 1, FlightStatus::Left);
+        swarm.end(count - 1, ShareStatus::Left);
         (0..cut_after).for_each(|_| swarm.step());
         swarm.links.iter_mut().for_each(|from| *from &= !(1 << cut));
         swarm.links[cut] = if deaf { 0 } else { u32::MAX };
         // Its lease ends after 20 s, then it waits for 20 s, and lands.
         swarm.run_s(silent_s.min(42));
         if let Some(landed_for_s) = silent_s.checked_sub(42) {
-            swarm.end(cut, FlightStatus::Left);
+            swarm.end(cut, ShareStatus::Left);
             swarm.run_s(landed_for_s);
         }
         swarm.links = [u32::MAX; MOST];
@@ -320,7 +320,7 @@ proptest! {
         for own in (0..count - 1).filter(flies_on) {
             let vehicle = &swarm.vehicles[own];
             let fleet = &vehicle.fleet;
-            prop_assert!(vehicle.status == FlightStatus::Alive, "{own} landed: {fleet:?}");
+            prop_assert!(vehicle.status == ShareStatus::Alive, "{own} landed: {fleet:?}");
             prop_assert!(!fleet.is_dividing(), "{own} divides: {fleet:?}");
             prop_assert_eq!(swarm.inputs(own), swarm.inputs(usize::from(cut == 0)));
         }
@@ -386,7 +386,7 @@ proptest! {
     #[test]
     fn one_started_again_in_the_flight_of_others_makes_no_second_majority(
         count in 3usize..=MOST, seed in any::<u64>(), lossy in any::<bool>(),
-        status in proptest::sample::select(&[FlightStatus::Finished, FlightStatus::Left][..]),
+        status in proptest::sample::select(&[ShareStatus::Finished, ShareStatus::Left][..]),
         resets in any::<bool>(), side in any::<u32>(), apart_before in any::<bool>(),
         late_s in proptest::option::of(3u32..9),
     ) {
@@ -397,7 +397,7 @@ proptest! {
         if let Some(late_s) = late_s {
             // It is started again after one of the others was: the rest wait, and have heard that.
             for own in 0..count {
-                swarm.end(own, FlightStatus::Left);
+                swarm.end(own, ShareStatus::Left);
             }
             swarm.run_s(5);
             for own in (0..count).filter(|own| *own != again) {
@@ -443,7 +443,7 @@ proptest! {
             let holds = |own: &usize| {
                 let vehicle = &swarm.vehicles[*own];
                 !vehicle.waits
-                    && vehicle.status == FlightStatus::Alive
+                    && vehicle.status == ShareStatus::Alive
                     && vehicle.fleet.has_lease(vehicle.clock(swarm.now))
             };
             let leases = (0..count).filter(holds).fold(0u32, |bits, own| bits | 1 << own);
@@ -467,7 +467,7 @@ proptest! {
         for flight in 1..flights {
             swarm.run_s(10);
             for own in 0..count {
-                swarm.end(own, FlightStatus::Finished);
+                swarm.end(own, ShareStatus::Finished);
             }
             swarm.run_s(5);
             for own in 0..count {
@@ -487,7 +487,7 @@ proptest! {
         // Until the vehicle finds that it is in the air, it may hear others.
         (0..hears).for_each(|_| swarm.step());
         swarm.start(struck);
-        swarm.end(struck, FlightStatus::Left);
+        swarm.end(struck, ShareStatus::Left);
         swarm.run_s(60);
         for own in (0..count).filter(|own| *own != struck) {
             let inputs = swarm.inputs(own);

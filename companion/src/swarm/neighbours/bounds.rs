@@ -32,7 +32,7 @@ pub(super) const RECKONED_SPEED_SHARE: f32 = 0.4;
 /// seconds.
 pub(super) const RECKONED_AFTER_S: f32 = 2.0;
 /// Greatest distance before a closed gate at which an unheard vehicle stands, metres.
-pub(super) const STANDS_SHORT_M: f32 = 0.5;
+pub(super) const STANDS_BEFORE_GATE_M: f32 = 0.5;
 /// Least length of path with open gates ahead of a vehicle that falls silent for it to be assumed
 /// to fly on, metres: with less ahead it may be standing there already.
 pub(super) const MIN_OPEN_PATH_M: f32 = 0.5;
@@ -54,7 +54,7 @@ pub(super) const UNHEARD_STRETCH_M: f32 = 6.0;
 /// back, m/s.
 pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
-pub(super) const UNHEARD_STRETCH_STEP_M: f32 = 1.0;
+pub(super) const UNHEARD_STRETCH_SPACING_M: f32 = 1.0;
 /// Silence after which a vehicle in a coverage mission may have landed further along its path than
 /// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `SwarmLinkLost` waits. No vehicle counts
 /// as out of the plan for a shorter silence.
@@ -63,7 +63,7 @@ pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
 /// Maximum number of spacings of the places on the unheard stretch in a coverage mission, where it
 /// is as long as the lease allows: with eight corners a neighbour makes 17 keep-out zones.
-pub(super) const STRETCH_PLACES: f32 = 8.0;
+pub(super) const MAX_STRETCH_SPACINGS: f32 = 8.0;
 /// Height of the column below a neighbour's place in which it may lie on the ground, metres; the
 /// planner shortens the column where it knows the ground.
 pub(super) const MAX_COLUMN_M: f32 = 60.0;

@@ -228,11 +228,11 @@ impl NeighbourEntry {
     /// messages and of those by which it learns that no vehicle hears it.
     pub(super) fn unheard_distance_m(&self) -> f32 {
         // The slack keeps rounding from cutting off the last corner.
-        libm::fmaxf(self.points_length_m + LEGS_ROUNDING_M, self.unheard_stop_m())
+        libm::fmaxf(self.points_length_m + LEGS_ROUNDING_M, self.unheard_stopping_distance_m())
     }
 
     /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
-    pub(super) fn unheard_stop_m(&self) -> f32 {
+    pub(super) fn unheard_stopping_distance_m(&self) -> f32 {
         UNHEARD_STRETCH_M + UNHEARD_STRETCH_PER_DELAY_MPS * 2.0 * self.message_delay.delay_s
     }
 
@@ -273,7 +273,7 @@ impl NeighbourEntry {
 
     /// Whether the neighbour may still fly to its pad, and that is within `apart_m` of the vertical
     /// through `place`. No two pads are that near to each other.
-    pub(crate) fn may_fly_home_near(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
+    pub(crate) fn may_return_to_pad_near(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
         let near = |pad: Point| (pad - place).xy().norm_squared() < apart_m * apart_m;
         self.may_fly_on(now) && self.pad.is_some_and(near)
     }
@@ -298,12 +298,12 @@ impl NeighbourEntry {
     /// to `upto_m` in all, and with its greatest distance from the nearest of them, metres.
     #[inline(never)]
     pub(super) fn for_each_place(&self, upto_m: f32, visit: &mut dyn FnMut(Point, f32)) {
-        let step_m = if upto_m > self.unheard_stop_m() {
-            upto_m / STRETCH_PLACES
+        let step_m = if upto_m > self.unheard_stopping_distance_m() {
+            upto_m / MAX_STRETCH_SPACINGS
         } else {
-            UNHEARD_STRETCH_STEP_M
+            UNHEARD_STRETCH_SPACING_M
         };
-        let wider_m = if step_m > UNHEARD_STRETCH_STEP_M { 0.5 * step_m } else { 0.0 };
+        let wider_m = if step_m > UNHEARD_STRETCH_SPACING_M { 0.5 * step_m } else { 0.0 };
         self.for_each_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {
             for step in 1..=(flown_m / step_m) as u32 {
                 let along_m = step as f32 * step_m;

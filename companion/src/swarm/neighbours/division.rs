@@ -79,13 +79,13 @@ impl<const V: usize> Neighbours<V> {
     /// Whether another vehicle that takes part is in flight, heard within `missed_after`, and none
     /// may be lost and no division is under way: while a vehicle may be lost, each that lives is
     /// needed for a majority.
-    pub(crate) fn does_another_fly_its_part(&self, now: Instant, missed_after: Duration) -> bool {
+    pub(crate) fn may_leave_part_to_others(&self, now: Instant, missed_after: Duration) -> bool {
         let whole = |fleet: &Fleet<V>| !fleet.is_dividing() && !fleet.is_any_missing();
-        self.fleet.as_ref().is_some_and(whole) && self.does_another_take_part(now, missed_after)
+        self.fleet.as_ref().is_some_and(whole) && self.is_another_in_flight(now, missed_after)
     }
 
     /// Whether another vehicle that takes part is in flight, heard within `missed_after`.
-    pub(crate) fn does_another_take_part(&self, now: Instant, missed_after: Duration) -> bool {
+    pub(crate) fn is_another_in_flight(&self, now: Instant, missed_after: Duration) -> bool {
         let heard = |c: &NeighbourEntry| c.heard_at.is_some_and(|at| now - at < missed_after);
         let flies =
             |c: &&NeighbourEntry| heard(c) && !c.reports_any(GROUNDED | LANDED | OUT_OF_PLAN);

@@ -120,7 +120,7 @@ impl NeighbourEntry {
         let age = now - placed_at;
         if age > MAX_HEIGHT_AGE {
             let fate = SilentFate {
-                dead: self.rests_silently(age, now),
+                dead: self.is_lost_on_points(age, now),
                 lies: age >= down && !self.ground_m.is_nan(),
                 may_fly_on: self.may_fly_on_unheard(down, now, reach),
             };
@@ -308,7 +308,7 @@ impl NeighbourEntry {
 
     /// Whether the neighbour counts as dead and rests on its points, with a position of this age.
     #[inline(never)]
-    pub(super) fn rests_silently(&self, age: Duration, now: Instant) -> bool {
+    pub(super) fn is_lost_on_points(&self, age: Duration, now: Instant) -> bool {
         age >= LOST_AFTER
             && !self.points.is_empty()
             && (self.is_dead(now) || !self.is_reported_out_of_range(now))

@@ -34,7 +34,7 @@ impl<const V: usize> Neighbours<V> {
     fn unheard_progress_m(&self, entry: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !entry.heard_within(now, UNHEARD_LANDING_AFTER);
         let far = lands && entry.may_fly_on(now) && !self.hears_nobody(now);
-        if far { entry.unheard_distance_m() } else { entry.unheard_stop_m() }
+        if far { entry.unheard_distance_m() } else { entry.unheard_stopping_distance_m() }
     }
 
     /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` where it is out

@@ -10,7 +10,7 @@
 use planner_core::flight::Gate;
 
 use super::Neighbours;
-use super::bounds::STANDS_SHORT_M;
+use super::bounds::STANDS_BEFORE_GATE_M;
 use crate::time::Instant;
 
 /// Longest time for which an unheard vehicle waits before a gate, seconds: less than row
@@ -28,7 +28,7 @@ impl<const V: usize> Neighbours<V> {
             let ahead_m = gate.at_m - progress_m;
             let waits = opens_s - ahead_m / self.fastest_mps > UNHEARD_GATE_WAIT_S;
             if !waits {
-                let late_s = opens_s - (ahead_m - STANDS_SHORT_M) / self.assumed_speed_mps;
+                let late_s = opens_s - (ahead_m - STANDS_BEFORE_GATE_M) / self.assumed_speed_mps;
                 delay_s = libm::fmaxf(delay_s, late_s);
             }
             waits
@@ -39,7 +39,7 @@ impl<const V: usize> Neighbours<V> {
     /// Seconds until `gate` is surely open, even if no vehicle is heard until then; `None` where
     /// that is unknown.
     fn time_until_passed_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
-        if self.has_passed(gate, now) {
+        if self.is_open_for_good(gate, now) {
             return Some(0.0);
         }
         self.entries[self.roster_index(gate.id)?].time_until_passed_s(gate.until_m, now)

@@ -187,7 +187,7 @@ impl<const V: usize> Neighbours<V> {
         let Some(by) = self.active_roster_index(from, now) else { return };
         let hop_us = (self.entries[by].message_delay.delay_s * 1e6) as u64;
         for item in &relay.items {
-            let Some(at) = self.in_ranks(item.rank) else { continue };
+            let Some(at) = self.index_of_rank(item.rank) else { continue };
             let (fastest_mps, entry) = (self.fastest_mps, &mut self.entries[at]);
             if entry.heard_within(now, HEARD_DIRECTLY_WITHIN) {
                 continue;
@@ -210,7 +210,7 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    fn in_ranks(&self, rank: u8) -> Option<usize> {
+    fn index_of_rank(&self, rank: u8) -> Option<usize> {
         self.entries[..self.roster_count].binary_search_by_key(&u16::from(rank), |c| c.rank).ok()
     }
 }

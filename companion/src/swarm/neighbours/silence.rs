@@ -32,8 +32,8 @@ impl<const V: usize> Neighbours<V> {
     /// Time since any vehicle of the roster was heard, or since one reported that it hears this
     /// vehicle, whichever is longer; counted from `since` at the earliest. Zero when all of them
     /// have landed or are out of the plan, or there are none.
-    pub fn silence_duration(&self, now: Instant, since: Instant) -> Duration {
-        if self.are_all_at_rest() {
+    pub fn unlinked_duration(&self, now: Instant, since: Instant) -> Duration {
+        if self.are_all_landed_or_out() {
             return Duration::default();
         }
         let others = || self.entries[..self.roster_count].iter();

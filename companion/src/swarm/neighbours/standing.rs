@@ -9,7 +9,7 @@ use crate::time::{Duration, Instant};
 impl<const V: usize> Neighbours<V> {
     /// Whether all vehicles of the roster last reported that they have landed or are out of the
     /// plan, or have been silent for `down_after`, when a lost vehicle is on the ground.
-    pub(crate) fn are_all_down(&self, now: Instant) -> bool {
+    pub(crate) fn are_all_out_or_down(&self, now: Instant) -> bool {
         self.entries[..self.roster_count]
             .iter()
             .all(|c| c.reports_any(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down_after))
@@ -30,7 +30,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether the vehicle `id` has landed, or is out of the plan; false for an id outside the
     /// roster.
-    pub(crate) fn is_at_rest(&self, id: u8, now: Instant) -> bool {
+    pub(crate) fn is_landed_or_out(&self, id: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
             self.entries[at].reports_any(LANDED) || self.entries[at].is_out_of_plan(now)
         })
@@ -69,7 +69,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether every other vehicle of the roster last reported that it has landed or is out of the
     /// plan; true where there is none.
-    pub fn are_all_at_rest(&self) -> bool {
+    pub fn are_all_landed_or_out(&self) -> bool {
         self.entries[..self.roster_count].iter().all(|c| c.reports_any(LANDED | OUT_OF_PLAN))
     }
 }

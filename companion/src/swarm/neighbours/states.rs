@@ -13,7 +13,7 @@ impl<const V: usize> Neighbours<V> {
     /// State and age, at `now`, of every neighbour whose position or progress was ever heard, or
     /// that counts as dead. A vehicle out of the plan opens no gate until a scan has found that it
     /// does not block the path ([`Self::mark_path_clear`]).
-    pub fn states_at(&mut self, now: Instant) -> &[Neighbour] {
+    pub fn states_with_age(&mut self, now: Instant) -> &[Neighbour] {
         self.states.clear();
         self.forget_silent_strangers(now);
         for entry in &self.entries {
@@ -41,7 +41,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether `gate` is open for good: its vehicle has passed it, or is out of the plan.
-    pub(crate) fn has_passed(&self, gate: &Gate, now: Instant) -> bool {
+    pub(crate) fn is_open_for_good(&self, gate: &Gate, now: Instant) -> bool {
         let entry = self.roster_index(gate.id).map(|at| &self.entries[at]);
         entry.is_some_and(|c| {
             let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);

@@ -55,9 +55,9 @@ pub(super) fn joined(at_ms: u64) -> Neighbours<4> {
 #[test]
 fn a_position_reaches_the_mission_frame_and_ages() {
     let mut table = joined(0);
-    assert!(table.states_at(Instant::ZERO).is_empty());
+    assert!(table.states_with_age(Instant::ZERO).is_empty());
     table.handle_position(Instant::from_millis(100), &ORIGIN, 9, &place(50, 1000));
-    let heard = table.states_at(Instant::from_millis(600))[0];
+    let heard = table.states_with_age(Instant::from_millis(600))[0];
     assert_eq!((heard.id, heard.rank), (9, 2));
     // A ten-thousandth of a degree of latitude is 11.1 m.
     assert!((heard.position - Point::new(0.0, 11.1, 2.5)).norm() < 0.02, "{:?}", heard.position);
@@ -83,10 +83,10 @@ fn late_and_repeated_positions_change_nothing_but_a_restart_does() {
     table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(20_000, 1000));
     for late in [20_000, 19_900, 10_001] {
         table.handle_position(Instant::from_millis(500), &ORIGIN, 9, &place(late, 0));
-        assert!(table.states_at(Instant::from_millis(500))[0].age_s > 0.4, "{late}");
+        assert!(table.states_with_age(Instant::from_millis(500))[0].age_s > 0.4, "{late}");
     }
     table.handle_position(Instant::from_millis(500), &ORIGIN, 9, &place(100, 0));
-    assert_eq!(table.states_at(Instant::from_millis(500))[0].age_s, 0.0);
+    assert_eq!(table.states_with_age(Instant::from_millis(500))[0].age_s, 0.0);
 }
 
 #[test]
@@ -103,7 +103,7 @@ fn progress_counts_only_on_our_mission_and_plan() {
         (ON_PLAN, 1, 2, None, None),
     ] {
         table.handle_intent(Instant::ZERO, 1, &intent(flags, mission, plan), 1, own_plan);
-        assert_eq!(table.states_at(Instant::ZERO)[0].progress_m, progress);
+        assert_eq!(table.states_with_age(Instant::ZERO)[0].progress_m, progress);
     }
 }
 
@@ -114,12 +114,12 @@ fn strangers_rank_last_are_capped_and_expire() {
     for id in [200, 201, 202] {
         table.handle_position(at(0), &ORIGIN, id, &place(0, 0));
     }
-    assert_eq!((table.states_at(at(0)).len(), table.dropped_count()), (2, 1));
-    assert!(table.states_at(at(0)).iter().all(|n| n.rank == u16::MAX));
+    assert_eq!((table.states_with_age(at(0)).len(), table.dropped_count()), (2, 1));
+    assert!(table.states_with_age(at(0)).iter().all(|n| n.rank == u16::MAX));
     table.handle_position(at(59_000), &ORIGIN, 201, &place(59_000, 0));
     let ids = |table: &mut Neighbours<4>, ms| {
         let mut ids = Vec::<u8, 4>::new();
-        table.states_at(at(ms)).iter().for_each(|n| ids.push(n.id).unwrap());
+        table.states_with_age(at(ms)).iter().for_each(|n| ids.push(n.id).unwrap());
         ids
     };
     assert_eq!(ids(&mut table, 59_900), [200, 201]);
@@ -135,18 +135,23 @@ fn a_position_of_the_roster_counts_only_with_the_missions_crc() {
     let mut table = table();
     table.handle_intent(at(0), 1, &intent(OUT_OF_PLAN | BLOCKED, 7, 8), 1, None);
     table.handle_position(at(0), &ORIGIN, 9, &place(0, 0));
-    assert_eq!(table.states_at(at(0))[0].rank, u16::MAX, "another mission's vehicle is a stranger");
+    assert_eq!(
+        table.states_with_age(at(0))[0].rank,
+        u16::MAX,
+        "another mission's vehicle is a stranger"
+    );
     assert_eq!(
         (table.heard_bits(at(0)), table.blocked_count_before(200)),
         (0, 0),
         "nor do its flags"
     );
     table.handle_intent(at(100), 1, &intent(0, 1, 2), 1, None);
-    assert!(table.states_at(at(100)).is_empty(), "it is no stranger any more");
+    assert!(table.states_with_age(at(100)).is_empty(), "it is no stranger any more");
     table.handle_position(at(200), &ORIGIN, 9, &place(200, 0));
-    assert_eq!(table.states_at(at(200))[0].rank, 2);
+    assert_eq!(table.states_with_age(at(200))[0].rank, 2);
     table.handle_position(at(5100), &ORIGIN, 9, &place(5100, 5000));
-    let (rostered, stranger) = (table.states_at(at(5100))[0], table.states_at(at(5100))[1]);
+    let (rostered, stranger) =
+        (table.states_with_age(at(5100))[0], table.states_with_age(at(5100))[1]);
     assert_eq!((rostered.rank, stranger.rank), (2, u16::MAX), "its mission was not heard for 5 s");
     assert!(rostered.position.y < 1.0 && stranger.position.y > 50.0);
 }
@@ -181,7 +186,7 @@ proptest::proptest! {
                 let reported = Intent { system_id: id, ..intent(flags, mission, 2) };
                 table.handle_intent(at(now), 1, &reported, 1, Some(2));
             }
-            let heard = table.states_at(at(now));
+            let heard = table.states_with_age(at(now));
             proptest::prop_assert!(heard.len() <= 4);
             let own = |id: u8| {
                 heard
@@ -195,7 +200,7 @@ proptest::proptest! {
             );
             proptest::prop_assert_eq!(table.blocked_count_before(255), 0);
             proptest::prop_assert_eq!(
-                table.silence_duration(at(now), at(0)),
+                table.unlinked_duration(at(now), at(0)),
                 Duration::from_millis(now)
             );
         }
@@ -207,26 +212,26 @@ fn silence_is_that_of_the_vehicles_that_fly() {
     let mut table = table();
     let at = Instant::from_millis;
     assert_eq!(
-        table.silence_duration(at(9000), at(2000)),
+        table.unlinked_duration(at(9000), at(2000)),
         Duration::from_millis(7000),
         "never heard"
     );
     table.handle_intent(at(5000), 1, &Intent { heard_bits: 0, ..intent(0, 1, 2) }, 1, None);
-    assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(7000), "unheard");
+    assert_eq!(table.unlinked_duration(at(9000), at(2000)), Duration::from_millis(7000), "unheard");
     table.handle_intent(at(5000), 1, &intent(0, 1, 2), 1, None);
-    assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::from_millis(4000));
+    assert_eq!(table.unlinked_duration(at(9000), at(2000)), Duration::from_millis(4000));
     assert!(table.linked_within(at(5500), Duration::from_millis(1000)));
     assert!(!table.linked_within(at(6500), Duration::from_millis(1000)));
     table.handle_intent(at(5000), 1, &intent(LANDED, 1, 2), 1, None);
     table.handle_intent(at(5000), 1, &Intent { system_id: 3, ..intent(LANDED, 1, 2) }, 1, None);
-    assert_eq!(table.silence_duration(at(9000), at(2000)), Duration::default(), "all have landed");
+    assert_eq!(table.unlinked_duration(at(9000), at(2000)), Duration::default(), "all have landed");
 }
 
 #[test]
 fn a_vehicle_out_of_the_plan_opens_gates_only_after_a_scan() {
     let at = Instant::from_millis;
     let mut table = table();
-    let out = |table: &mut Neighbours<4>, now: Instant| table.states_at(now)[0].out_of_plan;
+    let out = |table: &mut Neighbours<4>, now: Instant| table.states_with_age(now)[0].out_of_plan;
     table.handle_intent(at(1000), 1, &intent(0, 7, 8), 7, None);
     table.handle_position(at(1000), &ORIGIN, 9, &place(50, 1000));
     table.handle_intent(at(1000), 1, &intent(OUT_OF_PLAN, 7, 8), 7, None);
@@ -242,9 +247,9 @@ fn a_vehicle_out_of_the_plan_opens_gates_only_after_a_scan() {
     assert!(!out(&mut table, at(1600)), "it is not out any more");
     // Silent from now on: dead later, but nobody counts on that before the next scan.
     let dead = at(1500) + LOST_AFTER;
-    assert!(!out(&mut table, dead) && !table.states_at(dead)[0].grounded);
+    assert!(!out(&mut table, dead) && !table.states_with_age(dead)[0].grounded);
     table.mark_path_clear(dead);
-    assert!(out(&mut table, dead) && table.states_at(dead)[0].grounded);
+    assert!(out(&mut table, dead) && table.states_with_age(dead)[0].grounded);
 }
 
 #[test]
@@ -253,11 +258,11 @@ fn a_vehicle_silent_before_its_place_and_plan_were_heard_opens_gates_too() {
     table.handle_intent(Instant::ZERO, 1, &intent(0, 7, 8), 7, None);
     table.forget_plan();
     let dead = Instant::ZERO + LOST_AFTER;
-    assert!(table.states_at(dead).is_empty());
+    assert!(table.states_with_age(dead).is_empty());
     table.mark_path_clear(dead);
     let gate = Gate { at_m: 1.0, id: 9, until_m: 5.0 };
-    assert!(table.has_passed(&gate, dead), "a promise may count on that");
-    let state = table.states_at(dead)[0];
+    assert!(table.is_open_for_good(&gate, dead), "a promise may count on that");
+    let state = table.states_with_age(dead)[0];
     assert!(
         (state.id, state.out_of_plan, state.grounded) == (9, true, true)
             && state.position == FAR_AWAY
@@ -388,7 +393,7 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             holds_lease: false,
             lands,
         };
-        let dead = table.entries[1].rests_silently(now - placed_at, now);
+        let dead = table.entries[1].is_lost_on_points(now - placed_at, now);
         let mut met = table.entries[1].filter_neighbour(now);
         met.lost = dead;
         table.apply_silence(&table.entries[1], now, &mut met);

@@ -31,7 +31,7 @@ fn sleep_in_lock_step() {
             return;
         }
         let due = alarm.min(grants::next_due(cs));
-        clock::skip_time(cs, watchdog::earlier_of_due_and_reset(cs, now, due).saturating_sub(now));
+        clock::skip_time(cs, watchdog::limit_skip_or_reset(cs, now, due).saturating_sub(now));
         // Both handlers set their timers again for the remaining time.
         interrupts::pend(Irq::Timer1);
         interrupts::pend(Irq::DualTimer);

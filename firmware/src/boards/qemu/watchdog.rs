@@ -33,7 +33,7 @@ static LAST_FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 /// Time up to which lock step may skip the clock, counts since the start: `due`, or the watchdog's
 /// reset time if that is earlier. Resets the board if the reset time is past. The device's timer
 /// does not count skipped time, so this function does.
-pub fn earlier_of_due_and_reset(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
+pub fn limit_skip_or_reset(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
     let reset_time = LAST_FED.borrow(cs).get() + u64::from(2 * RELOAD_COUNTS);
     if now >= reset_time {
         SCB::sys_reset();

@@ -8,7 +8,7 @@ fn pictures_come_back() {
     PictureStore::open(dir.path()).unwrap().store_pictures(&[picture]).unwrap();
     let mut pictures = vec![Picture { t_s: 1.0, ..picture }];
     let kept = PictureStore::open(dir.path()).unwrap();
-    kept.add_to(&mut pictures);
+    kept.prepend_to(&mut pictures);
     assert_eq!(pictures, [Picture { t_s: 0.0, ..picture }, Picture { t_s: 1.0, ..picture }]);
     std::fs::write(dir.path().join(FILE_NAME), "[[1, 2]]").unwrap();
     assert!(PictureStore::open(dir.path()).is_err());

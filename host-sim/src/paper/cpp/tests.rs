@@ -12,7 +12,7 @@ fn what_was_printed_agrees_with_itself() {
     for (ours, printed) in mean_max.iter().flatten().zip(MEAN_LARGEST_TIME_S.iter().flatten()) {
         assert!((ours - printed).abs() < 0.01, "{ours} {printed}");
     }
-    assert!((ValueSummary::of(&COSTS_M[2]).sd - 3.53).abs() < 0.01);
+    assert!((ValueSummary::of(&TABLE_2_COSTS_M[2]).sd - 3.53).abs() < 0.01);
 }
 
 #[test]

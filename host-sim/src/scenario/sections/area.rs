@@ -22,7 +22,7 @@ use super::{
 use crate::area::{self, AreaFormat, MAX_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
 use crate::margins;
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 use crate::scenario::coverage::{AreaSection, CoverageMethod, HeadingRule, ORIGIN_HINT, Trigger};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
@@ -282,7 +282,7 @@ fn read_polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordina
             let path = folder.join(file.str()?);
             let polygons = area::read(&path).map_err(|error| ScenarioError {
                 hint: Some(file_hint(&error).to_owned()),
-                ..file.error(&format!("is no area: {}: {error}", quoted_path(&path)))
+                ..file.error(&format!("is no area: {}: {error}", printable_path(&path)))
             })?;
             let metres = AreaFormat::from_path(&path) == Some(AreaFormat::Wkt);
             let usual = if metres { Coordinates::Metres } else { Coordinates::Wgs84 };
@@ -348,7 +348,7 @@ fn read_ring(value: &TomlValue<'_>) -> Result<(RingXy, Coordinates)> {
             }
         });
     }
-    area::open_ring(&mut ring);
+    area::remove_repeated_vertices(&mut ring);
     if ring.len() < 3 {
         return Err(value.error("must have at least three places that differ"));
     }

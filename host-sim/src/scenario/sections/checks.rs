@@ -51,7 +51,7 @@ pub(super) fn check_margins(
     Err(text.error_with_hint(span, why, hint))
 }
 
-pub(super) fn check_apart(
+pub(super) fn check_starts_apart(
     text: TomlText<'_>,
     vehicles: &[(VehicleSection, VehicleSpans)],
     safety_distance_m: f32,
@@ -100,7 +100,7 @@ pub(super) fn check_goals_apart(
 }
 
 /// Refuses a vehicle's start, or a goal, outside the geofence.
-pub(super) fn check_inside(
+pub(super) fn check_inside_geofence(
     table: &Table<'_>,
     vehicles: &[(VehicleSection, VehicleSpans)],
     mission: &MissionSection,
@@ -129,7 +129,7 @@ fn goal_span(table: &Table<'_>, index: usize) -> TomlSpan {
     item.unwrap_or(goals.span)
 }
 
-pub(super) fn check_goals(
+pub(super) fn check_labelled_goals(
     text: TomlText<'_>,
     vehicles: &[(VehicleSection, VehicleSpans)],
     mission: &MissionSection,

@@ -7,7 +7,8 @@ use planner_core::geo::frames::Geodetic;
 use planner_core::roadmap::MAX_COORDINATE_M;
 
 use super::checks::{
-    VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins,
+    VehicleSpans, check_goals_apart, check_inside_geofence, check_labelled_goals, check_margins,
+    check_starts_apart,
 };
 use super::{
     Common, DEFAULT_TIME_LIMIT_S, VEHICLES_HINT, check_list_len, empty_table,
@@ -17,13 +18,13 @@ use super::{
 use crate::capacity::VEHICLES;
 use crate::files;
 use crate::margins;
-use crate::quote::{quoted, quoted_path};
+use crate::quote::{printable_path, quoted};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
 use crate::scenario::{AssignmentObjective, MissionMode, MissionSection, Scenario, VehicleSection};
 
 /// Reads the scenario of a mission with goals.
-pub(in crate::scenario) fn goals_mission(
+pub(in crate::scenario) fn read_goals_scenario(
     text: TomlText<'_>,
     root: &Table<'_>,
     folder: &Path,
@@ -51,9 +52,9 @@ pub(in crate::scenario) fn goals_mission(
     if let Some(span) = &mode_span {
         check_mode(text, root, mission.mode, span, &mut unsupported)?;
     }
-    check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
-    check_goals(text, &vehicles, &mission)?;
-    check_inside(&mission_table, &vehicles, &mission)?;
+    check_starts_apart(text, &vehicles, deconfliction.safety_distance_m)?;
+    check_labelled_goals(text, &vehicles, &mission)?;
+    check_inside_geofence(&mission_table, &vehicles, &mission)?;
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
     let vehicles: Vec<VehicleSection> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
     check_goals_apart(
@@ -182,7 +183,7 @@ fn read_mission(
 fn read_goals_file(value: &TomlValue<'_>, folder: &Path) -> Result<Vec<(Point, String)>> {
     let path = folder.join(value.str()?);
     let text = files::read_text(&path).map_err(|error| {
-        value.error(&format!("cannot be read: {}: {error}", quoted_path(&path)))
+        value.error(&format!("cannot be read: {}: {error}", printable_path(&path)))
     })?;
     let mut goals = Vec::new();
     for (index, line) in text.lines().enumerate() {
@@ -196,12 +197,12 @@ fn read_goals_file(value: &TomlValue<'_>, folder: &Path) -> Result<Vec<(Point, S
                 if line.split_whitespace().count() == 3
                     && numbers.iter().all(|n| n.is_finite() && n.abs() <= MAX_COORDINATE_M) =>
             {
-                let place = format!("{}:{}", quoted_path(&path), index + 1);
+                let place = format!("{}:{}", printable_path(&path), index + 1);
                 goals.push((Point::new(x, y, z), place));
                 check_list_len(value, goals.len(), VEHICLES, "goals")?;
             }
             _ => {
-                let place = format!("{}:{}", quoted_path(&path), index + 1);
+                let place = format!("{}:{}", printable_path(&path), index + 1);
                 return Err(value.error(&format!(
                     "is malformed: {place}: expected `x y z` in metres, found `{}`",
                     quoted(line)

@@ -9,7 +9,7 @@ use planner_core::geo::frames::Geodetic;
 
 use super::checks::VehicleSpans;
 use super::{DEFAULT_ORIGIN, read_map};
-use crate::coverage::MAX_CORNERS;
+use crate::coverage::MAX_NO_FLY_CORNERS;
 use crate::coverage::obstacles::{MapObstacles, TooManyCorners};
 use crate::map::{self, Unknown};
 use crate::margins;
@@ -100,11 +100,11 @@ impl MapBesideArea {
         let pads = flown.vehicles.iter().map(|vehicle| vehicle.start.xy());
         let places: Vec<_> = area.vertices.iter().copied().chain(pads).collect();
         let own = area.rings_of(RingKind::NoFly).map(<[_]>::len).sum();
-        let zones = obstacles.zones(floor_m, (&places, beyond_m), own, MAX_CORNERS);
+        let zones = obstacles.zones(floor_m, (&places, beyond_m), own, MAX_NO_FLY_CORNERS);
         let zones = zones.map_err(|TooManyCorners(corners)| {
             let why = format!(
                 "map.file: no-fly zones have {corners} corners with those around the map's \
-                 obstacles; at most {MAX_CORNERS} can be used"
+                 obstacles; at most {MAX_NO_FLY_CORNERS} can be used"
             );
             let hint = "a larger map.resolution_m or a greater area.height_m makes fewer";
             text.error_with_hint(&self.span, why, hint)
@@ -148,7 +148,7 @@ impl FlightSettings<'_> {
         for (vehicle, spans) in self.vehicles.iter().zip(self.spans) {
             let mut hull = vehicle.start;
             hull.z += vehicle.radius_m;
-            let Some(near_m) = obstacles.distance_beside_climb(&hull) else { continue };
+            let Some(near_m) = obstacles.obstacle_beside_climb_m(&hull) else { continue };
             let why = format!(
                 "vehicle {} starts {near_m:.2} m from an obstacle of the map; \
                  its climb needs {:.2} m",

@@ -3,7 +3,7 @@
 use companion::config::SAFETY_DISTANCE_M;
 use planner_core::track::deconflict::Method;
 
-use super::values::{MAX_ID, read_point};
+use super::values::{MAX_VEHICLE_ID, read_point};
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{
     Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, PositionErrors, Simulation,
@@ -56,11 +56,12 @@ pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
     let at_s = table.required("at_s", "when it strikes, in seconds")?.f64(&(0.0..=1e6))? as f32;
     let vehicle = table.get("vehicle");
     if let Some(value) = &vehicle
-        && !ids.contains(&(value.integer_in_range(1..=MAX_ID)? as u8))
+        && !ids.contains(&(value.integer_in_range(1..=MAX_VEHICLE_ID)? as u8))
     {
         return Err(value.error("is no vehicle's id"));
     }
-    let vehicle = vehicle.map(|v| v.integer_in_range(1..=MAX_ID).map(|id| id as u8)).transpose()?;
+    let vehicle =
+        vehicle.map(|v| v.integer_in_range(1..=MAX_VEHICLE_ID).map(|id| id as u8)).transpose()?;
     let direction =
         table.get("direction").map(|v| v.one_of(&[("tx", "tx"), ("rx", "rx"), ("both", "both")]));
     let fault = Fault {

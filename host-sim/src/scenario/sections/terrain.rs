@@ -9,7 +9,7 @@ use planner_core::geo::frames::Geodetic;
 
 use super::checks::VehicleSpans;
 use crate::margins;
-use crate::quote::quoted_path;
+use crate::quote::printable_path;
 use crate::scenario::coverage::{AreaSection, Terrain};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Table, TomlSpan, TomlText};
@@ -60,7 +60,7 @@ impl UnreadTerrain {
     }
 
     fn terrain_error(&self, text: TomlText<'_>, error: &TerrainError) -> ScenarioError {
-        let path = quoted_path(&self.path);
+        let path = printable_path(&self.path);
         match error {
             TerrainError::System { what, hint } => text.error_with_hint(
                 &self.span,
@@ -131,7 +131,7 @@ impl UnreadTerrain {
         let config = FieldConfig { area: [low - beyond, high + beyond], reach_m, slope };
         let grid = self.read(text, &area.origin, config.window())?.relative_to(area.origin.alt_m);
         let field = terrain::encode_field(&grid, &config).map_err(|error| {
-            let why = format!("area.terrain: {}: {error}", quoted_path(&self.path));
+            let why = format!("area.terrain: {}: {error}", printable_path(&self.path));
             let hint = match error {
                 FieldError::High(_) => "area.origin needs an alt_m near the ground",
                 _ => "the file must hold the area, all pads and some metres around them",

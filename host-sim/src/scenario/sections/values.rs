@@ -5,7 +5,7 @@ use planner_core::Point;
 use crate::scenario::reader::{Result, TomlValue};
 
 /// Highest MAVLink system id of a vehicle.
-pub(super) const MAX_ID: u64 = 250;
+pub(super) const MAX_VEHICLE_ID: u64 = 250;
 
 /// Reads a point given as three numbers: east, north, up in metres.
 pub(super) fn read_point(value: &TomlValue<'_>) -> Result<Point> {

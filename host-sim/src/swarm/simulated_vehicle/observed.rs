@@ -13,7 +13,7 @@ impl SimulatedVehicle {
         let state = self.state();
         // A board's reported state is up to a second old; the autopilot's landing is known at once.
         let lands = self.board.is_some() && self.autopilot.is_landing();
-        let on_path = state.moves_along_path() || state.is_interrupted_by_loss();
+        let on_path = state.is_on_path_or_stopping() || state.is_interrupted_by_loss();
         let phase = match (truth.touching, on_path && !lands) {
             (touching, _) if self.wrecked => {
                 if touching {

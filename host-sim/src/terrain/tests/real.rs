@@ -42,7 +42,7 @@ fn bilbao_is_where_its_system_says() {
             &TerrainFrame { origin: &origin, without_crs: WithoutCrs::Refused, window },
         )
         .unwrap();
-        let highest = grid.heights_in_box(&Flat::repeat(-300.0), &Flat::repeat(800.0));
+        let highest = grid.highest_in_box(&Flat::repeat(-300.0), &Flat::repeat(800.0));
         assert!(!highest.holes, "{name}");
         // Compared with the file's own cells in that box, whose sides are along the file's rows
         // here.
@@ -142,7 +142,7 @@ fn autzen_is_in_feet_and_where_its_system_says() {
             });
             held.map(|(_, z)| *z).fold(f32::MIN, f32::max)
         };
-        let found = grid.heights_in_box(&low, &high);
+        let found = grid.highest_in_box(&low, &high);
         let (least, most) = (inside(Flat::zeros()), inside(beside * 4.0));
         if least == f32::MIN {
             continue;

@@ -201,7 +201,7 @@ fn occupied_corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point>
 
 /// Whether the segment from `a` to `b` is strictly farther than `clearance_m` (positive, finite)
 /// from every obstacle. The caller has checked that the ends are finite and near the grid and, if
-/// the clearance is less than `TOUCH_CHECK_BELOW_CELLS`, that the segment touches nothing. The
+/// the clearance is less than `TOUCH_CHECK_CLEARANCE_CELLS`, that the segment touches nothing. The
 /// first part of the segment, `known` (0 to 1) of its length, is skipped: the caller knows that it
 /// is farther than the clearance, by much more than rounding.
 pub(crate) fn is_farther_than(

@@ -20,11 +20,11 @@ pub type Snapped = [i32; 3];
 #[inline]
 pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
     /// [`snap`] accepts coordinates from −1 to 2 times this number, in cells.
-    const MAX_COORDINATE: f32 = MAX_DIM as f32;
+    const MAX_DIM_CELLS: f32 = MAX_DIM as f32;
     let mut out = [0; 3];
     for axis in 0..3 {
         let u = (p[axis] - shape.min[axis]) / shape.resolution_m;
-        if !(-MAX_COORDINATE..=2.0 * MAX_COORDINATE).contains(&u) {
+        if !(-MAX_DIM_CELLS..=2.0 * MAX_DIM_CELLS).contains(&u) {
             return None;
         }
         let v = u * ONE_CELL as f32;

@@ -12,7 +12,7 @@ use super::config::PrmConfig;
 use super::neighbours::NodeIndex;
 use crate::Point;
 use crate::map::segment::{
-    Snapped, TOUCH_CHECK_BELOW_CELLS, is_farther_than, lane_mask, segment_is_clear, snap,
+    Snapped, TOUCH_CHECK_CLEARANCE_CELLS, is_farther_than, lane_mask, segment_is_clear, snap,
     snapped_rest_touches,
 };
 use crate::map::voxel::VoxelGrid;
@@ -153,7 +153,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
                 RayClass::Clear(room) => (true, room),
                 RayClass::Blocked => (false, 0.0),
                 RayClass::Leaves(known) => {
-                    (hint(place).unwrap_or_else(|| self.check_exactly(there, known)), 0.0)
+                    (hint(place).unwrap_or_else(|| self.is_ray_clear(there, known)), 0.0)
                 }
             };
             if clear {
@@ -166,12 +166,12 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     /// The exact check of the segment from `here` to `there`; the first part, `known` (0 to 1) of
     /// its length, lies in the free box and need not be checked.
     #[inline]
-    fn check_exactly(&self, there: [f32; 3], known: f32) -> bool {
+    fn is_ray_clear(&self, there: [f32; 3], known: f32) -> bool {
         let there = Point::from(there);
         let (Some(a), Some(b)) = (&self.snapped, snap(self.grid.shape(), &there)) else {
             return false;
         };
-        if self.clearance_cells >= TOUCH_CHECK_BELOW_CELLS {
+        if self.clearance_cells >= TOUCH_CHECK_CLEARANCE_CELLS {
             return is_farther_than(
                 self.grid,
                 &Point::from(self.here),
@@ -211,7 +211,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         });
         let t = leave[0].min(leave[1]).min(leave[2]);
         let at = |t: f32| [0, 1, 2].map(|axis| self.at[axis] + d[axis] * t);
-        if t < 0.999 && self.is_obstacle(at(t)) {
+        if t < 0.999 && self.is_certainly_obstacle(at(t)) {
             return RayClass::Blocked;
         }
         // The cell beyond the face by which the segment leaves the box is free, or may be. Up to
@@ -225,7 +225,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     /// Whether a point, in cells from the grid's minimum corner, lies in an occupied cell, and not
     /// within rounding of the cell's border.
     #[inline(always)]
-    fn is_obstacle(&self, place: [f32; 3]) -> bool {
+    fn is_certainly_obstacle(&self, place: [f32; 3]) -> bool {
         let mut cell = [0; 3];
         let mut certain = true;
         for axis in 0..3 {

@@ -85,7 +85,7 @@ fn algorithm2_divides_by_the_highest_ranked_vehicle_in_range() {
 }
 
 /// Past a vehicle that hovers beside the path, where a stop from cruise speed would end too
-/// near, the speed is at most [`PASSING_MPS`]; before a vehicle on the path, or one that moves,
+/// near, the speed is at most [`MAX_PASSING_MPS`]; before a vehicle on the path, or one that moves,
 /// the own vehicle stops.
 #[test]
 fn priority_passes_one_that_hovers_slowly_and_stops_before_others() {
@@ -114,10 +114,10 @@ fn priority_passes_one_that_hovers_slowly_and_stops_before_others() {
         assert_eq!(at(along_m.min(35.0), 1.8, 0.0).0, 2);
         assert_eq!(at(along_m.min(35.0), 2.0, -1.5).0, 2);
     }
-    let near = |mps: f32| (PASSING_MPS..PASSING_MPS + 0.01).contains(&mps);
+    let near = |mps: f32| (MAX_PASSING_MPS..MAX_PASSING_MPS + 0.01).contains(&mps);
     assert!(near(at(38.0, 2.0, 0.0).1), "{:?}", at(38.0, 2.0, 0.0));
     let before = at(20.0, 2.0, 0.0).1;
-    assert!(before > PASSING_MPS && before < 13.0, "{before}");
+    assert!(before > MAX_PASSING_MPS && before < 13.0, "{before}");
     assert_eq!(at(45.0, 2.0, 0.0), (0, 13.0), "it is behind");
 }
 

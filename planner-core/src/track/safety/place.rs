@@ -117,7 +117,7 @@ impl PlaceOnPoints {
     /// Distance along the points beyond the first place that the vehicle may have flown already,
     /// metres.
     #[inline]
-    pub fn flown_beyond_m(&self) -> f32 {
+    pub fn place_uncertainty_m(&self) -> f32 {
         if let Self::On { more_dm, .. } = *self { 0.1 * f32::from(more_dm) } else { 0.0 }
     }
 }
@@ -168,7 +168,7 @@ impl PointsReach {
             return Self { beyond_m: first_m + extent_m, most_m };
         }
         place_on_points.ahead(position, points).map_or(Self::OPEN, |(place, _)| Self {
-            beyond_m: away_m(&place) + place_on_points.flown_beyond_m(),
+            beyond_m: away_m(&place) + place_on_points.place_uncertainty_m(),
             most_m: away_m(first) + extent_m,
         })
     }

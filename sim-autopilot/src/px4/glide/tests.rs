@@ -5,7 +5,7 @@ fn it_arrives_where_it_shall_from_any_speed_and_stays() {
     for (speed, cruise) in [(0.0, 5.0), (0.3, 5.0), (1.85, 5.0), (4.0, 5.0), (8.0, 5.0), (0.5, 0.3)]
     {
         let velocity = Point::new(0.6 * speed, -0.8 * speed, 0.0);
-        let target = stopping_point(&velocity) + Point::new(1.0, 2.0, 0.0);
+        let target = stopping_offset(&velocity) + Point::new(1.0, 2.0, 0.0);
         let mut glide = SmoothedApproach::new(0, &Point::zeros(), &velocity);
         for step in 1..=5000_u64 {
             let before = glide.ramps.map(|ramp| ramp.derivative);

@@ -27,7 +27,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use companion::planner::coverage::MAX_ORDER_CHANGES as MAX_ORDER_CHANGES_ON_BOARD;
 use flockmate_tests::{shared_data, workspace};
-use host_sim::coverage::{MAX_CORNERS, MAX_LANES, MAX_ORDER_CHANGES};
+use host_sim::coverage::{MAX_LANES, MAX_NO_FLY_CORNERS, MAX_ORDER_CHANGES};
 use host_sim::scenario;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
@@ -304,7 +304,7 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     let pattern = LanePattern { spacing, angle_deg: None, margin_m: 0.0, search_steps: looks };
     let mut found: Box<Tracks<MAX_LANES>> = Box::default();
     let mut workspace: Box<tracks::LaneWorkspace<VERTICES>> = Box::default();
-    let mut transit = Box::new(Transit::<MAX_CORNERS>::empty());
+    let mut transit = Box::new(Transit::<MAX_NO_FLY_CORNERS>::empty());
     let mut times = Vec::new();
     for _ in 0..RUNS {
         let began = Instant::now();
@@ -319,7 +319,7 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     let legs = found.lanes().windows(2).map(|pair| (pair[0].to, pair[1].from));
     let mut crossings = 0;
     for (from, to) in legs {
-        let mut corners = heapless::Vec::<Flat, MAX_CORNERS>::new();
+        let mut corners = heapless::Vec::<Flat, MAX_NO_FLY_CORNERS>::new();
         transit
             .shortest_path(&from, &to, &mut corners)
             .map_err(|error| anyhow::anyhow!("{error:?}"))?;

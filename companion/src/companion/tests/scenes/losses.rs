@@ -4,7 +4,7 @@ use super::State::*;
 use super::*;
 use crate::Link;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
-use crate::link::roster::{self, FlightStatus, RosterReport, RosterReportEntry};
+use crate::link::roster::{self, RosterReport, RosterReportEntry, ShareStatus};
 use crate::swarm::fleet::Fleet;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
@@ -42,7 +42,7 @@ fn three() -> Config<4> {
 }
 
 /// The other vehicle sends a roster report with these states of this vehicle and of itself.
-pub(super) fn report_status(b: &mut Bench, own: FlightStatus, other: FlightStatus) {
+pub(super) fn report_status(b: &mut Bench, own: ShareStatus, other: ShareStatus) {
     let entry = |standing| RosterReportEntry { status: standing, ..RosterReportEntry::default() };
     let entries = [entry(own), entry(other)].into_iter().collect();
     let plan = super::super::divisions::own_roster(b).plan;
@@ -68,7 +68,7 @@ pub(super) fn tunnels(b: &mut Bench, payload: &[u8]) {
 
 /// The other vehicle leaves the mission; runs until this one holds for the division.
 pub(super) fn leaves(b: &mut Bench) {
-    report_status(b, FlightStatus::Alive, FlightStatus::Left);
+    report_status(b, ShareStatus::Alive, ShareStatus::Left);
     b.run_until(Dividing, 30.0);
 }
 
@@ -79,7 +79,7 @@ pub(super) fn another_leaves(scenes: &mut Scenes) {
     let had_finished = |b: &mut Bench| {
         b.answer_division = false;
         leaves(b);
-        report_status(b, FlightStatus::Alive, FlightStatus::Finished);
+        report_status(b, ShareStatus::Alive, ShareStatus::Finished);
         b.run(5.0);
         assert_eq!(b.state(), Dividing);
         b.answer_division = true;
@@ -113,7 +113,7 @@ pub(super) fn the_others_give_it_up(scenes: &mut Scenes) {
     let unheard_below_its_layer = |b: &mut Bench| (b.neighbour, b.stuck) = (None, true);
     let climbs = over_a_field_of(three(), field_plan(), Climb);
     scenes.play(climbs, unheard_below_its_layer, Aborted, 60.0);
-    let given_up = |b: &mut Bench| report_status(b, FlightStatus::Lost, FlightStatus::Alive);
+    let given_up = |b: &mut Bench| report_status(b, ShareStatus::Lost, ShareStatus::Alive);
     for state in [Climb, Follow, Scheduled, Streaming] {
         scenes.play(over_a_field(state), given_up, Aborted, 60.0);
     }
@@ -161,7 +161,7 @@ pub(super) fn it_is_in_reserve(scenes: &mut Scenes) {
     };
     let none_is_left = |b: &mut Bench| {
         started(b);
-        report_status(b, FlightStatus::Alive, FlightStatus::Finished);
+        report_status(b, ShareStatus::Alive, ShareStatus::Finished);
     };
     scenes.play(over_a_field_with(without_part(), Ready), none_is_left, Done, 5.0);
     // Of three it hears none: no majority.
@@ -191,7 +191,7 @@ fn a_vehicle_that_has_left_in_flight_never_takes_part_again() {
         resume(&mut b);
         b.run(1.0);
         let own = super::super::divisions::own_roster(&b).entries[0].status;
-        assert_eq!(own, FlightStatus::Left, "{false_ground}: {:?} {:?}", b.state(), b.texts);
+        assert_eq!(own, ShareStatus::Left, "{false_ground}: {:?} {:?}", b.state(), b.texts);
     }
 }
 
@@ -199,7 +199,7 @@ fn a_vehicle_that_has_left_in_flight_never_takes_part_again() {
 #[test]
 fn a_vehicle_that_was_restarted_comes_back_as_a_new_one() {
     let mut bench = over_a_field(Ready);
-    report_status(&mut bench, FlightStatus::Lost, FlightStatus::Alive);
+    report_status(&mut bench, ShareStatus::Lost, ShareStatus::Alive);
     bench.run(1.0);
     bench.start();
     bench.run_until(Follow, 30.0);
@@ -215,7 +215,7 @@ fn a_vehicle_in_reserve_waits_for_its_plan_of_a_division_that_counts() {
     b.run(6.0);
     b.start();
     b.run_until(Scheduled, 10.0);
-    report_status(&mut b, FlightStatus::Alive, FlightStatus::Left);
+    report_status(&mut b, ShareStatus::Alive, ShareStatus::Left);
     for _ in 0..400 {
         // Once the division is computed the shell no longer answers.
         if b.answer_division {

@@ -6,7 +6,7 @@ use super::State::*;
 use super::losses::{over_a_field, report_status, tunnels};
 use super::*;
 use crate::link::done::{self, PhotographedReport};
-use crate::link::roster::FlightStatus;
+use crate::link::roster::ShareStatus;
 
 /// The other vehicle reports from the ground what it knows to be photographed.
 fn knows(b: &mut Bench, first: u32, round: u8) {
@@ -96,9 +96,9 @@ fn only_what_others_on_the_ground_know_changes_the_plan() {
 /// waits: it would fly another plan than the flight under way.
 #[test]
 fn whoever_was_started_keeps_its_plan_when_others_have_landed() {
-    for status in [FlightStatus::Finished, FlightStatus::Left] {
+    for status in [ShareStatus::Finished, ShareStatus::Left] {
         let mut bench = over_a_field(Scheduled);
-        report_status(&mut bench, FlightStatus::Alive, status);
+        report_status(&mut bench, ShareStatus::Alive, status);
         knows(&mut bench, 20, 0);
         bench.run(1.0);
         assert_eq!(bench.companion.excluded_waypoints(), [], "{:?}", bench.texts);

@@ -4,7 +4,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::super::tests::{ORIGIN, intent, joined, place, uniform};
-use super::super::{GROUNDED, OUT_OF_PLAN, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION_M};
+use super::super::{GROUNDED, OUT_OF_PLAN, UNHEARD_STRETCH_SPACING_M, VAGUE_POSITION_M};
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
 
@@ -147,7 +147,7 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
                 at
             })
             .collect();
-        let upto_m = entry.unheard_stop_m();
+        let upto_m = entry.unheard_stopping_distance_m();
         let mut places = std::vec::Vec::new();
         entry.for_each_place(upto_m, &mut |place, _| places.push(place));
         let flown_m = upto_m * uniform(&mut rng, 0.0, 1.2).min(1.0);
@@ -162,7 +162,7 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
         let nearest_m =
             places.iter().map(|place| (place - from).norm()).fold(f32::INFINITY, f32::min);
         assert!(
-            nearest_m <= 0.5 * UNHEARD_STRETCH_STEP_M + 0.01,
+            nearest_m <= 0.5 * UNHEARD_STRETCH_SPACING_M + 0.01,
             "{case}: {nearest_m} m beside {places:?}"
         );
     }

@@ -72,8 +72,10 @@ impl Row {
     /// Gates of a vehicle that are still closed.
     fn closed(&self, rank: usize) -> &[Gate] {
         let gates = &self.gates[rank];
-        let open =
-            gates.iter().take_while(|gate| self.tables[rank].has_passed(gate, self.now)).count();
+        let open = gates
+            .iter()
+            .take_while(|gate| self.tables[rank].is_open_for_good(gate, self.now))
+            .count();
         &gates[open..]
     }
 
@@ -124,7 +126,7 @@ impl Row {
 
     fn check(&mut self) {
         for of in 0..self.tables.len() {
-            for state in self.tables[of].states_at(self.now).iter() {
+            for state in self.tables[of].states_with_age(self.now).iter() {
                 let (other, believed_m) =
                     (usize::from(state.id) - 1, state.progress_m.unwrap_or(0.0));
                 let flown_m = self.flown_m[other];

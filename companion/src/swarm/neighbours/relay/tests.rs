@@ -106,7 +106,7 @@ impl Swarm {
     /// The progress of vehicle `other` that vehicle `of` believes.
     fn believed_m(&mut self, of: usize, other: usize) -> Option<f32> {
         let (now, id) = (self.now, other as u8 + 1);
-        self.tables[of].states_at(now).iter().find(|n| n.id == id).and_then(|n| n.progress_m)
+        self.tables[of].states_with_age(now).iter().find(|n| n.id == id).and_then(|n| n.progress_m)
     }
 }
 
@@ -228,7 +228,7 @@ fn the_delay_of_a_flight_goes_with_its_progress() {
     table.handle_relay(second, 2, &report(6.0, 0));
     let believed_m = |after_s: u64, table: &mut Neighbours<8>| {
         let state = table
-            .states_at(second + Duration::from_secs(after_s))
+            .states_with_age(second + Duration::from_secs(after_s))
             .iter()
             .find(|n| n.id == 1)
             .copied();

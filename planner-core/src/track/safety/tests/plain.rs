@@ -201,11 +201,11 @@ fn the_nearest_place_is_among_the_remembered_ones() {
         let on_m = |p: &Point| (first - p).norm();
         let at_m = places.iter().filter(|(_, p)| on_m(p) < 0.02).map(|(at_m, _)| *at_m);
         let at_m = at_m.fold(f32::INFINITY, f32::min);
-        let remembered = at_m - 0.05..at_m + joint.flown_beyond_m() + 0.05;
+        let remembered = at_m - 0.05..at_m + joint.place_uncertainty_m() + 0.05;
         let within = places.iter().filter(|(at_m, _)| remembered.contains(at_m));
         let within_m = within.map(|(_, p)| away_m(p)).fold(f32::INFINITY, f32::min);
         assert!(within_m < least_m + 0.06, "{seed}: {within_m} instead of {least_m}, {joint:?}");
-        (on, back) = (on + 1, back + u32::from(joint.flown_beyond_m() > 0.0));
+        (on, back) = (on + 1, back + u32::from(joint.place_uncertainty_m() > 0.0));
     }
     std::println!("{on} on their points, {back} on some that come back");
     assert!(on > 2000 && back > 200, "{on} {back}");
@@ -254,7 +254,7 @@ fn a_vehicle_stays_in_its_set_where_points_lead_back() {
             assert!(away_m < 2.0 * stray_m + 0.1, "{seed}: {away_m} m from its set, {stray_m}");
         }
         let joint = PlaceOnPoints::find(&position, &points, &heard.velocity);
-        back += u32::from(joint.flown_beyond_m() > 0.0);
+        back += u32::from(joint.place_uncertainty_m() > 0.0);
     }
     std::println!("{back} of points that come back");
     assert!(back > 100, "{back}");

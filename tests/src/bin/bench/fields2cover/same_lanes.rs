@@ -3,7 +3,7 @@
 
 use anyhow::Result;
 use companion::planner::coverage::MAX_ORDER_CHANGES;
-use host_sim::coverage::{MAX_CORNERS, MAX_LANES};
+use host_sim::coverage::{MAX_LANES, MAX_NO_FLY_CORNERS};
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::footprint::{Footprint, Spacing};
@@ -33,7 +33,7 @@ pub fn way_m(
         rings.push(Ring { end: vertices.len() as u16, kind: RingKind::NoFly });
     }
     let area = Area::new(&vertices, &rings).map_err(|error| anyhow::anyhow!("{error:?}"))?;
-    let mut transit = Box::new(Transit::<MAX_CORNERS>::empty());
+    let mut transit = Box::new(Transit::<MAX_NO_FLY_CORNERS>::empty());
     transit.set_area(area).map_err(|error| anyhow::anyhow!("{error:?}"))?;
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
     let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
