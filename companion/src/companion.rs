@@ -212,7 +212,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             (PlanKind::Mission, State::Planning, Err(failure)) => self.mission.set_failure(failure),
             (PlanKind::Detour, ..) if !self.detours.is_request_read() => return,
             (PlanKind::Detour, state, Ok(plan)) if state.waits_for_detour() => {
-                self.begin_detour(plan);
+                self.adopt_detour(plan);
             }
             (PlanKind::Detour, state, Err(failure)) if state.waits_for_detour() => {
                 self.handle_detour_failure(failure);

@@ -40,7 +40,7 @@ use self::smoother::{ClockPace, SetpointSmoother, TICK_S};
 use self::waypoints::Algorithm2Waypoints;
 use crate::autopilot::limits::AutopilotLimits;
 use crate::config::Config;
-use crate::config::limits::{MotionLimits, Settings, Urgency};
+use crate::config::limits::{GuidanceLimits, MotionLimits, Urgency};
 use crate::guidance::evade::{EvadeSearch, StepBack};
 use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
@@ -147,7 +147,7 @@ pub struct Guidance {
     from_pad: bool,
     /// Whether it lands where a pilot, the autopilot or a lost position left it, off its path.
     lands_off_path: bool,
-    lead_m: f32,
+    lead_limit_m: f32,
     /// Arc length of the setpoint along the path, metres.
     pub(crate) setpoint_m: f32,
     /// Arc length where the vehicle will stop by advice or braking, without the filter, metres.
@@ -164,7 +164,7 @@ pub struct Guidance {
     guides_landing: bool,
     /// Whether the raw point stops because the path ahead leaves the geofence.
     stopped_at_fence: bool,
-    progress_m: f32,
+    last_progress_m: f32,
     progress_at: Instant,
     /// When the vehicle was last at its setpoint, or the setpoint last advanced; and where the
     /// setpoint was then.
@@ -205,8 +205,8 @@ pub struct Guidance {
 impl Guidance {
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let smoother = SetpointSmoother::new(MotionLimits::new(config, autopilot), config.geofence);
-        let Settings { track, leg_track, deconflict, fastest_mps } =
-            Settings::new(config, autopilot);
+        let GuidanceLimits { track, leg_track, deconflict, fastest_mps } =
+            GuidanceLimits::new(config, autopilot);
         Self {
             track,
             leg_track,
@@ -230,7 +230,7 @@ impl Guidance {
             on_path: false,
             from_pad: false,
             lands_off_path: false,
-            lead_m: LEG_LEAD_M,
+            lead_limit_m: LEG_LEAD_M,
             setpoint_m: 0.0,
             stops_at_m: f32::NEG_INFINITY,
             filter: SafetyFilter::default(),
@@ -239,7 +239,7 @@ impl Guidance {
             climbing_back: false,
             guides_landing: false,
             stopped_at_fence: false,
-            progress_m: 0.0,
+            last_progress_m: 0.0,
             progress_at: Instant::ZERO,
             followed_at: Instant::ZERO,
             followed_place: Point::zeros(),
@@ -464,8 +464,8 @@ impl Guidance {
         let change = self.smoother.acceleration() + correction - self.sent_acceleration;
         let most = self.smoother.jerk_mps3(urgency) * dt_s;
         self.sent_acceleration += change * (most / change.length().max(most).max(1e-6));
-        if self.tracker.along_m > self.progress_m + MIN_PROGRESS_M {
-            self.progress_m = self.tracker.along_m;
+        if self.tracker.along_m > self.last_progress_m + MIN_PROGRESS_M {
+            self.last_progress_m = self.tracker.along_m;
             self.progress_at = now;
         }
         if scene.plan.is_some() && (self.on_path || self.phase == Phase::Climb) && known {

@@ -88,7 +88,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let _ = self.events.push_back(Event::PlanRequested(PlanKind::Mission));
             }
             Action::HoldHere if to == State::Streaming => {
-                self.mission.leave_pad();
+                self.mission.note_pad_left();
                 self.guidance.stop_and_hold(position);
             }
             Action::HoldHere if to == State::PilotReturned => {

@@ -136,7 +136,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Switches to the detour that the shell has planned, or refuses it where it starts or ends
     /// elsewhere.
-    pub(super) fn begin_detour(&mut self, detour: &VehiclePlan<W, G>) {
+    pub(super) fn adopt_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let here = self.detours.start_of_detour(&self.detour_view());
         let begins = here.is_some_and(|here| self.mission.starts_at(detour, &here));
         let purpose = self.detours.sought().filter(|_| begins);
@@ -149,7 +149,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ground_m = self.mission.plan().map(|plan| self.guidance.ground_m(plan));
         self.mission.switch_to_detour(detour, progress_m, ground_m);
         let progress_at = self.guidance.last_progress_at();
-        self.detours.begin_detour(purpose, progress_m, self.now, progress_at, &mut self.timers);
+        self.detours.adopt_detour(purpose, progress_m, self.now, progress_at, &mut self.timers);
         self.neighbours.mark_avoided(self.now);
         // In the air the vehicle follows the detour from its start. On the pad the climb comes
         // first.

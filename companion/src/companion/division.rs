@@ -261,7 +261,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether this vehicle stands where it is to hold for a division.
     pub(super) fn is_holding_for_division(&self) -> bool {
         self.division_hold_m().is_some_and(|at_m| {
-            self.guidance.along_m() >= at_m - AT_HOLD_M && self.guidance.is_standing()
+            self.guidance.along_m() >= at_m - AT_HOLD_M && self.guidance.stands_outside_descent()
         })
     }
 

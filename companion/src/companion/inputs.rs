@@ -65,7 +65,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let follow = self.mission.state() == State::Follow;
         let on_ground = t.reports_ground(now);
         let fence = self.config.geofence;
-        let standing = self.guidance.is_standing() && t.velocity.length() < MAX_HOVER_MPS;
+        let standing =
+            self.guidance.stands_outside_descent() && t.velocity.length() < MAX_HOVER_MPS;
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
         let inside = |(low, high): (Point, Point)| {
             (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a])
@@ -207,7 +208,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             way_back_blocked_for: self.way_back_blocked_for(),
             join_barred: follow && self.guidance.is_join_barred(scene),
             // Over an area the search checks the way from where the vehicle is.
-            can_land_aside: can_leave && (joins || area) && self.detours.can_land_aside(&view),
+            may_seek_landing_aside: can_leave
+                && (joins || area)
+                && self.detours.may_seek_landing_aside(&view),
             seeks_landing: self.detours.seeks_landing(),
             lands_aside: self.detours.seeks_landing() || self.detours.lands_at_end(),
             landing_place_reached: follow && self.detours.lands_at_end() && at_end && standing,

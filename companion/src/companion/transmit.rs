@@ -64,7 +64,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         if link == Link::Swarm
             && self.links.take_due(link, OnDemandMessage::Roster)
-            && let Some(mut roster) = self.neighbours.roster()
+            && let Some(mut roster) = self.neighbours.next_roster_report()
         {
             (roster.system_id, roster.mission_crc) = (system, self.config.mission_crc);
             let mut payload = [0; roster::MAX_LEN];
@@ -272,7 +272,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | flag(intent::LANDED, self.mission.state() == Done && !flown_again)
             | flag(intent::ON_PLAN, on_plan && self.mission.plan().is_some())
             | flag(intent::OUT_OF_PLAN, out)
-            | flag(intent::WAITING, self.detours.is_waiting(&view))
+            | flag(intent::WAITING, self.detours.is_waiting_for_others(&view))
             | flag(intent::BLOCKED, self.detours.is_blocked())
             | flag(intent::ON_DETOUR, self.is_detouring())
     }

@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::{CheckedConfig, Config, ConfigError, RosterEntry, box_contains};
 use crate::autopilot::AutopilotKind;
-use crate::config::limits::Settings;
+use crate::config::limits::GuidanceLimits;
 
 impl<const V: usize> Config<V> {
     /// The settings as [`CheckedConfig`], with the vehicle's start, if [`Self::check`] accepts
@@ -64,8 +64,8 @@ impl<const V: usize> Config<V> {
             return Err(ConfigError::StartOutside(outside.system_id));
         }
         for kind in [AutopilotKind::Px4, AutopilotKind::ArduPilot] {
-            let settings = Settings::new(self, &kind.default_limits());
-            settings.check().map_err(|error| ConfigError::Setting(error.0))?;
+            let limits = GuidanceLimits::new(self, &kind.default_limits());
+            limits.check().map_err(|error| ConfigError::Setting(error.0))?;
         }
         Ok(())
     }

@@ -113,7 +113,7 @@ impl MotionLimits {
 
 /// Limits that guidance passes to the calls of planner-core.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Settings {
+pub(crate) struct GuidanceLimits {
     /// For the reference along the path.
     pub(crate) track: TrackConfig,
     /// For the reference along a straight leg: climb, join or descent.
@@ -124,7 +124,7 @@ pub(crate) struct Settings {
     pub(crate) fastest_mps: f32,
 }
 
-impl Settings {
+impl GuidanceLimits {
     /// The limits by the mission's settings and the autopilot's limits.
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let limits = MotionLimits::new(config, autopilot);

@@ -120,7 +120,7 @@ impl SafetyFilter {
 
     /// Time for which the filter has kept the vehicle from continuing although the vehicle goes
     /// first; zero if it has not done so within the last `free`.
-    pub(crate) fn blocked_for(&self, now: Instant, free: Duration) -> Duration {
+    pub(crate) fn blocked_with_priority_for(&self, now: Instant, free: Duration) -> Duration {
         let blocked = !self.hindered_yields && now - self.hindered_at < free;
         if blocked { now - self.hindered_since } else { Duration::default() }
     }

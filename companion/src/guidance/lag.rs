@@ -16,7 +16,7 @@ impl Guidance {
         if lead_m < ARRIVED_M || advance.norm_squared() > ARRIVED_M * ARRIVED_M {
             (self.followed_at, self.followed_place) = (now, place);
         }
-        let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
+        let share = ((self.lead_limit_m - lead_m) / (0.5 * self.lead_limit_m)).clamp(0.0, 1.0);
         share.min(self.estimate_speed_share)
     }
 

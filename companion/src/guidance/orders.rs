@@ -59,7 +59,7 @@ impl Guidance {
         (self.on_path, self.lands_off_path) = (true, false);
         self.evade_search.reset();
         self.acknowledged_path.from_m = f32::INFINITY;
-        self.progress_m = self.tracker.along_m;
+        self.last_progress_m = self.tracker.along_m;
         self.progress_at = now;
     }
 
@@ -109,7 +109,7 @@ impl Guidance {
     pub(crate) fn begin_path_at(&mut self, along_m: f32, now: Instant) {
         self.begin_path(now);
         (self.tracker.along_m, self.setpoint_m) = (along_m, along_m);
-        self.progress_m = along_m;
+        self.last_progress_m = along_m;
     }
 
     /// Sets the place along the path where the vehicle is to hold, metres; ∞ for none.
@@ -140,13 +140,13 @@ impl Guidance {
     }
 
     /// Whether the setpoint stands, outside a descent.
-    pub fn is_standing(&self) -> bool {
+    pub fn stands_outside_descent(&self) -> bool {
         self.is_setpoint_still() && self.phase != Phase::Descent
     }
 
     /// Whether the setpoint stands because its path leaves the geofence ahead.
     pub fn is_standing_at_fence(&self) -> bool {
-        self.stopped_at_fence && self.is_standing()
+        self.stopped_at_fence && self.stands_outside_descent()
     }
 
     /// Nearest place along the path at which the vehicle could stop now, metres.

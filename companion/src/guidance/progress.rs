@@ -41,7 +41,7 @@ impl Guidance {
 
     /// Place along the plan's path up to which this vehicle flies while unheard, through gates that
     /// are open or open after a short wait, metres; and the seconds by which those gates delay it
-    /// ([`Neighbours::unheard_reach`]).
+    /// ([`Neighbours::own_unheard_reach`]).
     pub(crate) fn unheard_reach<const V: usize, const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -51,7 +51,7 @@ impl Guidance {
     ) -> (f32, u8) {
         let Some(plan) = scene.plan else { return (f32::NEG_INFINITY, 0) };
         let gates = plan.gates.get(self.gates_open..).unwrap_or_default();
-        let (closed_m, delay_s) = neighbours.unheard_reach(gates, progress_m, now);
+        let (closed_m, delay_s) = neighbours.own_unheard_reach(gates, progress_m, now);
         (libm::fminf(closed_m, plan.path.length_m()), delay_s)
     }
 
@@ -180,7 +180,7 @@ impl Guidance {
                 // Both setpoint and vehicle have to be at the top: a low climb must not count as
                 // done while the vehicle is on its pad.
                 (self.smoother.position().z - top.position.z).abs() < CLIMBED_M
-                    && self.is_standing()
+                    && self.stands_outside_descent()
                     && apart.length() < 2.0 * ARRIVED_M
                     && apart.z.abs() < CLIMBED_M
             })
@@ -194,7 +194,8 @@ impl Guidance {
         now: Instant,
     ) -> bool {
         if self.is_algorithm2() {
-            let stands = self.is_standing() && scene.telemetry.velocity.length() < AT_REST_MPS;
+            let stands =
+                self.stands_outside_descent() && scene.telemetry.velocity.length() < AT_REST_MPS;
             return stands
                 && self.on_path
                 && self.waypoints.is_completed()
@@ -226,7 +227,7 @@ impl Guidance {
         self.has_reached_end(&plan.path)
             && !self.is_algorithm2()
             && !self.ends_away_from_goal
-            && self.is_standing()
+            && self.stands_outside_descent()
             && plan.path.point_at(plan.path.length_m()).is_some_and(|end| {
                 (end - scene.telemetry.position).length() < ARRIVED_M
                     && (end - self.smoother.position()).length() < ARRIVED_M

@@ -83,7 +83,7 @@ impl Guidance {
         let before_m = self.leg_tracker.along_m;
         let reference =
             track::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
-        self.lead_m = LEG_LEAD_M;
+        self.lead_limit_m = LEG_LEAD_M;
         if self.phase == Phase::Descent && self.leg_tracker.along_m > before_m {
             self.progress_at = now;
         }
@@ -158,7 +158,7 @@ impl Guidance {
         }
         let Reference { position, lead_m, .. } =
             track::advance(&self.track, path, &mut self.tracker, &advice, TICK_S)?;
-        self.lead_m = lead_m;
+        self.lead_limit_m = lead_m;
         Some(position)
     }
 
@@ -201,7 +201,7 @@ impl Guidance {
             self.stopped_at_fence = true;
         }
         let reference = track::advance(&self.track, leg, &mut self.leg_tracker, &advice, TICK_S)?;
-        self.lead_m = LEG_LEAD_M;
+        self.lead_limit_m = LEG_LEAD_M;
         self.tracker.speed_mps = self.leg_tracker.speed_mps;
         let length_m = path.length_m();
         self.tracker.along_m = if self.waypoints.is_completed() {

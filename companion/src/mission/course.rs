@@ -382,9 +382,9 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Notes in the record of photographed waypoints that the vehicle leaves its pad to fly its
     /// plan.
-    pub(crate) fn leave_pad(&mut self) {
+    pub(crate) fn note_pad_left(&mut self) {
         if let Some(VehiclePlan { task: Task::Photograph(photographs), .. }) = &self.plan {
-            self.photographed.leave_pad(photographs);
+            self.photographed.note_pad_left(photographs);
         }
     }
 

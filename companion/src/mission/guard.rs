@@ -373,8 +373,10 @@ impl Guard {
             }
             Self::LandingBlocked => i.column_blocked_for > Duration::default() && !i.must_land,
             Self::NoRoomToLand => i.is_landing_blocked_for(limit) && i.offboard && i.can_turn_back,
-            Self::NoRoomHere => i.is_landing_blocked_for(limit) && i.offboard && i.can_land_aside,
-            Self::PadTaken => i.is_pad_blocked_for(limit) && i.can_land_aside,
+            Self::NoRoomHere => {
+                i.is_landing_blocked_for(limit) && i.offboard && i.may_seek_landing_aside
+            }
+            Self::PadTaken => i.is_pad_blocked_for(limit) && i.may_seek_landing_aside,
             Self::NoPlaceAside => i.seeks_landing && (i.plan_failed || i.in_state >= limit),
             Self::LandingPlaceReached => i.landing_place_reached,
             Self::LandingClear => i.column_clear_for >= limit,

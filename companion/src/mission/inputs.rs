@@ -193,7 +193,7 @@ pub struct GuardInputs {
     /// Whether the vehicle is to join its path, but no way there is known to be free of walls.
     pub join_barred: bool,
     /// Whether a place aside to land at may be sought, from the path or over an area.
-    pub can_land_aside: bool,
+    pub may_seek_landing_aside: bool,
     /// Whether a place aside to land at is being sought.
     pub seeks_landing: bool,
     /// Whether a place aside to land at is being sought, flown to, or reached.

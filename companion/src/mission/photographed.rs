@@ -152,7 +152,7 @@ impl PhotographedWaypoints {
     /// Notes that the vehicle leaves its pad. If the waypoints to be left out were the whole area,
     /// the plan covers all of it again and a new round begins, unless a vehicle that left before
     /// has reported that round.
-    pub(crate) fn leave_pad(&mut self, photographs: &PicturePlan) {
+    pub(crate) fn note_pad_left(&mut self, photographs: &PicturePlan) {
         self.has_flown = true;
         let whole = photographs.area_waypoint_count() > 0
             && self.left_out_by_plan.count() >= photographs.area_waypoint_count();

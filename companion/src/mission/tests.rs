@@ -279,8 +279,10 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::LandingBlocked => i.column_blocked_for = long,
         G::LandingClear => i.column_clear_for = long,
         G::NoRoomToLand => (i.column_blocked_for, i.offboard, i.can_turn_back) = (long, true, true),
-        G::NoRoomHere => (i.column_blocked_for, i.offboard, i.can_land_aside) = (long, true, true),
-        G::PadTaken => (i.pad_blocked_for, i.can_land_aside) = (long, true),
+        G::NoRoomHere => {
+            (i.column_blocked_for, i.offboard, i.may_seek_landing_aside) = (long, true, true);
+        }
+        G::PadTaken => (i.pad_blocked_for, i.may_seek_landing_aside) = (long, true),
         G::NoPlaceAside => (i.plan_failed, i.seeks_landing) = (true, true),
         G::LandingPlaceReached => i.landing_place_reached = true,
         G::ColumnBlocked => (i.column_blocked_for, i.in_state) = (long, long),

@@ -253,7 +253,7 @@ impl Detours {
     }
 
     /// Whether this vehicle stands until another one moves, and does not claim the turn itself.
-    pub(crate) fn is_waiting<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn is_waiting_for_others<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
@@ -267,7 +267,7 @@ impl Detours {
         let now = view.now;
         let held = view.guidance.advice.waiting_for != 0 || view.guidance.filter.is_stopped();
         let rests = view.telemetry.velocity.length() < MAX_HOVER_MPS;
-        let stands = view.guidance.is_standing() && rests;
+        let stands = view.guidance.stands_outside_descent() && rests;
         match view.mission.state() {
             state if state.waits_on_pad() => {
                 self.blocked
@@ -391,7 +391,7 @@ impl Detours {
         let (now, filter) = (view.now, &view.guidance.filter);
         let for_good = view.config.lost_vehicle_down_s.is_some()
             && !view.neighbours.follows_plan(filter.last_blocker());
-        filter.blocked_for(now, free) > STUCK_AFTER
+        filter.blocked_with_priority_for(now, free) > STUCK_AFTER
             || (for_good && filter.hindered_for(now) > STUCK_AFTER)
     }
 

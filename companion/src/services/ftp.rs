@@ -20,7 +20,7 @@ mod reply;
 
 use heapless::Deque;
 
-use self::burst::{FtpBurst, next_request};
+use self::burst::{FtpBurst, request_of_next_packet};
 use self::duplicates::DuplicateDetection;
 #[cfg(test)]
 pub(crate) use self::packet::FTP_TEXTS;
@@ -171,7 +171,7 @@ impl Ftp {
         match (core::mem::replace(&mut self.operation, FtpOperation::Nothing), answer) {
             (FtpOperation::Read(request, true), ReadOutcome::Bytes(bytes)) => match self.burst {
                 Some(stream) if stream.first_request().is_same_request(&request) => {
-                    let due = next_request(&request, Some(&stream));
+                    let due = request_of_next_packet(&request, Some(&stream));
                     self.burst = stream.advanced_by(bytes.len());
                     self.set_reply(&due, ACK, u8::from(self.burst.is_none()), bytes);
                 }
@@ -181,7 +181,7 @@ impl Ftp {
                 self.ack(&request, &sum.to_le_bytes());
             }
             (FtpOperation::Read(request, true) | FtpOperation::Sum(request, true), _) => {
-                let due = next_request(&request, self.burst.take().as_ref());
+                let due = request_of_next_packet(&request, self.burst.take().as_ref());
                 self.nak(&due, NakError::Errno(EIO));
             }
             (other, _) => self.operation = other,
@@ -194,7 +194,7 @@ impl Ftp {
         match &mut self.operation {
             FtpOperation::Nothing | FtpOperation::Read(_, true) | FtpOperation::Sum(_, true) => {}
             FtpOperation::Read(request, asked) => {
-                let due = next_request(request, self.burst.as_ref());
+                let due = request_of_next_packet(request, self.burst.as_ref());
                 let file = self.session.map(|session| session.file);
                 let within =
                     |file: &File| store.file_size(*file).is_some_and(|size| due.offset < size);

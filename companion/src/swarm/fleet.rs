@@ -286,7 +286,7 @@ impl<const V: usize> Fleet<V> {
         }
         self.rejoin_if_ready(now, own.status);
         // One that has left may have been deaf meanwhile: whom it does not hear others may hear.
-        if self.has_lease(now) && self.is_alive(usize::from(self.own)) {
+        if self.has_lease(now) && self.vehicle_takes_part(usize::from(self.own)) {
             self.count_silent_as_lost(now);
         }
         if caught_up {
@@ -332,11 +332,14 @@ impl<const V: usize> Fleet<V> {
             ShareStatus::Finished => false,
         };
         let asked = self.members.iter().any(|m| m.has_part && asks(m));
-        self.is_alive(usize::from(self.own)) && !self.idle && !self.divisions.is_full() && asked
+        self.vehicle_takes_part(usize::from(self.own))
+            && !self.idle
+            && !self.divisions.is_full()
+            && asked
     }
 
-    /// Whether the vehicle of this rank takes part in the mission.
-    pub(crate) fn is_alive(&self, rank: usize) -> bool {
+    /// Whether the vehicle of this rank has a part, and was not lost, has not left or finished.
+    pub(crate) fn vehicle_takes_part(&self, rank: usize) -> bool {
         self.members[rank].takes_part()
     }
 
@@ -409,8 +412,8 @@ impl<const V: usize> Fleet<V> {
         };
         self.hash != 0
             && self.members.iter().filter(|m| m.has_part).all(is_down)
-            && (0..self.members.len()).filter(|rank| self.is_alive(*rank)).all(agrees)
-            && self.is_majority(|rank, _| self.is_alive(rank))
+            && (0..self.members.len()).filter(|rank| self.vehicle_takes_part(*rank)).all(agrees)
+            && self.is_majority(|rank, _| self.vehicle_takes_part(rank))
     }
 
     /// Makes the division under way binding: vehicles without a part in it leave the fleet.

@@ -42,7 +42,7 @@ proptest::proptest! {
             autopilot.set(parameter, near);
         }
         let l = MotionLimits::new(&config(), &autopilot);
-        proptest::prop_assert_eq!(Settings::new(&config(), &autopilot).check(), Ok(()));
+        proptest::prop_assert_eq!(GuidanceLimits::new(&config(), &autopilot).check(), Ok(()));
         for (value, least, most) in [
             (l.speed_mps, 0.1, 2.0),
             (l.climb_mps, 0.1, 1.0),
@@ -61,7 +61,7 @@ proptest::proptest! {
 #[test]
 fn a_slow_vehicle_expects_its_neighbours_to_be_as_fast_as_the_fastest() {
     let config = Config { cruise_mps: 0.5, slowest_mps: 0.5, fastest_mps: 6.0, ..config() };
-    let settings = Settings::new(&config, &AutopilotKind::Px4.default_limits());
-    assert_eq!(settings.track.cruise_mps, 0.5);
-    assert_eq!(filter_bounds(&settings.track, settings.fastest_mps).speed_max_mps, 6.0);
+    let limits = GuidanceLimits::new(&config, &AutopilotKind::Px4.default_limits());
+    assert_eq!(limits.track.cruise_mps, 0.5);
+    assert_eq!(filter_bounds(&limits.track, limits.fastest_mps).speed_max_mps, 6.0);
 }

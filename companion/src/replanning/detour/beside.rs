@@ -10,7 +10,7 @@
 //!
 //! ENU metres. Constant work except for [`is_barred`], which visits the zones of all others, and
 //! [`first_rejoin_m`], called once for each attempt: at most [`MAX_SAMPLES`] places on the path,
-//! each compared with [`MAX_ZONES`] zones.
+//! each compared with [`MAX_REJOIN_ZONES`] zones.
 
 use heapless::Vec;
 use planner_core::detour::{KeepOutZone, ZoneKind};
@@ -48,7 +48,7 @@ pub(super) const DETOUR_BESIDE_RETRY: Duration = Duration::from_secs(30);
 /// Maximum number of detours while one plan is flown.
 const MAX_DETOURS: u8 = 16;
 /// Maximum number of keep-out zones that are compared with the path.
-const MAX_ZONES: usize = 8;
+const MAX_REJOIN_ZONES: usize = 8;
 /// Maximum number of places on the path that are compared with the zones.
 const MAX_SAMPLES: usize = 100;
 /// Least spacing of the places on the path that are compared with the zones, metres.
@@ -143,8 +143,8 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     let waypoints = plan.path.waypoints();
     let home_m = waypoints.iter().nth_back(1)?.along_m;
     let most_m = view.guidance.gates_open_up_to_m(&view.scene).min(home_m);
-    let mut things = Vec::<KeepOutZone, MAX_ZONES>::new();
-    let add = |thing: KeepOutZone, things: &mut Vec<_, MAX_ZONES>| {
+    let mut things = Vec::<KeepOutZone, MAX_REJOIN_ZONES>::new();
+    let add = |thing: KeepOutZone, things: &mut Vec<_, MAX_REJOIN_ZONES>| {
         _ = (distance_to_zone_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
     };
     known.iter().for_each(|thing| add(*thing, &mut things));

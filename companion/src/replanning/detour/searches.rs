@@ -76,7 +76,7 @@ impl Detours {
     /// Whether this vehicle may search for a landing place beside its path: its task leaves the
     /// pad; it hears another vehicle, all others rest, or its landing has been held for
     /// [`HELD_LANDING_SIDESTEP_AFTER`]; and no search aside failed within [`SIDESTEP_RETRY_S`].
-    pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn may_seek_landing_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
@@ -225,7 +225,7 @@ impl Detours {
     /// Makes the path that has come for `purpose` the one flown. `progress_m` is the progress on
     /// the path before, which last grew at `progress_at`. If the path before was a detour and its
     /// progress last grew longer than [`STUCK_AFTER`] ago, it counts as a detour without progress.
-    pub(crate) fn begin_detour(
+    pub(crate) fn adopt_detour(
         &mut self,
         purpose: DetourPurpose,
         progress_m: f32,

@@ -67,7 +67,7 @@ fn a_turn_is_claimed_before_it_is_taken_and_only_by_one() {
     bench.run(4.0);
     assert_eq!(bench.state(), State::Blocked, "two would begin at once");
     assert!(
-        !bench.companion.detours.is_waiting(&bench.companion.detour_view()),
+        !bench.companion.detours.is_waiting_for_others(&bench.companion.detour_view()),
         "the lower system id goes on claiming"
     );
     bench.neighbour = other(BLOCKED | WAITING);
@@ -93,7 +93,7 @@ fn a_vehicle_that_hears_a_lower_system_id_claim_waits_again() {
     bench.run_until(State::Blocked, 3.0);
     bench.run(8.0);
     assert!(
-        bench.companion.detours.is_waiting(&bench.companion.detour_view())
+        bench.companion.detours.is_waiting_for_others(&bench.companion.detour_view())
             && bench.state() == State::Blocked
     );
     // The other vehicle flies its detour: not all stand any more.
@@ -102,7 +102,7 @@ fn a_vehicle_that_hears_a_lower_system_id_claim_waits_again() {
     bench.neighbour = other(BLOCKED | WAITING);
     bench.run(4.0);
     assert!(
-        bench.companion.detours.is_waiting(&bench.companion.detour_view())
+        bench.companion.detours.is_waiting_for_others(&bench.companion.detour_view())
             && bench.state() == State::Blocked,
         "it waits from the start again"
     );
@@ -112,7 +112,7 @@ fn a_vehicle_that_hears_a_lower_system_id_claim_waits_again() {
 #[test]
 fn a_vehicle_stopped_on_its_way_down_lets_others_fly_around() {
     let mut bench = beside_a_lower_id();
-    while bench.companion.guidance.is_standing() || bench.enu.z > 1.2 {
+    while bench.companion.guidance.stands_outside_descent() || bench.enu.z > 1.2 {
         bench.run(0.05);
     }
     assert_eq!(bench.state(), State::Follow);
@@ -122,7 +122,7 @@ fn a_vehicle_stopped_on_its_way_down_lets_others_fly_around() {
     bench.run_until(State::Blocked, 3.0);
     bench.run(8.0);
     assert!(
-        bench.companion.detours.is_waiting(&bench.companion.detour_view())
+        bench.companion.detours.is_waiting_for_others(&bench.companion.detour_view())
             && bench.state() == State::Blocked
     );
 }

@@ -47,7 +47,7 @@ impl FtpBurst {
 
 /// The request that the next packet answers: that of the burst's next packet if `request` started
 /// the burst, else `request` itself.
-pub fn next_request(request: &FtpRequest, stream: Option<&FtpBurst>) -> FtpRequest {
+pub fn request_of_next_packet(request: &FtpRequest, stream: Option<&FtpBurst>) -> FtpRequest {
     stream
         .filter(|stream| stream.request.is_same_request(request))
         .map_or(*request, FtpBurst::next_request)

@@ -49,7 +49,11 @@ impl<const V: usize> Fleet<V> {
     /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
     /// takes no part, and needs no lease.
     pub fn unheard_for(&self, now: Instant) -> Duration {
-        if self.is_alive(usize::from(self.own)) { self.lease_age(now) } else { Duration::default() }
+        if self.vehicle_takes_part(usize::from(self.own)) {
+            self.lease_age(now)
+        } else {
+            Duration::default()
+        }
     }
 
     /// Whether the others count this vehicle as lost, or have divided its part; false for one that
@@ -60,7 +64,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether this vehicle flies its part of the area, or will.
     pub(crate) fn takes_part(&self) -> bool {
-        self.is_alive(usize::from(self.own))
+        self.vehicle_takes_part(usize::from(self.own))
     }
 
     /// Whether this vehicle has left the mission and reported that.
@@ -71,7 +75,7 @@ impl<const V: usize> Fleet<V> {
     /// Whether another vehicle takes part, or left a part that is not divided yet.
     pub(crate) fn is_reserve_needed(&self) -> bool {
         let mut others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own));
-        self.is_dividing() || others.any(|rank| self.is_alive(rank))
+        self.is_dividing() || others.any(|rank| self.vehicle_takes_part(rank))
     }
 
     /// Whether another vehicle flies, or has flown and finished, left or was lost since it was
@@ -119,8 +123,8 @@ impl<const V: usize> Fleet<V> {
     /// makes the division binding once it is agreed. To be called only if this vehicle's path is
     /// that of the last binding division.
     pub(super) fn step_division(&mut self, now: Instant, own: &OwnReport) {
-        let is_alive = self.is_alive(usize::from(self.own));
-        let asks = own.wants_division && is_alive && !self.divisions.is_full();
+        let takes_part = self.vehicle_takes_part(usize::from(self.own));
+        let asks = own.wants_division && takes_part && !self.divisions.is_full();
         if !self.is_dividing() && !asks {
             return;
         }

@@ -122,15 +122,17 @@ impl<const V: usize> Fleet<V> {
     /// not, and both be a majority. Before that flight and after it, it is a new vehicle.
     fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, own: StartStatus) {
         let started = own == StartStatus::Started;
-        let (alive, flight) = (self.is_alive(usize::from(self.own)), self.is_another_in_flight());
-        if started && !alive && !flight && !self.airborne {
+        let (takes_part, flight) =
+            (self.vehicle_takes_part(usize::from(self.own)), self.is_another_in_flight());
+        if started && !takes_part && !flight && !self.airborne {
             // The flight in which this vehicle left is over, and another one begins.
             self.forget_plan();
         }
         let member = &mut self.members[rank];
         let RosterReportEntry { status, progress_dm, .. } = member.entry;
         let kept = RosterReportEntry { status, progress_dm, ..RosterReportEntry::default() };
-        let kept = if alive && (started || flight) { kept } else { RosterReportEntry::default() };
+        let kept =
+            if takes_part && (started || flight) { kept } else { RosterReportEntry::default() };
         member.entry = RosterReportEntry { incarnation, ..kept };
         member.hash = 0;
     }
@@ -159,7 +161,7 @@ impl<const V: usize> Fleet<V> {
     /// The roster report of this vehicle, with the entries from rank `first` on.
     pub fn roster_message(&self, first: usize) -> RosterReport {
         // A vehicle that has left computes no divisions: its hash would soon be outdated.
-        let hash = if self.is_alive(usize::from(self.own)) { self.hash } else { 0 };
+        let hash = if self.vehicle_takes_part(usize::from(self.own)) { self.hash } else { 0 };
         let entry =
             |m: &FleetVehicle| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
         RosterReport {

@@ -259,7 +259,7 @@ fn one_that_left_before_the_start_takes_part_again_by_its_plan() {
     (swarm.links[2], swarm.vehicles[2].status) = (u32::MAX, ShareStatus::Alive);
     swarm.run_s(READY_S);
     for vehicle in &swarm.vehicles {
-        assert!((0..3).all(|rank| vehicle.fleet.is_alive(rank)), "{:?}", vehicle.fleet);
+        assert!((0..3).all(|rank| vehicle.fleet.vehicle_takes_part(rank)), "{:?}", vehicle.fleet);
     }
     (0..3).for_each(|own| swarm.start(own));
     swarm.vehicles.iter_mut().for_each(|vehicle| vehicle.on_pad = false);
@@ -377,7 +377,7 @@ proptest! {
             let fleet = &swarm.vehicles[own].fleet;
             prop_assert!(!fleet.is_excluded() && !fleet.is_dividing(), "{own}: {fleet:?}");
             prop_assert_eq!(fleet.division_count(), 0);
-            prop_assert!((0..count).all(|rank| fleet.is_alive(rank)), "{own}: {fleet:?}");
+            prop_assert!((0..count).all(|rank| fleet.vehicle_takes_part(rank)), "{own}: {fleet:?}");
         }
     }
 

@@ -69,7 +69,7 @@ impl NeighbourEntry {
     /// Progress of the vehicle along the shared plan, metres: as it reports it; unheard for a
     /// second, the greater of that and what others relayed. `None` if it was last heard off the
     /// plan.
-    pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
+    pub(super) fn heard_progress_m(&self, now: Instant) -> Option<f32> {
         let own_m = self.state.progress_m;
         if self.heard_within(now, HEARD_DIRECTLY_WITHIN)
             || (own_m.is_none() && self.intent_at.is_some())
@@ -85,7 +85,7 @@ impl NeighbourEntry {
     /// Progress along the shared plan that the neighbour has surely made, metres: unheard at the
     /// edge of the radio's range it is assumed to fly on as far as its gates were open.
     pub(super) fn passed_m(&self, now: Instant) -> Option<f32> {
-        let known_m = self.progress_m(now)?;
+        let known_m = self.heard_progress_m(now)?;
         let Some(known_at) = self.intent_at.max(self.relayed_at) else { return Some(known_m) };
         let after_s = RECKONED_AFTER_S + f32::from(self.unheard_delay_s);
         let silent_s = (now - known_at).as_secs_f32() - after_s;
@@ -104,7 +104,7 @@ impl NeighbourEntry {
     /// gates may stop it before.
     pub(super) fn time_until_passed_s(&self, until_m: f32, now: Instant) -> Option<f32> {
         let known_m =
-            self.progress_m(now).filter(|_| !self.reports_any(ON_DETOUR | OUT_OF_PLAN))?;
+            self.heard_progress_m(now).filter(|_| !self.reports_any(ON_DETOUR | OUT_OF_PLAN))?;
         let known_at = self.intent_at.max(self.relayed_at)?;
         let fly_s = (until_m - known_m) / self.assumed_speed_mps;
         let after_s =
@@ -127,7 +127,7 @@ impl NeighbourEntry {
 
     /// Whether the neighbour is out of the plan, or lately reported that it stands until another
     /// vehicle moves, or lands after its detour.
-    pub(super) fn is_waiting(&self, now: Instant) -> bool {
+    pub(super) fn is_waiting_or_out_of_plan(&self, now: Instant) -> bool {
         self.is_out_of_plan(now)
             || (self.reports_any(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
             || self.is_landing_after_detour(now)
@@ -146,7 +146,7 @@ impl NeighbourEntry {
     /// Whether the neighbour claims the turn to fly a detour: blocked, hovering, not waiting.
     pub(super) fn claims_turn(&self, now: Instant) -> bool {
         self.reports_any(BLOCKED)
-            && !self.is_waiting(now)
+            && !self.is_waiting_or_out_of_plan(now)
             && self.heard_within(now, HEARD_WITHIN)
             && self.state.velocity.length() < MAX_HOVER_MPS
     }

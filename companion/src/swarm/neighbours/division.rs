@@ -90,7 +90,9 @@ impl<const V: usize> Neighbours<V> {
         let flies =
             |c: &&NeighbourEntry| heard(c) && !c.reports_any(GROUNDED | LANDED | OUT_OF_PLAN);
         let mut others = self.entries[..self.roster_count].iter().filter(flies);
-        self.fleet.as_ref().is_some_and(|fleet| others.any(|c| fleet.is_alive(usize::from(c.rank))))
+        self.fleet
+            .as_ref()
+            .is_some_and(|fleet| others.any(|c| fleet.vehicle_takes_part(usize::from(c.rank))))
     }
 
     /// Handles another vehicle's roster report; `own`: whether this vehicle was started.
@@ -102,7 +104,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// The next roster report: all vehicles, or in turn as many as one message holds.
-    pub(crate) fn roster(&mut self) -> Option<RosterReport> {
+    pub(crate) fn next_roster_report(&mut self) -> Option<RosterReport> {
         let fleet = self.fleet.as_ref()?;
         let next = usize::from(self.roster_next);
         let first = if next < fleet.vehicle_count() { next } else { 0 };

@@ -217,13 +217,13 @@ impl NeighbourEntry {
     /// Height of the lower end of the neighbour's column, ENU metres: the ground below it or, where
     /// that is unknown, [`MAX_COLUMN_M`] below `height_m`.
     #[inline]
-    fn floor_m(&self, height_m: f32) -> f32 {
+    fn column_bottom_m(&self, height_m: f32) -> f32 {
         if self.ground_m.is_nan() { height_m - MAX_COLUMN_M } else { self.ground_m }
     }
 
     /// Age of the neighbour's position; if it never had one, the time since the companion's start.
     #[inline(always)]
-    fn placed_for(&self, now: Instant) -> Duration {
+    fn position_age(&self, now: Instant) -> Duration {
         now - self.position_at.unwrap_or(Instant::ZERO)
     }
 
@@ -247,14 +247,14 @@ impl NeighbourEntry {
                 position: self.state.position,
                 velocity: self.state.velocity,
                 speed_mps: self.speed_mps,
-                age_s: self.placed_for(now).as_secs_f32(),
+                age_s: self.position_age(now).as_secs_f32(),
                 delay_s: self.message_delay.delay_s,
                 points: self.points_for_now(),
                 place_on_points: self.place_on_points,
                 points_reach: self.points_reach,
                 rests_within_m: 0.0,
                 grounded,
-                column_to_m: comes_down.then(|| self.floor_m(self.state.position.z)),
+                column_to_m: comes_down.then(|| self.column_bottom_m(self.state.position.z)),
             },
             before_climb: None,
         }
@@ -369,10 +369,10 @@ impl<const V: usize> Neighbours<V> {
         now: Instant,
         met: &mut FilterNeighbour<'a>,
     ) {
-        let placed_for = entry.placed_for(now);
+        let position_age = entry.position_age(now);
         // Most are heard.
-        if placed_for >= MAX_HEIGHT_AGE {
-            self.change_to_silent(entry, placed_for, now, met);
+        if position_age >= MAX_HEIGHT_AGE {
+            self.change_to_silent(entry, position_age, now, met);
         }
     }
 
@@ -380,7 +380,7 @@ impl<const V: usize> Neighbours<V> {
     fn change_to_silent<'a>(
         &'a self,
         entry: &'a NeighbourEntry,
-        placed_for: Duration,
+        position_age: Duration,
         now: Instant,
         met: &mut FilterNeighbour<'a>,
     ) {
@@ -395,7 +395,7 @@ impl<const V: usize> Neighbours<V> {
         let (by_intent, age_s) = (heard_s.is_some(), heard_s.unwrap_or(placed_s));
         // Silent for `down_after`, or grounded without a position of its own, the neighbour lies on
         // the ground below; before that it rests in the zone that detours stay clear of.
-        let down = placed_for >= self.down_after
+        let down = position_age >= self.down_after
             || (entry.reports_any(GROUNDED) && entry.lacks_position());
         let lies = down && (dead || entry.reports_any(GROUNDED)) && !entry.ground_m.is_nan();
         if let Some(first) = entry.points.first().filter(|_| by_intent) {
@@ -412,7 +412,7 @@ impl<const V: usize> Neighbours<V> {
             motion.position.z = top;
         }
         motion.grounded = (motion.grounded && top.is_none()) || lies;
-        let floor_m = entry.floor_m(motion.position.z);
+        let bottom_m = entry.column_bottom_m(motion.position.z);
         // A dead neighbour that flew along its points stopped on them, and rests in the zone that
         // detours stay clear of.
         motion.age_s = age_s;
@@ -437,8 +437,8 @@ impl<const V: usize> Neighbours<V> {
                 PointsReach::new(&motion.position, motion.points, &place, extent_m);
         }
         let column =
-            (dead || entry.has_column()) && (!motion.grounded || (lies && highest_m > floor_m));
-        motion.column_to_m = column.then_some(floor_m);
+            (dead || entry.has_column()) && (!motion.grounded || (lies && highest_m > bottom_m));
+        motion.column_to_m = column.then_some(bottom_m);
         met.out_of_range = entry.is_out_of_range(now);
         let stands = now - entry.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S;
         met.stands = motion.grounded || stands;

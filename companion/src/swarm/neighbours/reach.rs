@@ -21,10 +21,15 @@ impl<const V: usize> Neighbours<V> {
     /// Place along the path of the first of `gates` before which this vehicle, unheard, would wait
     /// too long, metres, ∞ if there is none; and the seconds by which the gates before that one
     /// delay this vehicle, compared with a flight at the assumed speed from `progress_m`.
-    pub(crate) fn unheard_reach(&self, gates: &[Gate], progress_m: f32, now: Instant) -> (f32, u8) {
+    pub(crate) fn own_unheard_reach(
+        &self,
+        gates: &[Gate],
+        progress_m: f32,
+        now: Instant,
+    ) -> (f32, u8) {
         let mut delay_s = 0.0;
         let closed = gates.iter().find(|gate| {
-            let Some(opens_s) = self.time_until_passed_s(gate, now) else { return true };
+            let Some(opens_s) = self.time_until_open_s(gate, now) else { return true };
             let ahead_m = gate.at_m - progress_m;
             let waits = opens_s - ahead_m / self.fastest_mps > UNHEARD_GATE_WAIT_S;
             if !waits {
@@ -38,7 +43,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Seconds until `gate` is surely open, even if no vehicle is heard until then; `None` where
     /// that is unknown.
-    fn time_until_passed_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
+    fn time_until_open_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
         if self.is_open_for_good(gate, now) {
             return Some(0.0);
         }

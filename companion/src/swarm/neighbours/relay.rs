@@ -139,12 +139,12 @@ impl NeighbourEntry {
             |at: Instant| self.heard_at.is_none_or(|heard| at > heard + HEARD_DIRECTLY_WITHIN);
         self.relayed_at.is_some_and(|at| now - at < RELAYED_LIFETIME && longer(at))
             && !self.heard_within(now, OUT_OF_RANGE_AFTER)
-            && self.progress_m(now).is_some()
+            && self.heard_progress_m(now).is_some()
     }
 
     /// The neighbour's report as it is to be relayed; `None` if the neighbour is off the plan.
     fn progress_to_relay(&self, now: Instant) -> Option<RelayedProgress> {
-        let progress_m = self.progress_m(now)?;
+        let progress_m = self.heard_progress_m(now)?;
         let age = (now - self.intent_at.max(self.relayed_at)?).as_micros().div_ceil(AGE_TICK_US);
         let age = age.min(u64::from(u8::MAX)) as u8;
         Some(RelayedProgress {

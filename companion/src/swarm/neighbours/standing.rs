@@ -49,12 +49,14 @@ impl<const V: usize> Neighbours<V> {
     /// Whether every other vehicle of the roster is out of the plan, recently reported that it
     /// waits or has landed, or descends at the end of a detour.
     pub fn are_all_waiting(&self, now: Instant) -> bool {
-        self.entries[..self.roster_count].iter().all(|c| c.is_waiting(now))
+        self.entries[..self.roster_count].iter().all(|c| c.is_waiting_or_out_of_plan(now))
     }
 
     /// Whether every other vehicle of the roster is out of the plan, waits, or claims the turn.
     pub fn are_all_standing(&self, now: Instant) -> bool {
-        self.entries[..self.roster_count].iter().all(|c| c.is_waiting(now) || c.claims_turn(now))
+        self.entries[..self.roster_count]
+            .iter()
+            .all(|c| c.is_waiting_or_out_of_plan(now) || c.claims_turn(now))
     }
 
     /// Whether a vehicle with a lower system id than `id` claims the turn to fly a detour.

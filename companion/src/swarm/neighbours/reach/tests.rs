@@ -82,7 +82,7 @@ impl Row {
     fn intent(&self, rank: usize) -> Intent {
         let progress_m = self.flown_m[rank];
         let (closed_m, delay_s) =
-            self.tables[rank].unheard_reach(self.closed(rank), progress_m, self.now);
+            self.tables[rank].own_unheard_reach(self.closed(rank), progress_m, self.now);
         Intent {
             system_id: rank as u8 + 1,
             flags: ON_PLAN,
