@@ -66,7 +66,7 @@ impl<'a> CoveragePlan<'a> {
     /// As [`Self::new`].
     pub fn plan_as_companions(scenario: &'a Scenario) -> anyhow::Result<Self> {
         let method = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
-        Self::plan_with_search(scenario, method, companion::planner::coverage::MAX_ORDER_CHANGES)
+        Self::plan_with_search(scenario, method, companion::planner::coverage::BOARD_SEARCH_STEPS)
     }
 
     fn plan_with_search(

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use companion::swarm::fleet::DivisionInput;
+use companion::swarm::fleet::VehicleDivisionInput;
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::Picture;
 use host_sim::mission::{HostPlan, PreparedMission};
@@ -62,7 +62,7 @@ fn is_beside_path(log: &[LogEvent], picture: &Picture) -> bool {
 }
 
 /// Inputs of successive divisions, from the first one on.
-type Chain<'a> = Vec<&'a [DivisionInput]>;
+type Chain<'a> = Vec<&'a [VehicleDivisionInput]>;
 
 /// Which vehicle owns which waypoint in a mission that was flown, by its division records.
 pub struct Owners {
@@ -98,7 +98,7 @@ impl Owners {
         match flight.done.is_empty() {
             true => owners.add(plan),
             false => {
-                let none = std::iter::empty::<&[DivisionInput]>();
+                let none = std::iter::empty::<&[VehicleDivisionInput]>();
                 owners.add(&*mission.plan_remaining(&flight.done, none)?);
             }
         }
@@ -144,9 +144,10 @@ impl Owners {
         Ok(owners)
     }
 
-    fn note_gone(&mut self, ids: &[u8], inputs: &[DivisionInput]) {
-        let left =
-            |input: &DivisionInput| !input.alive && input.along_dm != DivisionInput::WHOLE_PATH;
+    fn note_gone(&mut self, ids: &[u8], inputs: &[VehicleDivisionInput]) {
+        let left = |input: &VehicleDivisionInput| {
+            !input.alive && input.along_dm != VehicleDivisionInput::WHOLE_PATH
+        };
         self.gone.extend(ids.iter().zip(inputs).filter(|(_, own)| left(own)).map(|(id, _)| *id));
     }
 

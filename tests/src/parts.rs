@@ -1,6 +1,6 @@
 //! Divisions of numbered waypoints: a simple planner for the models of fleets, instead of lanes.
 
-use companion::swarm::fleet::{DivisionInput, Fleet};
+use companion::swarm::fleet::{Fleet, VehicleDivisionInput};
 
 /// Length of path per waypoint, decimetres.
 pub const WAYPOINT_DM: u16 = 100;
@@ -29,7 +29,7 @@ pub fn parts<const V: usize>(
         let mut done = Vec::new();
         for (rank, input) in inputs.iter().enumerate() {
             let taken = usize::from(input.along_dm / WAYPOINT_DM).min(parts[rank].len());
-            let sure = input.alive || input.along_dm == DivisionInput::WHOLE_PATH;
+            let sure = input.alive || input.along_dm == VehicleDivisionInput::WHOLE_PATH;
             done.extend(&parts[rank][..if sure { taken } else { taken.saturating_sub(1) }]);
             living[rank] = input.alive;
             hash = hash

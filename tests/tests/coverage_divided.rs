@@ -3,7 +3,7 @@
 //!
 //! With `FLOCKMATE_DIVIDED=N` each test divides N areas.
 
-use companion::swarm::fleet::DivisionInput;
+use companion::swarm::fleet::VehicleDivisionInput;
 use flockmate_tests::areas::Shape;
 use flockmate_tests::{areas, number};
 use host_sim::capacity::WAYPOINTS;
@@ -52,7 +52,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
         }
         let mut whole: Vec<Point> =
             plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)).collect();
-        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<DivisionInput>>::new());
+        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<VehicleDivisionInput>>::new());
         let mut lives = vec![true; vehicles];
         let mut divided = 0;
         for _ in 0..3 {
@@ -66,9 +66,10 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
                 let dm = (flight.path.length_m() * 10.0) as u32;
                 let on_pad = flight.climb_m > 0.0 && random.next_u32().is_multiple_of(5);
                 let flown = if on_pad || dm == 0 { 0 } else { 1 + random.next_u32() % dm };
-                DivisionInput { alive: lives[i], along_dm: flown.min(65_535) as u16 }
+                VehicleDivisionInput { alive: lives[i], along_dm: flown.min(65_535) as u16 }
             };
-            let inputs: Vec<DivisionInput> = (0..vehicles).map(|i| input(i, &mut random)).collect();
+            let inputs: Vec<VehicleDivisionInput> =
+                (0..vehicles).map(|i| input(i, &mut random)).collect();
             let before = plan;
             losses.push(inputs.clone());
             // There is no plan if vehicles hold so near to each other that no order of departures
@@ -135,7 +136,7 @@ fn stretches_leave_nothing_out_and_give_nothing_twice() {
         let planned = CoveragePlan::plan_as_companions(&mission.scenario).expect("it was planned");
         let whole = (0..planned.tracks.waypoint_count())
             .filter_map(|number| planned.tracks.waypoint(number));
-        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<DivisionInput>>::new());
+        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<VehicleDivisionInput>>::new());
         while let Some(inputs) = next_division_inputs(&plan) {
             for (flight, input) in plan.flights.iter().zip(&inputs) {
                 kept.extend(pictures(flight, input.along_m()));

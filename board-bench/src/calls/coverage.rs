@@ -20,7 +20,7 @@ use super::Meter;
 use super::coverage_workspace::CoverageWorkspace;
 
 /// Most changes of the lanes' order that the planner tries.
-pub const MAX_ORDER_CHANGES: u32 = companion::planner::coverage::MAX_ORDER_CHANGES;
+pub const BOARD_SEARCH_STEPS: u32 = companion::planner::coverage::BOARD_SEARCH_STEPS;
 /// Vehicles in the plans for which the bench sets a limit of instructions.
 const LIMITED_VEHICLES: usize = 3;
 /// Settings of the POWELL search, as on the host.
@@ -99,7 +99,7 @@ fn vehicles(count: usize) -> Vec<Vehicle, VEHICLES> {
 fn pattern(angle_deg: Option<f32>, lane_m: f32) -> LanePattern {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
     let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
-    LanePattern { spacing, angle_deg, margin_m: 0.0, search_steps: MAX_ORDER_CHANGES }
+    LanePattern { spacing, angle_deg, margin_m: 0.0, search_steps: BOARD_SEARCH_STEPS }
 }
 
 fn measure_cameras(meter: &mut impl Meter, sum: &mut Checksum) {

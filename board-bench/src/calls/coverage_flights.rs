@@ -167,12 +167,11 @@ fn measure_division(
     transit.set_area(case.area).expect("they fit");
     let CoverageWorkspace { tracks, build, powell, plan: routes, losses, schedule, .. } = lent;
     let pack = &mut powell.pack;
-    let looks = super::coverage::MAX_ORDER_CHANGES;
     let pattern = LanePattern {
         spacing: spacing(case.lane_m),
         angle_deg: case.angle_deg,
         margin_m: 0.0,
-        search_steps: looks,
+        search_steps: super::coverage::BOARD_SEARCH_STEPS,
     };
     tracks::build_lanes(&case.area, &pattern, &transit, build, tracks).expect("lanes");
     let (vehicles, pads) = vehicles(case.count);

@@ -8,7 +8,7 @@ use companion::storage::mission_file::coverage::{
 use companion::storage::mission_file::{
     self, MAX_BYTES, MissionBlock, MissionHeader, MissionKind, MissionVehicle, MissionView,
 };
-use companion::swarm::fleet::{DivisionInput, DivisionInputs};
+use companion::swarm::fleet::{DivisionInputs, VehicleDivisionInput};
 use firmware::capacity::{AREA_VERTICES, GATES, LANES, NO_FLY_CORNERS, VEHICLES, WAYPOINTS};
 use firmware::workspace::CoveragePlanWorkspace;
 use heapless::Vec;
@@ -136,7 +136,7 @@ fn write_mission(mission: &Mission<'_>, out: &mut [u8]) -> usize {
         parts: PartEligibility::Anyone,
         heading: HeadingRule::Sweep,
         trigger: Trigger::Distance,
-        search_steps: super::coverage::MAX_ORDER_CHANGES,
+        search_steps: super::coverage::BOARD_SEARCH_STEPS,
         heights: HEIGHTS,
         spacing: spacing(mission.lane_m),
         angle_deg: mission.angle_deg,
@@ -210,7 +210,7 @@ impl Board<'_> {
             let flight = &self.out.flights[k];
             let along_m =
                 if flight.task.leaves_pad() { flight.path.length_m() * share } else { 0.0 };
-            DivisionInput { alive: k >= lost, along_dm: (along_m * 10.0) as u16 }
+            VehicleDivisionInput { alive: k >= lost, along_dm: (along_m * 10.0) as u16 }
         };
         (0..self.mission.count).map(input).collect()
     }

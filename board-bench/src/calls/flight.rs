@@ -398,8 +398,8 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
 
     /// Passes a neighbour's roster message to the companion; it reports every vehicle as alive.
     fn send_roster_from(&mut self, system_id: u8) {
-        for first in (0..VEHICLES).step_by(roster::MAX_ENTRIES) {
-            let known = VEHICLES.min(first + roster::MAX_ENTRIES) - first;
+        for first in (0..VEHICLES).step_by(roster::MAX_ENTRIES_PER_MESSAGE) {
+            let known = VEHICLES.min(first + roster::MAX_ENTRIES_PER_MESSAGE) - first;
             let entries = core::iter::repeat_n(RosterReportEntry::default(), known).collect();
             let mission_crc = MISSION_CRC;
             let roster = RosterReport {

@@ -12,7 +12,7 @@ use crate::link::severity::Severity;
 use crate::margins::PILOT_KEEPS_AFTER;
 use crate::replanning::detour::path_kind::RejoinPlace;
 use crate::state::State;
-use crate::swarm::fleet::{COMMITMENT_S, DivisionInput, Fleet, LEASE, OwnReport};
+use crate::swarm::fleet::{COMMITMENT_S, Fleet, LEASE, OwnReport, VehicleDivisionInput};
 use crate::time::Duration;
 use crate::timers::Timer;
 
@@ -43,7 +43,7 @@ fn to_decimetres(along_m: f32) -> Option<u16> {
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// The input of the plan requested by [`PlanKind::Division`]: for each division so far, in
     /// order, the input of every vehicle by rank.
-    pub fn division_inputs(&self) -> impl Iterator<Item = &[DivisionInput]> + Clone {
+    pub fn division_inputs(&self) -> impl Iterator<Item = &[VehicleDivisionInput]> + Clone {
         self.neighbours.fleet().into_iter().flat_map(Fleet::inputs_of_divisions)
     }
 

@@ -222,7 +222,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             blocked: self.detours.is_blocked(),
             our_turn: self.detours.is_our_turn(&view),
             detour_ready: self.detours.is_detour_ready(),
-            no_way_around: self.detours.has_given_up(),
+            no_way_around: self.detours.has_given_up_detours(),
             time_below_landing: self.detours.time_below_landing(&view),
             standing,
         }

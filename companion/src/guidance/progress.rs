@@ -217,9 +217,9 @@ impl Guidance {
                 || self.guided_descent_m(scene, plan.descent_m) == 0.0)
     }
 
-    /// Whether the vehicle stands at the end of its path, and advice lets it descend from there to
-    /// the ground.
-    pub(super) fn is_free_to_land_at_end<const W: usize, const G: usize>(
+    /// Whether the vehicle stands at the end of its path, and advice lets it begin its descent from
+    /// there to the ground; the safety filter is not asked.
+    pub(super) fn may_begin_descent<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {

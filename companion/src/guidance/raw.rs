@@ -39,8 +39,7 @@ impl Guidance {
         if self.phase == Phase::Climb && state != State::Climb && self.is_leg_done() {
             (self.phase, self.leg) = (Phase::Join, None);
         }
-        if self.phase == Phase::Path && state == State::Follow && self.is_free_to_land_at_end(scene)
-        {
+        if self.phase == Phase::Path && state == State::Follow && self.may_begin_descent(scene) {
             (self.phase, self.leg) = (Phase::Descent, None);
             self.progress_at = now;
         }

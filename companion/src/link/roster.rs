@@ -25,7 +25,7 @@ pub const PAYLOAD_TYPE: u16 = 0xF10E;
 /// Version of the payload's layout.
 pub const VERSION: u8 = 2;
 /// Most vehicles in one message.
-pub const MAX_ENTRIES: usize = 22;
+pub const MAX_ENTRIES_PER_MESSAGE: usize = 22;
 const TUNNEL_HEADER_LEN: usize = 5;
 const HEADER_LEN: usize = 18;
 const ENTRY_LEN: usize = 5;
@@ -34,7 +34,7 @@ const DIVISIONS: u8 = 15;
 const HEARS_VEHICLE_IN_FLIGHT: u8 = 1 << 6;
 const IN_FLIGHT: u8 = 1 << 7;
 /// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
-pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_ENTRIES * ENTRY_LEN;
+pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_ENTRIES_PER_MESSAGE * ENTRY_LEN;
 
 /// Whether a vehicle takes part in the coverage mission. Of two reports about a vehicle, the status
 /// that is later in this list counts.
@@ -94,7 +94,7 @@ impl RosterReportEntry {
     }
 }
 
-/// The roster report, with at most [`MAX_ENTRIES`] vehicles.
+/// The roster report, with at most [`MAX_ENTRIES_PER_MESSAGE`] vehicles.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct RosterReport {
     /// MAVLink system id of the sender.
@@ -118,7 +118,7 @@ pub struct RosterReport {
     /// Hash of the division under way, as the sender computed it; 0 for none.
     pub hash: u32,
     /// States of consecutive vehicles of the roster, by rank.
-    pub entries: Vec<RosterReportEntry, MAX_ENTRIES>,
+    pub entries: Vec<RosterReportEntry, MAX_ENTRIES_PER_MESSAGE>,
 }
 
 impl RosterReport {
@@ -164,7 +164,7 @@ impl RosterReport {
             return None;
         }
         let count = usize::from(body[4]);
-        if count == 0 || count > MAX_ENTRIES || len != HEADER_LEN + ENTRY_LEN * count {
+        if count == 0 || count > MAX_ENTRIES_PER_MESSAGE || len != HEADER_LEN + ENTRY_LEN * count {
             return None;
         }
         let word =

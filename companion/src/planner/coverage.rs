@@ -23,11 +23,11 @@ use super::plan_failure;
 use crate::config::PlanFailure;
 use crate::storage::mission_file::coverage::{CoverageView, HeadingRule, PartEligibility};
 use crate::storage::mission_file::{MissionVehicle, MissionView};
-use crate::swarm::fleet::DivisionInput;
+use crate::swarm::fleet::VehicleDivisionInput;
 
-/// Most changes of the lanes' order that companions try when planning; on a board a few million
-/// instructions.
-pub const MAX_ORDER_CHANGES: u32 = 2000;
+/// Most changes of the lanes' order that companions try when planning (`search_steps`); on a board
+/// a few million instructions.
+pub const BOARD_SEARCH_STEPS: u32 = 2000;
 /// Most rings of an area that a companion plans.
 pub const MAX_RINGS: usize = 128;
 /// Clearance that every leg in a coverage mission is planned with, metres: there are no walls.
@@ -290,7 +290,7 @@ fn start_inputs_crc(request: &Request<'_, '_>) -> u32 {
 }
 
 /// CRC of the inputs of a division, and of all plans before it, whose inputs have the CRC `before`.
-fn division_inputs_crc(before: u32, inputs: &[DivisionInput]) -> u32 {
+fn division_inputs_crc(before: u32, inputs: &[VehicleDivisionInput]) -> u32 {
     let mut digest = CRC32.digest();
     digest.update(&before.to_le_bytes());
     for input in inputs {
@@ -318,7 +318,7 @@ pub fn plan_flights<
     const W: usize,
 >(
     request: &Request<'_, '_>,
-    losses: impl Iterator<Item = &'l [DivisionInput]> + Clone,
+    losses: impl Iterator<Item = &'l [VehicleDivisionInput]> + Clone,
     ws: &mut Workspace<X, L, K>,
     schedule: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,

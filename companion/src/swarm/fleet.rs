@@ -24,7 +24,7 @@ mod reports;
 mod tests;
 mod timeouts;
 
-pub use division_input::{DivisionInput, DivisionInputs};
+pub use division_input::{DivisionInputs, VehicleDivisionInput};
 pub use timeouts::{FleetTimeouts, LEASE, LEASE_HEARD_WITHIN, SILENT_AFTER};
 
 /// Time of flight up to a vehicle's commitment, seconds: it commits itself to fly to the last
@@ -358,7 +358,11 @@ impl<const V: usize> Fleet<V> {
         }
         // A vehicle that has no part since an earlier division gets none in this one.
         let input = |m: &FleetVehicle| {
-            if m.has_part { DivisionInput::from_entry(&m.entry) } else { DivisionInput::default() }
+            if m.has_part {
+                VehicleDivisionInput::from_entry(&m.entry)
+            } else {
+                VehicleDivisionInput::default()
+            }
         };
         if !self.members.iter().map(input).eq(self.division_inputs.iter().copied()) {
             self.withdraw_inputs();
@@ -381,7 +385,7 @@ impl<const V: usize> Fleet<V> {
 
     /// The inputs of every binding division, and of the one under way where its hash is still to be
     /// computed.
-    pub fn inputs_of_divisions(&self) -> impl Iterator<Item = &[DivisionInput]> + Clone {
+    pub fn inputs_of_divisions(&self) -> impl Iterator<Item = &[VehicleDivisionInput]> + Clone {
         let under_way = self.needs_division().then_some(&self.division_inputs);
         self.divisions.iter().chain(under_way).map(|inputs| &inputs[..])
     }

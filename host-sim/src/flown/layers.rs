@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use companion::swarm::fleet::DivisionInput;
+use companion::swarm::fleet::VehicleDivisionInput;
 use planner_core::Point;
 use planner_core::flight::{Flight, Task, WaypointRange};
 
@@ -34,7 +34,7 @@ pub fn flown_layers(
     ids.sort_unstable();
     let mut shown: Vec<ReportDivision> = Vec::new();
     let (mut before, mut gone, mut losses) =
-        (WaypointOwners::new(), Vec::new(), Vec::<&[DivisionInput]>::new());
+        (WaypointOwners::new(), Vec::new(), Vec::<&[VehicleDivisionInput]>::new());
     let whole = FlownDivision { t_s: 0.0, vehicle: 0, number: 0, inputs: Vec::new(), plan_crc: 0 };
     for division in std::iter::once(&whole).chain(&flight.divisions) {
         // Skipped: a division already shown, which another vehicle begins to fly later, or one

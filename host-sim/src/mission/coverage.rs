@@ -11,7 +11,7 @@ use companion::storage::mission_file::coverage::{
     CoverageHeader, CoverageParts, CoverageView, Ground, PartEligibility, VehicleShare,
 };
 use companion::storage::mission_file::{MissionBlock, MissionKind};
-use companion::swarm::fleet::DivisionInput;
+use companion::swarm::fleet::VehicleDivisionInput;
 use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::flights::MAX_PATH_LENGTH_M;
@@ -229,7 +229,7 @@ impl PreparedMission {
             parts,
             heading: area.heading,
             trigger: area.trigger,
-            search_steps: coverage::MAX_ORDER_CHANGES,
+            search_steps: coverage::BOARD_SEARCH_STEPS,
             heights: area.heights,
             spacing: area.usable,
             angle_deg: area.angle_deg,
@@ -251,7 +251,7 @@ impl PreparedMission {
     fn plan_area<'l>(
         &self,
         done: &[WaypointRange],
-        losses: impl Iterator<Item = &'l [DivisionInput]> + Clone,
+        losses: impl Iterator<Item = &'l [VehicleDivisionInput]> + Clone,
         ws: &mut HostWorkspace,
     ) -> anyhow::Result<Box<HostPlan>> {
         let mission = self.mission_view();
@@ -296,14 +296,14 @@ impl PreparedMission {
     }
 
     /// Plans what is left: without the waypoints `done`, and after the divisions `losses`, each of
-    /// which is one [`DivisionInput`] per vehicle.
+    /// which is one [`VehicleDivisionInput`] per vehicle.
     ///
     /// # Errors
     /// No plan was found; the error says why.
     pub fn plan_remaining<'l>(
         &self,
         done: &[WaypointRange],
-        losses: impl Iterator<Item = &'l [DivisionInput]> + Clone,
+        losses: impl Iterator<Item = &'l [VehicleDivisionInput]> + Clone,
     ) -> anyhow::Result<Box<HostPlan>> {
         self.plan_area(done, losses, &mut on_heap(HostWorkspace::new))
     }

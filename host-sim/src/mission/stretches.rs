@@ -2,7 +2,7 @@
 //! remaining area between them. Counts the divisions that a mission takes if no vehicle is lost.
 
 use anyhow::bail;
-use companion::swarm::fleet::{COMMITMENT_S, DivisionInput, MAX_DIVISIONS};
+use companion::swarm::fleet::{COMMITMENT_S, MAX_DIVISIONS, VehicleDivisionInput};
 use planner_core::flight::{Flight, Task};
 
 use super::ready::{HostPlan, PreparedMission};
@@ -22,18 +22,18 @@ fn division_due_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
 
 /// The input of a vehicle to a division if all vehicles hold `t_s` seconds after the start: whether
 /// it still takes part, and how far along its path it holds, decimetres (0 on its pad).
-fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> DivisionInput {
+fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> VehicleDivisionInput {
     let waypoints = flight.path.waypoints();
     let flown_s = t_s - flight.depart_s;
     let Some(next) = waypoints.iter().position(|waypoint| waypoint.arrive_s > flown_s) else {
-        return DivisionInput {
+        return VehicleDivisionInput {
             alive: !flight.task.leaves_pad(),
-            along_dm: if flight.task.leaves_pad() { DivisionInput::WHOLE_PATH } else { 0 },
+            along_dm: if flight.task.leaves_pad() { VehicleDivisionInput::WHOLE_PATH } else { 0 },
         };
     };
     let on_pad = flight.climb_m > 0.0 && (next == 0 || flown_s <= 0.0);
     if !flight.task.leaves_pad() || on_pad {
-        return DivisionInput { alive: true, along_dm: 0 };
+        return VehicleDivisionInput { alive: true, along_dm: 0 };
     }
     let along_m = match next.checked_sub(1).map(|before| (waypoints[before], waypoints[next])) {
         Some((a, b)) => {
@@ -41,12 +41,12 @@ fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> DivisionInput {
         }
         None => 0.0,
     };
-    DivisionInput { alive: true, along_dm: ((along_m * 10.0).ceil() as u16).max(1) }
+    VehicleDivisionInput { alive: true, along_dm: ((along_m * 10.0).ceil() as u16).max(1) }
 }
 
 /// Inputs, in the order of ids, of the division that the first vehicle to reach the end of its
 /// stretch requests; `None` if every route fits into its path.
-pub fn next_division_inputs(plan: &HostPlan) -> Option<Vec<DivisionInput>> {
+pub fn next_division_inputs(plan: &HostPlan) -> Option<Vec<VehicleDivisionInput>> {
     let hold_s =
         plan.flights.iter().filter_map(division_due_s).min_by(f32::total_cmp)? + COMMITMENT_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();
@@ -58,7 +58,7 @@ impl PreparedMission {
     /// Refuses a mission whose routes take more divisions without a loss than `MAX_DIVISIONS` less
     /// the reserve.
     pub(super) fn check_stretches(&self, plan: &HostPlan) -> anyhow::Result<()> {
-        let mut losses: Vec<Vec<DivisionInput>> = Vec::new();
+        let mut losses: Vec<Vec<VehicleDivisionInput>> = Vec::new();
         let mut next = next_division_inputs(plan);
         while let Some(inputs) = next {
             losses.push(inputs);

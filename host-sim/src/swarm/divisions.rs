@@ -8,7 +8,7 @@ use std::rc::Rc;
 use companion::link::frame::Framer;
 use companion::link::intent::Intent;
 use companion::link::roster::RosterReport;
-use companion::swarm::fleet::DivisionInput;
+use companion::swarm::fleet::VehicleDivisionInput;
 use companion::time::Instant;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
@@ -24,7 +24,7 @@ pub struct FlownDivision {
     pub number: u8,
     /// Inputs of this division, one a vehicle in the order of the vehicles' ids; empty if no
     /// vehicle reported them.
-    pub inputs: Vec<DivisionInput>,
+    pub inputs: Vec<VehicleDivisionInput>,
     /// CRC of the plan that the vehicle flies after this division.
     pub plan_crc: u32,
 }
@@ -45,7 +45,7 @@ struct Reported {
 pub struct DivisionLog {
     vehicles: HashMap<u8, Reported>,
     /// Inputs of each division, by the hash that the vehicles reported for it.
-    inputs_by_hash: HashMap<u32, Vec<DivisionInput>>,
+    inputs_by_hash: HashMap<u32, Vec<VehicleDivisionInput>>,
     reported: Vec<FlownDivision>,
 }
 
@@ -82,9 +82,9 @@ impl DivisionLog {
         let inputs = self.inputs_by_hash.entry(roster.hash).or_default();
         for (i, entry) in roster.entries.iter().enumerate() {
             let rank = i + usize::from(roster.first);
-            inputs.resize(inputs.len().max(rank + 1), DivisionInput::default());
+            inputs.resize(inputs.len().max(rank + 1), VehicleDivisionInput::default());
             if before.get(rank).is_none_or(|input| input.alive) {
-                inputs[rank] = DivisionInput::from_entry(entry);
+                inputs[rank] = VehicleDivisionInput::from_entry(entry);
             }
         }
     }

@@ -231,7 +231,9 @@ fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> 
         mission_crc: if how & 16 == 0 { 0xC0FFEE } else { bits as u32 },
         committed_hash: (bits >> 24) as u32 % 3,
         hash: (bits >> 32) as u32,
-        entries: (0..1 + (bits >> 56) as usize % roster::MAX_ENTRIES).map(&mut entry_of).collect(),
+        entries: (0..1 + (bits >> 56) as usize % roster::MAX_ENTRIES_PER_MESSAGE)
+            .map(&mut entry_of)
+            .collect(),
     };
     let mut whole = [0; roster::MAX_LEN];
     let length = roster.encode(&mut whole);

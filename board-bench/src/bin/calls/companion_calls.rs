@@ -204,7 +204,7 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
             meter.call("fleet::Fleet::set_hash_from_plan", bytes, || fleet.set_hash_from_plan(7));
         }
         meter.call("fleet::Fleet::division_hash", bytes, || fleet.division_hash());
-        for first in [0, roster::MAX_ENTRIES] {
+        for first in [0, roster::MAX_ENTRIES_PER_MESSAGE] {
             let mut reported =
                 meter.call("fleet::Fleet::roster_message", bytes, || fleet.roster_message(first));
             let mut payload = [0; roster::MAX_LEN];

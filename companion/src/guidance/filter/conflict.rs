@@ -127,7 +127,7 @@ impl Guidance {
             }
             if by_gates {
                 // Gates keep two vehicles on the plan apart, whatever the delay of their messages.
-                met.ignore_delay();
+                met.ignore_message_delay();
             }
             if met.lost && !(lands || deaf) && neighbours.may_fly_on_unheard(entry, now, &reach) {
                 // Where no neighbour is heard this vehicle's receiver may have failed: the others

@@ -13,7 +13,7 @@ proptest! {
     fn comes_back_as_sent_and_refuses_the_unsound(
         entries in proptest::collection::vec(
             (0u8..8, 0usize..4, any::<u16>(), any::<Option<u16>>(), any::<[bool; 2]>()),
-            1..=MAX_ENTRIES,
+            1..=MAX_ENTRIES_PER_MESSAGE,
         ),
         head in (0u8..16, any::<u8>(), any::<u8>(), any::<u32>(), any::<u32>(), any::<u32>()),
         [in_flight, hears_flight] in any::<[bool; 2]>(),

@@ -79,24 +79,25 @@ impl AreaDetourSearches {
     }
 }
 
-/// Number of sources for [`zones_of_source`]: two for each neighbour.
-fn source_count<const V: usize, const W: usize, const G: usize>(
+/// Number of values of `index` for [`neighbour_zones`]: two for each neighbour.
+fn neighbour_zones_count<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
 ) -> usize {
     2 * view.neighbours.len()
 }
 
-/// Passes the keep-out zones of source number `source` in a coverage mission to `visit`. The first
-/// half of the numbers stands for each neighbour's places, the second half for the column in which
-/// each may come down if it is in the air off the plan.
-fn zones_of_source<const V: usize, const W: usize, const G: usize>(
+/// Passes to `visit` the keep-out zones number `index` in a coverage mission. With n neighbours
+/// these are, below n, the zones of neighbour `index`'s places; from n on the column in which
+/// neighbour `index − n` may come down, if it is in the air off the plan. Reported obstacles are
+/// not among them.
+fn neighbour_zones<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
-    source: usize,
+    index: usize,
     visit: &mut dyn FnMut(KeepOutZone),
 ) {
     let apart_m = view.config.safety_distance_m + DETOUR_MARGIN_M;
-    match source.checked_sub(view.neighbours.len()) {
-        None => view.neighbours.zones_of(source, view.now, [apart_m; 2], visit),
+    match index.checked_sub(view.neighbours.len()) {
+        None => view.neighbours.zones_of(index, view.now, [apart_m; 2], visit),
         Some(i) => {
             let beside_m = apart_m + view.neighbours.pair_position_error_m();
             view.neighbours.landing_column(i, view.now, beside_m, |column| {
@@ -111,7 +112,7 @@ pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     visit: &mut dyn FnMut(KeepOutZone),
 ) {
-    (0..source_count(view)).for_each(|source| zones_of_source(view, source, visit));
+    (0..neighbour_zones_count(view)).for_each(|index| neighbour_zones(view, index, visit));
 }
 
 /// Distance of a place from the surface of a zone, metres; negative inside.
@@ -148,13 +149,13 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
         _ = (distance_to_zone_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
     };
     known.iter().for_each(|thing| add(*thing, &mut things));
-    for source in 0..source_count(view) {
+    for index in 0..neighbour_zones_count(view) {
         // Zones beyond the list's capacity are left out here: the shell's search for the detour
         // knows all of them.
         if things.is_full() {
             break;
         }
-        zones_of_source(view, source, &mut |thing| add(thing, &mut things));
+        neighbour_zones(view, index, &mut |thing| add(thing, &mut things));
     }
     let (mut at_m, mut met) = (from_m, false);
     for _ in 0..MAX_SAMPLES {

@@ -90,7 +90,7 @@ impl Detours {
 
     /// Whether this vehicle seeks no further detour: enough searches failed, or enough detours led
     /// nowhere.
-    pub(crate) fn has_given_up(&self) -> bool {
+    pub(crate) fn has_given_up_detours(&self) -> bool {
         self.no_retry
             || self.failures.saturating_add(self.detours_without_progress) >= MAX_DETOUR_SEARCHES
     }

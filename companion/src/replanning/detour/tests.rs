@@ -299,11 +299,11 @@ fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
             let before = after(1000 * pause_s - 1);
             assert!(!detours.may_search_again(pause_s, before), "searches without a pause");
             assert!(detours.may_search_again(pause_s, after(1000 * pause_s)));
-            assert!(!detours.has_given_up(), "that vehicle may yet leave more room");
+            assert!(!detours.has_given_up_detours(), "that vehicle may yet leave more room");
         }
         let (mut asked, outlook) =
             (0, if rng.next_u32() % 2 == 0 { RetryOutlook::Open } else { RetryOutlook::Closed });
-        while !detours.has_given_up() {
+        while !detours.has_given_up_detours() {
             detours.note_failure(along_m, outlook, now, &mut Timers::default());
             asked += 1;
         }

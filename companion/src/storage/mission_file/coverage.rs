@@ -24,9 +24,9 @@ const SHARE_LEN: usize = 12;
 const RING_LEN: usize = 4;
 /// Bytes of a vertex in the block.
 const VERTEX_LEN: usize = 8;
-/// Most changes of the lanes' order that a mission file may request to be tried: a board must try
-/// all of them.
-pub const MAX_ORDER_CHANGES_OF_FILE: u32 = 20_000_000;
+/// Greatest `search_steps` that a mission file may hold: a board may have to try that many changes
+/// of the lanes' order.
+pub const MAX_SEARCH_STEPS_OF_FILE: u32 = 20_000_000;
 
 /// Heading of the vehicles on the lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -317,8 +317,8 @@ impl CoverageHeader {
         if !heights.iter().all(|h| is_positive_up_to(*h, MAX_VERTEX_M)) {
             return refuse("heights");
         }
-        if self.search_steps > MAX_ORDER_CHANGES_OF_FILE {
-            return refuse("looks");
+        if self.search_steps > MAX_SEARCH_STEPS_OF_FILE {
+            return refuse("search_steps");
         }
         if self.angle_deg.is_some_and(|angle| !angle.is_finite()) {
             return refuse("angle_deg");

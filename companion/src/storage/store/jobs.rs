@@ -233,7 +233,7 @@ impl Store {
                 if bytes == flash_area::seal_mark(&self.layout, area, &seal).1 {
                     self.handle_sealed(area, seal);
                 } else {
-                    self.handle_area_failure(area);
+                    self.discard_area(area);
                 }
             }
             (FlashJob::Record(record), Ok(bytes)) => self.continue_record(record, bytes),
@@ -242,7 +242,7 @@ impl Store {
                 FlashJob::MarkUsed(area) | FlashJob::Seal(area, _) | FlashJob::SealCheck(area, _),
                 Err(_),
             ) => {
-                self.handle_area_failure(area);
+                self.discard_area(area);
             }
             (
                 FlashJob::Flush(slot)
@@ -250,7 +250,7 @@ impl Store {
                 | FlashJob::Check { slot, .. },
                 Err(_),
             ) => {
-                self.handle_area_failure(slot);
+                self.discard_area(slot);
             }
         }
         None
@@ -273,7 +273,7 @@ impl Store {
 
     /// Marks an area for erasure after a request to it failed. Ends its upload with an error, or
     /// counts a failed compaction.
-    pub(super) fn handle_area_failure(&mut self, area: FlashArea) {
+    pub(super) fn discard_area(&mut self, area: FlashArea) {
         *self.condition_mut(area) = AreaCondition::Dirty;
         match area {
             FlashArea::Slot(_) => self.end_upload(Err(UploadError::Flash)),

@@ -215,7 +215,7 @@ impl Store {
     /// and its data is written again.
     pub(super) fn fail_record(&mut self) {
         if let Some(compaction) = self.journal.compacting.clone() {
-            return self.handle_area_failure(FlashArea::Half(compaction.half));
+            return self.discard_area(FlashArea::Half(compaction.half));
         }
         self.journal.failures += 1;
         (self.unsaved, self.unsaved_photographed) = (true, !self.photographed.is_empty());

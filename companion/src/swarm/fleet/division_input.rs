@@ -4,18 +4,18 @@ use heapless::Vec;
 
 use crate::link::roster::{RosterReportEntry, ShareStatus};
 
-/// Input of a division for one vehicle: as [`planner_core::coverage::losses::VehicleStatus`], in
-/// decimetres.
+/// What a division takes into account of one vehicle: as
+/// [`planner_core::coverage::losses::VehicleStatus`], in decimetres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct DivisionInput {
+pub struct VehicleDivisionInput {
     /// Whether the vehicle flies on, and gets a part of what is divided.
     pub alive: bool,
     /// Place along its path, decimetres, up to which it takes, or took, its pictures;
-    /// [`DivisionInput::WHOLE_PATH`] where it took all of them.
+    /// [`VehicleDivisionInput::WHOLE_PATH`] where it took all of them.
     pub along_dm: u16,
 }
 
-impl DivisionInput {
+impl VehicleDivisionInput {
     /// Value of `along_dm` for a vehicle that took all pictures of its path.
     pub const WHOLE_PATH: u16 = u16::MAX;
 
@@ -29,7 +29,7 @@ impl DivisionInput {
         Self { alive: entry.status == ShareStatus::Alive, along_dm }
     }
 
-    /// `along_dm` in metres; infinite for [`DivisionInput::WHOLE_PATH`].
+    /// `along_dm` in metres; infinite for [`VehicleDivisionInput::WHOLE_PATH`].
     pub fn along_m(&self) -> f32 {
         if self.along_dm == Self::WHOLE_PATH {
             f32::INFINITY
@@ -40,4 +40,4 @@ impl DivisionInput {
 }
 
 /// The inputs of all vehicles, by their rank in the roster.
-pub type DivisionInputs<const V: usize> = Vec<DivisionInput, V>;
+pub type DivisionInputs<const V: usize> = Vec<VehicleDivisionInput, V>;

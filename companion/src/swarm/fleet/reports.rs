@@ -2,7 +2,7 @@
 //! knowledge.
 
 use super::{Fleet, FleetVehicle, INCARNATIONS, StartStatus};
-use crate::link::roster::{MAX_ENTRIES, RosterReport, RosterReportEntry, ShareStatus};
+use crate::link::roster::{MAX_ENTRIES_PER_MESSAGE, RosterReport, RosterReportEntry, ShareStatus};
 
 impl<const V: usize> Fleet<V> {
     /// Handles the roster report of the vehicle of rank `sender`; `own`: whether this vehicle was
@@ -172,7 +172,13 @@ impl<const V: usize> Fleet<V> {
             hears_flight: self.heard_flights() != 0,
             committed_hash: self.committed_hash,
             hash,
-            entries: self.members.iter().skip(first).take(MAX_ENTRIES).map(entry).collect(),
+            entries: self
+                .members
+                .iter()
+                .skip(first)
+                .take(MAX_ENTRIES_PER_MESSAGE)
+                .map(entry)
+                .collect(),
             ..RosterReport::default()
         }
     }

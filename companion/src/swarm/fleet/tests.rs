@@ -200,7 +200,7 @@ impl Swarm {
     }
 
     /// The inputs of the divisions that count for a vehicle.
-    fn inputs(&self, own: usize) -> Vec<Vec<DivisionInput>> {
+    fn inputs(&self, own: usize) -> Vec<Vec<VehicleDivisionInput>> {
         self.vehicles[own].fleet.divisions.iter().map(|inputs| inputs.to_vec()).collect()
     }
 

@@ -93,8 +93,12 @@ pub(super) const MAX_HEIGHT_AGE: Duration = Duration::from_secs(1);
 /// Height by which a landing column begins above the vehicle that lands, metres: another vehicle
 /// that is above it by less may be below it in a moment.
 pub(super) const COLUMN_TOP_ABOVE_M: f32 = 1.0;
-/// Position error of a neighbour whose own knowledge of its position is old, metres.
-pub(super) const VAGUE_POSITION_M: f32 = 0.5;
+/// Position error that is allowed for a neighbour that comes down, or that counts as dead, metres:
+/// added to the radius of its keep-out zones.
+pub(super) const STALE_POSITION_ERROR_M: f32 = 0.5;
+/// A neighbour out of the plan that has moved by less than this is still avoided by the present
+/// detour, metres.
+pub(super) const AVOIDED_WITHIN_M: f32 = 0.5;
 /// Distance beside its path at which a vehicle may come down unheard, beyond the deviation allowed
 /// beside a vehicle on the ground, metres. Its landing is guided as at its goal, so the distance is
 /// the one that the schedule keeps from landed vehicles in announced gusts of 3 m/s.

@@ -350,7 +350,7 @@ impl NeighbourEntry {
             |radius_m: f32| KeepOutZone { from: here, to: here, radius_m, kind: ZoneKind::Static };
         let column = |from: Point, nature: ZoneKind| {
             let to = from - Point::new(0.0, 0.0, self.column_depth_m(&from));
-            KeepOutZone { from, to, radius_m: apart_m + VAGUE_POSITION_M, kind: nature }
+            KeepOutZone { from, to, radius_m: apart_m + STALE_POSITION_ERROR_M, kind: nature }
         };
         if self.reports_any(GROUNDED) && self.reports_any(OUT_OF_PLAN) && self.lacks_position() {
             visit(column(here, ZoneKind::Grounded));
@@ -381,7 +381,7 @@ impl NeighbourEntry {
                 return self.for_each_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {
                     let next =
                         if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next };
-                    let (from, lies) = (high(next), place(apart_m + VAGUE_POSITION_M));
+                    let (from, lies) = (high(next), place(apart_m + STALE_POSITION_ERROR_M));
                     visit(KeepOutZone { from, to: high(at), ..lies });
                     if from.z > self.ground_m {
                         visit(KeepOutZone { from, to: low(next, self.ground_m), ..lies });
@@ -389,7 +389,7 @@ impl NeighbourEntry {
                 });
             }
             let nature = if down { ZoneKind::Grounded } else { ZoneKind::Static };
-            let beside_m = if field.is_some() { VAGUE_POSITION_M } else { UNHEARD_BESIDE_M };
+            let beside_m = if field.is_some() { STALE_POSITION_ERROR_M } else { UNHEARD_BESIDE_M };
             self.for_each_place(upto_m, &mut |at, wider_m| {
                 let far_m = apart_m + beside_m;
                 let radius_m = fpu::sqrtf(far_m * far_m + wider_m * wider_m);

@@ -5,7 +5,7 @@ use super::bounds::*;
 use super::entry::NeighbourEntry;
 use crate::config::Ground;
 use crate::link::intent::{GROUNDED, LANDED, OUT_OF_PLAN};
-use crate::link::roster::{MAX_ENTRIES, RosterReport};
+use crate::link::roster::{MAX_ENTRIES_PER_MESSAGE, RosterReport};
 use crate::swarm::fleet::{
     Fleet, FleetTimeouts, LEASE_HEARD_WITHIN, OwnReport, StartStatus, VehicleReception,
 };
@@ -108,7 +108,7 @@ impl<const V: usize> Neighbours<V> {
         let fleet = self.fleet.as_ref()?;
         let next = usize::from(self.roster_next);
         let first = if next < fleet.vehicle_count() { next } else { 0 };
-        self.roster_next = (first + MAX_ENTRIES) as u16;
+        self.roster_next = (first + MAX_ENTRIES_PER_MESSAGE) as u16;
         Some(fleet.roster_message(first))
     }
 }

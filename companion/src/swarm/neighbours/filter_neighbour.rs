@@ -45,8 +45,8 @@ impl<'a> FilterNeighbour<'a> {
         self.lost = true;
     }
 
-    /// The delay of the neighbour's messages no longer counts.
-    pub(crate) fn ignore_delay(&mut self) {
+    /// Ignores the delay of the neighbour's messages on the radio; their age still counts.
+    pub(crate) fn ignore_message_delay(&mut self) {
         self.motion.delay_s = 0.0;
     }
 

@@ -6,8 +6,8 @@ use planner_core::{Length, Point};
 use super::dead_reckoning::AreaGround;
 use super::entry::NeighbourEntry;
 use super::{
-    GROUNDED, LANDED, MAX_HEIGHT_AGE, MAX_HEIGHT_AGE_S, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE,
-    Neighbours, ON_PLAN, OUT_OF_PLAN, UNHEARD_LANDING_AFTER, VAGUE_POSITION_M,
+    AVOIDED_WITHIN_M, GROUNDED, LANDED, MAX_HEIGHT_AGE, MAX_HEIGHT_AGE_S, MAX_HEIGHT_DIFFERENCE_M,
+    NO_PLACE, Neighbours, ON_PLAN, OUT_OF_PLAN, UNHEARD_LANDING_AFTER,
 };
 use crate::time::Instant;
 
@@ -47,7 +47,7 @@ impl<const V: usize> Neighbours<V> {
         mut visit: impl FnMut(KeepOutZone),
     ) {
         let avoided =
-            |c: &NeighbourEntry| (c.avoided_at - c.state.position).length() < VAGUE_POSITION_M;
+            |c: &NeighbourEntry| (c.avoided_at - c.state.position).length() < AVOIDED_WITHIN_M;
         let unknown =
             |c: &&NeighbourEntry| c.position_at.is_some() && c.is_out_of_plan(now) && !avoided(c);
         if let Some(entry) = self.entries.get(i).filter(unknown) {

@@ -25,7 +25,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
-use companion::planner::coverage::MAX_ORDER_CHANGES as MAX_ORDER_CHANGES_ON_BOARD;
+use companion::planner::coverage::BOARD_SEARCH_STEPS;
 use flockmate_tests::{shared_data, workspace};
 use host_sim::coverage::{MAX_LANES, MAX_NO_FLY_CORNERS, MAX_ORDER_CHANGES};
 use host_sim::scenario;
@@ -230,7 +230,7 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
 
 /// The rows of one field: lengths and times of our routes and of its shortest one.
 fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec<Row>> {
-    let (first, angle) = ours(field, lane_m, MAX_ORDER_CHANGES_ON_BOARD)?;
+    let (first, angle) = ours(field, lane_m, BOARD_SEARCH_STEPS)?;
     let (searched, _) = ours(field, lane_m, MAX_ORDER_CHANGES)?;
     println!(
         "{name}: ours {:.1} m ({:.1} m of lanes), {} crossings",

@@ -20,7 +20,7 @@ use crate::planner::coverage::{self, Workspace};
 use crate::storage::mission_file::{
     self, MissionBlock, MissionHeader, MissionKind, MissionVehicle, MissionView,
 };
-use crate::swarm::fleet::DivisionInput;
+use crate::swarm::fleet::VehicleDivisionInput;
 
 /// Bytes before the coverage block in a file of two vehicles.
 const BEFORE: usize = mission_file::HEADER_LEN + 2 * mission_file::VEHICLE_LEN;
@@ -247,7 +247,7 @@ fn what_is_not_sound_is_refused_by_name() {
         (forged(5, &[2]), FileError::Header("parts").into()),
         (forged(6, &[2]), FileError::Header("heading").into()),
         (forged(7, &[3]), FileError::Header("trigger").into()),
-        (forged(8, &[0xFF; 4]), FileError::Header("looks").into()),
+        (forged(8, &[0xFF; 4]), FileError::Header("search_steps").into()),
         (forged(12, &nan), FileError::Header("heights").into()),
         (forged(28, &31.0f32.to_le_bytes()), FileError::Header("spacing").into()),
         (forged(36, &f32::INFINITY.to_le_bytes()), FileError::Header("angle_deg").into()),
@@ -324,10 +324,10 @@ fn a_kept_workspace_plans_what_an_empty_one_plans() {
     let mut draw = |below: u32| rand_core::Rng::next_u32(&mut random) % below;
     let mut kept = Box::<Memory>::default();
     let (mut which, mut done) = (0, List::new());
-    let mut losses: List<[DivisionInput; 2]> = List::new();
+    let mut losses: List<[VehicleDivisionInput; 2]> = List::new();
     let (mut plans, mut failures) = (0, 0);
     for _ in 0..400 {
-        let input = |draw: &mut dyn FnMut(u32) -> u32| DivisionInput {
+        let input = |draw: &mut dyn FnMut(u32) -> u32| VehicleDivisionInput {
             alive: draw(4) > 0,
             along_dm: draw(3000) as u16,
         };

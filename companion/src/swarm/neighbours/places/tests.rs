@@ -4,7 +4,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::super::tests::{ORIGIN, intent, joined, place, uniform};
-use super::super::{GROUNDED, OUT_OF_PLAN, UNHEARD_STRETCH_SPACING_M, VAGUE_POSITION_M};
+use super::super::{GROUNDED, OUT_OF_PLAN, STALE_POSITION_ERROR_M, UNHEARD_STRETCH_SPACING_M};
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
 
@@ -188,7 +188,7 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
         let comes_down = flags & (GROUNDED | OUT_OF_PLAN) == 0 && (45.0..75.0).contains(&silent_s);
         table.for_each_place(now, [apart_m, lying_m], |off| {
             // The place of a silent vehicle is not known any better than that.
-            let most_m = lying_m + VAGUE_POSITION_M;
+            let most_m = lying_m + STALE_POSITION_ERROR_M;
             let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };
             assert!(fits && off.radius_m >= lying_m, "{flags:#x}, {silent_s} s: {off:?}");
         });

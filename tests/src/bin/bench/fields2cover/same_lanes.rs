@@ -2,7 +2,7 @@
 //! due to the lanes themselves.
 
 use anyhow::Result;
-use companion::planner::coverage::MAX_ORDER_CHANGES;
+use companion::planner::coverage::BOARD_SEARCH_STEPS;
 use host_sim::coverage::{MAX_LANES, MAX_NO_FLY_CORNERS};
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
@@ -39,7 +39,7 @@ pub fn way_m(
     let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
     let given: Vec<[Flat; 2]> = lanes.iter().map(|ends| [0, 1].map(|k| narrow(&ends[k]))).collect();
     let mut found: Box<Tracks<MAX_LANES>> = Box::default();
-    order_given_lanes(&given, &spacing, MAX_ORDER_CHANGES, &transit, &mut found)
+    order_given_lanes(&given, &spacing, BOARD_SEARCH_STEPS, &transit, &mut found)
         .map_err(|error| anyhow::anyhow!("{error:?}"))?;
     let ordered: Vec<[Place; 2]> =
         found.lanes().iter().map(|lane| [lane.from, lane.to].map(wide)).collect();
