@@ -133,8 +133,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.telemetry.kind()
     }
 
-    /// System id of the neighbour that the safety filter stops for, else of the one that the advice
-    /// waits for at a gate or a predicted contact; 0 for none.
+    /// System id of the neighbour that the safety filter stops for; if there is none, of the one
+    /// that deconfliction (`Advice`) stops for, at a gate or before a predicted conflict; 0 for
+    /// none.
     pub fn waiting_for(&self) -> u8 {
         match self.guidance.filter.blocker() {
             0 => self.guidance.advice.waiting_for,
@@ -166,15 +167,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Arc length that this vehicle has covered along its own path, metres; in the climb the height
-    /// still to climb, negative.
+    /// still to climb, negative. On a detour the progress along it is added to the place where the
+    /// vehicle left its plan.
     pub fn progress_m(&self) -> f32 {
-        // On a detour the progress along the detour is added to the place where the vehicle left
-        // its plan.
         let left_at_m = if self.detours.is_on_detour() { self.detours.left_at_m() } else { 0.0 };
         self.guidance.progress_m(self.mission.state(), &self.guidance_inputs()) + left_at_m.max(0.0)
     }
 
-    /// Greatest speed, acceleration and jerk of the setpoints since the start.
+    /// Statistics of the setpoints since the companion's start: number, greatest values, holds.
     pub fn setpoint_stats(&self) -> SetpointStats {
         self.guidance.smoother.stats
     }

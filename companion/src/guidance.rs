@@ -80,6 +80,7 @@ pub const REJOIN_WINDOW_M: f32 = 5.0;
 pub const LOST_WINDOW_M: f32 = 2.5;
 /// Length of path searched ahead of a reference that stepped back for the point nearest to the
 /// setpoint, metres: at the 1.5 m/s of a step back the setpoint stands up to 2 m ahead of it.
+/// By Algorithm 2 also searched, to either side, for the point nearest to the raw point.
 const SETTLE_WINDOW_M: f32 = 3.0;
 /// A nearest point this close to an end of the searched path counts as not found, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
@@ -176,7 +177,9 @@ pub struct Guidance {
     /// The part of its path that the other vehicles have acknowledged.
     acknowledged_path: acknowledged_path::AcknowledgedPath,
     evade_search: EvadeSearch,
-    /// Whether the vehicle keeps out of the column below a vehicle that descends.
+    /// Whether the vehicle waits at an earlier place of its path than advised, or flies back to
+    /// one: out of the column below a vehicle that descends; in `SwarmLinkLost` also from above
+    /// vehicles that may lie below, or back to where others expect it.
     pub evading: bool,
     /// Distance ahead on the path at which the vehicle stops, by the deconfliction's advice or to
     /// evade, metres.
@@ -491,10 +494,5 @@ impl Guidance {
         let blocker = self.filter.blocker();
         self.filter = before;
         blocker
-    }
-
-    /// When the reference last advanced along the path by 0.25 m.
-    pub fn last_progress_at(&self) -> Instant {
-        self.progress_at
     }
 }

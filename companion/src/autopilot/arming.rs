@@ -52,7 +52,10 @@ pub(crate) struct ArmingHandshake {
 }
 
 impl ArmingHandshake {
-    /// Clears what belongs to the state `from`; entering `Arming` clears everything.
+    /// To be called at each change of the mission state. Clears the refusals reported in `from`.
+    /// Entering `Arming` clears everything but the height with which the vehicle was last disarmed.
+    /// Then, and after `PilotReturned`, the autopilot counts as in the companion's own mode.
+    /// Entering `CancelStart` notes whether the climb had begun.
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
         self.reported = [None; MAX_REPORTED_REFUSALS];
         if to == State::Arming {

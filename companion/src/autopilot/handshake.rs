@@ -114,7 +114,7 @@ impl Handshake {
         &self.limits
     }
 
-    /// Clears what belongs to the mission state `from`.
+    /// Passes a change of the mission state on to [`ArmingHandshake::reset_for_state`].
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
         self.arming.reset_for_state(from, to);
     }
@@ -251,8 +251,9 @@ impl Handshake {
         limits_reset
     }
 
-    /// Requests the change of mode, take-off or disarming that the mission state waits for. A mode
-    /// is requested a few times only while HEARTBEAT is silent: a pilot may fly the vehicle.
+    /// Requests the change of mode, take-off or disarming that the mission state waits for. In a
+    /// landing, also one that is held, no more than a few requests for the mode are sent while
+    /// HEARTBEAT is silent: a pilot may fly the vehicle.
     fn request_for_state(
         &mut self,
         telemetry: &Telemetry,

@@ -32,8 +32,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Remembers the position from before a jump, if the new state `to` is one that a jump leads
-    /// to.
+    /// To be called on entering state `to`. `PositionLost` because of a jump: keeps the reference's
+    /// place on the path as the place to report. A state that trusts the position again forgets it.
     pub(super) fn update_place_before_jump(&mut self, to: State) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);

@@ -251,8 +251,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         away.xy().length() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m
     }
 
-    /// Time for which this vehicle has been unheard; zero while it may fly on unheard. In a
-    /// coverage mission it counts from 1 s before the end of the lease.
+    /// Time for which this vehicle has heard no other one, or none has reported that it hears this
+    /// vehicle, whichever is longer; zero while it may fly on so. In a coverage mission: time since
+    /// the last renewal of its lease, counted from 1 s before the lease ends.
     fn unlinked_for(&self) -> Duration {
         let (now, state) = (self.now, self.mission.state());
         if let Some(fleet) = self.neighbours.fleet() {

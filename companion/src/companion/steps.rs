@@ -21,7 +21,8 @@ const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 const CHARGE_REPORT_AFTER: Duration = Duration::from_secs(5);
 /// Period of that report.
 const CHARGE_REPORT_EVERY: Duration = Duration::from_secs(30);
-/// Period of steps in the states that stream no setpoints: before take-off and after landing.
+/// Period of steps in the states that stream no setpoints: before and after a flight, in a take-off
+/// by command, and in a failsafe.
 const IDLE_STEP_EVERY: Duration = Duration::from_millis(200);
 /// Period at which a vehicle of a coverage mission sends its roster message to the swarm.
 const ROSTER_EVERY: Duration = Duration::from_millis(500);
@@ -164,7 +165,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Notes whether a vehicle that is due to depart is kept on its pad by another vehicle in the
-    /// column above the pad, or by a blocked path.
+    /// column above the pad, or by a blocked path. Also warns, at most each 30 s
+    /// (`CHARGE_REPORT_EVERY`), that the start waits for the battery's charge to be reported.
     fn note_barred_start(&mut self) {
         let due = self.mission.departure_due(self.now) && self.guidance.may_depart();
         let waits =

@@ -36,7 +36,8 @@ const MAX_TURNING_SETPOINT_MPS: f32 = 0.05;
 /// metres.
 const MAX_TURNING_SETPOINT_M: f32 = 0.03;
 /// A vehicle nearer than this to its advised stop counts as standing there, metres: a little more
-/// than the distance that advice looks ahead.
+/// than the distance that advice looks ahead. A gate no further than this before or behind the
+/// reference counts as the one that the vehicle waits at.
 const AT_ADVISED_STOP_M: f32 = 0.6;
 /// A vehicle that the filter kept from continuing within this time still counts as hindered.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
@@ -204,8 +205,8 @@ impl SafetyFilter {
         *self = Self { activations: self.activations, ..Self::default() };
     }
 
-    /// Whether the filter stops the vehicle in this step: passing a stranger slowly it stops only
-    /// while the sets conflict.
+    /// [`Urgency::Urgent`] while the filter stops the vehicle in this step; passing a stranger
+    /// slowly it stops only while the sets conflict.
     pub(super) fn urgency(&self, now: Instant) -> Urgency {
         match self.is_stopped() && (self.sets_intersect || !self.passes_stranger(now)) {
             true => Urgency::Urgent,

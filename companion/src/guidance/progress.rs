@@ -73,6 +73,11 @@ impl Guidance {
         gate_m.min(plan.path.length_m())
     }
 
+    /// When the reference last advanced along the path by 0.25 m.
+    pub fn last_progress_at(&self) -> Instant {
+        self.progress_at
+    }
+
     /// Arc length reported to neighbours, for their gates, metres: before and in the climb minus
     /// the height still to climb, in the descent beyond the path's length. On one path it never
     /// falls.

@@ -25,7 +25,8 @@ pub struct GuardInputs {
     /// blocked, even if it was clear meanwhile.
     pub blocked_for: Duration,
     /// Time for which this vehicle has heard no neighbour, or none has reported that it hears this
-    /// vehicle, in this state; zero once all have landed or left the plan.
+    /// vehicle, in this state; zero once all have landed or left the plan. In a coverage mission
+    /// it counts from 1 s before the lease ends.
     pub unlinked_for: Duration,
     /// Whether all lost vehicles must have been down for a minute: a division under way is then
     /// overdue.
@@ -92,8 +93,9 @@ pub struct GuardInputs {
     pub turn_back: bool,
     /// Whether the mission is a coverage mission.
     pub area: bool,
-    /// Whether, in a coverage mission, a path home over the field of heights can be requested from
-    /// here.
+    /// Whether this vehicle may request a path home from the shell: in a coverage mission, on its
+    /// path, while it has turned home fewer than `MAX_RETURNS` times. Perhaps there is no such
+    /// path.
     pub can_fly_home: bool,
     /// Whether this vehicle is on the last descent of its path, above its pad.
     pub descends: bool,
@@ -174,7 +176,8 @@ pub struct GuardInputs {
     /// Time for which another vehicle in the column above its pad, or an obstacle on its path, has
     /// kept this vehicle on its pad.
     pub start_barred_for: Duration,
-    /// Whether, in a coverage mission, another vehicle that takes part is in flight.
+    /// Whether, in a coverage mission, another vehicle that takes part is in flight, none is
+    /// missing, and no division is under way.
     pub others_fly: bool,
     /// Time for which the column below this vehicle, or before take-off above its pad, has been
     /// free of other vehicles.

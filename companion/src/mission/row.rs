@@ -23,7 +23,8 @@ pub enum Action {
     RequestOffboard,
     /// Request arming from the autopilot; a denied request is repeated after a second.
     RequestArming,
-    /// Request NAV_TAKEOFF from the autopilot, to the height of the climb, every four seconds.
+    /// Request NAV_TAKEOFF from the autopilot every four seconds, to the climb's height above where
+    /// the vehicle stands.
     RequestTakeOff,
     /// Let the setpoint climb from the current position to the start of the path.
     BeginClimb,

@@ -97,7 +97,8 @@ pub(crate) const STARTED_ON_PAD: &[State] = &[Scheduled, PadReplanning, Streamin
 /// States on the pad after MISSION_START, before take-off.
 pub(crate) const ON_PAD: &[State] =
     &[Scheduled, PadReplanning, Streaming, Engaging, Arming, CancelStart];
-/// States in the air, or about to take off, in which the companion flies the vehicle by setpoints.
+/// States in the air, or about to take off, in which the companion flies the vehicle: by setpoints,
+/// in `TakeOff` by a command.
 pub(crate) const FLYING: &[State] = &[
     TakeOff,
     Climb,

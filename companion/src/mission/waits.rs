@@ -22,9 +22,10 @@ pub(crate) struct Waits {
     pub(super) barred_start: BarredStart,
 }
 
-/// System id of the vehicle that this one waits for, 0 for none.
+/// When the wait for a vehicle that has not started is to be reported.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct WaitReport {
+    /// System id of the vehicle that this one waits for, 0 for none.
     id: u8,
 }
 

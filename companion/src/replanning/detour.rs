@@ -77,7 +77,8 @@ const BLOCKED_AGAIN_M: f32 = 2.0;
 const STOP_COUNTS_FOR: Duration = Duration::from_millis(500);
 /// Time without a stop by the safety filter after which a blocked vehicle counts as free.
 const STOP_COUNTS_FOR_WHILE_BLOCKED: Duration = Duration::from_secs(3);
-/// Time after which a vehicle on its pad that no other vehicle hears reports that it waits.
+/// Time after which a vehicle on its pad that hears no other one, or that no other one hears,
+/// reports that it waits.
 const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Sway, metres: a stopped vehicle this near to the end of a path aside counts as at the end.
 const ASIDE_END_TOLERANCE_M: f32 = 0.5;
@@ -234,7 +235,8 @@ impl Detours {
             && self.area_searches.may_seek(view.now, timers)
     }
 
-    /// Ends a detour in a coverage mission: the vehicle flies its own plan, which has come, next.
+    /// Ends a detour in a coverage mission: the shell has returned the vehicle's own plan again,
+    /// and the vehicle flies the rest of it next.
     pub(crate) fn end_area_detour(&mut self, timers: &mut Timers) {
         let (searches, next_at) = (self.area_searches, timers.due_at(Timer::RejoinSearch));
         self.forget_plan(timers);
@@ -426,8 +428,8 @@ impl Detours {
                     neighbours.for_each_unavoided_zone_of(source - new.len(), now, apart_m, visit);
                 }
             },
-            // In a coverage mission only the path just ahead counts: the vehicle goes on taking
-            // pictures until it is near the obstacle.
+            // In a coverage mission only the path up to `beyond_m` past where the vehicle can stop
+            // counts: it goes on taking pictures until it is near the obstacle.
             |obstacle| {
                 let until_m = match view.config.lost_vehicle_down_s {
                     Some(_) => view.guidance.stopping_point_m().max(0.0) + beyond_m,

@@ -144,7 +144,8 @@ impl Store {
         Ok(())
     }
 
-    /// Whether a parameter was set whose record has not been written yet.
+    /// Whether the record of the parameters is still to be written: a parameter was set, a roadmap
+    /// or field was removed, which the same record states, or the journal failed.
     pub fn has_unsaved_parameters(&self) -> bool {
         self.unsaved
     }

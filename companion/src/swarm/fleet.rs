@@ -322,9 +322,11 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Whether a division is under way: a vehicle was lost or left, or one has reported its
-    /// commitment. A commitment binds until a division does, even if the lost vehicle turns out to
-    /// have finished: others may already count on it.
+    /// Whether a division is under way: a vehicle was lost or left, or one (this one too) has
+    /// reported its commitment, the place where it will hold. False while this vehicle takes no
+    /// part or knows of no flight yet, and after the last possible division. A vehicle keeps its
+    /// commitment until a division is binding, even if the lost vehicle turns out to have
+    /// finished: others may already count on it.
     pub fn is_dividing(&self) -> bool {
         let asks = |m: &FleetVehicle| match m.entry.status {
             ShareStatus::Alive => m.entry.commitment_dm.is_some(),

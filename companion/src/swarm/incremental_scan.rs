@@ -1,7 +1,7 @@
 //! An incremental scan: whether one of many keep-out zones meets a condition. Each control step
 //! tests a few zones, so that it takes no longer with more neighbours.
 //!
-//! The zones ([`KeepOutZone`]) come from sources, such as neighbours, of which each gives up to 16.
+//! The zones ([`KeepOutZone`]) come from sources, such as neighbours, of which each gives a few.
 //! A step tests as many as its budget pays for; the next step continues from there. One zone that
 //! meets the condition ends the scan with yes, and the next scan begins with that zone's source: an
 //! obstacle on the path mostly stays there. The scan ends with no after all zones were tested.

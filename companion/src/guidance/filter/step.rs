@@ -145,7 +145,8 @@ impl Guidance {
             }
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
-                // Past a stranger the vehicle flies slowly until the path has been free for longer.
+                // The vehicle flies slowly past a stranger, which the roster does not name, until
+                // the path has been free for `MAX_STOP_FOR_STRANGER`.
                 let clear_for = if self.filter.passes_stranger(now) {
                     MAX_STOP_FOR_STRANGER
                 } else {

@@ -240,8 +240,8 @@ impl CameraControl {
             return;
         }
         if self.tries == MAX_TRIES {
-            // Where the last tries were those of a command dropped from the full queue, this one
-            // was not sent yet.
+            // A command that was not sent stays: the tries were those of an earlier command, which
+            // was dropped when the queue was full.
             if self.sent {
                 self.commands.pop_front();
             }

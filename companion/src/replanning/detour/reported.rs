@@ -29,8 +29,8 @@ impl Detours {
     }
 
     /// To be called on entering state `to`. `PositionLost` because of a jump: keeps the reference's
-    /// place on the path as the one to report. `Follow` or `WaitPosition`: the position is trusted
-    /// again.
+    /// place on the path as the place to report. `Follow` or `WaitPosition`, where the position is
+    /// trusted again: forgets that place. Other states change nothing.
     pub(crate) fn update_place_before_jump<const V: usize, const W: usize, const G: usize>(
         &mut self,
         to: State,

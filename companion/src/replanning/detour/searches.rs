@@ -222,9 +222,10 @@ impl Detours {
         })
     }
 
-    /// Makes the path that has come for `purpose` the one flown. `progress_m` is the progress on
-    /// the path before, which last grew at `progress_at`. If the path before was a detour and its
-    /// progress last grew longer than [`STUCK_AFTER`] ago, it counts as a detour without progress.
+    /// Puts the path that has come for `purpose` in place of the path flown so far; the mission
+    /// table begins it, see [`Self::is_detour_ready`]. `progress_m` is the progress on the path
+    /// before, which last grew at `progress_at`. If the path before was a detour and its progress
+    /// last grew longer than [`STUCK_AFTER`] ago, it counts as a detour without progress.
     pub(crate) fn adopt_detour(
         &mut self,
         purpose: DetourPurpose,

@@ -38,7 +38,8 @@ pub(super) const STANDS_BEFORE_GATE_M: f32 = 0.5;
 pub(super) const MIN_OPEN_PATH_M: f32 = 0.5;
 /// Longest time for which an unheard vehicle is assumed to fly on through open gates, seconds.
 pub(super) const MAX_UNHEARD_FLIGHT_S: f32 = 75.0;
-/// Time for which an unheard vehicle stands on its path before it lands.
+/// Silence of a vehicle at the edge of the radio's range, with no open gates ahead, up to which it
+/// counts as out of range: it stands on its path and does not land yet.
 pub(super) const UNHEARD_WAIT: Duration = Duration::from_secs(15);
 /// Silence after which a lost vehicle is on the ground, from the highest floors too: 50 m at 1.5
 /// m/s.
@@ -62,7 +63,8 @@ pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 /// Rounding of the length of a path of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
 /// Maximum number of spacings of the places on the unheard stretch in a coverage mission, where it
-/// is as long as the lease allows: with eight corners a neighbour makes 17 keep-out zones.
+/// is as long as the lease allows: with eight corners the stretch makes 17 keep-out zones, and the
+/// pad one more.
 pub(super) const MAX_STRETCH_SPACINGS: f32 = 8.0;
 /// Height of the column below a neighbour's place in which it may lie on the ground, metres; the
 /// planner shortens the column where it knows the ground.

@@ -10,7 +10,8 @@ use crate::config::Ground;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, ON_DETOUR, OUT_OF_PLAN, WAITING};
 use crate::time::{Duration, Instant};
 
-/// Where and when silent vehicles come down in a coverage mission.
+/// Where and when silent vehicles come down in a coverage mission, and by how much two in the air
+/// may be nearer than estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AreaGround {
     /// Heights of the ground, where it is not level.
@@ -117,7 +118,8 @@ impl NeighbourEntry {
         self.reports_any(OUT_OF_PLAN) || self.is_dead(now)
     }
 
-    /// Whether the neighbour is on the ground: reported, or dead and silent for `down_after`.
+    /// Whether the neighbour is on the ground: reported; or dead, silent for `down`, and not last
+    /// heard out of the plan.
     pub(super) fn is_on_ground(&self, now: Instant, down: Duration) -> bool {
         self.reports_any(GROUNDED)
             || (!self.reports_any(OUT_OF_PLAN)

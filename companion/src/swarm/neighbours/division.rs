@@ -15,7 +15,8 @@ use crate::time::{Duration, Instant};
 const PLAN_REPORT_LIFETIME: Duration = Duration::from_secs(3);
 
 impl<const V: usize> Neighbours<V> {
-    /// Whether this vehicle holds the lease in a coverage mission.
+    /// Whether, in a coverage mission, this vehicle holds its lease: a majority lately reported
+    /// that they hear it.
     #[inline(never)]
     pub(crate) fn holds_lease(&self, now: Instant) -> bool {
         self.fleet().is_some_and(|fleet| fleet.has_lease(now))

@@ -83,7 +83,7 @@ pub(crate) struct ReachQuery<'a> {
     pub(crate) on_plan: bool,
     /// Whether this vehicle hears no other one: then the others are assumed to fly on.
     pub(crate) hears_nobody: bool,
-    /// Whether this vehicle holds the lease in a coverage mission: heard by it or not, no other one
+    /// Whether this vehicle holds its lease in a coverage mission: heard by it or not, no other one
     /// then flies on for long.
     pub(crate) holds_lease: bool,
     /// Whether this vehicle lands, or descends in a coverage mission: then places where unheard
@@ -149,7 +149,7 @@ impl NeighbourEntry {
 
     /// Whether the neighbour may fly on although it counts as dead: this vehicle hears nobody, so
     /// that its own receiver may have failed. Not once the neighbour has been silent for `down`, in
-    /// which a vehicle without a lease lands, while this vehicle holds the lease. A neighbour out
+    /// which a vehicle without a lease lands, while this vehicle holds its lease. A neighbour out
     /// of the plan needs no lease: its pilot may keep it in the air.
     #[inline(always)]
     pub(crate) fn may_fly_on_unheard(
@@ -306,7 +306,9 @@ impl NeighbourEntry {
         self.is_reported_out_of_range(now) || (unheard && flies_on())
     }
 
-    /// Whether the neighbour counts as dead and rests on its points, with a position of this age.
+    /// Whether the filter counts the neighbour as lost, at rest on its points: its position has
+    /// this age, [`LOST_AFTER`] or more, it reported points, and it is dead ([`Self::is_dead`]) or
+    /// not reported out of range ([`Self::is_reported_out_of_range`]).
     #[inline(never)]
     pub(super) fn is_lost_on_points(&self, age: Duration, now: Instant) -> bool {
         age >= LOST_AFTER

@@ -12,7 +12,8 @@ impl<const V: usize> Neighbours<V> {
         heard.fold(0, |bits, c| bits | 1 << c.rank)
     }
 
-    /// Whether no vehicle of the roster was heard for 3 s: this vehicle's receiver may have failed.
+    /// Whether no other vehicle of the roster was heard for 3 s: this vehicle's receiver may have
+    /// failed. False where there is no other.
     #[inline(never)]
     pub(crate) fn hears_nobody(&self, now: Instant) -> bool {
         self.roster_count > 0
