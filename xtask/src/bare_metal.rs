@@ -163,6 +163,9 @@ pub fn build(board: Board) -> Result<Built> {
     // With this threshold opt-level 2 (below) inlines nearly as much as 3: a control step takes no
     // more instructions. With 275 it takes 0.5 % fewer and 1 % more flash.
     flags += &format!("-Ctarget-cpu={} -Cllvm-args=-inline-threshold=260", board.cpu());
+    // Else LLVM aligns every loop of a Cortex-M7 to 8 bytes, by `nop`s that are executed on the way
+    // in: 3.3 kB of flash. Without, a control step takes 0.1 % fewer instructions.
+    flags += " -Cllvm-args=-max-bytes-for-alignment=1";
     building
         .args(["build", "--release", "--locked", "--target", target])
         .args(["--features", board.name()])
