@@ -177,9 +177,9 @@ pub fn build(board: Board) -> Result<Built> {
     // Either variable would replace the flags set above.
     building.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
     building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info");
-    // A tenth less code than opt-level 3, and a control step takes no more instructions. The level's
-    // own threshold of inlining is kept: with 260 a step takes 0.3 % fewer and the flash 10.8 kB
-    // more.
+    // A tenth less code than opt-level 3, and a control step takes no more instructions. The
+    // level's own threshold of inlining is kept: with 260 a step takes 0.3 % fewer and the flash
+    // 10.8 kB more.
     building.args(["--config", "profile.release.opt-level=2"]);
     building.args(["--config", "profile.release.package.planner-core.opt-level=3"]);
     // With several units the functions that share a unit, and so what is inlined, depend on the

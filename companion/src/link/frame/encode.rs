@@ -9,9 +9,9 @@ pub(super) const V2_START: u8 = 0xFD;
 const COMPONENT_INFORMATION: u32 = 395;
 
 /// Lookup tables of a frame's CRC: one (512 B) on a board, where sixteen took 8.2 kB more flash and
-/// were no faster in a frame; sixteen (8 kB) on a desktop, with which sixteen bytes are processed at
-/// once: among many simulated vehicles the CRC is most of a crowded radio's work, and the `mavlink`
-/// crate computes it byte by byte.
+/// were no faster in a frame; sixteen (8 kB) on a desktop, with which sixteen bytes are processed
+/// at once: among many simulated vehicles the CRC is most of a crowded radio's work, and the
+/// `mavlink` crate computes it byte by byte.
 #[cfg(target_os = "none")]
 type CrcTable = Table<1>;
 #[cfg(not(target_os = "none"))]
