@@ -155,7 +155,7 @@ impl Planner<'_> {
             if own.too_many_zones {
                 return Err(PlanFailure::Capacity);
             }
-            detour::plan_vehicle_detour(
+            detour::plan_detour_for_vehicle(
                 roadmap,
                 request,
                 &mut own.obstacles,

@@ -138,7 +138,7 @@ impl<'a> CoveragePlan<'a> {
     /// Latitude and longitude of a point of the plan, taken at the origin's altitude; `place.z` is
     /// not used. ENU heights cannot be used far away: the plane that touches the earth at the
     /// origin is 780 m above the ground 100 km away.
-    pub fn geodetic(&self, place: &Point) -> Geodetic {
+    pub fn geodetic_at_origin_altitude(&self, place: &Point) -> Geodetic {
         let origin = &self.area_settings.origin;
         let mut up_m = 0.0;
         let mut found = enu_to_geodetic(origin, &Point::new(place.x, place.y, up_m));
@@ -167,20 +167,20 @@ impl<'a> CoveragePlan<'a> {
     }
 
     /// Cost of a route: all its sorties and the battery swaps between them, seconds.
-    pub fn cost_s(&self, route: &Route) -> f32 {
+    pub fn sorties_cost_s(&self, route: &Route) -> f32 {
         let swaps = self.sorties_of(route).count().saturating_sub(1) as f32;
         self.sorties_of(route).map(|sortie| sortie.route.cost_s).sum::<f32>()
             + swaps * BATTERY_SWAP_S
     }
 
     /// Cost of a route: the lengths of all its sorties, metres.
-    pub fn cost_m(&self, route: &Route) -> f32 {
+    pub fn sorties_cost_m(&self, route: &Route) -> f32 {
         self.sorties_of(route).map(|sortie| sortie.route.cost_m).sum()
     }
 
     /// The largest cost of a route, seconds.
-    pub fn max_cost_s(&self) -> f32 {
-        self.plan.routes.iter().map(|route| self.cost_s(route)).fold(0.0, f32::max)
+    pub fn max_sorties_cost_s(&self) -> f32 {
+        self.plan.routes.iter().map(|route| self.sorties_cost_s(route)).fold(0.0, f32::max)
     }
 
     /// Cuts each route into sorties that a battery lasts for; sorted by round.

@@ -27,7 +27,7 @@ use std::str::FromStr;
 use std::time::Duration;
 
 pub use self::transport::ByteLink;
-use crate::quote::quoted;
+use crate::quote::printable;
 
 /// Longest wait for a TCP connection when a link is first opened.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
@@ -59,7 +59,7 @@ pub enum LinkError {
     #[error("bad link URL: {0}: {1}")]
     Url(String, &'static str),
     /// The link could not be opened.
-    #[error("cannot open link: {}: {why}", quoted(&url.to_string()))]
+    #[error("cannot open link: {}: {why}", printable(&url.to_string()))]
     Open {
         /// URL of the link.
         url: LinkUrl,
@@ -72,7 +72,7 @@ impl FromStr for LinkUrl {
     type Err = LinkError;
 
     fn from_str(text: &str) -> Result<Self, LinkError> {
-        let bad = |why| LinkError::Url(quoted(text), why);
+        let bad = |why| LinkError::Url(printable(text), why);
         let (scheme, rest) = text
             .split_once(':')
             .ok_or_else(|| bad("expected tcp:, tcp-listen:, udp:, udp-listen: or serial:"))?;

@@ -29,7 +29,7 @@ use crate::capacity::{
 use crate::coverage::check_starts_on_ground;
 use crate::map::{self, VoxelMap};
 use crate::progress::Progress;
-use crate::result::{Left, Timing};
+use crate::result::{Timing, Unserved};
 use crate::roadmap::{self};
 use crate::scenario::Scenario;
 
@@ -77,7 +77,7 @@ impl PreparedMission {
         let begun = Instant::now();
         let stage = progress.begin_stage("map");
         let map = map::load(&scenario.map.file, scenario.map.resolution_m)?
-            .voxel_map(scenario.map.unknown);
+            .to_voxel_map(scenario.map.unknown);
         timing.map_s = begun.elapsed().as_secs_f64();
         drop(stage);
 
@@ -237,14 +237,14 @@ impl PreparedMission {
 
     /// Goals that no vehicle flies to, and vehicles that the plan leaves on their pads; both empty
     /// for a coverage mission.
-    pub fn unserved(&self, plan: &HostPlan) -> Left {
+    pub fn unserved(&self, plan: &HostPlan) -> Unserved {
         if self.scenario.area.is_some() {
             // In a coverage plan a vehicle that stays on its pad is no shortage: it would not
             // shorten the mission.
-            return Left::default();
+            return Unserved::default();
         }
         let flown = |goal: &u16| plan.flights.iter().any(|f| f.task == Task::Goto(*goal));
-        Left {
+        Unserved {
             goals: (0..self.goals.len() as u16).filter(|goal| !flown(goal)).collect(),
             vehicles: plan.flights.iter().filter(|f| !f.task.leaves_pad()).map(|f| f.id).collect(),
             reasons: Vec::new(),
@@ -298,7 +298,7 @@ impl PreparedMission {
         let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
         let mut own = Box::new(OwnPlan::default());
         let mut nodes = heapless::Vec::new();
-        detour::plan_vehicle_detour(
+        detour::plan_detour_for_vehicle(
             &self.roadmap_view(),
             request,
             obstacles,

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-/// Longest text that [`quoted`] returns, characters.
+/// Longest text that [`printable`] returns, characters.
 pub const MAX_QUOTE_CHARS: usize = 200;
 /// Longest line of an error message, characters: two quotations and the words around them.
 const MAX_ERROR_CHARS: usize = 600;
@@ -17,14 +17,14 @@ fn is_control_code(c: char) -> bool {
 
 /// The text with its control characters escaped; one longer than [`MAX_QUOTE_CHARS`] characters is
 /// cut to its beginning, `…` and its end.
-pub fn quoted(text: &str) -> String {
+pub fn printable(text: &str) -> String {
     // The text is cut before escaping too, so that any length costs bounded work.
     shortened(&escaped(&shortened(text, 2 * MAX_QUOTE_CHARS)), MAX_QUOTE_CHARS)
 }
 
-/// As [`quoted`], for a path; bytes that are not UTF-8 become `�`.
+/// As [`printable`], for a path; bytes that are not UTF-8 become `�`.
 pub fn printable_path(path: &Path) -> String {
-    quoted(&path.to_string_lossy())
+    printable(&path.to_string_lossy())
 }
 
 fn escaped(text: &str) -> String {
@@ -57,14 +57,14 @@ pub fn printable_message(text: &str) -> String {
     lines.join("\n")
 }
 
-/// An error message about the command line; each of the arguments that appears in it is quoted.
+/// An error message about the command line; each of the arguments that appears in it is printable.
 pub fn with_printable_arguments(text: &str, arguments: impl Iterator<Item = String>) -> String {
     let mut text = text.to_owned();
     for argument in arguments {
         let value = argument.split_once('=').map_or("", |(_, value)| value);
         for given in [argument.as_str(), value] {
-            if quoted(given) != given {
-                text = text.replace(given, &quoted(given));
+            if printable(given) != given {
+                text = text.replace(given, &printable(given));
             }
         }
     }

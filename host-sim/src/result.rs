@@ -29,7 +29,7 @@ pub struct MissionResult {
     /// Size of the roadmap that was planned on.
     pub roadmap: RoadmapSize,
     /// Goals without a vehicle, and vehicles without a goal.
-    pub left: Left,
+    pub left: Unserved,
     /// Results of the coverage; `None` in a mission with goals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<CoverageResult>,
@@ -138,7 +138,7 @@ pub struct SortieResult {
 /// Goals without a vehicle and vehicles without a goal: there are more of one kind than of the
 /// other, or the roadmap has no path between them.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Left {
+pub struct Unserved {
     /// Goals, by index.
     pub goals: Vec<u16>,
     /// Vehicles, by id: these stay on their pads.

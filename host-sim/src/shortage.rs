@@ -37,7 +37,7 @@ pub fn shortage_lines(mission: &PreparedMission, plan: &HostPlan) -> Vec<String>
     for &goal in left.goals.iter().take(MAX_GOAL_LINES) {
         lines.push(goal_line(&mut asked, usize::from(goal)));
     }
-    let remedy = if left.goals.is_empty() { Remedy::Unnamed } else { Remedy::Named };
+    let remedy = if left.goals.is_empty() { RemedyStatus::Unnamed } else { RemedyStatus::Named };
     for &id in left.vehicles.iter().take(MAX_GOAL_LINES.max(lines.len()) - lines.len()) {
         lines.push(vehicle_line(&mut asked, id, remedy));
     }
@@ -91,12 +91,12 @@ fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
 
 /// Whether a goal's line has named a remedy: then no vehicle's line names one.
 #[derive(Clone, Copy)]
-enum Remedy {
+enum RemedyStatus {
     Named,
     Unnamed,
 }
 
-fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, remedy: Remedy) -> String {
+fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, remedy: RemedyStatus) -> String {
     let (mission, reach) = (asked.mission, &asked.reach);
     let vehicle = mission.tasks.iter().position(|task| task.id == id).unwrap_or_default();
     let at = &mission.scenario.vehicles[vehicle].start;
@@ -106,8 +106,8 @@ fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, remedy: Remedy) -> Str
     let why = if !(0..goals).any(|goal| reach.are_connected(vehicle, goal)) {
         let goal = mission.tasks[vehicle].goal.map_or(0, usize::from);
         let helps = match remedy {
-            Remedy::Named => String::new(),
-            Remedy::Unnamed => format!("; {}", remedy_text(asked, vehicle, goal)),
+            RemedyStatus::Named => String::new(),
+            RemedyStatus::Unnamed => format!("; {}", remedy_text(asked, vehicle, goal)),
         };
         format!("no way in the roadmap leads from it to a goal{helps}")
     } else if goals < mission.tasks.len() {

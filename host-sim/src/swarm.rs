@@ -40,7 +40,7 @@ use crate::margins;
 use crate::mission::{HostPlan, OwnPlan, PreparedMission};
 use crate::progress::Progress;
 use crate::report::{self, Level};
-use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded};
+use crate::result::{MissionResult, Safety, Totals, Unserved, VehicleResult, rounded};
 use crate::scenario::CompanionHost;
 use crate::shortage;
 
@@ -363,7 +363,7 @@ impl<'a> SimulationRun<'a> {
                 deadlocks: referee.deadlocks,
             },
             roadmap: mission.roadmap_size(),
-            left: Left {
+            left: Unserved {
                 reasons: shortage::shortage_lines(mission, plan),
                 ..mission.unserved(plan)
             },

@@ -122,7 +122,7 @@ impl FtpClient {
         let mut buffer = [0; 2048];
         let length = self.link.receive(&mut buffer).context("link lost")?;
         if length == 0 {
-            self.link.rest();
+            self.link.wait_briefly();
         }
         let now =
             Instant::from_micros(self.link.now().duration_since(self.began).as_micros() as u64);
@@ -280,13 +280,14 @@ impl FtpClient {
             }
         }
         self.request_until_answered(TERMINATE, &[]).context("not stored")?;
-        if self.remote_crc(file).context("cannot compare")? != crc32(bytes) {
+        if self.remote_crc(file).context("cannot compare")? != ftp_crc32(bytes) {
             bail!("what arrived has another CRC-32");
         }
         Ok(())
     }
 
-    /// The CRC-32 of a file that the companion stores, computed there: [`crc32`] of the same bytes.
+    /// The CRC-32 of a file that the companion stores, computed there: [`ftp_crc32`] of the same
+    /// bytes.
     ///
     /// # Errors
     /// The companion has no such file, or does not answer.
@@ -299,7 +300,7 @@ impl FtpClient {
 
 /// The CRC-32 of MAVLink FTP: the polynomial of zip's CRC-32, but with initial value 0 and without
 /// the final inversion.
-pub fn crc32(bytes: &[u8]) -> u32 {
+pub fn ftp_crc32(bytes: &[u8]) -> u32 {
     const FTP: crc::Algorithm<u32> = crc::Algorithm {
         init: 0,
         xorout: 0,

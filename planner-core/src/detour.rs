@@ -128,10 +128,10 @@ impl KeepOutZone {
             let (least, most) = sorted(self.from[axis], self.to[axis]);
             high + self.radius_m < least || low - self.radius_m > most
         };
-        !(0..3).any(beside) && self.comes_near(a, b)
+        !(0..3).any(beside) && self.is_within_radius(a, b)
     }
 
-    fn comes_near(&self, a: &Point, b: &Point) -> bool {
+    fn is_within_radius(&self, a: &Point, b: &Point) -> bool {
         segments_distance_sq((a, b), (&self.from, &self.to)) < self.radius_m * self.radius_m
     }
 }
@@ -197,7 +197,7 @@ pub fn is_path_blocked<const W: usize>(
     let mut touches = |to: Point| {
         let was_beside = core::mem::replace(&mut beside, room.outcode(&to));
         let leg = (core::mem::replace(&mut from, to), to);
-        was_beside & beside == 0 && obstacle.comes_near(&leg.0, &leg.1)
+        was_beside & beside == 0 && obstacle.is_within_radius(&leg.0, &leg.1)
     };
     for waypoint in waypoints {
         if from_m >= until_m {
@@ -417,7 +417,7 @@ pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
 
 /// As [`plan_detour`], written as a vehicle's plan: without gates, since all other vehicles stand
 /// while the detour is flown.
-pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
+pub fn plan_detour_for_vehicle<const N: usize, const W: usize, const G: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
     obstacles: &mut [KeepOutZone],

@@ -168,10 +168,10 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
     }
     let handover_s =
         if request.vehicles.len() > MAX_VEHICLES_WITHOUT_HANDOVER { HANDOVER_S } else { 0.0 };
-    let mut planned = schedule_in_order(view, request, handover_s, ws, out);
+    let mut planned = schedule_with_handover(view, request, handover_s, ws, out);
     if handover_s > 0.0 && planned.is_err() {
         // A plan without handover, which makes vehicles late, is better than none.
-        planned = schedule_in_order(view, request, 0.0, ws, out);
+        planned = schedule_with_handover(view, request, 0.0, ws, out);
     }
     planned?;
     out.set_crc(&request.schedule);
@@ -192,7 +192,7 @@ const MAX_VEHICLES_WITHOUT_HANDOVER: usize = 12;
 /// Plans paths and their order, then checks that the gates of each vehicle fit. The schedule lets a
 /// vehicle be at a place `handover_s` after another one has left it.
 #[inline(never)]
-fn schedule_in_order<const N: usize, const V: usize, const W: usize, const P: usize>(
+fn schedule_with_handover<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     handover_s: f32,

@@ -119,7 +119,7 @@ impl AutopilotConfig {
     /// Constant error of the estimated height over the flight, metres. If the GPS receiver set the
     /// EKF origin, the origin's altitude has the same error.
     pub fn height_error_m(&self) -> f32 {
-        EstimateErrorState::new(self.estimator, self.autopilot, self.vehicle_seed()).height_m()
+        EstimateErrorState::new(self.estimator, self.autopilot, self.vehicle_seed()).height_bias_m()
     }
 }
 

@@ -78,7 +78,7 @@ pub struct EstimateErrorState {
     random: Gaussian,
     axes: [ErrorModel; 3],
     drift: Point,
-    height_m: f32,
+    height_bias_m: f32,
     /// Position error, ENU metres.
     pub position: Point,
     /// Velocity error, ENU m/s.
@@ -99,7 +99,7 @@ impl EstimateErrorState {
             random,
             axes: [across, across, up],
             drift: Point::zeros(),
-            height_m: height_m[0] + share * (height_m[1] - height_m[0]),
+            height_bias_m: height_m[0] + share * (height_m[1] - height_m[0]),
             position: Point::zeros(),
             velocity: Point::zeros(),
             rate: Point::zeros(),
@@ -112,8 +112,8 @@ impl EstimateErrorState {
     }
 
     /// Constant error of the height over the flight, metres.
-    pub fn height_m(&self) -> f32 {
-        self.height_m
+    pub fn height_bias_m(&self) -> f32 {
+        self.height_bias_m
     }
 
     /// Updates the errors by one period of [`UPDATE_PERIOD_S`].
@@ -133,7 +133,7 @@ impl EstimateErrorState {
         }
         let up_m = self.axes[2].max_error_m;
         self.drift.z = self.drift.z.clamp(-up_m, up_m);
-        self.position = self.drift + Point::new(0.0, 0.0, self.height_m);
+        self.position = self.drift + Point::new(0.0, 0.0, self.height_bias_m);
     }
 }
 

@@ -113,7 +113,7 @@ impl Autopilot {
     }
 
     /// Whether the simulated autopilot is in its Land mode.
-    pub fn is_landing(&self) -> bool {
+    pub fn is_in_land_mode(&self) -> bool {
         let land = match self.platform.config.autopilot {
             SimulatedKind::Px4 => Px4Mode::Land.custom_mode(),
             SimulatedKind::Ardupilot => ardupilot::CopterMode::Land.number(),

@@ -65,7 +65,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("schedule::earliest_departure, past 31", "the pieces of a flight × p"),
     ("schedule::gates, past 31", "the pieces of a flight × p"),
     ("detour::plan_detour, 128 things", "two A*, each half-edge × things; things × n"),
-    ("detour::plan_vehicle_detour, 128 things", "the same"),
+    ("detour::plan_detour_for_vehicle, 128 things", "the same"),
     ("detour::is_path_blocked", "w"),
     ("detour::KeepOutZone::contains", "constant"),
     ("deconflict::advise, priority", "g, v a gate in reach, 16 places a neighbour without plan"),
@@ -92,7 +92,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
         "around::plan_detour, 128 things",
         "320² looks at most, each at edges of zones, all things, half nodes of a field",
     ),
-    ("around::plan_vehicle_detour, 128 things", "the same"),
+    ("around::plan_detour_for_vehicle, 128 things", "the same"),
     (
         "tracks::build_lanes, 256 vertices",
         "lanes · vertices, and 2000 looks at the lanes' order, few of which take a way",
@@ -206,7 +206,7 @@ impl Meter for Uncounted {
 pub fn counted(program: &Path) -> Result<HashMap<String, CallCost>> {
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let mission = PreparedMission::prepare(scenario, &Progress::on_terminal())?;
-    let map = building::building_map(building::DEFAULT_SEED, 0.5)?.voxel_map(Unknown::Blocked);
+    let map = building::building_map(building::DEFAULT_SEED, 0.5)?.to_voxel_map(Unknown::Blocked);
     let lines =
         board::measure(program, &mission.roadmap_or_field_file, &board::map_image(&map.grid()));
     let calls = coverage::measure_coverage_calls(&mut Uncounted, &mut Box::default());

@@ -35,7 +35,7 @@ fn the_board_computes_what_the_host_computes() {
         .expect("the demo can be prepared");
     let map = building::building_map(building::DEFAULT_SEED, 0.5)
         .expect("the building")
-        .voxel_map(Unknown::Blocked);
+        .to_voxel_map(Unknown::Blocked);
     let lines =
         board::measure(&program, &mission.roadmap_or_field_file, &board::map_image(&map.grid()));
 

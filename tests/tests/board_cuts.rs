@@ -25,7 +25,7 @@ use flockmate_tests::board;
 use flockmate_tests::board_failure::reset;
 use host_sim::boards::{EmulatedBoard, PortBytes};
 use host_sim::link::ByteLink;
-use host_sim::upload::{FtpClient, crc32};
+use host_sim::upload::{FtpClient, ftp_crc32};
 use mavlink::dialects::ardupilotmega::{
     HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType,
 };
@@ -166,7 +166,7 @@ impl ByteLink for Line {
         self.put(&bytes[..passes]);
         if passes < bytes.len() {
             // The board receives what came before.
-            self.rest();
+            self.wait_briefly();
             return Err(Error::from(ErrorKind::ConnectionAborted));
         }
         Ok(())
@@ -180,7 +180,7 @@ impl ByteLink for Line {
         self.began + Duration::from_micros(self.now_us())
     }
 
-    fn rest(&mut self) {
+    fn wait_briefly(&mut self) {
         let mut until_us = self.now_us() + STEP_US;
         if let Cut::At(at_us) = *self.cut.lock().unwrap() {
             until_us = until_us.min(at_us);
@@ -316,13 +316,13 @@ fn cut_again_and_again(program: &Path, cuts: usize, seed: u64) -> Tally {
     let board = start(program, folder.path());
     let mut tally = Tally::default();
     let file = roadmap(20, seed as f32);
-    let mut old = crc32(&file);
+    let mut old = ftp_crc32(&file);
     let first = || uncut(&board, Autopilot::Disarmed).upload(File::Roadmap, &file, |_| ()).is_ok();
     assert!((0..TRIES).any(|_| first()), "no upload is possible");
     reset(&mut board.lock().unwrap());
     for cut in 0..cuts {
         let file = roadmap(10 + rng.next_u32() % NODES, cut as f32);
-        let new = crc32(&file);
+        let new = ftp_crc32(&file);
         let part = [Part::Erasing, Part::Taking, Part::Sealing][rng.next_u32() as usize % 3];
         let whole = cut_upload(&board, &file, part, &mut rng);
         let torn = stop(&board, part, if cut % 2 == 0 { LOOKS } else { 0 }, &mut rng);

@@ -304,7 +304,7 @@ impl ByteLink for Radio {
         self.now
     }
 
-    fn rest(&mut self) {
+    fn wait_briefly(&mut self) {
         // The vehicle's thread has ended once the vehicle has landed.
         let _ = self.sends.send(core::mem::take(&mut self.sent));
         if let Ok((now, heard)) = self.turns.recv() {

@@ -121,7 +121,7 @@ fn scanned_maps_fit_and_paths_stay_short() {
     {
         let Some(path) = shared_data(&format!("maps3d/{name}.bt")) else { return };
         let map =
-            map::load(path.to_str().unwrap(), resolution_m).unwrap().voxel_map(Unknown::Blocked);
+            map::load(path.to_str().unwrap(), resolution_m).unwrap().to_voxel_map(Unknown::Blocked);
         // The method of cutting down was chosen with the first seed.
         for seed in 1..=seeds {
             holds(name, &map, PrmConfig { seed, ..config(2300) }, &BOARDS[0]);
@@ -141,7 +141,7 @@ fn hall() -> VoxelMap {
             map.fill([x, y, 4], [x + 16, y + 110, 40 + 10 * shelf], Occupancy::Occupied);
         }
     }
-    map.voxel_map(Unknown::Blocked)
+    map.to_voxel_map(Unknown::Blocked)
 }
 
 /// Takes eight seconds in a release build.

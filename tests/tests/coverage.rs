@@ -308,7 +308,7 @@ fn what_cannot_be_flown_is_refused_by_name() {
         let planned = CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)
             .map_err(|error| error.to_string())?;
         let longest_s = planned.sorties.iter().map(|sortie| sortie.flown_s).fold(0.0, f32::max);
-        let costs_s = planned.max_cost_s();
+        let costs_s = planned.max_sorties_cost_s();
         drop(planned);
         PreparedMission::prepare(scenario, &Progress::hidden())
             .map_err(|error| format!("flown: {error}"))?;

@@ -194,7 +194,7 @@ fn tried(seed: u64, shape: Shape) -> Option<Tried> {
     let best = brute_force(&lengths, &work, 0, &all, &layers);
     let found = f64::from(plan.max_cost_s());
     assert!((found - best).abs() <= best * 1e-4, "seed {seed}: {found} instead of {best}\n{text}");
-    let backward = plan.routes.iter().any(|route| route.heading == RouteDirection::Backward);
+    let backward = plan.routes.iter().any(|route| route.direction == RouteDirection::Backward);
     Some(Tried {
         areas: 1,
         three: usize::from(vehicles.len() == 3),

@@ -101,7 +101,7 @@ fn judge_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32, seen: &mu
     );
     for (sortie, number) in sorties.iter().zip(1..) {
         assert_eq!((sortie.number, usize::from(sortie.of)), (number, sorties.len()));
-        assert_eq!((sortie.route.layer, sortie.route.heading), (route.layer, route.heading));
+        assert_eq!((sortie.route.layer, sortie.route.direction), (route.layer, route.direction));
         let own_s = flown_s(planned, &sortie.route);
         assert!(own_s <= most_s * ROUNDING, "{own_s} s of {most_s}");
         assert!((own_s - sortie.flown_s).abs() <= own_s * (ROUNDING - 1.0), "{own_s} {sortie:?}");

@@ -191,12 +191,12 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
 #[test]
 fn host_and_board_find_the_detours_that_the_map_gives() {
     let map = building::building_map(building::DEFAULT_SEED, 0.25).expect("the building");
-    detours("building", &map.voxel_map(Unknown::Blocked), 0.8);
+    detours("building", &map.to_voxel_map(Unknown::Blocked), 0.8);
     for (name, resolution_m, clearance_m) in
         [("geb079", 0.08, 0.2), ("manufacturing", 0.086_642_2, 0.3), ("maze", 0.195_32, 0.3)]
     {
         let Some(path) = shared_data(&format!("maps3d/{name}.bt")) else { continue };
         let map = map::load(path.to_str().expect("UTF-8"), resolution_m).expect("a map");
-        detours(name, &map.voxel_map(Unknown::Blocked), clearance_m);
+        detours(name, &map.to_voxel_map(Unknown::Blocked), clearance_m);
     }
 }

@@ -9,7 +9,7 @@ use planner_core::roadmap::prm::{self, NodeIndex, PrmConfig, Sampling};
 const SEEDS: u64 = 20;
 
 fn load(file: &str, resolution_m: f32) -> VoxelMap {
-    map::load(file, resolution_m).expect("the map is good").voxel_map(Unknown::Blocked)
+    map::load(file, resolution_m).expect("the map is good").to_voxel_map(Unknown::Blocked)
 }
 
 fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {

@@ -51,7 +51,7 @@ impl Checksum {
             let numbers =
                 [u32::from(route.vehicle), route.first, route.end, u32::from(route.layer)];
             numbers.into_iter().for_each(|number| self.add(number));
-            self.add(route.heading as u32);
+            self.add(route.direction as u32);
             self.add_floats(&[route.ground_m, route.cost_m, route.cost_s]);
         }
     }
@@ -273,8 +273,8 @@ fn measure_ways_home(
             around::plan_detour(transit, None, &request, &mut things, &mut own.path)
         });
         sum.add(u32::from(found.is_ok()) ^ own.path.length_m().to_bits());
-        let again = meter.call("around::plan_vehicle_detour, 128 things", 0, || {
-            around::plan_vehicle_detour(transit, None, &request, &mut things, &mut own)
+        let again = meter.call("around::plan_detour_for_vehicle, 128 things", 0, || {
+            around::plan_detour_for_vehicle(transit, None, &request, &mut things, &mut own)
         });
         sum.add(u32::from(again.is_ok()));
     }

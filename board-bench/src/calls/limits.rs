@@ -340,7 +340,7 @@ fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
             to.call("photographs::PicturePlan::area_waypoint_count", || plan.area_waypoint_count()),
             u32::MAX
         );
-        let all = to.call("photographs::PicturePlan::count", || plan.count(path));
+        let all = to.call("photographs::PicturePlan::planned_count", || plan.planned_count(path));
         let end_m =
             to.call("photographs::PicturePlan::last_picture_m", || plan.last_picture_m(path));
         assert!(end_m.is_none_or(|end_m| end_m <= path.length_m()));

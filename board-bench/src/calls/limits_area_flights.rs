@@ -212,7 +212,7 @@ fn call_hard_vehicles(
 }
 
 /// Plans with unusual routes. An unknown vehicle or a wrong waypoint range must be refused; an odd
-/// heading or layer may be planned or refused; no routes at all must be planned.
+/// direction or layer may be planned or refused; no routes at all must be planned.
 fn unusual_routes(
     plan: &mut PlanCall<'_>,
     good: &Work<'_, LANES, CORNERS>,
@@ -230,9 +230,9 @@ fn unusual_routes(
         routes.routes[0] = route;
         assert_eq!(plan(good, &routes, &FLIGHT_INPUTS), Err(PlanError::Terminals));
     }
-    for (heading, layer) in [(RouteDirection::Backward, 0), (RouteDirection::Forward, u8::MAX)] {
+    for (direction, layer) in [(RouteDirection::Backward, 0), (RouteDirection::Forward, u8::MAX)] {
         let mut routes = routes.clone();
-        routes.routes[0] = Route { heading, layer, ..first };
+        routes.routes[0] = Route { direction, layer, ..first };
         let _ = plan(good, &routes, &FLIGHT_INPUTS);
     }
     let aloft = PADS.map(|pad| Pad {
@@ -403,8 +403,8 @@ fn call_ways_home(
                     path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite()));
                 assert!(found.is_err() || finite);
                 to.add_count(usize::from(found.is_ok()));
-                let again = to.call("around::plan_vehicle_detour", || {
-                    around::plan_vehicle_detour(transit, field, &request, &mut [thing], own)
+                let again = to.call("around::plan_detour_for_vehicle", || {
+                    around::plan_detour_for_vehicle(transit, field, &request, &mut [thing], own)
                 });
                 assert_eq!(again, found);
                 let mut short = Path::<1>::new();

@@ -383,8 +383,9 @@ fn call_packing(
         pack(to, &Work { vehicles, ..good }, ws, plan);
     }
     for (first, end) in WAYPOINT_NUMBERS.into_iter().zip(WAYPOINT_NUMBERS.into_iter().rev()) {
-        for heading in [RouteDirection::Forward, RouteDirection::Backward] {
-            let whole = Route { vehicle: u8::MAX, first, end, heading, layer: 0, ..plan.routes[0] };
+        for direction in [RouteDirection::Forward, RouteDirection::Backward] {
+            let whole =
+                Route { vehicle: u8::MAX, first, end, direction, layer: 0, ..plan.routes[0] };
             for route in [whole, Route { first: end, ..whole }] {
                 let ends = to.call("pack::Route::end_waypoints", || route.end_waypoints());
                 let waypoints =

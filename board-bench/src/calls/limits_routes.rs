@@ -354,8 +354,8 @@ fn call_detours(
                         .all(|w| w.position.iter().all(|c| c.is_finite()))
             );
             to.add_count(usize::from(answer.is_ok()));
-            let again = to.call("detour::plan_vehicle_detour", || {
-                detour::plan_vehicle_detour(view, &request, &mut [thing], ws, &mut nodes, own)
+            let again = to.call("detour::plan_detour_for_vehicle", || {
+                detour::plan_detour_for_vehicle(view, &request, &mut [thing], ws, &mut nodes, own)
             });
             assert_eq!(again, answer);
         }

@@ -405,7 +405,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             match self.plan.as_ref().map(|plan| (&plan.task, &plan.path)) {
                 Some((Task::Photograph(photographs), path)) => {
                     !photographs.is_first_part
-                        && photographs.taken_count(path, along_m) == photographs.count(path)
+                        && photographs.taken_count(path, along_m) == photographs.planned_count(path)
                 }
                 Some(_) => true,
                 None => false,

@@ -252,7 +252,7 @@ pub fn plan_detour<
     let mut transit = Transit::<C>::empty();
     transit.set_area(area).map_err(Error::Coverage)?;
     let field = field.filter(|_| view.header().ground.is_some());
-    around::plan_vehicle_detour(&transit, field, request, obstacles, out)
+    around::plan_detour_for_vehicle(&transit, field, request, obstacles, out)
         .map_err(|_| PlanFailure::Unreachable)
 }
 

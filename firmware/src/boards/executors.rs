@@ -14,7 +14,7 @@ pub(super) fn start_links_executor(irq: impl InterruptNumber) -> SendSpawner {
 }
 
 /// Starts the executor of plans and flash in the interrupt `irq`. To be called once.
-pub(super) fn start_plans(irq: impl InterruptNumber) -> SendSpawner {
+pub(super) fn start_plans_executor(irq: impl InterruptNumber) -> SendSpawner {
     PLANS.start(irq)
 }
 
@@ -27,7 +27,7 @@ pub(super) unsafe fn poll_links_executor() {
     unsafe { LINKS.on_interrupt() }
 }
 
-/// Body of the handler of the interrupt given to [`start_plans`].
+/// Body of the handler of the interrupt given to [`start_plans_executor`].
 ///
 /// # Safety
 /// Only that handler may call it, as for [`poll_links_executor`].

@@ -127,7 +127,7 @@ pub fn start() -> Parts {
     let swarm = (receives.into_ring_buffered(DMA_RADIO_IN.take()), sends);
     Parts {
         links: executors::start_links_executor(interrupt::UART7),
-        plans: executors::start_plans(interrupt::UART8),
+        plans: executors::start_plans_executor(interrupt::UART8),
         autopilot,
         swarm,
         flash: Flash::new(Device::new(p.FLASH, Irqs)),

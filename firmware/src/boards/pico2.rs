@@ -150,7 +150,7 @@ pub fn start() -> Parts {
     let (sends, receives) = swarm.split();
     Parts {
         links: executors::start_links_executor(interrupt::SWI_IRQ_0),
-        plans: executors::start_plans(interrupt::SWI_IRQ_1),
+        plans: executors::start_plans_executor(interrupt::SWI_IRQ_1),
         autopilot,
         swarm: (receives, sends),
         flash: Flash { device: Device::new_blocking(p.FLASH), lender: FlashLender::new() },

@@ -49,7 +49,7 @@ pub fn start() -> Parts {
     watchdog.start();
     let parts = Parts {
         links: vectors::start_links_executor(),
-        plans: vectors::start_plans(),
+        plans: vectors::start_plans_executor(),
         autopilot: uart::AUTOPILOT.start(interrupts::Irq::Uart0Rx),
         swarm: uart::SWARM.start(interrupts::Irq::Uart1Rx),
         flash: Flash::new(),

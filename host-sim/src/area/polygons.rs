@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::quote::quoted;
+use crate::quote::printable;
 
 /// Most vertices that a file may have, over all its polygons.
 pub const MAX_VERTICES: usize = 10_000;
@@ -48,7 +48,10 @@ pub enum AreaFileError {
 
 impl AreaFileError {
     pub(super) fn malformed(format: &'static str, why: &impl ToString) -> Self {
-        Self::Malformed { format, why: quoted(why.to_string().lines().next().unwrap_or_default()) }
+        Self::Malformed {
+            format,
+            why: printable(why.to_string().lines().next().unwrap_or_default()),
+        }
     }
 }
 

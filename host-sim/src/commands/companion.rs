@@ -82,7 +82,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             .copied()
             .collect::<FixedVec<_, _>>();
     }
-    let mut companion = start(&config, &mut flash)?;
+    let mut companion = companion_with_store(&config, &mut flash)?;
     let mut links: Vec<(Link, Box<dyn link::ByteLink>)> =
         vec![(Link::Autopilot, args.autopilot.open()?)];
     if let Some(swarm) = &args.swarm {
@@ -159,7 +159,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         }
         if restarts {
             say!("{:9.3} s  restart commanded", began.elapsed().as_secs_f32());
-            companion = start(&config, &mut flash)?;
+            companion = companion_with_store(&config, &mut flash)?;
         }
         let state = companion.state();
         // In the air the mission may continue: a pilot may hand the vehicle back.
@@ -180,7 +180,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// A new companion with the store in its flash, which holds parameters and uploaded files.
-fn start(config: &Config<VEHICLES>, flash: &mut HostFlash) -> anyhow::Result<Box<HostCompanion>> {
+fn companion_with_store(
+    config: &Config<VEHICLES>,
+    flash: &mut HostFlash,
+) -> anyhow::Result<Box<HostCompanion>> {
     let store = Store::mount(flash::HOST_FLASH_LAYOUT, flash);
     let mut companion = new_companion(config.clone())?;
     companion.attach_store(store);

@@ -13,7 +13,7 @@ use crate::files::ResultFiles;
 use crate::mission::{HostPlan, PreparedMission};
 use crate::output;
 use crate::progress::Progress;
-use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded};
+use crate::result::{MissionResult, Safety, Totals, Unserved, VehicleResult, rounded};
 use crate::roadmap::BuildTimes;
 use crate::say;
 use crate::shortage;
@@ -140,7 +140,10 @@ fn planned_result(mission: &PreparedMission, plan: &HostPlan) -> MissionResult {
             deadlocks: 0,
         },
         roadmap: mission.roadmap_size(),
-        left: Left { reasons: shortage::shortage_lines(mission, plan), ..mission.unserved(plan) },
+        left: Unserved {
+            reasons: shortage::shortage_lines(mission, plan),
+            ..mission.unserved(plan)
+        },
         coverage: None,
     }
 }

@@ -57,7 +57,7 @@ fn home_position(planned: &CoveragePlan<'_>, route: &Route) -> Geodetic {
     let start = planned.scenario.vehicles[usize::from(route.vehicle)].start;
     Geodetic {
         alt_m: planned.area_settings.origin.alt_m + f64::from(start.z),
-        ..planned.geodetic(&start)
+        ..planned.geodetic_at_origin_altitude(&start)
     }
 }
 
@@ -91,7 +91,7 @@ pub fn flight_items(
     let home = home_position(planned, route);
     let start = scenario.vehicles[usize::from(route.vehicle)].start;
     let place = |position: &Point| {
-        let place = planned.geodetic(position);
+        let place = planned.geodetic_at_origin_altitude(position);
         [
             round_to(place.lat_deg, 1e9),
             round_to(place.lon_deg, 1e9),
@@ -267,7 +267,7 @@ pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Stri
                 WaypointAction::Photo(number) => ("photo", number.to_string()),
             };
             let p = point.position;
-            let place = planned.geodetic(&p);
+            let place = planned.geodetic_at_origin_altitude(&p);
             text += &format!(
                 "{id},{order},{time:.2},{act},{number},{:.9},{:.9},{:.3},{:.3},{:.3},{},{:.3}\n",
                 place.lat_deg,
@@ -287,7 +287,7 @@ pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Stri
 /// of each flight.
 pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Value {
     let place = |x: f32, y: f32| {
-        let place = planned.geodetic(&Point::new(x, y, 0.0));
+        let place = planned.geodetic_at_origin_altitude(&Point::new(x, y, 0.0));
         json!([round_to(place.lon_deg, 1e9), round_to(place.lat_deg, 1e9)])
     };
     let kinds = [(RingKind::Outer, "area"), (RingKind::Hole, "hole"), (RingKind::NoFly, "no-fly")];

@@ -68,7 +68,7 @@ impl MapObstacles {
             occupied_words: None,
             no_node_words: None,
             outside: Outside::Free,
-            ..map.voxel_map(unknown)
+            ..map.to_voxel_map(unknown)
         };
         let shape = map.shape;
         let is_ground = |cell: &[u32; 3]| {
@@ -220,7 +220,7 @@ impl Columns {
     }
 
     /// A column and the columns beside it, diagonally too.
-    fn around(&self, [i, j]: Column) -> impl Iterator<Item = Column> + use<> {
+    fn with_neighbours(&self, [i, j]: Column) -> impl Iterator<Item = Column> + use<> {
         let [wide, tall] = self.size;
         let near = |at: usize, size: usize| at.saturating_sub(1)..(at + 2).min(size);
         near(j, tall).flat_map(move |j| near(i, wide).map(move |i| [i, j]))
@@ -238,7 +238,7 @@ impl Columns {
             // Only from columns at the edge of a blocked region: all columns around the others are
             // blocked.
             let is_blocked = |column: Column| self.blocked[self.index(column)];
-            if !is_blocked(column) || self.around(column).all(is_blocked) {
+            if !is_blocked(column) || self.with_neighbours(column).all(is_blocked) {
                 continue;
             }
             for [i, j] in &near {
@@ -262,7 +262,7 @@ impl Columns {
                 if self.blocked[self.index(column)] {
                     part.push(column);
                 }
-                for beside in self.around(column) {
+                for beside in self.with_neighbours(column) {
                     if std::mem::take(&mut left[self.index(beside)]) {
                         open.push(beside);
                     }

@@ -50,7 +50,7 @@ pub fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> 
         method: planned.method.name(),
         complete: findings.is_clean(),
         totals: Totals {
-            path_m: rounded(routes.iter().map(|route| planned.cost_m(route)).sum()),
+            path_m: rounded(routes.iter().map(|route| planned.sorties_cost_m(route)).sum()),
             makespan_s: rounded(makespan_s),
         },
         safety: Safety {
@@ -75,7 +75,7 @@ fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
             goal: None,
             reached: false,
             landed: false,
-            path_m: route.map_or(0.0, |route| rounded(planned.cost_m(route))),
+            path_m: route.map_or(0.0, |route| rounded(planned.sorties_cost_m(route))),
             flown_m: 0.0,
             flight_time_s: route.map_or(0.0, |route| {
                 rounded(planned.sorties_of(route).map(|sortie| sortie.route.cost_s).sum())
@@ -89,8 +89,9 @@ fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
 /// Makes the coverage section from a plan and from the check of its pictures.
 pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> CoverageResult {
     let routes = &planned.plan.routes;
-    let max_cost_s = planned.max_cost_s();
-    let costs: Vec<f64> = routes.iter().map(|route| f64::from(planned.cost_s(route))).collect();
+    let max_cost_s = planned.max_sorties_cost_s();
+    let costs: Vec<f64> =
+        routes.iter().map(|route| f64::from(planned.sorties_cost_s(route))).collect();
     let (mean, sd) = mean_and_sd(&costs);
     let along = planned.tracks.lane_direction();
     let trigger = planned.area_settings.trigger;
@@ -104,7 +105,9 @@ pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) 
         max_cost_s: rounded(max_cost_s),
         mean_cost_s: rounded(mean as f32),
         sd_cost_s: rounded(sd as f32),
-        max_cost_m: rounded(routes.iter().map(|route| planned.cost_m(route)).fold(0.0, f32::max)),
+        max_cost_m: rounded(
+            routes.iter().map(|route| planned.sorties_cost_m(route)).fold(0.0, f32::max),
+        ),
         lower_bound_s: rounded(planned.lower_bound_s),
         gap: rounded(max_cost_s / planned.lower_bound_s - 1.0),
         trigger: match trigger {
@@ -144,8 +147,8 @@ fn route_results(planned: &CoveragePlan<'_>) -> Vec<RouteResult> {
         last: route.end - 1,
         backward: route.end_waypoints().0 != route.first,
         layer_m: rounded(heights.mission_m + f32::from(route.layer) * heights.layer_m),
-        cost_s: rounded(planned.cost_s(route)),
-        cost_m: rounded(planned.cost_m(route)),
+        cost_s: rounded(planned.sorties_cost_s(route)),
+        cost_m: rounded(planned.sorties_cost_m(route)),
         sorties: planned.sorties_of(route).map(sortie).collect(),
     };
     planned.plan.routes.iter().map(route).collect()

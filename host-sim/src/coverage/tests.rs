@@ -22,7 +22,7 @@ fn division(method: &str) -> (Vec<u32>, f32) {
     let planned = CoveragePlan::plan_as_companions(&scenario).unwrap();
     let mut firsts: Vec<u32> = planned.plan.routes.iter().map(|route| route.first).collect();
     firsts.sort_unstable();
-    (firsts, planned.max_cost_s())
+    (firsts, planned.max_sorties_cost_s())
 }
 
 #[test]
@@ -45,7 +45,7 @@ fn each_name_of_a_method_divides_by_its_algorithm() {
     assert!(costs[2] < costs[1] && costs[3] < costs[2], "{costs:?}");
     assert_eq!(division("powell"), powell);
     assert_eq!(division("simple"), simple);
-    let usual = (CoveragePlan::plan_as_companions(&scenario).unwrap()).max_cost_s();
+    let usual = (CoveragePlan::plan_as_companions(&scenario).unwrap()).max_sorties_cost_s();
     assert_eq!(usual, powell.1, "the default");
 }
 

@@ -74,7 +74,7 @@ fn report_part(flight: &Flight<WAYPOINTS>) -> ReportPart {
     let path = &flight.path;
     let (mut lanes, mut waypoints) = (Vec::<Point>::new(), 0);
     if let Task::Photograph(photographs) = &flight.task {
-        waypoints = photographs.count(path);
+        waypoints = photographs.planned_count(path);
         for shots in photographs.stretches(path) {
             lanes.extend([shots.from_m, shots.to_m].iter().filter_map(|at_m| path.point_at(*at_m)));
         }

@@ -30,7 +30,7 @@ pub trait ByteLink: Send {
     }
 
     /// Waits a millisecond; called when nothing was received.
-    fn rest(&mut self) {
+    fn wait_briefly(&mut self) {
         std::thread::sleep(Duration::from_millis(1));
     }
 }

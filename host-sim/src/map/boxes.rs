@@ -37,7 +37,7 @@ struct CellBox {
 
 impl CellBox {
     /// Twice the centre along an axis, cells.
-    fn center(&self, axis: usize) -> u32 {
+    fn twice_center(&self, axis: usize) -> u32 {
         u32::from(self.low[axis]) + u32::from(self.high[axis])
     }
 
@@ -263,14 +263,14 @@ fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellB
             |axis: usize| twice_center_range(boxes, axis).map_or(0, |(low, high)| high - low);
         let axis = (0..3).max_by_key(|&axis| spread(axis)).unwrap_or(0);
         middle = boxes.len() / 2;
-        boxes.select_nth_unstable_by_key(middle, |b| b.center(axis));
+        boxes.select_nth_unstable_by_key(middle, |b| b.twice_center(axis));
     }
     boxes.split_at_mut(middle)
 }
 
 /// Least and greatest value of twice the boxes' centres along an axis; `None` without boxes.
 fn twice_center_range(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
-    let centers = || boxes.iter().map(|b| b.center(axis));
+    let centers = || boxes.iter().map(|b| b.twice_center(axis));
     Some((centers().min()?, centers().max()?))
 }
 
@@ -279,7 +279,7 @@ fn twice_center_range(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
 fn bin_of_box(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
     let (low, high) = twice_center_range(boxes, axis)?;
     (low < high).then_some(move |b: &CellBox| {
-        (b.center(axis) - low) as usize * (SPLIT_BINS - 1) / (high - low) as usize
+        (b.twice_center(axis) - low) as usize * (SPLIT_BINS - 1) / (high - low) as usize
     })
 }
 

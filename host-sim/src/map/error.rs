@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::quote::{printable_path, quoted};
+use crate::quote::{printable, printable_path};
 
 /// Reason why a map could not be read, generated or written.
 #[derive(Debug, thiserror::Error)]
@@ -33,7 +33,7 @@ pub enum MapError {
         found: String,
     },
     /// The map's name has the ending of no known format, and is no built-in map.
-    #[error("unknown kind of map: {}: expected {expected}", quoted(file))]
+    #[error("unknown kind of map: {}: expected {expected}", printable(file))]
     UnknownKind {
         /// The map's name as given.
         file: String,
@@ -41,7 +41,7 @@ pub enum MapError {
         expected: &'static str,
     },
     /// The map cannot be represented on the requested grid.
-    #[error("map does not fit: {}: {why}", quoted(file))]
+    #[error("map does not fit: {}: {why}", printable(file))]
     Grid {
         /// The map's name as given.
         file: String,

@@ -241,7 +241,7 @@ impl OccupancyMap {
     }
 
     /// The bit grids that planner-core plans on; `unknown` says how unknown cells count.
-    pub fn voxel_map(&self, unknown: Unknown) -> VoxelMap {
+    pub fn to_voxel_map(&self, unknown: Unknown) -> VoxelMap {
         let inside = self.inside_mask();
         let not_free: Vec<u64> =
             self.free.iter().zip(&inside).map(|(free, inside)| !free & inside).collect();

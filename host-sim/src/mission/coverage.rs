@@ -90,8 +90,8 @@ pub(super) fn prepare(
     let mut schedule = schedule_config(&scenario);
     schedule.vertical_mps =
         climbs.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
-    let mut mission =
-        PreparedMission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
+    let voxels = map.to_voxel_map(map::Unknown::Free);
+    let mut mission = PreparedMission::new(scenario, voxels, tasks, schedule, board);
     if let Some(terrain) = mission.scenario.area.as_ref().and_then(|area| area.terrain.as_ref()) {
         mission.roadmap_or_field_file = terrain.field.to_vec();
     }

@@ -149,9 +149,9 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     table_2(&mut tables)?;
     let planning = table_3(&mut tables)?;
     table_4(&mut tables)?;
-    flown(&mut tables)?;
+    flight_times_tables(&mut tables)?;
     table_6(&mut tables)?;
-    print(&tables);
+    print_costs(&tables);
     print_planning(&planning);
     results.add("tables.json", result::json(&tables.rows)?.as_bytes())?;
     let (_, mut worst) = tables.worst.clone().unwrap_or_default();
@@ -234,7 +234,7 @@ fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn flown(tables: &mut Tables) -> anyhow::Result<()> {
+fn flight_times_tables(tables: &mut Tables) -> anyhow::Result<()> {
     let mut mean_max = [[0.0; 3]; 2];
     for table in &FLIGHT_TIMES_TABLES {
         let method = CoverageMethod::named(table.method).map_err(anyhow::Error::msg)?;
@@ -275,7 +275,7 @@ fn table_6(tables: &mut Tables) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn print(tables: &Tables) {
+fn print_costs(tables: &Tables) {
     say!(
         "Costs; areas and places are ours. Theirs in A1 to A12 were flown in Gazebo, in 6 in the field; ours are planned."
     );

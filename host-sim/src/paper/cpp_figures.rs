@@ -13,7 +13,7 @@ use crate::scenario::Scenario;
 use crate::scenario::coverage::CoverageMethod;
 
 /// Numbers of UAVs: Fig. 12 has two panels for each, ours and the paper's.
-const FLEETS: [usize; 2] = [3, 5];
+const FLEET_SIZES: [usize; 2] = [3, 5];
 /// Tracks: Fig. 13 has two panels for each, ours and the paper's.
 const TRACKS: [&str; 2] = ["short", "long"];
 
@@ -154,7 +154,7 @@ impl ValueSource {
 pub(super) fn spread_figures(rows: &[TableRow]) -> [Figure; 2] {
     let rows: Vec<&TableRow> = rows.iter().filter(|row| row.track.is_some()).collect();
     let (mut times, mut spreads) = (Vec::new(), Vec::new());
-    for (fleet, letter) in FLEETS.into_iter().zip('a'..) {
+    for (fleet, letter) in FLEET_SIZES.into_iter().zip('a'..) {
         for (whose, name) in ValueSource::BOTH {
             let title = format!("({letter}) {fleet} UAVs: {name}");
             let own = |row: &&&TableRow| row.ours.len() == fleet;

@@ -4,12 +4,12 @@ use proptest::prelude::*;
 #[test]
 fn short_plain_text_stays_as_it_is() {
     for text in ["", "a/b.toml", "größer ≤ 3 m", &"x".repeat(MAX_QUOTE_CHARS)] {
-        assert_eq!(quoted(text), text);
+        assert_eq!(printable(text), text);
     }
-    assert_eq!(quoted("\x1b[31mred\n"), "\\u{1b}[31mred\\n");
-    assert_eq!(quoted("a\u{202e}b"), "a\\u{202e}b");
-    assert!(quoted(&format!("begin{}end", "x".repeat(5000))).starts_with("beginx"));
-    assert!(quoted(&format!("begin{}end", "x".repeat(5000))).ends_with("xend"));
+    assert_eq!(printable("\x1b[31mred\n"), "\\u{1b}[31mred\\n");
+    assert_eq!(printable("a\u{202e}b"), "a\\u{202e}b");
+    assert!(printable(&format!("begin{}end", "x".repeat(5000))).starts_with("beginx"));
+    assert!(printable(&format!("begin{}end", "x".repeat(5000))).ends_with("xend"));
 }
 
 #[test]
@@ -24,7 +24,7 @@ fn arguments_are_quoted_inside_a_message() {
 proptest! {
     #[test]
     fn whatever_is_quoted_is_short_and_without_codes(text in "(?s).{0,700}") {
-        let short = quoted(&text);
+        let short = printable(&text);
         prop_assert!(
             short.chars().count() <= MAX_QUOTE_CHARS && !short.chars().any(is_control_code),
             "{short:?}"

@@ -5,7 +5,7 @@ use planner_core::roadmap::prm::Sampling;
 
 #[test]
 fn any_number_of_threads_gives_the_same_edges() {
-    let map = building_map(1, 0.5).unwrap().voxel_map(Unknown::Blocked);
+    let map = building_map(1, 0.5).unwrap().to_voxel_map(Unknown::Blocked);
     let config = PrmConfig {
         nodes: 500,
         edge_min_m: 0.5,

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use crate::quote::{MAX_QUOTE_CHARS, quoted};
+use crate::quote::{MAX_QUOTE_CHARS, printable};
 
 /// Number of characters of a long line that are shown before the marked ones.
 const CONTEXT_CHARS: usize = 40;
@@ -80,7 +80,7 @@ fn marked_line(text: &str, from: usize, marked: usize) -> (String, usize, usize)
     let begin =
         if from + marked > MAX_QUOTE_CHARS { from.saturating_sub(CONTEXT_CHARS) } else { 0 };
     let plain =
-        |c: char| if quoted(c.encode_utf8(&mut [0; 4])).chars().count() == 1 { c } else { ' ' };
+        |c: char| if printable(c.encode_utf8(&mut [0; 4])).chars().count() == 1 { c } else { ' ' };
     let mut shown: String = text.chars().skip(begin).take(MAX_QUOTE_CHARS - 2).map(plain).collect();
     let length = shown.chars().count();
     if text.chars().nth(begin + length).is_some() {

@@ -11,7 +11,7 @@ use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
 use super::error::{ScenarioError, SourcePlace};
-use crate::quote::quoted;
+use crate::quote::printable;
 
 /// Range of bytes in the scenario's text.
 pub(super) type TomlSpan = Range<usize>;
@@ -26,7 +26,7 @@ pub(super) struct TomlText<'a> {
 
 impl TomlText<'_> {
     /// Where the span begins, as `FILE:LINE`.
-    pub(super) fn line(&self, span: &TomlSpan) -> String {
+    pub(super) fn file_and_line(&self, span: &TomlSpan) -> String {
         format!("{}:{}", self.file, SourcePlace::of(self.text, span).line)
     }
 
@@ -225,8 +225,9 @@ impl<'a> Table<'a> {
         hint: Option<String>,
     ) -> ScenarioError {
         let place = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
-        let error =
-            self.text.error(&key.span(), format!("unknown key `{}`{place}", quoted(key.get_ref())));
+        let error = self
+            .text
+            .error(&key.span(), format!("unknown key `{}`{place}", printable(key.get_ref())));
         ScenarioError { hint, ..error }
     }
 

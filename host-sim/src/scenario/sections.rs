@@ -29,7 +29,7 @@ use super::types::{
 };
 use crate::link::LinkUrl;
 use crate::map::{RESOLUTION_RANGE_M, Source, Unknown};
-use crate::quote::quoted;
+use crate::quote::printable;
 
 /// Time limit of a simulated flight if the scenario gives none, seconds.
 const DEFAULT_TIME_LIMIT_S: f32 = 600.0;
@@ -46,7 +46,7 @@ pub(super) fn read_root<T>(
 ) -> Result<T> {
     let root = DeTable::parse(text.text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
-        let what = quoted(error.message().lines().next().unwrap_or_default());
+        let what = printable(error.message().lines().next().unwrap_or_default());
         let hint = syntax_hint(&text.text[span.start.min(text.text.len())..], &what);
         let error = text.error(&span, format!("not TOML: {what}"));
         ScenarioError { hint: hint.map(str::to_owned), ..error }

@@ -403,7 +403,7 @@ fn wrong_files_of_an_area_are_named_with_key_place_and_remedy() {
 /// required clearance.
 fn check_places(scenario: &Scenario) {
     let map = crate::map::load(&scenario.map.file, scenario.map.resolution_m).unwrap();
-    let voxels = map.voxel_map(scenario.map.unknown);
+    let voxels = map.to_voxel_map(scenario.map.unknown);
     let grid = voxels.grid();
     let shape = *grid.shape();
     let clearance = scenario.required_clearance_m();

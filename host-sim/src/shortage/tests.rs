@@ -14,7 +14,7 @@ fn rooms(door: u32) -> VoxelMap {
         let wall = (i == 30 && !in_door) || k == 0;
         map.set([i, j, k], if wall { Occupancy::Occupied } else { Occupancy::Free });
     }
-    map.voxel_map(Unknown::Free)
+    map.to_voxel_map(Unknown::Free)
 }
 
 /// The clearance of a start or goal is that of the point itself, not that of its cell's centre.

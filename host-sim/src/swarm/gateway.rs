@@ -60,7 +60,7 @@ impl Gateway {
                 break;
             }
             let bytes = &buffer[..length];
-            members.iter_mut().for_each(|member| member.handle_ground_bytes(now_us, bytes));
+            members.iter_mut().for_each(|member| member.handle_qgc_bytes(now_us, bytes));
             radio.broadcast(now_us, None, places, bytes);
         }
         for packet in overheard.iter().filter(|packet| is_for_ground(packet)) {
@@ -68,7 +68,7 @@ impl Gateway {
         }
         for member in members {
             loop {
-                let length = member.poll_ground_transmit(now_us, &mut buffer[..MAX_DATAGRAM]);
+                let length = member.poll_qgc_transmit(now_us, &mut buffer[..MAX_DATAGRAM]);
                 if length == 0 {
                     break;
                 }

@@ -379,26 +379,26 @@ impl SimulatedVehicle {
     /// Gives a ground station's frame to a board whose radio is not simulated, by the autopilot's
     /// serial link, as an autopilot forwards it.
     pub fn forward_to_board(&mut self, now_us: u64, frame: &[u8]) {
-        if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_down(now_us) {
+        if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_offline(now_us) {
             self.to_companion.write(now_us, frame);
         }
     }
 
     /// Gives the autopilot bytes from the ground station behind `--qgc`.
-    pub fn handle_ground_bytes(&mut self, now_us: u64, bytes: &[u8]) {
-        if !self.is_down(now_us) {
+    pub fn handle_qgc_bytes(&mut self, now_us: u64, bytes: &[u8]) {
+        if !self.is_offline(now_us) {
             self.autopilot.handle_ground_bytes(bytes);
         }
     }
 
     /// Moves whole frames for the ground station behind `--qgc` into `out`; returns their length.
-    pub fn poll_ground_transmit(&mut self, now_us: u64, out: &mut [u8]) -> usize {
+    pub fn poll_qgc_transmit(&mut self, now_us: u64, out: &mut [u8]) -> usize {
         let length = self.autopilot.poll_ground_transmit(out);
-        if self.is_down(now_us) { 0 } else { length }
+        if self.is_offline(now_us) { 0 } else { length }
     }
 
     /// Whether the vehicle has no power, or its autopilot boots.
-    fn is_down(&self, now_us: u64) -> bool {
+    fn is_offline(&self, now_us: u64) -> bool {
         self.killed || now_us < self.boots_until_us
     }
 

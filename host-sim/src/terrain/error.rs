@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::limits::{MAX_BYTES, MAX_CELLS};
-use crate::quote::quoted;
+use crate::quote::printable;
 
 /// Reason why a file gives no heights of the ground.
 #[derive(Debug, Error)]
@@ -50,10 +50,13 @@ pub(super) const WARP_HINT: &str =
 
 impl TerrainError {
     pub(super) fn malformed(format: &'static str, why: &impl ToString) -> Self {
-        Self::Malformed { format, why: quoted(why.to_string().lines().next().unwrap_or_default()) }
+        Self::Malformed {
+            format,
+            why: printable(why.to_string().lines().next().unwrap_or_default()),
+        }
     }
 
     pub(super) fn system(what: &str) -> Self {
-        Self::System { what: quoted(what), hint: WARP_HINT }
+        Self::System { what: printable(what), hint: WARP_HINT }
     }
 }

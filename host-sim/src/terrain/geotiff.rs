@@ -31,7 +31,7 @@ fn bad_file(why: &impl ToString) -> TerrainError {
     TerrainError::malformed(FORMAT, why)
 }
 
-fn malformed(error: TiffError) -> TerrainError {
+fn tiff_error(error: TiffError) -> TerrainError {
     match error {
         TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => {
             error.into()
@@ -45,8 +45,8 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     limits.decoding_buffer_size = MAX_CHUNK_BYTES;
     limits.intermediate_buffer_size = MAX_CHUNK_BYTES;
     limits.ifd_value_size = 1 << 24;
-    let mut decoder = Decoder::new(file).map_err(malformed)?.with_limits(limits);
-    let (columns, rows) = decoder.dimensions().map_err(malformed)?;
+    let mut decoder = Decoder::new(file).map_err(tiff_error)?.with_limits(limits);
+    let (columns, rows) = decoder.dimensions().map_err(tiff_error)?;
     let (columns, rows) = (columns as usize, rows as usize);
     if columns.saturating_mul(rows) > MAX_CELLS {
         return Err(TerrainError::TooManyCells(columns as u128 * rows as u128));
@@ -54,13 +54,13 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     if columns == 0 || rows == 0 {
         return Err(bad_file(&"it has no cells"));
     }
-    match decoder.colortype().map_err(malformed)? {
+    match decoder.colortype().map_err(tiff_error)? {
         ColorType::Gray(_) => {}
         other => {
             return Err(bad_file(&format!("it has colours ({other:?}), not one height a cell")));
         }
     }
-    let keys = decoder.find_tag_unsigned_vec(Tag::GeoKeyDirectoryTag).map_err(malformed)?;
+    let keys = decoder.find_tag_unsigned_vec(Tag::GeoKeyDirectoryTag).map_err(tiff_error)?;
     let keys = GeoKeys::new(&keys.unwrap_or_default());
     let crs = keys.crs(None)?;
     let unit_m = match (keys.height_unit_m()?, &crs) {
@@ -74,7 +74,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
         }
         (None, _) => 1.0,
     };
-    let missing = decoder.find_tag(Tag::GdalNodata).map_err(malformed)?;
+    let missing = decoder.find_tag(Tag::GdalNodata).map_err(tiff_error)?;
     let missing = missing.and_then(|value| value.into_string().ok());
     let missing: Option<f64> = missing.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok());
     let (corner, cell) = georeference(&mut decoder, &keys)?;
@@ -102,7 +102,7 @@ fn read_heights<R: Read + Seek>(
     for chunk in 0..across * rows.div_ceil(tall) {
         let (own_wide, own_tall) = decoder.chunk_data_dimensions(chunk as u32);
         let (own_wide, own_tall) = (own_wide as usize, own_tall as usize);
-        let values = decoder.read_chunk(chunk as u32).map_err(malformed)?;
+        let values = decoder.read_chunk(chunk as u32).map_err(tiff_error)?;
         let (left, top) = (chunk % across * wide, chunk / across * tall);
         let mut values = values_as_f64(values)?;
         for row in top..(top + own_tall).min(rows) {
@@ -129,8 +129,8 @@ fn georeference<R: Read + Seek>(
     keys: &GeoKeys,
 ) -> Result<([f64; 2], [f64; 2]), TerrainError> {
     let mut tag = |tag: Tag| -> Result<Option<Vec<f64>>, TerrainError> {
-        let found = decoder.find_tag(tag).map_err(malformed)?;
-        found.map(|value| value.into_f64_vec().map_err(malformed)).transpose()
+        let found = decoder.find_tag(tag).map_err(tiff_error)?;
+        found.map(|value| value.into_f64_vec().map_err(tiff_error)).transpose()
     };
     let scale = tag(Tag::ModelPixelScaleTag)?;
     let tie = tag(Tag::ModelTiepointTag)?;

@@ -153,7 +153,7 @@ impl<'a> Area<'a> {
     }
 
     /// Edges of all outer rings and holes, each as its two ends.
-    pub(super) fn edges(&self) -> impl Iterator<Item = (Flat, Flat)> + Clone + use<'a> {
+    pub(super) fn boundary_edges(&self) -> impl Iterator<Item = (Flat, Flat)> + Clone + use<'a> {
         self.rings_with_kind()
             .filter(|(kind, _)| *kind != RingKind::NoFly)
             .flat_map(|(_, ring)| edges_of(ring))

@@ -130,7 +130,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
 ///
 /// # Errors
 /// The reason why there is no such path.
-pub fn plan_vehicle_detour<const N: usize, const W: usize, const G: usize>(
+pub fn plan_detour_for_vehicle<const N: usize, const W: usize, const G: usize>(
     transit: &Transit<'_, N>,
     field: Option<FieldView<'_>>,
     request: &DetourRequest,

@@ -176,14 +176,14 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
             state = ((state / sets) & !(1 << v)) * sets + ((state % sets) & !(1 << layer));
             let first = self.ws.states[state].0;
             debug_assert_eq!(self.ws.reaches[usize::from(step) * stride + first as usize], end);
-            let (ground_m, heading) = self
+            let (ground_m, direction) = self
                 .work
                 .ground_distance_m(&self.work.vehicles[v], &self.work.route_ends(first, end));
             let route = Route {
                 vehicle: v as u8,
                 first,
                 end,
-                heading,
+                direction,
                 layer: layer as u8 + 1,
                 ground_m,
                 cost_m: 0.0,

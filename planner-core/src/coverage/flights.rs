@@ -364,7 +364,7 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
         .map(|range| range.end - range.first)
         .fold(0, u32::saturating_add);
     let area = work.tracks.waypoint_count().saturating_add(done);
-    let backward = route.heading == RouteDirection::Backward;
+    let backward = route.direction == RouteDirection::Backward;
     let order = if backward { WaypointOrder::Falling } else { WaypointOrder::Rising };
     let mut photographs = PicturePlan::new(waypoint_m, look, trigger).with_area(area, order);
     let mission_m = work.heights.mission_m;

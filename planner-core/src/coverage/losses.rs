@@ -207,7 +207,7 @@ fn rotate_routes<const L: usize, const N: usize, const K: usize>(
     let Some(mut vehicle) = routes.routes.first().map(|route| route.vehicle) else { return Ok(()) };
     for route in routes.routes.iter_mut().rev() {
         core::mem::swap(&mut route.vehicle, &mut vehicle);
-        (route.ground_m, route.heading) = work.ground_distance_m(
+        (route.ground_m, route.direction) = work.ground_distance_m(
             &work.vehicles[usize::from(route.vehicle)],
             &work.route_ends(route.first, route.end),
         );

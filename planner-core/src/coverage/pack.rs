@@ -81,7 +81,7 @@ pub struct Route {
     /// Highest waypoint number of the route plus one.
     pub end: u32,
     /// Direction in which the route is flown.
-    pub heading: RouteDirection,
+    pub direction: RouteDirection,
     /// Transit layer, from 1: it is this many times [`Heights::layer_m`] above the height of
     /// pictures.
     pub layer: u8,
@@ -97,7 +97,7 @@ impl Route {
     /// Numbers of the first and the last waypoint in the direction of flight.
     pub fn end_waypoints(&self) -> (u32, u32) {
         let last = self.end.saturating_sub(1);
-        match self.heading {
+        match self.direction {
             RouteDirection::Forward => (self.first, last),
             RouteDirection::Backward => (last, self.first),
         }
@@ -105,8 +105,8 @@ impl Route {
 
     /// Waypoint numbers in the order in which they are flown.
     pub fn waypoints(&self) -> impl Iterator<Item = u32> + use<> {
-        let Self { first, end, heading, .. } = *self;
-        (first..end).map(move |i| match heading {
+        let Self { first, end, direction, .. } = *self;
+        (first..end).map(move |i| match direction {
             RouteDirection::Forward => i,
             RouteDirection::Backward => end - 1 - (i - first),
         })
@@ -429,7 +429,7 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
             vehicle: 0,
             first: start,
             end,
-            heading: RouteDirection::Forward,
+            direction: RouteDirection::Forward,
             layer: 0,
             ground_m: 0.0,
             cost_m: 0.0,
@@ -453,7 +453,7 @@ fn assign_bins<const L: usize, const N: usize, const K: usize>(
     for (row, route) in out.routes.iter_mut().enumerate() {
         let vehicle = usize::from(ws.columns[row].ok_or(CoverageError::Unreachable)?);
         route.vehicle = vehicle as u8;
-        (route.ground_m, route.heading) = work
+        (route.ground_m, route.direction) = work
             .ground_distance_m(&work.vehicles[vehicle], &work.route_ends(route.first, route.end));
         if !route.ground_m.is_finite() {
             return Err(CoverageError::Unreachable);
@@ -495,6 +495,6 @@ pub(super) fn set_costs<const L: usize, const N: usize, const K: usize>(
             route.ground_m + 2.0 * top_m + work.sink_m(&ends.first) + work.sink_m(&ends.last);
         route.cost_s = route.ground_m / vehicle.cruise_mps
             + work.altitude_delay_s(vehicle, route.layer)
-            + if route.heading == RouteDirection::Forward { sink_s.0 } else { sink_s.1 };
+            + if route.direction == RouteDirection::Forward { sink_s.0 } else { sink_s.1 };
     }
 }

@@ -87,7 +87,7 @@ pub fn powell<const L: usize, const N: usize, const K: usize>(
         *share = weight / largest;
     }
     let mut cost = search.evaluate()?;
-    search.reset(count);
+    search.reset_directions(count);
     loop {
         let before = cost;
         let from = search.ws.current;
@@ -126,7 +126,7 @@ struct ShareSearch<'s, 'w, const L: usize, const N: usize, const K: usize> {
 }
 
 impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K> {
-    fn reset(&mut self, count: usize) {
+    fn reset_directions(&mut self, count: usize) {
         for (k, line) in self.ws.directions[..count].iter_mut().enumerate() {
             line.fill(0.0);
             line[k] = 1.0;

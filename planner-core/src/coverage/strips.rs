@@ -121,7 +121,12 @@ impl<'a> Strips<'a> {
         ws: &mut Sets<V>,
     ) -> Result<(), CoverageError> {
         ws.needed.clear();
-        project_rings(self.area.edges(), self.inset(span), &mut ws.crossings, &mut ws.needed)
+        project_rings(
+            self.area.boundary_edges(),
+            self.inset(span),
+            &mut ws.crossings,
+            &mut ws.needed,
+        )
     }
 
     /// `span` made slightly narrower: a ring that only touches a strip's border belongs to the
@@ -193,7 +198,7 @@ impl<'a> Strips<'a> {
         out: &mut Tracks<L>,
     ) -> Result<(), CoverageError> {
         self.compute_barred(v, ws)?;
-        line_crossings(self.area.edges(), v, &mut ws.crossings)?;
+        line_crossings(self.area.boundary_edges(), v, &mut ws.crossings)?;
         self.lay_between_borders(strip, v, ws, out)
     }
 

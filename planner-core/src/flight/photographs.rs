@@ -308,7 +308,7 @@ impl PicturePlan {
     }
 
     /// Number of pictures along the whole path.
-    pub fn count<const W: usize>(&self, path: &Path<W>) -> u32 {
+    pub fn planned_count<const W: usize>(&self, path: &Path<W>) -> u32 {
         self.corners_and_counts(path).map(|(_, count)| count).fold(0, u32::saturating_add)
     }
 }

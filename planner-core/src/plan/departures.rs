@@ -146,7 +146,7 @@ pub(super) fn improve_departure_order<
         flights.iter().zip(&lasts_s).map(|(f, lasts_s)| f.depart_s + lasts_s).fold(0.0, fmaxf)
     };
     let before_s = makespan_s(&out.flights);
-    if schedule_departures(&order, request, handover_s, ws, out).is_err()
+    if schedule_in_order(&order, request, handover_s, ws, out).is_err()
         || makespan_s(&out.flights) >= before_s
     {
         out.flights
@@ -182,7 +182,7 @@ const BOARD_VEHICLES: usize = 32;
 
 /// Schedules the vehicles in this order, each to take off as early as those before it allow.
 /// Vehicles that stay on their pads count as scheduled before all.
-fn schedule_departures<const N: usize, const V: usize, const W: usize, const P: usize>(
+fn schedule_in_order<const N: usize, const V: usize, const W: usize, const P: usize>(
     order: &[u16],
     request: &PlanRequest<'_>,
     handover_s: f32,

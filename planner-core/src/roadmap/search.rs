@@ -319,7 +319,7 @@ pub fn cost_matrix<const N: usize>(
         return Ok(());
     }
     let ((starts_at, starts_across), (goals_at, goals_across)) =
-        (bounding_box(view, starts), bounding_box(view, goals));
+        (centre_and_diagonal(view, starts), centre_and_diagonal(view, goals));
     let between = fpu::sqrtf((goals_at - starts_at).norm_squared());
     let from_starts = starts.len() as f32 * (between + goals_across);
     let from_goals = goals.len() as f32 * (between + starts_across);
@@ -341,7 +341,7 @@ pub fn cost_matrix<const N: usize>(
 }
 
 /// Centre and diagonal of the bounding box of some nodes, metres.
-fn bounding_box(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
+fn centre_and_diagonal(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
     let first = nodes.first().map_or(Point::zeros(), |&node| view.node(node));
     let corners = nodes.iter().map(|&node| view.node(node));
     let (low, high) = corners.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)));

@@ -162,7 +162,7 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
     let start = view.node(route.from);
     let pad = start - Point::new(0.0, 0.0, flight.climb_m);
     let goal = view.node(route.to);
-    let up = Leg::climb(pad, start, flight.climb_m / cfg.vertical_mps);
+    let up = Leg::vertical_leg(pad, start, flight.climb_m / cfg.vertical_mps);
     let climb = Climb { up, leave_by_s: ws.leave_pad_by_s(cfg, pad, &up, flight.segment_m) };
     let landing = ws.plan_landing(cfg, goal, flight.descent_m)?;
     let segment_m = flight.segment_m;
@@ -350,7 +350,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         if after_s == f32::INFINITY {
             return Err(ScheduleError::Blocked);
         }
-        Ok(Landing { down: Leg::climb(goal, ground, descent_m / cfg.vertical_mps), after_s })
+        Ok(Landing { down: Leg::vertical_leg(goal, ground, descent_m / cfg.vertical_mps), after_s })
     }
 
     /// Whether the transition might reach some state of its node earlier than it is reached now:

@@ -175,13 +175,13 @@ fn climb_part<const W: usize>(flight: &Flight<W>, first: &Waypoint) -> StraightP
         let before = Some(hold_segment(pad, from_m, f32::NEG_INFINITY, f32::INFINITY));
         return StraightPart {
             before,
-            leg: Leg::climb(pad, pad, 0.0),
+            leg: Leg::vertical_leg(pad, pad, 0.0),
             from_m,
             to_m: from_m,
             after: None,
         };
     }
-    let leg = Leg::climb(pad, first.position, first.arrive_s);
+    let leg = Leg::vertical_leg(pad, first.position, first.arrive_s);
     let (left_m, left_s) = leg.first_segment(flight.segment_m);
     let on_pad = hold_segment(pad, from_m, f32::NEG_INFINITY, fmaxf(left_s, MIN_PAD_HOLD_S));
     let before = Some(TimedSegment { to_m: left_m - flight.climb_m, ..on_pad });
@@ -208,8 +208,11 @@ fn descent_part<const W: usize>(
     let ground = last.position - Point::new(0.0, 0.0, flight.descent_m);
     let end_m = last.along_m + flight.descent_m;
     let landed_s = last.leave_s + flight.descent_m / vertical_mps;
-    let leg =
-        Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
+    let leg = Leg {
+        from_s: last.leave_s,
+        to_s: landed_s,
+        ..Leg::vertical_leg(last.position, ground, 0.0)
+    };
     let landed = hold_segment(ground, end_m, last.leave_s, f32::INFINITY);
     let after = Some(TimedSegment { from_m: last.along_m, ..landed });
     StraightPart { before: None, leg, from_m: last.along_m, to_m: end_m, after }
@@ -252,7 +255,7 @@ pub(super) struct Leg {
 
 impl Leg {
     /// A vertical leg, up or down, that begins at time 0.
-    pub(super) fn climb(from: Point, to: Point, to_s: f32) -> Self {
+    pub(super) fn vertical_leg(from: Point, to: Point, to_s: f32) -> Self {
         Self {
             from,
             to,

@@ -111,7 +111,7 @@ impl MotionBounds {
 /// The lesser of two numbers; `b` if `a` is NaN. `f32::min`, which also checks `b` for NaN, takes
 /// three times as long on a board.
 #[inline]
-fn less(a: f32, b: f32) -> f32 {
+fn fast_min(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
@@ -128,7 +128,7 @@ impl NeighbourMotion<'_> {
         }
         let until_stop_m = self.distance_until_stop_m(bounds, ahead_s);
         let PointsReach { beyond_m, most_m } = self.points_reach;
-        less(until_stop_m + beyond_m + self.lateral_reach_m(bounds), most_m)
+        fast_min(until_stop_m + beyond_m + self.lateral_reach_m(bounds), most_m)
     }
 
     /// Age of the neighbour's position and velocity, the radio's delay included, seconds.
@@ -141,7 +141,7 @@ impl NeighbourMotion<'_> {
     fn reach_any_direction_m(&self, bounds: &MotionBounds) -> f32 {
         // The neighbour learns that no vehicle hears it from messages that are delayed as much as
         // its own.
-        bounds.speed_max_mps * less(self.data_age_s(), bounds.silent_s + 2.0 * self.delay_s)
+        bounds.speed_max_mps * fast_min(self.data_age_s(), bounds.silent_s + 2.0 * self.delay_s)
     }
 
     /// Distance that the neighbour may fly until it has stopped, with `ahead_s` more seconds of
@@ -155,7 +155,7 @@ impl NeighbourMotion<'_> {
         let gained_mps = bounds.braking.accel_mps2 * (self.data_age_s() + REACTION_S);
         let max_mps = bounds.speed_max_mps;
         let most_mps = if self.speed_mps > max_mps { self.speed_mps } else { max_mps };
-        let speed_mps = less(less(self.speed_mps + gained_mps, most_mps), 2.0 * max_mps);
+        let speed_mps = fast_min(fast_min(self.speed_mps + gained_mps, most_mps), 2.0 * max_mps);
         let stop_m = bounds.braking.stop_m(speed_mps);
         speed_mps * (self.data_age_s() + REACTION_S + MAX_LAG_S)
             + stop_m

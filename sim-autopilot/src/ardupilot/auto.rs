@@ -16,7 +16,7 @@ use crate::itinerary::{LandedState, MissionLeg, interpolate_height};
 use crate::platform::{Platform, SensorReadings};
 
 /// Distance within which the place of a landing is reached, metres.
-const ARRIVED_M: f32 = 0.5;
+const LANDING_REACHED_M: f32 = 0.5;
 /// Distance to the target beyond which the vehicle turns its heading towards it, metres.
 const TURN_BEYOND_M: f32 = 2.0;
 
@@ -125,7 +125,7 @@ impl Copter {
             }
             Some(MissionLeg::Land { at: Some([east, north]) })
                 if libm::hypotf(east - sensors.position.x, north - sensors.position.y)
-                    > ARRIVED_M
+                    > LANDING_REACHED_M
                     && !sensors.touching =>
             {
                 let up = self.auto.stay.map_or(at.z, |stay| stay.z);

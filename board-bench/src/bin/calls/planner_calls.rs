@@ -322,8 +322,8 @@ fn measure_detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut 
         let _ = meter.call("detour::plan_detour, 128 things", bytes, || {
             detour::plan_detour(view, &request, &mut obstacles, search, &mut nodes, &mut own.path)
         });
-        let _ = meter.call("detour::plan_vehicle_detour, 128 things", bytes, || {
-            detour::plan_vehicle_detour(
+        let _ = meter.call("detour::plan_detour_for_vehicle, 128 things", bytes, || {
+            detour::plan_detour_for_vehicle(
                 view,
                 &request,
                 &mut obstacles,

@@ -63,7 +63,7 @@ pub fn start_links_executor() -> SendSpawner {
 }
 
 /// Starts the executor of plans and flash. To be called once.
-pub fn start_plans() -> SendSpawner {
+pub fn start_plans_executor() -> SendSpawner {
     interrupts::set_priority(Irq::Plans, interrupts::PLANS);
-    executors::start_plans(Irq::Plans)
+    executors::start_plans_executor(Irq::Plans)
 }

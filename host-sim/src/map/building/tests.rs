@@ -4,7 +4,7 @@ use crate::map::occupancy::Unknown;
 
 /// The floors that a vehicle with 0.8 m of clearance reaches from the lobby, over cell centres.
 fn floors_reached(map: &OccupancyMap) -> Vec<u32> {
-    let voxels = map.voxel_map(Unknown::Blocked);
+    let voxels = map.to_voxel_map(Unknown::Blocked);
     let (field, shape) = (ClearanceField::new(&voxels.grid()), voxels.shape);
     let start = shape.cell_of(&Point::new(20.0, 5.0, 1.5)).unwrap();
     let index = |[i, j, k]: [u32; 3]| ((k * shape.dims[1] + j) * shape.dims[0] + i) as usize;

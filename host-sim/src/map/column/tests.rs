@@ -99,7 +99,7 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
     for _ in 0..60 {
         let map = random_map(&mut rng);
         for unknown in [Unknown::Blocked, Unknown::Free] {
-            let voxels = map.voxel_map(unknown);
+            let voxels = map.to_voxel_map(unknown);
             let (min, size) = (map.shape().min, map.shape().max() - map.shape().min);
             for _ in 0..40 {
                 let p = min
@@ -153,7 +153,7 @@ fn what_is_wrong_with_a_column_is_named() {
     map.set([22, 20, 8], Occupancy::Occupied);
     map.set([8, 8, 0], Occupancy::Unknown);
     map.set([30, 30, 0], Occupancy::Free);
-    let voxels = map.voxel_map(Unknown::Blocked);
+    let voxels = map.to_voxel_map(Unknown::Blocked);
     let look =
         |x: f32, y: f32, z: f32| ground_below_column(&voxels, &Point::new(x, y, z), 0.3, 0.8);
     assert_eq!(look(5.0, 2.0, 4.0), Ok(0.25));

@@ -80,10 +80,10 @@ fn unknown_is_what_the_user_chose() {
     let counts = map.counts();
     let ones =
         |grid: &VoxelGrid<'_>| grid.words().iter().map(|w| u64::from(w.count_ones())).sum::<u64>();
-    let blocked = map.voxel_map(Unknown::Blocked);
+    let blocked = map.to_voxel_map(Unknown::Blocked);
     assert_eq!(ones(&blocked.grid()), counts.occupied + counts.unknown);
     assert_eq!(ones(&blocked.never_sample_grid()), counts.occupied + counts.unknown);
-    let free = map.voxel_map(Unknown::Free);
+    let free = map.to_voxel_map(Unknown::Free);
     assert_eq!(ones(&free.grid()), counts.occupied);
     assert_eq!(ones(&free.never_sample_grid()), counts.occupied + counts.unknown);
     assert_eq!((blocked.outside, free.outside), (Outside::Blocked, Outside::Free));
@@ -104,12 +104,12 @@ fn the_ground_is_the_first_obstacle_below() {
         let solid = (i == 0 && (k == 0 || k == 4)) || (i == 1 && k == 7);
         map.set([i, 0, k], if solid { Occupancy::Occupied } else { Occupancy::Free });
     }
-    let blocked = map.voxel_map(Unknown::Blocked);
+    let blocked = map.to_voxel_map(Unknown::Blocked);
     assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 2.4)), Some(1.5));
     assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 0.9)), Some(-0.5));
     assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 1.2)), Some(1.2), "inside an obstacle");
     assert_eq!(blocked.ground_below(&Point::new(0.7, 0.2, 9.0)), Some(3.0), "above the map");
     assert_eq!(blocked.ground_below(&Point::new(1.2, 0.2, 2.0)), Some(-1.0), "the map's floor");
     assert_eq!(blocked.ground_below(&Point::new(9.0, 0.2, 2.0)), None);
-    assert_eq!(map.voxel_map(Unknown::Free).ground_below(&Point::new(1.2, 0.2, 2.0)), None);
+    assert_eq!(map.to_voxel_map(Unknown::Free).ground_below(&Point::new(1.2, 0.2, 2.0)), None);
 }

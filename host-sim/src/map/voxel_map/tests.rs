@@ -8,7 +8,7 @@ fn nodes_lie_in_cells_that_are_entirely_inside_the_box() {
     map.fill([1, 0, 0], shape.dims, Occupancy::Free);
     map.set([7, 4, 3], Occupancy::Occupied);
     for unknown in [Unknown::Blocked, Unknown::Free] {
-        let map = map.voxel_map(unknown);
+        let map = map.to_voxel_map(unknown);
         let (min, max) = (map.shape.min, map.shape.max());
         let boxes = [
             (Point::repeat(-1e9), Point::repeat(1e9)),

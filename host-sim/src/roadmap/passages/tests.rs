@@ -32,7 +32,7 @@ fn rooms(rng: &mut Pcg32, count: u32) -> VoxelMap {
             }
         }
     }
-    map.voxel_map(Unknown::Blocked)
+    map.to_voxel_map(Unknown::Blocked)
 }
 
 #[test]

@@ -81,7 +81,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
     if let Some(terrain) = &terrain {
         terrain.apply_terrain(text, &mut area, &mut vehicles, &mission, &simulation)?;
     }
-    let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
+    let vehicle_places = vehicles.iter().map(|(_, s)| text.file_and_line(&s.start)).collect();
     let (vehicles, spans): (Vec<VehicleSection>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
     let apart_m =
         margins::min_pad_distance_m(&simulation, deconfliction.safety_distance_m, &vehicles);
@@ -226,7 +226,7 @@ fn read_area(
     let layer_m = table.f32("layer_m", 5.0, 0.1..=1000.0)?;
     let method = table.get("method").map(|v| v.one_of(&CoverageMethod::NAMES)).transpose()?;
     let area = AreaSection {
-        place: table.text.line(&source),
+        place: table.text.file_and_line(&source),
         vertices,
         rings,
         given_zones: polygons.no_fly.len(),

@@ -18,7 +18,7 @@ use super::{
 use crate::capacity::VEHICLES;
 use crate::files;
 use crate::margins;
-use crate::quote::{printable_path, quoted};
+use crate::quote::{printable, printable_path};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
 use crate::scenario::{AssignmentObjective, MissionMode, MissionSection, Scenario, VehicleSection};
@@ -55,7 +55,8 @@ pub(in crate::scenario) fn read_goals_scenario(
     check_starts_apart(text, &vehicles, deconfliction.safety_distance_m)?;
     check_labelled_goals(text, &vehicles, &mission)?;
     check_inside_geofence(&mission_table, &vehicles, &mission)?;
-    let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
+    let vehicle_places =
+        vehicles.iter().map(|(_, spans)| text.file_and_line(&spans.start)).collect();
     let vehicles: Vec<VehicleSection> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
     check_goals_apart(
         &mission_table,
@@ -147,7 +148,7 @@ fn read_mission(
             check_list_len(list, goals.len(), VEHICLES, "goals")?;
             goals
                 .iter()
-                .map(|v| Ok((read_place(v, origin)?, table.text.line(&v.span))))
+                .map(|v| Ok((read_place(v, origin)?, table.text.file_and_line(&v.span))))
                 .collect::<Result<_>>()?
         }
         (None, Some(file)) => read_goals_file(file, folder)?,
@@ -205,7 +206,7 @@ fn read_goals_file(value: &TomlValue<'_>, folder: &Path) -> Result<Vec<(Point, S
                 let place = format!("{}:{}", printable_path(&path), index + 1);
                 return Err(value.error(&format!(
                     "is malformed: {place}: expected `x y z` in metres, found `{}`",
-                    quoted(line)
+                    printable(line)
                 )));
             }
         }

@@ -12,7 +12,7 @@ impl SimulatedVehicle {
         let truth = self.autopilot.true_state();
         let state = self.state();
         // A board's reported state is up to a second old; the autopilot's landing is known at once.
-        let lands = self.board.is_some() && self.autopilot.is_landing();
+        let lands = self.board.is_some() && self.autopilot.is_in_land_mode();
         let on_path = state.is_on_path_or_stopping() || state.is_interrupted_by_loss();
         let phase = match (truth.touching, on_path && !lands) {
             (touching, _) if self.wrecked => {

@@ -30,7 +30,7 @@ fn pictures_stand_at_both_ends_of_a_stretch_and_evenly_between() {
     let third = stretches.next().unwrap();
     assert_eq!((third.from_m, third.to_m, third.step_m, third.count), (80.0, 80.0, 0.0, 1));
     assert_eq!(stretches.next(), None);
-    assert_eq!(photographs.count(&path), 11);
+    assert_eq!(photographs.planned_count(&path), 11);
     for (along_m, taken, last_m) in [
         (-1.0, 0, None),
         (0.0, 1, Some(0.0)),

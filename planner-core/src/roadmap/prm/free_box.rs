@@ -18,10 +18,11 @@ use crate::map::segment::{
 use crate::map::voxel::VoxelGrid;
 
 /// Margin for rounding, in cells. Coordinates in cells are computed to within 2⁻¹¹ cell as long as
-/// the grid has at most [`MAX_CELLS`] cells a side: two roundings of a coordinate err by 2 · 4096 ·
-/// 2⁻²⁴ = 2⁻¹¹ at worst, and snapping in the exact check by 2⁻¹⁵.
+/// the grid has at most [`MAX_GRID_SIDE_CELLS`] cells a side: two roundings of a coordinate err by
+/// 2 · 4096 · 2⁻²⁴ = 2⁻¹¹ at worst, and snapping in the exact check by 2⁻¹⁵.
 const ROUNDING_CELLS: f32 = 1.0 / 512.0;
-const MAX_CELLS: u32 = 4096;
+/// Most cells a side of a grid in which free boxes are used.
+const MAX_GRID_SIDE_CELLS: u32 = 4096;
 /// Depth behind a face of the box at which the cell that a segment enters is looked up, in cells.
 const PROBE_DEPTH_CELLS: f32 = 1.0 / 64.0;
 /// Most free boxes that are kept for reuse. Nodes come in the order of their cubes, a few rooms at
@@ -77,7 +78,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
             clearance_m: config.clearance_m,
             clearance_cells: config.clearance_m / resolution,
             cells_per_m: 1.0 / resolution,
-            reach: (config.edge_max_m / resolution).min(MAX_CELLS as f32) as i32 + 1,
+            reach: (config.edge_max_m / resolution).min(MAX_GRID_SIDE_CELLS as f32) as i32 + 1,
             boxes: [FreeBox::default(); MAX_BOXES],
             newest: 0,
             here: [0.0; 3],
@@ -93,7 +94,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         self.here = here;
         self.snapped = snap(shape, &Point::from(here));
         self.view = None;
-        if shape.dims.iter().any(|&d| d > MAX_CELLS) {
+        if shape.dims.iter().any(|&d| d > MAX_GRID_SIDE_CELLS) {
             return;
         }
         self.at = [0, 1, 2].map(|axis| (here[axis] - shape.min[axis]) * self.cells_per_m);

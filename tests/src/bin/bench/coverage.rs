@@ -227,7 +227,7 @@ fn write_out(work: &Work<'_, LANES, 8>, plan: &RoutePlan<VEHICLES>, points: &mut
             let to = route.end.min(lane.first + lane.count) - 1 - lane.first;
             points.extend([from, to].map(|k| at(&lane.waypoint(k), mission_m)));
         }
-        if route.heading == RouteDirection::Backward {
+        if route.direction == RouteDirection::Backward {
             points[begins..].reverse();
         }
         let [first, last] = [points[begins], points[points.len() - 1]];

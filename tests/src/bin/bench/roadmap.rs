@@ -71,7 +71,7 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
     bt::write(&map.to_octree("builtin:building")?, &files[0])?;
     let terminals = terminals();
     write_terminals(&files, &terminals)?;
-    let voxels = map.voxel_map(Unknown::Blocked);
+    let voxels = map.to_voxel_map(Unknown::Blocked);
     let grid = voxels.grid();
     let mut ours = Ours::new(&grid, &terminals);
     let two = rayon::ThreadPoolBuilder::new().num_threads(2).build()?;
