@@ -16,8 +16,8 @@ use crate::quote::printable_path;
 
 /// Longest text file that is read, bytes: a scenario, a list of goals or an area.
 pub const MAX_TEXT_BYTES: u64 = 1 << 20;
-/// Longest roadmap, mission or plan file that is read, bytes (64 MiB); the largest that this
-/// program writes have some 20 MB.
+/// Longest roadmap, mission, plan or picture file that is read, bytes (64 MiB); the largest that
+/// this program writes have some 20 MB.
 pub const MAX_BINARY_BYTES: u64 = 1 << 26;
 
 /// Reads all bytes of a regular file of at most `most` bytes.

@@ -206,7 +206,8 @@ pub struct RoadmapSize {
     pub nodes: usize,
     /// Number of edges, each counted once.
     pub edges: usize,
-    /// Length of the roadmap file, bytes.
+    /// Length of the roadmap file, bytes; in a coverage mission that of the field file, 0 over
+    /// level ground.
     pub bytes: usize,
 }
 

@@ -56,7 +56,8 @@ impl ParamValue {
         self.as_i32().map(|_| self.with_same_type(integer))
     }
 
-    /// `integer` as a value of the same type, clamped to its range.
+    /// `integer` as a value of the same integer type, clamped to its range; an `Int` if this is a
+    /// float.
     fn with_same_type(self, integer: i32) -> Self {
         match self {
             Int8(_) => Int8(integer.clamp(i32::from(i8::MIN), i32::from(i8::MAX)) as i8),

@@ -129,8 +129,9 @@ pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> Cov
     findings
 }
 
-/// The four corners of each picture's footprint on the ground, in order around it, metres east and
-/// north.
+/// For each picture the four corners of the rectangle that it is counted to show, in order around
+/// it, metres east and north: the picture's footprint on the ground, or, if that is rotated against
+/// the lanes, a rectangle within it.
 pub fn footprints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> Vec<[[f32; 2]; 4]> {
     let cells = CoverageCells::new(planned);
     pictures.iter().map(|picture| cells.footprint_corners(planned, picture)).collect()

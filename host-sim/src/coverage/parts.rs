@@ -30,7 +30,8 @@ pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> C
     coverage_layers(planned, divisions, pictures)
 }
 
-/// The layers of a plan or a flight, with the footprint of each picture on the ground.
+/// The layers of a plan or a flight, with the rectangle on the ground that each picture is counted
+/// to show ([`check::footprints`]).
 pub(crate) fn coverage_layers(
     planned: &CoveragePlan<'_>,
     divisions: Vec<ReportDivision>,

@@ -29,7 +29,8 @@ pub trait ByteLink: Send {
         Instant::now()
     }
 
-    /// Waits a millisecond; called when nothing was received.
+    /// Waits a millisecond, or lets a simulation behind the link run; called when nothing was
+    /// received.
     fn wait_briefly(&mut self) {
         std::thread::sleep(Duration::from_millis(1));
     }

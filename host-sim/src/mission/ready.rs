@@ -135,7 +135,7 @@ impl PreparedMission {
         Some(terrain_m.unwrap_or(below_m).max(top_m.unwrap_or(f32::NEG_INFINITY)))
     }
 
-    /// Numbers of nodes and edges, and bytes, of the roadmap.
+    /// Numbers of nodes and edges of the roadmap, and length of the roadmap or field file, bytes.
     pub fn roadmap_size(&self) -> RoadmapSize {
         RoadmapSize {
             nodes: self.roadmap.nodes.len(),

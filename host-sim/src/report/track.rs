@@ -11,13 +11,13 @@ pub struct TrackPoint {
     pub position: Point,
 }
 
-/// Footprint of a picture on the ground.
+/// The rectangle on the ground that a picture is counted to show.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureFootprint {
     /// When the picture was taken, seconds.
     pub t_s: f32,
     /// Vehicle that took the picture; 0 for a picture of an earlier flight.
     pub vehicle: u8,
-    /// Corners of the footprint in order around it, metres east and north.
+    /// Corners of the rectangle in order around it, metres east and north.
     pub corners: [[f32; 2]; 4],
 }

@@ -58,7 +58,8 @@ pub struct UnsupportedTable {
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapSection {
     /// Name of a built-in map, or path of the map file relative to the working directory (resolved
-    /// against the scenario's folder). Empty in a coverage mission: level ground at height 0.
+    /// against the scenario's folder). Empty in a coverage mission: level ground, at height 0 or at
+    /// the terrain's lowest height.
     pub file: String,
     /// Edge of a cell of the planning grid, metres.
     pub resolution_m: f32,

@@ -107,7 +107,8 @@ pub struct Referee<'a> {
     pub wall_contacts: u32,
     /// Number of times that a pair came nearer than the safety distance.
     pub violations: u32,
-    /// Number of vehicles that made no progress in flight for 20 s.
+    /// Number of times that a vehicle made no progress in flight for 20 s; without those that
+    /// ended, if [`Self::retracts_ended_deadlocks`].
     pub deadlocks: u32,
     /// Smallest distance of a flying centre to an obstacle in the whole flight, metres.
     pub min_clearance_m: f32,

@@ -114,7 +114,7 @@ impl Route {
 }
 
 /// The division of a path: at most one route per vehicle, in the order of the path. A vehicle
-/// without a route stays on the ground.
+/// without a route stays on its pad, or flies home if it is in the air.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RoutePlan<const K: usize> {
     /// The routes, in the order of the path.

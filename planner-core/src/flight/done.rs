@@ -12,8 +12,8 @@ pub struct WaypointRange {
     pub end: u32,
 }
 
-/// A set of waypoints that only grows, kept as at most `N` ranges in ascending order, which neither
-/// overlap nor touch.
+/// A set of waypoints, kept as at most `N` ranges in ascending order, which neither overlap nor
+/// touch. No single waypoint is ever removed: the set only grows until it is cleared.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WaypointSet<const N: usize> {
     ranges: Vec<WaypointRange, N>,

@@ -186,7 +186,8 @@ impl PicturePlan {
         }
     }
 
-    /// The same plan for an area of `area` waypoints, whose numbers along the path have this order.
+    /// The same plan, for an area with `area` waypoints, whose numbers rise or fall along the path
+    /// as `order` says.
     pub const fn with_area(self, area: u32, order: WaypointOrder) -> Self {
         Self { area, order, ..self }
     }

@@ -58,9 +58,9 @@ pub enum RoadmapError {
     /// The distance of this node to a landmark is beyond [`MAX_LANDMARK_DISTANCE_M`], or is not the
     /// length of the shortest path over all edges.
     Landmark(u16),
-    /// The height of this node above the ground is NaN, negative or beyond
+    /// The height of this node above the ground is NaN, negative, or finite and beyond
     /// [`MAX_LANDMARK_DISTANCE_M`]; or the number of heights is not the number of nodes, and this
-    /// is the first node without one.
+    /// is the first node without one. (An infinite height is allowed: nothing is below the node.)
     Height(u16),
     /// The workspace in which the distances to landmarks are computed holds fewer nodes than the
     /// roadmap has.

@@ -115,7 +115,8 @@ const MAX_PATH_SAMPLES: usize = 16;
 /// Time of flight between neighbouring samples of the path, seconds.
 const PATH_SAMPLE_S: f32 = 0.25;
 
-/// Distances that differ by less than this count as equal, metres.
+/// Margin for the rounding of distances, metres: subtracted from the distance to a conflict before
+/// samples are skipped by it.
 const DISTANCE_ROUNDING_M: f32 = 0.05;
 /// Distance beyond a gate at which the reference still counts as standing at it, metres: a small
 /// overshoot of the stop must not carry the vehicle through.
@@ -139,8 +140,9 @@ fn stopping_distance_apart_m(cfg: &DeconflictConfig, speed_mps: f32) -> f32 {
 }
 
 /// Advice to the vehicle `own`; `gates` must be sorted along its path. Work: the gates, a search
-/// among the neighbours for each gate within reach, and for each neighbour that does not fly the
-/// shared plan 16 points (`MAX_PATH_SAMPLES`) of the own path.
+/// among the neighbours for each gate within reach, and 16 points (`MAX_PATH_SAMPLES`) of the own
+/// path for each airborne neighbour that is off its path of the plan, or for every airborne one
+/// while `own` flies a detour; up to twice as many for one that hovers.
 pub fn advise<const W: usize>(
     cfg: &DeconflictConfig,
     own: &OwnVehicle<'_, W>,

@@ -108,9 +108,9 @@ impl Copter {
         self.goal
     }
 
-    /// Demand to land: descends as if to stop at `LAND_ALT_LOW` above home, at least at
-    /// `LAND_SPEED` and at most at `WPNAV_SPEED_DN` (`Mode::land_run_vertical_control`). Heights
-    /// count from home, since no rangefinder measures the ground.
+    /// The goal that lands the vehicle: it descends as if to stop at `LAND_ALT_LOW` above home, at
+    /// least at `LAND_SPEED` and at most at `WPNAV_SPEED_DN` (`Mode::land_run_vertical_control`).
+    /// Heights count from home, since no rangefinder measures the ground.
     pub(super) fn landing_goal(&self, sensors: &SensorReadings) -> GuidedGoal {
         let tuning = &self.tuning;
         let above_low = sensors.position.z - sensors.home.z - tuning.land_slow_below.max(1.0);

@@ -88,7 +88,7 @@ pub(super) fn clock_config(revision: Revision, source: ClockSource) -> embassy_s
 
 /// Sets the MPU's regions, then enables both caches.
 pub(super) fn configure_mpu_and_caches() {
-    // Region `flash::ROADMAP_REGION` stays disabled until a roadmap is lent.
+    // MPU region `flash::ROADMAP_REGION` stays disabled until a roadmap is lent (`Flash::lend`).
     let regions = [
         Some(h743::EXTERNAL),
         Some(h743::DMA),
