@@ -38,7 +38,7 @@ use crate::scenario::coverage::{AreaSection, CoverageMethod, ORIGIN_HINT};
 use crate::scenario::{Scenario, VehicleSection};
 
 /// Most changes of the lanes' order that the host tries while it shortens the path.
-pub const MAX_ORDER_CHANGES: u32 = 20_000_000;
+pub const HOST_SEARCH_STEPS: u32 = 20_000_000;
 
 /// Greatest height of a start above or below the ground, metres.
 const MAX_OFF_GROUND_M: f32 = 1.5;
@@ -56,7 +56,7 @@ impl<'a> CoveragePlan<'a> {
         // A pad may be on a roof, unless the origin's altitude is 0, which counts as not given.
         let given = scenario.area.as_ref().is_some_and(|area| area.origin.alt_m != 0.0);
         check_starts(scenario, if given { f32::INFINITY } else { MAX_OFF_GROUND_M })?;
-        Self::plan_with_search(scenario, method, MAX_ORDER_CHANGES)
+        Self::plan_with_search(scenario, method, HOST_SEARCH_STEPS)
     }
 
     /// Plans as companions do: with the scenario's method and as few changes of the lanes' order as
@@ -153,7 +153,7 @@ impl<'a> CoveragePlan<'a> {
     /// the mission's start.
     pub fn flights(&self) -> Vec<SortieFlight> {
         let flight = |sortie: &Sortie| {
-            let points = flight::route_points(self, &sortie.route);
+            let points = flight::flight_points(self, &sortie.route);
             let mut times_s = flight::passing_times_s(self, &sortie.route, &points);
             times_s.iter_mut().for_each(|time| *time += sortie.begin_s + sortie.depart_s);
             (*sortie, points, times_s)
@@ -252,7 +252,7 @@ impl<'a> CoveragePlan<'a> {
     fn check_fence(&self) -> anyhow::Result<()> {
         let Some(fence) = &self.scenario.mission.geofence else { return Ok(()) };
         for sortie in &self.sorties {
-            let points = flight::route_points(self, &sortie.route);
+            let points = flight::flight_points(self, &sortie.route);
             let Some(point) = points.iter().find(|point| !fence.contains(&point.position)) else {
                 continue;
             };
@@ -323,7 +323,7 @@ pub fn check_starts_on_ground(scenario: &Scenario) -> anyhow::Result<()> {
     check_starts(scenario, MAX_OFF_GROUND_M)
 }
 
-/// Refuses a start below the ground, or more than `most_m` above it.
+/// Refuses a start more than [`MAX_OFF_GROUND_M`] below the ground, or more than `most_m` above it.
 fn check_starts(scenario: &Scenario, most_m: f32) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
     let above_m = |v: &VehicleSection| v.start.z - area.ground_m(&v.start.xy());

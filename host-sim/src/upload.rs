@@ -95,7 +95,7 @@ impl FtpClient {
         Self { own_system, ..self }
     }
 
-    fn send(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
+    fn send_frame(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         self.frames = self.frames.wrapping_add(1);
         self.link.send(bytes).context("link lost")
     }
@@ -117,7 +117,7 @@ impl FtpClient {
             };
             let mut out = [0; frame::MAX_FRAME_LEN];
             let length = frame::encode(self.header(), &beat, &mut out);
-            self.send(&out[..length])?;
+            self.send_frame(&out[..length])?;
         }
         let mut buffer = [0; 2048];
         let length = self.link.receive(&mut buffer).context("link lost")?;
@@ -171,7 +171,7 @@ impl FtpClient {
         let mut out = [0; frame::MAX_FRAME_LEN];
         let extra = frame::extra_crc(MESSAGE_ID).context("the dialect has FTP")?;
         let length = frame::encode_raw(self.header(), MESSAGE_ID, extra, payload, &mut out);
-        self.send(&out[..length])
+        self.send_frame(&out[..length])
     }
 
     fn receive_answers(&mut self) -> anyhow::Result<Vec<FtpReply>> {

@@ -163,7 +163,7 @@ pub(crate) fn departure_with_conflict_counts<const W: usize>(
         }
         met(nth, [own_in_conflict.iter().map(|bits| bits.count_ones()).sum(), others_in_conflict]);
     }
-    first_allowed(forbidden, not_before_s).ok_or(ScheduleError::Blocked)
+    first_allowed_departure(forbidden, not_before_s).ok_or(ScheduleError::Blocked)
 }
 
 /// The interval of differences in take-off time, `a` minus `b`, outside which the two flights have
@@ -192,7 +192,7 @@ pub(crate) fn forbidden_differences<const W: usize>(
 }
 
 /// The earliest time ≥ `from_s` outside all forbidden intervals; `None` if there is none.
-fn first_allowed(forbidden: &[(f32, f32)], from_s: f32) -> Option<f32> {
+fn first_allowed_departure(forbidden: &[(f32, f32)], from_s: f32) -> Option<f32> {
     let mut time_s = from_s;
     // Intervals do not overlap, so each moves the time at most once.
     for _ in 0..=forbidden.len() {
@@ -206,7 +206,7 @@ fn first_allowed(forbidden: &[(f32, f32)], from_s: f32) -> Option<f32> {
 }
 
 /// The latest time ≤ `until_s` outside all forbidden intervals.
-fn last_allowed(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
+fn last_allowed_departure(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
     let mut time_s = until_s;
     for _ in 0..=forbidden.len() {
         match forbidden.iter().find(|&&(low, high)| low < time_s && time_s < high) {

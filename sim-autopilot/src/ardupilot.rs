@@ -34,10 +34,10 @@ use self::setpoint::GuidedGoal;
 use super::command::{Arming, CommandOutcome};
 use super::msg::SET_POSITION_TARGET_LOCAL_NED;
 use super::params::Params;
-use super::platform::{ControlDemand, IntegralAction, Platform, SensorReadings};
+use super::platform::{FlightModeOutput, IntegralAction, Platform, SensorReadings};
 use super::port::Sender;
 use super::status::{AutopilotStatus, MotorState};
-use super::vehicle::{Demand, VehicleLimits};
+use super::vehicle::{AirframeParameters, Demand};
 use super::wire::PayloadReader;
 use crate::{GpsFix, SimulatedKind};
 
@@ -159,8 +159,8 @@ pub struct Copter {
 
 impl Copter {
     /// ArduCopter as it boots: disarmed in STABILIZE; its estimator has a position after `ready_s`.
-    pub fn new(system_id: u8, limits: &VehicleLimits, ready_s: f32) -> Self {
-        let params = params::default_params(system_id, limits);
+    pub fn new(system_id: u8, airframe: &AirframeParameters, ready_s: f32) -> Self {
+        let params = params::default_params(system_id, airframe);
         Self {
             tuning: CopterTuning::new(&params),
             params,
@@ -336,7 +336,7 @@ impl Copter {
         platform: &mut Platform,
         sensors: &SensorReadings,
         dt_s: f32,
-    ) -> ControlDemand {
+    ) -> FlightModeOutput {
         let now_us = sensors.now_us;
         self.send_unsolicited_messages(platform, now_us);
         if self.armed {
@@ -347,7 +347,7 @@ impl Copter {
         if !self.armed {
             // A vehicle disarmed in the air falls; it has landed when it touches the ground.
             self.landed |= sensors.touching;
-            return self.idle_demand();
+            return self.idle_output();
         }
         if self.landed
             && let Some(takeoff) = self.takeoff
@@ -361,7 +361,7 @@ impl Copter {
             self.reference = CopterReference::new(sensors.position, Point::zeros());
         }
         if self.landed {
-            return self.idle_demand();
+            return self.idle_output();
         }
         let demand = self.demand(sensors, dt_s);
         self.detect_landing(sensors, &demand);
@@ -370,19 +370,20 @@ impl Copter {
         } else {
             IntegralAction::Keep
         };
-        ControlDemand { motors: MotorState::Lifting, integral, demand }
+        FlightModeOutput { motors: MotorState::Lifting, integral, demand }
     }
 
     /// Output while the motors are off or idle.
-    fn idle_demand(&self) -> ControlDemand {
-        ControlDemand {
+    fn idle_output(&self) -> FlightModeOutput {
+        FlightModeOutput {
             motors: MotorState::Idle,
             integral: IntegralAction::Clear,
             demand: self.tuning.default_demand(),
         }
     }
 
-    /// Starts the failsafes: lost position (LAND), silent ground station (RTL), low battery.
+    /// Starts the failsafes: lost position (LAND), silent ground station (RTL), low battery. That
+    /// of a lost position ends once there is a position again, but the mode stays LAND.
     fn update_failsafe(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         let now_us = sensors.now_us;
         let since = |start: u64| now_us.saturating_sub(start);

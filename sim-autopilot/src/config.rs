@@ -4,7 +4,7 @@ use planner_core::Point;
 use planner_core::geo::frames::{Geodetic, Projection};
 
 use super::estimator::EstimateErrorState;
-use super::vehicle::VehicleLimits;
+use super::vehicle::AirframeParameters;
 use crate::{EstimatorErrors, SimulatedKind};
 
 impl SimulatedKind {
@@ -52,8 +52,8 @@ pub struct AutopilotConfig {
     pub start: Point,
     /// Heading at the start, radians clockwise from north.
     pub heading_rad: f32,
-    /// Limits and dynamics of the airframe.
-    pub vehicle: VehicleLimits,
+    /// Size, limits and dynamics of the airframe.
+    pub vehicle: AirframeParameters,
     /// Mean wind, ENU m/s.
     pub wind: Point,
     /// Largest speed of gusts beyond the mean wind, m/s.
@@ -85,7 +85,7 @@ impl Default for AutopilotConfig {
     /// perfect estimate.
     fn default() -> Self {
         let origin = Geodetic { lat_deg: 47.397_742, lon_deg: 8.545_594, alt_m: 488.0 };
-        let vehicle = VehicleLimits::default();
+        let vehicle = AirframeParameters::default();
         Self {
             system_id: 1,
             autopilot: SimulatedKind::Px4,

@@ -4,7 +4,7 @@ use super::ardupilot::{self, Copter};
 use super::command::ReceivedCommand;
 use super::config::AutopilotConfig;
 use super::params::Params;
-use super::platform::{ControlDemand, Platform, SensorReadings};
+use super::platform::{FlightModeOutput, Platform, SensorReadings};
 use super::port::Sender;
 use super::px4;
 use super::px4::firmware::Px4;
@@ -79,13 +79,13 @@ impl Firmware {
         }
     }
 
-    /// Advances the mode logic by one step and returns the demand to the controller.
+    /// Advances the flight mode by one step; returns what it gives to the position controller.
     pub(super) fn update(
         &mut self,
         platform: &mut Platform,
         sensors: &SensorReadings,
         dt_s: f32,
-    ) -> ControlDemand {
+    ) -> FlightModeOutput {
         match self {
             Self::Px4(px4) => px4.update(platform, sensors),
             Self::Copter(copter) => copter.update(platform, sensors, dt_s),
@@ -148,7 +148,8 @@ impl Firmware {
         }
     }
 
-    /// Handles another system's HEARTBEAT, which only ArduCopter evaluates.
+    /// Handles another system's HEARTBEAT: ArduCopter's ground station failsafe uses it, the
+    /// simulated PX4 ignores it.
     pub(super) fn handle_heartbeat(&mut self, platform: &mut Platform, from: Sender) {
         if let Self::Copter(copter) = self {
             copter.handle_heartbeat(platform, from);

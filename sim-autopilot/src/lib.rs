@@ -73,7 +73,7 @@ use self::port::Port;
 pub use self::px4::Px4Mode;
 use self::snapshot::Snapshot;
 use self::status::{AutopilotFlags, MotorState};
-pub use self::vehicle::{TrueState, VehicleLimits, power_ratio_at_speed};
+pub use self::vehicle::{AirframeParameters, TrueState, power_ratio_at_speed};
 
 /// One simulated vehicle with its autopilot and MAVLink ports.
 #[derive(Clone, Debug)]
@@ -200,23 +200,23 @@ impl Autopilot {
     pub fn step(&mut self, dt_s: f32, ground_up_m: f32) {
         self.platform.advance_time(dt_s, ground_up_m);
         let sensors = self.platform.sensors();
-        let order = self.firmware.update(&mut self.platform, &sensors, dt_s);
+        let output = self.firmware.update(&mut self.platform, &sensors, dt_s);
         let (armed, landed) = (self.firmware.armed(), self.firmware.landed());
         let platform = &mut self.platform;
         platform.vehicle.set_flags(AutopilotFlags { armed, landed });
-        match order.integral {
+        match output.integral {
             IntegralAction::Keep => {}
             IntegralAction::Clear => platform.vehicle.reset_integral(),
             IntegralAction::Match => platform.vehicle.match_integral_to_demand(),
         }
-        if order.motors == MotorState::Lifting {
+        if output.motors == MotorState::Lifting {
             let gains = self.firmware.gains();
             let mut velocity = sensors.velocity;
-            velocity.z += order.demand.height_rate_weight * (sensors.height_rate - velocity.z);
-            platform.vehicle.control(&order.demand, gains, &sensors.position, &velocity, dt_s);
+            velocity.z += output.demand.height_rate_weight * (sensors.height_rate - velocity.z);
+            platform.vehicle.control(&output.demand, gains, &sensors.position, &velocity, dt_s);
         }
-        platform.last_demand = armed.then_some(order.demand);
-        platform.vehicle.advance(order.motors, &platform.disturbance.wind, ground_up_m, dt_s);
+        platform.last_demand = armed.then_some(output.demand);
+        platform.vehicle.advance(output.motors, &platform.disturbance.wind, ground_up_m, dt_s);
         platform.frame.recentre(platform.vehicle.position());
         platform.update_camera();
         self.transmit();

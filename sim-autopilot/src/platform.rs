@@ -50,9 +50,9 @@ pub struct SensorReadings {
     pub battery: f32,
 }
 
-/// Output of the mode logic in one step, for the vehicle's controller.
+/// What the flight mode gives to the position controller in one step.
 #[derive(Clone, Copy, Debug)]
-pub struct ControlDemand {
+pub struct FlightModeOutput {
     /// Whether the motors carry weight.
     pub motors: MotorState,
     /// What to do with the velocity controller's integral.
@@ -104,10 +104,10 @@ pub struct Platform {
 
 impl Platform {
     pub(super) fn new(config: &AutopilotConfig, streams: &[(u32, u32)]) -> Self {
-        let mut limits = config.vehicle;
-        limits.drag_per_s *= config.autopilot.drag_factor();
-        limits.wind_per_s *= config.autopilot.wind_factor();
-        let mut vehicle = Multicopter::new(limits, config.start);
+        let mut airframe = config.vehicle;
+        airframe.drag_per_s *= config.autopilot.drag_factor();
+        airframe.wind_per_s *= config.autopilot.wind_factor();
+        let mut vehicle = Multicopter::new(airframe, config.start);
         vehicle.set_heading(config.heading_rad);
         let start = config.start.cast::<f64>();
         let projection = config.autopilot.projection();

@@ -28,7 +28,7 @@ use self::params::Px4Tuning;
 use self::setpoint::OffboardSetpoint;
 use super::command::{Arming, CommandOutcome};
 use super::itinerary::MissionLeg;
-use super::platform::{ControlDemand, IntegralAction, Platform, SensorReadings};
+use super::platform::{FlightModeOutput, IntegralAction, Platform, SensorReadings};
 use super::shaping::JerkLimitedRate;
 use super::status::MotorState;
 use super::vehicle::Demand;
@@ -356,7 +356,7 @@ impl Commander {
     }
 
     /// Advances one step: failsafe, timers, flight phase, and the demand of the mode.
-    pub fn update(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) -> ControlDemand {
+    pub fn update(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) -> FlightModeOutput {
         let now = sensors.now_us;
         if self.armed {
             self.update_failsafe(sensors, tuning);
@@ -370,7 +370,7 @@ impl Commander {
                 self.landed_us = now;
             }
             let demand = tuning.default_demand();
-            return ControlDemand {
+            return FlightModeOutput {
                 motors: MotorState::Idle,
                 integral: IntegralAction::Clear,
                 demand,
@@ -414,7 +414,7 @@ impl Commander {
             FlightPhase::Ground => MotorState::Idle,
             FlightPhase::Ramp { .. } | FlightPhase::Flying => MotorState::Lifting,
         };
-        ControlDemand { motors, integral, demand }
+        FlightModeOutput { motors, integral, demand }
     }
 
     fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) {

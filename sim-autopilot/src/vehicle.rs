@@ -24,9 +24,9 @@ const GROUND_CONTACT_M: f32 = 0.002;
 /// against vertical air.
 const VERTICAL_WIND_SHARE: f32 = 0.2;
 
-/// Limits and dynamics of the airframe.
+/// Size, limits and dynamics of the airframe.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VehicleLimits {
+pub struct AirframeParameters {
     /// Radius of the body, metres: at rest its centre is this high above the ground.
     pub radius_m: f32,
     /// Horizontal speed limit, m/s (`MPC_XY_VEL_MAX`).
@@ -51,7 +51,7 @@ pub struct VehicleLimits {
     pub endurance_s: f32,
 }
 
-impl Default for VehicleLimits {
+impl Default for AirframeParameters {
     /// PX4's quadrotor defaults, with the drag of its simulator SIH (`SIH_KDV` 1 N s/m at
     /// `SIH_MASS` 1 kg): with it a replay of the recorded flights stays within 0.2 m. Real vehicles
     /// have less drag. So wind accelerates half as much as drag would suggest, still rather too
@@ -148,7 +148,7 @@ pub struct Gains {
 /// One simulated airframe with its position controller and true state.
 #[derive(Clone, Debug)]
 pub struct Multicopter {
-    limits: VehicleLimits,
+    airframe: AirframeParameters,
     state: TrueState,
     position: Vector3<f64>,
     thrust: Point,
@@ -161,7 +161,7 @@ pub struct Multicopter {
 
 impl Multicopter {
     /// A vehicle at rest at `position`, disarmed, with a full battery.
-    pub fn new(limits: VehicleLimits, position: Point) -> Self {
+    pub fn new(airframe: AirframeParameters, position: Point) -> Self {
         let state = TrueState {
             position,
             velocity: Point::zeros(),
@@ -174,7 +174,7 @@ impl Multicopter {
             battery: 1.0,
         };
         Self {
-            limits,
+            airframe,
             state,
             position: position.cast::<f64>(),
             thrust: Point::zeros(),
@@ -194,9 +194,9 @@ impl Multicopter {
         &self.position
     }
 
-    /// Limits and dynamics of the airframe.
-    pub fn limits(&self) -> &VehicleLimits {
-        &self.limits
+    /// Size, limits and dynamics of the airframe.
+    pub fn airframe(&self) -> &AirframeParameters {
+        &self.airframe
     }
 
     /// Acceleration by thrust alone, without gravity, ENU m/s²: it points along the body's vertical
@@ -277,7 +277,7 @@ impl Multicopter {
         let bounded_z = asked.z.clamp((demand.thrust_min - 1.0) * GRAVITY, GRAVITY);
         let across = libm::sqrtf(asked.x * asked.x + asked.y * asked.y);
         let across_max =
-            ((bounded_z + GRAVITY) * gains.tilt_tan).min(self.limits.acceleration_max_mps2);
+            ((bounded_z + GRAVITY) * gains.tilt_tan).min(self.airframe.acceleration_max_mps2);
         let saturated_z = bounded_z != asked.z;
         let saturated_xy = across > across_max;
         asked.z = bounded_z;
@@ -317,19 +317,19 @@ impl Multicopter {
     /// the body, metres ENU.
     pub fn advance(&mut self, motors: MotorState, wind: &Point, ground_up_m: f32, dt: f32) {
         let lift = motors == MotorState::Lifting;
-        let rest = f64::from(ground_up_m + self.limits.radius_m);
+        let rest = f64::from(ground_up_m + self.airframe.radius_m);
         let clearance = (self.position.z - rest) as f32;
         let target = if lift { self.acceleration_setpoint } else { Point::new(0.0, 0.0, -GRAVITY) };
-        let blend = dt / (dt + self.limits.lag_s);
+        let blend = dt / (dt + self.airframe.lag_s);
         let step = (target - self.thrust) * blend;
-        let most = self.limits.jerk_max_mps3 * dt;
+        let most = self.airframe.jerk_max_mps3 * dt;
         let norm = step.norm_squared();
         self.thrust +=
             if lift && norm > most * most { step * (most / libm::sqrtf(norm)) } else { step };
 
-        let push =
-            wind.component_mul(&Point::new(1.0, 1.0, VERTICAL_WIND_SHARE)) * self.limits.wind_per_s;
-        let mut acceleration = self.thrust + push - self.state.velocity * self.limits.drag_per_s;
+        let push = wind.component_mul(&Point::new(1.0, 1.0, VERTICAL_WIND_SHARE))
+            * self.airframe.wind_per_s;
+        let mut acceleration = self.thrust + push - self.state.velocity * self.airframe.drag_per_s;
         if clearance <= GROUND_CONTACT_M && acceleration.z <= 0.0 {
             // The ground carries the weight that thrust does not, and friction prevents sliding.
             acceleration = Point::zeros();
@@ -360,7 +360,7 @@ impl Multicopter {
             }
             MotorState::Idle => 0.04,
         };
-        self.state.battery = (self.state.battery - load * dt / self.limits.endurance_s).max(0.0);
+        self.state.battery = (self.state.battery - load * dt / self.airframe.endurance_s).max(0.0);
     }
 }
 

@@ -95,7 +95,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("around::plan_detour_for_vehicle, 128 things", "the same"),
     (
         "tracks::build_lanes, 256 vertices",
-        "lanes · vertices, and 2000 looks at the lanes' order, few of which take a way",
+        "lanes · vertices, and 2000 changes of the lanes' order tried, few of which take a way",
     ),
     ("tracks::build_lanes, 512 lanes", "the same"),
     ("lanes::Tracks::waypoint", "log of the lanes"),

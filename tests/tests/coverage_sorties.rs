@@ -25,7 +25,7 @@ fn with_batteries(text: &str, endurance_s: f32) -> String {
 
 /// Time of a route from pad to pad, with stops at both ends of each lane and over the pad, seconds.
 fn flown_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
-    let points = flight::route_points(planned, route);
+    let points = flight::flight_points(planned, route);
     let steady_s = flight::passing_times_s(planned, route, &points)
         .last()
         .copied()

@@ -3,7 +3,8 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::track::safety::{
-    Braking, Legs, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, PointsReach, ReachableSet,
+    Braking, Legs, MotionBounds, NeighbourMotion, OwnSet, PlaceOnPoints, ReachableSet,
+    ReportedPathReach,
 };
 
 use super::limits_results::{HARD_NUMBERS, Listener, Results, extreme_points};
@@ -36,7 +37,7 @@ pub(super) fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
             let points = &ahead[..i % 3];
             let place_on_points =
                 to.call("place::PlaceOnPoints::find", || PlaceOnPoints::find(&p, points, &p));
-            let along = || PointsReach::new(&p, points, &place_on_points, hard);
+            let along = || ReportedPathReach::new(&p, points, &place_on_points, hard);
             let heard = NeighbourMotion {
                 position: p,
                 velocity: p,
@@ -45,7 +46,7 @@ pub(super) fn call_reachable_sets(to: &mut Results<'_, impl Listener>) {
                 delay_s: 0.3,
                 points,
                 place_on_points,
-                points_reach: to.call("place::PointsReach::new", along),
+                reported_path_reach: to.call("place::ReportedPathReach::new", along),
                 rests_within_m: 0.0,
                 grounded: i % 5 == 0,
                 column_to_m: (i % 2 == 0).then_some(hard),

@@ -54,7 +54,7 @@ pub struct TimedFlight<'a> {
 }
 
 /// All points of a route's flight, from pad to pad.
-pub fn route_points(planned: &CoveragePlan<'_>, route: &Route) -> Vec<FlightPoint> {
+pub fn flight_points(planned: &CoveragePlan<'_>, route: &Route) -> Vec<FlightPoint> {
     let (vehicle, pad) = {
         let index = usize::from(route.vehicle);
         (&planned.vehicles[index], planned.scenario.vehicles[index].start)

@@ -62,7 +62,7 @@ pub fn route_duration_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
 /// at the corners at which its path rises or falls, seconds.
 fn terrain_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let vehicle = &planned.vehicles[usize::from(route.vehicle)];
-    let points = super::flight::route_points(planned, route);
+    let points = super::flight::flight_points(planned, route);
     let ups = points.windows(2).map(|pair| match pair[1].position.z - pair[0].position.z {
         up_m if up_m > 0.0 => up_m / vehicle.climb_mps,
         down_m => -down_m / vehicle.descend_mps,

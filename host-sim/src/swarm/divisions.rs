@@ -73,7 +73,7 @@ impl DivisionLog {
         if reported.number == reported.flown_number {
             reported.flown_crc = reported.plan_crc;
         }
-        self.note_division(t_s, roster.system_id);
+        self.log_flown_division(t_s, roster.system_id);
         if roster.hash == 0 {
             return;
         }
@@ -91,12 +91,12 @@ impl DivisionLog {
 
     fn take_intent(&mut self, t_s: f32, intent: &Intent) {
         self.vehicles.entry(intent.system_id).or_default().plan_crc = intent.plan_crc;
-        self.note_division(t_s, intent.system_id);
+        self.log_flown_division(t_s, intent.system_id);
     }
 
     /// Logs a division for `vehicle` once it reports both a higher number of divisions and another
     /// plan.
-    fn note_division(&mut self, t_s: f32, vehicle: u8) {
+    fn log_flown_division(&mut self, t_s: f32, vehicle: u8) {
         let reported = self.vehicles.entry(vehicle).or_default();
         if reported.number > reported.flown_number && reported.plan_crc != reported.flown_crc {
             (reported.flown_number, reported.flown_crc) = (reported.number, reported.plan_crc);

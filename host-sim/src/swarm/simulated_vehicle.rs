@@ -232,7 +232,7 @@ impl SimulatedVehicle {
                 .unwrap_or(f32::NEG_INFINITY);
         }
         self.autopilot.step(STEP_S, self.ground_m);
-        self.note_times(now_us as f64 * 1e-6);
+        self.note_flight_times(now_us as f64 * 1e-6);
         if self.killed {
             return Ok(());
         }
@@ -260,8 +260,8 @@ impl SimulatedVehicle {
         Ok(())
     }
 
-    /// Notes when the vehicle takes off, is lost and is down again.
-    fn note_times(&mut self, t_s: f64) {
+    /// Notes the times of take-off and loss, and when the vehicle is on the ground again.
+    fn note_flight_times(&mut self, t_s: f64) {
         let truth = self.autopilot.true_state();
         if !truth.touching && truth.armed {
             self.took_off_s.get_or_insert(t_s);

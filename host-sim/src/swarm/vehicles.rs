@@ -70,11 +70,11 @@ fn autopilot_config(
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
     let pad = vehicle.start - Point::new(0.0, 0.0, climb_m);
-    let limits = autopilot::VehicleLimits {
+    let airframe = autopilot::AirframeParameters {
         radius_m: vehicle.radius_m,
         speed_max_mps: vehicle.speed_max_mps,
         endurance_s: vehicle.battery_hover_s(),
-        ..autopilot::VehicleLimits::default()
+        ..autopilot::AirframeParameters::default()
     };
     let mut config = autopilot::AutopilotConfig {
         system_id: vehicle.id,
@@ -87,7 +87,7 @@ fn autopilot_config(
             .unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
         home: vehicle.home,
         start: pad,
-        vehicle: limits,
+        vehicle: airframe,
         wind: Point::new(settings.wind_mps, 0.0, 0.0),
         gust_mps: settings.gust_mps,
         position_noise_m: settings.position_noise_m,

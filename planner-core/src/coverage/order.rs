@@ -24,12 +24,12 @@ const MAX_MOVED: usize = 10;
 
 /// Sorts lanes into the order, and turns them in the directions, in which they are flown. The first
 /// `strips` of them run along the middle of strips, in the order of the strips, grouped into cells.
-/// `looks` is the number of search steps.
+/// The local search tries at most `search_steps` changes of the order.
 pub(super) fn order_lanes<const N: usize>(
     lanes: &mut [Lane],
     strips: usize,
     transit: &Transit<'_, N>,
-    looks: u32,
+    search_steps: u32,
 ) {
     if lanes.windows(2).all(|pair| pair[0].strip < pair[1].strip) {
         let first = usize::from(!is_first_lane_reversed(lanes));
@@ -38,7 +38,7 @@ pub(super) fn order_lanes<const N: usize>(
         }
         return;
     }
-    let mut search = LaneOrderSearch { transit, steps_left: looks };
+    let mut search = LaneOrderSearch { transit, steps_left: search_steps };
     order_cells(&mut lanes[..strips], transit);
     (1..=strips).for_each(|k| search.measure_links(&mut lanes[..strips], &[k]));
     search.shorten(&mut lanes[..strips]);

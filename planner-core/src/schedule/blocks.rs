@@ -31,8 +31,8 @@ const BLOCK_ROUNDING_M: f32 = 0.1;
 
 /// Most by which rounding shortens the length of a block's eight segments, metres.
 const LENGTH_ROUNDING_M: f32 = 0.01;
-/// The same as a share of the arc length at the block's end; the greater of both counts.
-const LENGTH_ROUNDING: f32 = 2e-6;
+/// The same as a share of the arc length at the end of the block; the greater of both counts.
+const LENGTH_ROUNDING_SHARE: f32 = 2e-6;
 
 /// A set of blocks of a flight: bit `i` is block `i`.
 pub(super) type BlockSet = u64;
@@ -60,7 +60,7 @@ impl SegmentBlock {
         let (first, last) = (&segments[0], &segments[segments.len() - 1]);
         let mut block = Self::around_line(first.from, last.to);
         segments.iter().for_each(|segment| block.bounding_box.include(&segment.to, &segment.to));
-        let rounding_m = fmaxf(LENGTH_ROUNDING_M, LENGTH_ROUNDING * last.to_m);
+        let rounding_m = fmaxf(LENGTH_ROUNDING_M, LENGTH_ROUNDING_SHARE * last.to_m);
         let length_m = last.to_m - first.from_m + rounding_m;
         let bent_sq = length_m * length_m - (last.to - first.from).norm_squared();
         block.lateral_extent_m = 0.5 * fpu::sqrtf(fmaxf(bent_sq, 0.0));

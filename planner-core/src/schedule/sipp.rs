@@ -19,7 +19,7 @@ use super::timed_segments::{
     Leg, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, MIN_PAD_HOLD_S, TimedSegment, WaitingPlaces,
     cut_into_segments, is_conflict, segment_count,
 };
-use super::{ForbiddenIntervals, add_forbidden_interval, first_allowed, last_allowed};
+use super::{ForbiddenIntervals, add_forbidden_interval, first_allowed_departure};
 use crate::flight::{Flight, Path};
 use crate::roadmap::search::heap::{Heap, SETTLED};
 use crate::roadmap::{HalfEdge, RoadmapView};
@@ -116,7 +116,7 @@ pub struct RouteQuery<'a> {
 struct Climb {
     up: Leg,
     /// Latest take-off, seconds: after it, another vehicle needs the space of the pad.
-    leave_by_s: f32,
+    latest_take_off_s: f32,
 }
 
 /// The descent from the goal's node to the ground.
@@ -163,15 +163,16 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
     let pad = start - Point::new(0.0, 0.0, flight.climb_m);
     let goal = view.node(route.to);
     let up = Leg::vertical_leg(pad, start, flight.climb_m / cfg.vertical_mps);
-    let climb = Climb { up, leave_by_s: ws.leave_pad_by_s(cfg, pad, &up, flight.segment_m) };
+    let climb =
+        Climb { up, latest_take_off_s: ws.latest_take_off_s(cfg, pad, &up, flight.segment_m) };
     let landing = ws.plan_landing(cfg, goal, flight.descent_m)?;
     let segment_m = flight.segment_m;
     // Lower bound of the time from `there` to the goal, seconds: the heuristic of A*.
     let left_s = |there: &Point| (goal - there).length() / cfg.cruise_mps;
 
     ws.add_states(cfg, view, route.from);
-    ws.forbid_departures(cfg, &up, segment_m, (route.not_before_s, climb.leave_by_s));
-    let leave_s = (route.not_before_s, climb.leave_by_s);
+    ws.forbid_departures(cfg, &up, segment_m, (route.not_before_s, climb.latest_take_off_s));
+    let leave_s = (route.not_before_s, climb.latest_take_off_s);
     let hop = StateTransition { node: route.from, parent: None, leave_s, duration_s: up.to_s };
     ws.relax_intervals(&hop, left_s(&start));
     while let Some(state) = ws.heap.pop() {
@@ -180,7 +181,8 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
         if reached.node == route.to {
             ws.forbid_departures(cfg, &landing.down, segment_m, leave_s);
             let from_s = fmaxf(reached.arrive_s, landing.after_s);
-            let land_s = first_allowed(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
+            let land_s =
+                first_allowed_departure(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
             if let Some(land_s) = land_s {
                 return write_flight(route, view, &climb, ws, (state, land_s), flight);
             }
@@ -196,12 +198,8 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
             let hop =
                 StateTransition { node: edge.target, parent: Some(state), leave_s, duration_s };
             if ws.may_improve(&hop) {
-                ws.forbid_departures(
-                    cfg,
-                    &leg_at_time_zero(here, there, duration_s),
-                    segment_m,
-                    leave_s,
-                );
+                let leg = leg_at_time_zero(here, there, duration_s);
+                ws.forbid_departures(cfg, &leg, segment_m, leave_s);
                 ws.relax_intervals(&hop, left_s(&there));
             }
         }
@@ -322,7 +320,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     }
 
     /// The latest take-off, seconds, before another vehicle needs the space of the pad.
-    fn leave_pad_by_s(&self, cfg: &ScheduleConfig, pad: Point, up: &Leg, segment_m: f32) -> f32 {
+    fn latest_take_off_s(&self, cfg: &ScheduleConfig, pad: Point, up: &Leg, segment_m: f32) -> f32 {
         // Held from −∞, so that it is not in conflict with another vehicle's pad.
         let on_pad = TimedSegment { from_s: f32::NEG_INFINITY, ..parked_segment(pad) };
         // The pad is held until the vehicle has flown the first timed segment of its climb.
@@ -374,8 +372,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         false
     }
 
-    /// Collects in `forbidden` the departures at which a flight along `leg` would be in conflict
-    /// with a scheduled one, as far as they matter for a departure within `leave_s`.
+    /// Sets `forbidden` to the departures at which a flight along `leg` would be in conflict with a
+    /// scheduled one. Those that do not matter from `leave_s.0` to `leave_s.1` may be missing.
     fn forbid_departures(
         &mut self,
         cfg: &ScheduleConfig,
@@ -427,7 +425,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             if self.heap.node_mark(index) == SETTLED {
                 continue;
             }
-            let leave_s = first_allowed(&self.forbidden, fmaxf(from_s, state.from_s - duration_s));
+            let leave_s =
+                first_allowed_departure(&self.forbidden, fmaxf(from_s, state.from_s - duration_s));
             let Some(leave_s) =
                 leave_s.filter(|&t| t <= until_s && t + duration_s <= state.until_s)
             else {
@@ -464,7 +463,7 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
         let before = ws.states[usize::from(reached.parent)];
         let here = view.node(reached.node);
         let (leg, until_s) = if first {
-            (climb.up, climb.leave_by_s)
+            (climb.up, climb.latest_take_off_s)
         } else {
             let from = view.node(before.node);
             (leg_at_time_zero(from, here, (here - from).length() / cfg.cruise_mps), before.until_s)
@@ -475,7 +474,7 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
         ws.forbid_departures(cfg, &leg, flight.segment_m, (earliest_s, latest_s));
         // Not before the departure that the search found free: forbidden intervals that were merged
         // for want of room may cover that time.
-        let left_s = fmaxf(last_allowed(&ws.forbidden, latest_s), earliest_s);
+        let left_s = fmaxf(super::last_allowed_departure(&ws.forbidden, latest_s), earliest_s);
         way.push((reached.node, left_s + duration_s, leave_s))
             .map_err(|_| ScheduleError::SegmentsFull)?;
         leave_s = left_s;

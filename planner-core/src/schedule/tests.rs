@@ -134,7 +134,8 @@ proptest! {
                 );
             }
         }
-        prop_assert_eq!(departure, first_allowed(&ws.forbidden, 0.0).ok_or(ScheduleError::Blocked));
+        let allowed = first_allowed_departure(&ws.forbidden, 0.0);
+        prop_assert_eq!(departure, allowed.ok_or(ScheduleError::Blocked));
         if let Ok(depart_s) = departure {
             let pair = [Flight { depart_s, ..own }, other];
             for index in 0..2 {

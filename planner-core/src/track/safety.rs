@@ -22,7 +22,7 @@ mod place;
 mod set;
 
 pub use self::own::{Legs, OwnSet};
-pub use self::place::{OFF_REPORTED_PATH_M, OFF_REPORTED_PATH_S, PlaceOnPoints, PointsReach};
+pub use self::place::{OFF_REPORTED_PATH_M, OFF_REPORTED_PATH_S, PlaceOnPoints, ReportedPathReach};
 pub use self::set::ReachableSet;
 use crate::{Point, SettingError, all_positive};
 
@@ -73,8 +73,8 @@ pub struct NeighbourMotion<'a> {
     pub points: &'a [Point],
     /// Where the neighbour is on its reported points.
     pub place_on_points: PlaceOnPoints,
-    /// Bounds of how far its reported points lead the neighbour.
-    pub points_reach: PointsReach,
+    /// How far its reported points lead the neighbour, from its position.
+    pub reported_path_reach: ReportedPathReach,
     /// Distance along its points within which a neighbour that has been silent for long may have
     /// stopped, metres; 0 for a neighbour that is heard.
     pub rests_within_m: f32,
@@ -127,7 +127,7 @@ impl NeighbourMotion<'_> {
             return self.reach_any_direction_m(bounds);
         }
         let until_stop_m = self.distance_until_stop_m(bounds, ahead_s);
-        let PointsReach { beyond_m, most_m } = self.points_reach;
+        let ReportedPathReach { beyond_m, most_m } = self.reported_path_reach;
         fast_min(until_stop_m + beyond_m + self.lateral_reach_m(bounds), most_m)
     }
 

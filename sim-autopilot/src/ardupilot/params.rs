@@ -5,7 +5,7 @@ use planner_core::Point;
 
 use crate::params::ParamValue::{self, Int, Int8, Int16, Real};
 use crate::params::{Encoding, Params};
-use crate::vehicle::{Demand, Gains, VehicleLimits};
+use crate::vehicle::{AirframeParameters, Demand, Gains};
 
 /// Default parameters, sorted by name.
 const DEFAULTS: &[(&str, ParamValue)] = &[
@@ -72,10 +72,10 @@ const DEFAULTS: &[(&str, ParamValue)] = &[
 ];
 
 /// The defaults, with `system_id` and the airframe's speed limit in the parameters that hold them.
-pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
+pub fn default_params(system_id: u8, airframe: &AirframeParameters) -> Params {
     let own = [
         ("SYSID_THISMAV", Int16(i16::from(system_id))),
-        ("WPNAV_SPEED", Real(100.0 * limits.speed_max_mps.min(10.0))),
+        ("WPNAV_SPEED", Real(100.0 * airframe.speed_max_mps.min(10.0))),
     ];
     Params::new(DEFAULTS, Encoding::Cast, &own)
 }

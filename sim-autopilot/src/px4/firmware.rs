@@ -10,10 +10,10 @@ use crate::command::{CommandOutcome, TEMPORARILY_REJECTED};
 use crate::itinerary::{LandedState, MissionLeg};
 use crate::msg::{COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED};
 use crate::params::Params;
-use crate::platform::{ControlDemand, Platform, SensorReadings};
+use crate::platform::{FlightModeOutput, Platform, SensorReadings};
 use crate::port::Sender;
 use crate::status::AutopilotStatus;
-use crate::vehicle::VehicleLimits;
+use crate::vehicle::AirframeParameters;
 use crate::wire::PayloadReader;
 
 /// Gimbal commands that PX4 was recorded to send when a failsafe starts: take control (1001), point
@@ -40,8 +40,8 @@ pub struct Px4 {
 
 impl Px4 {
     /// PX4 as it boots. The airframe's limits replace the defaults of some parameters.
-    pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
-        let params = params::default_params(system_id, limits);
+    pub fn new(system_id: u8, airframe: &AirframeParameters) -> Self {
+        let params = params::default_params(system_id, airframe);
         Self {
             commander: Commander::new(),
             tuning: Px4Tuning::new(&params),
@@ -56,7 +56,7 @@ impl Px4 {
         &mut self,
         platform: &mut Platform,
         sensors: &SensorReadings,
-    ) -> ControlDemand {
+    ) -> FlightModeOutput {
         self.commander.note_mission(platform);
         if let Some((from, mode)) = self.pending_mode.take() {
             let changed = match mode {
@@ -67,11 +67,11 @@ impl Px4 {
         }
         self.fly_mission(platform, sensors);
         let failed = self.commander.in_failsafe();
-        let order = self.commander.update(sensors, &self.tuning);
+        let output = self.commander.update(sensors, &self.tuning);
         if self.commander.in_failsafe() && !failed {
             send_gimbal_commands(platform);
         }
-        order
+        output
     }
 
     /// Updates the leg of the mission while AUTO.MISSION is active. A return item changes to

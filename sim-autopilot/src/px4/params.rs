@@ -6,7 +6,7 @@ use planner_core::Point;
 use crate::params::Encoding;
 use crate::params::ParamValue::{self, Int, Real};
 use crate::params::Params;
-use crate::vehicle::{Demand, Gains, VehicleLimits};
+use crate::vehicle::{AirframeParameters, Demand, Gains};
 
 /// Default parameters, sorted by name, as PX4 lists them.
 const DEFAULTS: &[(&str, ParamValue)] = &[
@@ -107,13 +107,13 @@ const DEFAULTS: &[(&str, ParamValue)] = &[
 ];
 
 /// The defaults, with `system_id` and the airframe's limits in the parameters that hold them.
-pub fn default_params(system_id: u8, limits: &VehicleLimits) -> Params {
+pub fn default_params(system_id: u8, airframe: &AirframeParameters) -> Params {
     let own = [
         ("MAV_SYS_ID", Int(i32::from(system_id))),
-        ("MPC_XY_VEL_MAX", Real(limits.speed_max_mps)),
-        ("MPC_Z_VEL_MAX_UP", Real(limits.climb_max_mps)),
-        ("MPC_Z_VEL_MAX_DN", Real(limits.descend_max_mps)),
-        ("MPC_TILTMAX_AIR", Real(limits.tilt_max_deg)),
+        ("MPC_XY_VEL_MAX", Real(airframe.speed_max_mps)),
+        ("MPC_Z_VEL_MAX_UP", Real(airframe.climb_max_mps)),
+        ("MPC_Z_VEL_MAX_DN", Real(airframe.descend_max_mps)),
+        ("MPC_TILTMAX_AIR", Real(airframe.tilt_max_deg)),
     ];
     Params::new(DEFAULTS, Encoding::Bytewise, &own)
 }

@@ -40,7 +40,7 @@ fn fly(vehicle: &mut Multicopter, demand: &Demand, wind: Point, seconds: f32) ->
 }
 
 fn airborne() -> Multicopter {
-    Multicopter::new(VehicleLimits::default(), Point::new(0.0, 0.0, 5.0))
+    Multicopter::new(AirframeParameters::default(), Point::new(0.0, 0.0, 5.0))
 }
 
 #[test]
@@ -78,7 +78,7 @@ fn jerk_and_speed_limits_hold() {
     let d = Demand { position: Point::new(-300.0, 0.0, 5.0), speed_max: 4.0, ..demand() };
     let (fastest, jerk) = fly(&mut v, &d, Point::zeros(), 15.0);
     assert!(fastest < 4.4, "fastest {fastest}");
-    assert!(jerk <= VehicleLimits::default().jerk_max_mps3 * 1.001, "jerk {jerk}");
+    assert!(jerk <= AirframeParameters::default().jerk_max_mps3 * 1.001, "jerk {jerk}");
 }
 
 #[test]
@@ -87,14 +87,14 @@ fn it_falls_without_lift_and_rests_on_the_ground() {
     for _ in 0..2000 {
         v.advance(MotorState::Idle, &Point::zeros(), 1.0, DT);
     }
-    let radius = VehicleLimits::default().radius_m;
+    let radius = AirframeParameters::default().radius_m;
     assert_eq!(v.state().position.z, 1.0 + radius);
     assert!(v.state().touching && v.state().velocity == Point::zeros());
 }
 
 #[test]
 fn a_parked_vehicle_is_not_blown_away() {
-    let mut v = Multicopter::new(VehicleLimits::default(), Point::new(1.0, 2.0, 0.3));
+    let mut v = Multicopter::new(AirframeParameters::default(), Point::new(1.0, 2.0, 0.3));
     for _ in 0..500 {
         v.advance(MotorState::Idle, &Point::new(15.0, 0.0, 0.0), 0.0, DT);
     }

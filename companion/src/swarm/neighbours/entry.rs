@@ -3,7 +3,7 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::track::deconflict::Neighbour;
-use planner_core::track::safety::{PlaceOnPoints, PointsReach};
+use planner_core::track::safety::{PlaceOnPoints, ReportedPathReach};
 
 use super::bounds::*;
 use crate::link::echo::MessageDelay;
@@ -41,7 +41,7 @@ pub(crate) struct NeighbourEntry {
     /// Where the neighbour's position is on its reported points.
     pub(super) place_on_points: PlaceOnPoints,
     /// How far the neighbour's points, up to its stop for now, lead it.
-    pub(super) points_reach: PointsReach,
+    pub(super) reported_path_reach: ReportedPathReach,
     /// Greatest distance of the points, up to its stop for now, from the first of them, metres.
     pub(super) extent_m: f32,
     /// Length of the polyline from the neighbour's position through all its points, metres: in a
@@ -114,7 +114,7 @@ impl NeighbourEntry {
             unheard_point_count: 0,
             place_on_points: PlaceOnPoints::Unknown,
             extent_m: 0.0,
-            points_reach: PointsReach::OPEN,
+            reported_path_reach: ReportedPathReach::OPEN,
             points_length_m: -1.0,
             may_come_down: false,
             gates_open_up_to_m: f32::NEG_INFINITY,
@@ -180,7 +180,8 @@ impl NeighbourEntry {
     pub(super) fn update_place_on_points(&mut self) {
         let (at, points) = (&self.state, self.points_for_now());
         let place = PlaceOnPoints::find(&at.position, points, &at.velocity);
-        self.points_reach = PointsReach::new(&at.position, points, &place, self.extent_m);
+        self.reported_path_reach =
+            ReportedPathReach::new(&at.position, points, &place, self.extent_m);
         self.place_on_points = place;
         if self.flies_all_points_unheard() {
             let mut at = self.state.position;

@@ -3,7 +3,7 @@
 
 use planner_core::Point;
 use planner_core::track::safety::{
-    MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, OwnSet, PlaceOnPoints, PointsReach,
+    MotionBounds, NeighbourMotion, OFF_REPORTED_PATH_M, OwnSet, PlaceOnPoints, ReportedPathReach,
 };
 
 use super::Neighbours;
@@ -58,7 +58,7 @@ impl<'a> FilterNeighbour<'a> {
     /// The neighbour counts as one that stands where it was last heard.
     pub(crate) fn stop_at_last_position(&mut self) {
         (self.motion.age_s, self.motion.speed_mps, self.motion.points) = (0.0, 0.0, &[]);
-        self.motion.points_reach = PointsReach::OPEN;
+        self.motion.reported_path_reach = ReportedPathReach::OPEN;
         self.motion.rests_within_m = 0.0;
     }
 
@@ -136,7 +136,7 @@ impl NeighbourEntry {
             // Not read.
             points: &[],
             place_on_points: PlaceOnPoints::Unknown,
-            points_reach: self.points_reach,
+            reported_path_reach: self.reported_path_reach,
             rests_within_m: 0.0,
             grounded: self.reports_any(GROUNDED | LANDED),
             column_to_m: None,
@@ -188,7 +188,7 @@ impl NeighbourEntry {
             reaches(FALL_CARRY_S * self.speed_mps + self.fall_aside_m());
         }
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
-            let beyond_m = self.points_reach.beyond_m + OFF_REPORTED_PATH_M;
+            let beyond_m = self.reported_path_reach.beyond_m + OFF_REPORTED_PATH_M;
             reaches(self.unheard_distance_m() + beyond_m);
         }
         if reach.lands || self.climb_top_m().is_some() {
@@ -251,7 +251,7 @@ impl NeighbourEntry {
                 delay_s: self.message_delay.delay_s,
                 points: self.points_for_now(),
                 place_on_points: self.place_on_points,
-                points_reach: self.points_reach,
+                reported_path_reach: self.reported_path_reach,
                 rests_within_m: 0.0,
                 grounded,
                 column_to_m: comes_down.then(|| self.column_bottom_m(self.state.position.z)),
@@ -274,7 +274,7 @@ impl NeighbourEntry {
             fastest_mps * (heard.age_s + heard.delay_s) + bounds.braking.stop_m(fastest_mps);
         (heard.age_s, heard.delay_s, heard.speed_mps) = (0.0, 0.0, 0.0);
         (heard.points, heard.place_on_points) = (&self.points, self.place_on_points);
-        heard.points_reach.most_m = f32::INFINITY;
+        heard.reported_path_reach.most_m = f32::INFINITY;
         heard.rests_within_m = libm::fminf(flown_m, self.unheard_distance_m());
     }
 
@@ -289,7 +289,7 @@ impl NeighbourEntry {
             delay_s: self.message_delay.delay_s.max(UNHEARD_BEYOND_TOP_S),
             points: &[],
             place_on_points: PlaceOnPoints::Beside,
-            points_reach: PointsReach::OPEN,
+            reported_path_reach: ReportedPathReach::OPEN,
             rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
@@ -424,7 +424,7 @@ impl<const V: usize> Neighbours<V> {
         }
         if dead {
             motion.points = &entry.points;
-            motion.points_reach.most_m = f32::INFINITY;
+            motion.reported_path_reach.most_m = f32::INFINITY;
             if top.is_none() {
                 motion.rests_within_m = entry.unheard_distance_m();
             }
@@ -435,8 +435,8 @@ impl<const V: usize> Neighbours<V> {
         if by_intent || lies || top.is_some() {
             let (place, extent_m) = (PlaceOnPoints::Unknown, entry.extent_m);
             motion.place_on_points = place;
-            motion.points_reach =
-                PointsReach::new(&motion.position, motion.points, &place, extent_m);
+            motion.reported_path_reach =
+                ReportedPathReach::new(&motion.position, motion.points, &place, extent_m);
         }
         let column =
             (dead || entry.has_column()) && (!motion.grounded || (lies && highest_m > bottom_m));

@@ -1,7 +1,9 @@
 extern crate std;
 
 use planner_core::flight::Gate;
-use planner_core::track::safety::{Braking, Legs, MotionBounds, OwnSet, PointsReach, ReachableSet};
+use planner_core::track::safety::{
+    Braking, Legs, MotionBounds, OwnSet, ReachableSet, ReportedPathReach,
+};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -407,7 +409,7 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
         let silent = met.lost || met.motion.age_s > MAX_HEIGHT_AGE_S;
         if lands && silent {
             (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
-            met.motion.points_reach = PointsReach::OPEN;
+            met.motion.reported_path_reach = ReportedPathReach::OPEN;
             met.motion.rests_within_m = 0.0;
         }
         let by_gates = met.on_plan && reach.on_plan;

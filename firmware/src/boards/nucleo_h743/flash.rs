@@ -70,7 +70,7 @@ impl Flash {
     /// lent. The store asks only for bytes that it has read whole by [`ReadFlash::read`], so no
     /// word of them is torn.
     pub fn lend(&mut self, at: u32, len: usize) -> Option<LentFlash> {
-        let address = bank_address(at, len)?;
+        let address = bank2_address(at, len)?;
         // SAFETY: inside the bank, and this driver does not erase or program bytes that are lent.
         let lent = self
             .lender
@@ -94,18 +94,18 @@ impl Flash {
 }
 
 /// Address of `len` bytes at offset `at` of the bank; `None` where they reach beyond it.
-fn bank_address(at: u32, len: usize) -> Option<usize> {
+fn bank2_address(at: u32, len: usize) -> Option<usize> {
     let end = (at as usize).checked_add(len)?;
     (end <= LAYOUT.len() as usize).then_some(BANK2_ADDRESS + at as usize)
 }
 
 impl ReadFlash for Flash {
     fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
-        let mut address = bank_address(at, out.len()).ok_or(FlashFault)?;
+        let mut address = bank2_address(at, out.len()).ok_or(FlashFault)?;
         let mut rest = out;
         while !rest.is_empty() {
             let (piece, after) = rest.split_at_mut(rest.len().min(WORD - address % WORD));
-            // SAFETY: inside the bank, as `bank_address` checked, and inside one word.
+            // SAFETY: inside the bank, as `bank2_address` checked, and inside one word.
             unsafe { read_tolerating_bus_errors(address as *const u8, piece) }?;
             address += piece.len();
             rest = after;

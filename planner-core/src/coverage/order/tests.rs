@@ -64,9 +64,9 @@ fn a_search_makes_no_way_longer_and_knows_its_length() {
             laid.push(Lane { from, to, first: 0, count: 0, start_m: 0.0, strip });
         }
         crate::coverage::cells::group_into_cells(&mut laid[..strips]);
-        let ways = [0, 300, 20_000].map(|looks| {
+        let ways = [0, 300, 20_000].map(|search_steps| {
             let mut lanes = laid.clone();
-            order_lanes(&mut lanes, strips, &Transit::<1>::empty(), looks);
+            order_lanes(&mut lanes, strips, &Transit::<1>::empty(), search_steps);
             for own in &laid {
                 let same = |lane: &&Lane| {
                     (lane.from, lane.to) == (own.from, own.to)

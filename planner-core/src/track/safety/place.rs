@@ -132,10 +132,10 @@ fn nearest_point_on_leg(position: &Point, from: &Point, to: &Point) -> Point {
     from + leg * clamp_to_unit(share)
 }
 
-/// Bounds of how far a neighbour's points lead it, as straight distances from its position:
-/// computed once, when the points are heard.
+/// How far the path points that a neighbour reports lead it, as straight distances from its
+/// position. Computed once, when the points are heard.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PointsReach {
+pub struct ReportedPathReach {
     /// Addition to the distance that the neighbour flies until it has stopped, metres: from its
     /// position to its place on the points, and from the first place where it may be to the last.
     pub beyond_m: f32,
@@ -144,7 +144,7 @@ pub struct PointsReach {
     pub most_m: f32,
 }
 
-impl PointsReach {
+impl ReportedPathReach {
     /// Where a neighbour has no points, or is beside them: nothing but its motion bounds its reach.
     pub const OPEN: Self = Self { beyond_m: 0.0, most_m: f32::INFINITY };
 

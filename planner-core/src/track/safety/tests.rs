@@ -6,7 +6,7 @@ use proptest::prelude::*;
 use std::vec;
 use std::vec::Vec as StdVec;
 
-use self::plain::points_reach;
+use self::plain::reported_path_reach;
 use super::*;
 
 const BRAKING: Braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
@@ -88,7 +88,7 @@ proptest! {
             delay_s: 0.0,
             points: &path,
             place_on_points: PlaceOnPoints::Unknown,
-            points_reach: points_reach(&path[0], &path, PlaceOnPoints::Unknown),
+            reported_path_reach: reported_path_reach(&path[0], &path, PlaceOnPoints::Unknown),
             rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
@@ -124,7 +124,7 @@ proptest! {
             delay_s: 0.2,
             points: &path,
             place_on_points: PlaceOnPoints::Unknown,
-            points_reach: points_reach(&position, &path, PlaceOnPoints::Unknown),
+            reported_path_reach: reported_path_reach(&position, &path, PlaceOnPoints::Unknown),
             rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
@@ -132,8 +132,8 @@ proptest! {
         let set = heard.reachable_set(&BOUNDS, ahead_s);
         prop_assert!(set.reach_m() <= heard.reach_m(&BOUNDS, ahead_s) + 0.01);
         let joint = PlaceOnPoints::find(&position, &path, &heard.velocity);
-        let points_reach = points_reach(&position, &path, joint);
-        let heard = NeighbourMotion { place_on_points: joint, points_reach, ..heard };
+        let reported_path_reach = reported_path_reach(&position, &path, joint);
+        let heard = NeighbourMotion { place_on_points: joint, reported_path_reach, ..heard };
         prop_assert!(set.reach_m() <= heard.reach_m(&BOUNDS, ahead_s) + 0.01);
     }
 }
@@ -161,7 +161,11 @@ fn a_fast_vehicle_behind_its_setpoint_stays_inside_its_set_around_a_corner() {
             delay_s: 0.0,
             points: &points,
             place_on_points: PlaceOnPoints::Unknown,
-            points_reach: points_reach(&Point::zeros(), &points, PlaceOnPoints::Unknown),
+            reported_path_reach: reported_path_reach(
+                &Point::zeros(),
+                &points,
+                PlaceOnPoints::Unknown,
+            ),
             rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
@@ -171,8 +175,8 @@ fn a_fast_vehicle_behind_its_setpoint_stays_inside_its_set_around_a_corner() {
         let away_m = least(&[place(flown_m)], &places(&set));
         assert!(away_m < 0.1, "{away_m} m outside at {speed_mps} m/s, corner at {corner_m} m");
         let joint = PlaceOnPoints::find(&heard.position, &points, &heard.velocity);
-        let points_reach = points_reach(&heard.position, &points, joint);
-        let reach_m = NeighbourMotion { points_reach, ..heard }.reach_m(&bounds, 0.0);
+        let reported_path_reach = reported_path_reach(&heard.position, &points, joint);
+        let reach_m = NeighbourMotion { reported_path_reach, ..heard }.reach_m(&bounds, 0.0);
         assert!(set.reach_m() <= reach_m + 0.01, "{} of {reach_m} m", set.reach_m());
         // The vehicle flies on beyond the last point that was heard.
         let beyond = NeighbourMotion { points: &[place(-1.5)], ..heard };
@@ -271,7 +275,7 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
                     delay_s: 0.0,
                     points: &other.path[from..],
                     place_on_points: PlaceOnPoints::Unknown,
-                    points_reach: PointsReach::OPEN,
+                    reported_path_reach: ReportedPathReach::OPEN,
                     rests_within_m: 0.0,
                     grounded: false,
                     column_to_m: None,

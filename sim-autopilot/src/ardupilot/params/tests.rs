@@ -10,7 +10,7 @@ fn names_are_sorted_and_fit_the_wire() {
 fn every_parameter_that_acts_is_in_the_table() {
     // A misspelt name would read as 0; of these only the battery's and the GCS failsafe are 0
     // by default.
-    let t = CopterTuning::new(&default_params(3, &VehicleLimits::default()));
+    let t = CopterTuning::new(&default_params(3, &AirframeParameters::default()));
     let positive =
         [t.speed, t.speed_up, t.speed_down, t.land_speed, t.land_slow_below, t.stick_sink];
     assert!(positive.iter().all(|v| *v > 0.1));

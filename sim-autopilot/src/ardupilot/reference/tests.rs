@@ -1,10 +1,10 @@
 use super::super::params;
 use super::*;
-use crate::vehicle::VehicleLimits;
+use crate::vehicle::AirframeParameters;
 
 #[test]
 fn it_arrives_within_every_limit_and_does_not_overshoot() {
-    let tuning = CopterTuning::new(&params::default_params(1, &VehicleLimits::default()));
+    let tuning = CopterTuning::new(&params::default_params(1, &AirframeParameters::default()));
     let mut reference = CopterReference::new(Point::zeros(), Point::zeros());
     let goal = GuidedGoal::hold(Point::new(12.0, 16.0, 10.0));
     let dt = 0.004;

@@ -9,7 +9,7 @@ fn names_are_sorted_and_fit_the_wire() {
 #[test]
 fn every_parameter_that_acts_is_in_the_table() {
     // A misspelt name would read as 0; none of these defaults is 0 but the two actions.
-    let t = Px4Tuning::new(&default_params(3, &VehicleLimits::default()));
+    let t = Px4Tuning::new(&default_params(3, &AirframeParameters::default()));
     for value in
         [t.speed_max, t.cruise, t.land_speed, t.spool_up_s, t.offboard_loss_s, t.return_height]
     {

@@ -27,7 +27,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use companion::planner::coverage::BOARD_SEARCH_STEPS;
 use flockmate_tests::{shared_data, workspace};
-use host_sim::coverage::{MAX_LANES, MAX_NO_FLY_CORNERS, MAX_ORDER_CHANGES};
+use host_sim::coverage::{HOST_SEARCH_STEPS, MAX_LANES, MAX_NO_FLY_CORNERS};
 use host_sim::scenario;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
@@ -231,7 +231,7 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
 /// The rows of one field: lengths and times of our routes and of its shortest one.
 fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec<Row>> {
     let (first, angle) = ours(field, lane_m, BOARD_SEARCH_STEPS)?;
-    let (searched, _) = ours(field, lane_m, MAX_ORDER_CHANGES)?;
+    let (searched, _) = ours(field, lane_m, HOST_SEARCH_STEPS)?;
     println!(
         "{name}: ours {:.1} m ({:.1} m of lanes), {} crossings",
         first.total_m, first.lanes_m, first.crossings
@@ -298,10 +298,10 @@ fn fields(path: &Path, lane_m: f32, coordinates: &str) -> Result<Vec<Field>> {
 }
 
 /// Our route, and the angle of its lanes, radians counter-clockwise from east.
-fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
+fn ours(field: &Field, lane_m: f32, search_steps: u32) -> Result<(Way, f64)> {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
     let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
-    let pattern = LanePattern { spacing, angle_deg: None, margin_m: 0.0, search_steps: looks };
+    let pattern = LanePattern { spacing, angle_deg: None, margin_m: 0.0, search_steps };
     let mut found: Box<Tracks<MAX_LANES>> = Box::default();
     let mut workspace: Box<tracks::LaneWorkspace<VERTICES>> = Box::default();
     let mut transit = Box::new(Transit::<MAX_NO_FLY_CORNERS>::empty());

@@ -79,13 +79,13 @@ fn way(rng: &mut Pcg32, from: Point, most: u32) -> StdVec<Point> {
 }
 
 /// How far `points` lead a vehicle at `position`.
-pub(super) fn points_reach(
+pub(super) fn reported_path_reach(
     position: &Point,
     points: &[Point],
     place: PlaceOnPoints,
-) -> PointsReach {
+) -> ReportedPathReach {
     let extent_m = points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f32::max);
-    PointsReach::new(position, points, &place, extent_m)
+    ReportedPathReach::new(position, points, &place, extent_m)
 }
 
 fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> NeighbourMotion<'a> {
@@ -98,7 +98,7 @@ fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> Neighbour
         delay_s: uniform(rng, 0.0, 0.5),
         points,
         place_on_points: PlaceOnPoints::Unknown,
-        points_reach: points_reach(&position, points, PlaceOnPoints::Unknown),
+        reported_path_reach: reported_path_reach(&position, points, PlaceOnPoints::Unknown),
         rests_within_m: one_of(rng, &[0.0, 0.0, 6.0]),
         grounded: rng.next_u32().is_multiple_of(16),
         column_to_m: rng
@@ -139,8 +139,8 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
             "{seed}: what is remembered is the same"
         );
         assert!(other.reach_m() <= heard.reach_m(&bounds, ahead_s) + 0.01, "{seed}");
-        let points_reach = points_reach(&position, &points, joint);
-        let remembered = NeighbourMotion { points_reach, ..heard };
+        let reported_path_reach = reported_path_reach(&position, &points, joint);
+        let remembered = NeighbourMotion { reported_path_reach, ..heard };
         assert!(other.reach_m() <= remembered.reach_m(&bounds, ahead_s) + 0.01, "{seed}");
         let from_line_m = least_sq(&ReachableSet::at(position), &set, f32::INFINITY).sqrt();
         assert!(
