@@ -31,14 +31,14 @@ use self::auto_state::Auto;
 use self::params::CopterTuning;
 use self::reference::CopterReference;
 use self::setpoint::GuidedGoal;
-use super::command::{Arming, CommandOutcome};
-use super::msg::SET_POSITION_TARGET_LOCAL_NED;
-use super::params::Params;
-use super::platform::{FlightModeOutput, IntegralAction, Platform, SensorReadings};
-use super::port::Sender;
-use super::status::{AutopilotStatus, MotorState};
-use super::vehicle::{AirframeParameters, Demand};
-use super::wire::PayloadReader;
+use crate::link::command::{Arming, CommandOutcome};
+use crate::link::msg::SET_POSITION_TARGET_LOCAL_NED;
+use crate::link::port::Sender;
+use crate::link::wire::PayloadReader;
+use crate::physics::vehicle::{AirframeParameters, Demand};
+use crate::platform::{FlightModeOutput, IntegralAction, Platform, SensorReadings};
+use crate::services::params::Params;
+use crate::status::{AutopilotStatus, MotorState};
 use crate::{GpsFix, SimulatedKind};
 
 /// Time from arming to lift-off if NAV_TAKEOFF comes at once, seconds: `MOT` arming delay 2 s,

@@ -11,16 +11,16 @@
 //! counted from 0) or CAMERA_FEEDBACK (180, ArduPilot, counted from 1). Source:
 //! `camera_trigger.cpp`, `AP_Camera_Backend.cpp`.
 //!
-//! The true position of each picture is kept for a referee ([`super::Autopilot::drain_photos`]).
+//! The true position of each picture is kept for a referee ([`crate::Autopilot::drain_photos`]).
 
 use planner_core::Point;
 
-use super::command::ReceivedCommand;
-use super::messages::to_mavlink_units;
-use super::msg::{CAMERA_FEEDBACK, CAMERA_IMAGE_CAPTURED};
-use super::port::Port;
-use super::snapshot::Snapshot;
 use crate::SimulatedKind;
+use crate::link::command::ReceivedCommand;
+use crate::link::msg::{CAMERA_FEEDBACK, CAMERA_IMAGE_CAPTURED};
+use crate::link::port::Port;
+use crate::telemetry::messages::to_mavlink_units;
+use crate::telemetry::snapshot::Snapshot;
 
 /// Period at which PX4 and ArduPilot check the trigger distance, microseconds.
 const TRIGGER_CHECK_EVERY_US: [u64; 2] = [50_000, 20_000];

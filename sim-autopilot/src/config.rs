@@ -3,8 +3,8 @@
 use planner_core::Point;
 use planner_core::geo::frames::{Geodetic, Projection};
 
-use super::estimator::EstimateErrorState;
-use super::vehicle::AirframeParameters;
+use crate::physics::estimator::EstimateErrorState;
+use crate::physics::vehicle::AirframeParameters;
 use crate::{EstimatorErrors, SimulatedKind};
 
 impl SimulatedKind {

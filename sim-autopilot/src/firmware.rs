@@ -1,17 +1,17 @@
 //! Dispatches every call that depends on the kind of autopilot.
 
-use super::ardupilot::{self, Copter};
-use super::command::ReceivedCommand;
-use super::config::AutopilotConfig;
-use super::params::Params;
-use super::platform::{FlightModeOutput, Platform, SensorReadings};
-use super::port::Sender;
-use super::px4;
-use super::px4::firmware::Px4;
-use super::status::AutopilotStatus;
-use super::telemetry;
-use super::vehicle::Gains;
-use super::wire::PayloadReader;
+use crate::ardupilot::{self, Copter};
+use crate::config::AutopilotConfig;
+use crate::link::command::ReceivedCommand;
+use crate::link::port::Sender;
+use crate::link::wire::PayloadReader;
+use crate::physics::vehicle::Gains;
+use crate::platform::{FlightModeOutput, Platform, SensorReadings};
+use crate::px4;
+use crate::px4::firmware::Px4;
+use crate::services::params::Params;
+use crate::status::AutopilotStatus;
+use crate::telemetry;
 use crate::{GpsFix, SimulatedKind};
 
 /// The autopilot software of one vehicle.

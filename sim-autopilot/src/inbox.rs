@@ -6,13 +6,13 @@
 
 use mavlink::dialects::ardupilotmega as dialect;
 
-use super::command::ReceivedCommand;
-use super::frame::CheckedFrame;
-use super::msg;
-use super::params::Encoding;
-use super::port::{AUTOPILOT_COMPONENT, Sender};
-use super::wire::PayloadReader;
-use super::{Autopilot, telemetry};
+use crate::link::command::ReceivedCommand;
+use crate::link::frame::CheckedFrame;
+use crate::link::msg;
+use crate::link::port::{AUTOPILOT_COMPONENT, Sender};
+use crate::link::wire::PayloadReader;
+use crate::services::params::Encoding;
+use crate::{Autopilot, telemetry};
 
 impl Autopilot {
     pub(super) fn handle_frame(&mut self, port: usize, frame: &CheckedFrame) {

@@ -8,7 +8,7 @@
 //! Drain contract: call [`Autopilot::handle_bytes`] whenever bytes have arrived,
 //! [`Autopilot::step`] once for each 4 ms of simulated time, and [`Autopilot::poll_transmit`] until
 //! it returns 0. The physics are in the mission's ENU frame; MAVLink messages are in NED about the
-//! vehicle's own EKF origin, in its autopilot's projection ([`geodesy`]).
+//! vehicle's own EKF origin, in its autopilot's projection ([`physics::geodesy`]).
 //!
 //! ```
 //! use sim_autopilot::{Autopilot, AutopilotConfig};
@@ -32,31 +32,17 @@
 
 pub mod ardupilot;
 mod camera;
-mod cmd;
-mod command;
 mod config;
-pub mod estimator;
 mod firmware;
-pub mod frame;
-pub mod geodesy;
 mod inbox;
-mod itinerary;
 mod kinds;
-mod messages;
-mod mission;
-mod msg;
-pub mod noise;
-pub mod params;
+pub mod link;
+pub mod physics;
 mod platform;
-pub mod port;
 pub mod px4;
-mod routing;
-mod shaping;
-mod snapshot;
+pub mod services;
 mod status;
 pub mod telemetry;
-pub mod vehicle;
-pub mod wire;
 
 use core::cell::OnceCell;
 
@@ -68,12 +54,14 @@ pub use self::camera::Photo;
 pub use self::config::{AutopilotConfig, AutopilotConfigError};
 use self::firmware::Firmware;
 pub use self::kinds::{EstimatorErrors, GpsFix, SimulatedKind};
+use self::link::port::Port;
+use self::link::routing;
+use self::physics::vehicle::GRAVITY;
+pub use self::physics::vehicle::{AirframeParameters, TrueState, power_ratio_at_speed};
 use self::platform::{IntegralAction, Platform};
-use self::port::Port;
 pub use self::px4::Px4Mode;
-use self::snapshot::Snapshot;
 use self::status::{AutopilotFlags, MotorState};
-pub use self::vehicle::{AirframeParameters, TrueState, power_ratio_at_speed};
+use self::telemetry::snapshot::Snapshot;
 
 /// One simulated vehicle with its autopilot and MAVLink ports.
 #[derive(Clone, Debug)]
@@ -271,7 +259,7 @@ impl Autopilot {
         let position = *platform.vehicle.position() + error;
         let truth = platform.vehicle.state();
         let force = platform.vehicle.specific_force();
-        let force = if truth.touching { Point::new(0.0, 0.0, vehicle::GRAVITY) } else { force };
+        let force = if truth.touching { Point::new(0.0, 0.0, GRAVITY) } else { force };
         let nan = Vector3::repeat(f64::NAN);
         let target = match &platform.last_demand {
             Some(demand) => [

@@ -1,22 +1,22 @@
 //! What both simulated autopilots share: vehicle, estimator, camera, ports, home, stored missions.
 
-use crate::cmd;
+use crate::link::cmd;
 use planner_core::Point;
 use planner_core::geo::frames::{self, Geodetic};
 
-use super::camera::{CameraTrigger, Photo};
-use super::command::{ACCEPTED, CommandOutcome, ReceivedCommand, message_id};
-use super::config::AutopilotConfig;
-use super::estimator::EstimateErrorState;
-use super::geodesy::LocalFrame;
-use super::mission::Missions;
-use super::msg::{GPS_GLOBAL_ORIGIN, HOME_POSITION, MESSAGE_INTERVAL};
-use super::noise::{self, Disturbance};
-use super::port::{PendingAck, Port, Sender};
-use super::status::MotorState;
-use super::vehicle::{Demand, Multicopter};
-use super::wire::PayloadReader;
 use crate::SimulatedKind;
+use crate::camera::{CameraTrigger, Photo};
+use crate::config::AutopilotConfig;
+use crate::link::command::{ACCEPTED, CommandOutcome, ReceivedCommand, message_id};
+use crate::link::msg::{GPS_GLOBAL_ORIGIN, HOME_POSITION, MESSAGE_INTERVAL};
+use crate::link::port::{PendingAck, Port, Sender};
+use crate::link::wire::PayloadReader;
+use crate::physics::estimator::EstimateErrorState;
+use crate::physics::geodesy::LocalFrame;
+use crate::physics::noise::{self, Disturbance};
+use crate::physics::vehicle::{Demand, Multicopter};
+use crate::services::mission::Missions;
+use crate::status::MotorState;
 
 /// Delay of a COMMAND_ACK, microseconds: one step. In recordings PX4 took 1.3 to 16 ms and
 /// ArduCopter took 2.5 to 7 ms.

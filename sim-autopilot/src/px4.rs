@@ -26,13 +26,13 @@ use self::glide::SmoothedApproach;
 pub use self::modes::Px4Mode;
 use self::params::Px4Tuning;
 use self::setpoint::OffboardSetpoint;
-use super::command::{Arming, CommandOutcome};
-use super::itinerary::MissionLeg;
-use super::platform::{FlightModeOutput, IntegralAction, Platform, SensorReadings};
-use super::shaping::JerkLimitedRate;
-use super::status::MotorState;
-use super::vehicle::Demand;
 use crate::GpsFix;
+use crate::link::command::{Arming, CommandOutcome};
+use crate::physics::shaping::JerkLimitedRate;
+use crate::physics::vehicle::Demand;
+use crate::platform::{FlightModeOutput, IntegralAction, Platform, SensorReadings};
+use crate::services::itinerary::MissionLeg;
+use crate::status::MotorState;
 
 /// Delay of the failsafe beyond `COM_OF_LOSS_T`, seconds: in recordings the failsafe started at
 /// most 1.23 s after the last setpoint, and gaps of 1.25 s started it.
@@ -392,7 +392,7 @@ impl Commander {
                     now.saturating_sub(since_us) as f32 * 1e-6 / tuning.takeoff_ramp_s.max(0.01);
                 // During the ramp the climb limit starts at the value that cancels hover thrust
                 // (`TakeoffHandling::updateRamp`).
-                let floor = -crate::vehicle::GRAVITY / tuning.gains.velocity_p[1].max(0.1);
+                let floor = -crate::physics::vehicle::GRAVITY / tuning.gains.velocity_p[1].max(0.1);
                 let limit = floor + progress * (demand.climb_max - floor);
                 if self.landed && progress >= IN_AIR_RAMP_SHARE {
                     self.landed = false;

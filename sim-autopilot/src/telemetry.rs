@@ -4,12 +4,15 @@
 //! A message is encoded only when it is due, from a `Snapshot` that is taken once for all
 //! messages of a step.
 
+pub(crate) mod messages;
+pub(crate) mod snapshot;
+
 use mavlink::dialects::ardupilotmega as dialect;
 
-use super::messages::{self, to_mavlink_units};
-use super::msg;
-use super::port::Port;
-use super::snapshot::Snapshot;
+use self::messages::to_mavlink_units;
+use crate::link::msg;
+use crate::link::port::Port;
+use crate::telemetry::snapshot::Snapshot;
 
 /// PX4's telemetry streams: message id and default interval in µs; 0: off until requested.
 pub const PX4_STREAMS: [(u32, u32); 32] = [

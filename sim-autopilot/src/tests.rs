@@ -10,7 +10,7 @@ mod protocol;
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::time::Instant;
 
-use super::*;
+use crate::*;
 
 const DT: f32 = 0.004;
 const HOLD: u32 = 0x0304_0000;

@@ -2,7 +2,7 @@
 
 use super::Copter;
 use super::setpoint::GuidedGoal;
-use crate::command::{Arming, CommandOutcome};
+use crate::link::command::{Arming, CommandOutcome};
 use crate::platform::{Platform, SensorReadings};
 
 impl Copter {

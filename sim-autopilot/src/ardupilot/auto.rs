@@ -11,9 +11,9 @@ use planner_core::Point;
 use super::auto_state::Auto;
 use super::setpoint::GuidedGoal;
 use super::{Copter, CopterMode, RtlLeg, TakeOff};
-use crate::command::CommandOutcome;
-use crate::itinerary::{LandedState, MissionLeg, interpolate_height};
+use crate::link::command::CommandOutcome;
 use crate::platform::{Platform, SensorReadings};
+use crate::services::itinerary::{LandedState, MissionLeg, interpolate_height};
 
 /// Distance within which the place of a landing is reached, metres.
 const LANDING_REACHED_M: f32 = 0.5;

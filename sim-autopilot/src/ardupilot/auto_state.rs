@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 
-use crate::itinerary::MissionLeg;
+use crate::services::itinerary::MissionLeg;
 
 /// State of the mode AUTO.
 #[derive(Clone, Copy, Debug, Default)]

@@ -3,14 +3,14 @@
 
 use super::setpoint::GuidedGoal;
 use super::{Copter, CopterMode, STREAMS};
-use crate::cmd;
-use crate::command::{
+use crate::link::cmd;
+use crate::link::command::{
     ACCEPTED, Arming, CUSTOM_MODE, DENIED, FAILED, ReceivedCommand, UNSUPPORTED, message_id,
 };
-use crate::msg;
+use crate::link::msg;
+use crate::link::port::Sender;
+use crate::link::wire::PayloadReader;
 use crate::platform::Platform;
-use crate::port::Sender;
-use crate::wire::PayloadReader;
 
 const SET_MODE: u16 = 11;
 

@@ -5,9 +5,9 @@ use planner_core::Point;
 use super::reference::CopterReference;
 use super::setpoint::GuidedGoal;
 use super::{Copter, CopterMode, RtlLeg, micros_from_s};
+use crate::physics::shaping::approach_rate;
+use crate::physics::vehicle::Demand;
 use crate::platform::SensorReadings;
-use crate::shaping::approach_rate;
-use crate::vehicle::Demand;
 
 /// Distance below its target height at which a take-off is complete, metres. With this value
 /// landed_state 2 comes 9.3 s after a command to 10 m, as recorded.

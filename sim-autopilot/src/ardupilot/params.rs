@@ -3,9 +3,9 @@
 
 use planner_core::Point;
 
-use crate::params::ParamValue::{self, Int, Int8, Int16, Real};
-use crate::params::{Encoding, Params};
-use crate::vehicle::{AirframeParameters, Demand, Gains};
+use crate::physics::vehicle::{AirframeParameters, Demand, Gains};
+use crate::services::params::ParamValue::{self, Int, Int8, Int16, Real};
+use crate::services::params::{Encoding, Params};
 
 /// Default parameters, sorted by name.
 const DEFAULTS: &[(&str, ParamValue)] = &[

@@ -9,7 +9,7 @@ use planner_core::Point;
 
 use super::params::CopterTuning;
 use super::setpoint::GuidedGoal;
-use crate::shaping::approach_rate;
+use crate::physics::shaping::approach_rate;
 
 /// Fraction of the acceleration limit that corrections of the position may use.
 const CORRECTION_ACCEL_SHARE: f32 = 0.5;

@@ -9,8 +9,8 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
 
+use crate::link::wire::PayloadReader;
 use crate::platform::Platform;
-use crate::wire::PayloadReader;
 
 const FRAME_LOCAL_NED: u8 = 1;
 const FRAME_LOCAL_OFFSET_NED: u8 = 7;

@@ -2,7 +2,7 @@
 //! home once set, PARAM_VALUE of its runtime.
 
 use super::Copter;
-use crate::msg::{HOME_POSITION, PARAM_VALUE, SYS_STATUS};
+use crate::link::msg::{HOME_POSITION, PARAM_VALUE, SYS_STATUS};
 use crate::platform::Platform;
 
 /// Period at which ArduCopter updates STAT_RUNTIME and sends it, microseconds.

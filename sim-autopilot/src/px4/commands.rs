@@ -1,20 +1,20 @@
 //! PX4's handling of commands, SET_MODE, message intervals and message requests, and its
 //! COMMAND_ACKs.
 
-use crate::msg;
+use crate::link::msg;
 use planner_core::geo::frames::Geodetic;
 
 use super::Px4Mode;
 use super::firmware::Px4;
-use crate::cmd;
-use crate::command::{
+use crate::link::cmd;
+use crate::link::command::{
     ACCEPTED, Arming, CUSTOM_MODE, CommandOutcome, DENIED, FAILED, ReceivedCommand,
     TEMPORARILY_REJECTED, UNSUPPORTED, message_id,
 };
+use crate::link::port::Sender;
+use crate::link::wire::PayloadReader;
 use crate::platform::Platform;
-use crate::port::Sender;
 use crate::telemetry;
-use crate::wire::PayloadReader;
 
 impl Px4 {
     /// Executes a command and queues its COMMAND_ACK.

@@ -5,16 +5,16 @@ use super::params::{self, Px4Tuning};
 use super::setpoint;
 use super::{Commander, Px4Mode};
 use crate::SimulatedKind;
-use crate::cmd;
-use crate::command::{CommandOutcome, TEMPORARILY_REJECTED};
-use crate::itinerary::{LandedState, MissionLeg};
-use crate::msg::{COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED};
-use crate::params::Params;
+use crate::link::cmd;
+use crate::link::command::{CommandOutcome, TEMPORARILY_REJECTED};
+use crate::link::msg::{COMMAND_LONG, SET_POSITION_TARGET_LOCAL_NED};
+use crate::link::port::Sender;
+use crate::link::wire::PayloadReader;
+use crate::physics::vehicle::AirframeParameters;
 use crate::platform::{FlightModeOutput, Platform, SensorReadings};
-use crate::port::Sender;
+use crate::services::itinerary::{LandedState, MissionLeg};
+use crate::services::params::Params;
 use crate::status::AutopilotStatus;
-use crate::vehicle::AirframeParameters;
-use crate::wire::PayloadReader;
 
 /// Gimbal commands that PX4 was recorded to send when a failsafe starts: take control (1001), point
 /// ahead (1000, DO_GIMBAL_MANAGER_PITCHYAW), release control (1001, DO_GIMBAL_MANAGER_CONFIGURE).

@@ -5,9 +5,9 @@ use planner_core::Point;
 use super::glide::{self, SmoothedApproach};
 use super::params::Px4Tuning;
 use super::{CRAWL_FACTOR, Commander, Px4Mode, ReturnLeg, SensorReadings};
-use crate::itinerary::{MissionLeg, interpolate_height};
-use crate::shaping::JerkLimitedRate;
-use crate::vehicle::Demand;
+use crate::physics::shaping::JerkLimitedRate;
+use crate::physics::vehicle::Demand;
+use crate::services::itinerary::{MissionLeg, interpolate_height};
 
 /// Least height of a setpoint above the vehicle that counts as a demand to climb, metres; a
 /// velocity or acceleration of [`MIN_CLIMB_DEMAND_MPS`] counts too.

@@ -3,7 +3,7 @@
 
 use planner_core::Point;
 
-use crate::shaping::JerkLimitedRate;
+use crate::physics::shaping::JerkLimitedRate;
 
 /// Horizontal acceleration of the automatic modes, m/s² (`MPC_ACC_HOR`).
 const AUTO_ACCEL_MPS2: f32 = 3.0;

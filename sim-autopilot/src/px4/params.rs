@@ -3,10 +3,10 @@
 
 use planner_core::Point;
 
-use crate::params::Encoding;
-use crate::params::ParamValue::{self, Int, Real};
-use crate::params::Params;
-use crate::vehicle::{AirframeParameters, Demand, Gains};
+use crate::physics::vehicle::{AirframeParameters, Demand, Gains};
+use crate::services::params::Encoding;
+use crate::services::params::ParamValue::{self, Int, Real};
+use crate::services::params::Params;
 
 /// Default parameters, sorted by name, as PX4 lists them.
 const DEFAULTS: &[(&str, ParamValue)] = &[

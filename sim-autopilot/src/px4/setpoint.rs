@@ -8,8 +8,8 @@
 use nalgebra::Vector3;
 use planner_core::geo::frames::Geodetic;
 
-use crate::geodesy::LocalFrame;
-use crate::wire::PayloadReader;
+use crate::link::wire::PayloadReader;
+use crate::physics::geodesy::LocalFrame;
 use planner_core::Point;
 
 const FRAME_LOCAL_NED: u8 = 1;

@@ -168,18 +168,19 @@ fn it_turns_to_a_commanded_yaw_the_short_way_at_a_bounded_rate() {
             for mask in [0x9F8, 0x9C0] {
                 bench.stream(20.0, setpoint(mask, 1, [0.0, 0.0, -10.0], [0.0; 3], yaw));
                 let from = bench.autopilot.true_state().heading_rad;
-                let way = vehicle::wrap_pi_once(yaw - from).abs();
+                let way = crate::physics::vehicle::wrap_pi_once(yaw - from).abs();
                 let (mut turned, mut fastest) = (0.0, 0.0_f32);
                 for _ in 0..1500 {
                     let before = bench.autopilot.true_state().heading_rad;
                     bench.run(0.004);
                     let truth = bench.autopilot.true_state();
-                    turned += vehicle::wrap_pi_once(truth.heading_rad - before).abs();
+                    turned +=
+                        crate::physics::vehicle::wrap_pi_once(truth.heading_rad - before).abs();
                     fastest = fastest.max(truth.heading_rate.abs());
                 }
                 let truth = bench.autopilot.true_state();
                 assert!(
-                    vehicle::wrap_pi_once(truth.heading_rad - yaw).abs() < 0.02,
+                    crate::physics::vehicle::wrap_pi_once(truth.heading_rad - yaw).abs() < 0.02,
                     "{autopilot:?} {yaw}"
                 );
                 assert!(fastest <= 1.001 * most, "{autopilot:?}: {fastest} rad/s of {most}");

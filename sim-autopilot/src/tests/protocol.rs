@@ -192,7 +192,7 @@ fn every_port_has_its_own_streams() {
 #[test]
 fn hostile_bytes_neither_panic_nor_move_it() {
     let mut bench = Bench::new();
-    let mut random = noise::Gaussian::new(5);
+    let mut random = crate::physics::noise::Gaussian::new(5);
     for id in [4, 11, 20, 21, 23, 43, 44, 45, 75, 76, 84, 86, 111] {
         for _ in 0..50 {
             let payload: Vec<u8> = (0..60).map(|_| (random.sample() * 80.0) as i32 as u8).collect();

@@ -1,6 +1,6 @@
 use super::super::params;
 use super::*;
-use crate::vehicle::AirframeParameters;
+use crate::physics::vehicle::AirframeParameters;
 
 #[test]
 fn it_arrives_within_every_limit_and_does_not_overshoot() {

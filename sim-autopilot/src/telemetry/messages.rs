@@ -3,10 +3,10 @@
 use mavlink::dialects::ardupilotmega as dialect;
 use planner_core::geo::frames::Geodetic;
 
-use super::msg::HEARTBEAT;
-use super::port::Port;
-use super::snapshot::Snapshot;
-use super::vehicle::GRAVITY;
+use crate::link::msg::HEARTBEAT;
+use crate::link::port::Port;
+use crate::physics::vehicle::GRAVITY;
+use crate::telemetry::snapshot::Snapshot;
 
 /// `capabilities` that PX4 1.17 reports, without FTP (32), which is not simulated.
 const PX4_CAPABILITIES: u64 = 0xE8DF;
@@ -47,24 +47,24 @@ const RECORDED: [(u32, u8, &[u8]); 5] = [
 ];
 
 /// Sends message `id` of [`RECORDED`].
-pub(super) fn send_recorded(id: u32, port: &mut Port) {
+pub(crate) fn send_recorded(id: u32, port: &mut Port) {
     if let Some(&(_, seed, payload)) = RECORDED.iter().find(|message| message.0 == id) {
         port.send_with_crc_extra(id, seed, payload);
     }
 }
 
 impl Snapshot {
-    pub(super) fn throttle(&self) -> f32 {
+    pub(crate) fn throttle(&self) -> f32 {
         if self.armed { (0.5 * self.specific_force.norm() / GRAVITY).clamp(0.0, 1.0) } else { 0.0 }
     }
 
     /// Pressure of the standard atmosphere at the estimated altitude, hPa.
-    pub(super) fn pressure(&self) -> f32 {
+    pub(crate) fn pressure(&self) -> f32 {
         let ratio = 1.0 - 2.255_77e-5 * self.geodetic.alt_m as f32;
         1013.25 * libm::powf(ratio.max(0.1), 5.255_88)
     }
 
-    pub(super) fn send_heartbeat(&self, port: &mut Port) {
+    pub(crate) fn send_heartbeat(&self, port: &mut Port) {
         let status = &self.status;
         let [a, b, c, d] = status.custom_mode.to_le_bytes();
         // Encoded by hand: MAV_TYPE_QUADROTOR 2, MAV_AUTOPILOT_PX4 12 or _ARDUPILOTMEGA 3, protocol
@@ -76,7 +76,7 @@ impl Snapshot {
         );
     }
 
-    pub(super) fn send_sys_status(&self, port: &mut Port) {
+    pub(crate) fn send_sys_status(&self, port: &mut Port) {
         let [present, enabled, mut health] =
             if self.is_px4() { PX4_SENSORS } else { ARDUPILOT_SENSORS };
         if self.status.armable {
@@ -103,7 +103,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_gps(&self, port: &mut Port) {
+    pub(crate) fn send_gps(&self, port: &mut Port) {
         let (north, east, fix) = self.gps;
         let cos = libm::cos(self.geodetic.lat_deg.to_radians()).max(0.01);
         let at = Geodetic {
@@ -132,7 +132,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_global_position(&self, port: &mut Port) {
+    pub(crate) fn send_global_position(&self, port: &mut Port) {
         let unknown = Geodetic::default();
         let known = self.status.origin_known;
         let (lat, lon, alt) = to_mavlink_units(if known { &self.geodetic } else { &unknown });
@@ -151,7 +151,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_servos(&self, port: &mut Port) {
+    pub(crate) fn send_servos(&self, port: &mut Port) {
         let idle = if self.is_px4() { 900 } else { 1000 };
         let motor = if self.armed { 1000 + (1000.0 * self.throttle()) as u16 } else { idle };
         let unused = if self.is_px4() { 900 } else { 0 };
@@ -169,7 +169,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_target(&self, port: &mut Port) {
+    pub(crate) fn send_target(&self, port: &mut Port) {
         let [p, v, a] = self.target.map(nalgebra::Vector3::cast::<f32>);
         port.send(&dialect::POSITION_TARGET_LOCAL_NED_DATA {
             time_boot_ms: self.boot_ms(),
@@ -189,7 +189,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_imu(&self, port: &mut Port) {
+    pub(crate) fn send_imu(&self, port: &mut Port) {
         // Thrust acts along the body's z axis, so the accelerometer measures it on z alone.
         port.send(&dialect::HIGHRES_IMU_DATA {
             time_usec: self.time_us,
@@ -210,7 +210,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_distance(&self, port: &mut Port) {
+    pub(crate) fn send_distance(&self, port: &mut Port) {
         port.send(&dialect::DISTANCE_SENSOR_DATA {
             time_boot_ms: self.boot_ms(),
             min_distance: 0,
@@ -223,7 +223,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_battery(&self, port: &mut Port) {
+    pub(crate) fn send_battery(&self, port: &mut Port) {
         let mut voltages = [u16::MAX; 10];
         voltages[0] = (1000.0 * self.battery_volts()) as u16;
         port.send(&dialect::BATTERY_STATUS_DATA {
@@ -239,7 +239,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_version(&self, port: &mut Port) {
+    pub(crate) fn send_version(&self, port: &mut Port) {
         let git = [0, 0, 0, 196, 209, 42, 241, 214];
         let (capabilities, version) = if self.is_px4() {
             (PX4_CAPABILITIES, PX4_VERSION)
@@ -261,7 +261,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_ekf_status_report(&self, port: &mut Port) {
+    pub(crate) fn send_ekf_status_report(&self, port: &mut Port) {
         port.send(&dialect::EKF_STATUS_REPORT_DATA {
             velocity_variance: 0.01,
             pos_horiz_variance: 0.02,
@@ -272,7 +272,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_home(&self, port: &mut Port) {
+    pub(crate) fn send_home(&self, port: &mut Port) {
         let (home, ned) = &self.home;
         let (latitude, longitude, altitude) = to_mavlink_units(home);
         let ned = ned.cast::<f32>();
@@ -291,7 +291,7 @@ impl Snapshot {
         });
     }
 
-    pub(super) fn send_odometry(&self, port: &mut Port) {
+    pub(crate) fn send_odometry(&self, port: &mut Port) {
         // Only the diagonal of the covariance (upper triangle, row by row) is known; the rest is
         // NaN.
         let mut pose_covariance = [f32::NAN; 21];
@@ -326,7 +326,7 @@ impl Snapshot {
 }
 
 /// Converts to latitude and longitude in 1e-7 degrees and altitude in millimetres, rounded.
-pub(super) fn to_mavlink_units(position: &Geodetic) -> (i32, i32, i32) {
+pub(crate) fn to_mavlink_units(position: &Geodetic) -> (i32, i32, i32) {
     (
         libm::round(position.lat_deg * 1e7) as i32,
         libm::round(position.lon_deg * 1e7) as i32,

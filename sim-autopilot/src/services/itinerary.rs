@@ -11,16 +11,16 @@
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
 
-use super::cmd::{
+use crate::SimulatedKind;
+use crate::link::cmd::{
     DO_CHANGE_SPEED, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST, NAV_DELAY, NAV_LAND,
     NAV_RETURN_TO_LAUNCH, NAV_TAKEOFF, NAV_WAYPOINT,
 };
-use super::command::ReceivedCommand;
-use super::mission::{MissionItem, MissionProgress};
-use super::msg::{MISSION_CURRENT, MISSION_ITEM_REACHED};
-use super::platform::{Platform, SensorReadings};
-use super::vehicle::wrap_pi_once;
-use crate::SimulatedKind;
+use crate::link::command::ReceivedCommand;
+use crate::link::msg::{MISSION_CURRENT, MISSION_ITEM_REACHED};
+use crate::physics::vehicle::wrap_pi_once;
+use crate::platform::{Platform, SensorReadings};
+use crate::services::mission::MissionItem;
 
 /// Horizontal distance at which a waypoint is reached, metres: `NAV_ACC_RAD` of PX4's multicopters,
 /// ArduCopter's `WPNAV_RADIUS`.
@@ -33,14 +33,14 @@ const MAX_YAW_ERROR_RAD: f32 = 0.21;
 
 /// What the land detector reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum LandedState {
+pub(crate) enum LandedState {
     OnGround,
     InAir,
 }
 
 /// What the vehicle flies for one mission item.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum MissionLeg {
+pub(crate) enum MissionLeg {
     /// Wait for this time, seconds.
     Wait(f32),
     /// Climb to height `up`, ENU metres.
@@ -57,7 +57,7 @@ pub(super) enum MissionLeg {
 impl MissionLeg {
     /// End point of a leg, at which the next one starts: its waypoint, else the vehicle's position
     /// `here`.
-    pub(super) fn leg_end(leg: Option<Self>, here: &Point) -> Point {
+    pub(crate) fn leg_end(leg: Option<Self>, here: &Point) -> Point {
         match leg {
             Some(Self::To { at, .. }) => at,
             _ => *here,
@@ -68,7 +68,7 @@ impl MissionLeg {
 /// Height and climb rate on the straight line between two waypoints, at the point abreast of the
 /// vehicle. Both autopilots fly along that line: PX4's `PositionSmoothing` computes one velocity on
 /// all three axes towards its end, ArduCopter's `AC_WPNav` one S-curve.
-pub(super) fn interpolate_height(
+pub(crate) fn interpolate_height(
     from: &Point,
     at: &Point,
     here: &Point,
@@ -103,12 +103,12 @@ impl Platform {
     }
 
     /// Whether a mission with items to fly is stored.
-    pub(super) fn has_mission(&self) -> bool {
+    pub(crate) fn has_mission(&self) -> bool {
         self.missions.items().len() > usize::from(self.first_item())
     }
 
     /// Whether the mission begins with a take-off; it may have a delay before.
-    pub(super) fn mission_takes_off(&self) -> bool {
+    pub(crate) fn mission_takes_off(&self) -> bool {
         let flown = self.missions.items().iter().skip(usize::from(self.first_item()));
         let mut legs = flown.map(item_command).filter(|&id| is_flown(id) && id != NAV_DELAY);
         legs.next() == Some(NAV_TAKEOFF)
@@ -116,7 +116,7 @@ impl Platform {
 
     /// Executes the commands that are due and returns the leg to fly; `None` once all items are
     /// completed.
-    pub(super) fn fly_mission(
+    pub(crate) fn fly_mission(
         &mut self,
         sensors: &SensorReadings,
         landed: LandedState,
@@ -143,17 +143,16 @@ impl Platform {
 
     /// Completes the current item: sends MISSION_ITEM_REACHED and MISSION_CURRENT, and the next
     /// item begins.
-    pub(super) fn complete_item(&mut self) {
-        let passed = self.missions.progress.current;
-        self.missions.progress = MissionProgress::starting_at(passed + 1);
+    pub(crate) fn complete_item(&mut self) {
+        let passed = self.missions.progress.complete_item();
         let reached = passed.to_le_bytes();
         self.ports.iter_mut().for_each(|port| port.send_raw(MISSION_ITEM_REACHED, &reached));
         self.send_on_all_ports(MISSION_CURRENT);
     }
 
     /// Makes the next flight start with the first item.
-    pub(super) fn rewind_mission(&mut self) {
-        self.missions.progress = MissionProgress::default();
+    pub(crate) fn rewind_mission(&mut self) {
+        self.missions.progress.rewind();
     }
 
     fn leg_of_item(&self, item: &MissionItem) -> Option<MissionLeg> {
@@ -223,12 +222,11 @@ impl Platform {
         landed: LandedState,
     ) -> bool {
         let in_air = landed == LandedState::InAir;
-        let progress = &mut self.missions.progress;
         let since = |us: Option<u64>| {
             sensors.now_us.saturating_sub(us.unwrap_or(sensors.now_us)) as f32 * 1e-6
         };
         match *leg {
-            MissionLeg::Wait(s) => since(progress.since_us) >= s,
+            MissionLeg::Wait(s) => since(self.missions.progress.since_us) >= s,
             MissionLeg::TakeOff { up } => in_air && sensors.position.z > up - REACHED_HEIGHT_M,
             MissionLeg::To { at, heading, stay_s, reached_m } => {
                 let off = at - sensors.position;
@@ -240,10 +238,11 @@ impl Platform {
                     && off.z.abs() <= REACHED_HEIGHT_M
                     && turned
                 {
-                    progress.arrived_us.get_or_insert(sensors.now_us);
+                    self.missions.progress.note_arrival(sensors.now_us);
                 }
-                let stayed = progress.arrived_us.is_some() && since(progress.arrived_us) >= stay_s;
-                in_air && (stayed || progress.arrived_us.is_some() && stay_s.is_nan())
+                let arrived_us = self.missions.progress.arrived_us;
+                let stayed = arrived_us.is_some() && since(arrived_us) >= stay_s;
+                in_air && (stayed || arrived_us.is_some() && stay_s.is_nan())
             }
             MissionLeg::Land { .. } | MissionLeg::Return => false,
         }

@@ -5,9 +5,9 @@
 //! forwarded to the ports that reach the target, a broadcast to all other ports at which any
 //! component was heard. A message for this autopilot alone is not forwarded.
 
-use super::frame::CheckedFrame;
-use super::msg;
-use super::port::{AUTOPILOT_COMPONENT, Port};
+use crate::link::frame::CheckedFrame;
+use crate::link::msg;
+use crate::link::port::{AUTOPILOT_COMPONENT, Port};
 
 /// Offset of the target system id in the payload of a message; the target component id follows it.
 /// `None`: the message has no target, so it is a broadcast.

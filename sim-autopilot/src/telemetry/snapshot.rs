@@ -5,8 +5,8 @@ use core::cell::OnceCell;
 use nalgebra::Vector3;
 use planner_core::geo::frames::Geodetic;
 
-use super::status::AutopilotStatus;
 use crate::SimulatedKind;
+use crate::status::AutopilotStatus;
 
 /// The state of one step from which telemetry messages are made.
 #[derive(Clone, Debug)]
@@ -87,25 +87,25 @@ pub fn attitude_from_specific_force(force: &Vector3<f32>, heading: f32) -> Attit
 }
 
 impl Snapshot {
-    pub(super) fn attitude(&self) -> &Attitude {
+    pub(crate) fn attitude(&self) -> &Attitude {
         self.attitude
             .get_or_init(|| attitude_from_specific_force(&self.specific_force, self.heading.0))
     }
 
-    pub(super) fn is_px4(&self) -> bool {
+    pub(crate) fn is_px4(&self) -> bool {
         self.status.autopilot == SimulatedKind::Px4
     }
 
-    pub(super) fn boot_ms(&self) -> u32 {
+    pub(crate) fn boot_ms(&self) -> u32 {
         (self.time_us / 1000) as u32
     }
 
-    pub(super) fn battery_volts(&self) -> f32 {
+    pub(crate) fn battery_volts(&self) -> f32 {
         // Four cells, each from BAT1_V_EMPTY (3.6 V) to BAT1_V_CHARGED (4.05 V).
         4.0 * (3.6 + 0.45 * self.battery)
     }
 
-    pub(super) fn heading_deg(&self) -> f32 {
+    pub(crate) fn heading_deg(&self) -> f32 {
         let degrees = self.heading.0.to_degrees();
         if degrees < 0.0 { degrees + 360.0 } else { degrees }
     }

@@ -1,6 +1,6 @@
 //! Reads COMMAND_LONG and COMMAND_INT into one type; MAV_RESULT values of the answers.
 
-use super::wire::PayloadReader;
+use crate::link::wire::PayloadReader;
 
 pub const ACCEPTED: u8 = 0;
 pub const TEMPORARILY_REJECTED: u8 = 1;

@@ -5,14 +5,14 @@
 //! Download: REQUEST_LIST → COUNT, then each item on request. Source: MAVLink guide, "Mission
 //! Protocol".
 
-use super::msg::{
+use crate::link::msg::{
     MISSION_ACK as ACK, MISSION_CLEAR_ALL as CLEAR_ALL, MISSION_COUNT as COUNT,
     MISSION_CURRENT as CURRENT, MISSION_ITEM, MISSION_ITEM_INT, MISSION_REQUEST as REQUEST,
     MISSION_REQUEST_INT as REQUEST_INT, MISSION_REQUEST_LIST as REQUEST_LIST,
     MISSION_SET_CURRENT as SET_CURRENT,
 };
-use super::port::{Port, Sender};
-use super::wire::PayloadReader;
+use crate::link::port::{Port, Sender};
+use crate::link::wire::PayloadReader;
 
 /// Values of MAV_MISSION_RESULT.
 const ACCEPTED: u8 = 0;
@@ -29,7 +29,7 @@ const RETRY_US: u64 = 250_000;
 const RETRIES: u32 = 20;
 
 /// An item as the first 37 bytes of MISSION_ITEM_INT's payload, without the mission type.
-pub(super) type MissionItem = [u8; 37];
+pub(crate) type MissionItem = [u8; 37];
 
 /// An upload in progress.
 #[derive(Clone, Debug)]
@@ -44,26 +44,43 @@ struct MissionUpload {
 
 /// Progress of the mission that is flown.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct MissionProgress {
+pub(crate) struct MissionProgress {
     /// Number of the current item; the number of items when all are completed.
     pub current: u16,
-    pub(super) since_us: Option<u64>,
-    pub(super) arrived_us: Option<u64>,
+    pub(crate) since_us: Option<u64>,
+    pub(crate) arrived_us: Option<u64>,
 }
 
 impl MissionProgress {
     /// Progress at the start of item `current`.
-    pub(super) fn starting_at(current: u16) -> Self {
+    pub(crate) fn starting_at(current: u16) -> Self {
         Self { current, ..Self::default() }
     }
 
     /// Skips the items before `first`.
-    pub(super) fn begin_no_earlier_than(&mut self, first: u16) {
+    pub(crate) fn begin_no_earlier_than(&mut self, first: u16) {
         self.current = self.current.max(first);
     }
 
+    /// Completes the current item: the next one begins. Returns the number of the completed one.
+    pub(super) fn complete_item(&mut self) -> u16 {
+        let completed = self.current;
+        *self = Self::starting_at(completed + 1);
+        completed
+    }
+
+    /// Makes the next flight start with the first item.
+    pub(super) fn rewind(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Notes that the vehicle is at the current item's place; only the first time counts.
+    pub(super) fn note_arrival(&mut self, now_us: u64) {
+        self.arrived_us.get_or_insert(now_us);
+    }
+
     /// The current item starts from its beginning when the mission is continued.
-    pub(super) fn restart_item(&mut self) {
+    pub(crate) fn restart_item(&mut self) {
         (self.since_us, self.arrived_us) = (None, None);
     }
 }
@@ -74,20 +91,20 @@ pub struct Missions {
     stored: [Vec<MissionItem>; MISSION_TYPES],
     upload: Option<MissionUpload>,
     /// Progress of the mission that is flown.
-    pub(super) progress: MissionProgress,
+    pub(crate) progress: MissionProgress,
     /// Speed that a mission item set, m/s, until the mode logic takes it.
-    pub(super) speed: Option<f32>,
+    pub(crate) speed: Option<f32>,
 }
 
 impl Missions {
     /// Items of the stored mission.
-    pub(super) fn items(&self) -> &[MissionItem] {
+    pub(crate) fn items(&self) -> &[MissionItem] {
         &self.stored[0]
     }
 
     /// Requests the next item of an upload again if it did not come in time; after 20 repetitions
     /// drops the upload.
-    pub(super) fn retry_item_request(&mut self, now_us: u64, index: usize, port: &mut Port) {
+    pub(crate) fn retry_item_request(&mut self, now_us: u64, index: usize, port: &mut Port) {
         let Some(upload) = &mut self.upload else { return };
         if upload.from.port != index || now_us < upload.asked_us + RETRY_US {
             return;
@@ -111,7 +128,7 @@ impl MissionUpload {
 
 impl Missions {
     /// Handles a message of the mission protocol that `from` sent and that arrived at `port`.
-    pub(super) fn handle_message(
+    pub(crate) fn handle_message(
         &mut self,
         now_us: u64,
         port: &mut Port,

@@ -3,8 +3,8 @@
 
 use mavlink::MessageData;
 
-use super::frame::{self, CheckedFrame, MAX_FRAME_LEN, PortFramer};
-use super::msg::{COMMAND_ACK, STATUSTEXT};
+use crate::link::frame::{self, CheckedFrame, MAX_FRAME_LEN, PortFramer};
+use crate::link::msg::{COMMAND_ACK, STATUSTEXT};
 
 /// Component id of an autopilot (MAV_COMP_ID_AUTOPILOT1).
 pub const AUTOPILOT_COMPONENT: u8 = 1;

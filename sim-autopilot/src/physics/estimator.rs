@@ -18,13 +18,13 @@
 
 use planner_core::Point;
 
-use super::noise::{Gaussian, UPDATE_PERIOD_S};
+use crate::physics::noise::{Gaussian, UPDATE_PERIOD_S};
 use crate::{EstimatorErrors, SimulatedKind};
 
 impl EstimatorErrors {
     /// Horizontal and vertical accuracy that ESTIMATOR_STATUS reports, metres. Recorded PX4s
     /// reported 0.02 to 0.29 and 0.07 to 0.3, whatever their error was.
-    pub(super) fn accuracy_m(self) -> [f32; 2] {
+    pub(crate) fn accuracy_m(self) -> [f32; 2] {
         match self {
             Self::Perfect | Self::Rtk => [0.02, 0.03],
             Self::Recorded => [0.2, 0.2],

@@ -5,7 +5,7 @@
 //! fields are read at their byte offsets in wire order (sorted by size, extensions last). Zeros
 //! that MAVLink 2 cut from the payload's end read as zero.
 
-use super::frame::CheckedFrame;
+use crate::link::frame::CheckedFrame;
 
 /// A payload padded with zeros to 255 bytes.
 pub struct PayloadReader<'a>(&'a [u8; 255]);
