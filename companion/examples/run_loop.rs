@@ -1,8 +1,7 @@
 //! The drain contract as a run loop: bytes and time in, bytes and events out.
 //!
 //! Here the clock counts steps of 10 ms, and the autopilot sends only a HEARTBEAT each second. A
-//! real shell reads a clock, reads and writes two ports, and plans elsewhere
-//! (`planner_core::plan`).
+//! real shell reads a clock, reads and writes two ports, and plans (`companion::planner::answer`).
 //!
 //! `cargo run -p companion --example run_loop`
 

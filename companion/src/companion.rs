@@ -7,6 +7,7 @@ mod division;
 mod frames;
 mod inputs;
 mod photographed;
+mod plan_inputs;
 mod steps;
 mod transmit;
 

@@ -13,7 +13,8 @@ pub enum Link {
     Swarm,
 }
 
-/// The plan that the shell is to compute.
+/// The plan that the shell is to compute: [`crate::Companion::read_plan_inputs`] gives what the
+/// planner needs for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanKind {
     /// The plan of the whole mission, for the flight from the pad.

@@ -11,6 +11,7 @@ use std::sync::OnceLock;
 use std::task::Waker;
 
 use companion::link::frame::{self, Header, MAX_FRAME_LEN};
+use companion::planner::PlanFiles;
 use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, Store};
 use companion::{AUTOPILOT_COMPONENT, Config, Link};
 use embassy_futures::block_on;
@@ -101,10 +102,8 @@ async fn board() {
     let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
     companion.attach_store(store);
     SHELL.start(companion);
-    let memory =
-        PlanningMemory { workspace: WORKSPACE.take(), swarm: SWARM.take(), own: OWN.take() };
-    let mut planner =
-        Planner { roadmap: None, field: None, mission: None, system_id, files_checksum: 0, memory };
+    let memory = PlanningMemory::new(WORKSPACE.take(), SWARM.take(), OWN.take());
+    let mut planner = Planner { files: PlanFiles::default(), system_id, files_checksum: 0, memory };
     let links = join5(
         SHELL.receive(Link::Autopilot, &FROM_AUTOPILOT, OnAutopilot::GoOn),
         SHELL.receive(Link::Swarm, &FROM_RADIO, OnAutopilot::GoOn),

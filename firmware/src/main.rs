@@ -10,6 +10,7 @@
 use core::fmt::Write as _;
 
 use companion::link::severity::Severity;
+use companion::planner::PlanFiles;
 use companion::storage::mission_file::{self, MissionError, MissionView};
 use companion::storage::store::{ReadFlash, Store};
 use companion::{Config, Link};
@@ -146,11 +147,8 @@ async fn planner_and_flash_task(
     if let Some(text) = said.crashed {
         companion.send_text(Severity::Warning, CRASH.init(text).as_str());
     }
-    said.warnings
-        .iter()
-        .copied()
-        .chain(aside)
-        .for_each(|text| companion.send_text(Severity::Warning, text));
+    let warnings = said.warnings.iter().copied().chain(aside);
+    warnings.for_each(|text| companion.send_text(Severity::Warning, text));
     if is_stranger {
         companion.send_text(Severity::Warning, NOT_IN_MISSION);
     }
@@ -163,9 +161,13 @@ async fn planner_and_flash_task(
     shell.start(companion);
     let then = if known.is_some() { OnAutopilot::GoOn } else { OnAutopilot::Restart };
     start_links(links, shell, then, autopilot, swarm);
-    let (workspace, swarm, own) = (WORKSPACE.take(), SWARM_PLAN.take(), OWN_PLAN.take());
-    let memory = PlanningMemory { workspace, swarm, own };
-    let mut planner = Planner { roadmap, field, mission, system_id, files_checksum: files, memory };
+    let memory = PlanningMemory::new(WORKSPACE.take(), SWARM_PLAN.take(), OWN_PLAN.take());
+    let mut planner = Planner {
+        files: PlanFiles { mission, roadmap, field },
+        system_id,
+        files_checksum: files,
+        memory,
+    };
     shell.run_planner_and_flash(&mut planner, &mut flash).await
 }
 

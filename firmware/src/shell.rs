@@ -12,7 +12,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use companion::link::frame::{Framer, MAX_FRAME_LEN};
 use companion::link::severity::Severity;
 use companion::storage::store::{FlashRequest, MAX_READ};
-use companion::{Event, Link, PlanFailure, PlanRequests};
+use companion::{Event, Link, PlanRequests};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -347,9 +347,9 @@ impl Shell {
     ) -> ! {
         loop {
             if let Some(wanted) = self.plan_requests.take() {
-                let detour =
+                let requested =
                     self.lock_companion(|companion| planner.read_inputs(wanted, companion));
-                let answer: Result<_, PlanFailure> = planner.answer(wanted, detour.as_ref());
+                let answer = planner.answer(requested.as_ref());
                 self.with_companion(|companion, now| companion.handle_plan(now, wanted, answer));
                 continue;
             }

@@ -7,41 +7,23 @@
 
 use core::mem::{ManuallyDrop, MaybeUninit};
 
-use companion::planner::coverage;
+use companion::planner::{AreaWorkspace, LendWorkspace};
 use planner_core::Point;
 use planner_core::map::voxel::VoxelGrid;
 use planner_core::plan::PlanWorkspace;
 use planner_core::roadmap::Edge;
 use planner_core::roadmap::prm::{self, PrmConfig, PrmError};
-use planner_core::schedule::ScheduleWorkspace;
 
 use crate::capacity::{
-    AREA_VERTICES, HALF_EDGES, LANES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES,
+    AREA_VERTICES, HALF_EDGES, LANES, NO_FLY_CORNERS, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS,
+    VEHICLES,
 };
 
 /// Workspace for planning a swarm on a roadmap.
 pub type PlannerWorkspace = PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
 /// Workspace for planning a coverage mission.
-pub struct CoveragePlanWorkspace {
-    /// Workspace for lanes and routes.
-    pub area: coverage::Workspace<AREA_VERTICES, LANES, VEHICLES>,
-    /// Workspace for scheduling the flights.
-    pub schedule: ScheduleWorkspace,
-}
-
-impl CoveragePlanWorkspace {
-    /// Empty; its bytes are all zeros.
-    pub const fn new() -> Self {
-        Self { area: coverage::Workspace::new(), schedule: ScheduleWorkspace::new() }
-    }
-}
-
-impl Default for CoveragePlanWorkspace {
-    fn default() -> Self {
-        Self::new()
-    }
-}
+pub type CoveragePlanWorkspace = AreaWorkspace<AREA_VERTICES, LANES, VEHICLES, NO_FLY_CORNERS>;
 
 /// The memory for all three uses, as large as the largest; a board has one.
 pub struct WorkspaceOverlay {
@@ -83,26 +65,11 @@ impl WorkspaceOverlay {
         }
     }
 
-    /// The memory as workspace of roadmap plans. It is zeroed if it had another use before.
-    pub fn planner(&mut self) -> &mut PlannerWorkspace {
-        self.switch_use(OverlayUse::Plan);
-        // SAFETY: `switch_use` zeroed it when the use changed to this one, all zeros is an empty
-        // planner, and since then it was written as a planner alone.
-        unsafe { &mut self.memory.plan }
-    }
-
     /// The memory as roadmap builder. It is zeroed if it had another use before.
     pub fn builder(&mut self) -> &mut RoadmapBuilder {
         self.switch_use(OverlayUse::Build);
-        // SAFETY: as in `planner`; all zeros is an empty builder.
+        // SAFETY: as in `for_goals`; all zeros is an empty builder.
         unsafe { &mut self.memory.build }
-    }
-
-    /// The memory as workspace of coverage plans. It is zeroed if it had another use before.
-    pub fn coverage_plan(&mut self) -> &mut CoveragePlanWorkspace {
-        self.switch_use(OverlayUse::CoveragePlan);
-        // SAFETY: as in `planner`; all zeros is an area without vertices.
-        unsafe { &mut self.memory.coverage }
     }
 
     /// Zeroes the memory if `used` differs from its use until now.
@@ -112,6 +79,33 @@ impl WorkspaceOverlay {
             unsafe { (&raw mut self.memory).write_bytes(0, 1) };
             self.used = used;
         }
+    }
+}
+
+impl
+    LendWorkspace<
+        ROADMAP_NODES,
+        VEHICLES,
+        TIMED_SEGMENTS,
+        AREA_VERTICES,
+        LANES,
+        VEHICLES,
+        NO_FLY_CORNERS,
+    > for WorkspaceOverlay
+{
+    /// The memory as workspace of roadmap plans. It is zeroed if it had another use before.
+    fn for_goals(&mut self) -> &mut PlannerWorkspace {
+        self.switch_use(OverlayUse::Plan);
+        // SAFETY: `switch_use` zeroed it when the use changed to this one, all zeros is an empty
+        // planner, and since then it was written as a planner alone.
+        unsafe { &mut self.memory.plan }
+    }
+
+    /// The memory as workspace of coverage plans. It is zeroed if it had another use before.
+    fn for_area(&mut self) -> &mut CoveragePlanWorkspace {
+        self.switch_use(OverlayUse::CoveragePlan);
+        // SAFETY: as in `for_goals`; all zeros is an area without vertices.
+        unsafe { &mut self.memory.coverage }
     }
 }
 

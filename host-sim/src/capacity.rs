@@ -22,6 +22,9 @@ pub const GATES: usize = 2048;
 /// them: 44 bytes each.
 pub const TIMED_SEGMENTS: usize = 32_768;
 
+/// Most keep-out zones of a detour: 32 bytes each.
+pub const ZONES: usize = 32 * VEHICLES;
+
 /// A companion with the host's capacities.
 pub type HostCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
 

@@ -4,36 +4,30 @@
 mod coverage;
 mod on_board;
 mod places;
+pub mod planner;
 mod ready;
 pub mod stretches;
 
 use std::time::Instant;
 
 use anyhow::{anyhow, bail};
-use companion::planner::{self, PlanStep};
+use companion::planner::{PlanStep, plan_goals};
 use companion::storage::mission_file::{MissionBlock, MissionGoal};
-use companion::{PlanFailure, PlanKind};
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, KeepOutZone};
 use planner_core::flight::{PathError, Task};
-use planner_core::plan::{self, PlanError};
-use planner_core::roadmap::search::SearchWorkspace;
+use planner_core::plan::PlanError;
 use planner_core::schedule::ScheduleError;
 
+use self::planner::GoalsWorkspace;
 use self::ready::schedule_config;
 pub use self::ready::{HostPlan, OwnPlan, PreparedMission, VERTICAL_MPS};
-use crate::capacity::{
-    BoardCapacity, GATES, HostCompanion, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
-    on_heap,
-};
+use crate::capacity::{BoardCapacity, GATES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::check_starts_on_ground;
 use crate::map::{self, VoxelMap};
 use crate::progress::Progress;
 use crate::result::{Timing, Unserved};
 use crate::roadmap::{self};
 use crate::scenario::Scenario;
-
-type HostPlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
 /// Length of the landing at each goal, metres: from the goal down to the hull centre of a vehicle
 /// that stands on the ground below it, computed for the largest radius of all vehicles.
@@ -156,10 +150,10 @@ impl PreparedMission {
         }
         let view = self.roadmap_view();
         let mission = self.mission_view();
-        let mut workspace = on_heap(HostPlanWorkspace::new);
+        let mut workspace = on_heap(GoalsWorkspace::new);
         let mut plan = on_heap(HostPlan::new);
         let (mut step_begun, mut search_s, mut assignment_s) = (Instant::now(), 0.0, 0.0);
-        planner::plan_goals(&mission, &view, self.max_gates(), &mut workspace, &mut plan, |step| {
+        plan_goals(&mission, &view, self.max_gates(), &mut workspace, &mut plan, |step| {
             let took_s =
                 core::mem::replace(&mut step_begun, Instant::now()).elapsed().as_secs_f64();
             match step {
@@ -249,63 +243,5 @@ impl PreparedMission {
             vehicles: plan.flights.iter().filter(|f| !f.task.leaves_pad()).map(|f| f.id).collect(),
             reasons: Vec::new(),
         }
-    }
-
-    /// Answers a plan request of the companion of vehicle `index`. Depending on `wanted`, the
-    /// answer is the vehicle's part of the swarm's plan, its part of a new plan of an area (without
-    /// the waypoints already photographed and, for a division, after losses of vehicles), or a
-    /// detour.
-    pub fn answer_plan_request(
-        &self,
-        plan: &HostPlan,
-        index: usize,
-        wanted: PlanKind,
-        companion: &mut HostCompanion,
-    ) -> Result<Box<OwnPlan>, PlanFailure> {
-        let own = |plan: &HostPlan| self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity);
-        match wanted {
-            PlanKind::Mission if companion.excluded_waypoints().is_empty() => own(plan),
-            PlanKind::Mission | PlanKind::Division => {
-                let losses = companion.division_inputs().take(if wanted == PlanKind::Division {
-                    usize::MAX
-                } else {
-                    0
-                });
-                let rest = self.plan_remaining(companion.excluded_waypoints(), losses);
-                own(&*rest.map_err(|_| PlanFailure::Unreachable)?)
-            }
-            PlanKind::Detour => {
-                let mut obstacles = Vec::new();
-                let request = companion.detour_request(|obstacle| obstacles.push(obstacle));
-                let request = request.ok_or(PlanFailure::Unreachable)?;
-                match self.scenario.area.is_some() {
-                    true => self.plan_area_detour(&request, &mut obstacles),
-                    false => self
-                        .plan_detour(&request, &mut obstacles)
-                        .map_err(|_| PlanFailure::Unreachable),
-                }
-            }
-        }
-    }
-
-    /// Plans a detour over the roadmap from where the vehicle is, clear of the keep-out zones
-    /// `obstacles`.
-    fn plan_detour(
-        &self,
-        request: &DetourRequest,
-        obstacles: &mut [KeepOutZone],
-    ) -> Result<Box<OwnPlan>, DetourError> {
-        let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
-        let mut own = Box::new(OwnPlan::default());
-        let mut nodes = heapless::Vec::new();
-        detour::plan_detour_for_vehicle(
-            &self.roadmap_view(),
-            request,
-            obstacles,
-            &mut search,
-            &mut nodes,
-            &mut own,
-        )?;
-        Ok(own)
     }
 }

@@ -37,7 +37,8 @@ use self::step::STEP_US;
 use self::vehicles::vehicles_on_pads;
 use crate::coverage::check::Picture;
 use crate::margins;
-use crate::mission::{HostPlan, OwnPlan, PreparedMission};
+use crate::mission::planner::HostPlanner;
+use crate::mission::{HostPlan, PreparedMission};
 use crate::progress::Progress;
 use crate::report::{self, Level};
 use crate::result::{MissionResult, Safety, Totals, Unserved, VehicleResult, rounded};
@@ -122,6 +123,7 @@ pub fn fly_with_ground_station(
 struct SimulationRun<'a> {
     mission: &'a PreparedMission,
     plan: &'a HostPlan,
+    planner: HostPlanner<'a>,
     members: Vec<SimulatedVehicle>,
     radio: Radio,
     referee: Referee<'a>,
@@ -238,6 +240,7 @@ impl<'a> SimulationRun<'a> {
         Ok(Self {
             mission,
             plan,
+            planner: HostPlanner::new(mission, plan),
             radio,
             referee,
             ground_station: GroundStation::new(scenario.mission.ground_stations[0]),
@@ -256,7 +259,7 @@ impl<'a> SimulationRun<'a> {
     }
 
     fn step(&mut self, step: u64, now_us: u64) -> anyhow::Result<()> {
-        let Self { mission, plan, members, radio, places, log, .. } = self;
+        let Self { mission, plan, planner, members, radio, places, log, .. } = self;
         self.t_s = now_us as f64 * 1e-6;
         let mut world = FaultTargets {
             members,
@@ -269,13 +272,15 @@ impl<'a> SimulationRun<'a> {
             member.step(step, i, mission, radio, places, log)?;
             if let Some(wanted) = member.take_plan_request() {
                 let own = match member.planner {
-                    PlanAnswer::BadRoadmap => plan_on_damaged(&mission.roadmap_or_field_file),
-                    _ => mission.answer_plan_request(plan, i, wanted, &mut member.companion),
+                    PlanAnswer::BadRoadmap => {
+                        Err(failure_on_damaged(&mission.roadmap_or_field_file))
+                    }
+                    _ => planner.answer(i, wanted, &mut member.companion),
                 };
                 if wanted == PlanKind::Mission {
                     self.done = member.companion.excluded_waypoints().to_vec();
                 }
-                member.hand_over_plan(now_us, wanted, own.as_deref().map_err(|failure| *failure));
+                member.hand_over_plan(now_us, wanted, own);
             }
             places[i] = member.autopilot.true_state().position;
             let flight = &plan.flights[i];
@@ -428,14 +433,14 @@ fn is_left_to_pilot(member: &SimulatedVehicle) -> bool {
 }
 
 /// How planning fails on the roadmap file with one bit changed.
-fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
+fn failure_on_damaged(file: &[u8]) -> PlanFailure {
     let mut damaged = file.to_vec();
     let middle = damaged.len() / 2;
     damaged[middle] ^= 1;
     match RoadmapView::parse(&damaged) {
-        Err(_) => Err(PlanFailure::RoadmapUnusable),
+        Err(_) => PlanFailure::RoadmapUnusable,
         // Not reached: the CRC detects every single changed bit.
-        Ok(_) => Err(PlanFailure::Invalid),
+        Ok(_) => PlanFailure::Invalid,
     }
 }
 

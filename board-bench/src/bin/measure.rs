@@ -7,6 +7,7 @@
 use core::hint::black_box;
 
 use board_bench::cases::{self, StepCase, StepKind};
+use companion::planner::LendWorkspace as _;
 use firmware::boards::chosen::{clock, memory};
 use firmware::boards::stack;
 use firmware::capacity::{ROADMAP_NODES, VEHICLES, WAYPOINTS};
@@ -41,7 +42,7 @@ fn main() -> ! {
         .expect("a roadmap lies in bank 2");
     println!("roadmap {} {} {:08x}", view.node_count(), view.half_edge_count(), view.crc());
     let workspace = WORKSPACE.take();
-    measure_plan(&view, workspace.planner());
+    measure_plan(&view, workspace.for_goals());
     measure_steps();
     measure_build(workspace, 0.0);
     measure_build(workspace, cases::CLEARANCE_M);

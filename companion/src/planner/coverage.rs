@@ -19,7 +19,6 @@ use planner_core::map::field::follow::TerrainFollowing;
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::ScheduleWorkspace;
 
-use super::plan_failure;
 use crate::config::PlanFailure;
 use crate::storage::mission_file::coverage::{CoverageView, HeadingRule, PartEligibility};
 use crate::storage::mission_file::{MissionVehicle, MissionView};
@@ -138,7 +137,7 @@ impl fmt::Display for Error {
 impl From<Error> for PlanFailure {
     fn from(error: Error) -> Self {
         match error {
-            Error::Plan(error) => plan_failure(&error),
+            Error::Plan(error) => error.into(),
             Error::NoField => Self::RoadmapUnusable,
             Error::Coverage(
                 CoverageError::Area(AreaError::AreaFull)

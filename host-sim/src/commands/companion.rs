@@ -16,6 +16,7 @@ use crate::capacity::{HostCompanion, VEHICLES, new_companion};
 use crate::flash::{self, HostFlash};
 use crate::link::{self, LinkUrl};
 use crate::mission::PreparedMission;
+use crate::mission::planner::HostPlanner;
 use crate::progress::Progress;
 use crate::say;
 use crate::shortage;
@@ -83,6 +84,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             .collect::<FixedVec<_, _>>();
     }
     let mut companion = companion_with_store(&config, &mut flash)?;
+    let mut planner = HostPlanner::new(&mission, &plan);
     let mut links: Vec<(Link, Box<dyn link::ByteLink>)> =
         vec![(Link::Autopilot, args.autopilot.open()?)];
     if let Some(swarm) = &args.swarm {
@@ -127,16 +129,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                     );
                 }
                 Event::PlanRequested(wanted) => {
-                    let mut own = mission.answer_plan_request(&plan, index, wanted, &mut companion);
+                    let mut own = planner.answer(index, wanted, &mut companion).cloned();
                     if let (Ok(own), None) = (&mut own, &args.swarm) {
                         own.gates.clear();
                         own.depart_s = 0.0;
                     }
-                    companion.handle_plan(
-                        now(),
-                        wanted,
-                        own.as_deref().map_err(|failure| *failure),
-                    );
+                    companion.handle_plan(now(), wanted, own.as_ref().map_err(|failure| *failure));
                 }
                 Event::StateChanged { from, to, text, .. } => {
                     say!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());

@@ -4,9 +4,8 @@
 use std::iter;
 
 use anyhow::{Context, anyhow, bail};
-use companion::PlanFailure;
 use companion::margins::TRACKING_M;
-use companion::planner::coverage::{self, Error, Request, Workspace};
+use companion::planner::coverage::{self, Error, Request};
 use companion::storage::mission_file::coverage::{
     CoverageHeader, CoverageParts, CoverageView, Ground, PartEligibility, VehicleShare,
 };
@@ -17,13 +16,13 @@ use planner_core::coverage::area::Area;
 use planner_core::coverage::flights::MAX_PATH_LENGTH_M;
 use planner_core::coverage::pack::TrackUnit;
 use planner_core::coverage::transit::Transit;
-use planner_core::detour::{DetourRequest, KeepOutZone};
 use planner_core::flight::{PathError, WaypointRange};
 use planner_core::map::field::FieldView;
 use planner_core::plan::{PlanError, VehicleTask};
-use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
+use planner_core::schedule::ScheduleError;
 
-use super::ready::{HostPlan, OwnPlan, PreparedMission, schedule_config};
+use super::planner::HostAreaWorkspace;
+use super::ready::{HostPlan, PreparedMission, schedule_config};
 use crate::area::MAX_VERTICES;
 use crate::capacity::{BOARD_NO_FLY_CORNERS, BoardCapacity, GATES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::sorties::{self, USABLE_CHARGE};
@@ -39,8 +38,6 @@ use crate::{map, margins};
 const TAKEOFF_HEIGHT_M: f32 = 3.0;
 /// Distance by which the map extends beyond area and pads, and above the highest layer, metres.
 const MAP_MARGIN_M: f32 = 30.0;
-
-type HostWorkspace = Workspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES>;
 
 /// Prepares a coverage mission: checks that companions can fly it, and encodes its files.
 pub(super) fn prepare(
@@ -96,9 +93,9 @@ pub(super) fn prepare(
         mission.roadmap_or_field_file = terrain.field.to_vec();
     }
     mission.encode_area(&climbs)?;
-    let mut ws = on_heap(HostWorkspace::new);
+    let mut ws = on_heap(HostAreaWorkspace::new);
     let plan = mission.plan_area(&[], iter::empty(), &mut ws)?;
-    if ws.routes() != &routes {
+    if ws.area.routes() != &routes {
         bail!(
             "cannot be flown: {}: companions would divide the area in another way\nhint: please report it, with the scenario",
             mission.scenario.path
@@ -252,13 +249,12 @@ impl PreparedMission {
         &self,
         done: &[WaypointRange],
         losses: impl Iterator<Item = &'l [VehicleDivisionInput]> + Clone,
-        ws: &mut HostWorkspace,
+        ws: &mut HostAreaWorkspace,
     ) -> anyhow::Result<Box<HostPlan>> {
         let mission = self.mission_view();
         let MissionKind::Coverage(view) = mission.kind() else {
             bail!("no area: {}", self.scenario.path)
         };
-        let mut schedule = on_heap(ScheduleWorkspace::new);
         let mut plan = on_heap(HostPlan::new);
         coverage::plan_flights::<
             MAX_VERTICES,
@@ -272,12 +268,12 @@ impl PreparedMission {
                 mission: &mission,
                 view,
                 field: self.height_field(),
-                max_gates: self.board.map_or(GATES, |board| board.gates),
+                max_gates: self.max_gates(),
                 photographed: done,
             },
             losses,
-            ws,
-            &mut schedule,
+            &mut ws.area,
+            &mut ws.schedule,
             &mut plan,
         )
         .map_err(|error| self.explain_error(&error))?;
@@ -292,7 +288,7 @@ impl PreparedMission {
 
     /// Plans the coverage mission from its start, with nothing photographed.
     pub(super) fn plan_coverage(&self) -> anyhow::Result<Box<HostPlan>> {
-        self.plan_area(&[], iter::empty(), &mut on_heap(HostWorkspace::new))
+        self.plan_area(&[], iter::empty(), &mut on_heap(HostAreaWorkspace::new))
     }
 
     /// Plans what is left: without the waypoints `done`, and after the divisions `losses`, each of
@@ -305,28 +301,7 @@ impl PreparedMission {
         done: &[WaypointRange],
         losses: impl Iterator<Item = &'l [VehicleDivisionInput]> + Clone,
     ) -> anyhow::Result<Box<HostPlan>> {
-        self.plan_area(done, losses, &mut on_heap(HostWorkspace::new))
-    }
-
-    /// Plans one vehicle's path over the area to its pad or to a place aside, clear of the keep-out
-    /// zones `obstacles`.
-    pub(super) fn plan_area_detour(
-        &self,
-        request: &DetourRequest,
-        obstacles: &mut [KeepOutZone],
-    ) -> Result<Box<OwnPlan>, PlanFailure> {
-        let mission = self.mission_view();
-        let MissionKind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
-        let (mut ws, mut own) = (on_heap(HostWorkspace::new), Box::new(OwnPlan::default()));
-        coverage::plan_detour::<
-            MAX_VERTICES,
-            MAX_LANES,
-            COVERAGE_VEHICLES,
-            MAX_NO_FLY_CORNERS,
-            WAYPOINTS,
-            GATES,
-        >(view, self.height_field(), request, obstacles, &mut ws, &mut own)?;
-        Ok(own)
+        self.plan_area(done, losses, &mut on_heap(HostAreaWorkspace::new))
     }
 
     /// Text about the first capacity of a board that the area exceeds; `None` if the board holds
@@ -346,9 +321,9 @@ impl PreparedMission {
                 board.name
             ));
         }
-        let mut ws = on_heap(HostWorkspace::new);
+        let mut ws = on_heap(HostAreaWorkspace::new);
         match self.plan_area(&[], iter::empty(), &mut ws) {
-            Ok(_) => board.area_excess(vertices.len(), ws.tracks().lanes().len()),
+            Ok(_) => board.area_excess(vertices.len(), ws.area.tracks().lanes().len()),
             Err(error) => Some(format!("{error:#}")),
         }
     }

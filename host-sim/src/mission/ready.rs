@@ -4,6 +4,8 @@
 use std::sync::OnceLock;
 
 use anyhow::anyhow;
+use companion::PlanFailure;
+use companion::planner;
 use companion::storage::mission_file::{
     self, MissionBlock, MissionHeader, MissionVehicle, MissionView,
 };
@@ -12,7 +14,7 @@ use planner_core::flight::VehiclePlan;
 use planner_core::geo::frames::{Geodetic, enu_to_geodetic};
 use planner_core::plan::{self, GoalMode, Objective, VehicleTask};
 use planner_core::roadmap::RoadmapView;
-use planner_core::schedule::{ScheduleConfig, ScheduleError};
+use planner_core::schedule::ScheduleConfig;
 
 use crate::capacity::{BoardCapacity, GATES, VEHICLES, WAYPOINTS};
 use crate::map::{ClearanceField, VoxelMap};
@@ -112,10 +114,13 @@ impl PreparedMission {
     }
 
     /// The part of `plan` that vehicle `index` flies, with its gates.
-    pub fn own_plan(&self, plan: &HostPlan, index: usize) -> Result<Box<OwnPlan>, ScheduleError> {
+    ///
+    /// # Errors
+    /// As [`planner::take_own_plan`].
+    pub fn own_plan(&self, plan: &HostPlan, index: usize) -> Result<Box<OwnPlan>, PlanFailure> {
         let mut workspace = Default::default();
         let mut own = Box::new(OwnPlan::default());
-        plan::vehicle_plan(plan, index, &self.schedule, &mut workspace, &mut own)?;
+        planner::take_own_plan(plan, index, &self.schedule, &mut workspace, &mut own)?;
         Ok(own)
     }
 

@@ -2,6 +2,7 @@
 
 use board_bench::calls::{Meter, flight};
 use board_bench::cases::{self, StepCase, StepKind, random_below, random_between, random_point};
+use companion::planner::LendWorkspace as _;
 use firmware::boards::chosen::memory;
 use firmware::capacity::{
     GATES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS,
@@ -75,11 +76,11 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
         })
         .expect("a roadmap lies in bank 2");
     measure_frames_and_grids(meter);
-    measure_searches(meter, &view, workspace.planner());
-    measure_assignments(meter, &mut workspace.planner().assignment);
-    measure_plans(meter, &view, workspace.planner(), &mut beside.plan);
-    measure_largest_swarm(meter, &view, workspace.planner(), &mut beside.plan);
-    measure_detours(meter, &view, &mut workspace.planner().search);
+    measure_searches(meter, &view, workspace.for_goals());
+    measure_assignments(meter, &mut workspace.for_goals().assignment);
+    measure_plans(meter, &view, workspace.for_goals(), &mut beside.plan);
+    measure_largest_swarm(meter, &view, workspace.for_goals(), &mut beside.plan);
+    measure_detours(meter, &view, &mut workspace.for_goals().search);
     measure_paths(meter);
     let (head, words) = memory::measurement_map();
     let grid = cases::voxel_map(&head, words);
@@ -90,9 +91,9 @@ pub fn measure_planner_calls(meter: &mut impl Meter) -> [u32; 2] {
     });
     measure_segments(meter, &grid);
     measure_roadmap_builds(meter, &grid, workspace);
-    let search = &mut workspace.planner().search;
+    let search = &mut workspace.for_goals().search;
     measure_host_calls(meter, &grid, search, beside);
-    coverage_calls::measure_coverage(meter, workspace.coverage_plan(), &mut beside.plan)
+    coverage_calls::measure_coverage(meter, workspace.for_area(), &mut beside.plan)
 }
 
 fn random_geodetic(rng: &mut Pcg32) -> Geodetic {

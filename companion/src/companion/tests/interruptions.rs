@@ -12,6 +12,7 @@ use crate::autopilot::AutopilotKind;
 use crate::autopilot::{ardupilot, px4};
 use crate::link::commands::{ACCEPTED, TEMPORARILY_REJECTED};
 use crate::link::intent::{GROUNDED, ON_PLAN, OUT_OF_PLAN};
+use crate::planner::{PlanInputs, RequestedPlan};
 use crate::testing::fake_autopilot::*;
 use planner_core::Point;
 
@@ -474,7 +475,9 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     b.run_until(State::Replanning, 10.0);
     // The obstacle lies on the detour that is returned next.
     obstacle(&mut b, Point::new(13.0, 16.0, 2.0));
-    let request = b.companion.detour_request(|_| {}).expect("planning");
+    let mut inputs = PlanInputs::<4, 16>::new();
+    let requested = b.companion.read_plan_inputs(PlanKind::Detour, &mut inputs);
+    let Some(RequestedPlan::Detour(request)) = requested else { panic!("it is planning") };
     let mut path = planner_core::flight::Path::new();
     for point in [request.here, Point::new(13.0, 16.0, 2.0), GOAL] {
         path.push(point, 1.2).unwrap();
@@ -483,5 +486,6 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     b.drain();
     b.run(1.0);
     assert_eq!(b.state(), State::Blocked, "{:?}", b.texts);
+    assert_eq!(b.companion.read_plan_inputs(PlanKind::Detour, &mut inputs), None);
     b.neighbour = Some((Point::new(8.0, 20.0, 0.0), GROUNDED | ON_PLAN, 0.0, 5));
 }

@@ -1,0 +1,101 @@
+//! The planner on the host: answers the companions' requests for plans as a board does, with more
+//! memory.
+
+use companion::planner::{
+    self, AreaWorkspace, LendWorkspace, OwnPlanMemory, PlanFiles, PlanningMemory,
+};
+use companion::{PlanFailure, PlanKind};
+use planner_core::map::field::FieldView;
+use planner_core::plan::PlanWorkspace;
+use planner_core::roadmap::RoadmapView;
+
+use super::ready::{HostPlan, OwnPlan, PreparedMission};
+use crate::area::MAX_VERTICES;
+use crate::capacity::{
+    GATES, HostCompanion, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS, ZONES, on_heap,
+};
+use crate::coverage::{MAX_LANES, MAX_NO_FLY_CORNERS, MAX_VEHICLES as COVERAGE_VEHICLES};
+
+/// Workspace for planning a swarm on a roadmap.
+pub(super) type GoalsWorkspace = PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
+/// Workspace for planning a coverage mission.
+pub(super) type HostAreaWorkspace =
+    AreaWorkspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_NO_FLY_CORNERS>;
+
+/// The workspaces that were needed so far.
+#[derive(Default)]
+struct HostWorkspaces {
+    goals: Option<Box<GoalsWorkspace>>,
+    area: Option<Box<HostAreaWorkspace>>,
+}
+
+impl
+    LendWorkspace<
+        ROADMAP_NODES,
+        VEHICLES,
+        TIMED_SEGMENTS,
+        MAX_VERTICES,
+        MAX_LANES,
+        COVERAGE_VEHICLES,
+        MAX_NO_FLY_CORNERS,
+    > for HostWorkspaces
+{
+    fn for_goals(&mut self) -> &mut GoalsWorkspace {
+        self.goals.get_or_insert_with(|| on_heap(GoalsWorkspace::new))
+    }
+
+    fn for_area(&mut self) -> &mut HostAreaWorkspace {
+        self.area.get_or_insert_with(|| on_heap(HostAreaWorkspace::new))
+    }
+}
+
+/// Makes the plans that the companions of a mission request, one after the other in the same
+/// memory.
+pub struct HostPlanner<'a> {
+    mission: &'a PreparedMission,
+    /// Plan of the whole mission, which is the same for all companions.
+    plan: &'a HostPlan,
+    files: PlanFiles<'a>,
+    workspaces: HostWorkspaces,
+    swarm: Box<HostPlan>,
+    own: Box<OwnPlanMemory<VEHICLES, WAYPOINTS, GATES, ZONES>>,
+}
+
+impl<'a> HostPlanner<'a> {
+    /// A planner for a mission whose plan before the first take-off is `plan`.
+    pub fn new(mission: &'a PreparedMission, plan: &'a HostPlan) -> Self {
+        // The file is one of the two, or empty over level ground.
+        let file = &mission.roadmap_or_field_file;
+        let files = PlanFiles {
+            mission: Some(mission.mission_view()),
+            roadmap: RoadmapView::parse(file).ok(),
+            field: FieldView::parse(file).ok(),
+        };
+        let (swarm, own) = (on_heap(HostPlan::new), on_heap(OwnPlanMemory::new));
+        Self { mission, plan, files, workspaces: HostWorkspaces::default(), swarm, own }
+    }
+
+    /// Makes the plan of kind `wanted` that the companion of vehicle `index` requests.
+    ///
+    /// # Errors
+    /// [`PlanFailure`]: the reason why there is no plan.
+    pub fn answer(
+        &mut self,
+        index: usize,
+        wanted: PlanKind,
+        companion: &mut HostCompanion,
+    ) -> Result<&OwnPlan, PlanFailure> {
+        let requested = companion.read_plan_inputs(wanted, &mut self.own.inputs);
+        let requested = requested.ok_or(PlanFailure::Unreachable)?;
+        if wanted == PlanKind::Mission && companion.excluded_waypoints().is_empty() {
+            // A board computes this plan; here it is computed once for all vehicles.
+            self.own.plan = *self.mission.own_plan(self.plan, index)?;
+            return Ok(&self.own.plan);
+        }
+        let memory = PlanningMemory::new(&mut self.workspaces, &mut self.swarm, &mut self.own);
+        let mut memory = PlanningMemory { max_gates: self.mission.max_gates(), ..memory };
+        let system_id = self.mission.tasks[index].id;
+        planner::answer(&self.files, system_id, &requested, &mut memory)?;
+        Ok(&self.own.plan)
+    }
+}
