@@ -46,13 +46,19 @@ const DEFAULT_ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
 /// Duration of a serial stall or an autopilot's boot if the fault has no `duration_s`, seconds.
 const DEFAULT_FAULT_S: f32 = 3.0;
 
-/// Refuses faults that the simulation cannot play on a vehicle: resetting a companion needs it in
-/// this process, disturbing its planner too; a radio cut needs the simulated radio.
+/// Refuses faults that the simulation cannot play: resetting a companion needs it in this process,
+/// disturbing its planner too; a radio cut needs the simulated radio, a damaged roadmap a file.
 ///
 /// # Errors
-/// Names the fault and the vehicle.
+/// Names the fault, and the vehicle that it cannot strike.
 pub fn check(scenario: &Scenario) -> anyhow::Result<()> {
+    let needs_no_file = scenario.area.as_ref().is_some_and(|area| area.terrain.is_none());
     for fault in &scenario.faults {
+        anyhow::ensure!(
+            !(needs_no_file && fault.kind == "bad-roadmap"),
+            "no such fault here: {}: bad-roadmap has no file to damage: an area over level ground is planned without a roadmap or field",
+            scenario.path
+        );
         for vehicle in scenario.vehicles.iter().filter(|vehicle| fault.strikes(vehicle)) {
             let in_vain = match (&vehicle.companion, fault.kind) {
                 (CompanionHost::InProcess { .. }, _) => false,

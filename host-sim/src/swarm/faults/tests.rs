@@ -21,3 +21,17 @@ fn what_strikes_a_companion_is_refused_where_that_is_elsewhere() {
     assert!(refused(alone, "radio-cut", "") && !refused(board, "radio-cut", ""));
     assert!(!refused(alone, "kill", "vehicle = 1"));
 }
+
+#[test]
+fn over_level_ground_there_is_no_file_to_damage() {
+    for (kind, refused) in [("bad-roadmap", true), ("late-plan", false)] {
+        let text = format!(
+            "[area]\npolygon = [[0, 0], [40, 0], [44, 24], [4, 26]]\nheight_m = 14.0\n\
+             camera = {{ fov_deg = 73.7, aspect = 1.5 }}\n\
+             [[vehicles]]\nid = 1\nstart = [-6, 0, 0]\n\
+             [[faults]]\nat_s = 1.0\nkind = \"{kind}\"\n"
+        );
+        let scenario = scenario::parse(&text, "level.toml").expect("a scenario");
+        assert_eq!(check(&scenario).is_err(), refused, "{kind}");
+    }
+}
