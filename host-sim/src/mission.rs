@@ -63,7 +63,7 @@ impl PreparedMission {
         board: Option<&'static BoardCapacity>,
         progress: &Progress,
     ) -> anyhow::Result<Self> {
-        if scenario.area.is_some() {
+        if scenario.covers_area() {
             check_starts_on_ground(&scenario)?;
             return coverage::prepare(scenario, board);
         }
@@ -143,7 +143,7 @@ impl PreparedMission {
     /// Plans the whole swarm with the planner that companions use, and records the times it took.
     pub fn plan(&mut self) -> anyhow::Result<Box<HostPlan>> {
         let begun = Instant::now();
-        if self.scenario.area.is_some() {
+        if self.scenario.covers_area() {
             let plan = self.plan_coverage()?;
             self.timing.plan_s = begun.elapsed().as_secs_f64();
             return Ok(plan);
@@ -232,7 +232,7 @@ impl PreparedMission {
     /// Goals that no vehicle flies to, and vehicles that the plan leaves on their pads; both empty
     /// for a coverage mission.
     pub fn unserved(&self, plan: &HostPlan) -> Unserved {
-        if self.scenario.area.is_some() {
+        if self.scenario.covers_area() {
             // In a coverage plan a vehicle that stays on its pad is no shortage: it would not
             // shorten the mission.
             return Unserved::default();

@@ -40,8 +40,8 @@ pub fn planned_page(
         generated_by: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
         scenario_toml: scenario.text.clone(),
         // A coverage mission has neither an obstacle map nor a roadmap to draw.
-        map: scenario.area.is_none().then(|| MapSurface::of(&mission.map.grid())),
-        roadmap: scenario.area.is_none().then(|| RoadmapLines {
+        map: (!scenario.covers_area()).then(|| MapSurface::of(&mission.map.grid())),
+        roadmap: (!scenario.covers_area()).then(|| RoadmapLines {
             nodes: mission.roadmap.nodes.clone(),
             edges: mission.roadmap.edges.iter().map(|e| [e.a, e.b]).collect(),
         }),
@@ -78,7 +78,7 @@ pub fn points_to_text(points: impl Iterator<Item = Point>) -> String {
 
 /// Prints which vehicles of a coverage mission are slower than its cruise speed.
 pub fn print_speed_limits(scenario: &Scenario) {
-    if scenario.area.is_none() {
+    if !scenario.covers_area() {
         return;
     }
     let cruise_mps = scenario.mission.cruise_mps;

@@ -29,7 +29,7 @@ pub const MAX_STORED_CLEARANCE_M: f32 = 6.0;
 const NODES_PER_JOB: usize = 32;
 /// Numbers that a roadmap file stores for each node beside its position: its distance to each
 /// landmark, and its height above the ground.
-const NODE_COLUMNS: usize = LANDMARKS + 1;
+const LANDMARK_AND_HEIGHT_COLUMNS: usize = LANDMARKS + 1;
 /// Clearances that differ by less than this count as equal, metres: the file stores millimetres.
 const SAME_CLEARANCE_M: f32 = 2e-4;
 
@@ -196,15 +196,22 @@ pub fn connect_with_clearances<const NODES: usize, const CUBES: usize>(
             let sure = (nearest_m - config.clearance_m).abs() > unsure_m;
             sure.then_some(nearest_m > config.clearance_m)
         };
-        prm::connect_range_with(grid, workspace, config, range, hint, |edge, room_m| {
-            let clearance_m = match known.take() {
-                Some(nearest_m) if room_m == 0.0 => nearest_m,
-                _ if room_m + SAME_CLEARANCE_M >= most_m(edge) => most_m(edge),
-                _ => clearance_m(edge, 0.0),
-            };
-            edges.push(Edge { a: edge.a, b: edge.b, clearance_m });
-            Ok(())
-        })
+        prm::connect_range_with_clearance_bound(
+            grid,
+            workspace,
+            config,
+            range,
+            hint,
+            |edge, room_m| {
+                let clearance_m = match known.take() {
+                    Some(nearest_m) if room_m == 0.0 => nearest_m,
+                    _ if room_m + SAME_CLEARANCE_M >= most_m(edge) => most_m(edge),
+                    _ => clearance_m(edge, 0.0),
+                };
+                edges.push(Edge { a: edge.a, b: edge.b, clearance_m });
+                Ok(())
+            },
+        )
     })
 }
 
@@ -245,7 +252,8 @@ impl BuiltRoadmap {
                 board.nodes
             );
         }
-        let bare = roadmap::encoded_len(nodes, 0, NODE_COLUMNS).unwrap_or(usize::MAX);
+        let bare =
+            roadmap::encoded_len(nodes, 0, LANDMARK_AND_HEIGHT_COLUMNS).unwrap_or(usize::MAX);
         let an_edge = 2 * size_of::<u32>();
         let most = (board.half_edges / 2).min(board.roadmap_bytes.saturating_sub(bare) / an_edge);
         let edges = cap::limit_edges(&self.nodes, &self.edges, most).ok_or_else(|| {
@@ -272,8 +280,8 @@ pub fn header(config: &PrmConfig, origin: Geodetic, starts: u16, goals: u16) -> 
 pub fn encode(roadmap: &BuiltRoadmap, header: &RoadmapHeader) -> anyhow::Result<Vec<u8>> {
     let too_large = || anyhow!("{} edges do not fit a roadmap file", roadmap.edges.len());
     let BuiltRoadmap { nodes, edges, heights_m } = roadmap;
-    let length =
-        roadmap::encoded_len(nodes.len(), edges.len(), NODE_COLUMNS).ok_or_else(too_large)?;
+    let length = roadmap::encoded_len(nodes.len(), edges.len(), LANDMARK_AND_HEIGHT_COLUMNS)
+        .ok_or_else(too_large)?;
     let mut bytes = vec![0; length];
     let mut workspace = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
     roadmap::write_with_landmarks(header, nodes, edges, heights_m, &mut workspace, &mut bytes)

@@ -75,7 +75,7 @@ fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
     let why = match (reachable, bound, labelled) {
         (false, bound, _) => {
             let vehicle = bound.map_or_else(|| smallest_vehicle(mission), |(vehicle, _)| vehicle);
-            format!("no way in the roadmap leads there; {}", remedy_text(asked, vehicle, goal))
+            format!("no way in the roadmap leads there; {}", path_remedy_text(asked, vehicle, goal))
         }
         (true, _, true) => "no vehicle names it as its goal".to_owned(),
         (true, _, false) if vehicles < mission.goals.len() => {
@@ -107,7 +107,7 @@ fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, remedy: RemedyStatus) 
         let goal = mission.tasks[vehicle].goal.map_or(0, usize::from);
         let helps = match remedy {
             RemedyStatus::Named => String::new(),
-            RemedyStatus::Unnamed => format!("; {}", remedy_text(asked, vehicle, goal)),
+            RemedyStatus::Unnamed => format!("; {}", path_remedy_text(asked, vehicle, goal)),
         };
         format!("no way in the roadmap leads from it to a goal{helps}")
     } else if goals < mission.tasks.len() {
@@ -125,7 +125,7 @@ fn smallest_vehicle(mission: &PreparedMission) -> usize {
 }
 
 /// Text that says what would give this vehicle a path to this goal, or that nothing would.
-fn remedy_text(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usize) -> String {
+fn path_remedy_text(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usize) -> String {
     let mission = asked.mission;
     let settings = &mission.scenario.vehicles[vehicle];
     let (radius_m, required_m) = (settings.radius_m, mission.tasks[vehicle].required_clearance_m);

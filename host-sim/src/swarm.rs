@@ -219,7 +219,7 @@ impl<'a> SimulationRun<'a> {
         if let Some(gateway) = &gateway {
             gateway.add_ground_ports(&mut members);
         }
-        if gateway.is_some() || scenario.area.is_some() {
+        if gateway.is_some() || scenario.covers_area() {
             radio.start_recording();
         }
         let vehicles: Vec<(u8, f32)> =
@@ -236,7 +236,7 @@ impl<'a> SimulationRun<'a> {
         referee.walls = scenario.area.as_ref().and_then(|area| area.obstacles.as_deref());
         // Lanes of two vehicles may lie side by side, and one vehicle waits for as long as the
         // other one is on its lanes: that is no deadlock.
-        referee.retracts_ended_deadlocks = !scenario.faults.is_empty() || scenario.area.is_some();
+        referee.retracts_ended_deadlocks = !scenario.faults.is_empty() || scenario.covers_area();
         Ok(Self {
             mission,
             plan,

@@ -62,7 +62,11 @@ impl<'a> Ceiling<'a> {
         )
         .margin_m;
         let near_m = 3.0 * field.shape().cell_m + margin_m + 2.0 * terrain.grid.cell_m();
-        Self { grid: &terrain.grid, near_m, slope: terrain.slope * 0.8 / std::f32::consts::SQRT_2 }
+        Self {
+            grid: &terrain.grid,
+            near_m,
+            slope: terrain.max_slope * 0.8 / std::f32::consts::SQRT_2,
+        }
     }
 
     fn over(&self, place: &Flat) -> f32 {

@@ -219,8 +219,8 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
             });
             to.add_count(usize::from(found.is_ok()));
             let full = |_: prm::PrmEdge, _: f32| Err(PrmError::RoadmapFull);
-            let found = to.call("prm::connect_range_with", || {
-                prm::connect_range_with(&grid, &index, &good, range, |_| None, full)
+            let found = to.call("prm::connect_range_with_clearance_bound", || {
+                prm::connect_range_with_clearance_bound(&grid, &index, &good, range, |_| None, full)
             });
             to.add_count(usize::from(found.is_ok()));
         }

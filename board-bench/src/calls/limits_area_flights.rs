@@ -256,12 +256,12 @@ fn call_field_plans(
     let mut file = [0; 64];
     let field = uneven_field(&mut file);
     for hard in HARD_NUMBERS {
-        let usual = TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, slope: 0.5 };
+        let usual = TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, max_slope: 0.5 };
         for following in [
             usual,
             TerrainFollowing { height_m: hard, ..usual },
             TerrainFollowing { tolerance_m: hard, ..usual },
-            TerrainFollowing { slope: hard, ..usual },
+            TerrainFollowing { max_slope: hard, ..usual },
         ] {
             let _ =
                 plan(good, routes, &FlightInputs { following: Some(following), ..FLIGHT_INPUTS });

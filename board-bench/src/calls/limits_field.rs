@@ -68,7 +68,7 @@ fn call_field_paths(to: &mut Results<'_, impl Listener>, field: FieldView<'_>) {
     for (i, hard) in HARD_NUMBERS.into_iter().enumerate() {
         for end in ENDS.into_iter().chain(FAR_COORDINATES.get(i).copied()) {
             let following =
-                TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, slope: hard };
+                TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, max_slope: hard };
             let (here, there) = (Flat::new(0.0, 3.0), Flat::new(end, 4.0));
             let lowest_m =
                 to.call("follow::TerrainFollowing::lowest_m", || following.lowest_m(&there));

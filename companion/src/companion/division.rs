@@ -84,8 +84,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let fingerprint = wants.then(|| fleet.division_hash());
         self.guidance.set_halt_m(halt_m);
         let timers = &mut self.timers;
-        let requests =
-            |hash| self.mission.should_request_division(hash, now, DIVISION_RETRY_EVERY, timers);
+        let requests = |hash| {
+            self.mission.open_division_request_if_due(hash, now, DIVISION_RETRY_EVERY, timers)
+        };
         if fingerprint.is_some_and(requests) {
             // The queue is full only if the shell does not drain; then the request is repeated
             // after `DIVISION_RETRY_EVERY`.

@@ -44,9 +44,9 @@ const FRAME_GLOBAL: u8 = 0;
 /// `MAV_FRAME_GLOBAL_INT`: altitude above mean sea level.
 const FRAME_GLOBAL_INT: u8 = 5;
 
-/// Time after a command frame within which an identical frame counts as its repetition, not as a
-/// new command.
-const DUPLICATE_WINDOW: Duration = Duration::from_secs(5);
+/// Time after a command frame within which an identical frame, with the same MAVLink sequence
+/// number, counts as its copy. A retry by the sender has another number: it is a new command.
+const DUPLICATE_FRAME_WINDOW: Duration = Duration::from_secs(5);
 
 /// A command addressed to this companion, to all components or to all vehicles.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -160,7 +160,7 @@ impl CommandHistory {
             seen.from == (frame.system, frame.component)
                 && (seen.sequence, seen.message) == (frame.sequence, frame.message_id)
                 && seen.payload[..] == frame.padded_payload()[..COMPARED_LEN]
-                && now - seen.at < DUPLICATE_WINDOW
+                && now - seen.at < DUPLICATE_FRAME_WINDOW
         };
         self.seen.iter().flatten().find(same).map(|seen| seen.result)
     }

@@ -58,7 +58,7 @@ impl ShareStatus {
 
     /// The status that counts in another plan or division than the one that it was reported of. A
     /// vehicle that had finished its part may have another part there: it counts as having left.
-    pub(crate) fn in_another_division(self) -> Self {
+    pub(crate) fn seen_from_another_division(self) -> Self {
         if self == Self::Finished { Self::Left } else { self }
     }
 }
@@ -89,8 +89,8 @@ impl RosterReportEntry {
     }
 
     /// The entry as it counts in another plan or division than the one that it was reported of.
-    pub(crate) fn in_another_division(&self) -> Self {
-        Self { status: self.status.in_another_division(), ..self.without_places() }
+    pub(crate) fn seen_from_another_division(&self) -> Self {
+        Self { status: self.status.seen_from_another_division(), ..self.without_places() }
     }
 }
 

@@ -292,19 +292,19 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.division_plan_ready = false;
     }
 
-    /// Whether the shell is to be asked for the division with this hash now; if so, stores the
-    /// request. Another request is made after `again` at the earliest, or once the shell has
-    /// answered: an answer does not name its request.
-    pub(crate) fn should_request_division(
+    /// Opens a request for the division with this hash, for the shell to answer, and returns true.
+    /// False while another request is open, whatever its hash: until the shell has answered (an
+    /// answer does not name its request), or `again` has passed.
+    pub(crate) fn open_division_request_if_due(
         &mut self,
-        fingerprint: u32,
+        hash: u32,
         now: Instant,
         again: Duration,
         timers: &mut Timers,
     ) -> bool {
         let asks = self.division_requested.is_none() || timers.is_due(Timer::DivisionRequest, now);
         if asks {
-            self.division_requested = Some(fingerprint);
+            self.division_requested = Some(hash);
             timers.set(Timer::DivisionRequest, now + again);
         }
         asks

@@ -203,9 +203,9 @@ impl<'m> Request<'_, 'm> {
         let field = self.field.filter(|field| field.crc() == crc).ok_or(Error::NoField)?;
         let steepest =
             vehicles.iter().map(|v| libm::fminf(v.climb_mps, v.descend_mps) / v.cruise_mps);
-        let slope = steepest.fold(f32::INFINITY, libm::fminf);
+        let max_slope = steepest.fold(f32::INFINITY, libm::fminf);
         let (height_m, tolerance_m) = (ground.height_m, ground.tolerance_m);
-        Ok(Some(TerrainFollowing { field, height_m, tolerance_m, slope }))
+        Ok(Some(TerrainFollowing { field, height_m, tolerance_m, max_slope }))
     }
 }
 

@@ -424,7 +424,7 @@ impl<'a> MissionView<'a> {
             && let Some(share) = view.shares().nth(index)
         {
             (config.climb_mps, config.descend_mps) = (share.climb_mps, share.descend_mps);
-            config.lost_vehicle_down_s = Some(view.time_to_ground_s());
+            config.lost_vehicle_down_s = Some(view.unheard_vehicle_down_s());
             config.ground = view.header().ground;
         }
         config.radius_m = own.radius_m;

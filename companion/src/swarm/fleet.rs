@@ -200,7 +200,7 @@ impl<const V: usize> Fleet<V> {
         self.division_inputs.clear();
         self.previous_inputs.clear();
         for member in &mut self.members {
-            member.entry = member.entry.in_another_division();
+            member.entry = member.entry.seen_from_another_division();
             (member.has_part, member.hash) = (true, 0);
         }
     }
@@ -242,7 +242,7 @@ impl<const V: usize> Fleet<V> {
         if caught_up && entry.status == ShareStatus::Alive {
             entry.progress_dm = entry.progress_dm.max(own.progress_dm);
         }
-        let status = if caught_up { own.status } else { own.status.in_another_division() };
+        let status = if caught_up { own.status } else { own.status.seen_from_another_division() };
         entry.status = entry.status.max(status);
         let takes_off = !own.waits && entry.status == ShareStatus::Alive;
         let bit = self.own_bit();
@@ -317,7 +317,7 @@ impl<const V: usize> Fleet<V> {
         for (rank, member) in self.members.iter_mut().enumerate() {
             member.heard_at = now;
             if rank != usize::from(self.own) {
-                member.entry = member.entry.in_another_division();
+                member.entry = member.entry.seen_from_another_division();
             }
         }
     }
@@ -432,7 +432,7 @@ impl<const V: usize> Fleet<V> {
             member.has_part &= input.alive;
             member.hash = 0;
             member.entry = match input.alive {
-                true => member.entry.in_another_division(),
+                true => member.entry.seen_from_another_division(),
                 false => member.entry.without_places(),
             };
         }

@@ -235,7 +235,7 @@ fn plan_and_fly(
     flashes: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
     faults::check(&scenario)?;
-    let kept = flashes.filter(|_| scenario.area.is_some()).map(PictureStore::open).transpose()?;
+    let kept = flashes.filter(|_| scenario.covers_area()).map(PictureStore::open).transpose()?;
     let gateway = shown.qgc.map(|url| url.open().map(Gateway::new)).transpose()?;
     let mut results = ResultFiles::open(out, &output::RESULT_FILES)?;
     let began = Instant::now();

@@ -127,7 +127,7 @@ fn planned_result(mission: &PreparedMission, plan: &HostPlan) -> MissionResult {
         seed: mission.scenario.seed,
         // The plan of an area always covers all of it; otherwise every goal or every vehicle must
         // be served.
-        complete: mission.scenario.area.is_some()
+        complete: mission.scenario.covers_area()
             || flying().count() == mission.goals.len().min(vehicles.len()),
         vehicles,
         totals: Totals { path_m: rounded(plan.total_m() as f32), makespan_s: rounded(makespan_s) },

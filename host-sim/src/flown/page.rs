@@ -40,7 +40,7 @@ pub fn flown_page(
     let body = PlotLimit { value: largest_m, label: "vehicle radius".to_owned() };
     page.plots = vec![plot("Smallest separation", safety, |s| s.separation_m)];
     // A coverage mission has no walls, so no clearance to them is plotted.
-    if mission.scenario.area.is_none() {
+    if !mission.scenario.covers_area() {
         page.plots.push(plot("Smallest wall clearance", body, |s| s.clearance_m));
     }
     Ok(page)

@@ -208,7 +208,8 @@ fn ground_map(planned: &CoveragePlan<'_>) -> anyhow::Result<map::OccupancyMap> {
 }
 
 impl PreparedMission {
-    /// Encodes the mission file of an area, with each vehicle's share.
+    /// Encodes the mission file of an area, with each vehicle's weight in the division and its
+    /// climb and descent speeds. Lanes are not in it: the companions plan them.
     fn encode_area(&mut self, shares: &[VehicleShare]) -> anyhow::Result<()> {
         let Some(area) = &self.scenario.area else { return Ok(()) };
         let parts = match division_method(&self.scenario) {

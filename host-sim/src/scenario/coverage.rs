@@ -73,7 +73,7 @@ pub struct Terrain {
     /// How far vehicles may fly higher above the field than [`AreaSection::height_m`], metres.
     pub tolerance_m: f32,
     /// Steepest slope that vehicles fly, metres of height for each metre over ground.
-    pub slope: f32,
+    pub max_slope: f32,
 }
 
 impl Terrain {
@@ -83,7 +83,12 @@ impl Terrain {
     /// The field's bytes are malformed.
     pub fn following(&self, height_m: f32) -> Result<TerrainFollowing<'_>, FileError> {
         let field = FieldView::parse(&self.field)?;
-        Ok(TerrainFollowing { field, height_m, tolerance_m: self.tolerance_m, slope: self.slope })
+        Ok(TerrainFollowing {
+            field,
+            height_m,
+            tolerance_m: self.tolerance_m,
+            max_slope: self.max_slope,
+        })
     }
 }
 

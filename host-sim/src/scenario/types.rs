@@ -348,6 +348,11 @@ impl Scenario {
         self.unsupported.first().map_or(Ok(()), |error| Err(error.clone()))
     }
 
+    /// Whether the mission photographs an area; it then has no goals, and `area` is there.
+    pub fn covers_area(&self) -> bool {
+        self.mission.mode == MissionMode::Coverage
+    }
+
     /// The greatest clearance that any vehicle requires, metres: largest radius and safety margin.
     pub fn required_clearance_m(&self) -> f32 {
         self.largest_radius_m() + self.roadmap.safety_margin_m

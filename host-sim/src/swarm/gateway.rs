@@ -64,7 +64,7 @@ impl Gateway {
             radio.broadcast(now_us, None, places, bytes);
         }
         for packet in overheard.iter().filter(|packet| is_for_ground(packet)) {
-            self.send(packet)?;
+            self.append_frames(packet)?;
         }
         for member in members {
             loop {
@@ -72,14 +72,15 @@ impl Gateway {
                 if length == 0 {
                     break;
                 }
-                self.send(&buffer[..length])?;
+                self.append_frames(&buffer[..length])?;
             }
         }
         self.flush()
     }
 
-    /// Appends whole frames to the datagram; sends the datagram first if they do not fit any more.
-    fn send(&mut self, frames: &[u8]) -> io::Result<()> {
+    /// Appends whole frames to the datagram, which [`Self::flush`] sends. If they do not fit any
+    /// more, the datagram is sent first.
+    fn append_frames(&mut self, frames: &[u8]) -> io::Result<()> {
         if self.datagram.len() + frames.len() > MAX_DATAGRAM {
             self.flush()?;
         }

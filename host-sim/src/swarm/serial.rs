@@ -8,9 +8,9 @@ use std::collections::VecDeque;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
-/// Properties of an emulated serial link.
+/// Properties of a simulated serial link.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SerialConfig {
+pub struct SimulatedSerialConfig {
     /// Bits per second.
     pub baud: u32,
     /// Time from a byte's last bit to the moment the receiver can read it, seconds.
@@ -29,7 +29,7 @@ const BAUDS: [u64; 8] = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800
 /// One direction of a serial link; time in microseconds since the start of the simulation.
 #[derive(Debug)]
 pub struct SerialLink {
-    config: SerialConfig,
+    config: SimulatedSerialConfig,
     rng: Pcg32,
     busy_until_us: u64,
     bytes: VecDeque<u8>,
@@ -48,7 +48,7 @@ pub struct SerialLink {
 
 impl SerialLink {
     /// An idle link; `seed` and `stream` choose its sequence of random numbers.
-    pub fn new(config: SerialConfig, seed: u64, stream: u64) -> Self {
+    pub fn new(config: SimulatedSerialConfig, seed: u64, stream: u64) -> Self {
         Self {
             config,
             rng: Pcg32::new(seed, stream),

@@ -10,7 +10,7 @@ use sim_autopilot::{Autopilot, Photo};
 
 use super::board::{BoardLinks, RemoteCompanion};
 use super::radio::Radio;
-use super::serial::{SerialConfig, SerialLink};
+use super::serial::{SerialLink, SimulatedSerialConfig};
 use super::step::{STEP_S, STEP_US};
 use crate::boards::STACK_LEN;
 use crate::capacity::{HostCompanion, VEHICLES, new_companion};
@@ -78,7 +78,7 @@ impl SimulatedVehicle {
     pub fn new(
         autopilot: &sim_autopilot::AutopilotConfig,
         config: Config<VEHICLES>,
-        serial: SerialConfig,
+        serial: SimulatedSerialConfig,
         seed: u64,
     ) -> anyhow::Result<Self> {
         let id = u64::from(autopilot.system_id);

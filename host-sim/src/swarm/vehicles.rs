@@ -9,15 +9,16 @@ use planner_core::geo::frames::enu_to_geodetic;
 use sim_autopilot as autopilot;
 
 use super::board::RemoteCompanion;
-use super::serial::SerialConfig;
+use super::serial::SimulatedSerialConfig;
 use super::simulated_vehicle::SimulatedVehicle;
 use crate::capacity::VEHICLES;
 use crate::flash::HostFlash;
 use crate::mission::PreparedMission;
 use crate::scenario::{AutopilotKind, CompanionHost, PositionErrors, VehicleSection};
 
-/// Radio range from which on a simulated radio counts as reaching every vehicle, metres.
-const UNLIMITED_RADIO_RANGE_M: f32 = 500.0;
+/// Radio range of a scenario, metres, from which on companions take it that the radio reaches
+/// every vehicle. The simulated radio keeps the scenario's range.
+const RADIO_REACHES_ALL_FROM_M: f32 = 500.0;
 /// Least radio range that a companion's settings may have, metres.
 const MIN_RADIO_RANGE_M: f32 = 1.0;
 
@@ -28,7 +29,7 @@ const MIN_RADIO_RANGE_M: f32 = 1.0;
 pub fn vehicles_on_pads(mission: &PreparedMission) -> anyhow::Result<Vec<SimulatedVehicle>> {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
-    let serial = SerialConfig {
+    let serial = SimulatedSerialConfig {
         baud: settings.serial_baud,
         latency_s: 0.001,
         corruption: f64::from(settings.serial_corruption),
@@ -133,7 +134,7 @@ pub fn companion_config(mission: &PreparedMission, id: u8) -> anyhow::Result<Con
     // The operator sets this radio range; from 500 m on, radio silence is never explained by
     // distance.
     let radio_range_m = match scenario.simulation.radio_range_m {
-        range_m if range_m < UNLIMITED_RADIO_RANGE_M => range_m.max(MIN_RADIO_RANGE_M),
+        range_m if range_m < RADIO_REACHES_ALL_FROM_M => range_m.max(MIN_RADIO_RANGE_M),
         _ => REACHES_ALL_M,
     };
     let method = scenario.deconfliction.method;

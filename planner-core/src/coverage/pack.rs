@@ -337,7 +337,7 @@ pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
 ) -> Result<(), CoverageError> {
     let count = work.vehicles.len();
     cbinpack(work.tracks, work.unit, &ws.shares[..count], &mut ws.ends[..count]);
-    assign_bins(work, bins, ws, out)?;
+    assign_bins_to_vehicles(work, bins, ws, out)?;
     set_layers_and_costs(work, out);
     Ok(())
 }
@@ -410,7 +410,7 @@ fn fill_bin<const L: usize>(
 }
 
 /// Assigns each bin that is not empty to a vehicle so that the sum of all transits is least.
-fn assign_bins<const L: usize, const N: usize, const K: usize>(
+fn assign_bins_to_vehicles<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     bins: BinEligibility,
     ws: &mut PackWorkspace<K>,

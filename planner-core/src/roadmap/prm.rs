@@ -189,14 +189,21 @@ pub fn connect_range<const NODES: usize, const CUBES: usize>(
     range: Range<usize>,
     mut found: impl FnMut(PrmEdge) -> Result<(), PrmError>,
 ) -> Result<(), PrmError> {
-    connect_range_with(grid, workspace, config, range, |_| None, |edge, _| found(edge))
+    connect_range_with_clearance_bound(
+        grid,
+        workspace,
+        config,
+        range,
+        |_| None,
+        |edge, _| found(edge),
+    )
 }
 
 /// As [`connect_range`], but `hint` may answer whether the segment between two nodes is clear. It
 /// must answer as [`segment_is_clear`] does, or `None`. It is called only where the free box does
 /// not decide, and just before `found`. The second argument of `found` is a lower bound on the
 /// distance of the edge to obstacles, metres, right to 2⁻¹¹ cell; 0 where the free box gives none.
-pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
+pub fn connect_range_with_clearance_bound<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     workspace: &NodeIndex<NODES, CUBES>,
     config: &PrmConfig,

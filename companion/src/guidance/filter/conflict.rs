@@ -140,7 +140,7 @@ impl Guidance {
                 // vehicle may fly, only for where it may have stopped.
                 met.stop_at_last_position();
             }
-            if follows && entry.flies_all_points_unheard() && !(by_gates || met.lost) {
+            if follows && entry.would_fly_all_points_unheard() && !(by_gates || met.lost) {
                 met.limit_to_points(entry, bounds);
             }
             let ahead_s =
@@ -157,7 +157,7 @@ impl Guidance {
             // The end of its path in a coverage mission is above its pad; by then it has sought a
             // place aside in vain.
             let at_end = || {
-                entry.flies_all_points_unheard()
+                entry.would_fly_all_points_unheard()
                     && scene.plan.is_some_and(|p| self.has_reached_end(&p.path))
             };
             let rests = lies && held >= LATE_LANDING_AFTER && (last_place || at_end());

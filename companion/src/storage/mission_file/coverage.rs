@@ -174,9 +174,10 @@ pub struct CoverageView<'a> {
 const UNHEARD_DOWN_S: f32 = LEASE_S as f32 + UNHEARD_NOTICED_S + LEASE_DELAY_S + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {
-    /// Time, seconds, after which a vehicle that no other vehicle hears any more is on the ground,
-    /// from the highest layer at the slowest vehicle's descent speed.
-    pub fn time_to_ground_s(&self) -> f32 {
+    /// Time, seconds, after which a vehicle that no other vehicle hears any more is on the ground:
+    /// the end of its lease, the delays and the stop ([`UNHEARD_DOWN_S`]), and the descent from
+    /// the highest layer at the slowest vehicle's descent speed.
+    pub fn unheard_vehicle_down_s(&self) -> f32 {
         let Heights { mission_m, layer_m } = self.header.heights;
         let low_m = self.header.ground.map_or(0.0, |ground| ground.low_m);
         let slowest_mps =

@@ -41,7 +41,7 @@ impl<const V: usize> Fleet<V> {
                 // know; it reports that itself.
                 if !(behind && entry.status == ShareStatus::Left && self.members[rank].heard_itself)
                 {
-                    let counts = if same { *entry } else { entry.in_another_division() };
+                    let counts = if same { *entry } else { entry.seen_from_another_division() };
                     self.merge_entry(rank, &counts, own);
                 }
                 if same && entry.agrees && rank != sender && roster.hash != 0 {

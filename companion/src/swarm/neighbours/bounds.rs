@@ -114,8 +114,9 @@ pub(super) const MEMBERSHIP_LIFETIME: Duration = Duration::from_secs(5);
 pub(super) const MAX_STRANGERS: usize = 4;
 /// Silence after which a stranger is forgotten.
 pub(super) const STRANGER_LIFETIME: Duration = Duration::from_secs(60);
-/// Rank of a stranger, greater than that of any vehicle of the roster.
-pub(super) const STRANGER_RANK: u16 = u16::MAX;
+/// Marks a stranger, which has no rank. It is greater than all ranks of the roster, so that by
+/// Algorithm 2 every vehicle slows down near a stranger.
+pub(super) const RANK_OUTSIDE_ROSTER: u16 = u16::MAX;
 /// Time of standing after which a neighbour is not expected to fly on at once.
 pub(super) const STANDS_AFTER: Duration = Duration::from_secs(5);
 /// Greatest delay of a message, seconds: a punctual report right after a late one may show progress

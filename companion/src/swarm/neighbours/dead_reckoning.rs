@@ -29,7 +29,7 @@ impl NeighbourEntry {
     #[inline(never)]
     pub(super) fn is_dead(&self, now: Instant) -> bool {
         // Most neighbours are heard: no further work for these.
-        let lost = |at: &Instant| now - *at >= LOST_AFTER && self.rank != STRANGER_RANK;
+        let lost = |at: &Instant| now - *at >= LOST_AFTER && self.rank != RANK_OUTSIDE_ROSTER;
         let Some(heard_at) = self.heard_at.filter(lost) else { return false };
         let flight_ms = (1000.0 * self.unheard_flight_time_s()) as u32;
         let dead = Duration::from_millis(LOST_AFTER_MS + u64::from(flight_ms));
@@ -158,7 +158,7 @@ impl NeighbourEntry {
         let silent = !self.heard_within(now, MAY_LAND_AFTER)
             && !self.is_reported_out_of_range(now)
             && !self.flies_plan_unheard();
-        self.rank != STRANGER_RANK
+        self.rank != RANK_OUTSIDE_ROSTER
             && !self.reports_any(GROUNDED | LANDED)
             && !self.is_out_of_plan(now)
             && (silent || (self.state.progress_m.is_none() && !self.reports_any(ON_DETOUR)))
@@ -208,7 +208,7 @@ impl NeighbourEntry {
     /// Depth of the column below a place on its path, metres: in a coverage mission to the ground.
     pub(super) fn column_depth_m(&self, place: &Point) -> f32 {
         // NaN, a ground never reported, counts as none.
-        if self.flies_all_points_unheard() {
+        if self.would_fly_all_points_unheard() {
             libm::fmaxf(MAX_COLUMN_M, place.z - self.ground_m)
         } else {
             MAX_COLUMN_M
@@ -245,7 +245,7 @@ impl NeighbourEntry {
 
     /// Whether the neighbour, silent in a coverage mission, may fly on by lease or autopilot.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
-        self.flies_all_points_unheard()
+        self.would_fly_all_points_unheard()
             && self.is_under_way()
             && !self.reports_any(OUT_OF_PLAN)
             && !self.heard_within(now, MAY_LAND_AFTER)
@@ -255,7 +255,7 @@ impl NeighbourEntry {
     /// from its position to where its speed carried it, and the distance beside it, metres.
     #[inline(never)]
     pub(super) fn fall(&self, now: Instant) -> Option<([Point; 2], f32)> {
-        let silent = self.flies_all_points_unheard()
+        let silent = self.would_fly_all_points_unheard()
             && self.is_under_way()
             && !self.heard_within(now, MAY_LAND_AFTER);
         let (here, velocity) = (self.state.position, self.state.velocity);

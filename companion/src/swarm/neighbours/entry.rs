@@ -133,8 +133,9 @@ impl NeighbourEntry {
         }
     }
 
-    /// Whether the neighbour flies to the last of its points even unheard: in a coverage mission.
-    pub(crate) fn flies_all_points_unheard(&self) -> bool {
+    /// Whether the neighbour, if it were unheard, would fly on to the last of its points: so it is
+    /// in coverage missions. Says nothing of whether it is heard.
+    pub(crate) fn would_fly_all_points_unheard(&self) -> bool {
         self.points_length_m >= 0.0
     }
 
@@ -183,7 +184,7 @@ impl NeighbourEntry {
         self.reported_path_reach =
             ReportedPathReach::new(&at.position, points, &place, self.extent_m);
         self.place_on_points = place;
-        if self.flies_all_points_unheard() {
+        if self.would_fly_all_points_unheard() {
             let mut at = self.state.position;
             let legs = self.points.iter().map(|next| next - core::mem::replace(&mut at, *next));
             self.points_length_m = legs.map(|leg| fpu::sqrtf(leg.norm_squared())).sum();

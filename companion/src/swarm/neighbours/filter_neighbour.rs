@@ -183,8 +183,8 @@ impl NeighbourEntry {
             let age_s = if may_fly_on { silent_s } else { age.as_secs_f32().min(silent_s) };
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
-        let flies_on = self.flies_all_points_unheard() && !(reach.on_plan && self.on_plan());
-        if reach.lands && self.flies_all_points_unheard() {
+        let flies_on = self.would_fly_all_points_unheard() && !(reach.on_plan && self.on_plan());
+        if reach.lands && self.would_fly_all_points_unheard() {
             reaches(FALL_CARRY_S * self.speed_mps + self.fall_aside_m());
         }
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
@@ -198,7 +198,7 @@ impl NeighbourEntry {
         let reported = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
         if let Some(first) = self.points.first().filter(|_| reported) {
             away_sq = away_sq.min(reach.own.distance_from_box(first).xy().norm_squared());
-            reaches(if self.flies_all_points_unheard() {
+            reaches(if self.would_fly_all_points_unheard() {
                 self.unheard_distance_m()
             } else {
                 self.extent_m
@@ -236,7 +236,7 @@ impl NeighbourEntry {
         let comes_down = !grounded && self.has_column();
         FilterNeighbour {
             id: self.id,
-            stranger: self.rank == STRANGER_RANK,
+            stranger: self.rank == RANK_OUTSIDE_ROSTER,
             on_plan: self.on_plan(),
             out_of_range: false,
             shares_plan: self.shares_plan,

@@ -189,7 +189,7 @@ impl<const V: usize> Neighbours<V> {
             }
             // A vehicle in the air comes down at its pad; off its plan perhaps also below its
             // place, or at the end of its points.
-            if entry.flies_all_points_unheard() && entry.is_under_way() {
+            if entry.would_fly_all_points_unheard() && entry.is_under_way() {
                 entry.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
                 if !entry.reports_any(ON_PLAN) {
                     bar([from; 2], 0.0);

@@ -9,20 +9,22 @@ use crate::time::Instant;
 impl<const V: usize> Neighbours<V> {
     /// Index of the entry of the stranger `id`, added if it fits.
     pub(super) fn stranger_entry(&mut self, id: u8, now: Instant) -> Option<usize> {
-        let known = self.stranger_index(id);
+        let known = self.stranger_entry_index(id);
         if known.is_some() {
             return known;
         }
         self.forget_silent_strangers(now);
         let room = self.entries.len() - self.roster_count < MAX_STRANGERS;
-        let added = Some(id).filter(|_| room).and_then(|id| self.add_entry(id, STRANGER_RANK));
+        let added =
+            Some(id).filter(|_| room).and_then(|id| self.add_entry(id, RANK_OUTSIDE_ROSTER));
         if added.is_none() {
             self.dropped = self.dropped.wrapping_add(1);
         }
         added
     }
 
-    fn stranger_index(&self, id: u8) -> Option<usize> {
+    /// Index into `entries`, where the strangers follow the roster, of the stranger `id`.
+    fn stranger_entry_index(&self, id: u8) -> Option<usize> {
         let strangers = &self.entries[self.roster_count..];
         strangers.iter().position(|c| c.id == id).map(|at| at + self.roster_count)
     }

@@ -413,7 +413,7 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             met.motion.rests_within_m = 0.0;
         }
         let by_gates = met.on_plan && reach.on_plan;
-        let leased = table.entries[1].flies_all_points_unheard();
+        let leased = table.entries[1].would_fly_all_points_unheard();
         if leased && !(lands || by_gates || met.lost || reach.hears_nobody) {
             met.limit_to_points(&table.entries[1], &bounds);
         }

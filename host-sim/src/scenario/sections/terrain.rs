@@ -158,7 +158,7 @@ impl UnreadTerrain {
             grid: Arc::new(grid),
             field: field.into(),
             tolerance_m: self.tolerance_m,
-            slope,
+            max_slope: slope,
         };
         let top_m = terrain.following(area.height_m).map_or(0.0, |following| following.top_m());
         if top_m <= 0.0 {

@@ -1,7 +1,7 @@
 use super::*;
 
-const CONFIG: SerialConfig =
-    SerialConfig { baud: 100_000, latency_s: 0.001, corruption: 0.0, buffer: 100 };
+const CONFIG: SimulatedSerialConfig =
+    SimulatedSerialConfig { baud: 100_000, latency_s: 0.001, corruption: 0.0, buffer: 100 };
 
 #[test]
 fn bytes_arrive_after_their_bit_times_and_in_order() {
@@ -27,7 +27,7 @@ fn a_full_buffer_loses_and_counts() {
 
 #[test]
 fn corruption_changes_the_share_of_bytes_it_says() {
-    let config = SerialConfig { corruption: 0.1, buffer: 1 << 20, ..CONFIG };
+    let config = SimulatedSerialConfig { corruption: 0.1, buffer: 1 << 20, ..CONFIG };
     let mut link = SerialLink::new(config, 1, 0);
     let mut got = Vec::new();
     link.write(0, &[0; 100_000]);

@@ -28,7 +28,7 @@ pub struct TerrainFollowing<'a> {
     /// Most metres by which the path may be higher than this least height.
     pub tolerance_m: f32,
     /// Greatest slope of the path: metres up or down per metre over ground.
-    pub slope: f32,
+    pub max_slope: f32,
 }
 
 impl TerrainFollowing<'_> {
@@ -84,7 +84,7 @@ impl TerrainFollowing<'_> {
         let place = |sample: u32| {
             if sample == count { *to } else { start + way * (sample as f32 / count as f32) }
         };
-        let steep = self.slope;
+        let steep = self.max_slope;
         let (mut last, mut z_m) = (0, from.z);
         let (mut cone, mut floor_m) = ((-steep, steep), from.z);
         let mut sample = 1;

@@ -80,7 +80,7 @@ proptest! {
             field: FieldView::parse(&bytes).unwrap(),
             height_m: 30.0,
             tolerance_m,
-            slope,
+            max_slope: slope,
         };
         let [from, to] = ends.map(|[x, y]| Flat::new(x, y));
         let begin = following.start_point(&from, &to);
@@ -121,7 +121,8 @@ fn over_level_ground_and_along_a_slope_a_path_is_straight() {
     let ridge = field(&shape, &ridge);
     for (bytes, most) in [(&level, 1), (&rising, 1), (&ridge, 2)] {
         let field = FieldView::parse(bytes).unwrap();
-        let following = TerrainFollowing { field, height_m: 20.0, tolerance_m: 2.0, slope: 0.2 };
+        let following =
+            TerrainFollowing { field, height_m: 20.0, tolerance_m: 2.0, max_slope: 0.2 };
         let (from, to) = (Flat::new(3.0, 5.0), Flat::new(187.0, 5.0));
         let begin = following.start_point(&from, &to);
         let mut corners = Vec::new();
