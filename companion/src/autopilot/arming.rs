@@ -1,7 +1,7 @@
 //! Arming the autopilot step by step, and which of its refusals are reported as texts.
 
 use crate::autopilot::landed::RISEN_M;
-use crate::autopilot::telemetry::{Ack, MAX_POSITION_AGE_ON_PAD, Telemetry};
+use crate::autopilot::telemetry::{Ack, MAX_POSITION_AGE, MAX_POSITION_AGE_ON_PAD, Telemetry};
 use crate::state::State;
 use crate::time::{Duration, Instant};
 
@@ -77,10 +77,13 @@ impl ArmingHandshake {
         let on_ground = !t.reports_flight();
         self.in_own_mode &=
             t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
-        // Between two HEARTBEATs the vehicle may be armed, and rise, unseen.
-        if !t.armed && t.heartbeat_at == Some(now) {
-            self.disarmed_z_m = t.position.z;
-        } else if !on_ground || t.position.z > self.disarmed_z_m + RISEN_M {
+        if !t.armed {
+            // Once arming is requested, the vehicle may be armed and rise unseen from the last
+            // HEARTBEAT on, unless the landing detector reports the ground.
+            let rests = self.requested_at.is_none() || t.lately_reported_ground(now);
+            self.disarmed_z_m = if rests { t.position.z } else { t.heartbeat_z_m };
+        }
+        if (t.armed && !on_ground) || t.position.z > self.disarmed_z_m + RISEN_M {
             self.flown = true;
         }
         if state.is_over() && on_ground && !t.armed {
@@ -139,11 +142,12 @@ impl ArmingHandshake {
         self.flown
     }
 
-    /// Whether a vehicle whose start is cancelled may be disarmed: it has not risen, and if its
-    /// climb had begun, its position is new.
+    /// Whether a vehicle whose start is cancelled may be disarmed: it has not risen, and its
+    /// position is known, or new if its climb had begun. Unseen, its pilot may have taken off with
+    /// it; on its pad the autopilot disarms it by itself after some 10 s.
     pub(crate) fn may_disarm_on_pad(&self, now: Instant, telemetry: &Telemetry) -> bool {
-        let seen = telemetry.position_age(now) < MAX_POSITION_AGE_ON_PAD;
-        !self.flown && (seen || !self.climb_begun)
+        let most = if self.climb_begun { MAX_POSITION_AGE_ON_PAD } else { MAX_POSITION_AGE };
+        !self.flown && telemetry.position_age(now) < most
     }
 
     /// Notes that HEARTBEAT is missing while the vehicle is to be armed.

@@ -23,6 +23,11 @@ pub(super) struct LandedReport {
 }
 
 impl LandedReport {
+    /// Whether the report says that the vehicle is on the ground, and is new.
+    pub(super) fn is_new_ground(&self, now: Instant) -> bool {
+        self.on_ground && now - self.at <= SURELY_VALID_FOR
+    }
+
     /// Whether the report says that the vehicle is on the ground, and still holds: it is new, or
     /// the vehicle, at the estimated height `z_m` now, has not risen since. NaN: unknown height.
     pub(super) fn holds_ground(&self, z_m: f32, now: Instant) -> bool {

@@ -33,6 +33,8 @@ use crate::time::{Duration, Instant};
 /// Age of the last HEARTBEAT from which the autopilot counts as silent: HEARTBEAT comes at 1 Hz,
 /// and a late one is not yet silence.
 pub(crate) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
+/// Gap between two HEARTBEATs that counts as a silence of the autopilot.
+const MAX_SILENCE: Duration = Duration::from_secs(3);
 /// Age of a position from which a vehicle may have risen unseen: positions come at 30 Hz.
 pub(crate) const MAX_POSITION_AGE_ON_PAD: Duration = Duration::from_millis(150);
 /// Age from which a position counts as unknown.
@@ -111,6 +113,10 @@ pub struct Telemetry {
     pub kind: Option<AutopilotKind>,
     /// When the last HEARTBEAT was received.
     pub heartbeat_at: Option<Instant>,
+    /// When the first HEARTBEAT since the last silence was received.
+    heard_since: Instant,
+    /// Estimated height at the last HEARTBEAT, metres.
+    pub(super) heartbeat_z_m: f32,
     /// Flight mode in the autopilot's own numbering.
     pub custom_mode: u32,
     /// Whether the motors are armed.
@@ -194,19 +200,6 @@ impl Telemetry {
         time_since(self.position_at, now)
     }
 
-    /// Whether the landing detector last reported flight.
-    pub fn reports_flight(&self) -> bool {
-        self.landed.is_some_and(|report| !report.on_ground)
-    }
-
-    /// Whether the landing detector reports the ground; an old report counts for 3 s, while the
-    /// vehicle has not risen.
-    pub fn reports_ground(&self, now: Instant) -> bool {
-        let known = self.position_age(now) < MAX_POSITION_AGE;
-        let z_m = if known { self.position.z } else { f32::NAN };
-        self.landed.is_some_and(|report| report.holds_ground(z_m, now))
-    }
-
     /// Bound of the error of the estimated position, metres: three times the reported accuracy
     /// (`ACCURACY_FACTOR`), and at least `vouched_m`, which the operator vouches for (`FLK_EST_M`).
     /// Infinite while no recent accuracy is known.
@@ -268,7 +261,10 @@ impl Telemetry {
                 self.armed = p[6] & FLAG_ARMED != 0;
                 self.update_origin_trust();
                 self.system_status = p[7];
-                self.heartbeat_at = Some(now);
+                if self.heartbeat_age(now) > MAX_SILENCE {
+                    self.heard_since = now;
+                }
+                (self.heartbeat_at, self.heartbeat_z_m) = (Some(now), self.position.z);
                 TelemetryChange::Updated
             }
             EXTENDED_SYS_STATE => {
@@ -492,5 +488,6 @@ fn time_since(at: Option<Instant>, now: Instant) -> Duration {
     at.map_or(Duration::from_micros(u64::MAX), |at| now - at)
 }
 
+mod reports;
 #[cfg(test)]
 mod tests;

@@ -89,6 +89,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         GuardInputs {
             in_state: self.mission.time_in_state(now),
             heartbeat_age: t.heartbeat_age(now),
+            heard_for: t.heard_for(now),
             position_age: t.position_age(now),
             jumped: t.is_settling(now),
             stalled_for: match self.mission.state() {
@@ -154,7 +155,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             mode_foreign,
             critical: t.is_critical(),
             on_ground,
-            height_m: if on_ground { view.height_m() } else { f32::NAN },
+            height_m: if t.last_reported_ground() { view.height_m() } else { f32::NAN },
             has_flown: handshake.has_flown(),
             vertical: t.position_age(now) < MAX_POSITION_AGE
                 && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,

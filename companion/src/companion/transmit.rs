@@ -256,7 +256,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let grounded = match self.mission.state() {
             state if state.has_landed() => !flown_again,
             // On its path it flies, whatever the landing detector reports.
-            state => !self.telemetry.armed || (!state.is_on_path() && view.is_on_ground()),
+            state => {
+                self.telemetry.rests_disarmed(self.now)
+                    || (!state.is_on_path() && view.is_on_ground())
+            }
         };
         let on_plan = !self.guidance.returning
             && self.mission.state().is_on_plan()

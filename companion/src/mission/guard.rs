@@ -21,7 +21,7 @@ pub enum Guard {
     PositionKnown,
     /// The position is older than the limit.
     NoPosition,
-    /// The position is older than the limit, and the state has lasted longer.
+    /// For the limit the state has lasted and HEARTBEATs have come, but no position.
     StillNoPosition,
     /// The position jumped, or the EKF origin changed, within the last second.
     PositionJumped,
@@ -291,7 +291,7 @@ impl Guard {
             Self::NoHeartbeat => i.heartbeat_age > limit,
             Self::PositionKnown => i.position_age < MAX_POSITION_AGE,
             Self::NoPosition => i.position_age > limit,
-            Self::StillNoPosition => i.position_age.min(i.in_state) > limit,
+            Self::StillNoPosition => i.position_age.min(i.in_state).min(i.heard_for) > limit,
             Self::PositionJumped => i.jumped,
             Self::FoundFlying => i.airborne,
             Self::PlanReady => i.plan_ready,

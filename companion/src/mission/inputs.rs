@@ -12,6 +12,8 @@ pub struct GuardInputs {
     pub in_state: Duration,
     /// Time since the autopilot's last HEARTBEAT.
     pub heartbeat_age: Duration,
+    /// Time for which HEARTBEATs have come without a gap of 3 s.
+    pub heard_for: Duration,
     /// Time since the last usable position.
     pub position_age: Duration,
     /// Whether the position jumped, or the EKF origin changed, within the last second.
@@ -139,7 +141,7 @@ pub struct GuardInputs {
     /// Whether the landing detector reports the vehicle on the ground.
     pub on_ground: bool,
     /// Estimated height above the ground as far as the plan says, metres; NaN while unknown, and
-    /// where the landing detector does not report the ground.
+    /// where the landing detector last reported flight.
     pub height_m: f32,
     /// Whether the landing detector has reported flight, or the vehicle has risen, since arming was
     /// requested.

@@ -187,7 +187,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::AutopilotHeard | G::PositionKnown => {}
         G::NoHeartbeat => i.heartbeat_age = long,
         G::NoPosition => i.position_age = long,
-        G::StillNoPosition => (i.position_age, i.in_state) = (long, long),
+        G::StillNoPosition => (i.position_age, i.in_state, i.heard_for) = (long, long, long),
         G::PositionJumped => (i.position_age, i.jumped) = (long, true),
         G::FoundFlying => i.airborne = true,
         G::BackOnPath => i.near_path = true,

@@ -18,6 +18,7 @@ use planner_core::Point;
 
 mod carried;
 mod false_ground;
+mod lost_messages;
 mod old_values;
 mod random;
 mod reported_ground;

@@ -8,7 +8,7 @@ use super::*;
 happens! {
     Pause, Resume, Land, Return, Start, Pilot, Back, Failsafe, NoPosition, Position, Jump,
     Silent, Heard, Disarm, Battery, FalseGround, TrueGround, Refuses, Obeys, Mute, Wait,
-    NoHeartbeat, Heartbeat, NoLandedState, LandedState
+    NoHeartbeat, Heartbeat, NoLandedState, LandedState, Lift
 }
 
 /// Number of events that come before those in which a single message is lost. Stored seeds draw
@@ -30,8 +30,12 @@ struct Watch {
     unheard_acts: u32,
     /// Number of ticks since the position was last heard.
     unknown: u32,
+    /// Number of ticks for which it has been heard.
+    known: u32,
     /// Number of ticks since the landing detector last reported ground falsely.
     honest: u32,
+    /// Number of ticks for which a gust, or its pilot, lifts the vehicle at 0.6 m/s.
+    lifted_for: u32,
     /// Whether an arming request has taken effect since the last start or resume.
     armed_once: bool,
     /// Whether the start that a pause on the pad ended was resumed before the disarming: the next
@@ -44,6 +48,11 @@ impl Watch {
     fn tick(&mut self, b: &mut Bench) {
         let (before, armed, was) = (b.setpoints.len(), b.armed, b.state());
         let low = b.companion.telemetry.position.z < 0.8;
+        if self.lifted_for > 0 {
+            // Disarmed, it falls.
+            let z_m = if b.armed { b.enu.z + 0.03 } else { 0.0 };
+            (self.lifted_for, b.enu.z) = (self.lifted_for - 1, z_m);
+        }
         b.tick();
         let unheard = b.silent || b.no_heartbeat;
         let sent = b.setpoints.len() > before;
@@ -76,9 +85,10 @@ impl Watch {
         self.piloted = if foreign { self.piloted + 1 } else { 0 };
         self.unheard_acts = if unheard { self.unheard_acts } else { 0 };
         self.unknown = if b.silent || b.no_position { self.unknown + 1 } else { 0 };
+        self.known = if self.unknown > 0 { 0 } else { self.known + 1 };
         self.honest = if b.false_ground { 0 } else { self.honest + 1 };
         // A false report may be the last one, and counts for 3 s.
-        let sound = self.unknown == 0 && self.honest > 70;
+        let sound = self.known > 24 && self.honest > 70;
         assert!(
             !sound || !b.armed || b.enu.z < 1.2 || intent.flags & GROUNDED == 0,
             "reported on the ground at {:?} in {state:?}: {:#?}",
@@ -196,7 +206,8 @@ impl Watch {
             Heartbeat => b.no_heartbeat = false,
             NoLandedState => b.no_landed_state = true,
             LandedState => b.no_landed_state = false,
-            Back | Disarm | Wait => {}
+            Lift if b.armed => self.lifted_for = 40,
+            Back | Disarm | Lift | Wait => {}
         }
     }
 }
@@ -213,7 +224,9 @@ fn fly(px4: bool, begin: u32, script: &[(usize, u32)]) {
         piloted: 0,
         unheard_acts: 0,
         unknown: 0,
+        known: 0,
         honest: 100,
+        lifted_for: 0,
         armed_once: false,
         resumed: false,
         log: Vec::new(),

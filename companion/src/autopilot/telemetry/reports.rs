@@ -1,0 +1,50 @@
+//! What the landing detector's and the HEARTBEAT's reports say now.
+
+use super::{MAX_HEARTBEAT_AGE, MAX_POSITION_AGE, MAX_SILENCE, Telemetry};
+use crate::autopilot::landed::RISEN_M;
+use crate::time::{Duration, Instant};
+
+impl Telemetry {
+    /// Whether the landing detector last reported flight.
+    pub fn reports_flight(&self) -> bool {
+        self.landed.is_some_and(|report| !report.on_ground)
+    }
+
+    /// Whether the landing detector last reported the ground, however long ago.
+    pub(crate) fn last_reported_ground(&self) -> bool {
+        self.landed.is_some_and(|report| report.on_ground)
+    }
+
+    /// Whether the landing detector reported the ground in the last 0.4 s.
+    pub(in crate::autopilot) fn lately_reported_ground(&self, now: Instant) -> bool {
+        self.landed.is_some_and(|report| report.is_new_ground(now))
+    }
+
+    /// Whether the landing detector reports the ground. While the motors are armed an old report
+    /// counts for 3 s, as long as the vehicle has not risen.
+    pub fn reports_ground(&self, now: Instant) -> bool {
+        let known = self.position_age(now) < MAX_POSITION_AGE;
+        let z_m = if known { self.position.z } else { f32::NAN };
+        self.landed.is_some_and(|report| match self.armed {
+            true => report.holds_ground(z_m, now),
+            false => report.on_ground,
+        })
+    }
+
+    /// Whether the last HEARTBEAT says that the motors are off, and the vehicle has not flown
+    /// since: where no other one comes, neither the landing detector nor the height shows flight.
+    pub(crate) fn rests_disarmed(&self, now: Instant) -> bool {
+        let heard = self.heartbeat_age(now) < MAX_HEARTBEAT_AGE;
+        let risen = self.position.z > self.heartbeat_z_m + RISEN_M;
+        !self.armed && (heard || !(risen || self.reports_flight()))
+    }
+
+    /// Time for which HEARTBEATs have come without a gap of 3 s ([`MAX_SILENCE`]); zero in such a
+    /// gap.
+    pub(crate) fn heard_for(&self, now: Instant) -> Duration {
+        match self.heartbeat_age(now) > MAX_SILENCE {
+            true => Duration::default(),
+            false => now - self.heard_since,
+        }
+    }
+}
