@@ -17,6 +17,8 @@ const PASSINGS: u64 = 60;
 const ACCEL_MPS2: f32 = 3.5;
 /// Time up to which a stop does not count as one, seconds.
 const STOP_S: f32 = 0.5;
+/// Longest stop for a neighbour that was silent for more than a second, seconds.
+const UNHEARD_STOP_S: f32 = 1.5;
 
 fn report(outcomes: &[Outcome]) {
     outcomes
@@ -40,6 +42,14 @@ fn no_vehicle_that_passes_at_the_scheduled_separation_is_stopped() {
             outcome.longest_stop_s <= STOP_S,
             "{:.2} s: {}",
             outcome.longest_stop_s,
+            meeting::line(outcome)
+        );
+        // After a second of silence the neighbour may be anywhere in a ball: the vehicle waits
+        // until it is heard again.
+        assert!(
+            outcome.longest_unheard_stop_s <= UNHEARD_STOP_S,
+            "{:.2} s unheard: {}",
+            outcome.longest_unheard_stop_s,
             meeting::line(outcome)
         );
     }

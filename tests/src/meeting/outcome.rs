@@ -42,9 +42,9 @@ pub struct Outcome {
     pub arrived: usize,
     /// Number of stops by the safety filter, of all vehicles.
     pub filter_stops: u32,
-    /// Longest stop by the safety filter in which all neighbours were heard, seconds.
+    /// Longest stop by the safety filter for a neighbour that was heard, seconds.
     pub longest_stop_s: f32,
-    /// Longest stop by the safety filter in which a neighbour was silent for more than a second.
+    /// Longest stop by the safety filter for a neighbour that was silent for more than a second.
     pub longest_unheard_stop_s: f32,
     /// Greatest number of times that one vehicle found its path blocked.
     pub most_blocked: u32,

@@ -41,11 +41,13 @@ pub(super) struct MeetingVehicle {
     pub(super) commands: u8,
     /// Number of stops by the safety filter.
     pub(super) stops: u32,
-    /// Since when the present stop lasts, and whether some neighbour was silent for longer than
-    /// [`HEARD_S`] in it.
+    /// System ids of all vehicles, in the order of `heard`.
+    ids: Vec<u8>,
+    /// Since when the present stop lasts, and whether the neighbour that the filter stops for was
+    /// silent for longer than [`HEARD_S`] in it.
     pub(super) stopped: Option<(Instant, bool)>,
-    /// Longest stop by the safety filter in which all neighbours were heard, seconds, and the
-    /// longest one in which one was silent.
+    /// Longest stop by the safety filter for a neighbour that was heard, seconds, and the longest
+    /// one for one that was silent.
     pub(super) longest_stop_s: f32,
     pub(super) longest_unheard_stop_s: f32,
     /// Number of times that its companion found its path blocked.
@@ -106,6 +108,7 @@ impl MeetingVehicle {
             bytes: Vec::new(),
             commands: 0,
             stops: 0,
+            ids: scene.vehicles.iter().map(|vehicle| vehicle.id).collect(),
             stopped: None,
             longest_stop_s: 0.0,
             longest_unheard_stop_s: 0.0,
@@ -116,19 +119,19 @@ impl MeetingVehicle {
     /// Updates the length of the longest stop by the filter: a stop ends when the filter stops for
     /// no neighbour any more (a wait at a gate may follow), or the vehicle flies again.
     pub(super) fn note_stops(&mut self, now: Instant) {
-        let stops = self.companion.filter_stop_count();
+        let (stops, blocker) =
+            (self.companion.filter_stop_count(), self.companion.query_filter(now));
         if core::mem::replace(&mut self.stops, stops) != stops {
             self.stopped.get_or_insert((now, false));
-        } else if self.companion.query_filter(now) == 0
-            || self.autopilot.velocity.norm() > MOVES_MPS
-        {
+        } else if blocker == 0 || self.autopilot.velocity.norm() > MOVES_MPS {
             self.stopped = None;
         }
         let Some((since, unheard)) = &mut self.stopped else { return };
         let now_s = now.as_micros() as f32 * 1e-6;
+        let stops_for = self.ids.iter().position(|&id| id == blocker).map(|k| &self.heard[k]);
         let silent =
             |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s > HEARD_S);
-        *unheard |= self.heard.iter().any(silent);
+        *unheard |= stops_for.is_some_and(silent);
         let longest_s = match unheard {
             true => &mut self.longest_unheard_stop_s,
             false => &mut self.longest_stop_s,
