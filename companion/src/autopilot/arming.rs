@@ -1,7 +1,7 @@
 //! Arming the autopilot step by step, and which of its refusals are reported as texts.
 
 use crate::autopilot::landed::RISEN_M;
-use crate::autopilot::telemetry::{Ack, MAX_POSITION_AGE, MAX_POSITION_AGE_ON_PAD, Telemetry};
+use crate::autopilot::telemetry::{Ack, MAX_HEARTBEAT_AGE, MAX_POSITION_AGE_ON_PAD, Telemetry};
 use crate::state::State;
 use crate::time::{Duration, Instant};
 
@@ -10,6 +10,12 @@ const ARMING_RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// Longest time from the COMMAND_ACK that accepts arming to the first HEARTBEAT (1 Hz) with the
 /// armed bit; also the time to wait for a COMMAND_ACK before arming is requested again.
 const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
+/// Rise of the estimated height by which the landing detector's report of the ground still counts
+/// more while the motors spin up, metres.
+const MAX_SPIN_UP_DRIFT_M: f32 = 0.6;
+/// Age of the position up to which a vehicle whose climb had not begun is taken to stand on its
+/// pad: a pilot needs longer to take over and take off.
+const UNSEEN_ON_PAD_FOR: Duration = Duration::from_secs(5);
 /// Most arming requests in a row without a COMMAND_ACK; after them arming has failed.
 const MAX_ARMING_TRIES: u8 = 2;
 /// Most different refusals (command and result) that are reported in one mission state.
@@ -79,9 +85,14 @@ impl ArmingHandshake {
             t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
         if !t.armed {
             // Once arming is requested, the vehicle may be armed and rise unseen from the last
-            // HEARTBEAT on, unless the landing detector reports the ground.
-            let rests = self.requested_at.is_none() || t.lately_reported_ground(now);
-            self.disarmed_z_m = if rests { t.position.z } else { t.heartbeat_z_m };
+            // HEARTBEAT on. While the landing detector reports the ground, what looks like a small
+            // rise is the estimate, which spinning motors disturb.
+            let drifts = t.heartbeat_age(now) < MAX_HEARTBEAT_AGE && t.lately_reported_ground(now);
+            let most_m = if drifts { MAX_SPIN_UP_DRIFT_M } else { 0.0 };
+            self.disarmed_z_m = match self.requested_at {
+                None => t.position.z,
+                Some(_) => t.position.z.min(t.heartbeat_z_m + most_m),
+            };
         }
         if (t.armed && !on_ground) || t.position.z > self.disarmed_z_m + RISEN_M {
             self.flown = true;
@@ -143,10 +154,10 @@ impl ArmingHandshake {
     }
 
     /// Whether a vehicle whose start is cancelled may be disarmed: it has not risen, and its
-    /// position is known, or new if its climb had begun. Unseen, its pilot may have taken off with
-    /// it; on its pad the autopilot disarms it by itself after some 10 s.
+    /// position is new. If its climb had not begun, the position may be 5 s old; later its pilot
+    /// may have taken off with it, unseen.
     pub(crate) fn may_disarm_on_pad(&self, now: Instant, telemetry: &Telemetry) -> bool {
-        let most = if self.climb_begun { MAX_POSITION_AGE_ON_PAD } else { MAX_POSITION_AGE };
+        let most = if self.climb_begun { MAX_POSITION_AGE_ON_PAD } else { UNSEEN_ON_PAD_FOR };
         !self.flown && telemetry.position_age(now) < most
     }
 

@@ -34,7 +34,7 @@ use crate::time::{Duration, Instant};
 /// and a late one is not yet silence.
 pub(crate) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 /// Gap between two HEARTBEATs that counts as a silence of the autopilot.
-const MAX_SILENCE: Duration = Duration::from_secs(3);
+const MAX_SILENCE: Duration = Duration::from_millis(4500);
 /// Age of a position from which a vehicle may have risen unseen: positions come at 30 Hz.
 pub(crate) const MAX_POSITION_AGE_ON_PAD: Duration = Duration::from_millis(150);
 /// Age from which a position counts as unknown.

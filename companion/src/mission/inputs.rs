@@ -12,7 +12,7 @@ pub struct GuardInputs {
     pub in_state: Duration,
     /// Time since the autopilot's last HEARTBEAT.
     pub heartbeat_age: Duration,
-    /// Time for which HEARTBEATs have come without a gap of 3 s.
+    /// Time for which HEARTBEATs have come without a gap of 4.5 s.
     pub heard_for: Duration,
     /// Time since the last usable position.
     pub position_age: Duration,

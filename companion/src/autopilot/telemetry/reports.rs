@@ -20,14 +20,14 @@ impl Telemetry {
         self.landed.is_some_and(|report| report.is_new_ground(now))
     }
 
-    /// Whether the landing detector reports the ground. While the motors are armed an old report
-    /// counts for 3 s, as long as the vehicle has not risen.
+    /// Whether the landing detector reports the ground. Unless the vehicle rests disarmed, an old
+    /// report counts for 3 s, as long as the vehicle has not risen.
     pub fn reports_ground(&self, now: Instant) -> bool {
         let known = self.position_age(now) < MAX_POSITION_AGE;
         let z_m = if known { self.position.z } else { f32::NAN };
-        self.landed.is_some_and(|report| match self.armed {
-            true => report.holds_ground(z_m, now),
-            false => report.on_ground,
+        self.landed.is_some_and(|report| match self.rests_disarmed(now) {
+            true => report.on_ground,
+            false => report.holds_ground(z_m, now),
         })
     }
 
@@ -39,7 +39,7 @@ impl Telemetry {
         !self.armed && (heard || !(risen || self.reports_flight()))
     }
 
-    /// Time for which HEARTBEATs have come without a gap of 3 s ([`MAX_SILENCE`]); zero in such a
+    /// Time for which HEARTBEATs have come without a gap of 4.5 s ([`MAX_SILENCE`]); zero in such a
     /// gap.
     pub(crate) fn heard_for(&self, now: Instant) -> Duration {
         match self.heartbeat_age(now) > MAX_SILENCE {

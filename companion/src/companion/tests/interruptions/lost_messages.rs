@@ -115,6 +115,41 @@ fn a_rise_read_with_the_last_heartbeat_is_a_rise() {
     }
 }
 
+/// HEARTBEAT is lost as the vehicle is armed, and its pilot takes off with it unheard, while the
+/// landing detector falsely reports the ground, or nothing: no disarming above the pad, and the
+/// vehicle does not report that it is grounded.
+#[test]
+fn a_pilot_who_takes_off_unheard_is_not_disarmed() {
+    for kind in KINDS {
+        for (false_ground, lost) in [(true, false), (false, true), (true, true)] {
+            for rise_m in [0.01, 0.03, 0.05] {
+                let mut b = bench(kind);
+                b.refused.push(ARM);
+                b.start();
+                b.run_until(State::Arming, 12.0);
+                b.refused.clear();
+                b.run(0.3);
+                (b.no_heartbeat, b.no_landed_state) = (true, lost);
+                (b.false_ground, b.stuck, b.armed) = (false_ground, true, true);
+                for tick in 0..2400 {
+                    (b.armed, b.mode) = (true, pilot_mode(kind));
+                    let z_m = f32::min(b.enu.z + rise_m, 5.0);
+                    b.enu.z = z_m;
+                    let from = b.commands.len();
+                    b.tick();
+                    let case = format!("{kind:?} {false_ground} {lost} {rise_m} {:?}", b.state());
+                    // Below 0.85 m a report of the ground counts more than the height.
+                    let most_m = if false_ground { 0.9 } else { HARMLESS_M };
+                    assert!(z_m <= most_m || !disarms(&b, from), "{case}: disarmed at {z_m}");
+                    let flags = b.companion.own_intent().flags;
+                    let grounded = flags & GROUNDED != 0;
+                    assert!(!lost || tick < 500 || !grounded, "{case}: reported as grounded");
+                }
+            }
+        }
+    }
+}
+
 /// The estimated height rises while the motors spin up: a pause still keeps the vehicle on its pad.
 #[test]
 fn a_pause_holds_a_vehicle_whose_estimate_drifts_on_its_pad() {

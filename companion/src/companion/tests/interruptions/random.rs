@@ -48,7 +48,8 @@ impl Watch {
     fn tick(&mut self, b: &mut Bench) {
         let (before, armed, was) = (b.setpoints.len(), b.armed, b.state());
         let low = b.companion.telemetry.position.z < 0.8;
-        if self.lifted_for > 0 {
+        // A pilot needs 5 s to take over a vehicle that is not seen any more.
+        if self.lifted_for > 0 && !(1..110).contains(&self.unknown) {
             // Disarmed, it falls.
             let z_m = if b.armed { b.enu.z + 0.03 } else { 0.0 };
             (self.lifted_for, b.enu.z) = (self.lifted_for - 1, z_m);
