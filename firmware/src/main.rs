@@ -190,7 +190,7 @@ fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<LentFlash>, boo
             }
             flash.take_back(lent);
         }
-        if !store.refuse_roadmap() {
+        if !store.fall_back_to_older_roadmap() {
             return (None, aside);
         }
     }

@@ -37,9 +37,9 @@ const EXTRA_SWAY_TIME: Duration = Duration::from_secs(60);
 const MAX_SWAY_M: f32 = 2.0;
 /// An unheard vehicle stops if its next closed gate is less than this ahead, metres.
 const MIN_GATE_AHEAD_M: f32 = 0.2;
-/// Longest time of a climb beyond 1 s for each metre of height, seconds: idling motors, and the
-/// stop at the top.
-const MAX_CLIMB_OVERHEAD_S: f32 = 8.0;
+/// Time that a climb is assumed to take at most beyond 1 s for each metre of height, seconds:
+/// idling motors, and the stop at the top.
+const ASSUMED_CLIMB_OVERHEAD_S: f32 = 8.0;
 /// Vertical speed above which a vehicle does not rest on the ground, m/s.
 const MAX_RESTING_CLIMB_MPS: f32 = 0.5;
 
@@ -363,7 +363,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 // The climb is assumed at 1 m/s, or slower if the settings say so; idling motors
                 // before it and the stop at its top are added.
                 let climb_s = if progress_m < 0.0 {
-                    MAX_CLIMB_OVERHEAD_S
+                    ASSUMED_CLIMB_OVERHEAD_S
                         + libm::ceilf(-progress_m / libm::fminf(self.config.climb_mps, 1.0))
                 } else {
                     0.0

@@ -1,5 +1,5 @@
-//! Where the reference stops on its path, and when it steps back from below a vehicle that
-//! descends.
+//! Moves the place where a vehicle waits back along its path: out of the column below a vehicle
+//! that descends, and in `SwarmLinkLost` to where others expect it. Notes when it is trapped there.
 
 use planner_core::flight::Path;
 use planner_core::track::deconflict::Advice;

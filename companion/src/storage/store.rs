@@ -110,7 +110,7 @@ impl Store {
     /// Rejects the roadmap or field of this start, which is complete but cannot be used.
     /// [`Self::roadmap`] is then the older one; returns whether there is one. To be called before
     /// any other use of the store.
-    pub fn refuse_roadmap(&mut self) -> bool {
+    pub fn fall_back_to_older_roadmap(&mut self) -> bool {
         if let Some(slot) = self.in_use {
             self.slots[slot] = AreaCondition::Dirty;
             self.in_use = self.newest_slot();

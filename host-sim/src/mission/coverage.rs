@@ -65,7 +65,7 @@ pub(super) fn prepare(
         })
         .collect();
     check_batteries(&planned)?;
-    check_picture_height(&planned)?;
+    check_ground_clearance(&planned)?;
     let top_m = TAKEOFF_HEIGHT_M.min(pictures_above_ground_m(planned.area_settings));
     drop(planned);
     for vehicle in &mut scenario.vehicles {
@@ -140,7 +140,7 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
 
 /// Refuses pictures so low that a vehicle whose estimate is too high by the greatest error could
 /// touch the ground.
-fn check_picture_height(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
+fn check_ground_clearance(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     let height_m = pictures_above_ground_m(planned.area_settings);
     for vehicle in &planned.scenario.vehicles {
         let lower_m =

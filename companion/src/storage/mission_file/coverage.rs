@@ -175,7 +175,7 @@ const UNHEARD_DOWN_S: f32 = LEASE_S as f32 + UNHEARD_NOTICED_S + LEASE_DELAY_S +
 
 impl<'a> CoverageView<'a> {
     /// Time, seconds, after which a vehicle that no other vehicle hears any more is on the ground:
-    /// the end of its lease, the delays and the stop ([`UNHEARD_DOWN_S`]), and the descent from
+    /// the end of its lease, the delays and the stop (`UNHEARD_DOWN_S`), and the descent from
     /// the highest layer at the slowest vehicle's descent speed.
     pub fn unheard_vehicle_down_s(&self) -> f32 {
         let Heights { mission_m, layer_m } = self.header.heights;

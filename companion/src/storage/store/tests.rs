@@ -494,7 +494,7 @@ fn a_roadmap_that_cannot_be_used_is_refused_or_given_up_for_the_one_before() {
     upload(&mut store, &mut flash, File::Roadmap, &new, 239).unwrap().unwrap();
     let mut store = Store::mount(LAYOUT, &mut flash);
     assert_eq!(bytes_at(&flash, store.roadmap()), Some(new.as_slice()));
-    assert!(store.refuse_roadmap());
+    assert!(store.fall_back_to_older_roadmap());
     assert_eq!(bytes_at(&flash, store.roadmap()), Some(old.as_slice()));
-    assert!(!store.refuse_roadmap() && store.roadmap().is_none());
+    assert!(!store.fall_back_to_older_roadmap() && store.roadmap().is_none());
 }

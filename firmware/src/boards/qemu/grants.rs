@@ -99,7 +99,7 @@ pub fn next_due(cs: CriticalSection<'_>) -> u64 {
 }
 
 /// Interrupt handler of the dual timer: executes the records that are due.
-pub fn on_alarm() {
+pub fn on_record_due() {
     Register::new(TIMER, INTCLR).write(1);
     critical_section::with(|cs| {
         if let Some(host) = &mut *SIMULATION_LINK.borrow_ref_mut(cs) {

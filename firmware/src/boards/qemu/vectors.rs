@@ -43,7 +43,7 @@ unsafe extern "C" fn timer1() {
 }
 
 unsafe extern "C" fn dual_timer() {
-    grants::on_alarm();
+    grants::on_record_due();
 }
 
 unsafe extern "C" fn links() {

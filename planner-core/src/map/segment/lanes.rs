@@ -3,8 +3,8 @@
 /// Mask of the cells of a brick whose index along `axis` is a set bit of `lanes` (bits 0 to 3).
 #[inline(always)]
 pub(crate) fn lane_mask(axis: usize, lanes: u32) -> u64 {
-    const LANE_MASKS: [[u64; 16]; 3] = lane_masks();
-    LANE_MASKS[axis][(lanes & 15) as usize]
+    const LAYER_MASKS: [[u64; 16]; 3] = lane_masks();
+    LAYER_MASKS[axis][(lanes & 15) as usize]
 }
 
 const fn lane_masks() -> [[u64; 16]; 3] {

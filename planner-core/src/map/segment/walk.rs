@@ -125,7 +125,8 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
         }
     }
 
-    /// The segment's coordinate on `axis` where its coordinate on `U` is `u`, within `slack`.
+    /// The segment's coordinate on `axis` where its coordinate on `U` is `u`. It errs by at most
+    /// `slack`, which is not added here: [`Span::new`] widens by it.
     #[inline(always)]
     fn coordinate_at(&self, axis: usize, u: i32) -> i32 {
         let run = i64::from(u - self.a[U]);
