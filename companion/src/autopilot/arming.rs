@@ -157,8 +157,11 @@ impl ArmingHandshake {
     /// position is new. If its climb had not begun, the position may be 5 s old; later its pilot
     /// may have taken off with it, unseen.
     pub(crate) fn may_disarm_on_pad(&self, now: Instant, telemetry: &Telemetry) -> bool {
-        let most = if self.climb_begun { MAX_POSITION_AGE_ON_PAD } else { UNSEEN_ON_PAD_FOR };
-        !self.flown && telemetry.position_age(now) < most
+        let seen = match self.climb_begun {
+            true => telemetry.position_age(now) < MAX_POSITION_AGE_ON_PAD,
+            false => telemetry.last_position_at.is_some_and(|at| now - at < UNSEEN_ON_PAD_FOR),
+        };
+        !self.flown && seen
     }
 
     /// Notes that HEARTBEAT is missing while the vehicle is to be armed.

@@ -11,6 +11,9 @@ const SURELY_VALID_FOR: Duration = Duration::from_millis(400);
 /// Age up to which a report of the ground holds while the vehicle has not risen since.
 const VALID_ON_PAD_FOR: Duration = Duration::from_millis(3000);
 
+/// Age of the last report of a stream at 1 Hz, the default of PX4 where a request for 5 Hz is lost.
+const SLOW_REPORT_AGE: Duration = Duration::from_millis(1200);
+
 /// What the landing detector reported.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LandedReport {
@@ -23,9 +26,10 @@ pub(super) struct LandedReport {
 }
 
 impl LandedReport {
-    /// Whether the report says that the vehicle is on the ground, and is new.
+    /// Whether the report says that the vehicle is on the ground, and is no older than one of a
+    /// slow stream.
     pub(super) fn is_new_ground(&self, now: Instant) -> bool {
-        self.on_ground && now - self.at <= SURELY_VALID_FOR
+        self.on_ground && now - self.at <= SLOW_REPORT_AGE
     }
 
     /// Whether the report says that the vehicle is on the ground, and still holds: it is new, or

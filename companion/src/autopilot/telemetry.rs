@@ -148,6 +148,8 @@ pub struct Telemetry {
     accuracy: Option<(f32, Instant)>,
     /// When the last usable position was received; `None` while the position is unknown.
     pub position_at: Option<Instant>,
+    /// The same, kept while the position is unknown.
+    pub(super) last_position_at: Option<Instant>,
     /// Position in the mission frame, ENU metres.
     pub position: Point,
     /// Velocity in the mission frame, ENU m/s.
@@ -463,6 +465,7 @@ impl Telemetry {
         self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));
         if !self.is_settling(now) && now >= self.positions_valid_from {
             self.position_at = Some(now);
+            self.last_position_at = Some(now);
         }
         TelemetryChange::Updated
     }

@@ -291,7 +291,10 @@ impl Guard {
             Self::NoHeartbeat => i.heartbeat_age > limit,
             Self::PositionKnown => i.position_age < MAX_POSITION_AGE,
             Self::NoPosition => i.position_age > limit,
-            Self::StillNoPosition => i.position_age.min(i.in_state).min(i.heard_for) > limit,
+            Self::StillNoPosition => {
+                i.position_age.min(i.in_state).min(i.heard_for) > limit
+                    && i.heartbeat_age < MAX_HEARTBEAT_AGE
+            }
             Self::PositionJumped => i.jumped,
             Self::FoundFlying => i.airborne,
             Self::PlanReady => i.plan_ready,

@@ -15,7 +15,7 @@ impl Telemetry {
         self.landed.is_some_and(|report| report.on_ground)
     }
 
-    /// Whether the landing detector reported the ground in the last 0.4 s.
+    /// Whether the landing detector reported the ground in the last 1.2 s.
     pub(in crate::autopilot) fn lately_reported_ground(&self, now: Instant) -> bool {
         self.landed.is_some_and(|report| report.is_new_ground(now))
     }

@@ -192,3 +192,42 @@ fn a_landed_vehicle_whose_autopilot_is_switched_off_reports_no_change() {
         assert!(flags.iter().all(|f| f & wanted == wanted), "{kind:?} {flags:?}");
     }
 }
+
+/// ArduCopter's estimator gives up while the motors spin up: the start is cancelled by disarming.
+#[test]
+fn a_start_whose_estimate_is_lost_is_disarmed_on_its_pad() {
+    let mut b = bench(AutopilotKind::ArduPilot);
+    (b.stays_armed, b.spool) = (true, Duration::from_secs(9));
+    b.refused.push(ARM);
+    b.start();
+    b.run_until(State::Arming, 12.0);
+    b.stuck = true;
+    b.run(0.3);
+    (b.armed, b.ekf_flags, b.no_position) = (true, 0, true);
+    b.refused.clear();
+    let from = b.commands.len();
+    b.run(3.0);
+    assert!(disarms(&b, from), "{:?}: {:?}", b.state(), b.texts);
+}
+
+/// A vehicle given back without a position is not landed in the gap of HEARTBEATs in which its
+/// pilot takes it over.
+#[test]
+fn a_vehicle_given_back_without_a_position_is_not_landed_unheard() {
+    for kind in KINDS {
+        let mut b = reach(kind, State::Follow, None).expect("it flies");
+        b.mode = pilot_mode(kind);
+        b.run_until(State::PilotControl, 2.0);
+        b.mode = kind.setpoint_mode();
+        b.run_until(State::PilotReturned, 3.0);
+        b.no_position = true;
+        b.run(16.5);
+        let before = b.commands.len();
+        b.no_heartbeat = true;
+        b.run(0.5);
+        b.mode = pilot_mode(kind);
+        b.run(30.0);
+        let acts = b.commands[before..].iter().filter(|c| c.0 == SET_MODE).count();
+        assert_eq!(acts, 0, "{kind:?} {:?}: {:?}", b.state(), b.texts);
+    }
+}
