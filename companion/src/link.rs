@@ -15,7 +15,7 @@ pub mod severity;
 
 use self::answer_limits::{AnswerKind, AnswerTokenBuckets, SenderKind};
 use self::commands::{Command, CommandHistory};
-use self::echo::{IntentEcho, SentIntents};
+use self::echo::{IntentEcho, ReportedPath, SentIntents};
 use self::frame::{Counters, Frame, Framer, Header};
 use self::outbox::{Outbox, Outgoing};
 use self::rate_limit::RadioTokenBucket;
@@ -235,12 +235,12 @@ impl Links {
         self.outboxes[link as usize].next_header(system)
     }
 
-    /// The header of an intent whose points end `ends_m` metres along this vehicle's path. Its
-    /// sequence number and `ends_m` are remembered: an echo of it by a neighbour gives the message
-    /// delay, and the part of the path that the neighbour knows.
-    pub(crate) fn intent_header(&mut self, system: u8, ends_m: f32, now: Instant) -> Header {
+    /// The header of an intent that reports `path`. Its sequence number and `path` are remembered:
+    /// an echo of it by a neighbour gives the message delay, and the part of the path that the
+    /// neighbour knows.
+    pub(crate) fn intent_header(&mut self, system: u8, path: ReportedPath, now: Instant) -> Header {
         let header = self.next_header(Link::Swarm, system);
-        self.sent.note_sent(header.sequence, ends_m, now);
+        self.sent.note_sent(header.sequence, path, now);
         header
     }
 

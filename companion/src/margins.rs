@@ -32,6 +32,13 @@ pub(crate) const LEASE_S: u64 = 20;
 /// Time after which a vehicle notices that it is unheard, seconds: the greatest age of the report
 /// that renewed its lease.
 pub(crate) const UNHEARD_NOTICED_S: f32 = 1.8;
+/// Part of [`unheard_stretch_m`] for drift, and for the last centimetres of a stop, metres.
+pub(crate) const UNHEARD_STRETCH_SPARE_M: f32 = 0.67;
+/// Time for which an unheard vehicle flies on beyond where it was last heard, seconds: after 1 s
+/// without any message it stops. One that still hears others notices later, and flies back.
+const UNHEARD_FLIGHT_S: f32 = 1.3;
+/// Braking of an unheard vehicle, m/s².
+const UNHEARD_BRAKING_MPS2: f32 = 1.5;
 /// Delay of the messages by which a lease is renewed, seconds.
 pub(crate) const LEASE_DELAY_S: f32 = 2.0;
 /// Time under a pilot's control after which a vehicle counts as having left the plan and the
@@ -99,6 +106,14 @@ pub fn speed_share_for_bound(bound_m: f32, clearance_m: f32, radius_m: f32) -> f
 
 /// Least share of the cruise speed at which a vehicle is flown; slower it stops.
 const MIN_SPEED_SHARE: f32 = 0.1;
+
+/// Length of its path on which an unheard vehicle comes to rest, metres beyond where it was last
+/// heard, in a mission whose fastest vehicle flies at this speed: it notices, stops, and flies back
+/// if it came further. In a coverage mission it flies on as long as its lease allows.
+pub(crate) fn unheard_stretch_m(fastest_mps: f32) -> f32 {
+    let stop_m = fastest_mps * fastest_mps / (2.0 * UNHEARD_BRAKING_MPS2);
+    fastest_mps * UNHEARD_FLIGHT_S + stop_m + UNHEARD_STRETCH_SPARE_M
+}
 
 #[cfg(test)]
 mod tests;

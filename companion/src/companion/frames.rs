@@ -216,7 +216,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
         let delay_s = echo.and_then(|echo| self.links.message_delay_s(&echo, self.now));
         if let Some(sent) = echo.and_then(|echo| self.links.sent_intents().note_arrival(&echo)) {
-            self.guidance.note_acknowledged_path(sent.at, sent.ends_m);
+            self.guidance.note_acknowledged_path(sent.at, sent.path.along_m, sent.path.ends_m);
         }
         if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.message_delay(id)) {
             late.update(delay_s);

@@ -12,6 +12,7 @@ use planner_core::geo::frames;
 use super::Companion;
 use crate::events::Link;
 use crate::guidance::Setpoint;
+use crate::link::echo::ReportedPath;
 use crate::link::frame::{self, AUTOPILOT_COMPONENT};
 use crate::link::intent::{self, Intent};
 use crate::link::rate_limit::{ARMED_BYTES_PER_S, DISARMED_BYTES_PER_S};
@@ -58,7 +59,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Intent) {
             let mut payload = [0; 133];
             let len = self.own_intent().encode(&mut payload);
-            let header = self.links.intent_header(system, self.reported_points_end_m(), self.now);
+            let header = self.links.intent_header(system, self.reported_path(), self.now);
             self.guidance.note_intent_sent(self.now);
             return encode_tunnel(header, &payload[..len], out);
         }
@@ -353,15 +354,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Some(most_m.min(plan.path.length_m()))
     }
 
-    /// Place along this vehicle's path where the points of its intent end, metres.
-    fn reported_points_end_m(&self) -> f32 {
+    /// Part of this vehicle's path that its intent reports.
+    fn reported_path(&self) -> ReportedPath {
         let from_m = self.guidance.setpoint_m;
+        let along_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
         let flies = self.guidance.along_m() >= 0.0 && !self.guidance.hold.is_reported();
-        let Some(plan) = self.mission.plan().filter(|_| flies) else { return from_m };
+        let Some(plan) = self.mission.plan().filter(|_| flies) else {
+            return ReportedPath { along_m, ends_m: from_m };
+        };
         // The setpoint and these waypoints are as many points as an intent holds.
         let last =
             plan.path.waypoints().iter().filter(|w| w.along_m > from_m).nth(intent::MAX_POINTS - 2);
-        self.guidance.stops_at_m.max(from_m).min(last.map_or(f32::INFINITY, |last| last.along_m))
+        let last_m = last.map_or(f32::INFINITY, |last| last.along_m);
+        ReportedPath { along_m, ends_m: self.guidance.stops_at_m.max(from_m).min(last_m) }
     }
 
     /// Points along which this vehicle flies next, from its setpoint to where it will stop for now;

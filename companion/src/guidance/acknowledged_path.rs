@@ -1,7 +1,18 @@
 //! What other vehicles know of this vehicle's way along its path: once no vehicle hears it, it
 //! lands where they expect it, though gates may have let it fly further.
 
-use crate::time::Instant;
+use crate::margins::{UNHEARD_STRETCH_SPARE_M, unheard_stretch_m};
+use crate::time::{Duration, Instant};
+
+/// Age below which another vehicle's report that it hears this one shows that this one is linked.
+pub(super) const LINKED_WITHIN: Duration = Duration::from_millis(800);
+/// A vehicle this little beyond the part of its path that others know does not fly back, metres.
+pub(super) const BEYOND_KNOWN_M: f32 = 0.3;
+/// Time by which a vehicle follows behind its reference, seconds.
+const BEHIND_REFERENCE_S: f32 = 0.5;
+/// Distance before the end of the stretch on which others expect an unheard vehicle, to which it
+/// flies back, metres: it does not from [`BEYOND_KNOWN_M`] further on, and may drift.
+const BEFORE_STRETCH_END_M: f32 = UNHEARD_STRETCH_SPARE_M + 0.33;
 
 /// Part of a vehicle's path that others know by the intents that they acknowledged, metres along
 /// it.
@@ -9,17 +20,62 @@ use crate::time::Instant;
 pub(super) struct AcknowledgedPath {
     /// Place where the others surely heard the vehicle last; ∞ where they heard it nowhere on this
     /// path.
-    pub from_m: f32,
+    from_m: f32,
+    /// Place that the vehicle had passed when another one last reported that it hears it; −∞ where
+    /// none did on this path.
+    passed_m: f32,
+    /// Place where the vehicle was when it sent the last acknowledged intent; ∞ where none was
+    /// acknowledged.
+    at_m: f32,
     /// Place to which the points of the last acknowledged intent lead; −∞ where none was
     /// acknowledged.
-    pub to_m: f32,
+    to_m: f32,
     /// When the path was begun: intents sent earlier are of another path.
-    pub since: Instant,
+    since: Instant,
 }
 
 impl AcknowledgedPath {
     /// For a path that begins now, of which others know nothing.
     pub const fn of_new_path(now: Instant) -> Self {
-        Self { from_m: f32::INFINITY, to_m: f32::NEG_INFINITY, since: now }
+        Self {
+            from_m: f32::INFINITY,
+            passed_m: f32::NEG_INFINITY,
+            at_m: f32::INFINITY,
+            to_m: f32::NEG_INFINITY,
+            since: now,
+        }
+    }
+
+    /// Begins to follow the path: so far, others have heard the vehicle nowhere on it.
+    pub fn start_following(&mut self) {
+        self.from_m = f32::INFINITY;
+    }
+
+    /// Notes that others hear the vehicle while its reference is at `along_m` along its path.
+    pub fn note_heard(&mut self, along_m: f32, speed_mps: f32) {
+        self.from_m = along_m - speed_mps * LINKED_WITHIN.as_secs_f32();
+        self.passed_m = along_m - speed_mps * BEHIND_REFERENCE_S;
+    }
+
+    /// Notes that another vehicle has acknowledged the intent sent at `sent_at` from `at_m` along
+    /// the path, whose points lead to `to_m` along it.
+    pub fn note_acknowledged(&mut self, sent_at: Instant, at_m: f32, to_m: f32) {
+        if sent_at > self.since {
+            (self.at_m, self.to_m) = (at_m, to_m);
+        }
+    }
+
+    /// The first place at which others expect the vehicle once they hear it no more: it must have
+    /// passed what lies before.
+    pub fn first_m(&self) -> f32 {
+        self.from_m.max(self.passed_m)
+    }
+
+    /// The last place at which others expect the vehicle once they hear it no more: no further than
+    /// it could report, though gates may have opened since, and no further than
+    /// [`unheard_stretch_m`] from where they heard it.
+    pub fn last_m(&self, fastest_mps: f32) -> f32 {
+        let stretch_m = unheard_stretch_m(fastest_mps) - BEFORE_STRETCH_END_M;
+        self.from_m.max(self.to_m).min(self.passed_m.max(self.at_m + stretch_m))
     }
 }

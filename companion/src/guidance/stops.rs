@@ -4,33 +4,27 @@
 use planner_core::flight::Path;
 use planner_core::track::deconflict::Advice;
 
+use super::acknowledged_path::{BEYOND_KNOWN_M, LINKED_WITHIN};
 use super::{Guidance, Phase};
 use crate::guidance::evade::{self, EvadeTarget, StepBack};
 use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
-use crate::time::{Duration, Instant};
+use crate::time::Instant;
 
 /// A stop nearer ahead than this is the place where the vehicle will wait, metres.
 const WAIT_WITHIN_M: f32 = 8.0;
-/// Age below which another vehicle's report that it hears this one shows that this one is linked.
-const LINKED_WITHIN: Duration = Duration::from_millis(800);
 /// Drift in gusts of a vehicle that its autopilot lands from a standstill, with some reserve,
 /// metres.
 const UNHEARD_LANDING_DRIFT_M: f32 = 0.5;
-
-/// A vehicle this little beyond the part of its path that others know does not fly back, metres.
-const BEYOND_KNOWN_M: f32 = 0.3;
 
 /// Setpoint speed above which a vehicle below one that descends no longer counts as trapped, m/s.
 const NOT_TRAPPED_MPS: f32 = 0.5;
 
 impl Guidance {
-    /// Notes that another vehicle has acknowledged the intent sent at `sent_at`, whose points lead
-    /// to `ends_m` along the path.
-    pub(crate) fn note_acknowledged_path(&mut self, sent_at: Instant, ends_m: f32) {
-        if sent_at > self.acknowledged_path.since {
-            self.acknowledged_path.to_m = ends_m;
-        }
+    /// Notes that another vehicle has acknowledged the intent sent at `sent_at` from `at_m` along
+    /// the path, whose points lead to `to_m` along it.
+    pub(crate) fn note_acknowledged_path(&mut self, sent_at: Instant, at_m: f32, to_m: f32) {
+        self.acknowledged_path.note_acknowledged(sent_at, at_m, to_m);
     }
 
     /// Ends an evasion, so that the setpoint stops where it is: the next state does not fly on.
@@ -41,8 +35,8 @@ impl Guidance {
     /// Moves the place where the vehicle waits back along its path, out of the columns of vehicles
     /// that descend: the advised stop if it is ahead of the reference, else `back_to_m`. In
     /// `SwarmLinkLost`, before it lands, the vehicle steps back from above vehicles that may lie
-    /// below, and to the end of the part of its path that others know; never beyond where they last
-    /// heard it.
+    /// below, and onto the part of its path where others expect it; never beyond where they last
+    /// heard it, nor where it must have flown since.
     pub(super) fn evade<const V: usize, const W: usize>(
         &mut self,
         state: State,
@@ -54,16 +48,19 @@ impl Guidance {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
         if neighbours.linked_within(now, LINKED_WITHIN) {
-            self.acknowledged_path.from_m =
-                along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.as_secs_f32();
+            self.acknowledged_path.note_heard(along_m, self.tracker.speed_mps.max(0.0));
         }
         let (alone, follows) = (state == State::SwarmLinkLost, state == State::Follow);
+        // An unheard vehicle that the filter stopped short of its reference is not led on to it, to
+        // fly back from there.
+        let at_reference = along_m < self.setpoint_m + BEYOND_KNOWN_M;
         // A vehicle in its climb or descent, or on its way aside, is not moved.
         let waits = state.is_on_path()
+            && (at_reference || !alone)
             && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.ends_away_from_goal && follows);
         let lands_m = along_m.min(self.expected_up_to_m(state, neighbours));
-        let beyond = alone && along_m > lands_m + BEYOND_KNOWN_M;
+        let beyond = alone && at_reference && along_m > lands_m + BEYOND_KNOWN_M;
         let wait_m = if follows { along_m + advice.stop_within_m.max(0.0) } else { lands_m };
         let beside_m = safety_m + evade::EVADE_MARGIN_M;
         let waits_there = waits && (!follows || advice.stop_within_m < WAIT_WITHIN_M);
@@ -83,7 +80,7 @@ impl Guidance {
             EvadeTarget::Back(to_m) => (Some(to_m.min(wait_m)), false),
             EvadeTarget::Nowhere => (None, !alone),
         };
-        let from_m = self.acknowledged_path.from_m;
+        let from_m = self.acknowledged_path.first_m();
         let to_m = to_m.filter(|to_m| !alone || *to_m >= from_m).or(beyond.then_some(lands_m));
         self.evading = to_m.is_some();
         if let Some(to_m) = to_m {
@@ -94,19 +91,14 @@ impl Guidance {
         self.no_better_place = nowhere;
     }
 
-    /// Place along its path up to which others expect a vehicle in `SwarmLinkLost`, metres: gates
-    /// that opened since may have let it fly beyond what it could report. ∞ in any other state, in
-    /// a coverage mission, and where the radio's range is known, so that others expect it further
-    /// on.
+    /// Place along its path up to which others expect a vehicle in `SwarmLinkLost`, metres. ∞ in
+    /// any other state, in a coverage mission, and where the radio's range is known, so that others
+    /// expect it further on.
     fn expected_up_to_m<const V: usize>(&self, state: State, neighbours: &Neighbours<V>) -> f32 {
         let expected = state == State::SwarmLinkLost
             && neighbours.fleet().is_none()
             && !neighbours.knows_range();
-        if expected {
-            self.acknowledged_path.from_m.max(self.acknowledged_path.to_m)
-        } else {
-            f32::INFINITY
-        }
+        if expected { self.acknowledged_path.last_m(self.fastest_mps) } else { f32::INFINITY }
     }
 
     /// Since when the vehicle has been below one that descends, unable to leave along its path.

@@ -43,13 +43,21 @@ impl IntentEcho {
     }
 }
 
-/// An intent that this vehicle sent: sequence number, time of sending, and the place along its path
-/// to which the intent's points led, metres.
+/// The part of its path that a vehicle reports in an intent, metres along the path.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ReportedPath {
+    /// Where the vehicle is.
+    pub(crate) along_m: f32,
+    /// Where the intent's points end.
+    pub(crate) ends_m: f32,
+}
+
+/// An intent that this vehicle sent: sequence number, time of sending, and the reported path.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SentIntent {
     sequence: u8,
     pub(crate) at: Instant,
-    pub(crate) ends_m: f32,
+    pub(crate) path: ReportedPath,
 }
 
 /// Ring of the intents that this vehicle sent last.
@@ -62,8 +70,8 @@ pub(crate) struct SentIntents {
 }
 
 impl SentIntents {
-    pub(crate) fn note_sent(&mut self, sequence: u8, ends_m: f32, now: Instant) {
-        self.ring[self.count % MAX_SENT_INTENTS] = Some(SentIntent { sequence, at: now, ends_m });
+    pub(crate) fn note_sent(&mut self, sequence: u8, path: ReportedPath, now: Instant) {
+        self.ring[self.count % MAX_SENT_INTENTS] = Some(SentIntent { sequence, at: now, path });
         self.count = self.count.wrapping_add(1);
     }
 

@@ -129,6 +129,8 @@ pub struct Bench {
     pub neighbour_clear_m: f32,
     /// Ranks of the vehicles that the neighbour reports to hear, as bits.
     pub neighbour_hears: u32,
+    /// Whether the neighbour echoes the last intent of this vehicle.
+    pub neighbour_echoes: bool,
     neighbour_sequence: u8,
 }
 
@@ -194,6 +196,7 @@ impl Bench {
             neighbour_clock: None,
             neighbour_clear_m: -1e6,
             neighbour_hears: u32::MAX,
+            neighbour_echoes: false,
             neighbour_sequence: 0,
         }
     }

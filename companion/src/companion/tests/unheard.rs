@@ -1,10 +1,14 @@
-//! A vehicle that no other vehicle hears any more in a coverage mission stays where its last intent
-//! says that it may be.
+//! A vehicle that no other vehicle hears any more: in a coverage mission it stays where its last
+//! intent says that it may be, in others it comes to rest on the stretch of its path where others
+//! expect it.
 
 use super::State::*;
 use super::divisions::over_a_field;
 use super::*;
-use crate::link::intent::Intent;
+use crate::link::intent::{GROUNDED, Intent, ON_PLAN};
+use crate::margins::unheard_stretch_m;
+use planner_core::flight::{Gate, Path};
+use proptest::prelude::ProptestConfig;
 
 /// Horizontal distance of a place from the path that an intent reports, beginning at `from`,
 /// metres.
@@ -51,4 +55,57 @@ fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
         }
     }
     assert!(furthest_m > 8.0 && beyond > 4, "{furthest_m} m, {beyond}");
+}
+
+proptest::proptest! {
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 60 } else { 600 }))]
+    /// Whatever its speed, and whether its radio still hears or not.
+    #[test]
+    fn an_unheard_vehicle_rests_where_others_expect_it(
+        cruise_mps in 0.5f32..8.0,
+        flown_s in 0.2f32..15.0,
+        hears in proptest::bool::ANY,
+        gate_m in proptest::option::of(5f32..60.0),
+    ) {
+        let mut config = Config { cruise_mps, ..two_vehicles() };
+        (config.slowest_mps, config.fastest_mps) = (cruise_mps, cruise_mps);
+        let mut bench = Bench::new(config);
+        bench.step_m = cruise_mps * 0.06;
+        bench.neighbour_echoes = true;
+        let mut path = Path::new();
+        for x in [0.0, 40.0, 300.0] {
+            path.push(START + Point::new(x, 0.0, 0.0), 1.2).unwrap();
+        }
+        let mut plan = VehiclePlan { path, ..plan() };
+        if let Some(at_m) = gate_m {
+            plan.gates.push(Gate { at_m, id: 77, until_m: 100.0 }).unwrap();
+        }
+        bench.answer_plan = Some(Ok(plan));
+        bench.neighbour = Some((Point::new(8.0, 60.0, 0.0), GROUNDED | ON_PLAN, 0.0, 5));
+        bench.run_until(State::Ready, 6.0);
+        bench.start();
+        bench.run_until(State::Follow, 60.0);
+        bench.run(flown_s);
+        let heard_m = bench.enu.x - START.x;
+        bench.run(0.1);
+        let speed_mps = (bench.enu.x - START.x - heard_m) / 0.1;
+        let heard_m = heard_m + 0.1 * speed_mps;
+        bench.neighbour_echoes = false;
+        if hears {
+            bench.run(0.8);
+            bench.neighbour_hears = 0;
+        } else {
+            bench.neighbour = None;
+        }
+        bench.run_until(State::Land, 60.0);
+        let rests_m = bench.enu.x - START.x - heard_m;
+        let most_m = unheard_stretch_m(cruise_mps);
+        proptest::prop_assert!(rests_m < most_m, "{rests_m} m on at {speed_mps} m/s, {most_m}");
+        let least_m = speed_mps * (0.5 + speed_mps / 5.0);
+        let stops_m = gate_m.map_or(f32::INFINITY, |at_m| 0.8 * (at_m - heard_m).max(0.0));
+        proptest::prop_assert!(
+            rests_m > least_m.min(stops_m) - 0.3,
+            "{rests_m} m on at {speed_mps} m/s, at least {least_m}, {stops_m}"
+        );
+    }
 }

@@ -1,6 +1,8 @@
 use super::*;
 use proptest::prelude::*;
 
+const PATH: ReportedPath = ReportedPath { along_m: 0.0, ends_m: 0.0 };
+
 proptest! {
     #[test]
     fn half_the_round_trip_is_the_delay(
@@ -10,7 +12,7 @@ proptest! {
         let (mut sent, mut late) = (SentIntents::default(), MessageDelay::default());
         for (i, way) in ways.iter().enumerate() {
             let now = Instant::from_millis(i as u64 * 200);
-            sent.note_sent(i as u8, 0.0, now);
+            sent.note_sent(i as u8, PATH, now);
             let echo = IntentEcho::new(3, i as u8, Duration::from_millis(held)).unwrap();
             let back = now + Duration::from_millis(2 * way + held);
             let delay_s = sent.message_delay_s(&echo, back).unwrap();
@@ -26,7 +28,7 @@ proptest! {
     ) {
         let (mut sent, mut late) = (SentIntents::default(), MessageDelay::default());
         for i in 0..20 {
-            sent.note_sent(i, 0.0, Instant::from_millis(u64::from(i) * 200));
+            sent.note_sent(i, PATH, Instant::from_millis(u64::from(i) * 200));
         }
         for (sequence, held, at_ms) in echoes {
             let echo = IntentEcho { rank: 0, sequence, held };
@@ -44,10 +46,10 @@ proptest! {
 fn the_newest_intent_that_arrived_says_where_its_points_led() {
     let mut sent = SentIntents::default();
     let at = |i: u8| Instant::from_millis(1000 + u64::from(i) * 200);
-    (0..8).for_each(|i| sent.note_sent(i, f32::from(i), at(i)));
+    (0..8).for_each(|i| sent.note_sent(i, ReportedPath { ends_m: f32::from(i), ..PATH }, at(i)));
     let echo = |sequence| IntentEcho { rank: 0, sequence, held: 0 };
     let mut arrived =
-        |sequence| sent.note_arrival(&echo(sequence)).map(|sent| (sent.at, sent.ends_m));
+        |sequence| sent.note_arrival(&echo(sequence)).map(|sent| (sent.at, sent.path.ends_m));
     assert_eq!(arrived(3), Some((at(3), 3.0)));
     assert_eq!(arrived(2), None, "overtaken");
     assert_eq!(arrived(99), None, "never sent");

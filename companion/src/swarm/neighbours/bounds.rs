@@ -47,17 +47,21 @@ pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
 /// Silence after which the column of a vehicle that left the plan in the air in a coverage mission
 /// is free again: the vehicle is down by then, whatever it flew there.
 pub(super) const COLUMN_KEPT_FOR: Duration = Duration::from_secs(600);
-/// Stretch of its path that an unheard vehicle may have flown, metres: the vehicle notices after
-/// [`HEARD_WITHIN`] and 1 s, and stops. In a coverage mission it flies on as long as its lease
-/// allows.
-pub(super) const UNHEARD_STRETCH_M: f32 = 6.0;
-/// Growth of [`UNHEARD_STRETCH_M`] for each second that a message takes to another vehicle and
+/// Hardest stop of a vehicle that falls silent, m/s²: that of ArduCopter's BRAKE.
+pub(super) const HARDEST_STOP_MPS2: f32 = 2.5;
+/// Time for which a vehicle flies on before its hardest stop, seconds.
+pub(super) const HARDEST_STOP_AFTER_S: f32 = 0.5;
+/// Share of its points that a vehicle flies at least: it may brake for their end already.
+pub(super) const LEAST_SHARE_OF_POINTS: f32 = 0.8;
+/// Distance of a point from the vehicle from which on it shows the course, metres.
+pub(super) const MIN_COURSE_M: f32 = 0.5;
+/// Growth of `unheard_stretch_m` for each second that a message takes to another vehicle and
 /// back, m/s.
 pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_SPACING_M: f32 = 1.0;
 /// Silence after which a vehicle in a coverage mission may have landed further along its path than
-/// [`UNHEARD_STRETCH_M`]: its lease, and the time that row `SwarmLinkLost` waits. No vehicle counts
+/// `unheard_stretch_m`: its lease, and the time that row `SwarmLinkLost` waits. No vehicle counts
 /// as out of the plan for a shorter silence.
 pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 /// Rounding of the length of a path of eight legs, metres.

@@ -175,7 +175,7 @@ impl NeighbourEntry {
         let here = self.state.position;
         let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
         if !self.heard_within(now, MAY_LAND_AFTER) {
-            return self.for_each_place(upto_m, &mut |place, wider_m| {
+            return self.for_each_place([0.0, upto_m], &mut |place, wider_m| {
                 let radius_m = fpu::sqrtf(apart_m * apart_m + wider_m * wider_m);
                 let (from, to) =
                     (place + up(COLUMN_TOP_ABOVE_M), place - up(self.column_depth_m(&place)));
@@ -235,7 +235,7 @@ impl NeighbourEntry {
 
     /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
     pub(super) fn unheard_stopping_distance_m(&self) -> f32 {
-        UNHEARD_STRETCH_M + UNHEARD_STRETCH_PER_DELAY_MPS * 2.0 * self.message_delay.delay_s
+        self.unheard_stretch_m + UNHEARD_STRETCH_PER_DELAY_MPS * 2.0 * self.message_delay.delay_s
     }
 
     /// Whether the neighbour was in the air, or about to take off, when it was last heard.
@@ -296,27 +296,78 @@ impl NeighbourEntry {
         }
     }
 
-    /// Calls `visit` with places along its points that the neighbour may have reached unheard, up
-    /// to `upto_m` in all, and with its greatest distance from the nearest of them, metres.
+    /// Calls `visit` with places along its points that the neighbour may have reached unheard, from
+    /// `from_m` to `to_m` along them, and with its greatest distance from the nearest of them,
+    /// metres.
     #[inline(never)]
-    pub(super) fn for_each_place(&self, upto_m: f32, visit: &mut dyn FnMut(Point, f32)) {
-        let step_m = if upto_m > self.unheard_stopping_distance_m() {
-            upto_m / MAX_STRETCH_SPACINGS
+    pub(super) fn for_each_place(
+        &self,
+        [from_m, to_m]: [f32; 2],
+        visit: &mut dyn FnMut(Point, f32),
+    ) {
+        let step_m = if to_m > self.unheard_stopping_distance_m() {
+            to_m / MAX_STRETCH_SPACINGS
         } else {
             UNHEARD_STRETCH_SPACING_M
         };
         let wider_m = if step_m > UNHEARD_STRETCH_SPACING_M { 0.5 * step_m } else { 0.0 };
-        self.for_each_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {
-            for step in 1..=(flown_m / step_m) as u32 {
-                let along_m = step as f32 * step_m;
+        let mut before_m = 0.0;
+        self.for_each_leg(to_m, &mut |[at, next], [leg_m, flown_m]| {
+            // Both ends of the part that counts, too.
+            let first_m = libm::fmaxf(from_m - before_m, 0.0);
+            before_m += flown_m;
+            let mut along_m = first_m;
+            while along_m < flown_m {
                 visit(at + (next - at) * (along_m / leg_m), wider_m);
+                along_m += step_m;
             }
-            // The end of the flown part too.
-            visit(
-                if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
-                wider_m,
-            );
+            if first_m <= flown_m {
+                visit(
+                    if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
+                    wider_m,
+                );
+            }
         });
+    }
+
+    /// Least distance along its points, metres, at which the neighbour comes to rest unheard: that
+    /// of its hardest stop from the speed at which it was last heard. Its companion flies it back
+    /// no further. 0 in a coverage mission, and where it climbs, descends or lands.
+    fn least_rest_m(&self) -> f32 {
+        let far = |way: &Point| way.norm_squared() > MIN_COURSE_M * MIN_COURSE_M;
+        let course = self.points.iter().map(|p| p - self.state.position).find(far);
+        let Some(ahead) =
+            course.filter(|_| !self.would_fly_all_points_unheard() && !self.has_column())
+        else {
+            return 0.0;
+        };
+        let speed_mps = libm::fmaxf(self.state.velocity.dot(&ahead) / ahead.length(), 0.0);
+        let stop_m = speed_mps * (HARDEST_STOP_AFTER_S + speed_mps / (2.0 * HARDEST_STOP_MPS2));
+        let (mut points_m, mut at) = (0.0, self.state.position);
+        for next in &self.points {
+            points_m += (next - core::mem::replace(&mut at, *next)).length();
+            if LEAST_SHARE_OF_POINTS * points_m >= stop_m {
+                return stop_m;
+            }
+        }
+        LEAST_SHARE_OF_POINTS * points_m
+    }
+
+    /// The first place along its points where the neighbour may rest, silent, and the points beyond
+    /// it; `None` where that is the place at which it was heard.
+    pub(super) fn nearest_rest_place(&self) -> Option<(Point, &[Point])> {
+        let (mut left_m, mut at) = (self.least_rest_m(), self.state.position);
+        if left_m <= 0.0 {
+            return None;
+        }
+        for (i, next) in self.points.iter().enumerate() {
+            let leg_m = (next - at).length();
+            if leg_m > left_m {
+                return Some((at + (next - at) * (left_m / leg_m), &self.points[i..]));
+            }
+            (at, left_m) = (*next, left_m - leg_m);
+        }
+        None
     }
 
     /// Greatest height at which the neighbour may lie after coming down from `place`, ENU up,
@@ -392,7 +443,7 @@ impl NeighbourEntry {
             }
             let nature = if down { ZoneKind::Grounded } else { ZoneKind::Static };
             let beside_m = if field.is_some() { STALE_POSITION_ERROR_M } else { UNHEARD_BESIDE_M };
-            self.for_each_place(upto_m, &mut |at, wider_m| {
+            self.for_each_place([self.least_rest_m(), upto_m], &mut |at, wider_m| {
                 let far_m = apart_m + beside_m;
                 let radius_m = fpu::sqrtf(far_m * far_m + wider_m * wider_m);
                 visit(KeepOutZone { radius_m, ..column(at, nature) });

@@ -210,7 +210,7 @@ impl NeighbourEntry {
 
     /// Whether the neighbour may come down from where it is, so that the column below it counts.
     #[inline]
-    fn has_column(&self) -> bool {
+    pub(super) fn has_column(&self) -> bool {
         self.may_come_down || self.reports_any(OUT_OF_PLAN) || self.ground_m.is_nan()
     }
 
@@ -400,9 +400,9 @@ impl<const V: usize> Neighbours<V> {
         let down = position_age >= self.down_after
             || (entry.reports_any(GROUNDED) && entry.lacks_position());
         let lies = down && (dead || entry.reports_any(GROUNDED)) && !entry.ground_m.is_nan();
-        if let Some(first) = entry.points.first().filter(|_| by_intent) {
-            motion.position = *first;
-        }
+        let rest = entry.nearest_rest_place().filter(|_| dead && !by_intent);
+        let heard = entry.points.first().filter(|_| by_intent).copied();
+        motion.position = heard.or(rest.map(|(place, _)| place)).unwrap_or(motion.position);
         // A neighbour silent in its climb may have flown to the climb's top, or just above it.
         let top = if age_s > MAX_HEIGHT_AGE_S && !lies { entry.climb_top_m() } else { None };
         let mut highest_m = entry.ground_m;
@@ -423,7 +423,7 @@ impl<const V: usize> Neighbours<V> {
             motion.delay_s = if dead { 0.0 } else { UNHEARD_BEYOND_TOP_S };
         }
         if dead {
-            motion.points = &entry.points;
+            motion.points = rest.map_or(&entry.points, |(_, points)| points);
             motion.reported_path_reach.most_m = f32::INFINITY;
             if top.is_none() {
                 motion.rests_within_m = entry.unheard_distance_m();

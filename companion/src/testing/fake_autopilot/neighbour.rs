@@ -6,6 +6,7 @@ use planner_core::geo::frames;
 
 use super::{Bench, ORIGIN, SYSTEM};
 use crate::Link;
+use crate::link::echo::IntentEcho;
 use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::intent::Intent;
 
@@ -19,7 +20,15 @@ impl Bench {
         if !self.neighbour_sequence.is_multiple_of(4) {
             return;
         }
+        let sent =
+            self.swarm.iter().rev().find(|f| Intent::decode(f.padded_payload(), SYSTEM).is_some());
+        let echo = sent.filter(|_| self.neighbour_echoes).map(|sent| IntentEcho {
+            rank: self.companion.neighbours.own_rank() as u8,
+            sequence: sent.sequence,
+            held: 0,
+        });
         let intent = Intent {
+            echo,
             system_id: id,
             flags,
             mission_crc: 0xC0FFEE,

@@ -20,8 +20,13 @@ const LATTICE_M: f32 = 0.5;
 const JOIN_M: f32 = 1.0;
 /// Height above its final position from which on a vehicle counts as in the air, metres.
 const ALOFT_M: f32 = 1.0;
-/// How far along its path a vehicle whose radio fails may fly unheard, metres.
-const STRETCH_M: f32 = 6.0;
+/// How far along its path a vehicle whose radio fails comes to rest at most, metres.
+const STRETCH_M: f32 = 4.6;
+/// Time for which such a vehicle flies on at least, seconds, and its hardest stop then, m/s².
+const FLIES_ON_S: f32 = 0.5;
+const HARDEST_STOP_MPS2: f32 = 2.5;
+/// Time over which its speed is measured, seconds.
+const SPEED_OVER_S: f32 = 0.5;
 /// Distance kept from that stretch beyond the safety distance, metres.
 const BESIDE_M: f32 = 0.4;
 /// Spacing of the points of the path that a silent vehicle's final position is compared with,
@@ -96,6 +101,8 @@ pub fn cause(
     let path = &plan.flights[held].path;
     let Some(over) = path.waypoints().last().map(|w| w.position) else { return Cause::WayLeft };
     let ground = over - Point::new(0.0, 0.0, plan.flights[held].descent_m);
+    // One that never took off would have begun at the top of its climb.
+    let from = if rose(&flight.tracks[held]) { from } else { path.waypoints()[0].position };
     let others: Vec<Ball> = (0..flight.tracks.len())
         .filter(|i| *i != held && *i != struck.index)
         .filter_map(|i| first_place_since(&flight.tracks[i], left_s))
@@ -134,6 +141,12 @@ pub fn cause(
 /// A point, and the distance to keep from it, metres.
 type Ball = (Point, f32);
 
+/// Whether a vehicle was in the air at any time.
+fn rose(track: &[(f32, Point)]) -> bool {
+    let lowest_m = track.iter().map(|(_, place)| place.z).fold(f32::INFINITY, f32::min);
+    track.iter().any(|(_, place)| place.z > lowest_m + ALOFT_M)
+}
+
 /// When a vehicle that landed short began its last descent, and where; its last point if it never
 /// rose.
 fn gave_up(track: &[(f32, Point)]) -> Option<(f32, Point)> {
@@ -164,8 +177,8 @@ pub fn rest_offsets_m(plan: &HostPlan, flight: &SwarmFlight, struck: Struck) -> 
     Some([rest.1, rest.0 - heard.0])
 }
 
-/// Points on the ground below the path, as far as the vehicle may fly unheard from where it was
-/// last heard.
+/// Points on the ground below the path at which the vehicle may have come to rest, by where it was
+/// last heard, and how fast.
 fn possible_rest_places(
     plan: &HostPlan,
     flight: &SwarmFlight,
@@ -184,8 +197,13 @@ fn possible_rest_places(
         .filter_map(|m| Some((m, (path.point_at(m)? - heard).norm())))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map_or(0.0, |(m, _)| m);
+    let before = first_place_since(track, struck.at_s - SPEED_OVER_S).unwrap_or(heard);
+    let speed_mps = (heard - before).xy().norm() / SPEED_OVER_S;
+    let least_m = speed_mps * (FLIES_ON_S + speed_mps / (2.0 * HARDEST_STOP_MPS2));
     (0..=(STRETCH_M / STEP_M) as usize)
-        .filter_map(|i| path.point_at(nearest + i as f32 * STEP_M))
+        .map(|i| i as f32 * STEP_M)
+        .filter(|m| *m >= least_m)
+        .filter_map(|m| path.point_at(nearest + m))
         .map(|place| (Point::new(place.x, place.y, rest.z), radius_m))
         .collect()
 }

@@ -307,9 +307,9 @@ fn explain(
     flight: &swarm::SwarmFlight,
     struck: Struck,
 ) {
-    if let Some([beside_m, along_m]) =
-        held::rest_offsets_m(plan, flight, struck).filter(|_| struck.silent)
-    {
+    // One that waited on its pad until all others had landed may have flown its mission then.
+    let lies = struck.silent && !flight.result.vehicles[struck.index].reached;
+    if let Some([beside_m, along_m]) = held::rest_offsets_m(plan, flight, struck).filter(|_| lies) {
         row.lies_m = [row.lies_m[0].max(beside_m), row.lies_m[1].max(along_m)];
     }
     let held = |(i, v): &(usize, &VehicleResult)| !v.reached && *i != struck.index;

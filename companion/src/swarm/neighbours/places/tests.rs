@@ -149,7 +149,7 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
             .collect();
         let upto_m = entry.unheard_stopping_distance_m();
         let mut places = std::vec::Vec::new();
-        entry.for_each_place(upto_m, &mut |place, _| places.push(place));
+        entry.for_each_place([0.0, upto_m], &mut |place, _| places.push(place));
         let flown_m = upto_m * uniform(&mut rng, 0.0, 1.2).min(1.0);
         let (mut left_m, mut from) = (flown_m, entry.state.position);
         for next in &entry.points {
