@@ -43,6 +43,9 @@ const ASSUMED_CLIMB_OVERHEAD_S: f32 = 8.0;
 /// Vertical speed above which a vehicle does not rest on the ground, m/s.
 const MAX_RESTING_CLIMB_MPS: f32 = 0.5;
 
+/// Time after an unheard descent within which it makes room for a vehicle that waited for it.
+const DESCENT_LEAVES_ROOM_WITHIN: Duration = Duration::from_secs(30);
+
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// The values of all guards' inputs now.
     pub(crate) fn guard_inputs(&self) -> GuardInputs {
@@ -279,9 +282,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// The part of `hindered_for` that counts: the time since the safety filter last kept this
     /// vehicle from moving on because of a vehicle that comes down unheard. Such a descent takes
-    /// longer than the limits for hindrances, and leaves room once it ends.
+    /// longer than the limits for hindrances, and leaves room once it ends; if it has left none for
+    /// [`DESCENT_LEAVES_ROOM_WITHIN`], all of `hindered_for` counts.
     fn counted_hindrance(&self, hindered_for: Duration) -> Duration {
-        hindered_for.min(self.guidance.filter.time_since_blocked_by_descent(self.now))
+        let since = self.guidance.filter.time_since_blocked_by_descent(self.now);
+        if since < DESCENT_LEAVES_ROOM_WITHIN { hindered_for.min(since) } else { hindered_for }
     }
 
     /// Time for which other vehicles have barred the descent to its pad, or the path there.

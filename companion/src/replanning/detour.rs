@@ -66,7 +66,7 @@ const DEAD_END_AFTER: Duration = Duration::from_secs(15);
 /// detour; one search fewer is enough if they failed in one place over [`EARLY_GIVE_UP_AFTER_S`].
 const MAX_DETOUR_SEARCHES: u8 = 3;
 /// Time since the first failed search in one place after which one search fewer is enough, s.
-const EARLY_GIVE_UP_AFTER_S: u64 = 60;
+const EARLY_GIVE_UP_AFTER_S: u64 = 50;
 /// Time without progress on a detour, or under a stop by the safety filter, that counts as a block.
 const STUCK_AFTER: Duration = Duration::from_secs(20);
 /// Progress since the last block after which a further block counts as a new one, metres.
