@@ -35,7 +35,8 @@ pub(crate) const UNHEARD_NOTICED_S: f32 = 1.8;
 /// Part of [`unheard_stretch_m`] for drift, and for the last centimetres of a stop, metres.
 pub(crate) const UNHEARD_STRETCH_SPARE_M: f32 = 0.67;
 /// Time for which an unheard vehicle flies on beyond where it was last heard, seconds: after 1 s
-/// without any message it stops. One that still hears others notices later, and flies back.
+/// without any message it stops. One that still hears others notices later, and flies back if it
+/// came further, where its way back is free.
 const UNHEARD_FLIGHT_S: f32 = 1.3;
 /// Braking of an unheard vehicle, m/s².
 const UNHEARD_BRAKING_MPS2: f32 = 1.5;

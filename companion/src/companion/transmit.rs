@@ -357,7 +357,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Part of this vehicle's path that its intent reports.
     fn reported_path(&self) -> ReportedPath {
         let from_m = self.guidance.setpoint_m;
-        let along_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
+        let along_m =
+            self.guidance.measured_progress_m(self.mission.state(), &self.guidance_inputs());
         let flies = self.guidance.along_m() >= 0.0 && !self.guidance.hold.is_reported();
         let Some(plan) = self.mission.plan().filter(|_| flies) else {
             return ReportedPath { along_m, ends_m: from_m };

@@ -47,8 +47,8 @@ impl AcknowledgedPath {
     }
 
     /// Begins to follow the path: so far, others have heard the vehicle nowhere on it.
-    pub fn start_following(&mut self) {
-        self.from_m = f32::INFINITY;
+    pub fn start_following(&mut self, now: Instant) {
+        *self = Self { to_m: self.to_m, ..Self::of_new_path(now) };
     }
 
     /// Notes that others hear the vehicle while its reference is at `along_m` along its path.

@@ -58,7 +58,7 @@ impl Guidance {
     pub fn start_following(&mut self, now: Instant) {
         (self.on_path, self.lands_off_path) = (true, false);
         self.evade_search.reset();
-        self.acknowledged_path.start_following();
+        self.acknowledged_path.start_following(now);
         self.last_progress_m = self.tracker.along_m;
         self.progress_at = now;
     }

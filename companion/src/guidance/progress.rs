@@ -89,7 +89,7 @@ impl Guidance {
         self.measured_progress_m(state, scene).max(self.reported_m)
     }
 
-    pub(super) fn measured_progress_m<const W: usize, const G: usize>(
+    pub(crate) fn measured_progress_m<const W: usize, const G: usize>(
         &self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,

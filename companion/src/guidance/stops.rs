@@ -36,7 +36,7 @@ impl Guidance {
     /// that descend: the advised stop if it is ahead of the reference, else `back_to_m`. In
     /// `SwarmLinkLost`, before it lands, the vehicle steps back from above vehicles that may lie
     /// below, and onto the part of its path where others expect it; never beyond where they last
-    /// heard it, nor where it must have flown since.
+    /// heard it.
     pub(super) fn evade<const V: usize, const W: usize>(
         &mut self,
         state: State,

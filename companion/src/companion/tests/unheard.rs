@@ -101,7 +101,7 @@ proptest::proptest! {
         let rests_m = bench.enu.x - START.x - heard_m;
         let most_m = unheard_stretch_m(cruise_mps);
         proptest::prop_assert!(rests_m < most_m, "{rests_m} m on at {speed_mps} m/s, {most_m}");
-        let least_m = speed_mps * (0.5 + speed_mps / 5.0);
+        let least_m = speed_mps * (0.3 + speed_mps / 6.0).min(0.6);
         let stops_m = gate_m.map_or(f32::INFINITY, |at_m| 0.8 * (at_m - heard_m).max(0.0));
         proptest::prop_assert!(
             rests_m > least_m.min(stops_m) - 0.3,

@@ -47,10 +47,14 @@ pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
 /// Silence after which the column of a vehicle that left the plan in the air in a coverage mission
 /// is free again: the vehicle is down by then, whatever it flew there.
 pub(super) const COLUMN_KEPT_FOR: Duration = Duration::from_secs(600);
-/// Hardest stop of a vehicle that falls silent, m/s²: that of ArduCopter's BRAKE.
-pub(super) const HARDEST_STOP_MPS2: f32 = 2.5;
+/// Time by which a vehicle that still hears others notices later that it is unheard, seconds.
+pub(super) const NOTICED_LATER_S: f32 = 0.5;
+/// Hardest stop of a vehicle that falls silent, m/s²: the braking of PX4's own modes.
+pub(super) const HARDEST_STOP_MPS2: f32 = 3.0;
 /// Time for which a vehicle flies on before its hardest stop, seconds.
-pub(super) const HARDEST_STOP_AFTER_S: f32 = 0.5;
+pub(super) const HARDEST_STOP_AFTER_S: f32 = 0.3;
+/// Time in which a vehicle without power comes down at least, seconds: it flies on meanwhile.
+pub(super) const LEAST_FALL_S: f32 = 0.6;
 /// Share of its points that a vehicle flies at least: it may brake for their end already.
 pub(super) const LEAST_SHARE_OF_POINTS: f32 = 0.8;
 /// Distance of a point from the vehicle from which on it shows the course, metres.

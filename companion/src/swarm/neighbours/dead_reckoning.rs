@@ -2,6 +2,7 @@
 
 use planner_core::detour::{KeepOutZone, ZoneKind};
 use planner_core::flight::PROGRESS_ERROR_M;
+use planner_core::track::safety::PlaceOnPoints;
 use planner_core::{Length, Point};
 
 use super::bounds::*;
@@ -280,13 +281,23 @@ impl NeighbourEntry {
         self.may_fly_on(now) && self.pad.is_some_and(near)
     }
 
+    /// The points that the neighbour flies to next from its position; its setpoint may be behind.
+    fn next_points(&self) -> &[Point] {
+        match self.place_on_points {
+            PlaceOnPoints::On { leg, .. } if !self.would_fly_all_points_unheard() => {
+                self.points.get(usize::from(leg)..).unwrap_or(&self.points)
+            }
+            _ => &self.points,
+        }
+    }
+
     /// Calls `each` with the neighbour's position and each leg along its points that it may have
     /// flown unheard, `left_m` in all: both ends, and metres of the leg and of its flown part.
     #[inline(never)]
     pub(super) fn for_each_leg(&self, mut left_m: f32, each: &mut dyn FnMut([Point; 2], [f32; 2])) {
         let mut at = self.state.position;
         each([at; 2], [0.0; 2]);
-        for next in &self.points {
+        for next in self.next_points() {
             let leg_m = (next - at).length();
             if leg_m > left_m {
                 return each([at, *next], [leg_m, left_m]);
@@ -296,7 +307,7 @@ impl NeighbourEntry {
         }
     }
 
-    /// Calls `visit` with places along its points that the neighbour may have reached unheard, from
+    /// Calls `visit` with places along its points where the neighbour may rest unheard, from
     /// `from_m` to `to_m` along them, and with its greatest distance from the nearest of them,
     /// metres.
     #[inline(never)]
@@ -313,15 +324,14 @@ impl NeighbourEntry {
         let wider_m = if step_m > UNHEARD_STRETCH_SPACING_M { 0.5 * step_m } else { 0.0 };
         let mut before_m = 0.0;
         self.for_each_leg(to_m, &mut |[at, next], [leg_m, flown_m]| {
-            // Both ends of the part that counts, too.
-            let first_m = libm::fmaxf(from_m - before_m, 0.0);
-            before_m += flown_m;
-            let mut along_m = first_m;
+            let mut along_m = if from_m > before_m { from_m - before_m } else { step_m };
             while along_m < flown_m {
                 visit(at + (next - at) * (along_m / leg_m), wider_m);
                 along_m += step_m;
             }
-            if first_m <= flown_m {
+            before_m += flown_m;
+            // The end of the flown part too.
+            if from_m <= before_m {
                 visit(
                     if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
                     wider_m,
@@ -331,20 +341,21 @@ impl NeighbourEntry {
     }
 
     /// Least distance along its points, metres, at which the neighbour comes to rest unheard: that
-    /// of its hardest stop from the speed at which it was last heard. Its companion flies it back
-    /// no further. 0 in a coverage mission, and where it climbs, descends or lands.
-    fn least_rest_m(&self) -> f32 {
+    /// of its hardest stop from the speed at which it was last heard, or of a fall. 0 in a coverage
+    /// mission, off its points, and where it climbs, descends or lands.
+    pub(super) fn least_rest_m(&self) -> f32 {
         let far = |way: &Point| way.norm_squared() > MIN_COURSE_M * MIN_COURSE_M;
-        let course = self.points.iter().map(|p| p - self.state.position).find(far);
-        let Some(ahead) =
-            course.filter(|_| !self.would_fly_all_points_unheard() && !self.has_column())
-        else {
-            return 0.0;
-        };
+        let course = self.next_points().iter().map(|p| p - self.state.position).find(far);
+        let flies = matches!(self.place_on_points, PlaceOnPoints::On { .. })
+            && !self.would_fly_all_points_unheard()
+            && !self.has_column();
+        let Some(ahead) = course.filter(|_| flies) else { return 0.0 };
         let speed_mps = libm::fmaxf(self.state.velocity.dot(&ahead) / ahead.length(), 0.0);
-        let stop_m = speed_mps * (HARDEST_STOP_AFTER_S + speed_mps / (2.0 * HARDEST_STOP_MPS2));
+        let flies_for_s = HARDEST_STOP_AFTER_S + speed_mps / (2.0 * HARDEST_STOP_MPS2);
+        let stop_m = speed_mps * libm::fminf(flies_for_s, LEAST_FALL_S);
+        let stop_m = libm::fminf(stop_m, self.unheard_stretch_m);
         let (mut points_m, mut at) = (0.0, self.state.position);
-        for next in &self.points {
+        for next in self.next_points() {
             points_m += (next - core::mem::replace(&mut at, *next)).length();
             if LEAST_SHARE_OF_POINTS * points_m >= stop_m {
                 return stop_m;
@@ -353,17 +364,21 @@ impl NeighbourEntry {
         LEAST_SHARE_OF_POINTS * points_m
     }
 
-    /// The first place along its points where the neighbour may rest, silent, and the points beyond
-    /// it; `None` where that is the place at which it was heard.
-    pub(super) fn nearest_rest_place(&self) -> Option<(Point, &[Point])> {
-        let (mut left_m, mut at) = (self.least_rest_m(), self.state.position);
-        if left_m <= 0.0 {
-            return None;
-        }
-        for (i, next) in self.points.iter().enumerate() {
+    /// The place `least_m` along its points, with the points from the beginning of its leg on, and
+    /// its place on these; `None` where that is the neighbour's own.
+    pub(super) fn nearest_rest_place(
+        &self,
+        least_m: f32,
+    ) -> Option<(Point, &[Point], PlaceOnPoints)> {
+        let (mut left_m, mut at) = (least_m, self.state.position);
+        let skipped = self.points.len() - self.next_points().len();
+        for (i, next) in self.points.iter().enumerate().skip(skipped).filter(|_| least_m > 0.0) {
             let leg_m = (next - at).length();
             if leg_m > left_m {
-                return Some((at + (next - at) * (left_m / leg_m), &self.points[i..]));
+                let rest = at + (next - at) * (left_m / leg_m);
+                let from = i.saturating_sub(1);
+                let place = PlaceOnPoints::On { leg: (i - from) as u8, more_dm: 0 };
+                return Some((rest, &self.points[from..], place));
             }
             (at, left_m) = (*next, left_m - leg_m);
         }

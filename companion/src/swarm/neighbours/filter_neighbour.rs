@@ -191,6 +191,9 @@ impl NeighbourEntry {
             let beyond_m = self.reported_path_reach.beyond_m + OFF_REPORTED_PATH_M;
             reaches(self.unheard_distance_m() + beyond_m);
         }
+        if dead {
+            reaches(LEAST_FALL_S * self.speed_mps);
+        }
         if reach.lands || self.climb_top_m().is_some() {
             reaches(self.rest_radius_m(reach));
         }
@@ -219,6 +222,12 @@ impl NeighbourEntry {
     #[inline]
     fn column_bottom_m(&self, height_m: f32) -> f32 {
         if self.ground_m.is_nan() { height_m - MAX_COLUMN_M } else { self.ground_m }
+    }
+
+    /// Age of the neighbour's last intent, seconds, if it is fresh and reports points.
+    fn fresh_intent_age_s(&self, now: Instant) -> Option<f32> {
+        let heard_at = self.intent_at.filter(|_| !self.points.is_empty());
+        heard_at.map(|at| (now - at).as_secs_f32()).filter(|heard_s| *heard_s < MAX_HEIGHT_AGE_S)
     }
 
     /// Age of the neighbour's position; if it never had one, the time since the companion's start.
@@ -389,20 +398,17 @@ impl<const V: usize> Neighbours<V> {
         let (motion, dead) = (&mut met.motion, met.lost);
         let placed_s = motion.age_s;
         // If only an intent is fresh, its first point, the setpoint, stands for the position.
-        let heard_at =
-            entry.intent_at.filter(|_| placed_s > MAX_HEIGHT_AGE_S && !entry.points.is_empty());
-        let heard_s = heard_at
-            .map(|at| (now - at).as_secs_f32())
-            .filter(|heard_s| *heard_s < MAX_HEIGHT_AGE_S);
+        let heard_s = entry.fresh_intent_age_s(now).filter(|_| placed_s > MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (heard_s.is_some(), heard_s.unwrap_or(placed_s));
         // Silent for `down_after`, or grounded without a position of its own, the neighbour lies on
         // the ground below; before that it rests in the zone that detours stay clear of.
         let down = position_age >= self.down_after
             || (entry.reports_any(GROUNDED) && entry.lacks_position());
         let lies = down && (dead || entry.reports_any(GROUNDED)) && !entry.ground_m.is_nan();
-        let rest = entry.nearest_rest_place().filter(|_| dead && !by_intent);
+        let least_m = if dead && !by_intent { entry.least_rest_m() } else { 0.0 };
+        let rest = entry.nearest_rest_place(least_m);
         let heard = entry.points.first().filter(|_| by_intent).copied();
-        motion.position = heard.or(rest.map(|(place, _)| place)).unwrap_or(motion.position);
+        motion.position = heard.or(rest.map(|(at, ..)| at)).unwrap_or(motion.position);
         // A neighbour silent in its climb may have flown to the climb's top, or just above it.
         let top = if age_s > MAX_HEIGHT_AGE_S && !lies { entry.climb_top_m() } else { None };
         let mut highest_m = entry.ground_m;
@@ -423,20 +429,23 @@ impl<const V: usize> Neighbours<V> {
             motion.delay_s = if dead { 0.0 } else { UNHEARD_BEYOND_TOP_S };
         }
         if dead {
-            motion.points = rest.map_or(&entry.points, |(_, points)| points);
-            motion.reported_path_reach.most_m = f32::INFINITY;
+            motion.points = rest.map_or(&entry.points, |(_, points, _)| points);
             if top.is_none() {
-                motion.rests_within_m = entry.unheard_distance_m();
+                motion.rests_within_m = entry.unheard_distance_m() - least_m;
             }
         }
         if top.is_some() || lies {
             motion.points = &[];
         }
-        if by_intent || lies || top.is_some() {
-            let (place, extent_m) = (PlaceOnPoints::Unknown, entry.extent_m);
-            motion.place_on_points = place;
-            motion.reported_path_reach =
-                ReportedPathReach::new(&motion.position, motion.points, &place, extent_m);
+        let flies = !(by_intent || lies || top.is_some());
+        let moved = match rest {
+            _ if !flies => Some(PlaceOnPoints::Unknown),
+            Some((.., place)) => Some(place),
+            None => None,
+        };
+        moved.into_iter().for_each(|place| put_on_points(motion, place, entry.extent_m));
+        if dead && flies {
+            motion.reported_path_reach.most_m = f32::INFINITY;
         }
         let column =
             (dead || entry.has_column()) && (!motion.grounded || (lies && highest_m > bottom_m));
@@ -446,4 +455,11 @@ impl<const V: usize> Neighbours<V> {
         met.stands = motion.grounded || stands;
         met.before_climb = top.map(|_| entry.state.position);
     }
+}
+
+/// Puts a neighbour whose position or points were replaced on these points.
+fn put_on_points(motion: &mut NeighbourMotion<'_>, place: PlaceOnPoints, extent_m: f32) {
+    motion.place_on_points = place;
+    motion.reported_path_reach =
+        ReportedPathReach::new(&motion.position, motion.points, &place, extent_m);
 }

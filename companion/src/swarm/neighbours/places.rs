@@ -7,7 +7,7 @@ use super::dead_reckoning::AreaGround;
 use super::entry::NeighbourEntry;
 use super::{
     AVOIDED_WITHIN_M, GROUNDED, LANDED, MAX_HEIGHT_AGE, MAX_HEIGHT_AGE_S, MAX_HEIGHT_DIFFERENCE_M,
-    NO_PLACE, Neighbours, ON_PLAN, OUT_OF_PLAN, UNHEARD_LANDING_AFTER,
+    NO_PLACE, NOTICED_LATER_S, Neighbours, ON_PLAN, OUT_OF_PLAN, UNHEARD_LANDING_AFTER,
 };
 use crate::time::Instant;
 
@@ -34,7 +34,12 @@ impl<const V: usize> Neighbours<V> {
     fn unheard_progress_m(&self, entry: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !entry.heard_within(now, UNHEARD_LANDING_AFTER);
         let far = lands && entry.may_fly_on(now) && !self.hears_nobody(now);
-        if far { entry.unheard_distance_m() } else { entry.unheard_stopping_distance_m() }
+        if far {
+            return entry.unheard_distance_m();
+        }
+        let stops_m = entry.unheard_stopping_distance_m();
+        // With a known range a vehicle that notices late does not fly back: it may be out of range.
+        if self.knows_range() { stops_m + NOTICED_LATER_S * self.fastest_mps } else { stops_m }
     }
 
     /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` where it is out

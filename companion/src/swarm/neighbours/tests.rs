@@ -341,7 +341,7 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
     let braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
     let bounds = MotionBounds { braking, speed_max_mps: 2.0, silent_s: 3.0 };
     let (mut beyond, mut reached, mut missed) = (0, 0, 0);
-    for seed in 0..20_000 {
+    for seed in 0..200_000 {
         let rng = &mut Pcg32::seed_from_u64(seed);
         let near = |rng: &mut Pcg32, m: f32| {
             Point::new(uniform(rng, -m, m), uniform(rng, -m, m), uniform(rng, -m, m))

@@ -22,9 +22,11 @@ const JOIN_M: f32 = 1.0;
 const ALOFT_M: f32 = 1.0;
 /// How far along its path a vehicle whose radio fails comes to rest at most, metres.
 const STRETCH_M: f32 = 4.6;
-/// Time for which such a vehicle flies on at least, seconds, and its hardest stop then, m/s².
-const FLIES_ON_S: f32 = 0.5;
-const HARDEST_STOP_MPS2: f32 = 2.5;
+/// Time for which such a vehicle flies on at least, seconds, its hardest stop then, m/s², and the
+/// time that a fall takes at least, seconds.
+const FLIES_ON_S: f32 = 0.3;
+const HARDEST_STOP_MPS2: f32 = 3.0;
+const LEAST_FALL_S: f32 = 0.6;
 /// Time over which its speed is measured, seconds.
 const SPEED_OVER_S: f32 = 0.5;
 /// Distance kept from that stretch beyond the safety distance, metres.
@@ -199,7 +201,8 @@ fn possible_rest_places(
         .map_or(0.0, |(m, _)| m);
     let before = first_place_since(track, struck.at_s - SPEED_OVER_S).unwrap_or(heard);
     let speed_mps = (heard - before).xy().norm() / SPEED_OVER_S;
-    let least_m = speed_mps * (FLIES_ON_S + speed_mps / (2.0 * HARDEST_STOP_MPS2));
+    let flies_s = FLIES_ON_S + speed_mps / (2.0 * HARDEST_STOP_MPS2);
+    let least_m = speed_mps * flies_s.min(LEAST_FALL_S);
     (0..=(STRETCH_M / STEP_M) as usize)
         .map(|i| i as f32 * STEP_M)
         .filter(|m| *m >= least_m)
