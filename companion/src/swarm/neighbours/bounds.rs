@@ -62,7 +62,7 @@ pub(super) const MIN_COURSE_M: f32 = 0.5;
 /// Growth of `unheard_stretch_m` for each second that a message takes to another vehicle and
 /// back, m/s.
 pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
-/// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
+/// Least spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_SPACING_M: f32 = 1.0;
 /// Silence after which a vehicle in a coverage mission may have landed further along its path than
 /// `unheard_stretch_m`: its lease, and the time that row `SwarmLinkLost` waits. No vehicle counts
@@ -70,9 +70,9 @@ pub(super) const UNHEARD_STRETCH_SPACING_M: f32 = 1.0;
 pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 /// Rounding of the length of a path of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
-/// Maximum number of spacings of the places on the unheard stretch in a coverage mission, where it
-/// is as long as the lease allows: with eight corners the stretch makes 17 keep-out zones, and the
-/// pad one more.
+/// Maximum number of spacings of the places on the unheard stretch, which is long at a high speed,
+/// and in a coverage mission as long as the lease allows: with eight corners it makes at most 17
+/// keep-out zones, and the pad one more.
 pub(super) const MAX_STRETCH_SPACINGS: f32 = 8.0;
 /// Height of the column below a neighbour's place in which it may lie on the ground, metres; the
 /// planner shortens the column where it knows the ground.

@@ -316,11 +316,7 @@ impl NeighbourEntry {
         [from_m, to_m]: [f32; 2],
         visit: &mut dyn FnMut(Point, f32),
     ) {
-        let step_m = if to_m > self.unheard_stopping_distance_m() {
-            to_m / MAX_STRETCH_SPACINGS
-        } else {
-            UNHEARD_STRETCH_SPACING_M
-        };
+        let step_m = libm::fmaxf(UNHEARD_STRETCH_SPACING_M, to_m / MAX_STRETCH_SPACINGS);
         let wider_m = if step_m > UNHEARD_STRETCH_SPACING_M { 0.5 * step_m } else { 0.0 };
         let mut before_m = 0.0;
         self.for_each_leg(to_m, &mut |[at, next], [leg_m, flown_m]| {

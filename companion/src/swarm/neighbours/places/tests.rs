@@ -4,9 +4,12 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::super::tests::{ORIGIN, intent, joined, place, uniform};
-use super::super::{GROUNDED, OUT_OF_PLAN, STALE_POSITION_ERROR_M, UNHEARD_STRETCH_SPACING_M};
+use super::super::{
+    GROUNDED, MAX_STRETCH_SPACINGS, OUT_OF_PLAN, STALE_POSITION_ERROR_M, UNHEARD_STRETCH_SPACING_M,
+};
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
+use crate::margins::unheard_stretch_m;
 
 /// Wherever a vehicle in a coverage mission is on the points that it reported before it fell
 /// silent: nobody lands below, and no place below is taken for free.
@@ -131,19 +134,21 @@ fn where_a_vehicle_may_have_fallen_nobody_lands() {
 }
 
 /// Wherever on its unheard stretch a silent vehicle is, a keep-out place is at most half a spacing
-/// away: up to the stretch's end, and around its corners.
+/// away: up to the stretch's end, and around its corners. At no speed are there more places than a
+/// search for a detour has room for.
 #[test]
 fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
     let mut rng = Pcg32::seed_from_u64(15);
-    let mut at_the_end = 0;
+    let (mut at_the_end, mut most) = (0, 0);
     for case in 0..5000 {
         let mut table = joined(0);
         let entry = &mut table.entries[1];
         entry.message_delay.delay_s = uniform(&mut rng, 0.0, 0.5);
+        entry.unheard_stretch_m = unheard_stretch_m(uniform(&mut rng, 0.5, 8.0));
         let mut at = entry.state.position;
         entry.points = (0..1 + rng.next_u32() % 8)
             .map(|_| {
-                at += Point::from_fn(|_, _| uniform(&mut rng, -4.0, 4.0));
+                at += Point::from_fn(|_, _| uniform(&mut rng, -8.0, 8.0));
                 at
             })
             .collect();
@@ -161,12 +166,12 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
         at_the_end += usize::from(flown_m >= upto_m && left_m <= 0.0);
         let nearest_m =
             places.iter().map(|place| (place - from).norm()).fold(f32::INFINITY, f32::min);
-        assert!(
-            nearest_m <= 0.5 * UNHEARD_STRETCH_SPACING_M + 0.01,
-            "{case}: {nearest_m} m beside {places:?}"
-        );
+        let spacing_m = UNHEARD_STRETCH_SPACING_M.max(upto_m / MAX_STRETCH_SPACINGS);
+        assert!(nearest_m <= 0.5 * spacing_m + 0.01, "{case}: {nearest_m} m beside {places:?}");
+        most = most.max(places.len());
     }
     assert!(at_the_end > 300, "{at_the_end}");
+    assert!((10..18).contains(&most), "{most}");
 }
 
 #[test]
