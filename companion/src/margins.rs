@@ -40,6 +40,12 @@ pub(crate) const UNHEARD_STRETCH_SPARE_M: f32 = 0.67;
 const UNHEARD_FLIGHT_S: f32 = 1.3;
 /// Braking of an unheard vehicle, m/s².
 const UNHEARD_BRAKING_MPS2: f32 = 1.5;
+/// Hardest stop of a vehicle that falls silent, m/s²: the braking of PX4's own modes.
+const HARDEST_STOP_MPS2: f32 = 3.0;
+/// Time for which a vehicle flies on before its hardest stop, seconds.
+const HARDEST_STOP_AFTER_S: f32 = 0.3;
+/// Time in which a vehicle without power comes down at least, seconds: it flies on meanwhile.
+pub(crate) const LEAST_FALL_S: f32 = 0.6;
 /// Delay of the messages by which a lease is renewed, seconds.
 pub(crate) const LEASE_DELAY_S: f32 = 2.0;
 /// Time under a pilot's control after which a vehicle counts as having left the plan and the
@@ -110,10 +116,18 @@ const MIN_SPEED_SHARE: f32 = 0.1;
 
 /// Length of its path on which an unheard vehicle comes to rest, metres beyond where it was last
 /// heard, in a mission whose fastest vehicle flies at this speed: it notices, stops, and flies back
-/// if it came further. In a coverage mission it flies on as long as its lease allows.
-pub(crate) fn unheard_stretch_m(fastest_mps: f32) -> f32 {
+/// if it came further. Messages of others that were under way when its radio failed reach it up to
+/// `delay_s` later. In a coverage mission it flies on as long as its lease allows.
+pub(crate) fn unheard_stretch_m(fastest_mps: f32, delay_s: f32) -> f32 {
     let stop_m = fastest_mps * fastest_mps / (2.0 * UNHEARD_BRAKING_MPS2);
-    fastest_mps * UNHEARD_FLIGHT_S + stop_m + UNHEARD_STRETCH_SPARE_M
+    fastest_mps * (UNHEARD_FLIGHT_S + delay_s) + stop_m + UNHEARD_STRETCH_SPARE_M
+}
+
+/// Distance that a vehicle flies on at least, metres, once it was last heard at this speed: that of
+/// its hardest stop, or of a fall.
+pub(crate) fn least_unheard_rest_m(speed_mps: f32) -> f32 {
+    let flies_for_s = HARDEST_STOP_AFTER_S + speed_mps / (2.0 * HARDEST_STOP_MPS2);
+    speed_mps * libm::fminf(flies_for_s, LEAST_FALL_S)
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
 //! What other vehicles know of this vehicle's way along its path: once no vehicle hears it, it
 //! lands where they expect it, though gates may have let it fly further.
 
-use crate::margins::{UNHEARD_STRETCH_SPARE_M, unheard_stretch_m};
+use crate::margins::{UNHEARD_STRETCH_SPARE_M, least_unheard_rest_m, unheard_stretch_m};
 use crate::time::{Duration, Instant};
 
-/// Age below which another vehicle's report that it hears this one shows that this one is linked.
-pub(super) const LINKED_WITHIN: Duration = Duration::from_millis(800);
+/// Age below which another vehicle's report that it hears this one counts as new: two steps.
+pub(super) const NEW_REPORT_AGE: Duration = Duration::from_millis(100);
 /// A vehicle this little beyond the part of its path that others know does not fly back, metres.
 pub(super) const BEYOND_KNOWN_M: f32 = 0.3;
 /// Time by which a vehicle follows behind its reference, seconds.
@@ -18,12 +18,10 @@ const BEFORE_STRETCH_END_M: f32 = UNHEARD_STRETCH_SPARE_M + 0.33;
 /// it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AcknowledgedPath {
-    /// Place where the others surely heard the vehicle last; ∞ where they heard it nowhere on this
-    /// path.
-    from_m: f32,
-    /// Place that the vehicle had passed when another one last reported that it hears it; −∞ where
-    /// none did on this path.
-    passed_m: f32,
+    /// The first place where others may expect the vehicle, as they may have heard it up to their
+    /// last report that they hear it, and know how far it flies on at least. `None` where no
+    /// vehicle has heard it on this path.
+    first_m: Option<f32>,
     /// Place where the vehicle was when it sent the last acknowledged intent; ∞ where none was
     /// acknowledged.
     at_m: f32,
@@ -37,13 +35,7 @@ pub(super) struct AcknowledgedPath {
 impl AcknowledgedPath {
     /// For a path that begins now, of which others know nothing.
     pub const fn of_new_path(now: Instant) -> Self {
-        Self {
-            from_m: f32::INFINITY,
-            passed_m: f32::NEG_INFINITY,
-            at_m: f32::INFINITY,
-            to_m: f32::NEG_INFINITY,
-            since: now,
-        }
+        Self { first_m: None, at_m: f32::INFINITY, to_m: f32::NEG_INFINITY, since: now }
     }
 
     /// Begins to follow the path: so far, others have heard the vehicle nowhere on it.
@@ -51,10 +43,11 @@ impl AcknowledgedPath {
         *self = Self { to_m: self.to_m, ..Self::of_new_path(now) };
     }
 
-    /// Notes that others hear the vehicle while its reference is at `along_m` along its path.
-    pub fn note_heard(&mut self, along_m: f32, speed_mps: f32) {
-        self.from_m = along_m - speed_mps * LINKED_WITHIN.as_secs_f32();
-        self.passed_m = along_m - speed_mps * BEHIND_REFERENCE_S;
+    /// Notes a new report that another vehicle hears this one, whose reference is at `along_m`
+    /// along its path. The report was under way for `delay_s`.
+    pub fn note_heard(&mut self, along_m: f32, speed_mps: f32, delay_s: f32) {
+        let heard_m = along_m - speed_mps * (BEHIND_REFERENCE_S + delay_s);
+        self.first_m = Some(heard_m + least_unheard_rest_m(speed_mps));
     }
 
     /// Notes that another vehicle has acknowledged the intent sent at `sent_at` from `at_m` along
@@ -68,14 +61,17 @@ impl AcknowledgedPath {
     /// The first place at which others expect the vehicle once they hear it no more: it must have
     /// passed what lies before.
     pub fn first_m(&self) -> f32 {
-        self.from_m.max(self.passed_m)
+        self.first_m.unwrap_or(f32::INFINITY)
     }
 
     /// The last place at which others expect the vehicle once they hear it no more: no further than
     /// it could report, though gates may have opened since, and no further than
     /// [`unheard_stretch_m`] from where they heard it.
     pub fn last_m(&self, fastest_mps: f32) -> f32 {
-        let stretch_m = unheard_stretch_m(fastest_mps) - BEFORE_STRETCH_END_M;
-        self.from_m.max(self.to_m).min(self.passed_m.max(self.at_m + stretch_m))
+        let stretch_m = unheard_stretch_m(fastest_mps, 0.0) - BEFORE_STRETCH_END_M;
+        let stretch_ends_m = self.at_m + stretch_m;
+        self.first_m.map_or(stretch_ends_m, |first_m| {
+            first_m.max(self.to_m).min(first_m.max(stretch_ends_m))
+        })
     }
 }

@@ -4,7 +4,7 @@
 use planner_core::flight::Path;
 use planner_core::track::deconflict::Advice;
 
-use super::acknowledged_path::{BEYOND_KNOWN_M, LINKED_WITHIN};
+use super::acknowledged_path::{BEYOND_KNOWN_M, NEW_REPORT_AGE};
 use super::{Guidance, Phase};
 use crate::guidance::evade::{self, EvadeTarget, StepBack};
 use crate::state::State;
@@ -47,8 +47,8 @@ impl Guidance {
     ) {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
-        if neighbours.linked_within(now, LINKED_WITHIN) {
-            self.acknowledged_path.note_heard(along_m, self.tracker.speed_mps.max(0.0));
+        if let Some(delay_s) = neighbours.reporters_delay_s(now, NEW_REPORT_AGE) {
+            self.acknowledged_path.note_heard(along_m, self.tracker.speed_mps.max(0.0), delay_s);
         }
         let (alone, follows) = (state == State::SwarmLinkLost, state == State::Follow);
         // An unheard vehicle that the filter stopped short of its reference is not led on to it, to

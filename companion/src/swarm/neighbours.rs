@@ -34,7 +34,6 @@ use self::bounds::*;
 use self::entry::NeighbourEntry;
 use crate::config::{Ground, RosterEntry};
 use crate::link::intent::{GROUNDED, Intent, LANDED, ON_PLAN, OUT_OF_PLAN};
-use crate::margins::unheard_stretch_m;
 use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
 
@@ -56,8 +55,8 @@ pub struct Neighbours<const V: usize> {
     assumed_speed_mps: f32,
     /// Distance from which on the radio may not reach, metres; ∞ where it reaches every vehicle.
     range_edge_m: f32,
-    /// Length of its path on which an unheard vehicle comes to rest, metres.
-    unheard_stretch_m: f32,
+    /// Speed of the mission's fastest vehicle, m/s.
+    cruise_mps: f32,
     /// Position of this vehicle, ENU.
     place: Point,
     /// Rank of the vehicle with which the next relay message begins.
@@ -92,7 +91,7 @@ impl<const V: usize> Neighbours<V> {
             fastest_mps: libm::fmaxf(fastest_mps, MAX_LANDING_MPS),
             assumed_speed_mps: slowest_mps * RECKONED_SPEED_SHARE,
             range_edge_m: f32::INFINITY,
-            unheard_stretch_m: unheard_stretch_m(fastest_mps),
+            cruise_mps: fastest_mps,
             place: Point::zeros(),
             relay_next: 0,
             own_rank: 0,
@@ -120,8 +119,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     fn add_entry(&mut self, id: u8, rank: u16) -> Option<usize> {
-        let entry =
-            NeighbourEntry::unheard(id, rank, self.assumed_speed_mps, self.unheard_stretch_m);
+        let entry = NeighbourEntry::unheard(id, rank, self.assumed_speed_mps, self.cruise_mps);
         self.entries.push(entry).ok()?;
         Some(self.entries.len() - 1)
     }

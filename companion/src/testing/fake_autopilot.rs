@@ -129,8 +129,9 @@ pub struct Bench {
     pub neighbour_clear_m: f32,
     /// Ranks of the vehicles that the neighbour reports to hear, as bits.
     pub neighbour_hears: u32,
-    /// Whether the neighbour echoes the last intent of this vehicle.
-    pub neighbour_echoes: bool,
+    /// How many intents of this vehicle are newer than the one that the neighbour echoes; `None`: it
+    /// echoes none.
+    pub neighbour_echoes: Option<usize>,
     neighbour_sequence: u8,
 }
 
@@ -196,7 +197,7 @@ impl Bench {
             neighbour_clock: None,
             neighbour_clear_m: -1e6,
             neighbour_hears: u32::MAX,
-            neighbour_echoes: false,
+            neighbour_echoes: None,
             neighbour_sequence: 0,
         }
     }

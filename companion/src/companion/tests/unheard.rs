@@ -7,7 +7,10 @@ use super::divisions::over_a_field;
 use super::*;
 use crate::link::intent::{GROUNDED, Intent, ON_PLAN};
 use crate::margins::unheard_stretch_m;
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use planner_core::flight::{Gate, Path};
+use planner_core::geo::frames::{self, Geodetic};
 use proptest::prelude::ProptestConfig;
 
 /// Horizontal distance of a place from the path that an intent reports, beginning at `from`,
@@ -57,21 +60,44 @@ fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
     assert!(furthest_m > 8.0 && beyond > 4, "{furthest_m} m, {beyond}");
 }
 
+/// Where the vehicle was by its last position on the radio, metres beyond its start along x, and
+/// its speed by the last two, m/s.
+fn last_report(bench: &Bench) -> (f32, f32) {
+    let mut sent =
+        bench.swarm.iter().rev().filter(|f| f.message_id == GLOBAL_POSITION_INT_DATA::ID);
+    let mut next = || {
+        let frame = sent.next().expect("five a second");
+        let at = frame.decode::<GLOBAL_POSITION_INT_DATA>().expect("its own frame");
+        let place = Geodetic {
+            lat_deg: f64::from(at.lat) * 1e-7,
+            lon_deg: f64::from(at.lon) * 1e-7,
+            alt_m: f64::from(at.alt) * 1e-3,
+        };
+        (frames::geodetic_to_enu(&ORIGIN, &place).x - START.x, at.time_boot_ms)
+    };
+    let ((x, at_ms), (before, before_ms)) = (next(), next());
+    (x, (x - before) / (1e-3 * (at_ms - before_ms) as f32))
+}
+
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 60 } else { 600 }))]
-    /// Whatever its speed, and whether its radio still hears or not.
+    /// Whatever its speed, and whether its radio still hears or not. Messages take `delay_s`, so
+    /// those of others that were under way come later; of the reports that they heard it, which
+    /// they send for 0.8 s, it hears a share.
     #[test]
     fn an_unheard_vehicle_rests_where_others_expect_it(
         cruise_mps in 0.5f32..8.0,
         flown_s in 0.2f32..15.0,
-        hears in proptest::bool::ANY,
+        reports_heard in proptest::option::of(0f32..1.0),
+        delay in 0usize..6,
         gate_m in proptest::option::of(5f32..60.0),
     ) {
+        let delay_s = 0.1 * delay as f32;
         let mut config = Config { cruise_mps, ..two_vehicles() };
         (config.slowest_mps, config.fastest_mps) = (cruise_mps, cruise_mps);
         let mut bench = Bench::new(config);
         bench.step_m = cruise_mps * 0.06;
-        bench.neighbour_echoes = true;
+        bench.neighbour_echoes = Some(delay);
         let mut path = Path::new();
         for x in [0.0, 40.0, 300.0] {
             path.push(START + Point::new(x, 0.0, 0.0), 1.2).unwrap();
@@ -86,20 +112,22 @@ proptest::proptest! {
         bench.start();
         bench.run_until(State::Follow, 60.0);
         bench.run(flown_s);
-        let heard_m = bench.enu.x - START.x;
-        bench.run(0.1);
-        let speed_mps = (bench.enu.x - START.x - heard_m) / 0.1;
-        let heard_m = heard_m + 0.1 * speed_mps;
-        bench.neighbour_echoes = false;
-        if hears {
-            bench.run(0.8);
-            bench.neighbour_hears = 0;
-        } else {
-            bench.neighbour = None;
+        // What the others heard last is up to 0.2 s old when the radio fails.
+        let (heard_m, speed_mps) = last_report(&bench);
+        bench.neighbour_echoes = None;
+        match reports_heard {
+            Some(share) => {
+                bench.run(0.8 * share + 2.0 * delay_s);
+                bench.neighbour_hears = 0;
+            }
+            None => {
+                bench.run(delay_s);
+                bench.neighbour = None;
+            }
         }
         bench.run_until(State::Land, 60.0);
         let rests_m = bench.enu.x - START.x - heard_m;
-        let most_m = unheard_stretch_m(cruise_mps);
+        let most_m = unheard_stretch_m(cruise_mps, delay_s);
         proptest::prop_assert!(rests_m < most_m, "{rests_m} m on at {speed_mps} m/s, {most_m}");
         let least_m = speed_mps * (0.3 + speed_mps / 6.0).min(0.6);
         let stops_m = gate_m.map_or(f32::INFINITY, |at_m| 0.8 * (at_m - heard_m).max(0.0));

@@ -49,19 +49,10 @@ pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
 pub(super) const COLUMN_KEPT_FOR: Duration = Duration::from_secs(600);
 /// Time by which a vehicle that still hears others notices later that it is unheard, seconds.
 pub(super) const NOTICED_LATER_S: f32 = 0.5;
-/// Hardest stop of a vehicle that falls silent, m/s²: the braking of PX4's own modes.
-pub(super) const HARDEST_STOP_MPS2: f32 = 3.0;
-/// Time for which a vehicle flies on before its hardest stop, seconds.
-pub(super) const HARDEST_STOP_AFTER_S: f32 = 0.3;
-/// Time in which a vehicle without power comes down at least, seconds: it flies on meanwhile.
-pub(super) const LEAST_FALL_S: f32 = 0.6;
 /// Share of its points that a vehicle flies at least: it may brake for their end already.
 pub(super) const LEAST_SHARE_OF_POINTS: f32 = 0.8;
 /// Distance of a point from the vehicle from which on it shows the course, metres.
 pub(super) const MIN_COURSE_M: f32 = 0.5;
-/// Growth of `unheard_stretch_m` for each second that a message takes to another vehicle and
-/// back, m/s.
-pub(super) const UNHEARD_STRETCH_PER_DELAY_MPS: f32 = 2.0;
 /// Least spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const UNHEARD_STRETCH_SPACING_M: f32 = 1.0;
 /// Silence after which a vehicle in a coverage mission may have landed further along its path than

@@ -9,6 +9,7 @@ use super::bounds::*;
 use super::entry::NeighbourEntry;
 use crate::config::Ground;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, ON_DETOUR, OUT_OF_PLAN, WAITING};
+use crate::margins::{least_unheard_rest_m, unheard_stretch_m};
 use crate::time::{Duration, Instant};
 
 /// Where and when silent vehicles come down in a coverage mission, and by how much two in the air
@@ -236,7 +237,7 @@ impl NeighbourEntry {
 
     /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
     pub(super) fn unheard_stopping_distance_m(&self) -> f32 {
-        self.unheard_stretch_m + UNHEARD_STRETCH_PER_DELAY_MPS * 2.0 * self.message_delay.delay_s
+        unheard_stretch_m(self.cruise_mps, self.message_delay.delay_s)
     }
 
     /// Whether the neighbour was in the air, or about to take off, when it was last heard.
@@ -347,9 +348,8 @@ impl NeighbourEntry {
             && !self.has_column();
         let Some(ahead) = course.filter(|_| flies) else { return 0.0 };
         let speed_mps = libm::fmaxf(self.state.velocity.dot(&ahead) / ahead.length(), 0.0);
-        let flies_for_s = HARDEST_STOP_AFTER_S + speed_mps / (2.0 * HARDEST_STOP_MPS2);
-        let stop_m = speed_mps * libm::fminf(flies_for_s, LEAST_FALL_S);
-        let stop_m = libm::fminf(stop_m, self.unheard_stretch_m);
+        let most_m = unheard_stretch_m(self.cruise_mps, 0.0);
+        let stop_m = libm::fminf(least_unheard_rest_m(speed_mps), most_m);
         let (mut points_m, mut at) = (0.0, self.state.position);
         for next in self.next_points() {
             points_m += (next - core::mem::replace(&mut at, *next)).length();

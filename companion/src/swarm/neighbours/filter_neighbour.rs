@@ -10,6 +10,7 @@ use super::Neighbours;
 use super::bounds::*;
 use super::entry::NeighbourEntry;
 use crate::link::intent::{GROUNDED, LANDED, OUT_OF_PLAN, WAITING};
+use crate::margins::LEAST_FALL_S;
 use crate::time::{Duration, Instant};
 
 /// State of a neighbour that the safety filter compares: its priority, and its reachable set's

@@ -20,13 +20,17 @@ impl Bench {
         if !self.neighbour_sequence.is_multiple_of(4) {
             return;
         }
-        let sent =
-            self.swarm.iter().rev().find(|f| Intent::decode(f.padded_payload(), SYSTEM).is_some());
-        let echo = sent.filter(|_| self.neighbour_echoes).map(|sent| IntentEcho {
-            rank: self.companion.neighbours.own_rank() as u8,
-            sequence: sent.sequence,
-            held: 0,
-        });
+        let mut sent = self
+            .swarm
+            .iter()
+            .rev()
+            .filter(|frame| Intent::decode(frame.padded_payload(), SYSTEM).is_some());
+        let echo =
+            self.neighbour_echoes.and_then(|behind| sent.nth(behind)).map(|sent| IntentEcho {
+                rank: self.companion.neighbours.own_rank() as u8,
+                sequence: sent.sequence,
+                held: 0,
+            });
         let intent = Intent {
             echo,
             system_id: id,

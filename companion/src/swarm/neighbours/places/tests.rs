@@ -9,7 +9,6 @@ use super::super::{
 };
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
-use crate::margins::unheard_stretch_m;
 
 /// Wherever a vehicle in a coverage mission is on the points that it reported before it fell
 /// silent: nobody lands below, and no place below is taken for free.
@@ -144,7 +143,7 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
         let mut table = joined(0);
         let entry = &mut table.entries[1];
         entry.message_delay.delay_s = uniform(&mut rng, 0.0, 0.5);
-        entry.unheard_stretch_m = unheard_stretch_m(uniform(&mut rng, 0.5, 8.0));
+        entry.cruise_mps = uniform(&mut rng, 0.5, 8.0);
         let mut at = entry.state.position;
         entry.points = (0..1 + rng.next_u32() % 8)
             .map(|_| {
