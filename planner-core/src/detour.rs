@@ -34,6 +34,10 @@ const PATH_APPROACH_ROUNDING_M: f32 = 0.002;
 /// the axis of a zone has no distance left to keep, and only has to leave.
 const TOUCHING_M: f32 = 0.6;
 
+/// Greatest height of a vehicle's position above the ground on which it lies, metres: the radius of
+/// its hull.
+const MAX_LYING_HEIGHT_M: f32 = 0.3;
+
 /// A capsule, or the column below a vehicle, that a detour keeps out of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeepOutZone {
@@ -56,7 +60,7 @@ pub enum ZoneKind {
     /// neither rest there nor climb towards it.
     Descending,
     /// A vehicle on the ground below `from`: where the roadmap has the ground's height, only a
-    /// column at the ground is kept clear.
+    /// column from the ground to the vehicle that lies on it is kept clear.
     Grounded,
 }
 
@@ -82,8 +86,8 @@ impl KeepOutZone {
     }
 
     /// The zone, ended at the ground below it if the roadmap has the ground's height: a vehicle
-    /// does not fall through a floor. For [`ZoneKind::Grounded`] its top is moved down to the
-    /// ground, too.
+    /// does not fall through a floor. For [`ZoneKind::Grounded`] its top is moved down to a vehicle
+    /// that lies there, too.
     fn clipped_to_ground(&self, view: &RoadmapView<'_>) -> Self {
         let falls = self.to.z < self.from.z;
         let Some((low_m, high_m)) = view.ground_range_near(&self.from).filter(|_| falls) else {
@@ -92,7 +96,7 @@ impl KeepOutZone {
         let (mut from, mut to) = (self.from, self.to);
         to.z = fmaxf(to.z, low_m);
         if self.kind == ZoneKind::Grounded {
-            from.z = fmaxf(high_m, to.z);
+            from.z = fmaxf(fminf(high_m + MAX_LYING_HEIGHT_M, from.z), to.z);
         }
         Self { from, to, ..*self }
     }
