@@ -2,8 +2,8 @@
 //! with a search of its own.
 //!
 //! The search joins points of a lattice if the map leaves the vehicle its required clearance
-//! between them and every vehicle on the ground is further away than the safety distance. It uses
-//! neither the roadmap nor the companion.
+//! between them and every other vehicle is further away than the safety distance and a vehicle's
+//! deviation from its path. It uses neither the roadmap nor the companion.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -16,6 +16,8 @@ use serde::Serialize;
 
 /// Distance of neighbouring lattice points, metres.
 const LATTICE_M: f32 = 0.5;
+/// Radius of a vehicle's hull, metres.
+const HULL_M: f32 = 0.3;
 /// Distance within which both ends of the path are joined to lattice points, metres.
 const JOIN_M: f32 = 1.0;
 /// Height above its final position from which on a vehicle counts as in the air, metres.
@@ -27,12 +29,16 @@ const STRETCH_M: f32 = 4.6;
 const FLIES_ON_S: f32 = 0.3;
 const HARDEST_STOP_MPS2: f32 = 3.0;
 const LEAST_FALL_S: f32 = 0.6;
+/// Time between two of its positions, seconds: so old may be what the others heard last.
+const REPORTED_EVERY_S: f32 = 0.2;
 /// Time over which its speed is measured, seconds.
 const SPEED_OVER_S: f32 = 0.5;
+/// Distance kept from a vehicle that lies or stands beyond the safety distance, metres: a vehicle
+/// that flies by may deviate so far from its path.
+const DEVIATION_M: f32 = 0.25;
 /// Distance kept from that stretch beyond the safety distance, metres.
 const BESIDE_M: f32 = 0.4;
-/// Spacing of the points of the path that a silent vehicle's final position is compared with,
-/// metres.
+/// Spacing of the points of the path that a silent vehicle's positions are compared with, metres.
 const FINE_M: f32 = 0.05;
 /// Spacing of the points at which a silent vehicle may lie, metres.
 const STEP_M: f32 = 0.5;
@@ -98,7 +104,8 @@ pub fn cause(
     struck: Struck,
     held: usize,
 ) -> Cause {
-    let apart_m = mission.scenario.deconfliction.safety_distance_m;
+    let safety_m = mission.scenario.deconfliction.safety_distance_m;
+    let apart_m = safety_m + DEVIATION_M;
     let Some((left_s, from)) = gave_up(&flight.tracks[held]) else { return Cause::WayLeft };
     let path = &plan.flights[held].path;
     let Some(over) = path.waypoints().last().map(|w| w.position) else { return Cause::WayLeft };
@@ -130,7 +137,7 @@ pub fn cause(
         return Cause::OnlyRoute;
     }
     let may = if struck.silent {
-        possible_rest_places(plan, flight, struck, apart_m + BESIDE_M)
+        possible_rest_places(plan, flight, struck, safety_m + BESIDE_M)
     } else {
         Vec::new()
     };
@@ -162,6 +169,17 @@ fn first_place_since(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
     track.get(after).or(track.last()).map(|(_, place)| *place)
 }
 
+/// Place at this time, on the line between two samples; that of the last sample afterwards.
+fn place_at(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
+    let after = track.partition_point(|(at_s, _)| *at_s < t_s);
+    let [(from_s, from), (to_s, to)] = match (after.checked_sub(1), track.get(after)) {
+        (Some(before), Some(next)) => [track[before], *next],
+        (None, Some(first)) => return Some(first.1),
+        (_, None) => return track.last().map(|(_, place)| *place),
+    };
+    Some(from + (to - from) * ((t_s - from_s) / (to_s - from_s)))
+}
+
 /// How far a silent vehicle lies beside its path, and how far along its path from where it was last
 /// heard, metres.
 pub fn rest_offsets_m(plan: &HostPlan, flight: &SwarmFlight, struck: Struck) -> Option<[f32; 2]> {
@@ -189,23 +207,24 @@ fn possible_rest_places(
 ) -> Vec<Ball> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
-    let (Some(heard), Some((_, rest))) = (first_place_since(track, struck.at_s), track.last())
-    else {
+    let heard = place_at(track, struck.at_s - REPORTED_EVERY_S);
+    let (Some(heard), Some((_, rest))) = (heard, track.last()) else {
         return Vec::new();
     };
-    let steps = (path.length_m() / STEP_M) as usize;
+    let steps = (path.length_m() / FINE_M) as usize;
     let nearest = (0..=steps)
-        .map(|i| i as f32 * STEP_M)
+        .map(|i| i as f32 * FINE_M)
         .filter_map(|m| Some((m, (path.point_at(m)? - heard).norm())))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map_or(0.0, |(m, _)| m);
-    let before = first_place_since(track, struck.at_s - SPEED_OVER_S).unwrap_or(heard);
+    let before = place_at(track, struck.at_s - REPORTED_EVERY_S - SPEED_OVER_S);
+    let before = before.unwrap_or(heard);
     let speed_mps = (heard - before).xy().norm() / SPEED_OVER_S;
     let flies_s = FLIES_ON_S + speed_mps / (2.0 * HARDEST_STOP_MPS2);
     let least_m = speed_mps * flies_s.min(LEAST_FALL_S);
     (0..=(STRETCH_M / STEP_M) as usize)
-        .map(|i| i as f32 * STEP_M)
-        .filter(|m| *m >= least_m)
+        .map(|i| least_m + i as f32 * STEP_M)
+        .filter(|m| *m <= STRETCH_M)
         .filter_map(|m| path.point_at(nearest + m))
         .map(|place| (Point::new(place.x, place.y, rest.z), radius_m))
         .collect()
@@ -237,6 +256,10 @@ impl Search<'_> {
         let free = |a: &Point, b: &Point| {
             segment_is_clear(&grid, a, b, self.required_m) && apart(a, b, &balls)
         };
+        // A vehicle that has drifted towards a wall may fly away from it.
+        let leaves = |to: &Point| {
+            segment_is_clear(&grid, &self.from, to, HULL_M) && apart(&self.from, to, &balls)
+        };
         let shape = self.mission.map.shape;
         let extent = shape.max() - shape.min;
         let sizes = [extent.x, extent.y, extent.z].map(|m| (m / LATTICE_M) as usize + 1);
@@ -250,7 +273,8 @@ impl Search<'_> {
             for j in 0..sizes[1] {
                 for k in 0..sizes[2] {
                     let place = at([i, j, k]);
-                    if (place - self.from).norm() < JOIN_M && free(&self.from, &place) {
+                    if (place - self.from).norm() < JOIN_M && leaves(&place) && free(&place, &place)
+                    {
                         seen[index([i, j, k])] = true;
                         queue.push_back([i, j, k]);
                     }
