@@ -104,6 +104,12 @@ pub(super) const AVOIDED_WITHIN_M: f32 = 0.5;
 /// beside a vehicle on the ground, metres. Its landing is guided as at its goal, so the distance is
 /// the one that the schedule keeps from landed vehicles in announced gusts of 3 m/s.
 pub(super) const UNHEARD_BESIDE_M: f32 = 0.15;
+/// Acceleration by which the safety filter widens the set of a vehicle that is off the points that
+/// it reports, m/s².
+pub(super) const OFF_POINTS_ACCEL_MPS2: f32 = 1.5;
+/// Age of a vehicle's last position, on its receipt 0, that is seldom exceeded, seconds: five are
+/// sent a second.
+pub(super) const TYPICAL_AGE_S: f32 = 0.3;
 /// Sum of the deviations of two vehicles in the air, one of which hovers, metres.
 pub(super) const PAIR_SWAY_M: f32 = 0.1;
 /// Time for which an intent of our mission shows that the sender's positions are those of the

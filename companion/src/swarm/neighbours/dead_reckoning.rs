@@ -398,6 +398,16 @@ impl NeighbourEntry {
         libm::fmaxf(self.ground_m, libm::fminf(ground.high_m, place.z - below_m))
     }
 
+    /// Distance, metres, by which the safety filter keeps further away from a neighbour that is not
+    /// on the points that it reports, by the time that its messages take; 0 on its points.
+    fn off_points_reach_m(&self) -> f32 {
+        let age_s = self.message_delay.delay_s + TYPICAL_AGE_S;
+        match self.place_on_points {
+            PlaceOnPoints::Beside => 0.5 * OFF_POINTS_ACCEL_MPS2 * age_s * age_s,
+            PlaceOnPoints::On { .. } | PlaceOnPoints::Unknown => 0.0,
+        }
+    }
+
     /// Calls `visit` with the keep-out zones, of radius `apart_m`, of all places where
     /// the neighbour may be from now on; unheard up to `upto_m` along its points.
     pub(super) fn keep_out_zones(
@@ -463,7 +473,7 @@ impl NeighbourEntry {
             if self.is_landing_after_detour(now) {
                 visit(column(here, ZoneKind::Static));
             }
-            visit(place(wide_m + PAIR_SWAY_M));
+            visit(place(wide_m + PAIR_SWAY_M + self.off_points_reach_m()));
         }
     }
 }

@@ -1,5 +1,6 @@
 extern crate std;
 
+use planner_core::track::safety::{Braking, MotionBounds, PlaceOnPoints};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -9,6 +10,7 @@ use super::super::{
 };
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
+use crate::time::Duration;
 
 /// Wherever a vehicle in a coverage mission is on the points that it reported before it fell
 /// silent: nobody lands below, and no place below is taken for free.
@@ -171,6 +173,42 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
     }
     assert!(at_the_end > 300, "{at_the_end}");
     assert!((10..18).contains(&most), "{most}");
+}
+
+/// Beside a vehicle that stands, but not on the points that it reports, the safety filter lets no
+/// vehicle pass as near as beside others, so no detour leads there.
+#[test]
+fn a_detour_keeps_as_far_from_a_vehicle_off_its_points_as_the_filter_does() {
+    let mut rng = Pcg32::seed_from_u64(17);
+    let braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
+    let bounds = MotionBounds { braking, speed_max_mps: 2.0, silent_s: 3.0 };
+    let (mut off_points, mut on_points) = (0, 0);
+    for _ in 0..1000 {
+        let mut table = joined(0);
+        let now = Instant::from_millis(100);
+        table.handle_position(now, &ORIGIN, 9, &place(50, 1000));
+        table.handle_intent(now, 1, &intent(0, 1, 2), 1, Some(2));
+        let entry = &mut table.entries[1];
+        entry.state.velocity = Point::zeros();
+        entry.speed_mps = 0.0;
+        entry.message_delay.delay_s = uniform(&mut rng, 0.0, 1.0);
+        let aside = Point::from_fn(|_, _| uniform(&mut rng, -2.0, 2.0));
+        entry.points = [entry.state.position + aside].into_iter().collect();
+        entry.update_place_on_points();
+        let late = now + Duration::from_millis(u64::from(rng.next_u32() % 300));
+        let beside = entry.place_on_points == PlaceOnPoints::Beside;
+        let wider_m = entry.filter_neighbour(late).motion.reachable_set(&bounds, 0.0).widened_by_m;
+        let apart_m = uniform(&mut rng, 1.0, 3.0);
+        let mut radius_m = 0.0_f32;
+        table.for_each_place(late, [apart_m; 2], |zone| radius_m = radius_m.max(zone.radius_m));
+        if beside {
+            assert!(radius_m >= apart_m + wider_m, "{radius_m} m, {apart_m} + {wider_m} m");
+        } else {
+            assert!(radius_m < apart_m + 0.2, "{radius_m} m, {apart_m} m");
+        }
+        *(if beside { &mut off_points } else { &mut on_points }) += 1;
+    }
+    assert!(off_points > 300 && on_points > 30, "{off_points} {on_points}");
 }
 
 #[test]
