@@ -266,8 +266,9 @@ fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P:
 /// Most take-off times that are tried for one vehicle.
 const MAX_DEPARTURES: usize = 6;
 /// Longest wait in the air at one place that the planner accepts without trying a later take-off,
-/// seconds: half of what counts as a standstill (20 s).
-const LONG_WAIT_S: f32 = 10.0;
+/// seconds: a quarter of what counts as a standstill (20 s), since the vehicle that is waited for
+/// may be late.
+const LONG_WAIT_S: f32 = 5.0;
 
 /// The longest wait of a flight at a waypoint, and the sum of all its waits there, seconds.
 fn wait_durations_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
