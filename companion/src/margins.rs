@@ -38,6 +38,9 @@ pub(crate) const UNHEARD_STRETCH_SPARE_M: f32 = 0.67;
 /// without any message it stops. One that still hears others notices later, and flies back if it
 /// came further, where its way back is free.
 const UNHEARD_FLIGHT_S: f32 = 1.3;
+/// Part of a message's delay for which it waits for the receiver's next step, seconds: it is in
+/// [`UNHEARD_FLIGHT_S`] already.
+const STEP_DELAY_S: f32 = 0.05;
 /// Braking of an unheard vehicle, m/s².
 const UNHEARD_BRAKING_MPS2: f32 = 1.5;
 /// Hardest stop of a vehicle that falls silent, m/s²: the braking of PX4's own modes.
@@ -116,11 +119,13 @@ const MIN_SPEED_SHARE: f32 = 0.1;
 
 /// Length of its path on which an unheard vehicle comes to rest, metres beyond where it was last
 /// heard, in a mission whose fastest vehicle flies at this speed: it notices, stops, and flies back
-/// if it came further. Messages of others that were under way when its radio failed reach it up to
-/// `delay_s` later. In a coverage mission it flies on as long as its lease allows.
+/// if it came further. Messages take `delay_s`: twice as much later comes the last report that it
+/// is heard, and by that it does not know how long before it was. In a coverage mission it flies on
+/// as long as its lease allows.
 pub(crate) fn unheard_stretch_m(fastest_mps: f32, delay_s: f32) -> f32 {
     let stop_m = fastest_mps * fastest_mps / (2.0 * UNHEARD_BRAKING_MPS2);
-    fastest_mps * (UNHEARD_FLIGHT_S + delay_s) + stop_m + UNHEARD_STRETCH_SPARE_M
+    let late_s = 2.0 * libm::fmaxf(delay_s - STEP_DELAY_S, 0.0);
+    fastest_mps * (UNHEARD_FLIGHT_S + late_s) + stop_m + UNHEARD_STRETCH_SPARE_M
 }
 
 /// Distance that a vehicle flies on at least, metres, once it was last heard at this speed: that of

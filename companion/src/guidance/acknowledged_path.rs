@@ -44,9 +44,9 @@ impl AcknowledgedPath {
     }
 
     /// Notes a new report that another vehicle hears this one, whose reference is at `along_m`
-    /// along its path. The report was under way for `delay_s`.
-    pub fn note_heard(&mut self, along_m: f32, speed_mps: f32, delay_s: f32) {
-        let heard_m = along_m - speed_mps * (BEHIND_REFERENCE_S + delay_s);
+    /// along its path.
+    pub fn note_heard(&mut self, along_m: f32, speed_mps: f32) {
+        let heard_m = along_m - speed_mps * BEHIND_REFERENCE_S;
         self.first_m = Some(heard_m + least_unheard_rest_m(speed_mps));
     }
 

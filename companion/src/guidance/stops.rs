@@ -47,8 +47,8 @@ impl Guidance {
     ) {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
-        if let Some(delay_s) = neighbours.reporters_delay_s(now, NEW_REPORT_AGE) {
-            self.acknowledged_path.note_heard(along_m, self.tracker.speed_mps.max(0.0), delay_s);
+        if neighbours.linked_within(now, NEW_REPORT_AGE) {
+            self.acknowledged_path.note_heard(along_m, self.tracker.speed_mps.max(0.0));
         }
         let (alone, follows) = (state == State::SwarmLinkLost, state == State::Follow);
         // An unheard vehicle that the filter stopped short of its reference is not led on to it, to

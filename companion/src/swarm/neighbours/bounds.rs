@@ -48,7 +48,7 @@ pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
 /// is free again: the vehicle is down by then, whatever it flew there.
 pub(super) const COLUMN_KEPT_FOR: Duration = Duration::from_secs(600);
 /// Time by which a vehicle that still hears others notices later that it is unheard, seconds.
-pub(super) const NOTICED_LATER_S: f32 = 0.5;
+pub(super) const NOTICED_LATER_S: f32 = 0.8;
 /// Share of its points that a vehicle flies at least: it may brake for their end already.
 pub(super) const LEAST_SHARE_OF_POINTS: f32 = 0.8;
 /// Distance of a point from the vehicle from which on it shows the course, metres.

@@ -37,9 +37,13 @@ impl<const V: usize> Neighbours<V> {
         if far {
             return entry.unheard_distance_m();
         }
-        let stops_m = entry.unheard_stopping_distance_m();
-        // With a known range a vehicle that notices late does not fly back: it may be out of range.
-        if self.knows_range() { stops_m + NOTICED_LATER_S * self.fastest_mps } else { stops_m }
+        entry.unheard_stopping_distance_m() + self.noticed_later_m()
+    }
+
+    /// Distance, metres, by which a vehicle that notices late that it is unheard may rest further
+    /// on: with a known range it does not fly back, since it may be out of range.
+    pub(super) fn noticed_later_m(&self) -> f32 {
+        if self.knows_range() { NOTICED_LATER_S * self.fastest_mps } else { 0.0 }
     }
 
     /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` where it is out

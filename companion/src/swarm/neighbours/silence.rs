@@ -2,7 +2,6 @@
 
 use super::Neighbours;
 use super::bounds::*;
-use super::entry::NeighbourEntry;
 use crate::time::{Duration, Instant};
 
 impl<const V: usize> Neighbours<V> {
@@ -21,14 +20,6 @@ impl<const V: usize> Neighbours<V> {
             && self.entries[..self.roster_count]
                 .iter()
                 .all(|c| !c.heard_within(now, MAY_LAND_AFTER))
-    }
-
-    /// Least message delay of the vehicles of the roster that reported within `span` that they hear
-    /// this one, seconds; `None` if none did.
-    pub(crate) fn reporters_delay_s(&self, now: Instant, span: Duration) -> Option<f32> {
-        let reported = |c: &&NeighbourEntry| c.hears_us_at.is_some_and(|at| now - at < span);
-        let reporters = self.entries[..self.roster_count].iter().filter(reported);
-        reporters.map(|c| c.message_delay.delay_s).min_by(f32::total_cmp)
     }
 
     /// Whether, within `span`, a vehicle of the roster was heard, and one reported that it hears
