@@ -119,13 +119,18 @@ const MIN_SPEED_SHARE: f32 = 0.1;
 
 /// Length of its path on which an unheard vehicle comes to rest, metres beyond where it was last
 /// heard, in a mission whose fastest vehicle flies at this speed: it notices, stops, and flies back
-/// if it came further. Messages take `delay_s`: twice as much later comes the last report that it
-/// is heard, and by that it does not know how long before it was. In a coverage mission it flies on
-/// as long as its lease allows.
-pub(crate) fn unheard_stretch_m(fastest_mps: f32, delay_s: f32) -> f32 {
+/// if it came further. In a coverage mission it flies on as long as its lease allows.
+pub(crate) fn unheard_stretch_m(fastest_mps: f32) -> f32 {
     let stop_m = fastest_mps * fastest_mps / (2.0 * UNHEARD_BRAKING_MPS2);
-    let late_s = 2.0 * libm::fmaxf(delay_s - STEP_DELAY_S, 0.0);
-    fastest_mps * (UNHEARD_FLIGHT_S + late_s) + stop_m + UNHEARD_STRETCH_SPARE_M
+    fastest_mps * UNHEARD_FLIGHT_S + stop_m + UNHEARD_STRETCH_SPARE_M
+}
+
+/// Time of flight by which [`unheard_stretch_m`] is longer where messages take `delay_s`, seconds:
+/// twice as much later comes the last report that the vehicle is heard, which does not say how long
+/// before that was.
+#[inline]
+pub(crate) fn unheard_delay_s(delay_s: f32) -> f32 {
+    if delay_s > STEP_DELAY_S { 2.0 * (delay_s - STEP_DELAY_S) } else { 0.0 }
 }
 
 /// Distance that a vehicle flies on at least, metres, once it was last heard at this speed: that of

@@ -68,7 +68,7 @@ impl AcknowledgedPath {
     /// it could report, though gates may have opened since, and no further than
     /// [`unheard_stretch_m`] from where they heard it.
     pub fn last_m(&self, fastest_mps: f32) -> f32 {
-        let stretch_m = unheard_stretch_m(fastest_mps, 0.0) - BEFORE_STRETCH_END_M;
+        let stretch_m = unheard_stretch_m(fastest_mps) - BEFORE_STRETCH_END_M;
         let stretch_ends_m = self.at_m + stretch_m;
         self.first_m.map_or(stretch_ends_m, |first_m| {
             first_m.max(self.to_m).min(first_m.max(stretch_ends_m))

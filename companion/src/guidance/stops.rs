@@ -47,7 +47,7 @@ impl Guidance {
     ) {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
-        if neighbours.linked_within(now, NEW_REPORT_AGE) {
+        if neighbours.is_reported_heard_within(now, NEW_REPORT_AGE) {
             self.acknowledged_path.note_heard(along_m, self.tracker.speed_mps.max(0.0));
         }
         let (alone, follows) = (state == State::SwarmLinkLost, state == State::Follow);

@@ -47,6 +47,8 @@ pub struct Neighbours<const V: usize> {
     /// Number of roster vehicles in `entries`, sorted by id; behind them are the strangers.
     roster_count: usize,
     dropped: u16,
+    /// When a vehicle of the roster last reported that it hears this one.
+    reported_heard_at: Option<Instant>,
     /// When the last scan began that found no vehicle out of the plan on the path.
     clear_at: Instant,
     /// Greatest speed at which a reported progress is believed to grow, m/s.
@@ -87,6 +89,7 @@ impl<const V: usize> Neighbours<V> {
             states: Vec::new(),
             roster_count: 0,
             dropped: 0,
+            reported_heard_at: None,
             clear_at: Instant::ZERO,
             fastest_mps: libm::fmaxf(fastest_mps, MAX_LANDING_MPS),
             assumed_speed_mps: slowest_mps * RECKONED_SPEED_SHARE,
@@ -119,7 +122,12 @@ impl<const V: usize> Neighbours<V> {
     }
 
     fn add_entry(&mut self, id: u8, rank: u16) -> Option<usize> {
-        let entry = NeighbourEntry::unheard(id, rank, self.assumed_speed_mps, self.cruise_mps);
+        let entry = NeighbourEntry::unheard(
+            id,
+            rank,
+            self.assumed_speed_mps,
+            [self.unheard_stretch_m(), self.cruise_mps],
+        );
         self.entries.push(entry).ok()?;
         Some(self.entries.len() - 1)
     }
@@ -228,6 +236,7 @@ impl<const V: usize> Neighbours<V> {
         // From rank 32 on there is no bit: this vehicle counts as heard by the neighbour.
         if rank >= 32 || intent.heard_bits & (1 << rank) != 0 {
             entry.hears_us_at = Some(now);
+            self.reported_heard_at = Some(now);
         }
         entry.heard_bits = intent.heard_bits;
         entry.points.clone_from(&intent.points);

@@ -129,8 +129,8 @@ pub struct Bench {
     pub neighbour_clear_m: f32,
     /// Ranks of the vehicles that the neighbour reports to hear, as bits.
     pub neighbour_hears: u32,
-    /// How many intents of this vehicle are newer than the one that the neighbour echoes; `None`: it
-    /// echoes none.
+    /// How many intents of this vehicle are newer than the one that the neighbour echoes; `None`:
+    /// it echoes none.
     pub neighbour_echoes: Option<usize>,
     neighbour_sequence: u8,
 }

@@ -6,7 +6,7 @@ use super::State::*;
 use super::divisions::over_a_field;
 use super::*;
 use crate::link::intent::{GROUNDED, Intent, ON_PLAN};
-use crate::margins::unheard_stretch_m;
+use crate::margins::{unheard_delay_s, unheard_stretch_m};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use planner_core::flight::{Gate, Path};
@@ -129,7 +129,7 @@ proptest::proptest! {
         }
         bench.run_until(State::Land, 60.0);
         let rests_m = bench.enu.x - START.x - heard_m;
-        let most_m = unheard_stretch_m(cruise_mps, estimated_s);
+        let most_m = unheard_stretch_m(cruise_mps) + cruise_mps * unheard_delay_s(estimated_s);
         proptest::prop_assert!(rests_m < most_m, "{rests_m} m on at {speed_mps} m/s, {most_m}");
         let least_m = speed_mps * (0.3 + speed_mps / 6.0).min(0.6);
         let stops_m = gate_m.map_or(f32::INFINITY, |at_m| 0.8 * (at_m - heard_m).max(0.0));

@@ -9,7 +9,7 @@ use super::bounds::*;
 use super::entry::NeighbourEntry;
 use crate::config::Ground;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, ON_DETOUR, OUT_OF_PLAN, WAITING};
-use crate::margins::{least_unheard_rest_m, unheard_stretch_m};
+use crate::margins::{least_unheard_rest_m, unheard_delay_s};
 use crate::time::{Duration, Instant};
 
 /// Where and when silent vehicles come down in a coverage mission, and by how much two in the air
@@ -230,14 +230,18 @@ impl NeighbourEntry {
     /// Distance along its points that the neighbour may fly unheard, metres. In a coverage mission
     /// that is all of them; elsewhere the length of a stop, plus what delays add: of its own
     /// messages and of those by which it learns that no vehicle hears it.
+    #[inline]
     pub(super) fn unheard_distance_m(&self) -> f32 {
         // The slack keeps rounding from cutting off the last corner.
-        libm::fmaxf(self.points_length_m + LEGS_ROUNDING_M, self.unheard_stopping_distance_m())
+        let all_m = self.points_length_m + LEGS_ROUNDING_M;
+        let stops_m = self.unheard_stopping_distance_m();
+        if all_m > stops_m { all_m } else { stops_m }
     }
 
     /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
+    #[inline]
     pub(super) fn unheard_stopping_distance_m(&self) -> f32 {
-        unheard_stretch_m(self.cruise_mps, self.message_delay.delay_s)
+        self.unheard_stretch_m + self.cruise_mps * unheard_delay_s(self.message_delay.delay_s)
     }
 
     /// Whether the neighbour was in the air, or about to take off, when it was last heard.
@@ -348,8 +352,7 @@ impl NeighbourEntry {
             && !self.has_column();
         let Some(ahead) = course.filter(|_| flies) else { return 0.0 };
         let speed_mps = libm::fmaxf(self.state.velocity.dot(&ahead) / ahead.length(), 0.0);
-        let most_m = unheard_stretch_m(self.cruise_mps, 0.0);
-        let stop_m = libm::fminf(least_unheard_rest_m(speed_mps), most_m);
+        let stop_m = libm::fminf(least_unheard_rest_m(speed_mps), self.unheard_stretch_m);
         let (mut points_m, mut at) = (0.0, self.state.position);
         for next in self.next_points() {
             points_m += (next - core::mem::replace(&mut at, *next)).length();

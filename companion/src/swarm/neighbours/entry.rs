@@ -61,6 +61,9 @@ pub(crate) struct NeighbourEntry {
     pub(super) at_range_edge: bool,
     /// Least speed at which the neighbour is assumed to make progress while unheard, m/s.
     pub(super) assumed_speed_mps: f32,
+    /// Length of its points on which the neighbour comes to rest unheard, metres, where messages
+    /// come at once.
+    pub(super) unheard_stretch_m: f32,
     /// Greatest speed at which the neighbour is assumed to fly on unheard, m/s.
     pub(super) cruise_mps: f32,
     /// The neighbour's speed at its last position, m/s.
@@ -84,7 +87,12 @@ impl NeighbourEntry {
     /// The entry of a neighbour that has not been heard yet.
     // Inlined at its only caller: a board's stack has no room for a copy.
     #[inline(always)]
-    pub(super) fn unheard(id: u8, rank: u16, assumed_speed_mps: f32, cruise_mps: f32) -> Self {
+    pub(super) fn unheard(
+        id: u8,
+        rank: u16,
+        assumed_speed_mps: f32,
+        [unheard_stretch_m, cruise_mps]: [f32; 2],
+    ) -> Self {
         let state = Neighbour {
             id,
             rank,
@@ -123,6 +131,7 @@ impl NeighbourEntry {
             unheard_delay_s: 0,
             at_range_edge: false,
             assumed_speed_mps,
+            unheard_stretch_m,
             cruise_mps,
             ground_m: f32::NAN,
             speed_mps: 0.0,

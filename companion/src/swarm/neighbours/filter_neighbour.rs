@@ -432,8 +432,7 @@ impl<const V: usize> Neighbours<V> {
         if dead {
             motion.points = rest.map_or(&entry.points, |(_, points, _)| points);
             if top.is_none() {
-                motion.rests_within_m =
-                    entry.unheard_distance_m() + self.noticed_later_m() - least_m;
+                motion.rests_within_m = entry.unheard_distance_m() - least_m;
             }
         }
         if top.is_some() || lies {

@@ -7,7 +7,7 @@ use super::dead_reckoning::AreaGround;
 use super::entry::NeighbourEntry;
 use super::{
     AVOIDED_WITHIN_M, GROUNDED, LANDED, MAX_HEIGHT_AGE, MAX_HEIGHT_AGE_S, MAX_HEIGHT_DIFFERENCE_M,
-    NO_PLACE, NOTICED_LATER_S, Neighbours, ON_PLAN, OUT_OF_PLAN, UNHEARD_LANDING_AFTER,
+    NO_PLACE, Neighbours, ON_PLAN, OUT_OF_PLAN, UNHEARD_LANDING_AFTER,
 };
 use crate::time::Instant;
 
@@ -37,13 +37,7 @@ impl<const V: usize> Neighbours<V> {
         if far {
             return entry.unheard_distance_m();
         }
-        entry.unheard_stopping_distance_m() + self.noticed_later_m()
-    }
-
-    /// Distance, metres, by which a vehicle that notices late that it is unheard may rest further
-    /// on: with a known range it does not fly back, since it may be out of range.
-    pub(super) fn noticed_later_m(&self) -> f32 {
-        if self.knows_range() { NOTICED_LATER_S * self.fastest_mps } else { 0.0 }
+        entry.unheard_stopping_distance_m()
     }
 
     /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` where it is out

@@ -7,13 +7,25 @@ use super::bounds::*;
 use super::entry::NeighbourEntry;
 use crate::config::REACHES_ALL_M;
 use crate::link::intent::{LANDED, OUT_OF_PLAN};
+use crate::margins::unheard_stretch_m;
 
 impl<const V: usize> Neighbours<V> {
     /// Sets this vehicle's position, ENU, and the range of the radio, metres.
     pub(crate) fn set_place(&mut self, place: Point, radio_range_m: f32) {
-        let all = radio_range_m >= REACHES_ALL_M;
+        let (all, known) = (radio_range_m >= REACHES_ALL_M, self.knows_range());
         self.range_edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
         self.place = place;
+        if known != self.knows_range() {
+            let stretch_m = self.unheard_stretch_m();
+            self.entries.iter_mut().for_each(|entry| entry.unheard_stretch_m = stretch_m);
+        }
+    }
+
+    /// Length of its path on which an unheard vehicle comes to rest, metres. With a known range one
+    /// that notices late does not fly back: it may be out of range.
+    pub(super) fn unheard_stretch_m(&self) -> f32 {
+        let later_s = if self.knows_range() { NOTICED_LATER_S } else { 0.0 };
+        unheard_stretch_m(self.cruise_mps) + later_s * self.fastest_mps
     }
 
     /// Whether the operator has set the range of the radio (`FLK_RADIO_M`).

@@ -22,6 +22,11 @@ impl<const V: usize> Neighbours<V> {
                 .all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }
 
+    /// Whether, within `span`, a vehicle of the roster reported that it hears this one.
+    pub(crate) fn is_reported_heard_within(&self, now: Instant, span: Duration) -> bool {
+        self.reported_heard_at.is_some_and(|at| now - at < span)
+    }
+
     /// Whether, within `span`, a vehicle of the roster was heard, and one reported that it hears
     /// this vehicle.
     pub fn linked_within(&self, now: Instant, span: Duration) -> bool {

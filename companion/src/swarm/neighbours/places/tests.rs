@@ -10,6 +10,7 @@ use super::super::{
 };
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
+use crate::margins::unheard_stretch_m;
 use crate::time::Duration;
 
 /// Wherever a vehicle in a coverage mission is on the points that it reported before it fell
@@ -146,6 +147,7 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
         let entry = &mut table.entries[1];
         entry.message_delay.delay_s = uniform(&mut rng, 0.0, 0.5);
         entry.cruise_mps = uniform(&mut rng, 0.5, 8.0);
+        entry.unheard_stretch_m = unheard_stretch_m(entry.cruise_mps);
         let mut at = entry.state.position;
         entry.points = (0..1 + rng.next_u32() % 8)
             .map(|_| {
