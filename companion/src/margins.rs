@@ -125,11 +125,10 @@ pub(crate) fn unheard_stretch_m(fastest_mps: f32) -> f32 {
     fastest_mps * UNHEARD_FLIGHT_S + stop_m + UNHEARD_STRETCH_SPARE_M
 }
 
-/// Time of flight by which [`unheard_stretch_m`] is longer where messages take `delay_s`, seconds:
-/// twice as much later comes the last report that the vehicle is heard, which does not say how long
-/// before that was.
+/// Time, seconds, for which an unheard vehicle flies on beyond [`unheard_stretch_m`] where messages
+/// take `delay_s`: those that it sent, and the reports that it is heard, are each late by that.
 #[inline]
-pub(crate) fn unheard_delay_s(delay_s: f32) -> f32 {
+pub(crate) fn late_report_flight_s(delay_s: f32) -> f32 {
     if delay_s > STEP_DELAY_S { 2.0 * (delay_s - STEP_DELAY_S) } else { 0.0 }
 }
 

@@ -14,13 +14,13 @@ const BEHIND_REFERENCE_S: f32 = 0.5;
 /// flies back, metres: it does not from [`BEYOND_KNOWN_M`] further on, and may drift.
 const BEFORE_STRETCH_END_M: f32 = UNHEARD_STRETCH_SPARE_M + 0.33;
 
-/// Part of a vehicle's path that others know by the intents that they acknowledged, metres along
-/// it.
+/// Part of a vehicle's path that others know by the intents that they acknowledged, and by their
+/// reports that they hear it, metres along it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AcknowledgedPath {
-    /// The first place where others may expect the vehicle, as they may have heard it up to their
-    /// last report that they hear it, and know how far it flies on at least. `None` where no
-    /// vehicle has heard it on this path.
+    /// The first place where others may expect the vehicle: where it was at their last report that
+    /// they hear it, and the least distance that it flies on from there. `None` where no vehicle
+    /// has heard it on this path.
     first_m: Option<f32>,
     /// Place where the vehicle was when it sent the last acknowledged intent; ∞ where none was
     /// acknowledged.
@@ -64,9 +64,10 @@ impl AcknowledgedPath {
         self.first_m.unwrap_or(f32::INFINITY)
     }
 
-    /// The last place at which others expect the vehicle once they hear it no more: no further than
-    /// it could report, though gates may have opened since, and no further than
-    /// [`unheard_stretch_m`] from where they heard it.
+    /// The last place to which the vehicle flies back once others hear it no more: no further than
+    /// it could report, though gates may have opened since, nor than [`BEFORE_STRETCH_END_M`]
+    /// before the end of the stretch from where it sent the last acknowledged intent; never before
+    /// `first_m`.
     pub fn last_m(&self, fastest_mps: f32) -> f32 {
         let stretch_m = unheard_stretch_m(fastest_mps) - BEFORE_STRETCH_END_M;
         let stretch_ends_m = self.at_m + stretch_m;

@@ -35,8 +35,8 @@ impl Guidance {
     /// Moves the place where the vehicle waits back along its path, out of the columns of vehicles
     /// that descend: the advised stop if it is ahead of the reference, else `back_to_m`. In
     /// `SwarmLinkLost`, before it lands, the vehicle steps back from above vehicles that may lie
-    /// below, and onto the part of its path where others expect it; never beyond where they last
-    /// heard it.
+    /// below, and onto the part of its path where others expect it; never before the first place
+    /// where they do.
     pub(super) fn evade<const V: usize, const W: usize>(
         &mut self,
         state: State,

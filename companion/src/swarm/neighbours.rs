@@ -58,7 +58,7 @@ pub struct Neighbours<const V: usize> {
     /// Distance from which on the radio may not reach, metres; ∞ where it reaches every vehicle.
     range_edge_m: f32,
     /// Speed of the mission's fastest vehicle, m/s.
-    cruise_mps: f32,
+    fastest_cruise_mps: f32,
     /// Position of this vehicle, ENU.
     place: Point,
     /// Rank of the vehicle with which the next relay message begins.
@@ -94,7 +94,7 @@ impl<const V: usize> Neighbours<V> {
             fastest_mps: libm::fmaxf(fastest_mps, MAX_LANDING_MPS),
             assumed_speed_mps: slowest_mps * RECKONED_SPEED_SHARE,
             range_edge_m: f32::INFINITY,
-            cruise_mps: fastest_mps,
+            fastest_cruise_mps: fastest_mps,
             place: Point::zeros(),
             relay_next: 0,
             own_rank: 0,
@@ -126,7 +126,7 @@ impl<const V: usize> Neighbours<V> {
             id,
             rank,
             self.assumed_speed_mps,
-            [self.unheard_stretch_m(), self.cruise_mps],
+            [self.stretch_for_range_m(), self.fastest_cruise_mps],
         );
         self.entries.push(entry).ok()?;
         Some(self.entries.len() - 1)

@@ -6,7 +6,7 @@ use super::State::*;
 use super::divisions::over_a_field;
 use super::*;
 use crate::link::intent::{GROUNDED, Intent, ON_PLAN};
-use crate::margins::{unheard_delay_s, unheard_stretch_m};
+use crate::margins::{late_report_flight_s, unheard_stretch_m};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use planner_core::flight::{Gate, Path};
@@ -93,6 +93,7 @@ proptest::proptest! {
         delay in 0usize..11,
         gate_m in proptest::option::of(5f32..60.0),
     ) {
+        // An intent is sent each 0.2 s: each that the echo is behind adds 0.1 s each way.
         let delay_s = 0.1 * delay as f32;
         let mut config = Config { cruise_mps, ..two_vehicles() };
         (config.slowest_mps, config.fastest_mps) = (cruise_mps, cruise_mps);
@@ -129,7 +130,7 @@ proptest::proptest! {
         }
         bench.run_until(State::Land, 60.0);
         let rests_m = bench.enu.x - START.x - heard_m;
-        let most_m = unheard_stretch_m(cruise_mps) + cruise_mps * unheard_delay_s(estimated_s);
+        let most_m = unheard_stretch_m(cruise_mps) + cruise_mps * late_report_flight_s(estimated_s);
         proptest::prop_assert!(rests_m < most_m, "{rests_m} m on at {speed_mps} m/s, {most_m}");
         let least_m = speed_mps * (0.3 + speed_mps / 6.0).min(0.6);
         let stops_m = gate_m.map_or(f32::INFINITY, |at_m| 0.8 * (at_m - heard_m).max(0.0));

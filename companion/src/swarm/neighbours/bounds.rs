@@ -105,10 +105,10 @@ pub(super) const AVOIDED_WITHIN_M: f32 = 0.5;
 /// the one that the schedule keeps from landed vehicles in announced gusts of 3 m/s.
 pub(super) const UNHEARD_BESIDE_M: f32 = 0.15;
 /// Acceleration by which the safety filter widens the set of a vehicle that is off the points that
-/// it reports, m/s².
+/// it reports, m/s², with the default `FLK_ACCEL`; with a greater one it may stop a detour.
 pub(super) const OFF_POINTS_ACCEL_MPS2: f32 = 1.5;
-/// Age of a vehicle's last position, on its receipt 0, that is seldom exceeded, seconds: five are
-/// sent a second.
+/// Age of a vehicle's last position that is seldom exceeded, without the delay of its message,
+/// seconds: five are sent a second.
 pub(super) const TYPICAL_AGE_S: f32 = 0.3;
 /// Sum of the deviations of two vehicles in the air, one of which hovers, metres.
 pub(super) const PAIR_SWAY_M: f32 = 0.1;

@@ -9,7 +9,7 @@ use super::bounds::*;
 use super::entry::NeighbourEntry;
 use crate::config::Ground;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, ON_DETOUR, OUT_OF_PLAN, WAITING};
-use crate::margins::{least_unheard_rest_m, unheard_delay_s};
+use crate::margins::{late_report_flight_s, least_unheard_rest_m};
 use crate::time::{Duration, Instant};
 
 /// Where and when silent vehicles come down in a coverage mission, and by how much two in the air
@@ -241,7 +241,8 @@ impl NeighbourEntry {
     /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
     #[inline]
     pub(super) fn unheard_stopping_distance_m(&self) -> f32 {
-        self.unheard_stretch_m + self.cruise_mps * unheard_delay_s(self.message_delay.delay_s)
+        self.unheard_stretch_m
+            + self.fastest_cruise_mps * late_report_flight_s(self.message_delay.delay_s)
     }
 
     /// Whether the neighbour was in the air, or about to take off, when it was last heard.
@@ -402,7 +403,8 @@ impl NeighbourEntry {
     }
 
     /// Distance, metres, by which the safety filter keeps further away from a neighbour that is not
-    /// on the points that it reports, by the time that its messages take; 0 on its points.
+    /// on the points that it reports, or reports none: by what it may fly aside in its messages'
+    /// age. 0 on its points.
     fn off_points_reach_m(&self) -> f32 {
         let age_s = self.message_delay.delay_s + TYPICAL_AGE_S;
         match self.place_on_points {

@@ -62,10 +62,10 @@ pub(crate) struct NeighbourEntry {
     /// Least speed at which the neighbour is assumed to make progress while unheard, m/s.
     pub(super) assumed_speed_mps: f32,
     /// Length of its points on which the neighbour comes to rest unheard, metres, where messages
-    /// come at once.
+    /// come at once; longer where the radio's range is known.
     pub(super) unheard_stretch_m: f32,
     /// Greatest speed at which the neighbour is assumed to fly on unheard, m/s.
-    pub(super) cruise_mps: f32,
+    pub(super) fastest_cruise_mps: f32,
     /// The neighbour's speed at its last position, m/s.
     pub(super) speed_mps: f32,
     /// Whether the neighbour's plan has our plan's CRC, whether it follows that plan or not.
@@ -91,7 +91,7 @@ impl NeighbourEntry {
         id: u8,
         rank: u16,
         assumed_speed_mps: f32,
-        [unheard_stretch_m, cruise_mps]: [f32; 2],
+        [unheard_stretch_m, fastest_cruise_mps]: [f32; 2],
     ) -> Self {
         let state = Neighbour {
             id,
@@ -132,7 +132,7 @@ impl NeighbourEntry {
             at_range_edge: false,
             assumed_speed_mps,
             unheard_stretch_m,
-            cruise_mps,
+            fastest_cruise_mps,
             ground_m: f32::NAN,
             speed_mps: 0.0,
             shares_plan: false,

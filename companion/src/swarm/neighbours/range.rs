@@ -16,16 +16,16 @@ impl<const V: usize> Neighbours<V> {
         self.range_edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
         self.place = place;
         if known != self.knows_range() {
-            let stretch_m = self.unheard_stretch_m();
+            let stretch_m = self.stretch_for_range_m();
             self.entries.iter_mut().for_each(|entry| entry.unheard_stretch_m = stretch_m);
         }
     }
 
     /// Length of its path on which an unheard vehicle comes to rest, metres. With a known range one
     /// that notices late does not fly back: it may be out of range.
-    pub(super) fn unheard_stretch_m(&self) -> f32 {
+    pub(super) fn stretch_for_range_m(&self) -> f32 {
         let later_s = if self.knows_range() { NOTICED_LATER_S } else { 0.0 };
-        unheard_stretch_m(self.cruise_mps) + later_s * self.fastest_mps
+        unheard_stretch_m(self.fastest_cruise_mps) + later_s * self.fastest_cruise_mps
     }
 
     /// Whether the operator has set the range of the radio (`FLK_RADIO_M`).
@@ -42,3 +42,6 @@ impl<const V: usize> Neighbours<V> {
         self.knows_range() && self.entries[..self.roster_count].iter().all(beyond)
     }
 }
+
+#[cfg(test)]
+mod tests;

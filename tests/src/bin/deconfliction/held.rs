@@ -2,8 +2,9 @@
 //! with a search of its own.
 //!
 //! The search joins points of a lattice if the map leaves the vehicle its required clearance
-//! between them and every other vehicle is further away than the safety distance and a vehicle's
-//! deviation from its path. It uses neither the roadmap nor the companion.
+//! between them (its hull where it begins), and every other vehicle is further away than the safety
+//! distance and [`DEVIATION_M`], a place where a silent one may lie than the safety distance and
+//! [`BESIDE_M`]. It uses neither the roadmap nor the companion.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -36,7 +37,8 @@ const SPEED_OVER_S: f32 = 0.5;
 /// Distance kept from a vehicle that lies or stands beyond the safety distance, metres: a vehicle
 /// that flies by may deviate so far from its path.
 const DEVIATION_M: f32 = 0.25;
-/// Distance kept from that stretch beyond the safety distance, metres.
+/// Distance kept from the stretch where a silent vehicle may lie, beyond the safety distance,
+/// metres.
 const BESIDE_M: f32 = 0.4;
 /// Spacing of the points of the path that a silent vehicle's positions are compared with, metres.
 const FINE_M: f32 = 0.05;
@@ -180,8 +182,8 @@ fn place_at(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
     Some(from + (to - from) * ((t_s - from_s) / (to_s - from_s)))
 }
 
-/// How far a silent vehicle lies beside its path, and how far along its path from where it was last
-/// heard, metres.
+/// How far a silent vehicle lies beside its path, and how far along its path from where its radio
+/// failed, metres.
 pub fn rest_offsets_m(plan: &HostPlan, flight: &SwarmFlight, struck: Struck) -> Option<[f32; 2]> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
@@ -224,7 +226,8 @@ fn possible_rest_places(
     let least_m = speed_mps * flies_s.min(LEAST_FALL_S);
     (0..=(STRETCH_M / STEP_M) as usize)
         .map(|i| least_m + i as f32 * STEP_M)
-        .filter(|m| *m <= STRETCH_M)
+        .filter(|m| *m < STRETCH_M)
+        .chain([STRETCH_M])
         .filter_map(|m| path.point_at(nearest + m))
         .map(|place| (Point::new(place.x, place.y, rest.z), radius_m))
         .collect()

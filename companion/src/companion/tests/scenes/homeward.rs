@@ -93,6 +93,12 @@ pub(super) fn waits_for_nothing(scenes: &mut Scenes) {
 pub(super) fn is_in_the_way_of_another(scenes: &mut Scenes) {
     let stays_in_front = |b: &mut Bench| {
         b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::ON_DETOUR);
+        b.answer_detour = detours::NO_WAY;
+        let turns = |b: &Bench| b.texts.iter().any(|text| text.contains("planning the way home"));
+        while !turns(b) {
+            b.run(0.1);
+        }
+        b.answer_detour = Some(Ok(()));
         is_home(b);
     };
     scenes.play(over_a_field(Follow), stays_in_front, Aborted, 1.0);

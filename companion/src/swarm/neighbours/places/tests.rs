@@ -145,9 +145,9 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
     for case in 0..5000 {
         let mut table = joined(0);
         let entry = &mut table.entries[1];
-        entry.message_delay.delay_s = uniform(&mut rng, 0.0, 0.5);
-        entry.cruise_mps = uniform(&mut rng, 0.5, 8.0);
-        entry.unheard_stretch_m = unheard_stretch_m(entry.cruise_mps);
+        entry.message_delay.delay_s = uniform(&mut rng, 0.0, 1.0);
+        entry.fastest_cruise_mps = uniform(&mut rng, 0.5, 15.0);
+        entry.unheard_stretch_m = unheard_stretch_m(entry.fastest_cruise_mps);
         let mut at = entry.state.position;
         entry.points = (0..1 + rng.next_u32() % 8)
             .map(|_| {
