@@ -237,6 +237,7 @@ impl<'a> SimulationRun<'a> {
         // Lanes of two vehicles may lie side by side, and one vehicle waits for as long as the
         // other one is on its lanes: that is no deadlock.
         referee.retracts_ended_deadlocks = !scenario.faults.is_empty() || scenario.covers_area();
+        referee.retracts_out_of_range_waits = scenario.has_short_radio();
         Ok(Self {
             mission,
             plan,
@@ -418,11 +419,11 @@ impl<'a> SimulationRun<'a> {
                 self.log.push(report::LogEvent { t_s, vehicle: Some(vehicle.id), level, text });
             }
         }
-        self.log.extend(self.referee.incidents.iter().map(|(t_s, i, text)| report::LogEvent {
-            t_s: *t_s as f32,
-            vehicle: Some(scenario.vehicles[*i].id),
-            level: Level::Error,
-            text: text.clone(),
+        self.log.extend(self.referee.incidents.iter().map(|seen| report::LogEvent {
+            t_s: seen.t_s as f32,
+            vehicle: Some(scenario.vehicles[seen.vehicle].id),
+            level: if seen.ended { Level::Warning } else { Level::Error },
+            text: seen.text.clone(),
         }));
     }
 }

@@ -12,6 +12,10 @@ use planner_core::track::deconflict::Method;
 use super::coverage::AreaSection;
 use super::error::ScenarioError;
 use crate::link::LinkUrl;
+
+/// Radio range, metres, from which on companions take it that the radio reaches every vehicle. The
+/// simulated radio keeps the scenario's range.
+const RADIO_REACHES_ALL_FROM_M: f32 = 500.0;
 use crate::map::Unknown;
 
 /// A scenario, read and checked.
@@ -351,6 +355,11 @@ impl Scenario {
     /// Whether the mission photographs an area; it then has no goals, and `area` is there.
     pub fn covers_area(&self) -> bool {
         self.mission.mode == MissionMode::Coverage
+    }
+
+    /// Whether a vehicle may be out of the radio range of others.
+    pub fn has_short_radio(&self) -> bool {
+        self.simulation.radio_range_m < RADIO_REACHES_ALL_FROM_M
     }
 
     /// The greatest clearance that any vehicle requires, metres: largest radius and safety margin.

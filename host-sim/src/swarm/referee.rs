@@ -18,6 +18,9 @@ use crate::terrain::HeightGrid;
 const CONTACT_ROUNDING_M: f32 = 1e-3;
 /// Time without progress in flight that counts as a deadlock, seconds.
 const DEADLOCK_S: f64 = 20.0;
+/// Longest wait for a vehicle out of radio range, seconds: 45 until it counts as lost, and some for
+/// those in between.
+const OUT_OF_RANGE_WAIT_S: f64 = 60.0;
 /// Least increase of arc length along the path that counts as progress, metres.
 const COUNTS_AS_PROGRESS_M: f32 = 0.1;
 /// Distance from its last place of progress at which a vehicle that reports no progress counts as
@@ -101,6 +104,9 @@ pub struct Referee<'a> {
     /// Whether a deadlock that ends no longer counts: where faults strike, vehicles wait until it
     /// is known what became of the struck vehicle, and for their turn to fly around it.
     pub retracts_ended_deadlocks: bool,
+    /// Whether a deadlock that ends within [`OUT_OF_RANGE_WAIT_S`], by flying on, no longer counts:
+    /// where vehicles may be out of radio range, they wait until one counts as lost.
+    pub retracts_out_of_range_waits: bool,
     /// Spherical obstacles that are in no map: centre and radius, metres.
     pub obstacles: Vec<(Point, f32)>,
     /// Number of times that a body began to touch an obstacle.
@@ -108,7 +114,7 @@ pub struct Referee<'a> {
     /// Number of times that a pair came nearer than the safety distance.
     pub violations: u32,
     /// Number of times that a vehicle made no progress in flight for 20 s; without those that
-    /// ended, if [`Self::retracts_ended_deadlocks`].
+    /// ended, if [`Self::retracts_ended_deadlocks`] or [`Self::retracts_out_of_range_waits`].
     pub deadlocks: u32,
     /// Smallest distance of a flying centre to an obstacle in the whole flight, metres.
     pub min_clearance_m: f32,
@@ -116,8 +122,27 @@ pub struct Referee<'a> {
     pub min_separation_m: f32,
     /// Smallest distances over time, one sample each 0.2 s.
     pub samples: Vec<DistanceSample>,
-    /// Contacts, violations and deadlocks: seconds, index of the vehicle, and text.
-    pub incidents: Vec<(f64, usize, String)>,
+    /// Contacts, violations, deadlocks, and standstills that ended.
+    pub incidents: Vec<Incident>,
+}
+
+/// What the referee saw.
+#[derive(Clone, Debug)]
+pub struct Incident {
+    /// When it began, or counted, seconds.
+    pub t_s: f64,
+    /// Index of the vehicle.
+    pub vehicle: usize,
+    /// What happened.
+    pub text: String,
+    /// Whether it is a standstill that ended, and no longer counts as a deadlock.
+    pub ended: bool,
+}
+
+impl Incident {
+    fn new(t_s: f64, vehicle: usize, text: String) -> Self {
+        Self { t_s, vehicle, text, ended: false }
+    }
 }
 
 impl<'a> Referee<'a> {
@@ -153,6 +178,7 @@ impl<'a> Referee<'a> {
             recorded_s: f64::NEG_INFINITY,
             window: EMPTY_SAMPLE,
             retracts_ended_deadlocks: false,
+            retracts_out_of_range_waits: false,
             obstacles: Vec::new(),
             wall_contacts: 0,
             violations: 0,
@@ -247,7 +273,7 @@ impl<'a> Referee<'a> {
         if touches && !was_touching {
             self.wall_contacts += 1;
             let [x, y, z] = now.position.into();
-            self.incidents.push((
+            self.incidents.push(Incident::new(
                 t_s,
                 i,
                 format!("touches an obstacle at [{x:.2}, {y:.2}, {z:.2}]"),
@@ -302,12 +328,12 @@ impl<'a> Referee<'a> {
                         "nearer than the safety distance to vehicle {}",
                         self.vehicles[j].id
                     );
-                    self.incidents.push((t_s, i, text));
+                    self.incidents.push(Incident::new(t_s, i, text));
                 }
                 let touches = apart < self.vehicles[i].radius_m + self.vehicles[j].radius_m;
                 let was_touching = std::mem::replace(&mut self.touching[i * n + j], touches);
                 if touches && !was_touching {
-                    self.incidents.push((
+                    self.incidents.push(Incident::new(
                         t_s,
                         i,
                         format!("touches vehicle {}", self.vehicles[j].id),
@@ -338,7 +364,11 @@ impl<'a> Referee<'a> {
         } else {
             "touches the wreck of"
         };
-        self.incidents.push((t_s, flier, format!("{what} vehicle {}", self.vehicles[wreck].id)));
+        self.incidents.push(Incident::new(
+            t_s,
+            flier,
+            format!("{what} vehicle {}", self.vehicles[wreck].id),
+        ));
     }
 
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
@@ -357,24 +387,24 @@ impl<'a> Referee<'a> {
             vehicle.best_progress_m =
                 now.progress_m.unwrap_or(f32::NEG_INFINITY).max(vehicle.best_progress_m);
             vehicle.progressed_at = now.position;
-            vehicle.progressed_s = t_s;
+            let stood_s = t_s - std::mem::replace(&mut vehicle.progressed_s, t_s);
             // A vehicle whose power fails may have waited for a good reason.
             let ends = moved || now.phase != RefereePhase::Flying;
-            if std::mem::take(&mut vehicle.stuck) && ends && self.retracts_ended_deadlocks {
+            let waited = moved && stood_s <= OUT_OF_RANGE_WAIT_S;
+            let retracts = (ends && self.retracts_ended_deadlocks)
+                || (waited && self.retracts_out_of_range_waits);
+            if std::mem::take(&mut vehicle.stuck) && retracts {
                 self.deadlocks -= 1;
-                let text = no_progress();
-                if let Some(at) = self
-                    .incidents
-                    .iter()
-                    .rposition(|(_, vehicle, what)| *vehicle == i && *what == text)
-                {
-                    self.incidents.remove(at);
+                let counted = |to: &&mut Incident| to.vehicle == i && to.text == no_progress();
+                if let Some(incident) = self.incidents.iter_mut().rfind(counted) {
+                    incident.ended = true;
+                    incident.text = format!("stood for {stood_s:.0} s");
                 }
             }
         } else if t_s - vehicle.progressed_s > DEADLOCK_S && !vehicle.stuck {
             vehicle.stuck = true;
             self.deadlocks += 1;
-            self.incidents.push((t_s, i, no_progress()));
+            self.incidents.push(Incident::new(t_s, i, no_progress()));
         }
     }
 }

@@ -16,9 +16,6 @@ use crate::flash::HostFlash;
 use crate::mission::PreparedMission;
 use crate::scenario::{AutopilotKind, CompanionHost, PositionErrors, VehicleSection};
 
-/// Radio range of a scenario, metres, from which on companions take it that the radio reaches
-/// every vehicle. The simulated radio keeps the scenario's range.
-const RADIO_REACHES_ALL_FROM_M: f32 = 500.0;
 /// Least radio range that a companion's settings may have, metres.
 const MIN_RADIO_RANGE_M: f32 = 1.0;
 
@@ -131,11 +128,10 @@ pub fn companion_config(mission: &PreparedMission, id: u8) -> anyhow::Result<Con
     // has.
     let scenario = &mission.scenario;
     let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
-    // The operator sets this radio range; from 500 m on, radio silence is never explained by
-    // distance.
-    let radio_range_m = match scenario.simulation.radio_range_m {
-        range_m if range_m < RADIO_REACHES_ALL_FROM_M => range_m.max(MIN_RADIO_RANGE_M),
-        _ => REACHES_ALL_M,
+    // The operator sets this radio range.
+    let radio_range_m = match scenario.has_short_radio() {
+        true => scenario.simulation.radio_range_m.max(MIN_RADIO_RANGE_M),
+        false => REACHES_ALL_M,
     };
     let method = scenario.deconfliction.method;
     Ok(Config { accel_mps2: PLANNED_ACCEL_MPS2, method, geofence, radio_range_m, ..config })

@@ -68,7 +68,7 @@ fn a_near_pair_is_one_violation_unless_both_stand() {
         assert_eq!(referee.violations, 1);
         // The text names the other vehicle of the pair by its id.
         assert_eq!(
-            (referee.incidents[0].1, &*referee.incidents[0].2),
+            (referee.incidents[0].vehicle, &*referee.incidents[0].text),
             (1, "nearer than the safety distance to vehicle 7")
         );
         assert!((referee.min_separation_m - 1.3).abs() < 1e-6);
@@ -127,6 +127,10 @@ fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
         assert_eq!(referee.deadlocks, 1);
         referee.observe(30.0, &on_path(2.5));
         assert_eq!(referee.deadlocks, 0);
+        assert_eq!(
+            (&*referee.incidents[0].text, referee.incidents[0].ended),
+            ("stood for 30 s", true)
+        );
         for step in 301..600 {
             referee.observe(f64::from(step) * 0.1, &on_path(2.5));
         }

@@ -9,6 +9,7 @@ use clap::Parser;
 use flockmate_tests::edge::{Edge, Outcome};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
+use host_sim::report::LogEvent;
 use host_sim::scenario;
 use host_sim::swarm::{self, SwarmFlight};
 use rayon::prelude::*;
@@ -56,13 +57,14 @@ fn main() -> Result<()> {
         let flown: Vec<(u64, Result<SwarmFlight>)> =
             seeds.into_par_iter().map(|seed| (seed, fly(seed, range_m))).collect();
         let flights = flown.len();
-        let (mut complete, mut safety, mut left, mut unnamed) = (0, [0; 3], 0, 0);
+        let (mut complete, mut safety, mut stood, mut left, mut unnamed) = (0, [0; 3], 0, 0, 0);
         for (seed, flight) in flown {
             let SwarmFlight { result, log, .. } = flight.with_context(|| format!("seed {seed}"))?;
             for event in log.iter().filter(|_| args.seed.is_some()) {
                 println!("  {:7.2} s, vehicle {:?}: {}", event.t_s, event.vehicle, event.text);
             }
             complete += usize::from(result.complete);
+            stood += print_standstills(&log, &format!("range {range_m} m, seed {seed}"));
             let counts =
                 [result.safety.violations, result.safety.wall_contacts, result.safety.deadlocks];
             safety.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
@@ -88,8 +90,8 @@ fn main() -> Result<()> {
             }
         }
         println!(
-            "range {range_m} m: {complete}/{} complete, {} violations, {} contacts, {} deadlocks, {left} not landed, \
-             {unnamed} without a reason",
+            "range {range_m} m: {complete}/{} complete, {} violations, {} contacts, {} deadlocks, {stood} stood \
+             for 20 s, {left} not landed, {unnamed} without a reason",
             flights, safety[0], safety[1], safety[2]
         );
         let least = complete_least * flights / 20;
@@ -99,6 +101,14 @@ fn main() -> Result<()> {
         std::process::exit(1);
     }
     Ok(())
+}
+
+/// Prints the standstills of `flight` that ended, and returns their number.
+fn print_standstills(log: &[LogEvent], flight: &str) -> usize {
+    let stood = log.iter().filter(|event| event.text.starts_with("stood for"));
+    stood
+        .inspect(|event| println!("  {flight}, vehicle {:?}: {}", event.vehicle, event.text))
+        .count()
 }
 
 /// Flies missions in which a vehicle fails at the edge of the radio range, judged by true motion.
