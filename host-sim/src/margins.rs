@@ -7,6 +7,7 @@
 //! | separation of two paths | safety distance + 2 (tracking + estimate) |
 //! | separation to parked vehicle | safety distance + [`DEVIATION_BESIDE_PARKED_M`] + estimate + gust |
 //! | tracking | [`companion::margins::TRACKING_M`] |
+//! | beside parked vehicles, in large swarms | [`EXTRA_BESIDE_PARKED_M`] more, where there is room |
 //! | estimate, `rtk` | part of the tracking: at most 0.1 m |
 //! | estimate, `recorded`, PX4 | 0.65 m |
 //! | estimate, `recorded`, ArduPilot | 0.12 m: the greatest recorded error |
@@ -30,6 +31,7 @@
 
 use companion::autopilot::AutopilotKind;
 use companion::margins::TRACKING_M;
+use planner_core::Point;
 use planner_core::coverage::footprint::{Footprint, Spacing};
 
 use crate::scenario::{PositionErrors, Simulation, VehicleSection};
@@ -43,6 +45,15 @@ pub const PAIR_DEVIATION_COVERAGE_M: f32 = 2.4;
 /// Deviation of a flying vehicle from its path that is added to the separation from a parked
 /// vehicle, metres.
 pub const DEVIATION_BESIDE_PARKED_M: f32 = 0.25;
+/// Further distance from parked vehicles in swarms of more than [`MAX_VEHICLES_OF_FEW`], where pads
+/// and goals leave room for it, metres. Gusts of 3 m/s push one vehicle in some hundred by up to
+/// 0.5 m, and in a large swarm hundreds of them pass beside a parked one.
+const EXTRA_BESIDE_PARKED_M: f32 = 0.1;
+/// Most vehicles of a swarm for which [`EXTRA_BESIDE_PARKED_M`] is not added.
+const MAX_VEHICLES_OF_FEW: usize = 12;
+/// Distance that has to remain between pads and goals beyond the separation from a parked vehicle,
+/// metres.
+const REMAINS_BETWEEN_PADS_M: f32 = 0.1;
 /// Further deviation of one vehicle per m/s of peak gust, seconds. Gusts do not push two vehicles
 /// towards each other at the same time, so it is added only for one vehicle beside a parked one or
 /// a wall.
@@ -150,6 +161,22 @@ pub fn with_usable_footprint(
         across_m: across_m.max(spacing.lane_m),
     };
     Spacing { footprint, ..*spacing }
+}
+
+/// Distance that is added to `parked_m`, the separation from a parked vehicle, in a mission whose
+/// vehicles land at these places, metres. Starts and places nearer to each other than `parked_m`
+/// are never both taken.
+pub fn extra_beside_parked_m(parked_m: f32, vehicles: &[VehicleSection], landed: &[Point]) -> f32 {
+    if vehicles.len() <= MAX_VEHICLES_OF_FEW {
+        return 0.0;
+    }
+    let places: Vec<&Point> = vehicles.iter().map(|v| &v.start).chain(landed).collect();
+    let pairs = (0..places.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
+    let apart_m = pairs
+        .map(|(j, i)| (places[i] - places[j]).norm())
+        .filter(|apart_m| *apart_m >= parked_m)
+        .fold(f32::INFINITY, f32::min);
+    (apart_m - REMAINS_BETWEEN_PADS_M - parked_m).clamp(0.0, EXTRA_BESIDE_PARKED_M)
 }
 
 /// Distance between a flight path and a vehicle parked on the ground, metres.

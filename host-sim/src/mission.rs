@@ -24,6 +24,7 @@ pub use self::ready::{HostPlan, OwnPlan, PreparedMission, VERTICAL_MPS};
 use crate::capacity::{BoardCapacity, GATES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::check_starts_on_ground;
 use crate::map::{self, VoxelMap};
+use crate::margins;
 use crate::progress::Progress;
 use crate::result::{Timing, Unserved};
 use crate::roadmap::{self};
@@ -77,10 +78,20 @@ impl PreparedMission {
 
         let begun = Instant::now();
         let stage = progress.begin_stage("roadmap");
-        let schedule = schedule_config(&scenario);
+        let mut schedule = schedule_config(&scenario);
         let goals = places::goal_points(&scenario, &map, &schedule)?;
         let tasks = places::vehicle_tasks(&scenario, &map)?;
         let descents_m = descents_m(&scenario, &map, &goals)?;
+        let landed: Vec<Point> = goals
+            .iter()
+            .zip(&descents_m)
+            .map(|(goal, m)| goal - Point::new(0.0, 0.0, *m))
+            .collect();
+        schedule.parked_separation_m += margins::extra_beside_parked_m(
+            schedule.parked_separation_m,
+            &scenario.vehicles,
+            &landed,
+        );
         if let Some(BoardCapacity { name, vehicles, .. }) =
             board.filter(|b| b.vehicles < tasks.len().max(goals.len()))
         {
