@@ -7,7 +7,7 @@
 //! | separation of two paths | safety distance + 2 (tracking + estimate) |
 //! | separation to parked vehicle | safety distance + [`DEVIATION_BESIDE_PARKED_M`] + estimate + gust |
 //! | tracking | [`companion::margins::TRACKING_M`] |
-//! | beside parked vehicles, in large swarms | [`EXTRA_BESIDE_PARKED_M`] more, where there is room |
+//! | beside parked vehicles, in large swarms | `EXTRA_BESIDE_PARKED_M` more, where there is room |
 //! | estimate, `rtk` | part of the tracking: at most 0.1 m |
 //! | estimate, `recorded`, PX4 | 0.65 m |
 //! | estimate, `recorded`, ArduPilot | 0.12 m: the greatest recorded error |

@@ -104,8 +104,8 @@ pub struct Referee<'a> {
     /// Whether a deadlock that ends no longer counts: where faults strike, vehicles wait until it
     /// is known what became of the struck vehicle, and for their turn to fly around it.
     pub retracts_ended_deadlocks: bool,
-    /// Whether a deadlock that ends within [`OUT_OF_RANGE_WAIT_S`], by flying on, no longer counts:
-    /// where vehicles may be out of radio range, they wait until one counts as lost.
+    /// Whether a deadlock that ends by flying on within 60 s (`OUT_OF_RANGE_WAIT_S`) no longer
+    /// counts: where vehicles may be out of radio range, they wait until one counts as lost.
     pub retracts_out_of_range_waits: bool,
     /// Spherical obstacles that are in no map: centre and radius, metres.
     pub obstacles: Vec<(Point, f32)>,
