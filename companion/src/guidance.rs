@@ -472,7 +472,7 @@ impl Guidance {
             self.progress_at = now;
         }
         if scene.plan.is_some() && (self.on_path || self.phase == Phase::Climb) && known {
-            self.reported_m = self.progress_m(state, scene);
+            self.note_reported_progress(state, scene);
         }
         if sends {
             self.note_place_sent();

@@ -89,6 +89,19 @@ impl Guidance {
         self.measured_progress_m(state, scene).max(self.reported_m)
     }
 
+    /// Notes the progress that this vehicle reports. Nobody heard of the way that it flies back in
+    /// `SwarmLinkLost`, and has to fly again.
+    pub(super) fn note_reported_progress<const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &GuidanceInputs<'_, W, G>,
+    ) {
+        self.reported_m = match state == State::SwarmLinkLost && self.back_to_m.is_some() {
+            true => self.measured_progress_m(state, scene),
+            false => self.progress_m(state, scene),
+        };
+    }
+
     pub(crate) fn measured_progress_m<const W: usize, const G: usize>(
         &self,
         state: State,

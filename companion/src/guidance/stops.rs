@@ -48,7 +48,7 @@ impl Guidance {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
         if neighbours.is_reported_heard_within(now, NEW_REPORT_AGE) {
-            self.acknowledged_path.note_heard(along_m, self.tracker.speed_mps.max(0.0));
+            self.acknowledged_path.note_heard(along_m, self.tracker.speed_mps.max(0.0), now);
         }
         let (alone, follows) = (state == State::SwarmLinkLost, state == State::Follow);
         // An unheard vehicle that the filter stopped short of its reference is not led on to it, to
@@ -59,7 +59,8 @@ impl Guidance {
             && (at_reference || !alone)
             && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.ends_away_from_goal && follows);
-        let lands_m = along_m.min(self.expected_up_to_m(state, neighbours));
+        let [from_m, upto_m] = self.expected_places(state, neighbours, now);
+        let lands_m = along_m.min(upto_m);
         let beyond = alone && at_reference && along_m > lands_m + BEYOND_KNOWN_M;
         let wait_m = if follows { along_m + advice.stop_within_m.max(0.0) } else { lands_m };
         let beside_m = safety_m + evade::EVADE_MARGIN_M;
@@ -80,7 +81,6 @@ impl Guidance {
             EvadeTarget::Back(to_m) => (Some(to_m.min(wait_m)), false),
             EvadeTarget::Nowhere => (None, !alone),
         };
-        let from_m = self.acknowledged_path.first_m();
         let to_m = to_m.filter(|to_m| !alone || *to_m >= from_m).or(beyond.then_some(lands_m));
         self.evading = to_m.is_some();
         if let Some(to_m) = to_m {
@@ -91,14 +91,22 @@ impl Guidance {
         self.no_better_place = nowhere;
     }
 
-    /// Place along its path up to which others expect a vehicle in `SwarmLinkLost`, metres. ∞ in
-    /// any other state, in a coverage mission, and where the radio's range is known, so that others
-    /// expect it further on.
-    fn expected_up_to_m<const V: usize>(&self, state: State, neighbours: &Neighbours<V>) -> f32 {
-        let expected = state == State::SwarmLinkLost
+    /// First and last place along its path where others expect a vehicle in `SwarmLinkLost`,
+    /// metres. The last is ∞ in any other state, in a coverage mission, and where the radio's range
+    /// is known, so that others expect it further on.
+    fn expected_places<const V: usize>(
+        &self,
+        state: State,
+        neighbours: &Neighbours<V>,
+        now: Instant,
+    ) -> [f32; 2] {
+        let limited = state == State::SwarmLinkLost
             && neighbours.fleet().is_none()
             && !neighbours.knows_range();
-        if expected { self.acknowledged_path.last_m(self.fastest_mps) } else { f32::INFINITY }
+        let hears = limited && !neighbours.hears_nobody(now);
+        let delay_s = hears.then(|| neighbours.max_message_delay_s());
+        let [first_m, last_m] = self.acknowledged_path.expected(self.fastest_mps, delay_s, now);
+        [first_m, if limited { last_m } else { f32::INFINITY }]
     }
 
     /// Since when the vehicle has been below one that descends, unable to leave along its path.

@@ -132,6 +132,8 @@ pub struct Bench {
     /// How many intents of this vehicle are newer than the one that the neighbour echoes; `None`:
     /// it echoes none.
     pub neighbour_echoes: Option<usize>,
+    /// How long ago the neighbour received the intent that it echoes, in units of 10 ms.
+    pub neighbour_held: u8,
     neighbour_sequence: u8,
 }
 
@@ -198,6 +200,7 @@ impl Bench {
             neighbour_clear_m: -1e6,
             neighbour_hears: u32::MAX,
             neighbour_echoes: None,
+            neighbour_held: 0,
             neighbour_sequence: 0,
         }
     }

@@ -5,6 +5,7 @@
 use super::State::*;
 use super::divisions::over_a_field;
 use super::*;
+use crate::link::frame::Frame;
 use crate::link::intent::{GROUNDED, Intent, ON_PLAN};
 use crate::margins::{late_report_flight_s, unheard_stretch_m};
 use mavlink::MessageData;
@@ -79,11 +80,33 @@ fn last_report(bench: &Bench) -> (f32, f32) {
     (x, (x - before) / (1e-3 * (at_ms - before_ms) as f32))
 }
 
+/// Runs the bench for 4 s in which the neighbour, whose messages take `delay` times 0.1 s, hears it
+/// no more: it reports to hear it for `reports_s` longer, and echoes the last intent that arrived
+/// for 2.5 s.
+fn hear_no_more(bench: &mut Bench, delay: usize, reports_s: f32) {
+    let count = |bench: &Bench| {
+        let of_intent = |f: &&Frame| Intent::decode(f.padded_payload(), SYSTEM).is_some();
+        bench.swarm.iter().filter(of_intent).count()
+    };
+    let before = count(bench);
+    for step in 0..80 {
+        let late_s = 0.05 * step as f32 - 0.2 * delay as f32;
+        let missed = count(bench) - before;
+        bench.neighbour_echoes = (late_s < 2.5).then_some(delay.max(missed));
+        bench.neighbour_held = 20 * missed.saturating_sub(delay).min(12) as u8;
+        if late_s >= reports_s {
+            bench.neighbour_hears = 0;
+        }
+        bench.run(0.05);
+    }
+}
+
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 60 } else { 600 }))]
     /// Whatever its speed, and whether its radio still hears or not. Messages take `delay_s`: those
     /// of others that were under way come later, or not. Of the reports that they heard it, which
-    /// they send for 0.8 s, it hears a share.
+    /// they send for 0.8 s, it hears a share. Its gate may open meanwhile: others do not know that
+    /// it flies on.
     #[test]
     fn an_unheard_vehicle_rests_where_others_expect_it(
         cruise_mps in 0.5f32..15.0,
@@ -92,7 +115,11 @@ proptest::proptest! {
         receives in proptest::bool::ANY,
         delay in 0usize..11,
         gate_m in proptest::option::of(5f32..60.0),
+        opens in proptest::bool::ANY,
     ) {
+        // One that is faster overshoots by more than it flies back before it lands; with longer
+        // delays it does not know what arrived last.
+        let opens = opens && cruise_mps < 4.0 && delay < 4;
         // An intent is sent each 0.2 s: each that the echo is behind adds 0.1 s each way.
         let delay_s = 0.1 * delay as f32;
         let mut config = Config { cruise_mps, ..two_vehicles() };
@@ -109,7 +136,7 @@ proptest::proptest! {
             plan.gates.push(Gate { at_m, id: 77, until_m: 100.0 }).unwrap();
         }
         bench.answer_plan = Some(Ok(plan));
-        bench.neighbour = Some((Point::new(8.0, 60.0, 0.0), GROUNDED | ON_PLAN, 0.0, 5));
+        bench.neighbour = Some((Point::new(8.0, 60.0, 0.0), GROUNDED | ON_PLAN, 99.0, 5));
         bench.run_until(State::Ready, 6.0);
         bench.start();
         bench.run_until(State::Follow, 60.0);
@@ -117,13 +144,15 @@ proptest::proptest! {
         // What the others heard last is up to 0.2 s old when the radio fails.
         let (heard_m, speed_mps) = last_report(&bench);
         let estimated_s = bench.companion.neighbours.max_message_delay_s();
-        bench.neighbour_echoes = None;
         match reports_heard {
             Some(share) => {
-                bench.run(0.8 * share + 2.0 * delay_s);
-                bench.neighbour_hears = 0;
+                if let Some((.., progress_m, _)) = bench.neighbour.as_mut().filter(|_| opens) {
+                    *progress_m = 100.0;
+                }
+                hear_no_more(&mut bench, delay, 0.8 * share);
             }
             None => {
+                bench.neighbour_echoes = None;
                 bench.run(if receives { delay_s } else { 0.0 });
                 bench.neighbour = None;
             }
@@ -131,6 +160,9 @@ proptest::proptest! {
         bench.run_until(State::Land, 60.0);
         let rests_m = bench.enu.x - START.x - heard_m;
         let most_m = unheard_stretch_m(cruise_mps) + cruise_mps * late_report_flight_s(estimated_s);
+        // The reported points end at the gate.
+        let gate_on_m = gate_m.map_or(f32::INFINITY, |at_m| (at_m - heard_m).max(0.0) + 0.6);
+        let most_m = most_m.min(gate_on_m);
         proptest::prop_assert!(rests_m < most_m, "{rests_m} m on at {speed_mps} m/s, {most_m}");
         let least_m = speed_mps * (0.3 + speed_mps / 6.0).min(0.6);
         let stops_m = gate_m.map_or(f32::INFINITY, |at_m| 0.8 * (at_m - heard_m).max(0.0));
@@ -138,5 +170,46 @@ proptest::proptest! {
             rests_m > least_m.min(stops_m) - 0.3,
             "{rests_m} m on at {speed_mps} m/s, at least {least_m}, {stops_m}"
         );
+    }
+}
+
+/// A gate opens as its transmitter fails: it flies on, and back. Heard again, it reports no
+/// progress that it has yet to make.
+#[test]
+fn a_vehicle_heard_again_reports_no_progress_that_it_has_yet_to_make() {
+    for cruise_mps in [1.0, 2.0, 3.0] {
+        for lost_s in [6.0, 8.0, 10.0, 12.0] {
+            let mut config = Config { cruise_mps, ..two_vehicles() };
+            (config.slowest_mps, config.fastest_mps) = (cruise_mps, cruise_mps);
+            let mut bench = Bench::new(config);
+            bench.step_m = cruise_mps * 0.06;
+            bench.neighbour_echoes = Some(0);
+            let mut path = Path::new();
+            for x in [0.0, 40.0, 300.0] {
+                path.push(START + Point::new(x, 0.0, 0.0), 1.2).unwrap();
+            }
+            let mut plan = VehiclePlan { path, ..plan() };
+            plan.gates.push(Gate { at_m: 10.0, id: 77, until_m: 100.0 }).unwrap();
+            bench.answer_plan = Some(Ok(plan));
+            bench.neighbour = Some((Point::new(8.0, 60.0, 0.0), GROUNDED | ON_PLAN, 99.0, 5));
+            bench.run_until(State::Ready, 6.0);
+            bench.start();
+            bench.run_until(State::Follow, 60.0);
+            bench.run(20.0);
+            bench.neighbour.as_mut().expect("it flies").2 = 100.0;
+            hear_no_more(&mut bench, 0, 0.8);
+            bench.run(lost_s - 4.0);
+            bench.neighbour_held = 0;
+            (bench.neighbour_hears, bench.neighbour_echoes) = (u32::MAX, Some(0));
+            for _ in 0..60 {
+                bench.run(0.05);
+                let mut sent = bench.swarm.iter().rev();
+                let intent = sent.find_map(|f| Intent::decode(f.padded_payload(), SYSTEM));
+                let intent = intent.filter(|intent| intent.flags & ON_PLAN != 0);
+                let reported_m = intent.map_or(0.0, |intent| intent.progress_m);
+                let at_m = bench.enu.x - START.x;
+                assert!(reported_m < at_m + 0.6, "{reported_m} at {at_m}, {cruise_mps} {lost_s}");
+            }
+        }
     }
 }
