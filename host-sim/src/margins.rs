@@ -46,8 +46,8 @@ pub const PAIR_DEVIATION_COVERAGE_M: f32 = 2.4;
 /// vehicle, metres.
 pub const DEVIATION_BESIDE_PARKED_M: f32 = 0.25;
 /// Further distance from parked vehicles in swarms of more than [`MAX_VEHICLES_OF_FEW`], where pads
-/// and goals leave room for it, metres. Gusts of 3 m/s push one vehicle in some hundred by up to
-/// 0.5 m, and in a large swarm hundreds of them pass beside a parked one.
+/// and goals leave room for it, metres. In gusts of 3 m/s vehicles were up to 0.5 m off their
+/// paths, and in a large swarm many pass beside parked ones.
 const EXTRA_BESIDE_PARKED_M: f32 = 0.1;
 /// Most vehicles of a swarm for which [`EXTRA_BESIDE_PARKED_M`] is not added.
 const MAX_VEHICLES_OF_FEW: usize = 12;
@@ -164,13 +164,13 @@ pub fn with_usable_footprint(
 }
 
 /// Distance that is added to `parked_m`, the separation from a parked vehicle, in a mission whose
-/// vehicles land at these places, metres. Starts and places nearer to each other than `parked_m`
-/// are never both taken.
-pub fn extra_beside_parked_m(parked_m: f32, vehicles: &[VehicleSection], landed: &[Point]) -> f32 {
-    if vehicles.len() <= MAX_VEHICLES_OF_FEW {
+/// vehicles stand at `pads` and land at `landed`, metres. Places nearer to each other than
+/// `parked_m` are never both taken.
+pub fn extra_beside_parked_m(parked_m: f32, pads: &[Point], landed: &[Point]) -> f32 {
+    if pads.len() <= MAX_VEHICLES_OF_FEW {
         return 0.0;
     }
-    let places: Vec<&Point> = vehicles.iter().map(|v| &v.start).chain(landed).collect();
+    let places = [pads, landed].concat();
     let pairs = (0..places.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
     let apart_m = pairs
         .map(|(j, i)| (places[i] - places[j]).norm())
@@ -192,3 +192,6 @@ pub fn parked_separation_m(
         + DEVIATION_PER_GUST_S * simulation.gust_mps
         + estimates.fold(0.0, f32::max)
 }
+
+#[cfg(test)]
+mod tests;

@@ -82,16 +82,13 @@ impl PreparedMission {
         let goals = places::goal_points(&scenario, &map, &schedule)?;
         let tasks = places::vehicle_tasks(&scenario, &map)?;
         let descents_m = descents_m(&scenario, &map, &goals)?;
-        let landed: Vec<Point> = goals
-            .iter()
-            .zip(&descents_m)
-            .map(|(goal, m)| goal - Point::new(0.0, 0.0, *m))
-            .collect();
-        schedule.parked_separation_m += margins::extra_beside_parked_m(
-            schedule.parked_separation_m,
-            &scenario.vehicles,
-            &landed,
-        );
+        let below = |(place, height_m): (&Point, f32)| place - Point::new(0.0, 0.0, height_m);
+        let starts = scenario.vehicles.iter().map(|vehicle| &vehicle.start);
+        let pads: Vec<Point> =
+            starts.zip(tasks.iter().map(|task| task.climb_m)).map(below).collect();
+        let landed: Vec<Point> = goals.iter().zip(descents_m.iter().copied()).map(below).collect();
+        schedule.parked_separation_m +=
+            margins::extra_beside_parked_m(schedule.parked_separation_m, &pads, &landed);
         if let Some(BoardCapacity { name, vehicles, .. }) =
             board.filter(|b| b.vehicles < tasks.len().max(goals.len()))
         {

@@ -16,8 +16,8 @@ const BEFORE_STRETCH_END_M: f32 = UNHEARD_STRETCH_SPARE_M + 0.33;
 /// Time after the last report that another vehicle hears this one from which no echo can come that
 /// acknowledges a later intent: an intent is echoed within 2.54 s.
 const ECHOED_WITHIN: Duration = Duration::from_secs(3);
-/// Time for which others report that they hear this vehicle after its last intent, and that in
-/// which each of both is sent, seconds.
+/// Time from a vehicle's last intent that arrives until the last report that it is heard, seconds,
+/// without the delay of messages: others report so for 0.8 s, and both are sent each 0.2 s.
 const REPORTS_HEARD_FOR_S: f32 = 1.2;
 /// Longest delay of messages with which a vehicle knows which of its intents arrived last, seconds:
 /// longer, an echo that comes seldom may be of one that is seconds older.

@@ -12,11 +12,11 @@ use planner_core::track::deconflict::Method;
 use super::coverage::AreaSection;
 use super::error::ScenarioError;
 use crate::link::LinkUrl;
+use crate::map::Unknown;
 
 /// Radio range, metres, from which on companions take it that the radio reaches every vehicle. The
 /// simulated radio keeps the scenario's range.
 const RADIO_REACHES_ALL_FROM_M: f32 = 500.0;
-use crate::map::Unknown;
 
 /// A scenario, read and checked.
 #[derive(Clone, Debug)]

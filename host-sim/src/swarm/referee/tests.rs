@@ -151,3 +151,23 @@ fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
         assert_eq!(referee.deadlocks, 0);
     });
 }
+
+#[test]
+fn out_of_radio_range_only_a_short_wait_that_flying_on_ends_is_no_deadlock() {
+    let phases = [RefereePhase::Flying, RefereePhase::TakeOffOrLanding];
+    for (stands_s, phase, deadlocks) in [(40, phases[0], 0), (80, phases[0], 1), (40, phases[1], 1)]
+    {
+        with_monitor(|mut referee| {
+            referee.retracts_out_of_range_waits = true;
+            let rests = at(5.0, 5.0, 5.0, RefereePhase::Grounded);
+            for step in 0..10 * stands_s {
+                let hovers = at(2.0, 2.0, 5.0, RefereePhase::Flying);
+                referee.observe(f64::from(step) * 0.1, &[hovers, rests]);
+            }
+            assert_eq!(referee.deadlocks, 1);
+            let x = if phase == RefereePhase::Flying { 2.5 } else { 2.0 };
+            referee.observe(f64::from(stands_s), &[at(x, 2.0, 5.0, phase), rests]);
+            assert_eq!(referee.deadlocks, deadlocks, "{stands_s} s, {phase:?}");
+        });
+    }
+}

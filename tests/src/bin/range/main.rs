@@ -106,9 +106,10 @@ fn main() -> Result<()> {
 /// Prints the standstills of `flight` that ended, and returns their number.
 fn print_standstills(log: &[LogEvent], flight: &str) -> usize {
     let stood = log.iter().filter(|event| event.text.starts_with("stood for"));
-    stood
-        .inspect(|event| println!("  {flight}, vehicle {:?}: {}", event.vehicle, event.text))
-        .count()
+    let print = |event: &&LogEvent| {
+        println!("  {flight}, vehicle {}: {}", event.vehicle.unwrap_or(0), event.text);
+    };
+    stood.inspect(print).count()
 }
 
 /// Flies missions in which a vehicle fails at the edge of the radio range, judged by true motion.
