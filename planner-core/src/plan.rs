@@ -7,10 +7,11 @@
 //! length over all pairs (unlabelled). The paper leaves out the order at shared stretches, which
 //! [`crate::schedule`] decides.
 //!
-//! Cost: one search per vehicle, one assignment, then at most 2 · (min(vehicles, 64) + 9) rounds.
-//! In a round each vehicle takes one to three A*, up to a dozen searches of the schedule (one per
-//! departure tried) and one pass over all scheduled timed segments. Twice that for more than
-//! `MAX_VEHICLES_WITHOUT_HANDOVER` vehicles that cannot be planned with a handover.
+//! Cost: one search per vehicle, one assignment, then at most 2 · (min(vehicles, 64) + 9) rounds, and
+//! 9 more where a vehicle would hover for long. In a round each vehicle takes one to three A*, up to a
+//! dozen searches of the schedule (one per departure tried) and one pass over all scheduled timed
+//! segments. Twice that for more than `MAX_VEHICLES_WITHOUT_HANDOVER` vehicles that cannot be
+//! planned with a handover.
 
 mod departures;
 mod order;

@@ -18,6 +18,8 @@ use rayon::prelude::*;
 
 /// Number of swarms unless `FLOCKMATE_SCHEDULES` sets another.
 const SWARMS: u64 = 200;
+/// Hover from which the planner seeks another order, seconds.
+const LONG_HOVER_S: f32 = 10.0;
 /// Flight of the fastest vehicle in one step, metres.
 const STEP_M: f32 = 0.3;
 
@@ -145,6 +147,8 @@ struct Sum {
     refused: BTreeMap<String, u64>,
     failures: Vec<String>,
     makespan_s: f64,
+    /// Number of plans in which a vehicle hovers at one place for more than [`LONG_HOVER_S`].
+    long_hovers: u64,
 }
 
 fn one(seed: u64) -> Sum {
@@ -180,6 +184,10 @@ fn one(seed: u64) -> Sum {
         let last = f.path.waypoints().last().map_or(0.0, |w| w.leave_s);
         f.depart_s + last + f.descent_m / swarm.schedule.vertical_mps
     };
+    let longest_hover_s = |f: &Flight<WAYPOINTS>| {
+        f.path.waypoints().iter().map(|w| w.leave_s - w.arrive_s).fold(0.0, f32::max)
+    };
+    sum.long_hovers = u64::from(plan.flights.iter().any(|f| longest_hover_s(f) > LONG_HOVER_S));
     sum.makespan_s = f64::from(plan.flights.iter().map(landed_s).fold(0.0, f32::max));
     for _ in 0..2 {
         if let Err(error) = fly(&plan, &owns, swarm.safety_m, &mut rng) {
@@ -204,20 +212,24 @@ fn random_swarms_stay_apart_and_arrive_by_gates_alone() {
         all.flights += sum.flights;
         all.unfit += sum.unfit;
         all.makespan_s += sum.makespan_s;
+        all.long_hovers += sum.long_hovers;
         sum.refused
             .into_iter()
             .for_each(|(name, count)| *all.refused.entry(name).or_default() += count);
         all.failures.extend(sum.failures);
     }
     println!(
-        "{} swarms, {} planned, {} flights, {} without all plans, mean makespan {:.2} s, refused {:?}",
+        "{} swarms, {} planned, {} flights, {} without all plans, mean makespan {:.2} s, {} with a hover \
+         of more than {LONG_HOVER_S} s, refused {:?}",
         all.swarms,
         all.planned,
         all.flights,
         all.unfit,
         all.makespan_s / all.planned.max(1) as f64,
+        all.long_hovers,
         all.refused,
     );
+    assert!(all.long_hovers * 20 < all.planned, "a vehicle hovers where another order avoids it");
     assert!(all.planned * 3 > all.swarms, "most swarms are refused: nothing is shown");
     let shown: Vec<_> = all.failures.iter().take(20).collect();
     assert!(all.failures.is_empty(), "{} of {}: {shown:#?}", all.failures.len(), all.swarms);
