@@ -27,7 +27,7 @@ pub const PLAN_CASES: u64 = 200;
 /// Number of [`StepCase`]s whose instructions are counted; the largest count is reported.
 pub const STEP_CASES: usize = 10_000;
 /// Most vehicles of a [`PlanCase`], so that its cost matrix is at most 10 × 10.
-const MAX_SWARM: usize = 10;
+const MAX_SWARM_VEHICLES: usize = 10;
 /// Number of points along each path of a [`PlanCase`] at which [`deconflict::advise`] is called
 /// with random neighbours.
 const ADVICE_PER_PATH: usize = 4;
@@ -48,7 +48,7 @@ pub const ASSIGNMENT_MODE: GoalMode = GoalMode::Unlabelled(Objective::TotalDista
 
 /// The tasks of a swarm with one vehicle at each start of the roadmap, at most [`VEHICLES`].
 pub fn vehicle_tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
-    let starts = view.header().starts.min(VEHICLES as u16);
+    let starts = view.header().start_count.min(VEHICLES as u16);
     let task = |i: u16| VehicleTask {
         id: 1 + i as u8,
         required_clearance_m: CLEARANCE_M,
@@ -60,14 +60,14 @@ pub fn vehicle_tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
 
 /// Descent at each goal of the roadmap, from the path's end to the ground: 1 m.
 pub fn goal_descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
-    (0..view.header().goals.min(VEHICLES as u16)).map(|_| 1.0).collect()
+    (0..view.header().goal_count.min(VEHICLES as u16)).map(|_| 1.0).collect()
 }
 
 /// The plan request for the vehicles of [`vehicle_tasks`] and the descents of [`goal_descents`].
 pub fn plan_request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
     PlanRequest {
         vehicles,
-        descents_m,
+        goal_descents_m: descents_m,
         mode: ASSIGNMENT_MODE,
         schedule: SCHEDULE,
         max_gates: GATES,
@@ -75,19 +75,19 @@ pub fn plan_request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> P
 }
 
 /// Workspace of [`plan_case`].
-pub struct Workspace {
+pub struct PlanCaseWorkspace {
     search: SearchWorkspace<ROADMAP_NODES>,
     assignment: AssignmentWorkspace<VEHICLES>,
 }
 
-impl Workspace {
+impl PlanCaseWorkspace {
     /// Empty; its bytes are all zeros.
     pub const fn new() -> Self {
         Self { search: SearchWorkspace::new(), assignment: AssignmentWorkspace::new() }
     }
 }
 
-impl Default for Workspace {
+impl Default for PlanCaseWorkspace {
     fn default() -> Self {
         Self::new()
     }
@@ -97,23 +97,23 @@ impl Default for Workspace {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlanCase {
     /// CRC of the cost matrix.
-    pub costs: u32,
+    pub costs_crc: u32,
     /// CRC of the assignment of vehicles to goals, and of its total cost.
-    pub assignment: u32,
+    pub assignment_crc: u32,
     /// CRC of all paths: nodes, positions, arc lengths, clearances.
-    pub paths: u32,
+    pub paths_crc: u32,
     /// CRC of the advice among random neighbours, by both methods: speed scale, stop distance, the
     /// vehicle waited for.
-    pub scales: u32,
+    pub advice_crc: u32,
 }
 
 /// Computes case `number`: cost matrix, assignment and paths of up to ten vehicles between random
 /// nodes, some edges blocked at random; then advice among random neighbours along every path.
-pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> PlanCase {
+pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut PlanCaseWorkspace) -> PlanCase {
     let mut rng = Pcg32::seed_from_u64(number);
     let nodes = view.node_count();
-    let swarm = 1 + random_below(&mut rng, MAX_SWARM);
-    let draw = |rng: &mut Pcg32| -> Vec<u16, MAX_SWARM> {
+    let swarm = 1 + random_below(&mut rng, MAX_SWARM_VEHICLES);
+    let draw = |rng: &mut Pcg32| -> Vec<u16, MAX_SWARM_VEHICLES> {
         (0..swarm).map(|_| random_below(rng, nodes) as u16).collect()
     };
     let (starts, goals) = (draw(&mut rng), draw(&mut rng));
@@ -124,15 +124,15 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
     };
     let mut case = [CRC32.digest(), CRC32.digest(), CRC32.digest(), CRC32.digest()];
     let [costs_crc, assignment_crc, paths_crc, scales_crc] = &mut case;
-    let mut costs = [0.0; MAX_SWARM * MAX_SWARM];
+    let mut costs = [0.0; MAX_SWARM_VEHICLES * MAX_SWARM_VEHICLES];
     let costs = &mut costs[..swarm * swarm];
     let found = search::cost_matrix(view, &starts, &goals, passable, &mut ws.search, costs);
     costs_crc.update(&[u8::from(found.is_ok())]);
     costs.iter().for_each(|cost| costs_crc.update(&cost.to_bits().to_le_bytes()));
-    let mut assigned = [None; MAX_SWARM];
+    let mut assigned = [None; MAX_SWARM_VEHICLES];
     let assigned = &mut assigned[..swarm];
     if let Ok(assignment) = assignment::assign(costs, swarm, swarm, &mut ws.assignment, assigned) {
-        assignment_crc.update(&assignment.total.to_bits().to_le_bytes());
+        assignment_crc.update(&assignment.total_cost.to_bits().to_le_bytes());
     }
     for (&start, goal) in starts.iter().zip(assigned.iter()) {
         assignment_crc.update(&goal.unwrap_or(u16::MAX).to_le_bytes());
@@ -149,13 +149,13 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
         }
         for waypoint in path.waypoints() {
             let numbers =
-                waypoint.position.iter().chain([&waypoint.along_m, &waypoint.clearance_m]);
+                waypoint.position.iter().chain([&waypoint.along_m, &waypoint.leg_clearance_m]);
             numbers.for_each(|number| paths_crc.update(&number.to_bits().to_le_bytes()));
         }
         (0..ADVICE_PER_PATH).for_each(|_| add_advice_along_path(&mut rng, &path, scales_crc));
     }
     let [costs, assignment, paths, scales] = case.map(digest_value);
-    PlanCase { costs, assignment, paths, scales }
+    PlanCase { costs_crc: costs, assignment_crc: assignment, paths_crc: paths, advice_crc: scales }
 }
 
 /// Finalizes a digest of this type; the crate has a digest type for each width, and `map` needs
@@ -173,14 +173,14 @@ fn add_advice_along_path(
     let Some(position) = path.point_at(along_m) else { return };
     let neighbours: Vec<Neighbour, VEHICLES> =
         (0..VEHICLES).map(|k| random_neighbour(rng, k, &position, 12.0)).collect();
-    let own = OwnVehicle { rank: 3, position, along_m, path, detours: false };
+    let own = OwnVehicle { rank: 3, position, along_m, path, on_detour: false };
     for method in [Method::Priority, Method::Algorithm2] {
         let cfg =
             DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 };
         let advice = deconflict::advise(&cfg, &own, &[], &neighbours);
         scales.update(&advice.speed_scale.to_bits().to_le_bytes());
         scales.update(&advice.stop_within_m.to_bits().to_le_bytes());
-        scales.update(&[advice.waiting_for]);
+        scales.update(&[advice.waiting_for_id]);
     }
 }
 
@@ -244,8 +244,8 @@ impl StepCase {
         let reach_m = if hard { 3.0 } else { path.length_m() };
         let gate = |rng: &mut Pcg32| Gate {
             at_m: along_m + random_between(rng, 0.0, reach_m),
-            id: 2 + random_below(rng, neighbours.max(1)) as u8,
-            until_m: random_between(rng, 0.0, 60.0),
+            wait_for_id: 2 + random_below(rng, neighbours.max(1)) as u8,
+            open_from_progress_m: random_between(rng, 0.0, 60.0),
         };
         let mut gates: Vec<_, GATES> =
             (0..random_below(rng, GATES + 1)).map(|_| gate(rng)).collect();
@@ -272,7 +272,7 @@ impl StepCase {
     pub fn advise(&self, method: Method) -> Advice {
         let Self { position, along_m, path, .. } = self;
         let own =
-            OwnVehicle { rank: 0, position: *position, along_m: *along_m, path, detours: false };
+            OwnVehicle { rank: 0, position: *position, along_m: *along_m, path, on_detour: false };
         deconflict::advise(
             &DeconflictConfig { method, ..self.cfg },
             &own,
@@ -299,7 +299,7 @@ pub fn random_point(rng: &mut Pcg32, reach_m: f32) -> Point {
 
 /// Settings of the roadmap that is built on board: 2300 nodes in paper P3D's building.
 pub const ROADMAP_CONFIG: PrmConfig = PrmConfig {
-    nodes: 2300,
+    random_nodes: 2300,
     edge_min_m: 0.5,
     edge_max_m: 8.0,
     clearance_m: 0.0,

@@ -1,7 +1,8 @@
 //! The drain contract as a run loop: bytes and time in, bytes and events out.
 //!
 //! Here the clock counts steps of 10 ms, and the autopilot sends only a HEARTBEAT each second. A
-//! real shell reads a clock, reads and writes two ports, and plans (`companion::planner::answer`).
+//! real shell reads a clock, reads and writes two ports, and plans
+//! (`companion::planner::answer_plan_request`).
 //!
 //! `cargo run -p companion --example run_loop`
 

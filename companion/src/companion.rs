@@ -81,15 +81,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     #[inline(always)]
-    fn from_checked(CheckedConfig { config, start }: CheckedConfig<V>) -> Self {
+    fn from_checked(CheckedConfig { config, path_start: start }: CheckedConfig<V>) -> Self {
         const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };
         let mut neighbours = Neighbours::new(
             &config.roster,
             config.system_id,
-            config.slowest_mps,
-            config.fastest_mps.max(config.climb_mps),
+            config.slowest_vehicle_mps,
+            config.fastest_vehicle_mps.max(config.climb_mps),
         );
-        if let Some(down_s) = config.lost_vehicle_down_s {
+        if let Some(down_s) = config.lost_vehicle_down_after_s {
             let pair_error_m =
                 margins::pair_position_error_m(config.required_clearance_m, config.radius_m);
             neighbours.form_fleet(down_s, config.ground, pair_error_m);
@@ -138,28 +138,28 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// that deconfliction (`Advice`) stops for, at a gate or before a predicted conflict; 0 for
     /// none.
     pub fn waiting_for(&self) -> u8 {
-        match self.guidance.filter.blocker() {
-            0 => self.guidance.advice.waiting_for,
+        match self.guidance.filter.blocker_id() {
+            0 => self.guidance.advice.waiting_for_id,
             id => id,
         }
     }
 
     /// Number of times that the safety filter stopped the vehicle.
     pub fn filter_stop_count(&self) -> u32 {
-        self.guidance.filter.activation_count()
+        self.guidance.filter.stop_count()
     }
 
     /// System id of the neighbour that the safety filter stops for at `now`, computed as in each
     /// step; 0 for none. The call changes no state: benches call it to count the filter's
     /// instructions.
-    pub fn query_filter(&mut self, now: Instant) -> u8 {
+    pub fn query_filter_blocker(&mut self, now: Instant) -> u8 {
         let scene = GuidanceInputs::new(
             self.mission.plan(),
             &self.telemetry,
             (self.neighbours.own_rank(), self.config.system_id),
             self.detours.path_source(),
         );
-        self.guidance.query_filter(self.mission.state(), &scene, &self.neighbours, now)
+        self.guidance.query_filter_blocker(self.mission.state(), &scene, &self.neighbours, now)
     }
 
     /// Whether the setpoint is in a stop by the safety filter, which may use twice the jerk.
@@ -172,7 +172,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// vehicle left its plan.
     pub fn progress_m(&self) -> f32 {
         let left_at_m = if self.detours.is_on_detour() { self.detours.left_at_m() } else { 0.0 };
-        self.guidance.progress_m(self.mission.state(), &self.guidance_inputs()) + left_at_m.max(0.0)
+        self.guidance.reported_progress_m(self.mission.state(), &self.guidance_inputs())
+            + left_at_m.max(0.0)
     }
 
     /// Statistics of the setpoints since the companion's start: number, greatest values, holds.
@@ -208,9 +209,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         match (wanted, self.mission.state(), outcome) {
             (PlanKind::Mission, State::Planning, Ok(plan)) => {
                 self.mission.set_plan(plan);
-                self.neighbours.fleet_mut().into_iter().for_each(|f| f.set_plan(plan.plan_crc));
+                self.neighbours
+                    .fleet_mut()
+                    .into_iter()
+                    .for_each(|f| f.set_plan(plan.swarm_plan_crc));
             }
-            (PlanKind::Mission, State::Planning, Err(failure)) => self.mission.set_failure(failure),
+            (PlanKind::Mission, State::Planning, Err(failure)) => {
+                self.mission.set_plan_failure(failure);
+            }
             (PlanKind::Detour, ..) if !self.detours.is_request_read() => return,
             (PlanKind::Detour, state, Ok(plan)) if state.waits_for_detour() => {
                 self.adopt_detour(plan);
@@ -246,7 +252,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// State, climb, landing column and time limits, from which the requests to the autopilot are
     /// made.
     fn handshake_context(&self) -> HandshakeContext {
-        let in_state = self.mission.time_in_state(self.now);
+        let time_in_state = self.mission.time_in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;
         let timeout_s = (margin_m / self.config.cruise_mps)
             .clamp(GUID_TIMEOUT_RANGE_S.0, GUID_TIMEOUT_RANGE_S.1);
@@ -255,12 +261,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         HandshakeContext {
             now: self.now,
             state: self.mission.state(),
-            in_state,
+            time_in_state,
             climb_m: self.mission.climb_m(),
             guided_timeout_s: timeout_s,
             column_clear,
-            may_land: self.must_land()
-                || (column_clear && HandshakeContext::is_column_checked(in_state)),
+            may_request_land_mode: self.must_land()
+                || (column_clear && HandshakeContext::is_column_checked(time_in_state)),
         }
     }
 

@@ -13,10 +13,10 @@ use planner_core::track::deconflict::Method;
 use crate::margins;
 
 /// Maximum number of ground stations that a mission names.
-pub const GROUND_STATIONS: usize = 4;
+pub const MAX_GROUND_STATIONS: usize = 4;
 /// System ids of the ground stations of a mission that names none: 255, which QGroundControl,
 /// MAVProxy and pymavlink use.
-pub const USUAL_GROUND_STATIONS: [u8; GROUND_STATIONS] = [255, 0, 0, 0];
+pub const DEFAULT_GROUND_STATION_IDS: [u8; MAX_GROUND_STATIONS] = [255, 0, 0, 0];
 
 /// Default safety distance between the centres of two vehicles, metres: two airframes of 0.3 m
 /// radius, and 0.9 m of air.
@@ -28,7 +28,7 @@ pub struct RosterEntry {
     /// MAVLink system id, 1…255.
     pub system_id: u8,
     /// First point of its path, ENU metres: above its pad, at the altitude to which it climbs.
-    pub start: Point,
+    pub path_start: Point,
 }
 
 /// Settings of one companion, for a roster of at most `V` vehicles.
@@ -46,10 +46,10 @@ pub struct Config<const V: usize> {
     pub cruise_mps: f32,
     /// Cruise speed of the slowest vehicle of the mission, m/s: an unheard vehicle is assumed to
     /// fly at least at a share of it.
-    pub slowest_mps: f32,
+    pub slowest_vehicle_mps: f32,
     /// Cruise speed of the fastest vehicle of the mission, m/s: it bounds how far an unheard
     /// vehicle may have flown.
-    pub fastest_mps: f32,
+    pub fastest_vehicle_mps: f32,
     /// Speed of this vehicle's climb from its pad, m/s.
     pub climb_mps: f32,
     /// Speed of this vehicle's guided descent, m/s.
@@ -68,7 +68,7 @@ pub struct Config<const V: usize> {
     pub method: Method,
     /// Least error of the position estimate that is assumed, whatever accuracy the autopilot
     /// reports, metres (`FLK_EST_M`): the operator vouches by it for the receiver.
-    pub estimate_m: f32,
+    pub min_estimate_error_m: f32,
     /// Range within which the swarm's radio surely works, metres (`FLK_RADIO_M`). A neighbour that
     /// falls silent beyond 0.7 of this range is taken to be out of range, not failed. With
     /// [`REACHES_ALL_M`] the radio reaches every vehicle, so any silence is a failure.
@@ -85,15 +85,15 @@ pub struct Config<const V: usize> {
     pub geofence: Option<(Point, Point)>,
     /// In a coverage mission, whose area is divided again after the loss of a vehicle: the longest
     /// time that a lost vehicle takes to come down, seconds. `None` in a mission with goals.
-    pub lost_vehicle_down_s: Option<f32>,
+    pub lost_vehicle_down_after_s: Option<f32>,
     /// Height range of the ground below a coverage mission whose ground is not level.
-    pub ground: Option<Ground>,
+    pub ground: Option<UnevenGround>,
     /// Whether a coverage mission that starts again leaves out the waypoints that are photographed
     /// already.
     pub skips_photographed: bool,
     /// System ids of the senders whose commands, parameter changes and file transfers are accepted;
     /// 0 fills an unused entry.
-    pub ground_stations: [u8; GROUND_STATIONS],
+    pub ground_stations: [u8; MAX_GROUND_STATIONS],
 }
 
 /// Value of `radio_range_m` for a radio that reaches every vehicle, metres.
@@ -103,7 +103,7 @@ pub const REACHES_ALL_M: f32 = 10_000.0;
 #[derive(Clone, Debug)]
 pub struct CheckedConfig<const V: usize> {
     pub(crate) config: Config<V>,
-    pub(crate) start: Point,
+    pub(crate) path_start: Point,
 }
 
 /// Reason why a configuration was refused.
@@ -136,15 +136,15 @@ impl<const V: usize> Config<V> {
         let mut roster = Vec::new();
         // With `V` = 0 this vehicle does not fit into the roster: `check` then refuses the
         // settings.
-        let _ = roster.push(RosterEntry { system_id, start });
+        let _ = roster.push(RosterEntry { system_id, path_start: start });
         Self {
             system_id,
             roster,
             origin,
             mission_crc: 0,
             cruise_mps: 2.0,
-            slowest_mps: 2.0,
-            fastest_mps: 2.0,
+            slowest_vehicle_mps: 2.0,
+            fastest_vehicle_mps: 2.0,
             climb_mps: 1.0,
             descend_mps: 1.0,
             accel_mps2: 1.5,
@@ -152,16 +152,16 @@ impl<const V: usize> Config<V> {
             required_clearance_m: 0.8,
             safety_distance_m: SAFETY_DISTANCE_M,
             method: Method::Priority,
-            estimate_m: margins::MIN_ESTIMATE_ERROR_M,
+            min_estimate_error_m: margins::MIN_ESTIMATE_ERROR_BOUND_M,
             radio_range_m: REACHES_ALL_M,
             start_tolerance_m: 2.0,
             battery_low_percent: 15,
             swarm_hz: 5,
             geofence: None,
-            lost_vehicle_down_s: None,
+            lost_vehicle_down_after_s: None,
             ground: None,
             skips_photographed: true,
-            ground_stations: USUAL_GROUND_STATIONS,
+            ground_stations: DEFAULT_GROUND_STATION_IDS,
         }
     }
 
@@ -174,12 +174,12 @@ impl<const V: usize> Config<V> {
 
 /// Heights of ground that is not level, below a coverage mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ground {
+pub struct UnevenGround {
     /// Least height above the ground from which pictures are taken, metres.
-    pub height_m: f32,
-    /// Greatest height of paths above `height_m`, metres: they lie between `height_m` and
-    /// `height_m` + `tolerance_m` above the ground.
-    pub tolerance_m: f32,
+    pub min_height_above_ground_m: f32,
+    /// Greatest height of paths above `min_height_above_ground_m`, metres: they lie between
+    /// `min_height_above_ground_m` and `height_m` + `tolerance_m` above the ground.
+    pub height_tolerance_m: f32,
     /// Height of the lowest ground, ENU up in the mission frame, metres.
     pub low_m: f32,
     /// Height of the highest ground, ENU up in the mission frame, metres.

@@ -41,25 +41,25 @@ impl PlanKind {
 /// the details only when it begins.
 #[derive(Debug, Default)]
 pub struct PlanRequests {
-    waiting: AtomicU8,
+    waiting_kinds: AtomicU8,
 }
 
 impl PlanRequests {
     /// Holds no request.
     pub const fn new() -> Self {
-        Self { waiting: AtomicU8::new(0) }
+        Self { waiting_kinds: AtomicU8::new(0) }
     }
 
     /// Adds a request; nothing changes if one of this kind waits already.
     pub fn add(&self, wanted: PlanKind) {
-        self.waiting.fetch_or(wanted.bit(), Ordering::Relaxed);
+        self.waiting_kinds.fetch_or(wanted.bit(), Ordering::Relaxed);
     }
 
     /// Removes and returns the most urgent request; `None` when none waits.
     pub fn take(&self) -> Option<PlanKind> {
-        PlanKind::BY_URGENCY
-            .into_iter()
-            .find(|kind| self.waiting.fetch_and(!kind.bit(), Ordering::Relaxed) & kind.bit() != 0)
+        PlanKind::BY_URGENCY.into_iter().find(|kind| {
+            self.waiting_kinds.fetch_and(!kind.bit(), Ordering::Relaxed) & kind.bit() != 0
+        })
     }
 }
 
@@ -84,13 +84,13 @@ pub enum Event {
     },
     /// This vehicle is back on its path in a coverage mission after a detour. Waypoints that the
     /// detour passed by are not photographed; the next start of the mission flies them.
-    FlownAround {
+    DetourSkippedWaypoints {
         /// Number of waypoints that are left.
-        left: u32,
+        count: u32,
     },
     /// This vehicle has waited for 30 s for a vehicle that was not started; repeated every 30 s
     /// while it waits.
-    WaitsForStart {
+    WaitsForUnstartedVehicle {
         /// MAVLink system id of the vehicle that was not started.
         id: u8,
     },

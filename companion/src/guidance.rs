@@ -33,9 +33,9 @@ use planner_core::track::{self, ReferenceState, TrackConfig};
 use planner_core::{Length, Point};
 
 use self::filter::SafetyFilter;
-use self::hold::{GOING_FIRST_STANDSTILL, Hold, YIELDING_STANDSTILL};
+use self::hold::{HOLD_AFTER_IF_FIRST, HOLD_AFTER_IF_YIELDING, Hold};
 use self::phase::Phase;
-use self::setpoint::position_correction;
+use self::setpoint::correction_acceleration;
 use self::smoother::{ClockPace, SetpointSmoother, TICK_S};
 use self::waypoints::Algorithm2Waypoints;
 use crate::autopilot::limits::AutopilotLimits;
@@ -52,22 +52,22 @@ pub use self::smoother::SetpointStats;
 
 /// A vehicle this near to its reference, or to the end of a climb or a path, counts as there,
 /// metres.
-const ARRIVED_M: f32 = 0.35;
+const ARRIVED_WITHIN_M: f32 = 0.35;
 /// Speed below which the vehicle stands at the end of its path, m/s.
 const AT_REST_MPS: f32 = 0.5;
 /// Speed below which the setpoint stands, m/s.
 const STANDING_SETPOINT_MPS: f32 = 0.05;
 /// A climb is done within this vertical distance of its top, metres.
-const CLIMBED_M: f32 = 0.12;
+const CLIMB_DONE_WITHIN_M: f32 = 0.12;
 /// A guided descent is done within this height above its lower end, metres.
-const DESCENDED_M: f32 = 0.2;
+const DESCENT_DONE_WITHIN_M: f32 = 0.2;
 /// Time for which the setpoint rests at the end of a guided descent before the autopilot's landing
 /// mode takes over, even if the vehicle has not reached that point.
-const LAND_AFTER: Duration = Duration::from_secs(2);
+const LAND_MODE_AFTER_REST: Duration = Duration::from_secs(2);
 /// Time without progress of a guided landing after which the autopilot's own landing takes over.
 const GUIDED_LANDING_STALL_TIMEOUT: Duration = Duration::from_secs(4);
 /// Greatest distance of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
-const LEG_LEAD_M: f32 = 1.5;
+const MAX_LEG_LEAD_M: f32 = 1.5;
 /// Greatest speed with which the setpoint of a vehicle on its pad follows the position estimate
 /// before the take-off, m/s.
 const MAX_PAD_DRIFT_MPS: f32 = 0.2;
@@ -77,11 +77,11 @@ pub const REJOIN_WINDOW_M: f32 = 5.0;
 /// Length of path searched, to either side, for the point nearest to a vehicle whose position was
 /// lost, metres: it stopped within its braking distance of the reference, so a position further
 /// along the path is not believed.
-pub const LOST_WINDOW_M: f32 = 2.5;
+pub const REJOIN_WINDOW_AFTER_LOSS_M: f32 = 2.5;
 /// Length of path searched ahead of a reference that stepped back for the point nearest to the
 /// setpoint, metres: at the 1.5 m/s of a step back the setpoint stands up to 2 m ahead of it.
 /// By Algorithm 2 also searched, to either side, for the point nearest to the raw point.
-const SETTLE_WINDOW_M: f32 = 3.0;
+const REFERENCE_RESET_WINDOW_M: f32 = 3.0;
 /// A nearest point this close to an end of the searched path counts as not found, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
 /// A setpoint within this distance of the reference along the path has reached it, metres: after
@@ -94,17 +94,17 @@ const MIN_PROGRESS_M: f32 = 0.25;
 const FENCE_MARGIN_M: f32 = 0.05;
 /// Bisection steps that find where the path leaves the geofence: to 1 cm in the 3 m of a stop.
 const FENCE_HALVINGS: usize = 8;
-/// Upper bound of `low_height_m`, the height above the ground from which a guided descent is slow,
-/// or an autopilot that is not led to the ground lands by itself, metres; the margin to walls is
-/// another upper bound.
-const MAX_LOW_HEIGHT_M: f32 = 1.2;
+/// Upper bound of `final_descent_height_m`, the height above the ground from which a guided descent
+/// is slow, or an autopilot that is not led to the ground lands by itself, metres; the margin to
+/// walls is another upper bound.
+const MAX_FINAL_DESCENT_HEIGHT_M: f32 = 1.2;
 /// Greatest speed of a guided descent near the ground, m/s: that of ArduCopter's landing.
 const TOUCHDOWN_MPS: f32 = 0.5;
 /// A leg shorter than this counts as flown, metres.
 const MIN_LEG_M: f32 = 1e-3;
 
 /// Advice before the neighbours are first evaluated: stand.
-const NO_ADVICE_YET: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
+const NO_ADVICE_YET: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for_id: 0 };
 
 /// State of guidance: flight phase, raw point, smoother and safety filter.
 #[derive(Clone, Debug)]
@@ -114,7 +114,7 @@ pub struct Guidance {
     leg_track: TrackConfig,
     deconflict: DeconflictConfig,
     /// Speed of the mission's fastest vehicle, m/s.
-    fastest_mps: f32,
+    fastest_vehicle_mps: f32,
     /// Greatest horizontal distance from its start at which the vehicle takes off, metres.
     start_tolerance_m: f32,
     /// Share of the nominal speed that the error bound of the position estimate allows; 0 stops.
@@ -130,27 +130,27 @@ pub struct Guidance {
     /// The waypoint that the vehicle flies to by Algorithm 2 of the paper.
     waypoints: Algorithm2Waypoints,
     /// Whether the raw point was set back to where the setpoint stands.
-    raw_point_at_rest: bool,
+    raw_point_at_setpoint: bool,
     /// Whether the position was lost, so that setpoints carried no place.
-    position_unknown: bool,
+    position_was_lost: bool,
     /// Whether setpoints lead to a place: the position was known in the last step.
-    leads_to_place: bool,
+    setpoint_has_position: bool,
     /// Whether in the last step a pilot or the autopilot flew, and setpoints followed the vehicle.
-    autopilot_took_over: bool,
+    setpoint_followed_vehicle: bool,
     /// Time since a setpoint with a place was sent, seconds.
-    unsent_s: f32,
+    since_sent_s: f32,
     /// The advice of the last step: speed scale, distance to the stop, vehicle waited for.
     pub advice: Advice,
     /// Number of gates of the plan, from the first on, that have opened; they stay open.
-    gates_open: usize,
-    on_path: bool,
+    open_gate_count: usize,
+    has_begun_path: bool,
     /// Whether its path begins above its pad, so that it may join it from where it took off.
-    from_pad: bool,
+    path_begins_above_pad: bool,
     /// Whether it lands where a pilot, the autopilot or a lost position left it, off its path.
     lands_off_path: bool,
-    lead_limit_m: f32,
+    max_lead_m: f32,
     /// Arc length of the setpoint along the path, metres.
-    pub(crate) setpoint_m: f32,
+    pub(crate) setpoint_along_m: f32,
     /// Arc length where the vehicle will stop by advice or braking, without the filter, metres.
     pub(crate) stops_at_m: f32,
     /// The safety filter.
@@ -166,12 +166,11 @@ pub struct Guidance {
     /// Whether the raw point stops because the path ahead leaves the geofence.
     stopped_at_fence: bool,
     last_progress_m: f32,
-    progress_at: Instant,
-    /// When the vehicle was last at its setpoint, or the setpoint last advanced; and where the
-    /// setpoint was then.
-    followed_at: Instant,
-    followed_place: Point,
-    reported_m: f32,
+    last_progress_at: Instant,
+    /// When the vehicle was last at its setpoint, or that last advanced; and where that was then.
+    followed_or_advanced_at: Instant,
+    setpoint_when_followed: Point,
+    last_reported_progress_m: f32,
     /// Whether the vehicle flies back along its path, to the path's start.
     pub returning: bool,
     /// The part of its path that the other vehicles have acknowledged.
@@ -183,21 +182,21 @@ pub struct Guidance {
     pub evading: bool,
     /// Distance ahead on the path at which the vehicle stops, by the deconfliction's advice or to
     /// evade, metres.
-    wait_distance_m: f32,
+    stop_ahead_m: f32,
     /// Place along the path where the vehicle holds for a division, metres; ∞ for none.
-    halt_m: f32,
+    division_hold_m: f32,
     /// Place along the path to which the vehicle steps back from below one that descends, metres;
     /// `None` if it does not step back.
-    back_to_m: Option<f32>,
+    step_back_to_m: Option<f32>,
     /// Whether no place back along the path is outside the columns of vehicles that descend.
-    no_better_place: bool,
+    no_evade_place: bool,
     /// Since when the vehicle has been below one that descends, unable to leave along its path.
-    trapped_since: Option<Instant>,
+    trapped_below_since: Option<Instant>,
     /// Whether the path ends aside or back on the plan's path: then no descent begins at its end.
     pub ends_away_from_goal: bool,
     /// Height above the ground from which a guided descent is slow, or an autopilot that is not led
     /// to the ground lands by itself, metres.
-    low_height_m: f32,
+    final_descent_height_m: f32,
     /// Height of the lowest ground between pads, ENU up, metres; ∞ where only the pads' heights are
     /// known.
     lowest_ground_m: f32,
@@ -208,13 +207,13 @@ pub struct Guidance {
 impl Guidance {
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let smoother = SetpointSmoother::new(MotionLimits::new(config, autopilot), config.geofence);
-        let GuidanceLimits { track, leg_track, deconflict, fastest_mps } =
+        let GuidanceLimits { track, leg_track, deconflict, fastest_vehicle_mps } =
             GuidanceLimits::new(config, autopilot);
         Self {
             track,
             leg_track,
             deconflict,
-            fastest_mps,
+            fastest_vehicle_mps,
             start_tolerance_m: config.start_tolerance_m,
             estimate_speed_share: 1.0,
             smoother,
@@ -223,18 +222,18 @@ impl Guidance {
             leg: None,
             leg_tracker: ReferenceState::default(),
             waypoints: Algorithm2Waypoints::default(),
-            raw_point_at_rest: true,
-            position_unknown: false,
-            leads_to_place: false,
-            autopilot_took_over: false,
-            unsent_s: 0.0,
+            raw_point_at_setpoint: true,
+            position_was_lost: false,
+            setpoint_has_position: false,
+            setpoint_followed_vehicle: false,
+            since_sent_s: 0.0,
             advice: NO_ADVICE_YET,
-            gates_open: 0,
-            on_path: false,
-            from_pad: false,
+            open_gate_count: 0,
+            has_begun_path: false,
+            path_begins_above_pad: false,
             lands_off_path: false,
-            lead_limit_m: LEG_LEAD_M,
-            setpoint_m: 0.0,
+            max_lead_m: MAX_LEG_LEAD_M,
+            setpoint_along_m: 0.0,
             stops_at_m: f32::NEG_INFINITY,
             filter: SafetyFilter::default(),
             hold: Hold::default(),
@@ -243,24 +242,24 @@ impl Guidance {
             guides_landing: false,
             stopped_at_fence: false,
             last_progress_m: 0.0,
-            progress_at: Instant::ZERO,
-            followed_at: Instant::ZERO,
-            followed_place: Point::zeros(),
-            reported_m: f32::NEG_INFINITY,
+            last_progress_at: Instant::ZERO,
+            followed_or_advanced_at: Instant::ZERO,
+            setpoint_when_followed: Point::zeros(),
+            last_reported_progress_m: f32::NEG_INFINITY,
             returning: false,
             acknowledged_path: acknowledged_path::AcknowledgedPath::of_new_path(Instant::ZERO),
             evade_search: EvadeSearch::default(),
             evading: false,
-            wait_distance_m: f32::INFINITY,
-            halt_m: f32::INFINITY,
-            back_to_m: None,
-            no_better_place: false,
-            trapped_since: None,
+            stop_ahead_m: f32::INFINITY,
+            division_hold_m: f32::INFINITY,
+            step_back_to_m: None,
+            no_evade_place: false,
+            trapped_below_since: None,
             ends_away_from_goal: false,
             lowest_ground_m: config.ground.map_or(f32::INFINITY, |ground| ground.low_m),
-            low_height_m: libm::fminf(
+            final_descent_height_m: libm::fminf(
                 config.required_clearance_m - config.radius_m,
-                MAX_LOW_HEIGHT_M,
+                MAX_FINAL_DESCENT_HEIGHT_M,
             ),
             sent_acceleration: Point::zeros(),
         }
@@ -268,30 +267,31 @@ impl Guidance {
 
     /// Computes all limits again, from the settings and the autopilot's limits.
     pub fn set_limits<const V: usize>(&mut self, config: &Config<V>, autopilot: &AutopilotLimits) {
-        let Self { track, leg_track, deconflict, fastest_mps, .. } = Self::new(config, autopilot);
+        let Self { track, leg_track, deconflict, fastest_vehicle_mps, .. } =
+            Self::new(config, autopilot);
         (self.track, self.leg_track) = (track, leg_track);
-        (self.deconflict, self.fastest_mps) = (deconflict, fastest_mps);
+        (self.deconflict, self.fastest_vehicle_mps) = (deconflict, fastest_vehicle_mps);
         self.start_tolerance_m = config.start_tolerance_m;
         self.smoother.set_limits(MotionLimits::new(config, autopilot), config.geofence);
     }
 
     /// Forgets the flight before: phase, leg, path progress, advice and filter. The setpoint stays.
     pub fn reset(&mut self) {
-        (self.tracker, self.setpoint_m) = (ReferenceState::default(), 0.0);
+        (self.tracker, self.setpoint_along_m) = (ReferenceState::default(), 0.0);
         self.phase = Phase::Hold;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
-        (self.on_path, self.returning, self.ends_away_from_goal) = (false, false, false);
+        (self.has_begun_path, self.returning, self.ends_away_from_goal) = (false, false, false);
         self.acknowledged_path = acknowledged_path::AcknowledgedPath::of_new_path(Instant::ZERO);
-        self.reported_m = f32::NEG_INFINITY;
+        self.last_reported_progress_m = f32::NEG_INFINITY;
         self.advice = NO_ADVICE_YET;
-        self.gates_open = 0;
+        self.open_gate_count = 0;
         self.filter.reset();
     }
 
     /// Arc length of the reference along the path, metres; −∞ before the path is begun.
-    pub fn along_m(&self) -> f32 {
-        if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
+    pub fn reference_along_m(&self) -> f32 {
+        if self.has_begun_path { self.tracker.along_m } else { f32::NEG_INFINITY }
     }
 
     /// One step of `dt_s` seconds: advice, safety filter, raw points, setpoint. Returns false where
@@ -305,47 +305,47 @@ impl Guidance {
         dt_s: f32,
     ) -> bool {
         let position = scene.telemetry.position;
-        self.unsent_s += dt_s;
+        self.since_sent_s += dt_s;
         let advised_at_m = self.tracker.along_m;
-        let asks = state == State::Scheduled || state.follows_path();
+        let asks = state == State::Scheduled || state.follows_path_or_is_blocked();
         if let Some(plan) = scene.plan.filter(|_| asks) {
-            let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
+            let along_m = if self.has_begun_path { self.tracker.along_m } else { -plan.climb_m };
             let own = OwnVehicle {
                 rank: scene.rank,
                 position,
                 along_m,
                 path: &plan.path,
-                detours: scene.is_on_detour(),
+                on_detour: scene.is_on_detour(),
             };
             let others = neighbours.states_with_age(now);
             self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, others);
-            if self.on_path {
+            if self.has_begun_path {
                 self.advice.stop_within_m =
-                    self.advice.stop_within_m.min((self.halt_m - along_m).max(0.0));
+                    self.advice.stop_within_m.min((self.division_hold_m - along_m).max(0.0));
             }
         }
         if let Some(plan) = scene.plan {
-            let next = plan.gates.get(self.gates_open);
+            let next = plan.gates.get(self.open_gate_count);
             if next.is_some_and(|gate| neighbours.is_open_for_good(gate, now)) {
-                self.gates_open += 1;
+                self.open_gate_count += 1;
             }
-            self.follow_setpoint(&plan.path, dt_s);
-            let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
-            self.stops_at_m = match state.follows_path() {
+            self.update_setpoint_along_m(&plan.path, dt_s);
+            let along_m = if self.has_begun_path { self.tracker.along_m } else { -plan.climb_m };
+            self.stops_at_m = match state.follows_path_or_is_blocked() {
                 // Also while the vehicle is stopped: the filter checks up to the stop even if that
                 // was advised too late.
                 true => {
                     let least_m = track::braking_distance_m(&self.track, &plan.path, &self.tracker);
                     along_m + self.advice.stop_within_m.max(least_m)
                 }
-                false => self.setpoint_m + self.smoother.stopping_distance_m(Urgency::Smooth),
+                false => self.setpoint_along_m + self.smoother.stop_distance_m(Urgency::Smooth),
             };
         }
         self.step_filter(state, scene, neighbours, now);
         let urgency = self.filter.urgency(now);
-        let known = scene.is_place_known(state, now);
+        let known = scene.is_position_usable(state, now);
         let leads = known && state != State::PositionLost;
-        let led_before = core::mem::replace(&mut self.leads_to_place, leads);
+        let led_before = core::mem::replace(&mut self.setpoint_has_position, leads);
         if !state.streams_setpoints() {
             self.smoother.end_stream();
             self.forget_waiting();
@@ -354,29 +354,29 @@ impl Guidance {
         let kind = scene.telemetry.kind();
         let taken = (state.lands_or_disarms() || state == State::PilotControl)
             && scene.telemetry.custom_mode != kind.setpoint_mode();
-        self.position_unknown |= !known || state == State::PositionLost;
-        let flies = scene.telemetry.reports_flight();
-        let taken_before = core::mem::replace(&mut self.autopilot_took_over, taken);
+        self.position_was_lost |= !known || state == State::PositionLost;
+        let flies = scene.telemetry.last_reported_flight();
+        let taken_before = core::mem::replace(&mut self.setpoint_followed_vehicle, taken);
         if taken && !known {
             // The velocity of the last setpoint is not the vehicle's any more.
             self.smoother.end_stream();
-        } else if leads && !led_before && state.needs_new_position() {
+        } else if leads && !led_before && state.needs_fresh_position() {
             // Known again, the position may be far from the last setpoint.
-            self.smoother.resume_at(position, self.unsent_s);
+            self.smoother.resume_at(position, self.since_sent_s);
             self.forget_leg();
         }
         if known && (taken || taken_before || !self.smoother.has_setpoint()) {
             // Another autopilot mode flies or just flew, or there is no setpoint yet: the setpoint
             // begins at the vehicle's position, or takes its velocity.
             if taken {
-                self.smoother.follow_vehicle(position, self.unsent_s);
+                self.smoother.follow_vehicle(position, self.since_sent_s);
             } else if !self.smoother.has_setpoint() {
-                self.smoother.resume_at(position, self.unsent_s);
+                self.smoother.resume_at(position, self.since_sent_s);
             } else if flies {
-                self.smoother.hold_with_velocity(&scene.telemetry.velocity);
+                self.smoother.brake_from_velocity(&scene.telemetry.velocity);
             }
             self.forget_leg();
-            self.position_unknown = false;
+            self.position_was_lost = false;
         }
         let sends = leads;
         if !self.smoother.has_setpoint() || taken {
@@ -392,42 +392,44 @@ impl Guidance {
             state == State::Follow && self.phase == Phase::Descent && self.filter.climbs_back(now);
         let turns = self.phase == Phase::Descent && self.leg.is_some() && up != self.climbing_back;
         let leads = self.update_guided_landing(state, scene, now);
-        let goes =
-            known && !turns && (leads || state.advances()) && (urgency == Urgency::Smooth || up);
+        let goes = known
+            && !turns
+            && (leads || state.setpoint_advances())
+            && (urgency == Urgency::Smooth || up);
         let mut advice = if state == State::Follow { self.advice } else { Advice::FREE };
         advice.speed_scale = advice.speed_scale.min(self.filter.speed_scale(now));
         let path = scene.plan.map(|plan| &plan.path);
-        if let (Some(path), true) = (path, known && self.on_path && !self.is_algorithm2()) {
-            self.evade(state, path, &mut advice, neighbours, now);
+        if let (Some(path), true) = (path, known && self.has_begun_path && !self.is_algorithm2()) {
+            self.update_evasion(state, path, &mut advice, neighbours, now);
         }
         if self.leg.is_none() {
             self.climbing_back = up;
         }
-        let wanted = goes || (self.back_to_m.is_some() && urgency == Urgency::Smooth);
+        let wanted = goes || (self.step_back_to_m.is_some() && urgency == Urgency::Smooth);
         let back_up = up && self.is_leg_done();
         let holds = (!wanted || back_up)
-            && self.on_path
+            && self.has_begun_path
             && matches!(self.phase, Phase::Path | Phase::Join | Phase::Descent)
             && state.is_on_path()
             && self.smoother.is_standing();
         let yields = self.filter.is_yielding() || state != State::Follow;
-        let patience = if yields { YIELDING_STANDSTILL } else { GOING_FIRST_STANDSTILL };
+        let patience = if yields { HOLD_AFTER_IF_YIELDING } else { HOLD_AFTER_IF_FIRST };
         self.hold_changed |= match holds {
-            true => self.hold.stand(patience, neighbours.max_message_delay_s(), now),
+            true => self.hold.note_standing(patience, neighbours.max_message_delay_s(), now),
             false => self.hold.end(),
         };
         let moves = wanted && !self.hold.is_binding(now);
-        if !moves && self.smoother.is_standing() && !self.raw_point_at_rest {
+        if !moves && self.smoother.is_standing() && !self.raw_point_at_setpoint {
             if let (Some(path), Phase::Path) = (path, self.phase) {
-                self.settle_reference(path);
+                self.reset_reference_to_setpoint(path);
             }
-            self.smoother.forget_curve();
+            self.smoother.restart_curve_at_setpoint();
             self.forget_leg();
         }
-        let lag_share = self.lag_share(scene.telemetry, now);
-        let share = if moves { lag_share } else { self.standing_speed_share() };
+        let lag_speed_share = self.lag_speed_share(scene.telemetry, now);
+        let share = if moves { lag_speed_share } else { self.standing_speed_share() };
         let mut back = StepBack::Free;
-        let dt_s = if self.smoother.makes_up_for_gap() { self.unsent_s } else { dt_s };
+        let dt_s = if self.smoother.makes_up_for_gap() { self.since_sent_s } else { dt_s };
         // Advice was computed once for this step: its stop stays at one place while the raw points
         // move on.
         let stops_at_m = advised_at_m + advice.stop_within_m;
@@ -446,7 +448,7 @@ impl Guidance {
                     let share = most / away.length().max(most);
                     self.smoother.raw_point() + away * share
                 }
-                Some(plan) if sends && !self.raw_point_at_rest => {
+                Some(plan) if sends && !self.raw_point_at_setpoint => {
                     self.next_braked_raw_point(&plan.path)
                 }
                 _ => self.smoother.raw_point(),
@@ -456,7 +458,7 @@ impl Guidance {
         self.update_trapped(back, now);
         let sound = self.smoother.make_setpoint();
         let correction = if flies && state != State::PilotControl && known {
-            position_correction(
+            correction_acceleration(
                 &self.smoother.position(),
                 &self.smoother.velocity(),
                 scene.telemetry,
@@ -465,13 +467,13 @@ impl Guidance {
             Point::zeros()
         };
         let change = self.smoother.acceleration() + correction - self.sent_acceleration;
-        let most = self.smoother.jerk_mps3(urgency) * dt_s;
+        let most = self.smoother.max_jerk_mps3(urgency) * dt_s;
         self.sent_acceleration += change * (most / change.length().max(most).max(1e-6));
         if self.tracker.along_m > self.last_progress_m + MIN_PROGRESS_M {
             self.last_progress_m = self.tracker.along_m;
-            self.progress_at = now;
+            self.last_progress_at = now;
         }
-        if scene.plan.is_some() && (self.on_path || self.phase == Phase::Climb) && known {
+        if scene.plan.is_some() && (self.has_begun_path || self.phase == Phase::Climb) && known {
             self.note_reported_progress(state, scene);
         }
         if sends {
@@ -482,7 +484,7 @@ impl Guidance {
 
     /// System id of the neighbour that the safety filter stops for now; 0 for none. The filter's
     /// state stays as it was.
-    pub fn query_filter<const V: usize, const W: usize, const G: usize>(
+    pub fn query_filter_blocker<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
@@ -491,7 +493,7 @@ impl Guidance {
     ) -> u8 {
         let before = self.filter;
         self.step_filter(state, scene, neighbours, now);
-        let blocker = self.filter.blocker();
+        let blocker = self.filter.blocker_id();
         self.filter = before;
         blocker
     }

@@ -4,11 +4,12 @@
 //! calls [`Companion::handle_bytes`] with the bytes that a link received,
 //! [`Companion::handle_timeout`] when [`Companion::poll_timeout`] is due, and
 //! [`Companion::handle_plan`] with the answer to [`Event::PlanRequested`], which
-//! [`planner::answer`] makes. After *each* `handle_*` call it calls [`Companion::poll_transmit`]
-//! for both links until it returns 0, and [`Companion::poll_event`] until it returns `None`. With a
-//! flash ([`Companion::attach_store`]) it also calls [`Companion::poll_flash`] and passes the
-//! outcome of each operation to [`Companion::handle_flash`], whenever the operation is done. Times
-//! never go back. Every call does bounded work.
+//! [`planner::answer_plan_request`] makes. After *each* `handle_*` call it calls
+//! [`Companion::poll_transmit`] for both links until it returns 0, and [`Companion::poll_event`]
+//! until it returns `None`. With a flash ([`Companion::attach_store`]) it also calls
+//! [`Companion::poll_flash`] and passes the outcome of each operation to
+//! [`Companion::handle_flash`], whenever the operation is done. Times never go back. Every call
+//! does bounded work.
 //!
 //! ```
 //! use companion::link::frame::MAX_FRAME_LEN;

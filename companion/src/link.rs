@@ -51,9 +51,9 @@ pub(crate) enum OnDemandMessage {
     /// they agree.
     Roster,
     /// TUNNEL with the waypoints of the area that are photographed.
-    Done,
+    PhotographedReport,
     /// NAMED_VALUE_FLOAT with the number of photographed waypoints, for plots.
-    DoneCount,
+    PhotographedCount,
 }
 
 /// Both links, to the autopilot and to the swarm: framers, queues and rate limits.
@@ -62,11 +62,11 @@ pub(crate) struct Links {
     framers: [Framer; 2],
     outboxes: [Outbox; 2],
     /// For each link, the [`OnDemandMessage`]s that are due: bit n for the n-th variant.
-    due: [u16; 2],
+    due_bits: [u16; 2],
     radio: RadioTokenBucket,
-    sent: SentIntents,
-    rates: AnswerTokenBuckets,
-    repeats: CommandHistory,
+    sent_intents: SentIntents,
+    answer_buckets: AnswerTokenBuckets,
+    command_history: CommandHistory,
 }
 
 impl Links {
@@ -88,17 +88,17 @@ impl Links {
 
     /// Sets the due flag of a message: it is made at the next poll of the link.
     pub(crate) fn set_due(&mut self, link: Link, what: OnDemandMessage) {
-        self.due[link as usize] |= 1 << what as u8;
+        self.due_bits[link as usize] |= 1 << what as u8;
     }
 
     /// Clears the due flag of a message.
     pub(crate) fn clear_due(&mut self, link: Link, what: OnDemandMessage) {
-        self.due[link as usize] &= !(1 << what as u8);
+        self.due_bits[link as usize] &= !(1 << what as u8);
     }
 
     /// Clears the due flag of a message. Returns whether it was set.
     pub(crate) fn take_due(&mut self, link: Link, what: OnDemandMessage) -> bool {
-        let due = self.due[link as usize] & 1 << what as u8 != 0;
+        let due = self.due_bits[link as usize] & 1 << what as u8 != 0;
         self.clear_due(link, what);
         due
     }
@@ -142,7 +142,7 @@ impl Links {
             }
         };
         self.outboxes[link as usize].free_entries() > kept
-            && self.rates.take_token(now, link, sender, kind)
+            && self.answer_buckets.take_token(now, link, sender, kind)
     }
 
     /// Queues an answer, or drops it where its rate limit or the link's queue has no room.
@@ -161,7 +161,7 @@ impl Links {
 
     /// Queues on both links, as answers with a rate limit, a text about something that a sender
     /// did; each `#` in it is replaced by one of the numbers.
-    pub(crate) fn send_sender_text(
+    pub(crate) fn send_rate_limited_text(
         &mut self,
         now: Instant,
         sender: SenderKind,
@@ -190,7 +190,7 @@ impl Links {
         from: (u8, u8),
     ) {
         let numbers = [u32::from(from.0), u32::from(from.1), 0];
-        self.send_sender_text(now, sender, Severity::Info, text, numbers);
+        self.send_rate_limited_text(now, sender, Severity::Info, text, numbers);
     }
 
     /// Queues a text with the sender of a command that took effect.
@@ -206,12 +206,12 @@ impl Links {
     /// The answer given lately to the same command frame, of which this is a duplicate;
     /// `Some(None)` if it got none; `None` for a frame that is no duplicate.
     pub(crate) fn previous_answer(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
-        self.repeats.previous_answer(frame, now)
+        self.command_history.previous_answer(frame, now)
     }
 
     /// Remembers a command frame and its answer, so that a duplicate of it gets the same answer.
     pub(crate) fn remember_answer(&mut self, frame: &Frame, result: Option<u8>, now: Instant) {
-        self.repeats.remember(frame, result, now);
+        self.command_history.remember(frame, result, now);
     }
 
     /// Whether the radio's token bucket, which fills by `bytes_per_s`, allows another frame beside
@@ -240,24 +240,24 @@ impl Links {
     /// neighbour knows.
     pub(crate) fn intent_header(&mut self, system: u8, path: ReportedPath, now: Instant) -> Header {
         let header = self.next_header(Link::Swarm, system);
-        self.sent.note_sent(header.sequence, path, now);
+        self.sent_intents.note_sent(header.sequence, path, now);
         header
     }
 
     /// Number of intents sent since the start.
     pub(crate) fn intents_sent(&self) -> usize {
-        self.sent.count()
+        self.sent_intents.count()
     }
 
     /// One-way delay of messages, seconds, measured by a neighbour's echo of an intent of this
     /// vehicle; `None` where that intent is no longer remembered.
     pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
-        self.sent.message_delay_s(echo, now)
+        self.sent_intents.message_delay_s(echo, now)
     }
 
     /// This vehicle's intents sent last, and which of them are known to have arrived.
     pub(crate) fn sent_intents(&mut self) -> &mut SentIntents {
-        &mut self.sent
+        &mut self.sent_intents
     }
 
     /// Writes the first message of a link's queue to `out` and removes it. Returns its length, 0

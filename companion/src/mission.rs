@@ -15,8 +15,8 @@ pub mod table;
 pub(crate) mod task;
 pub(crate) mod waits;
 
+pub(crate) use self::table::MAX_UNFOLLOWED;
 use self::table::TABLE;
-pub(crate) use self::table::UNFOLLOWED_MOST;
 
 pub use self::guard::Guard;
 pub use self::inputs::GuardInputs;
@@ -28,14 +28,14 @@ pub use crate::state::interruption::{InterruptedStates, TargetState};
 /// Whether the table has a row from `state` with this guard. A command whose guard has none there
 /// is refused.
 pub fn has_row_for(state: State, guard: Guard) -> bool {
-    TABLE.iter().any(|row| row.guard == guard && row.states & state_mask(&[state]) != 0)
+    TABLE.iter().any(|row| row.guard == guard && row.from_mask & state_mask(&[state]) != 0)
 }
 
 /// The first row of the table from `state` whose guard has been met for the row's time; `None`
 /// where the state is kept.
 pub fn first_applicable_row(state: State, inputs: &GuardInputs) -> Option<&'static TransitionRow> {
     let here = state_mask(&[state]);
-    TABLE.iter().find(|row| row.states & here != 0 && row.guard.is_met(inputs, row.min_duration))
+    TABLE.iter().find(|row| row.from_mask & here != 0 && row.guard.is_met(inputs, row.min_duration))
 }
 
 #[cfg(test)]

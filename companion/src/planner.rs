@@ -41,7 +41,7 @@ pub enum PlanStep {
 ///
 /// # Errors
 /// [`PlanFailure`]: the reason why there is no plan.
-pub fn answer<
+pub fn answer_plan_request<
     'm,
     M,
     const N: usize,
@@ -70,7 +70,7 @@ where
         (MissionKind::Goals, RequestedPlan::Flight) => {
             let roadmap = files.roadmap.as_ref().ok_or(PlanFailure::RoadmapUnusable)?;
             let ws = workspaces.for_goals();
-            plan_goals(mission, roadmap, *max_gates, ws, swarm, |_| {})?;
+            plan_goal_mission(mission, roadmap, *max_gates, ws, swarm, |_| {})?;
             take_own_plan(
                 swarm,
                 index,
@@ -94,11 +94,11 @@ where
             .map_err(|_| PlanFailure::Unreachable)?;
         }
         (MissionKind::Coverage(view), RequestedPlan::Flight) => {
-            let PlanInputs { photographed, losses, .. } = &own.inputs;
+            let PlanInputs { photographed, divisions, .. } = &own.inputs;
             let (field, max_gates) = (files.field, *max_gates);
             let ws = workspaces.for_area();
             let request = coverage::Request { mission, view, field, max_gates, photographed };
-            plan_area(&request, index, losses, ws, swarm, &mut own.plan)?;
+            plan_area(&request, index, divisions, ws, swarm, &mut own.plan)?;
         }
         (MissionKind::Coverage(view), RequestedPlan::Detour(request)) => {
             plan_area_detour(view, files.field, request, workspaces.for_area(), own)?;
@@ -121,14 +121,14 @@ fn plan_area<
 >(
     request: &coverage::Request<'_, '_>,
     index: usize,
-    losses: &[DivisionInputs<V>],
+    divisions: &[DivisionInputs<V>],
     ws: &mut AreaWorkspace<X, L, K, C>,
     swarm: &mut SwarmPlan<V, W>,
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), PlanFailure> {
-    let losses = losses.iter().map(|inputs| &inputs[..]);
+    let divisions = divisions.iter().map(|inputs| &inputs[..]);
     let AreaWorkspace { area, schedule } = ws;
-    coverage::plan_flights::<X, L, K, C, V, W>(request, losses, area, schedule, swarm)?;
+    coverage::plan_flights::<X, L, K, C, V, W>(request, divisions, area, schedule, swarm)?;
     take_own_plan(swarm, index, &request.mission.header().schedule, schedule, out)
 }
 
@@ -176,7 +176,7 @@ pub fn take_own_plan<const V: usize, const W: usize, const G: usize>(
 /// # Errors
 /// Reason why there is no plan; [`PlanError::SwarmFull`] for a mission with more than `V` vehicles
 /// or goals.
-pub fn plan_goals<const N: usize, const V: usize, const W: usize, const P: usize>(
+pub fn plan_goal_mission<const N: usize, const V: usize, const W: usize, const P: usize>(
     mission: &MissionView<'_>,
     roadmap: &RoadmapView<'_>,
     gates_most: usize,
@@ -188,7 +188,7 @@ pub fn plan_goals<const N: usize, const V: usize, const W: usize, const P: usize
     let request = mission
         .plan_request(&mut tasks, &mut descents_m, gates_most)
         .map_err(|_| PlanError::SwarmFull)?;
-    let mut goals = plan::Goals::new();
+    let mut goals = plan::AssignedGoals::new();
     plan::compute_costs(roadmap, &request, ws)?;
     done(PlanStep::Search);
     plan::assign_goals(&request, ws, &mut goals)?;

@@ -32,7 +32,7 @@ pub(crate) struct ReceivedFrame<'a> {
     pub(crate) frame: &'a Frame,
     pub(crate) now: Instant,
     /// System id of this vehicle.
-    pub(crate) own: u8,
+    pub(crate) own_system_id: u8,
 }
 
 impl ReceivedFrame<'_> {
@@ -43,21 +43,22 @@ impl ReceivedFrame<'_> {
 
     /// Whether another component sent the frame.
     pub(crate) fn is_from_another_component(&self) -> bool {
-        self.sender_ids() != (self.own, COMPANION_COMPONENT)
+        self.sender_ids() != (self.own_system_id, COMPANION_COMPONENT)
     }
 
     /// Whether another component sent the frame to this companion. Bytes `at` and `at + 1` of the
     /// payload are the target's system and component id.
     pub(crate) fn is_for_companion(&self, at: usize) -> bool {
         let p = self.frame.padded_payload();
-        self.is_from_another_component() && (p[at], p[at + 1]) == (self.own, COMPANION_COMPONENT)
+        self.is_from_another_component()
+            && (p[at], p[at + 1]) == (self.own_system_id, COMPANION_COMPONENT)
     }
 
     /// As [`Self::is_for_companion`], or to all components of this vehicle.
     pub(crate) fn is_for_vehicle(&self, at: usize) -> bool {
         let p = self.frame.padded_payload();
         self.is_for_companion(at)
-            || (self.is_from_another_component() && (p[at], p[at + 1]) == (self.own, 0))
+            || (self.is_from_another_component() && (p[at], p[at + 1]) == (self.own_system_id, 0))
     }
 
     /// Queues an answer, or drops it where its rate limit or the link's queue has no room.
@@ -75,17 +76,17 @@ pub(crate) struct Services {
     ftp: Ftp,
     /// Cruise, climb and descent speed of the mission, m/s; the parameters may lower the speeds in
     /// use.
-    nominal_mps: [f32; 3],
+    mission_speeds_mps: [f32; 3],
     /// Whether a parameter was set since [`Self::apply_parameters`].
-    unapplied: bool,
+    parameters_unapplied: bool,
 }
 
 impl Services {
     /// Without a flash: no files, and parameters are lost at a restart.
     pub(crate) fn new<const V: usize>(config: &Config<V>) -> Self {
-        let nominal_mps = [config.cruise_mps, config.climb_mps, config.descend_mps];
+        let mission_speeds_mps = [config.cruise_mps, config.climb_mps, config.descend_mps];
         let (parameters, ftp) = (Parameters::default(), Ftp::default());
-        Self { store: None, parameters, ftp, nominal_mps, unapplied: false }
+        Self { store: None, parameters, ftp, mission_speeds_mps, parameters_unapplied: false }
     }
 
     /// Keeps files and parameters in this flash from now on.
@@ -94,8 +95,8 @@ impl Services {
     }
 
     /// The photographed waypoints of an area as stored in flash; empty where there are none.
-    pub(crate) fn photographed(&self) -> &[u8] {
-        self.store.as_ref().map_or(&[], Store::photographed)
+    pub(crate) fn photographed_record(&self) -> &[u8] {
+        self.store.as_ref().map_or(&[], Store::photographed_record)
     }
 
     /// Stores the photographed waypoints in flash.
@@ -107,13 +108,13 @@ impl Services {
 
     /// Whether a parameter was set since [`Self::apply_parameters`].
     pub(crate) fn has_unapplied_parameters(&self) -> bool {
-        self.unapplied
+        self.parameters_unapplied
     }
 
     /// Writes the parameters into the companion's settings, from which they take effect.
     pub(crate) fn apply_parameters<const V: usize>(&mut self, config: &mut Config<V>) {
-        self.unapplied = false;
-        [config.cruise_mps, config.climb_mps, config.descend_mps] = self.nominal_mps;
+        self.parameters_unapplied = false;
+        [config.cruise_mps, config.climb_mps, config.descend_mps] = self.mission_speeds_mps;
         self.parameters().apply(config);
     }
 
@@ -226,7 +227,7 @@ impl Services {
                 ParameterError::Range => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
             }),
         };
-        self.unapplied |= result.is_ok();
+        self.parameters_unapplied |= result.is_ok();
         if result.is_ok() {
             links.send_text_with_sender(
                 heard.now,
@@ -264,15 +265,15 @@ fn refuse_parameter(
 /// target's system and component id, 0 for all.
 pub(crate) fn answer_timesync(heard: &ReceivedFrame<'_>, links: &mut Links) {
     let p = heard.frame.padded_payload();
-    let to_our_system =
-        (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == COMPANION_COMPONENT);
+    let to_our_system = (p[16] == 0 || p[16] == heard.own_system_id)
+        && (p[17] == 0 || p[17] == COMPANION_COMPONENT);
     let request =
         heard.frame.decode::<TIMESYNC_DATA>().filter(|request| request.tc1 == 0 && to_our_system);
     if let Some(request) = request {
         let tc1 = heard.now.as_micros() as i64 * 1000;
         heard.queue_answer(
             links,
-            AnswerKind::Time,
+            AnswerKind::Timesync,
             Outgoing::Timesync { tc1, ts1: request.ts1, to: heard.sender_ids() },
         );
     }

@@ -138,7 +138,7 @@ impl State {
 
     /// Whether a vehicle in this state flies on along its coverage path while its lease lasts, even
     /// if no other vehicle hears it, or is about to: it prepares its take-off or climbs.
-    pub(crate) fn flies_on_lease(self) -> bool {
+    pub(crate) fn may_fly_on_lease(self) -> bool {
         self.is_on_path() || self.prepares_take_off() || self.takes_off()
     }
 
@@ -170,18 +170,18 @@ impl State {
     }
 
     /// Whether the vehicle waits with its plan on its pad, disarmed: started or not.
-    pub(crate) fn waits_with_plan(self) -> bool {
-        self == Self::Ready || self.waits_on_pad()
+    pub(crate) fn waits_on_pad_with_plan(self) -> bool {
+        self == Self::Ready || self.waits_on_pad_after_start()
     }
 
     /// Whether the vehicle waits on its pad, disarmed, and is to fly its plan from there: no detour
     /// is sought.
     pub(crate) fn waits_to_fly_plan(self) -> bool {
-        self.waits_with_plan() && !self.waits_for_detour()
+        self.waits_on_pad_with_plan() && !self.waits_for_detour()
     }
 
     /// Whether the vehicle has been started and waits on its pad, disarmed.
-    pub(crate) fn waits_on_pad(self) -> bool {
+    pub(crate) fn waits_on_pad_after_start(self) -> bool {
         matches!(self, Self::Scheduled | Self::PadReplanning)
     }
 
@@ -191,26 +191,26 @@ impl State {
     }
 
     /// Whether the vehicle has been started, and arming was not requested yet.
-    pub(crate) fn is_before_arming(self) -> bool {
-        self.waits_on_pad() || matches!(self, Self::Streaming | Self::Engaging)
+    pub(crate) fn is_started_before_arming(self) -> bool {
+        self.waits_on_pad_after_start() || matches!(self, Self::Streaming | Self::Engaging)
     }
 
     /// Whether the vehicle has been started and has not left its pad: before its take-off, or after
     /// its start was cancelled.
-    pub(crate) fn is_on_pad(self) -> bool {
-        self.waits_on_pad() || self.prepares_take_off() || self == Self::CancelStart
+    pub(crate) fn is_started_on_pad(self) -> bool {
+        self.waits_on_pad_after_start() || self.prepares_take_off() || self == Self::CancelStart
     }
 
     /// Whether the vehicle has been started and has not reached its path: it waits on its pad, is
     /// brought to fly, or rises.
-    pub(crate) fn is_before_path(self) -> bool {
-        self.waits_on_pad() || self.prepares_take_off() || self.takes_off()
+    pub(crate) fn is_started_before_path(self) -> bool {
+        self.waits_on_pad_after_start() || self.prepares_take_off() || self.takes_off()
     }
 
     /// Whether a further MISSION_START changes nothing, since the vehicle is on its way to its path
     /// or on it.
     pub(crate) fn is_mission_under_way(self) -> bool {
-        self.is_before_path() || self.is_on_path()
+        self.is_started_before_path() || self.is_on_path()
     }
 
     /// Whether the vehicle rises from its pad to the start of its path.
@@ -219,37 +219,37 @@ impl State {
     }
 
     /// Whether the setpoint advances: up the climb, or along the path.
-    pub(crate) fn advances(self) -> bool {
+    pub(crate) fn setpoint_advances(self) -> bool {
         matches!(self, Self::Climb | Self::Follow)
     }
 
     /// Whether the vehicle follows its path, or would if nothing blocked it.
-    pub fn follows_path(self) -> bool {
+    pub fn follows_path_or_is_blocked(self) -> bool {
         self == Self::Follow || self.is_blocked()
     }
 
     /// Whether the vehicle follows its path, or stands before what blocks it and seeks no other
     /// path.
-    pub(crate) fn keeps_to_path(self) -> bool {
+    pub(crate) fn follows_path_or_waits_blocked(self) -> bool {
         matches!(self, Self::Follow | Self::Blocked)
     }
 
     /// Whether the vehicle may be kept by a gate that another vehicle has not passed, on its pad or
     /// on its path.
     pub(crate) fn may_wait_at_gate(self) -> bool {
-        self == Self::Scheduled || self.keeps_to_path()
+        self == Self::Scheduled || self.follows_path_or_waits_blocked()
     }
 
     /// Whether a vehicle in a coverage mission flies its part, or holds on its path and may fly on:
     /// for a division, or before what blocks the path.
-    pub(crate) fn flies_its_part(self) -> bool {
-        self == Self::Dividing || self.keeps_to_path()
+    pub(crate) fn flies_or_holds_its_part(self) -> bool {
+        self == Self::Dividing || self.follows_path_or_waits_blocked()
     }
 
     /// Whether the vehicle flies on, as far as others let it, after a pause or its pilot: a further
     /// command to resume changes nothing.
     pub(crate) fn has_resumed(self) -> bool {
-        self.advances() || self.is_blocked() || self == Self::Dividing
+        self.setpoint_advances() || self.is_blocked() || self == Self::Dividing
     }
 
     /// Whether the vehicle stands on its path because something blocks it.
@@ -263,25 +263,28 @@ impl State {
     }
 
     /// Whether the vehicle lands, or would if the column below were free.
-    pub(crate) fn lands(self) -> bool {
+    pub(crate) fn lands_or_landing_is_held(self) -> bool {
         matches!(self, Self::Land | Self::LandingHeld)
     }
 
     /// Whether the vehicle brakes to a stop to land, or lands.
-    pub(crate) fn begins_landing(self) -> bool {
+    pub(crate) fn stops_to_land_or_lands(self) -> bool {
         matches!(self, Self::Stopping | Self::Land)
     }
 
     /// Whether the vehicle lands, would if the column below were free, or has landed and waits
     /// until its motors are disarmed.
     pub(crate) fn lands_or_disarms(self) -> bool {
-        self.lands() || self == Self::Disarm
+        self.lands_or_landing_is_held() || self == Self::Disarm
     }
 
     /// Whether the vehicle takes no part in the mission any more: it stops to land, lands or has
     /// landed, its mission has ended, or the autopilot's failsafe acts.
     pub(crate) fn has_left_mission(self) -> bool {
-        self.begins_landing() || self.lands_or_disarms() || self.is_over() || self == Self::Failsafe
+        self.stops_to_land_or_lands()
+            || self.lands_or_disarms()
+            || self.is_over()
+            || self == Self::Failsafe
     }
 
     /// Whether the vehicle is on the ground after its flight.
@@ -300,7 +303,7 @@ impl State {
     }
 
     /// Whether a pilot or the autopilot's failsafe flies the vehicle.
-    pub(crate) fn is_taken_over(self) -> bool {
+    pub(crate) fn is_flown_by_pilot_or_failsafe(self) -> bool {
         matches!(self, Self::PilotControl | Self::Failsafe)
     }
 
@@ -310,19 +313,19 @@ impl State {
     }
 
     /// Whether somebody else flies the vehicle, or did and has not let the mission go on.
-    pub(crate) fn is_flown_by_another(self) -> bool {
+    pub(crate) fn is_left_to_pilot_or_failsafe(self) -> bool {
         self.is_left_to_pilot() || self == Self::Failsafe
     }
 
     /// Whether setpoints lead to a place only while the position is new: a pilot or the autopilot's
     /// own mode may fly the vehicle away unseen.
-    pub(crate) fn needs_new_position(self) -> bool {
+    pub(crate) fn needs_fresh_position(self) -> bool {
         self.is_left_to_pilot() || self.lands_or_disarms()
     }
 
     /// Whether the vehicle may stand away from its path before its mission goes on: after its
     /// pilot, or after its position was lost.
-    pub(crate) fn may_resume_off_path(self) -> bool {
+    pub(crate) fn may_be_off_path_on_resume(self) -> bool {
         matches!(self, Self::PilotReturned | Self::PositionLost)
     }
 
@@ -340,7 +343,7 @@ impl State {
     /// pad a pause may be pending.
     pub fn may_need_resume(self) -> bool {
         matches!(self, Self::PilotReturned | Self::Paused | Self::CancelStart)
-            || self.waits_with_plan()
+            || self.waits_on_pad_with_plan()
     }
 
     /// Whether a pause is stored in this state until a row of the table can act on it: before the
@@ -351,7 +354,7 @@ impl State {
             Planning | CancelStart | TakeOff | AutopilotSilent | PositionLost | PilotReturned => {
                 true
             }
-            _ => self.waits_with_plan(),
+            _ => self.waits_on_pad_with_plan(),
         }
     }
 
@@ -370,7 +373,7 @@ impl State {
         use State::*;
         match self {
             Ready | Follow | Paused | Dividing => true,
-            _ => self.is_before_path() || self.is_blocked(),
+            _ => self.is_started_before_path() || self.is_blocked(),
         }
     }
 

@@ -23,7 +23,7 @@ use embassy_time::{Duration, Timer};
 use firmware::capacity::{BoardCompanion, VEHICLES, WAYPOINTS};
 use firmware::flash::Flash;
 use firmware::planner::{OwnPlanMemory, Planner, PlanningMemory};
-use firmware::shell::{OnAutopilot, Shell, wait_for_system_id};
+use firmware::shell::{OnAutopilot, Shell, wait_for_autopilot_id};
 use firmware::workspace::WorkspaceOverlay;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot};
 use planner_core::Point;
@@ -94,14 +94,14 @@ async fn board() {
     let mut flash = Ram(vec![0xff; LAYOUT.len() as usize]);
     let store = Store::mount(LAYOUT, &mut flash);
     let system_id =
-        wait_for_system_id(&mut &FROM_AUTOPILOT).await.expect("an autopilot is connected");
+        wait_for_autopilot_id(&mut &FROM_AUTOPILOT).await.expect("an autopilot is connected");
     let nowhere = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
     let settings = Config::new(system_id, Point::zeros(), nowhere)
         .checked()
         .expect("these settings are sound");
     let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
     companion.attach_store(store);
-    SHELL.start(companion);
+    SHELL.set_companion(companion);
     let memory = PlanningMemory::new(WORKSPACE.take(), SWARM.take(), OWN.take());
     let mut planner = Planner { files: PlanFiles::default(), system_id, files_checksum: 0, memory };
     let links = join5(

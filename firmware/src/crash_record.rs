@@ -16,9 +16,9 @@ pub const RECORD_WORDS: usize = 25;
 /// 32-bit words of the record's text.
 const TEXT_WORDS: usize = MAX_TEXT_LEN.div_ceil(4);
 /// 32-bit words of the record before the text.
-const HEADER_WORDS: usize = 5 + 2 * WORK_KINDS;
+const HEADER_WORDS: usize = 5 + 2 * WORK_KIND_COUNT;
 /// Number of kinds of [`FileWork`], without `None`.
-const WORK_KINDS: usize = 3;
+const WORK_KIND_COUNT: usize = 3;
 /// Number of starts in a row that must crash amid work on the same files until these files are set
 /// aside.
 const MAX_CRASHED_STARTS: u32 = 3;
@@ -71,7 +71,7 @@ pub struct CrashRecord {
     running: RunningWork,
     /// For each kind of work: checksum of the files on which it crashed last, and number of starts
     /// in a row that it crashed.
-    failed_work: [(u32, u32); WORK_KINDS],
+    failed_work: [(u32, u32); WORK_KIND_COUNT],
     /// Bit mask of the kinds of work that ended without a crash in this run, on the files in
     /// `failed_work`; bit 0 is [`FileWork::CheckRoadmap`].
     completed_work: u32,
@@ -81,7 +81,10 @@ impl CrashRecord {
     /// Evaluates the record at a start: `kept` is the record found in memory, `cause` the chip's
     /// reset cause. Returns the record to keep from now on, and the STATUSTEXT about the end of the
     /// last run; `None` if there is nothing to report. After power-on `kept` is ignored.
-    pub fn on_start(kept: Option<Self>, cause: ResetCause) -> (Self, Option<String<MAX_TEXT_LEN>>) {
+    pub fn evaluate_on_start(
+        kept: Option<Self>,
+        cause: ResetCause,
+    ) -> (Self, Option<String<MAX_TEXT_LEN>>) {
         let mut kept = kept.filter(|_| cause != ResetCause::Power).unwrap_or_default();
         let crashed = kept.end == RunEnd::Crashed;
         let said = match (kept.end, cause) {

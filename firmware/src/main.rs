@@ -25,7 +25,7 @@ use firmware::crash_record::FileWork;
 use firmware::flash_lender::LentFlash;
 use firmware::planner::{OwnPlanMemory, Planner, PlanningMemory};
 use firmware::shell::{
-    CHECK_IN_EVERY, OnAutopilot, SYSTEM_ID_WITHOUT_AUTOPILOT, Shell, wait_for_system_id,
+    CHECK_IN_EVERY, OnAutopilot, SYSTEM_ID_WITHOUT_AUTOPILOT, Shell, wait_for_autopilot_id,
 };
 use firmware::workspace::WorkspaceOverlay;
 use heapless::{String, Vec};
@@ -55,8 +55,8 @@ static SWARM_PLAN: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> =
     ConstStaticCell::new(SwarmPlan::new());
 static OWN_PLAN: ConstStaticCell<OwnPlanMemory> = ConstStaticCell::new(OwnPlanMemory::new());
 static MISSION_BYTES: ConstStaticCell<[u8; MISSION_LEN]> = ConstStaticCell::new([0; MISSION_LEN]);
-static CRASH: StaticCell<String<50>> = StaticCell::new();
-static REFUSED: StaticCell<String<50>> = StaticCell::new();
+static CRASH_TEXT: StaticCell<String<50>> = StaticCell::new();
+static MISSION_REFUSAL_TEXT: StaticCell<String<50>> = StaticCell::new();
 
 defmt::timestamp!("{=u64:us}", embassy_time::Instant::now().as_micros());
 
@@ -111,16 +111,16 @@ async fn planner_and_flash_task(
     said: StartReport,
 ) {
     let mut store = Store::mount(LAYOUT, &mut flash);
-    let (lent, roadmap_aside) = find_roadmap(&mut store, &mut flash);
+    let (lent, roadmap_aside) = find_roadmap_or_field(&mut store, &mut flash);
     let roadmap = lent.as_deref().and_then(|bytes| RoadmapView::parse(bytes).ok());
     let field = lent.as_deref().and_then(|bytes| FieldView::parse(bytes).ok());
     let map_crc =
         roadmap.as_ref().map(RoadmapView::crc).or(field.as_ref().map(FieldView::crc)).unwrap_or(0);
-    let FoundMission { mission, files_checksum: files, set_aside: mission_aside, refused } =
+    let FoundMission { mission, files_checksum: files, set_aside: mission_aside, parse_error } =
         find_mission(&store, &mut flash, roadmap.as_ref(), map_crc);
     let known = match store.parameters().system_id() {
         Some(id) => Some(id),
-        None => wait_for_system_id(&mut autopilot.0).await,
+        None => wait_for_autopilot_id(&mut autopilot.0).await,
     };
     let system_id = known.unwrap_or(SYSTEM_ID_WITHOUT_AUTOPILOT);
     defmt::info!(
@@ -134,7 +134,8 @@ async fn planner_and_flash_task(
     let own = mission.as_ref().map(|mission| mission.companion_config(system_id));
     let is_stranger = known.is_some() && matches!(own, Some(Err(MissionError::NotInRoster(_))));
     let unfit = own.as_ref().and_then(|own| own.as_ref().err().copied());
-    let refused = refused.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
+    let refused =
+        parse_error.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
     let config = own
         .and_then(Result::ok)
         .unwrap_or_else(|| Config::new(system_id, Point::zeros(), UNKNOWN_ORIGIN));
@@ -145,7 +146,7 @@ async fn planner_and_flash_task(
     let companion = BoardCompanion::init_in_place(COMPANION.uninit(), settings);
     companion.attach_store(store);
     if let Some(text) = said.crashed {
-        companion.send_text(Severity::Warning, CRASH.init(text).as_str());
+        companion.send_text(Severity::Warning, CRASH_TEXT.init(text).as_str());
     }
     let warnings = said.warnings.iter().copied().chain(aside);
     warnings.for_each(|text| companion.send_text(Severity::Warning, text));
@@ -156,11 +157,11 @@ async fn planner_and_flash_task(
         let mut text = String::new();
         // Text that does not fit is cut; a test checks that every error fits.
         let _ = write!(text, "Mission: {error}");
-        companion.send_text(Severity::Warning, REFUSED.init(text).as_str());
+        companion.send_text(Severity::Warning, MISSION_REFUSAL_TEXT.init(text).as_str());
     }
-    shell.start(companion);
+    shell.set_companion(companion);
     let then = if known.is_some() { OnAutopilot::GoOn } else { OnAutopilot::Restart };
-    start_links(links, shell, then, autopilot, swarm);
+    spawn_link_tasks(links, shell, then, autopilot, swarm);
     let memory = PlanningMemory::new(WORKSPACE.take(), SWARM_PLAN.take(), OWN_PLAN.take());
     let mut planner = Planner {
         files: PlanFiles { mission, roadmap, field },
@@ -173,10 +174,10 @@ async fn planner_and_flash_task(
 
 /// Lends the newest stored roadmap or field that parses. The flag says whether a newer one was
 /// skipped because it brought three starts in a row down.
-fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<LentFlash>, bool) {
+fn find_roadmap_or_field(store: &mut Store, flash: &mut Flash) -> (Option<LentFlash>, bool) {
     let mut aside = false;
     loop {
-        let lies = store.roadmap();
+        let lies = store.map_range();
         if let Some(lent) = lies.and_then(|r| flash.lend(r.start, (r.end - r.start) as usize)) {
             // The last 4 bytes of a roadmap or field are its CRC-32.
             let sum = lent.last_chunk().copied().map_or(0, u32::from_le_bytes);
@@ -207,7 +208,7 @@ struct FoundMission {
     /// down.
     set_aside: bool,
     /// Parse error of the stored mission.
-    refused: Option<MissionError>,
+    parse_error: Option<MissionError>,
 }
 
 /// Reads the stored mission and checks it against the roadmap in use. The mission is copied into
@@ -220,7 +221,7 @@ fn find_mission(
     map_crc: u32,
 ) -> FoundMission {
     let bytes = MISSION_BYTES.take();
-    let found = store.mission().and_then(|r| {
+    let found = store.mission_range().and_then(|r| {
         let bytes = bytes.get_mut(..(r.end - r.start) as usize)?;
         flash.read(r.start, bytes).ok()?;
         Some(&*bytes)
@@ -235,12 +236,12 @@ fn find_mission(
     }
     let read = MissionView::parse(bytes);
     crash::finish_work();
-    let refused = read.err();
+    let parse_error = read.err();
     let mission = read.ok().filter(|mission| mission.can_be_planned_with(roadmap));
-    FoundMission { mission, files_checksum: files, refused, set_aside: false }
+    FoundMission { mission, files_checksum: files, parse_error, set_aside: false }
 }
 
-fn start_links(
+fn spawn_link_tasks(
     links: SendSpawner,
     shell: &'static Shell,
     then: OnAutopilot,

@@ -1,5 +1,5 @@
-//! The planner on board: [`planner::answer`] on the files in flash, in the board's memory. A file
-//! that brought it down in three starts is refused.
+//! The planner on board: [`planner::answer_plan_request`] on the files in flash, in the board's
+//! memory. A file that brought it down in three starts is refused.
 
 use companion::planner::{self, PlanFiles, RequestedPlan};
 use companion::{PlanFailure, PlanKind};
@@ -67,6 +67,6 @@ impl Planner<'_> {
         &mut self,
         requested: &RequestedPlan,
     ) -> Result<&VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
-        planner::answer(&self.files, self.system_id, requested, &mut self.memory)
+        planner::answer_plan_request(&self.files, self.system_id, requested, &mut self.memory)
     }
 }

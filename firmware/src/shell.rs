@@ -11,7 +11,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use companion::link::frame::{Framer, MAX_FRAME_LEN};
 use companion::link::severity::Severity;
-use companion::storage::store::{FlashRequest, MAX_READ};
+use companion::storage::store::{FlashRequest, MAX_READ_LEN};
 use companion::{Event, Link, PlanRequests};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex;
@@ -63,11 +63,11 @@ pub struct Shell {
     /// Time of each task's last check-in, milliseconds since the start: receive tasks of both
     /// links, transmit tasks of both links, timer task.
     checked_in_ms: [AtomicU32; TASK_COUNT],
-    /// Whether [`Shell::start`] has stored a companion.
-    started: AtomicBool,
+    /// Whether [`Shell::set_companion`] has stored a companion.
+    has_companion: AtomicBool,
     setpoints: SetpointGaps,
     /// For each link: number of errors that its UART returned since the start.
-    pub line_errors: [AtomicU32; 2],
+    pub uart_errors: [AtomicU32; 2],
 }
 
 /// A [`FlashRequest`] without the bytes to program: offset and length in bytes.
@@ -80,7 +80,7 @@ enum FlashOperation {
 /// Waits for HEARTBEATs on `uart` and returns the autopilot's system id. An autopilot may forward
 /// other autopilots' messages: of those heard until 1.1 s after the first HEARTBEAT, the id of the
 /// one that sent most frames is returned. `None` if no HEARTBEAT comes within 3 s.
-pub async fn wait_for_system_id(uart: &mut impl Read) -> Option<u8> {
+pub async fn wait_for_autopilot_id(uart: &mut impl Read) -> Option<u8> {
     let mut listener = AutopilotListener::new();
     let mut until = Instant::now() + FIRST_AUTOPILOT_WITHIN;
     let mut chunk = [0; UART_CHUNK];
@@ -155,7 +155,7 @@ pub const START_TIMEOUT_MS: u32 = 20_000;
 
 const HEARTBEAT: u32 = 0;
 const TASK_COUNT: usize = 5;
-const TIME_TASK: usize = 4;
+const TIMER_TASK: usize = 4;
 
 /// Time since the board's start, in the companion's type.
 pub fn now() -> companion::Instant {
@@ -167,7 +167,7 @@ fn now_ms() -> u32 {
 }
 
 impl Shell {
-    /// A shell without a companion; [`Self::start`] stores it.
+    /// A shell without a companion; [`Self::set_companion`] stores it.
     pub const fn new() -> Self {
         Self {
             companion: Mutex::new(RefCell::new(None)),
@@ -178,18 +178,18 @@ impl Shell {
             restart_requested_ms: AtomicU32::new(0),
             flash_busy: AtomicBool::new(false),
             checked_in_ms: [const { AtomicU32::new(0) }; TASK_COUNT],
-            started: AtomicBool::new(false),
+            has_companion: AtomicBool::new(false),
             setpoints: SetpointGaps::new(),
-            line_errors: [const { AtomicU32::new(0) }; 2],
+            uart_errors: [const { AtomicU32::new(0) }; 2],
         }
     }
 
     /// Stores the companion; to be called before any task of the links or timers is spawned. Before
     /// this call [`Self::may_feed_watchdog`] is true for the first [`START_TIMEOUT_MS`] only.
-    pub fn start(&self, companion: &'static mut BoardCompanion) {
+    pub fn set_companion(&self, companion: &'static mut BoardCompanion) {
         self.companion.lock(|held| *held.borrow_mut() = Some(companion));
         (0..TASK_COUNT).for_each(|task| self.check_in(task));
-        self.started.store(true, Ordering::Relaxed);
+        self.has_companion.store(true, Ordering::Relaxed);
     }
 
     /// Calls `work` with the companion locked; handles no events and wakes no task.
@@ -226,8 +226,8 @@ impl Shell {
                     }
                     // The companion has sent a STATUSTEXT about these already.
                     Event::StateChanged { .. }
-                    | Event::WaitsForStart { .. }
-                    | Event::FlownAround { .. } => {}
+                    | Event::WaitsForUnstartedVehicle { .. }
+                    | Event::DetourSkippedWaypoints { .. } => {}
                 }
             }
             if companion.streams_setpoints() {
@@ -262,7 +262,7 @@ impl Shell {
     pub async fn receive(&'static self, link: Link, mut uart: impl Read, then: OnAutopilot) -> ! {
         let mut chunk = [0; UART_CHUNK];
         let mut listener = (then == OnAutopilot::Restart).then(AutopilotListener::new);
-        let errors = &self.line_errors[link as usize];
+        let errors = &self.uart_errors[link as usize];
         let (mut reported, mut next_report_at) = (0, Instant::MIN);
         loop {
             match with_timeout(CHECK_IN_EVERY, uart.read(&mut chunk)).await {
@@ -286,7 +286,7 @@ impl Shell {
                 (reported, next_report_at) = (count, Instant::now() + UART_REPORT_EVERY);
                 self.with_companion(|companion, _| {
                     let counters = companion.counters(link);
-                    let damaged = counters.bad_crc.wrapping_add(counters.expired);
+                    let damaged = counters.bad_crc.wrapping_add(counters.expired_partial);
                     companion.send_text_with_numbers(
                         Severity::Warning,
                         UART_ERROR_TEXTS[link as usize],
@@ -314,7 +314,7 @@ impl Shell {
                 // There is room in the send queue: work that waited for it may go on.
                 self.plan_or_flash_due.signal(());
                 if uart.write_all(&frame[..length]).await.is_err() {
-                    self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed);
+                    self.uart_errors[link as usize].fetch_add(1, Ordering::Relaxed);
                 }
             }
             self.check_in(2 + link as usize);
@@ -334,7 +334,7 @@ impl Shell {
                 select(Timer::at(Instant::from_micros(due.as_micros())), self.timer_changed.wait())
                     .await;
             }
-            self.check_in(TIME_TASK);
+            self.check_in(TIMER_TASK);
         }
     }
 
@@ -365,7 +365,7 @@ impl Shell {
         if self.restart_requested_ms.load(Ordering::Relaxed) != 0 {
             return false;
         }
-        let mut bytes = [0; MAX_READ];
+        let mut bytes = [0; MAX_READ_LEN];
         let request = self.lock_companion(|companion| {
             Some(match companion.poll_flash()? {
                 FlashRequest::Erase { at } => FlashOperation::Erase(at),
@@ -403,13 +403,13 @@ impl Shell {
     }
 
     /// Whether the watchdog may be fed: all tasks checked in within 0.4 s, and while setpoints are
-    /// streamed the last was sent within 0.4 s; before [`Self::start`], for the first 20 s.
+    /// streamed the last was sent within 0.4 s; before [`Self::set_companion`], for the first 20 s.
     pub fn may_feed_watchdog(&self) -> bool {
         self.may_feed_watchdog_at(now_ms())
     }
 
     fn may_feed_watchdog_at(&self, now_ms: u32) -> bool {
-        if !self.started.load(Ordering::Relaxed) {
+        if !self.has_companion.load(Ordering::Relaxed) {
             return now_ms < START_TIMEOUT_MS;
         }
         let limit = 4 * CHECK_IN_EVERY.as_millis() as u32;

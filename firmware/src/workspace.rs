@@ -33,8 +33,8 @@ pub struct WorkspaceOverlay {
 
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum OverlayUse {
-    Plan,
-    Build,
+    RoadmapPlan,
+    RoadmapBuild,
     CoveragePlan,
 }
 
@@ -61,13 +61,13 @@ impl WorkspaceOverlay {
     pub const fn new() -> Self {
         Self {
             memory: Memory { plan: ManuallyDrop::new(PlannerWorkspace::new()) },
-            used: OverlayUse::Plan,
+            used: OverlayUse::RoadmapPlan,
         }
     }
 
     /// The memory as roadmap builder. It is zeroed if it had another use before.
     pub fn builder(&mut self) -> &mut RoadmapBuilder {
-        self.switch_use(OverlayUse::Build);
+        self.switch_use(OverlayUse::RoadmapBuild);
         // SAFETY: as in `for_goals`; all zeros is an empty builder.
         unsafe { &mut self.memory.build }
     }
@@ -95,7 +95,7 @@ impl
 {
     /// The memory as workspace of roadmap plans. It is zeroed if it had another use before.
     fn for_goals(&mut self) -> &mut PlannerWorkspace {
-        self.switch_use(OverlayUse::Plan);
+        self.switch_use(OverlayUse::RoadmapPlan);
         // SAFETY: `switch_use` zeroed it when the use changed to this one, all zeros is an empty
         // planner, and since then it was written as a planner alone.
         unsafe { &mut self.memory.plan }

@@ -91,7 +91,9 @@ fn errors_of_a_line_are_counted_and_reported_and_what_comes_after_is_heard() {
     let config =
         Config::new(1, Point::zeros(), Geodetic { lat_deg: 47.0, lon_deg: 8.0, alt_m: 500.0 });
     let shell: &'static Shell = Box::leak(Box::new(Shell::new()));
-    shell.start(Box::leak(Box::new(BoardCompanion::new(config).expect("the settings are good"))));
+    shell.set_companion(Box::leak(Box::new(
+        BoardCompanion::new(config).expect("the settings are good"),
+    )));
     let lines = [Line::default(), Line::default()];
     let mut receives = pin!(shell.receive(Link::Autopilot, End(&lines[0]), OnAutopilot::GoOn));
     let mut transmits = pin!(shell.transmit(Link::Autopilot, End(&lines[0])));
@@ -121,7 +123,7 @@ fn errors_of_a_line_are_counted_and_reported_and_what_comes_after_is_heard() {
     let errors = |link: usize| {
         reported(link).into_iter().filter(|text| text.contains("errors")).collect::<Vec<_>>()
     };
-    assert_eq!(shell.line_errors[0].load(Ordering::Relaxed), 2);
+    assert_eq!(shell.uart_errors[0].load(Ordering::Relaxed), 2);
     assert!(reported(0).contains(&"Autopilot found".to_owned()), "{:?}", reported(0));
     // The first error is reported at once, on both links; those of the next ten seconds together.
     assert_eq!(errors(0), ["Autopilot line: 1 errors, 0 damaged frames"]);
@@ -133,5 +135,5 @@ fn errors_of_a_line_are_counted_and_reported_and_what_comes_after_is_heard() {
     assert_eq!(errors(0)[1..], ["Autopilot line: 502 errors, 1 damaged frames"]);
     run(30_000);
     assert_eq!(errors(0).len(), 2, "no more errors, no more texts");
-    assert_eq!(shell.line_errors[1].load(Ordering::Relaxed), 0);
+    assert_eq!(shell.uart_errors[1].load(Ordering::Relaxed), 0);
 }

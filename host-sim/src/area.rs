@@ -50,7 +50,7 @@ impl AreaFormat {
 /// The file cannot be read, is not in the format of its ending, holds no polygon or too many
 /// vertices.
 pub fn read(path: &Path) -> Result<Polygons, AreaFileError> {
-    let format = AreaFormat::from_path(path).ok_or(AreaFileError::Format)?;
+    let format = AreaFormat::from_path(path).ok_or(AreaFileError::UnknownFormat)?;
     parse(&files::read_text(path)?, format)
 }
 

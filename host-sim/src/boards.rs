@@ -17,7 +17,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail, ensure};
 use companion::Link as Port;
-use lock_step::{COMMAND_LINE, FromBoard, HEAD, LONGEST, ToBoard};
+use lock_step::{COMMAND_LINE, FromBoard, HEADER_LEN, MAX_MESSAGE_LEN, ToBoard};
 
 pub use self::flash_image::flash_bank_image;
 use crate::quote::printable_path;
@@ -102,7 +102,7 @@ impl EmulatedBoard {
         });
         let mut board = Self { qemu, input, answers, now_us: 0 };
         ensure!(
-            board.wait_for_grant()?.restarted,
+            board.wait_for_grant_end()?.restarted,
             "the firmware is none for lock step: {}",
             printable_path(program)
         );
@@ -115,8 +115,8 @@ impl EmulatedBoard {
     }
 
     /// Grants the board time until `until_us`, and hands over the bytes that its ports receive
-    /// until then, sorted by time. The caller has to call [`wait_for_grant`](Self::wait_for_grant)
-    /// next.
+    /// until then, sorted by time. The caller has to call
+    /// [`wait_for_grant_end`](Self::wait_for_grant_end) next.
     ///
     /// # Errors
     /// The QEMU process has ended.
@@ -138,16 +138,16 @@ impl EmulatedBoard {
     ///
     /// # Errors
     /// The board does not answer within 10 s, or its process has ended.
-    pub fn wait_for_grant(&mut self) -> anyhow::Result<GrantResult> {
-        self.wait_for_grant_within(BOARD_HUNG_AFTER)
+    pub fn wait_for_grant_end(&mut self) -> anyhow::Result<GrantResult> {
+        self.wait_for_grant_end_within(BOARD_HUNG_AFTER)
     }
 
-    /// As [`wait_for_grant`](Self::wait_for_grant), with another limit of wall-clock
+    /// As [`wait_for_grant_end`](Self::wait_for_grant_end), with another limit of wall-clock
     /// time: a board that hangs until its watchdog resets it takes the host seconds.
     ///
     /// # Errors
-    /// As [`wait_for_grant`](Self::wait_for_grant).
-    pub fn wait_for_grant_within(&mut self, timeout: Duration) -> anyhow::Result<GrantResult> {
+    /// As [`wait_for_grant_end`](Self::wait_for_grant_end).
+    pub fn wait_for_grant_end_within(&mut self, timeout: Duration) -> anyhow::Result<GrantResult> {
         let answer = match self.answers.recv_timeout(timeout) {
             Ok(answer) => answer?,
             Err(RecvTimeoutError::Timeout) => {
@@ -162,19 +162,19 @@ impl EmulatedBoard {
     /// Grants the board time until `until_us`, and waits until it has used it up.
     ///
     /// # Errors
-    /// As [`begin_grant`](Self::begin_grant) and [`wait_for_grant`](Self::wait_for_grant).
+    /// As [`begin_grant`](Self::begin_grant) and [`wait_for_grant_end`](Self::wait_for_grant_end).
     pub fn run_grant(
         &mut self,
         until_us: u64,
         pieces: &[PortBytes],
     ) -> anyhow::Result<GrantResult> {
         self.begin_grant(until_us, pieces)?;
-        self.wait_for_grant()
+        self.wait_for_grant_end()
     }
 
     fn send(&mut self, message: &[u8]) -> anyhow::Result<()> {
         ensure!(
-            message.len() <= LONGEST,
+            message.len() <= MAX_MESSAGE_LEN,
             "{} bytes at once are too many for a board",
             message.len()
         );
@@ -196,7 +196,7 @@ impl Drop for EmulatedBoard {
 fn read_answer(output: &mut BufReader<ChildStdout>) -> anyhow::Result<GrantResult> {
     let mut answer = GrantResult::default();
     loop {
-        let mut head = [0; HEAD];
+        let mut head = [0; HEADER_LEN];
         output.read_exact(&mut head).context("the board is gone")?;
         let record = FromBoard::from_bytes(&head).context("the board says what is no record")?;
         let mut bytes = vec![0; record.payload_len()];

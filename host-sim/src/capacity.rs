@@ -64,7 +64,7 @@ pub struct BoardCapacity {
 /// Most convex corners of an area's no-fly zones; the same on every board.
 pub const BOARD_NO_FLY_CORNERS: usize = 32;
 
-const fn roadmap_bytes(layout: &FlashLayout) -> usize {
+const fn max_roadmap_file_len(layout: &FlashLayout) -> usize {
     (layout.slot_len - DATA_OFFSET) as usize
 }
 
@@ -76,7 +76,7 @@ pub const NUCLEO_H743: BoardCapacity = BoardCapacity {
     vehicles: 32,
     gates: 128,
     timed_segments: 2048,
-    roadmap_bytes: roadmap_bytes(&FlashLayout::H743),
+    roadmap_bytes: max_roadmap_file_len(&FlashLayout::H743),
     vertices: 256,
     lanes: 512,
 };
@@ -88,7 +88,7 @@ pub const PICO2: BoardCapacity = BoardCapacity {
     half_edges: 32_768,
     vehicles: 16,
     timed_segments: 1024,
-    roadmap_bytes: roadmap_bytes(&FlashLayout::PICO2),
+    roadmap_bytes: max_roadmap_file_len(&FlashLayout::PICO2),
     lanes: 256,
     ..NUCLEO_H743
 };

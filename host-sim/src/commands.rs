@@ -17,7 +17,7 @@ use crate::scenario::{self, Scenario};
 
 /// Loads a scenario and refuses features that are not available yet; `seed` replaces the scenario's
 /// seed.
-fn load(path: &Path, seed: Option<u64>) -> anyhow::Result<Scenario> {
+fn load_supported(path: &Path, seed: Option<u64>) -> anyhow::Result<Scenario> {
     let mut scenario = scenario::load(path)?;
     scenario.check_supported()?;
     scenario.seed = seed.unwrap_or(scenario.seed);

@@ -23,10 +23,10 @@ use planner_core::Point;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::bound::lower_bound_s;
 use planner_core::coverage::pack::{
-    PackWorkspace, Route, RoutePlan, TrackUnit, Vehicle, Work, binpat, binpat_by_shares,
+    CoverageProblem, PackWorkspace, Route, RoutePlan, TrackUnit, Vehicle, binpat, binpat_by_shares,
 };
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
-use planner_core::coverage::transit::Transit;
+use planner_core::coverage::transit::TransitGraph;
 use planner_core::coverage::{CoverageError, Flat, exact, powell};
 use planner_core::geo::frames::{Geodetic, enu_to_geodetic};
 use planner_core::map::field::follow::TerrainFollowing;
@@ -41,7 +41,7 @@ use crate::scenario::{Scenario, VehicleSection};
 pub const HOST_SEARCH_STEPS: u32 = 20_000_000;
 
 /// Greatest height of a start above or below the ground, metres.
-const MAX_OFF_GROUND_M: f32 = 1.5;
+const MAX_START_OFF_GROUND_M: f32 = 1.5;
 
 /// A sortie, its points, and the time at which each point is passed, seconds after the mission's
 /// start.
@@ -55,7 +55,7 @@ impl<'a> CoveragePlan<'a> {
     pub fn new(scenario: &'a Scenario, method: CoverageMethod) -> anyhow::Result<Self> {
         // A pad may be on a roof, unless the origin's altitude is 0, which counts as not given.
         let given = scenario.area.as_ref().is_some_and(|area| area.origin.alt_m != 0.0);
-        check_starts(scenario, if given { f32::INFINITY } else { MAX_OFF_GROUND_M })?;
+        check_start_heights(scenario, if given { f32::INFINITY } else { MAX_START_OFF_GROUND_M })?;
         Self::plan_with_search(scenario, method, HOST_SEARCH_STEPS)
     }
 
@@ -79,13 +79,13 @@ impl<'a> CoveragePlan<'a> {
             bail!("area is missing: {}\nhint: {hint}", scenario.path);
         };
         let area = Area::new(&wanted.vertices, &wanted.rings)
-            .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", wanted.place))?;
+            .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", wanted.file_line))?;
         let vehicles: Vec<Vehicle> =
             scenario.vehicles.iter().map(|v| planner_vehicle(v, scenario)).collect();
         check_starts_outside_zones(scenario, &area, &vehicles)?;
         let failed = |error: CoverageError| explain_error(error, wanted, scenario.vehicles.len());
         let began = Instant::now();
-        let mut transit = Box::new(Transit::empty());
+        let mut transit = Box::new(TransitGraph::empty());
         transit.set_area(area).map_err(failed)?;
         let ways = began.elapsed().as_secs_f64();
         let began = Instant::now();
@@ -93,7 +93,7 @@ impl<'a> CoveragePlan<'a> {
         let lanes = began.elapsed().as_secs_f64();
         let following = terrain_following(wanted)?;
         let began = Instant::now();
-        let work = Work {
+        let work = CoverageProblem {
             tracks: &tracks,
             transit: &transit,
             vehicles: &vehicles,
@@ -122,11 +122,11 @@ impl<'a> CoveragePlan<'a> {
             sorties: Vec::new(),
             closest_approach_m: f32::INFINITY,
             plan,
-            shares,
+            binpat_shares: shares,
             lower_bound_s,
             computing_s: seconds,
         };
-        planned.sorties = match wanted.batteries {
+        planned.sorties = match wanted.allows_battery_swaps {
             true => planned.cut_into_sorties()?,
             false => planned.one_sortie_per_route()?,
         };
@@ -155,7 +155,8 @@ impl<'a> CoveragePlan<'a> {
         let flight = |sortie: &Sortie| {
             let points = flight::flight_points(self, &sortie.route);
             let mut times_s = flight::passing_times_s(self, &sortie.route, &points);
-            times_s.iter_mut().for_each(|time| *time += sortie.begin_s + sortie.depart_s);
+            let departure_s = sortie.round_begin_s + sortie.departure_delay_s;
+            times_s.iter_mut().for_each(|time| *time += departure_s);
             (*sortie, points, times_s)
         };
         self.sorties.iter().map(flight).collect()
@@ -163,11 +164,11 @@ impl<'a> CoveragePlan<'a> {
 
     /// The sorties of a route's vehicle, in the order in which they are flown.
     pub fn sorties_of(&self, route: &Route) -> impl Iterator<Item = &Sortie> {
-        self.sorties.iter().filter(|sortie| sortie.route.vehicle == route.vehicle)
+        self.sorties.iter().filter(|sortie| sortie.route.vehicle_index == route.vehicle_index)
     }
 
     /// Cost of a route: all its sorties and the battery swaps between them, seconds.
-    pub fn sorties_cost_s(&self, route: &Route) -> f32 {
+    pub fn sorties_and_swaps_cost_s(&self, route: &Route) -> f32 {
         let swaps = self.sorties_of(route).count().saturating_sub(1) as f32;
         self.sorties_of(route).map(|sortie| sortie.route.cost_s).sum::<f32>()
             + swaps * BATTERY_SWAP_S
@@ -179,15 +180,16 @@ impl<'a> CoveragePlan<'a> {
     }
 
     /// The largest cost of a route, seconds.
-    pub fn max_sorties_cost_s(&self) -> f32 {
-        self.plan.routes.iter().map(|route| self.sorties_cost_s(route)).fold(0.0, f32::max)
+    pub fn max_sorties_and_swaps_cost_s(&self) -> f32 {
+        let cost_s = |route: &Route| self.sorties_and_swaps_cost_s(route);
+        self.plan.routes.iter().map(cost_s).fold(0.0, f32::max)
     }
 
     /// Cuts each route into sorties that a battery lasts for; sorted by round.
     fn cut_into_sorties(&self) -> anyhow::Result<Vec<Sortie>> {
         let mut sorties = Vec::new();
         for route in &self.plan.routes {
-            let index = usize::from(route.vehicle);
+            let index = usize::from(route.vehicle_index);
             let vehicle = &self.scenario.vehicles[index];
             let lasts_s = vehicle.battery_hover_s();
             let too_long = |error: LaneTooLong| {
@@ -195,7 +197,7 @@ impl<'a> CoveragePlan<'a> {
                     "battery too small: {}: vehicle {} would fly {:.0} s for lane {} alone; its battery lasts {lasts_s:.0} s, \
                      and {:.0} % of that are for the landing\nhint: a place nearer to the area, another angle_deg, or a higher \
                      cruise_mps",
-                    self.scenario.vehicle_places[index],
+                    self.scenario.vehicle_file_lines[index],
                     vehicle.id,
                     error.takes_s,
                     error.lane + 1,
@@ -208,7 +210,7 @@ impl<'a> CoveragePlan<'a> {
             let numbered = parts.into_iter().zip(1..);
             sorties.extend(numbered.map(|(route, number)| Sortie {
                 number,
-                of,
+                sorties_of_vehicle: of,
                 ..sorties::whole_route_sortie(self, route)
             }));
         }
@@ -232,15 +234,15 @@ impl<'a> CoveragePlan<'a> {
                 bail!(
                     "cannot keep vehicles apart: {}: no order of departures keeps {separation_m} m between them\nhint: \
                      fewer vehicles, or places further apart",
-                    self.area_settings.place
+                    self.area_settings.file_line
                 );
             };
             self.closest_approach_m = self.closest_approach_m.min(least_m);
             let own = self.sorties.iter_mut().filter(|sortie| sortie.number == round[0].0.number);
             let mut end_s = begin_s;
             for (sortie, depart_s) in own.zip(departures_s) {
-                (sortie.begin_s, sortie.depart_s) = (begin_s, depart_s);
-                end_s = sortie.end_s().max(end_s);
+                (sortie.round_begin_s, sortie.departure_delay_s) = (begin_s, depart_s);
+                end_s = sortie.landing_s().max(end_s);
             }
             begin_s = end_s + BATTERY_SWAP_S;
         }
@@ -256,11 +258,11 @@ impl<'a> CoveragePlan<'a> {
             let Some(point) = points.iter().find(|point| !fence.contains(&point.position)) else {
                 continue;
             };
-            let (place, index) = (point.position, usize::from(sortie.route.vehicle));
+            let (place, index) = (point.position, usize::from(sortie.route.vehicle_index));
             bail!(
                 "outside mission.geofence: {}: vehicle {} would fly to [{:.1}, {:.1}, {:.1}]\nhint: a geofence around area \
                  and pads, up to the highest layer, or a smaller area",
-                self.scenario.vehicle_places[index],
+                self.scenario.vehicle_file_lines[index],
                 self.scenario.vehicles[index].id,
                 place.x,
                 place.y,
@@ -274,16 +276,16 @@ impl<'a> CoveragePlan<'a> {
     /// vehicle's `endurance_s`, where the scenario gives one.
     fn one_sortie_per_route(&self) -> anyhow::Result<Vec<Sortie>> {
         for route in &self.plan.routes {
-            let index = usize::from(route.vehicle);
+            let index = usize::from(route.vehicle_index);
             let vehicle = &self.scenario.vehicles[index];
             let takes_s = sorties::route_duration_s(self, route);
             let too_long = |endurance_s: &f32| takes_s > USABLE_CHARGE * endurance_s;
-            let Some(endurance_s) = vehicle.endurance_s.filter(too_long) else { continue };
+            let Some(endurance_s) = vehicle.hover_endurance_s.filter(too_long) else { continue };
             bail!(
                 "area too large: {}: vehicle {} would fly {takes_s:.0} s; its endurance_s is {endurance_s:.0}, and {:.0} % of \
                  that are for the landing\nhint: more vehicles, wider lanes, a higher cruise_mps and speed_max_mps take less time; \
                  area.batteries = true plans sorties",
-                self.scenario.vehicle_places[index],
+                self.scenario.vehicle_file_lines[index],
                 vehicle.id,
                 100.0 * (1.0 - USABLE_CHARGE)
             );
@@ -295,19 +297,21 @@ impl<'a> CoveragePlan<'a> {
 /// The surface that vehicles follow above terrain; none above level ground.
 fn terrain_following(wanted: &AreaSection) -> anyhow::Result<Option<TerrainFollowing<'_>>> {
     let following =
-        wanted.terrain.as_ref().map(|terrain| terrain.following(wanted.height_m)).transpose();
-    following.map_err(|error| anyhow::anyhow!("bad field: {}: {error}", wanted.place))
+        wanted.terrain.as_ref().map(|t| t.following(wanted.picture_height_m)).transpose();
+    following.map_err(|error| anyhow::anyhow!("bad field: {}: {error}", wanted.file_line))
 }
 
 /// The lanes of an area, in the best order of those that are tried.
 fn build_tracks(
     wanted: &AreaSection,
     area: &Area<'_>,
-    transit: &Transit<'_, MAX_NO_FLY_CORNERS>,
-    search_steps: u32,
+    transit: &TransitGraph<'_, MAX_NO_FLY_CORNERS>,
+    max_search_steps: u32,
 ) -> Result<Box<Tracks<MAX_LANES>>, CoverageError> {
-    let (angle_deg, margin_m) = (wanted.angle_deg, wanted.margin_m);
-    let pattern = LanePattern { spacing: wanted.usable, angle_deg, margin_m, search_steps };
+    let (spacing, angle_from_east_deg) = (wanted.usable_spacing, wanted.lane_angle_deg);
+    let border_overshoot_m = wanted.lane_overrun_m;
+    let pattern =
+        LanePattern { spacing, angle_from_east_deg, border_overshoot_m, max_search_steps };
     let mut tracks = Box::new(Tracks::new());
     let mut workspace = Box::new(tracks::LaneWorkspace::<MAX_VERTICES>::new());
     tracks::build_lanes(area, &pattern, transit, &mut workspace, &mut tracks)?;
@@ -320,19 +324,19 @@ fn build_tracks(
 /// # Errors
 /// A vehicle starts too far above or below the ground; the error names it.
 pub fn check_starts_on_ground(scenario: &Scenario) -> anyhow::Result<()> {
-    check_starts(scenario, MAX_OFF_GROUND_M)
+    check_start_heights(scenario, MAX_START_OFF_GROUND_M)
 }
 
-/// Refuses a start more than [`MAX_OFF_GROUND_M`] below the ground, or more than `most_m` above it.
-fn check_starts(scenario: &Scenario, most_m: f32) -> anyhow::Result<()> {
+/// Refuses a start more than [`MAX_START_OFF_GROUND_M`] below the ground, or `most_m` above it.
+fn check_start_heights(scenario: &Scenario, most_m: f32) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
-    let above_m = |v: &VehicleSection| v.start.z - area.ground_m(&v.start.xy());
-    let stray = |v: &VehicleSection| !(-MAX_OFF_GROUND_M..=most_m).contains(&above_m(v));
+    let above_m = |v: &VehicleSection| v.start.z - area.ground_height_m(&v.start.xy());
+    let stray = |v: &VehicleSection| !(-MAX_START_OFF_GROUND_M..=most_m).contains(&above_m(v));
     if let Some(index) = scenario.vehicles.iter().position(stray) {
         let vehicle = &scenario.vehicles[index];
         bail!(
             "bad vehicle: {}: vehicle {} starts {:.1} m {} the ground\nhint: {ORIGIN_HINT}",
-            scenario.vehicle_places[index],
+            scenario.vehicle_file_lines[index],
             vehicle.id,
             above_m(vehicle).abs(),
             if above_m(vehicle) < 0.0 { "below" } else { "above" }
@@ -348,9 +352,9 @@ fn check_starts_outside_zones(
     vehicles: &[Vehicle],
 ) -> anyhow::Result<()> {
     let ids = scenario.vehicles.iter().map(|vehicle| vehicle.id);
-    let given = scenario.area.as_ref().map_or(0, |area| area.given_zones);
-    for ((vehicle, place), id) in vehicles.iter().zip(&scenario.vehicle_places).zip(ids) {
-        match zone_at(area, &vehicle.place) {
+    let given = scenario.area.as_ref().map_or(0, |area| area.given_no_fly_zones);
+    for ((vehicle, place), id) in vehicles.iter().zip(&scenario.vehicle_file_lines).zip(ids) {
+        match no_fly_zone_at(area, &vehicle.transit_start) {
             None => {}
             Some(zone) if zone < given => {
                 bail!("bad vehicle: {place}: vehicle {id} starts inside no-fly zone {zone}")
@@ -366,7 +370,7 @@ fn check_starts_outside_zones(
 
 /// Index of the first no-fly zone that holds a place, among the area's no-fly zones; `None` if none
 /// does.
-fn zone_at(area: &Area<'_>, place: &Flat) -> Option<usize> {
+fn no_fly_zone_at(area: &Area<'_>, place: &Flat) -> Option<usize> {
     let zones = area.rings().iter().enumerate().filter(|(_, ring)| ring.kind == RingKind::NoFly);
     let holds = |(index, _): (usize, &Ring)| {
         let corners = area.ring(index);
@@ -381,7 +385,7 @@ fn planner_vehicle(vehicle: &VehicleSection, scenario: &Scenario) -> Vehicle {
     let place = vehicle.start.xy();
     let [climb_mps, descend_mps] = vehicle.climb_and_descent_mps();
     Vehicle {
-        place,
+        transit_start: place,
         home: place,
         cruise_mps: scenario.mission.cruise_mps.min(vehicle.speed_max_mps),
         climb_mps,
@@ -399,7 +403,7 @@ const MIN_SHARE_M: f32 = 1e-3;
 /// # Errors
 /// As the method's planner.
 pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    work: &CoverageProblem<'_, L, N>,
     method: CoverageMethod,
     plan: &mut RoutePlan<K>,
 ) -> Result<Option<Vec<f32>>, CoverageError> {
@@ -420,8 +424,8 @@ pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
             let (mut ways_m, mut reaches) = (vec![0.0; ways], vec![0; reaches]);
             let mut states = vec![(0, 0); states];
             let mut ws = exact::ExactWorkspace {
-                ways_m: &mut ways_m,
-                reaches: &mut reaches,
+                transit_lengths_m: &mut ways_m,
+                reachable_ends: &mut reaches,
                 states: &mut states,
             };
             exact::plan_exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)?;
@@ -434,13 +438,13 @@ pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
 /// BINPAT's plan. `None` if BINPAT cuts elsewhere, or assigns the parts to vehicles so that they
 /// take longer: companions plan by shares alone, so they cannot fly the exact plan.
 fn imitate_exact_plan<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    work: &CoverageProblem<'_, L, N>,
     exact: &mut RoutePlan<K>,
 ) -> Result<Option<Vec<f32>>, CoverageError> {
     let mut shares = vec![0.0; work.vehicles.len()];
     let mut packed_m = 0.0;
     for (share, route) in shares.iter_mut().zip(&exact.routes) {
-        let end_m = work.tracks.distance_to_waypoint_m(route.end - 1);
+        let end_m = work.tracks.distance_to_waypoint_m(route.waypoint_end - 1);
         // A share of length 0 would get no waypoint, but the path's first waypoint alone has
         // length 0.
         *share = (end_m - packed_m).max(MIN_SHARE_M);
@@ -448,11 +452,8 @@ fn imitate_exact_plan<const L: usize, const N: usize, const K: usize>(
     }
     let mut plan = RoutePlan::new();
     binpat_by_shares(work, &shares, &mut PackWorkspace::<K>::new(), &mut plan)?;
-    let alike = plan
-        .routes
-        .iter()
-        .map(|r| (r.first, r.end))
-        .eq(exact.routes.iter().map(|r| (r.first, r.end)));
+    let waypoints = |route: &Route| (route.lowest_waypoint, route.waypoint_end);
+    let alike = plan.routes.iter().map(waypoints).eq(exact.routes.iter().map(waypoints));
     if !alike || plan.max_cost_s() > exact.max_cost_s() {
         return Ok(None);
     }
@@ -462,7 +463,7 @@ fn imitate_exact_plan<const L: usize, const N: usize, const K: usize>(
 
 /// The error text for a coverage plan that failed, with the place in the scenario.
 fn explain_error(error: CoverageError, wanted: &AreaSection, vehicles: usize) -> anyhow::Error {
-    let place = &wanted.place;
+    let place = &wanted.file_line;
     let why = match error {
         CoverageError::Area(area) => format!("{area:?}"),
         CoverageError::SettingOutOfRange(name) => format!("{name} is out of its range"),

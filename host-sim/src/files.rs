@@ -61,7 +61,7 @@ pub struct ResultFiles {
     dir: PathBuf,
     /// Directories that were created for the results, the innermost first; removed unless
     /// committed.
-    made: Vec<PathBuf>,
+    created_dirs: Vec<PathBuf>,
     files: Vec<(NamedTempFile, PathBuf)>,
 }
 
@@ -75,12 +75,15 @@ impl ResultFiles {
     pub fn open(dir: &Path, names: &[&str]) -> anyhow::Result<Self> {
         let dir = if dir.as_os_str().is_empty() { Path::new(".") } else { dir };
         let missing = dir.ancestors().take_while(|d| !d.as_os_str().is_empty() && !d.exists());
-        let results =
-            Self { dir: dir.into(), made: missing.map(PathBuf::from).collect(), files: Vec::new() };
+        let results = Self {
+            dir: dir.into(),
+            created_dirs: missing.map(PathBuf::from).collect(),
+            files: Vec::new(),
+        };
         fs::create_dir_all(dir)
             .with_context(|| format!("cannot make a directory: {}", printable_path(dir)))?;
         for name in names {
-            results.output_path(name)?;
+            results.writable_output_path(name)?;
         }
         results.temporary_file()?;
         Ok(results)
@@ -101,7 +104,7 @@ impl ResultFiles {
 
     /// Path that a result of this name is written to: the target of a symbolic link, else the name
     /// inside the directory. Fails if an existing file there cannot be written.
-    fn output_path(&self, name: &str) -> anyhow::Result<PathBuf> {
+    fn writable_output_path(&self, name: &str) -> anyhow::Result<PathBuf> {
         let path = self.dir.join(name);
         let cannot = || format!("cannot write: {}", printable_path(&path));
         match fs::canonicalize(&path) {
@@ -133,7 +136,7 @@ impl ResultFiles {
     /// # Errors
     /// The file cannot be written.
     pub fn add(&mut self, name: &str, bytes: &[u8]) -> anyhow::Result<()> {
-        let target = self.output_path(name)?;
+        let target = self.writable_output_path(name)?;
         let mut file = self.temporary_file()?;
         let written = file.write_all(bytes).and_then(|()| file.flush());
         written.with_context(|| format!("cannot write: {}", printable_path(&target)))?;
@@ -172,7 +175,7 @@ impl ResultFiles {
                     .with_context(|| format!("cannot write: {}", printable_path(&target)));
             }
         }
-        self.made.clear();
+        self.created_dirs.clear();
         Ok(())
     }
 
@@ -201,7 +204,7 @@ fn undo_rename(target: &Path, before: Option<TempPath>) {
 impl Drop for ResultFiles {
     fn drop(&mut self) {
         self.files.clear();
-        for dir in &self.made {
+        for dir in &self.created_dirs {
             // Fails, and leaves the directory, if another program has put files into it.
             let _ = fs::remove_dir(dir);
         }

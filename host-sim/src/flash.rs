@@ -6,7 +6,7 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use companion::storage::store::{FlashFault, FlashLayout, FlashRequest, MAX_READ, ReadFlash};
+use companion::storage::store::{FlashFault, FlashLayout, FlashRequest, MAX_READ_LEN, ReadFlash};
 
 use crate::files;
 use crate::quote::printable_path;
@@ -56,7 +56,7 @@ impl HostFlash {
     pub fn execute_request<'a>(
         &mut self,
         request: FlashRequest<'_>,
-        read: &'a mut [u8; MAX_READ],
+        read: &'a mut [u8; MAX_READ_LEN],
     ) -> Result<&'a [u8], FlashFault> {
         match request {
             FlashRequest::Read { at, len } => {

@@ -48,7 +48,7 @@ const BAD_INPUT: u8 = 2;
 fn main() -> ExitCode {
     let done = match Cli::try_parse() {
         Ok(cli) => run(cli.command),
-        Err(error) => print_argument_error(&error),
+        Err(error) => print_help_or_argument_error(&error),
     };
     // A command whose output could not be printed (stdout closed or full) has failed.
     let done = done.and_then(|code| progress::check_printed().map(|()| code));
@@ -81,7 +81,7 @@ fn run(command: HostSimCommand) -> anyhow::Result<ExitCode> {
 
 /// Handles arguments that clap did not parse into a command: prints help or version if they were
 /// requested; otherwise returns an error of one line with hints.
-fn print_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
+fn print_help_or_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode> {
     let asked = matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
     if asked {
         let text = error.render();

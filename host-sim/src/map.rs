@@ -17,7 +17,7 @@ pub use boxes::BoxTree;
 pub use edt::ClearanceField;
 pub use error::MapError;
 pub use ground::level_ground_map;
-pub use occupancy::{OccupancyMap, Unknown};
+pub use occupancy::{OccupancyMap, UnknownSpace};
 pub use octree::{Occupancy, Octree};
 pub use voxel_map::VoxelMap;
 
@@ -30,14 +30,14 @@ pub const RESOLUTION_RANGE_M: std::ops::RangeInclusive<f64> = 0.001..=100.0;
 
 /// What the name of a map stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Source<'a> {
+pub enum MapSource<'a> {
     /// The generated nine-floor building with this seed.
     Building(u64),
     /// The path of an OctoMap binary file.
     Bt(&'a Path),
 }
 
-impl<'a> Source<'a> {
+impl<'a> MapSource<'a> {
     /// Parses the name of a map; no file is opened.
     pub fn parse(file: &'a str) -> Result<Self, MapError> {
         let unknown = || MapError::UnknownKind { file: file.into(), expected: ACCEPTED_MAPS };
@@ -59,9 +59,9 @@ impl<'a> Source<'a> {
 /// Loads a map onto a planning grid with cells of `resolution_m`. `file` is the name of a built-in
 /// map, or a path relative to the working directory.
 pub fn load(file: &str, resolution_m: f32) -> Result<OccupancyMap, MapError> {
-    match Source::parse(file)? {
-        Source::Building(seed) => building::building_map(seed, resolution_m),
-        Source::Bt(path) => OccupancyMap::from_octree(&bt::read(path)?, resolution_m, file),
+    match MapSource::parse(file)? {
+        MapSource::Building(seed) => building::building_map(seed, resolution_m),
+        MapSource::Bt(path) => OccupancyMap::from_octree(&bt::read(path)?, resolution_m, file),
     }
 }
 

@@ -6,8 +6,8 @@
 //! | margin to walls, beyond the hull | tracking + estimate + gust |
 //! | separation of two paths | safety distance + 2 (tracking + estimate) |
 //! | separation to parked vehicle | safety distance + [`DEVIATION_BESIDE_PARKED_M`] + estimate + gust |
-//! | tracking | [`companion::margins::TRACKING_M`] |
-//! | beside parked vehicles, in large swarms | `EXTRA_BESIDE_PARKED_M` more, where there is room |
+//! | tracking | [`companion::margins::CRUISE_TRACKING_ERROR_M`] |
+//! | beside parked vehicles, large swarms | `MAX_EXTRA_BESIDE_PARKED_M` more, where there is room |
 //! | estimate, `rtk` | part of the tracking: at most 0.1 m |
 //! | estimate, `recorded`, PX4 | 0.65 m |
 //! | estimate, `recorded`, ArduPilot | 0.12 m: the greatest recorded error |
@@ -30,7 +30,7 @@
 //!   passing them: the delay is the distance flown meanwhile.
 
 use companion::autopilot::AutopilotKind;
-use companion::margins::TRACKING_M;
+use companion::margins::CRUISE_TRACKING_ERROR_M;
 use planner_core::Point;
 use planner_core::coverage::footprint::{Footprint, Spacing};
 
@@ -45,15 +45,15 @@ pub const PAIR_DEVIATION_COVERAGE_M: f32 = 2.4;
 /// Deviation of a flying vehicle from its path that is added to the separation from a parked
 /// vehicle, metres.
 pub const DEVIATION_BESIDE_PARKED_M: f32 = 0.25;
-/// Further distance from parked vehicles in swarms of more than [`MAX_VEHICLES_OF_FEW`], where pads
-/// and goals leave room for it, metres. In gusts of 3 m/s vehicles were up to 0.5 m off their
-/// paths, and in a large swarm many pass beside parked ones.
-const EXTRA_BESIDE_PARKED_M: f32 = 0.1;
-/// Most vehicles of a swarm for which [`EXTRA_BESIDE_PARKED_M`] is not added.
-const MAX_VEHICLES_OF_FEW: usize = 12;
+/// Further distance from parked vehicles in swarms of more than [`MAX_VEHICLES_WITHOUT_EXTRA`],
+/// where pads and goals leave room for it, metres. In gusts of 3 m/s vehicles were up to 0.5 m off
+/// their paths, and in a large swarm many pass beside parked ones.
+const MAX_EXTRA_BESIDE_PARKED_M: f32 = 0.1;
+/// Most vehicles of a swarm for which [`MAX_EXTRA_BESIDE_PARKED_M`] is not added.
+const MAX_VEHICLES_WITHOUT_EXTRA: usize = 12;
 /// Distance that has to remain between pads and goals beyond the separation from a parked vehicle,
 /// metres.
-const REMAINS_BETWEEN_PADS_M: f32 = 0.1;
+const MIN_REMAINING_PAD_GAP_M: f32 = 0.1;
 /// Further deviation of one vehicle per m/s of peak gust, seconds. Gusts do not push two vehicles
 /// towards each other at the same time, so it is added only for one vehicle beside a parked one or
 /// a wall.
@@ -73,7 +73,7 @@ pub fn estimate_error_margin_m(estimator: PositionErrors, autopilot: AutopilotKi
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequiredDistances {
     /// Distance between the hull of a vehicle and walls, metres.
-    pub margin_m: f32,
+    pub wall_margin_m: f32,
     /// Distance between the paths of two vehicles, centre to centre, metres.
     pub separation_m: f32,
 }
@@ -87,12 +87,14 @@ pub fn required_distances(
 ) -> RequiredDistances {
     let mut errors: Vec<f32> = vehicles
         .iter()
-        .map(|v| TRACKING_M + estimate_error_margin_m(simulation.estimator, v.autopilot))
+        .map(|v| {
+            CRUISE_TRACKING_ERROR_M + estimate_error_margin_m(simulation.estimator, v.autopilot)
+        })
         .collect();
     errors.sort_by(|a, b| b.total_cmp(a));
     let worst = |k: usize| errors.get(k).copied().unwrap_or(0.0);
     RequiredDistances {
-        margin_m: worst(0) + DEVIATION_PER_GUST_S * simulation.gust_mps,
+        wall_margin_m: worst(0) + DEVIATION_PER_GUST_S * simulation.gust_peak_mps,
         separation_m: safety_distance_m + worst(0) + worst(1),
     }
 }
@@ -110,7 +112,7 @@ pub fn min_pad_distance_m(
 ) -> f32 {
     let own = |v: &VehicleSection| {
         estimate_error_margin_m(simulation.estimator, v.autopilot)
-            + touchdown_extra_m(simulation.gust_mps, v.autopilot)
+            + touchdown_extra_m(simulation.gust_peak_mps, v.autopilot)
     };
     parked_separation_m(simulation, safety_distance_m, vehicles)
         + vehicles.iter().map(own).fold(0.0, f32::max)
@@ -146,7 +148,7 @@ pub fn with_usable_footprint(
     simulation: &Simulation,
     vehicles: &[VehicleSection],
 ) -> Spacing {
-    let error_m = required_distances(simulation, 0.0, vehicles).margin_m;
+    let error_m = required_distances(simulation, 0.0, vehicles).wall_margin_m;
     let lower_m = vehicles
         .iter()
         .map(|v| max_height_error_m(simulation.estimator, v.autopilot))
@@ -157,8 +159,8 @@ pub fn with_usable_footprint(
     let along_m = spacing.footprint.along_m * share - 2.0 * (error_m + late_m);
     let across_m = spacing.footprint.across_m * share - 2.0 * error_m;
     let footprint = Footprint {
-        along_m: along_m.max(spacing.waypoint_m),
-        across_m: across_m.max(spacing.lane_m),
+        along_m: along_m.max(spacing.max_waypoint_spacing_m),
+        across_m: across_m.max(spacing.max_lane_spacing_m),
     };
     Spacing { footprint, ..*spacing }
 }
@@ -167,7 +169,7 @@ pub fn with_usable_footprint(
 /// vehicles stand at `pads` and land at `landed`, metres. Places nearer to each other than
 /// `parked_m` are never both taken.
 pub fn extra_beside_parked_m(parked_m: f32, pads: &[Point], landed: &[Point]) -> f32 {
-    if pads.len() <= MAX_VEHICLES_OF_FEW {
+    if pads.len() <= MAX_VEHICLES_WITHOUT_EXTRA {
         return 0.0;
     }
     let places = [pads, landed].concat();
@@ -176,7 +178,7 @@ pub fn extra_beside_parked_m(parked_m: f32, pads: &[Point], landed: &[Point]) ->
         .map(|(j, i)| (places[i] - places[j]).norm())
         .filter(|apart_m| *apart_m >= parked_m)
         .fold(f32::INFINITY, f32::min);
-    (apart_m - REMAINS_BETWEEN_PADS_M - parked_m).clamp(0.0, EXTRA_BESIDE_PARKED_M)
+    (apart_m - MIN_REMAINING_PAD_GAP_M - parked_m).clamp(0.0, MAX_EXTRA_BESIDE_PARKED_M)
 }
 
 /// Distance between a flight path and a vehicle parked on the ground, metres.
@@ -189,7 +191,7 @@ pub fn parked_separation_m(
         vehicles.iter().map(|v| estimate_error_margin_m(simulation.estimator, v.autopilot));
     safety_distance_m
         + DEVIATION_BESIDE_PARKED_M
-        + DEVIATION_PER_GUST_S * simulation.gust_mps
+        + DEVIATION_PER_GUST_S * simulation.gust_peak_mps
         + estimates.fold(0.0, f32::max)
 }
 

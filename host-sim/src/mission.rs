@@ -11,7 +11,7 @@ pub mod stretches;
 use std::time::Instant;
 
 use anyhow::{anyhow, bail};
-use companion::planner::{PlanStep, plan_goals};
+use companion::planner::{PlanStep, plan_goal_mission};
 use companion::storage::mission_file::{MissionBlock, MissionGoal};
 use planner_core::Point;
 use planner_core::flight::{PathError, Task};
@@ -39,7 +39,7 @@ fn descents_m(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::R
         .enumerate()
         .map(|(i, goal)| {
             // Slots around a single goal are reported under that goal's line of the scenario.
-            let places = &scenario.mission.goal_places;
+            let places = &scenario.mission.goal_file_lines;
             let place = places.get(i).or(places.first());
             places::climb_height_m(scenario, map, &format!("goal {i}"), place, goal, largest_m)
         })
@@ -102,11 +102,11 @@ impl PreparedMission {
         let capping = Instant::now();
         if let Some(board) = board {
             roadmap = roadmap.fit_to_board(board)?;
-            timing.roadmap_parts.cap_s = capping.elapsed().as_secs_f64();
+            timing.roadmap_parts.edge_cap_s = capping.elapsed().as_secs_f64();
         }
         let encoding = Instant::now();
         let roadmap_file = roadmap::encode(&roadmap, &header)?;
-        timing.roadmap_parts.file_s = encoding.elapsed().as_secs_f64();
+        timing.roadmap_parts.encoding_s = encoding.elapsed().as_secs_f64();
         let mut mission = Self {
             goals,
             roadmap,
@@ -161,7 +161,7 @@ impl PreparedMission {
         let mut workspace = on_heap(GoalsWorkspace::new);
         let mut plan = on_heap(HostPlan::new);
         let (mut step_begun, mut search_s, mut assignment_s) = (Instant::now(), 0.0, 0.0);
-        plan_goals(&mission, &view, self.max_gates(), &mut workspace, &mut plan, |step| {
+        plan_goal_mission(&mission, &view, self.max_gates(), &mut workspace, &mut plan, |step| {
             let took_s =
                 core::mem::replace(&mut step_begun, Instant::now()).elapsed().as_secs_f64();
             match step {
@@ -186,7 +186,7 @@ impl PreparedMission {
         match error {
             PlanError::Schedule(id, ScheduleError::Blocked) => anyhow!(
                 "vehicle {id} cannot pass the others: {path}: no order and no side-step lets it by\nhint: {}",
-                self.describe_near_goals().unwrap_or_else(|| {
+                self.describe_too_near_goals().unwrap_or_else(|| {
                     "move its start or goal out of their way, or give the \
                                                    roadmap more nodes"
                         .into()
@@ -221,12 +221,13 @@ impl PreparedMission {
 
     /// If two goals are too near for vehicles to stand landed at both: a text with their distance
     /// and the distance needed. `None` if there is no such pair.
-    fn describe_near_goals(&self) -> Option<String> {
+    fn describe_too_near_goals(&self) -> Option<String> {
         let scenario = &self.scenario;
         let needed_m = self.schedule.parked_separation_m;
         let landed = |i: usize| self.goals[i] - Point::new(0.0, 0.0, self.descents_m[i]);
-        let place =
-            |i: usize| scenario.mission.goal_places.get(i).map_or(&*scenario.path, String::as_str);
+        let place = |i: usize| {
+            scenario.mission.goal_file_lines.get(i).map_or(&*scenario.path, String::as_str)
+        };
         let mut pairs = (0..self.goals.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
         let (j, i) = pairs.find(|&(j, i)| (landed(i) - landed(j)).norm() < needed_m)?;
         Some(format!(
@@ -248,7 +249,12 @@ impl PreparedMission {
         let flown = |goal: &u16| plan.flights.iter().any(|f| f.task == Task::Goto(*goal));
         Unserved {
             goals: (0..self.goals.len() as u16).filter(|goal| !flown(goal)).collect(),
-            vehicles: plan.flights.iter().filter(|f| !f.task.leaves_pad()).map(|f| f.id).collect(),
+            vehicles: plan
+                .flights
+                .iter()
+                .filter(|f| !f.task.leaves_pad())
+                .map(|f| f.vehicle_id)
+                .collect(),
             reasons: Vec::new(),
         }
     }

@@ -29,9 +29,9 @@ pub fn planned_page(
             goal_index: flight.task.goal().map(usize::from),
             start: vehicle.start,
             goal: flight.task.goal().map(|goal| mission.goals[usize::from(goal)]),
-            planned: flight.path.waypoints().iter().map(|w| w.position).collect(),
+            planned_path: flight.path.waypoints().iter().map(|w| w.position).collect(),
             track: Vec::new(),
-            lost_s: None,
+            power_lost_at_s: None,
         })
         .collect();
     Ok(ReportData {
@@ -77,7 +77,7 @@ pub fn points_to_text(points: impl Iterator<Item = Point>) -> String {
 }
 
 /// Prints which vehicles of a coverage mission are slower than its cruise speed.
-pub fn print_speed_limits(scenario: &Scenario) {
+pub fn print_slow_vehicles(scenario: &Scenario) {
     if !scenario.covers_area() {
         return;
     }
@@ -108,7 +108,7 @@ pub fn print_summary(result: &MissionResult, dir: &Path) {
             v.end
         );
     }
-    for reason in &result.left.reasons {
+    for reason in &result.unserved.reasons {
         say!("left       {reason}");
     }
     let safety = &result.safety;
@@ -132,23 +132,23 @@ pub fn print_summary(result: &MissionResult, dir: &Path) {
             "area       {:.2} % flown over, {} waypoints ({} flown twice, {} left); \
              area.trigger = \"none\": no pictures were asked for",
             100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
-            coverage.waypoints,
-            coverage.twice,
-            coverage.left
+            coverage.waypoint_count,
+            coverage.repeated_waypoints,
+            coverage.missed_waypoints
         ),
         Some(coverage) => say!(
             "area       {:.2} % photographed by {} pictures of {} waypoints ({} flown twice, {} left)",
             100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
             coverage.photos,
-            coverage.waypoints,
-            coverage.twice,
-            coverage.left
+            coverage.waypoint_count,
+            coverage.repeated_waypoints,
+            coverage.missed_waypoints
         ),
         None => say!(
             "roadmap    {} nodes, {} edges, {} bytes",
             result.roadmap.nodes,
             result.roadmap.edges,
-            result.roadmap.bytes
+            result.roadmap.file_bytes
         ),
     }
     say!("total      {:.1} m, makespan {:.1} s", result.totals.path_m, result.totals.makespan_s);

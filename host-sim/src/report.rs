@@ -22,7 +22,7 @@ pub use data::{
     RoadmapLines, SphereObstacle, vehicle_color,
 };
 pub use figures::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
-pub use surface::{FACE_LIMIT, MapSurface};
+pub use surface::{MAX_FACES_OR_CREASES, MapSurface};
 pub use track::{PictureFootprint, TrackPoint};
 
 /// The report page as one self-contained HTML text of a few megabytes.

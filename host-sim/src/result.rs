@@ -26,10 +26,11 @@ pub struct MissionResult {
     pub totals: Totals,
     /// Smallest distances, and counts of contacts, violations and deadlocks.
     pub safety: Safety,
-    /// Size of the roadmap that was planned on.
-    pub roadmap: RoadmapSize,
+    /// Numbers of nodes, edges and bytes of the roadmap that was planned on.
+    pub roadmap: RoadmapCounts,
     /// Goals without a vehicle, and vehicles without a goal.
-    pub left: Unserved,
+    #[serde(rename = "left")]
+    pub unserved: Unserved,
     /// Results of the coverage; `None` in a mission with goals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<CoverageResult>,
@@ -42,15 +43,20 @@ pub struct CoverageResult {
     /// that a camera would take all along the lanes that were flown.
     pub covered_share: f64,
     /// Number of waypoints on all lanes.
-    pub waypoints: u32,
+    #[serde(rename = "waypoints")]
+    pub waypoint_count: u32,
     /// Number of lanes.
-    pub lanes: usize,
+    #[serde(rename = "lanes")]
+    pub lane_count: usize,
     /// Greatest distance from one lane to the next, metres.
-    pub lane_m: f64,
+    #[serde(rename = "lane_m")]
+    pub lane_spacing_m: f64,
     /// Greatest distance from one waypoint to the next, metres.
-    pub waypoint_m: f64,
+    #[serde(rename = "waypoint_m")]
+    pub waypoint_spacing_m: f64,
     /// Direction of the lanes, degrees counter-clockwise from east.
-    pub angle_deg: f64,
+    #[serde(rename = "angle_deg")]
+    pub lane_angle_deg: f64,
     /// Greatest cost of any vehicle's route, seconds.
     pub max_cost_s: f64,
     /// Mean cost of the vehicles' routes, seconds.
@@ -62,15 +68,18 @@ pub struct CoverageResult {
     /// Lower bound of `max_cost_s` over all divisions of the area, seconds.
     pub lower_bound_s: f64,
     /// `max_cost_s / lower_bound_s - 1`.
-    pub gap: f64,
+    #[serde(rename = "gap")]
+    pub gap_to_lower_bound: f64,
     /// What triggers the camera: `distance`, `waypoint` or `none`.
     pub trigger: &'static str,
     /// Number of pictures that companions requested.
     pub photos: u64,
     /// Number of waypoints photographed (with `trigger` `none`: flown) more than once.
-    pub twice: u64,
+    #[serde(rename = "twice")]
+    pub repeated_waypoints: u64,
     /// Number of waypoints that no vehicle photographed (with `trigger` `none`: flew over).
-    pub left: u64,
+    #[serde(rename = "left")]
+    pub missed_waypoints: u64,
     /// Heights above the ground; `None` over level ground.
     #[serde(flatten)]
     pub terrain: Option<TerrainResult>,
@@ -82,15 +91,20 @@ pub struct CoverageResult {
 #[derive(Clone, Debug, Serialize)]
 pub struct TerrainResult {
     /// Least height above the ground of any lane or leg between lanes, metres.
-    pub ground_least_m: f64,
+    #[serde(rename = "ground_least_m")]
+    pub min_above_ground_m: f64,
     /// Greatest height above the ground of any lane or leg between lanes, metres.
-    pub ground_most_m: f64,
+    #[serde(rename = "ground_most_m")]
+    pub max_above_ground_m: f64,
     /// Greatest slope of any lane or leg between lanes: rise divided by horizontal distance.
-    pub steepest: f64,
+    #[serde(rename = "steepest")]
+    pub steepest_slope: f64,
     /// Number of legs that come too near to the ground.
-    pub too_low: u64,
+    #[serde(rename = "too_low")]
+    pub legs_too_low: u64,
     /// Number of legs that are steeper than their vehicle flies.
-    pub too_steep: u64,
+    #[serde(rename = "too_steep")]
+    pub legs_too_steep: u64,
 }
 
 /// One route.
@@ -99,13 +113,16 @@ pub struct RouteResult {
     /// MAVLink system id.
     pub vehicle: u8,
     /// Lowest number of the route's waypoints.
-    pub first: u32,
+    #[serde(rename = "first")]
+    pub lowest_waypoint: u32,
     /// Highest number of the route's waypoints.
-    pub last: u32,
+    #[serde(rename = "last")]
+    pub highest_waypoint: u32,
     /// Whether the route's waypoints are flown from the highest number to the lowest.
     pub backward: bool,
     /// Height of the vehicle's transit layer, metres.
-    pub layer_m: f64,
+    #[serde(rename = "layer_m")]
+    pub layer_height_m: f64,
     /// Time at which the vehicle first leaves its pad, seconds after the mission's start.
     pub depart_s: f64,
     /// Cost C_k of the route, seconds: all sorties and the battery swaps between them.
@@ -120,19 +137,24 @@ pub struct RouteResult {
 #[derive(Clone, Debug, Serialize)]
 pub struct SortieResult {
     /// Lowest number of the sortie's waypoints.
-    pub first: u32,
+    #[serde(rename = "first")]
+    pub lowest_waypoint: u32,
     /// Highest number of the sortie's waypoints.
-    pub last: u32,
+    #[serde(rename = "last")]
+    pub highest_waypoint: u32,
     /// Time at which the round of this sortie begins, seconds after the mission's start.
-    pub begin_s: f64,
-    /// Time at which the vehicle leaves its pad, seconds after `begin_s`.
-    pub depart_s: f64,
+    #[serde(rename = "begin_s")]
+    pub round_begin_s: f64,
+    /// Time at which the vehicle leaves its pad, seconds after `round_begin_s`.
+    #[serde(rename = "depart_s")]
+    pub departure_delay_s: f64,
     /// Cost C_k of the sortie, seconds.
     pub cost_s: f64,
     /// Cost of the sortie, metres.
     pub cost_m: f64,
     /// Time from pad to pad, with the descent to the lanes and the climb from them, seconds.
-    pub flown_s: f64,
+    #[serde(rename = "flown_s")]
+    pub flight_duration_s: f64,
 }
 
 /// Goals without a vehicle and vehicles without a goal: there are more of one kind than of the
@@ -199,16 +221,17 @@ pub struct Safety {
     pub deadlocks: u32,
 }
 
-/// Size of the roadmap that was planned on.
+/// Numbers of nodes, edges and bytes of the roadmap that was planned on.
 #[derive(Clone, Debug, Serialize)]
-pub struct RoadmapSize {
+pub struct RoadmapCounts {
     /// Number of nodes, starts and goals included.
     pub nodes: usize,
     /// Number of edges, each counted once.
     pub edges: usize,
     /// Length of the roadmap file, bytes; in a coverage mission that of the field file, 0 over
     /// level ground.
-    pub bytes: usize,
+    #[serde(rename = "bytes")]
+    pub file_bytes: usize,
 }
 
 /// `timing.json`: seconds of this machine's clock, `simulated_s` excepted.

@@ -17,7 +17,7 @@ use planner_core::geo::frames::Geodetic;
 use planner_core::map::voxel::{GridShape, VoxelGrid};
 use planner_core::roadmap::prm::{self, NodeIndex, PrmConfig, PrmError};
 use planner_core::roadmap::search::SearchWorkspace;
-use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapError, RoadmapHeader};
+use planner_core::roadmap::{self, Edge, LANDMARK_COUNT, RoadmapError, RoadmapHeader};
 use rayon::prelude::*;
 
 use crate::capacity::{BoardCapacity, ROADMAP_CUBES, ROADMAP_NODES, on_heap};
@@ -29,7 +29,7 @@ pub const MAX_STORED_CLEARANCE_M: f32 = 6.0;
 const NODES_PER_JOB: usize = 32;
 /// Numbers that a roadmap file stores for each node beside its position: its distance to each
 /// landmark, and its height above the ground.
-const LANDMARK_AND_HEIGHT_COLUMNS: usize = LANDMARKS + 1;
+const LANDMARK_AND_HEIGHT_COLUMNS: usize = LANDMARK_COUNT + 1;
 /// Clearances that differ by less than this count as equal, metres: the file stores millimetres.
 const SAME_CLEARANCE_M: f32 = 2e-4;
 
@@ -41,14 +41,15 @@ pub struct BuiltRoadmap {
     /// Edges with their clearances.
     pub edges: Vec<Edge>,
     /// Height of each node above the ground below it, metres; infinite where there is no ground.
-    pub heights_m: Vec<f32>,
+    pub heights_above_ground_m: Vec<f32>,
 }
 
 /// How long each part of the construction took, seconds. Boxes and nodes are made in parallel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct BuildTimes {
     /// Building the tree of boxes over the map, which gives distances to obstacles.
-    pub boxes_s: f64,
+    #[serde(rename = "boxes_s")]
+    pub box_tree_s: f64,
     /// Sampling random free nodes, and measuring their heights above the ground.
     pub nodes_s: f64,
     /// Finding which pairs of nodes are joined, and the clearance of each edge.
@@ -56,9 +57,11 @@ pub struct BuildTimes {
     /// Adding nodes in passages that random sampling missed.
     pub passages_s: f64,
     /// Choosing the edges that a board has room for.
-    pub cap_s: f64,
+    #[serde(rename = "cap_s")]
+    pub edge_cap_s: f64,
     /// Encoding the file: distances to the landmarks, adjacency rows, CRC-32.
-    pub file_s: f64,
+    #[serde(rename = "file_s")]
+    pub encoding_s: f64,
 }
 
 /// Samples nodes and joins them: Algorithm 1 of paper P3D, with the clearance of every edge. The
@@ -71,23 +74,24 @@ pub fn build(
     let grid = map.grid();
     let sampled = || {
         let nodes = sample(map, terminals, config)?;
-        let heights_m: Vec<f32> = nodes.iter().map(|node| height_m(map, node)).collect();
+        let heights_m: Vec<f32> =
+            nodes.iter().map(|node| height_above_ground_m(map, node)).collect();
         anyhow::Ok((nodes, heights_m))
     };
-    let ((tree, boxes_s), (sampled, nodes_s)) =
+    let ((tree, box_tree_s), (sampled, nodes_s)) =
         rayon::join(|| timed(|| BoxTree::new(&grid)), || timed(sampled));
     let (nodes, heights_m) = sampled?;
     let joining = Instant::now();
     let mut workspace = Box::new(NodeIndex::<ROADMAP_NODES, ROADMAP_CUBES>::new());
     let edges = connect_with_clearances(&grid, &tree, &nodes, config, &mut workspace)
-        .map_err(|e| describe(&e))?;
+        .map_err(|e| describe_prm_error(&e))?;
     let parts = BuildTimes {
-        boxes_s,
+        box_tree_s,
         nodes_s,
         edges_s: joining.elapsed().as_secs_f64(),
         ..BuildTimes::default()
     };
-    Ok((BuiltRoadmap { nodes, edges, heights_m }, parts))
+    Ok((BuiltRoadmap { nodes, edges, heights_above_ground_m: heights_m }, parts))
 }
 
 /// Adds nodes in passages between starts and goals that random sampling missed, joins all nodes
@@ -108,17 +112,19 @@ pub fn add_passages(
     if total > ROADMAP_NODES {
         bail!("the roadmap would have {total} nodes: this build plans on at most {ROADMAP_NODES}");
     }
-    roadmap.heights_m.extend(added.iter().map(|node| height_m(map, node)));
+    roadmap
+        .heights_above_ground_m
+        .extend(added.iter().map(|node| height_above_ground_m(map, node)));
     roadmap.nodes.extend(&added);
     let mut workspace = Box::new(NodeIndex::<ROADMAP_NODES, ROADMAP_CUBES>::new());
     roadmap.edges = connect_with_clearances(&grid, &tree, &roadmap.nodes, config, &mut workspace)
-        .map_err(|e| describe(&e))?;
+        .map_err(|e| describe_prm_error(&e))?;
     Ok(added.len())
 }
 
 /// Height of a node above the ground below it, metres; infinite where there is no ground.
-fn height_m(map: &VoxelMap, node: &Point) -> f32 {
-    map.ground_below(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m)
+fn height_above_ground_m(map: &VoxelMap, node: &Point) -> f32 {
+    map.ground_z_below_m(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m)
 }
 
 /// The result of `work`, and the seconds that it took.
@@ -134,14 +140,14 @@ pub fn sample(
     terminals: &[Point],
     config: &PrmConfig,
 ) -> anyhow::Result<Vec<Point>> {
-    let total = terminals.len() + config.nodes;
+    let total = terminals.len() + config.random_nodes;
     if total > ROADMAP_NODES {
         bail!("the roadmap would have {total} nodes: this build plans on at most {ROADMAP_NODES}");
     }
     let mut nodes = vec![Point::zeros(); total];
     let never_sample = map.never_sample_grid();
     prm::sample_nodes(&map.grid(), Some(&never_sample), terminals, config, &mut nodes)
-        .map_err(|e| describe(&e))?;
+        .map_err(|e| describe_prm_error(&e))?;
     Ok(nodes)
 }
 
@@ -271,15 +277,15 @@ pub fn header(config: &PrmConfig, origin: Geodetic, starts: u16, goals: u16) -> 
         edge_max_m: config.edge_max_m,
         tested_clearance_m: config.clearance_m,
         max_clearance_m: MAX_STORED_CLEARANCE_M,
-        starts,
-        goals,
+        start_count: starts,
+        goal_count: goals,
     }
 }
 
 /// The roadmap as the file that is uploaded to a board.
 pub fn encode(roadmap: &BuiltRoadmap, header: &RoadmapHeader) -> anyhow::Result<Vec<u8>> {
     let too_large = || anyhow!("{} edges do not fit a roadmap file", roadmap.edges.len());
-    let BuiltRoadmap { nodes, edges, heights_m } = roadmap;
+    let BuiltRoadmap { nodes, edges, heights_above_ground_m: heights_m } = roadmap;
     let length = roadmap::encoded_len(nodes.len(), edges.len(), LANDMARK_AND_HEIGHT_COLUMNS)
         .ok_or_else(too_large)?;
     let mut bytes = vec![0; length];
@@ -289,7 +295,7 @@ pub fn encode(roadmap: &BuiltRoadmap, header: &RoadmapHeader) -> anyhow::Result<
     Ok(bytes)
 }
 
-fn describe(error: &PrmError) -> anyhow::Error {
+fn describe_prm_error(error: &PrmError) -> anyhow::Error {
     match error {
         PrmError::Config(name) => anyhow!("roadmap.{name} is out of range"),
         PrmError::TerminalBlocked(i) => {

@@ -24,19 +24,19 @@ pub use planner_core::roadmap::prm::Sampling;
 pub use planner_core::track::deconflict::Method;
 pub(crate) use sections::DEFAULT_ORIGIN;
 pub use types::{
-    AssignmentObjective, CompanionHost, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault,
-    Geofence, MapSection, MissionMode, MissionSection, PositionErrors, RoadmapSection, Scenario,
-    Simulation, Terminals, UnsupportedTable, VehicleSection,
+    AssignmentObjective, CompanionHost, Deconfliction, FAULT_OBSTACLE, Fault, Geofence, MapSection,
+    MissionMode, MissionSection, PositionErrors, RoadmapSection, Scenario, Simulation,
+    TerminalEdges, UnsupportedTable, VEHICLE_FAULT_KINDS, VehicleSection,
 };
 
 /// Reads a scenario file; paths in it are relative to its folder.
 pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
-    let (text, name, folder) = text(path)?;
-    read(&text, &name, &folder)
+    let (text, name, folder) = read_scenario_file(path)?;
+    read_scenario(&text, &name, &folder)
 }
 
 /// A scenario file's text, its name for errors, and its folder.
-fn text(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
+fn read_scenario_file(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
     let name = printable_path(path);
     let fail = |why: String| ScenarioError { file: name.clone(), place: None, why, hint: None };
     let text = files::read_text(path).map_err(|e| {
@@ -52,11 +52,11 @@ fn text(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
 /// Parses a scenario's text; errors call it `name`, and its paths are relative to the working
 /// directory.
 pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
-    read(text, name, Path::new(""))
+    read_scenario(text, name, Path::new(""))
 }
 
 /// Reads a scenario's text: a coverage mission if it has `[area]`, else one with goals.
-fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError> {
+fn read_scenario(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError> {
     let text = reader::TomlText { file, text };
     sections::read_root(text, |root| match root.get("area") {
         Some(_) => sections::area::read_coverage_scenario(text, root, folder),

@@ -21,7 +21,7 @@ const WIDTH_STEP_M: f32 = 0.05;
 /// Largest map that is flooded, cells: the queues take up to 12 bytes a cell.
 const MAX_FLOODED_CELLS: usize = 1 << 25;
 /// Most goals that get a line of their own; `and N more` counts the rest.
-const MAX_GOAL_LINES: usize = 8;
+const MAX_SHORTAGE_LINES: usize = 8;
 
 /// One line for each goal without a vehicle and each vehicle without a goal: its position, the
 /// reason and what would help.
@@ -31,14 +31,17 @@ pub fn shortage_lines(mission: &PreparedMission, plan: &HostPlan) -> Vec<String>
     if all == 0 {
         return Vec::new();
     }
-    let mut asked =
-        ShortageFindings { mission, reach: Reachability::new(mission), widths: BTreeMap::new() };
+    let mut asked = ShortageFindings {
+        mission,
+        reachability: Reachability::new(mission),
+        widest_clearances_m: BTreeMap::new(),
+    };
     let mut lines = Vec::new();
-    for &goal in left.goals.iter().take(MAX_GOAL_LINES) {
+    for &goal in left.goals.iter().take(MAX_SHORTAGE_LINES) {
         lines.push(goal_line(&mut asked, usize::from(goal)));
     }
     let remedy = if left.goals.is_empty() { RemedyStatus::Unnamed } else { RemedyStatus::Named };
-    for &id in left.vehicles.iter().take(MAX_GOAL_LINES.max(lines.len()) - lines.len()) {
+    for &id in left.vehicles.iter().take(MAX_SHORTAGE_LINES.max(lines.len()) - lines.len()) {
         lines.push(vehicle_line(&mut asked, id, remedy));
     }
     if all > lines.len() {
@@ -50,18 +53,22 @@ pub fn shortage_lines(mission: &PreparedMission, plan: &HostPlan) -> Vec<String>
 /// The mission, and what was found about it so far.
 struct ShortageFindings<'a> {
     mission: &'a PreparedMission,
-    reach: Reachability,
+    reachability: Reachability,
     /// By vehicle index: [`widest_path_clearances_m`] from its start to all goals, computed on
     /// demand.
-    widths: BTreeMap<usize, Option<Vec<f32>>>,
+    widest_clearances_m: BTreeMap<usize, Option<Vec<f32>>>,
 }
 
 fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
-    let (mission, reach) = (asked.mission, &asked.reach);
+    let (mission, reach) = (asked.mission, &asked.reachability);
     let (at, vehicles) = (&mission.goals[goal], mission.tasks.len());
     let what = format!("goal {goal} at [{}, {}, {}]", at.x, at.y, at.z);
-    let place =
-        mission.scenario.mission.goal_places.get(goal).map_or(String::new(), |p| format!(" ({p})"));
+    let place = mission
+        .scenario
+        .mission
+        .goal_file_lines
+        .get(goal)
+        .map_or(String::new(), |p| format!(" ({p})"));
     let bound = mission
         .tasks
         .iter()
@@ -97,11 +104,14 @@ enum RemedyStatus {
 }
 
 fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, remedy: RemedyStatus) -> String {
-    let (mission, reach) = (asked.mission, &asked.reach);
+    let (mission, reach) = (asked.mission, &asked.reachability);
     let vehicle = mission.tasks.iter().position(|task| task.id == id).unwrap_or_default();
     let at = &mission.scenario.vehicles[vehicle].start;
-    let place =
-        mission.scenario.vehicle_places.get(vehicle).map_or(String::new(), |p| format!(" ({p})"));
+    let place = mission
+        .scenario
+        .vehicle_file_lines
+        .get(vehicle)
+        .map_or(String::new(), |p| format!(" ({p})"));
     let goals = mission.goals.len();
     let why = if !(0..goals).any(|goal| reach.are_connected(vehicle, goal)) {
         let goal = mission.tasks[vehicle].goal.map_or(0, usize::from);
@@ -129,7 +139,7 @@ fn path_remedy_text(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usiz
     let mission = asked.mission;
     let settings = &mission.scenario.vehicles[vehicle];
     let (radius_m, required_m) = (settings.radius_m, mission.tasks[vehicle].required_clearance_m);
-    let widths = asked.widths.entry(vehicle).or_insert_with(|| {
+    let widths = asked.widest_clearances_m.entry(vehicle).or_insert_with(|| {
         let field = mission.clearance_field();
         widest_path_clearances_m(
             &mission.map,
@@ -145,11 +155,11 @@ fn path_remedy_text(asked: &mut ShortageFindings<'_>, vehicle: usize, goal: usiz
     let half_m = mission.map.shape.resolution_m / 2.0;
     if widest_m >= required_m {
         let settings = &mission.scenario.roadmap;
-        let passages = if settings.passages { "" } else { ", or roadmap.passages = true," };
+        let passages = if settings.adds_passages { "" } else { ", or roadmap.passages = true," };
         format!(
             "the map has one with the {required_m:.2} m to the nearest obstacle that are needed: \
              more roadmap.nodes ({}){passages} would help",
-            settings.nodes
+            settings.random_nodes
         )
     } else if widest_m > radius_m {
         let margin_m = ((widest_m - radius_m - half_m).max(0.0) * 100.0).floor() / 100.0;

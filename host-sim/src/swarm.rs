@@ -46,14 +46,14 @@ use crate::scenario::CompanionHost;
 use crate::shortage;
 
 /// Distance from its goal within which a vehicle counts as having reached it, metres.
-const REACHED_M: f32 = 0.5;
+const GOAL_REACHED_WITHIN_M: f32 = 0.5;
 /// Horizontal distance from its pad beyond which a vehicle has left it, metres.
 const AWAY_FROM_PAD_M: f32 = 2.0;
 /// Simulated time after the last vehicle is done, before the simulation ends, seconds.
 const AFTERMATH_S: f64 = 1.0;
 /// Time without any armed vehicle, after all faults, after which no vehicle is expected to fly any
 /// more, seconds: longer than from a gate's opening to the take-off.
-const STANDSTILL_S: f64 = 30.0;
+const END_AFTER_STANDSTILL_S: f64 = 30.0;
 /// Greatest lag behind the wall clock that the simulation makes up for; a longer lag remains. If
 /// the simulation hurried, autopilots would pass seconds in which no companion in another process
 /// can send anything.
@@ -66,7 +66,7 @@ pub struct SwarmFlight {
     /// True track of each vehicle: times in seconds, positions in ENU metres.
     pub tracks: Vec<Vec<(f32, Point)>>,
     /// When each vehicle lost its power, or its motors in the air, seconds; `None` for the others.
-    pub lost_s: Vec<Option<f32>>,
+    pub power_lost_at_s: Vec<Option<f32>>,
     /// Smallest distances over time, one sample each 0.2 s.
     pub samples: Vec<DistanceSample>,
     /// Pictures taken, sorted by vehicle.
@@ -74,13 +74,13 @@ pub struct SwarmFlight {
     /// Events of the companions, the fault script and the referee.
     pub log: Vec<report::LogEvent>,
     /// Waypoints of a coverage mission that were photographed in earlier flights.
-    pub done: Vec<WaypointRange>,
+    pub photographed_before: Vec<WaypointRange>,
     /// Divisions that companions of a coverage mission agreed on, in order of time.
     pub divisions: Vec<FlownDivision>,
     /// Length of the simulated flight, seconds.
     pub simulated_s: f64,
     /// Time that the simulation took on this machine's clock, seconds.
-    pub took_s: f64,
+    pub wall_time_s: f64,
 }
 
 /// How fast the simulation runs.
@@ -132,13 +132,13 @@ struct SimulationRun<'a> {
     divisions: DivisionLog,
     script: FaultScript<'a>,
     log: Vec<report::LogEvent>,
-    done: Vec<WaypointRange>,
-    places: Vec<Point>,
-    nearest_goal_m: Vec<f32>,
+    photographed_before: Vec<WaypointRange>,
+    true_positions: Vec<Point>,
+    nearest_to_end_m: Vec<f32>,
     /// Simulated time so far, seconds.
     t_s: f64,
     /// When some vehicle was last seen armed, or the start or a fault was still awaited, seconds.
-    moved_s: f64,
+    last_active_s: f64,
     ends_at_s: f64,
 }
 
@@ -175,26 +175,27 @@ fn simulate(
             std::thread::sleep(due.saturating_sub(began.elapsed()));
         }
     }
-    let took_s = began.elapsed().as_secs_f64();
+    let wall_time_s = began.elapsed().as_secs_f64();
     run.members.iter_mut().try_for_each(SimulatedVehicle::print_stack_use)?;
     let result = run.result(command);
     run.log_trouble_and_incidents(&result);
     let tracks = (0..run.members.len()).map(|i| run.referee.track(i).to_vec()).collect();
-    let lost_s = run.members.iter().map(|m| m.lost_s.map(|t_s| t_s as f32)).collect();
+    let power_lost_at_s =
+        run.members.iter().map(|m| m.power_lost_at_s.map(|t_s| t_s as f32)).collect();
     let pictures = run.members.iter_mut().flat_map(SimulatedVehicle::drain_pictures).collect();
-    let SimulationRun { referee, log, done, divisions, t_s, .. } = run;
+    let SimulationRun { referee, log, photographed_before, divisions, t_s, .. } = run;
     let divisions = divisions.into_divisions();
     Ok(SwarmFlight {
         result,
         tracks,
-        lost_s,
+        power_lost_at_s,
         samples: referee.samples,
         pictures,
         log,
-        done,
+        photographed_before,
         divisions,
         simulated_s: t_s,
-        took_s,
+        wall_time_s,
     })
 }
 
@@ -210,7 +211,7 @@ impl<'a> SimulationRun<'a> {
         let mut radio = Radio::new(
             RadioConfig {
                 range_m: settings.radio_range_m,
-                loss: f64::from(settings.radio_loss),
+                loss_probability: f64::from(settings.radio_loss),
                 delay_s: f64::from(settings.radio_delay_s),
             },
             members.len(),
@@ -233,7 +234,7 @@ impl<'a> SimulationRun<'a> {
         );
         referee.terrain =
             scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
-        referee.walls = scenario.area.as_ref().and_then(|area| area.obstacles.as_deref());
+        referee.area_obstacles = scenario.area.as_ref().and_then(|area| area.obstacles.as_deref());
         // Lanes of two vehicles may lie side by side, and one vehicle waits for as long as the
         // other one is on its lanes: that is no deadlock.
         referee.retracts_ended_deadlocks = !scenario.faults.is_empty() || scenario.covers_area();
@@ -249,37 +250,37 @@ impl<'a> SimulationRun<'a> {
             divisions: DivisionLog::default(),
             script: FaultScript::new(scenario),
             log: Vec::new(),
-            done: Vec::new(),
-            places: members.iter().map(|m| m.autopilot.true_state().position).collect(),
-            nearest_goal_m: vec![f32::INFINITY; members.len()],
+            photographed_before: Vec::new(),
+            true_positions: members.iter().map(|m| m.autopilot.true_state().position).collect(),
+            nearest_to_end_m: vec![f32::INFINITY; members.len()],
             members,
             t_s: 0.0,
-            moved_s: 0.0,
+            last_active_s: 0.0,
             ends_at_s: f64::INFINITY,
         })
     }
 
     fn step(&mut self, step: u64, now_us: u64) -> anyhow::Result<()> {
-        let Self { mission, plan, planner, members, radio, places, log, .. } = self;
+        let Self { mission, plan, planner, members, radio, true_positions: places, log, .. } = self;
         self.t_s = now_us as f64 * 1e-6;
         let mut world = FaultTargets {
             members,
             radio,
             ground_station: &mut self.ground_station,
-            obstacles: &mut self.referee.obstacles,
+            obstacles: &mut self.referee.sphere_obstacles,
         };
         self.script.step(now_us, &mut world, log)?;
         for (i, member) in members.iter_mut().enumerate() {
             member.step(step, i, mission, radio, places, log)?;
             if let Some(wanted) = member.take_plan_request() {
-                let own = match member.planner {
+                let own = match member.plan_answer {
                     PlanAnswer::BadRoadmap => {
-                        Err(failure_on_damaged(&mission.roadmap_or_field_file))
+                        Err(plan_failure_on_damaged_roadmap(&mission.roadmap_or_field_file))
                     }
                     _ => planner.answer(i, wanted, &mut member.companion),
                 };
                 if wanted == PlanKind::Mission {
-                    self.done = member.companion.excluded_waypoints().to_vec();
+                    self.photographed_before = member.companion.excluded_waypoints().to_vec();
                 }
                 member.hand_over_plan(now_us, wanted, own);
             }
@@ -292,7 +293,7 @@ impl<'a> SimulationRun<'a> {
             };
             if let Some(end) = end {
                 let off = places[i] - end;
-                let nearest_m = &mut self.nearest_goal_m[i];
+                let nearest_m = &mut self.nearest_to_end_m[i];
                 *nearest_m = match flight.task.goal() {
                     Some(_) => nearest_m.min(off.norm()),
                     // A flight in a coverage mission ends above its own pad, so the distance counts
@@ -316,7 +317,7 @@ impl<'a> SimulationRun<'a> {
     /// Sets the end of the simulation once no vehicle is expected to move any more.
     fn update_end(&mut self) {
         let (members, plan) = (&self.members, self.plan);
-        let started = self.ground_station.is_started();
+        let started = self.ground_station.is_start_commanded();
         let done = |i: usize| {
             let at_rest = is_finished(members[i].state()) || members[i].is_powerless();
             let has_no_goal = !plan.flights[i].task.leaves_pad();
@@ -325,13 +326,13 @@ impl<'a> SimulationRun<'a> {
                 || is_left_to_pilot(&members[i])
         };
         let still = |m: &SimulatedVehicle| !m.autopilot.true_state().armed || is_left_to_pilot(m);
-        if !(self.script.is_over() && started && members.iter().all(still)) {
-            self.moved_s = self.t_s;
+        if !(self.script.has_no_change_left() && started && members.iter().all(still)) {
+            self.last_active_s = self.t_s;
         }
         // In a coverage mission vehicles on the ground wait until a lost vehicle is down.
-        let still_s = STANDSTILL_S + f64::from(members[0].lost_vehicle_down_s());
-        let over = (0..members.len()).all(done) || self.t_s - self.moved_s > still_s;
-        if self.ends_at_s.is_infinite() && self.script.is_over() && over {
+        let still_s = END_AFTER_STANDSTILL_S + f64::from(members[0].lost_vehicle_down_after_s());
+        let over = (0..members.len()).all(done) || self.t_s - self.last_active_s > still_s;
+        if self.ends_at_s.is_infinite() && self.script.has_no_change_left() && over {
             self.ends_at_s = self.t_s + AFTERMATH_S;
         }
     }
@@ -357,8 +358,8 @@ impl<'a> SimulationRun<'a> {
                     .all(|(i, v)| self.has_completed_task(i, v) || self.is_disabled_by_fault(i)),
             vehicles,
             totals: Totals {
-                path_m: rounded(plan.total_m() as f32),
-                makespan_s: (last_landing_s - self.ground_station.started_s()).max(0.0),
+                path_m: rounded(plan.total_path_m() as f32),
+                makespan_s: (last_landing_s - self.ground_station.start_commanded_s()).max(0.0),
             },
             safety: Safety {
                 wall_contacts: referee.wall_contacts,
@@ -368,8 +369,8 @@ impl<'a> SimulationRun<'a> {
                 violations: referee.violations,
                 deadlocks: referee.deadlocks,
             },
-            roadmap: mission.roadmap_size(),
-            left: Unserved {
+            roadmap: mission.roadmap_counts(),
+            unserved: Unserved {
                 reasons: shortage::shortage_lines(mission, plan),
                 ..mission.unserved(plan)
             },
@@ -385,9 +386,9 @@ impl<'a> SimulationRun<'a> {
             scenario.simulation.estimator,
             scenario.vehicles[i].autopilot,
         );
-        let nearest_goal_m = self.nearest_goal_m[i] - error_m;
+        let nearest_to_end_m = self.nearest_to_end_m[i] - error_m;
         let flown_m = self.referee.flown_m(i);
-        vehicle_result(&self.members[i], &self.plan.flights[i], flown_m, nearest_goal_m, self.t_s)
+        vehicle_result(&self.members[i], &self.plan.flights[i], flown_m, nearest_to_end_m, self.t_s)
     }
 
     /// Whether the vehicle flew to the end of its path and landed, or had no flight to make.
@@ -400,7 +401,7 @@ impl<'a> SimulationRun<'a> {
     /// is finished, or is left to its pilot.
     fn is_disabled_by_fault(&self, i: usize) -> bool {
         let member = &self.members[i];
-        self.script.is_struck(i)
+        self.script.was_struck(i)
             && (member.is_powerless()
                 || member.took_off_s.is_none()
                 || is_finished(member.state())
@@ -422,7 +423,7 @@ impl<'a> SimulationRun<'a> {
         self.log.extend(self.referee.incidents.iter().map(|seen| report::LogEvent {
             t_s: seen.t_s as f32,
             vehicle: Some(scenario.vehicles[seen.vehicle].id),
-            level: if seen.ended { Level::Warning } else { Level::Error },
+            level: if seen.retracted { Level::Warning } else { Level::Error },
             text: seen.text.clone(),
         }));
     }
@@ -434,7 +435,7 @@ fn is_left_to_pilot(member: &SimulatedVehicle) -> bool {
 }
 
 /// How planning fails on the roadmap file with one bit changed.
-fn failure_on_damaged(file: &[u8]) -> PlanFailure {
+fn plan_failure_on_damaged_roadmap(file: &[u8]) -> PlanFailure {
     let mut damaged = file.to_vec();
     let middle = damaged.len() / 2;
     damaged[middle] ^= 1;
@@ -459,21 +460,23 @@ fn vehicle_result(
     member: &SimulatedVehicle,
     flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,
     flown_m: f64,
-    nearest_goal_m: f32,
+    nearest_to_end_m: f32,
     now_s: f64,
 ) -> VehicleResult {
     // A flight in a coverage mission ends where it began: only a landing shows that it is over.
     let landed = member.landed_s.is_some();
-    let reached = nearest_goal_m <= REACHED_M && (landed || flight.task.goal().is_some());
+    let reached =
+        nearest_to_end_m <= GOAL_REACHED_WITHIN_M && (landed || flight.task.goal().is_some());
     let end = match (has_flight_to_make(member, flight), member.state()) {
         (false, _) => "no goal".to_owned(),
         // Its estimate was at the goal, its true position was not.
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
         _ => member.describe_end(),
     };
-    let flight_time_s = member.took_off_s.map_or(0.0, |from| member.down_s.unwrap_or(now_s) - from);
+    let flight_time_s =
+        member.took_off_s.map_or(0.0, |from| member.back_on_ground_s.unwrap_or(now_s) - from);
     VehicleResult {
-        id: flight.id,
+        id: flight.vehicle_id,
         goal: flight.task.goal(),
         reached,
         landed,

@@ -46,10 +46,10 @@ pub fn read(path: &Path, frame: &TerrainFrame<'_>) -> Result<HeightGrid, Terrain
         "asc" => asc::read(path)?.resampled(frame)?,
         "tif" | "tiff" => geotiff::read(path)?.resampled(frame)?,
         "las" | "laz" => cloud::read(path, frame)?,
-        _ => return Err(TerrainError::Format),
+        _ => return Err(TerrainError::UnknownFormat),
     };
-    match grid.count() {
-        0 => Err(TerrainError::Elsewhere(printable_path(path))),
+    match grid.known_cell_count() {
+        0 => Err(TerrainError::NoHeightInWindow(printable_path(path))),
         _ => Ok(grid),
     }
 }

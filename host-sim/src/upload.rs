@@ -42,9 +42,9 @@ pub struct FtpClient {
     framer: Framer,
     began: Clock,
     next_heartbeat_at: Clock,
-    frames: u8,
+    frame_sequence: u8,
     own_system: u8,
-    system: Option<u8>,
+    target_system: Option<u8>,
     sequence: u16,
     session: u8,
     retransmission: Retransmission,
@@ -53,7 +53,7 @@ pub struct FtpClient {
 /// A WRITE request that is not answered yet.
 struct PendingWrite {
     request: [u8; PAYLOAD_LEN],
-    length: usize,
+    data_len: usize,
     sent_at: Clock,
     repeated: bool,
 }
@@ -61,7 +61,7 @@ struct PendingWrite {
 struct FtpReply {
     sequence: u16,
     session: u8,
-    yes: bool,
+    is_ack: bool,
     request_opcode: u8,
     data: Vec<u8>,
 }
@@ -80,9 +80,9 @@ impl FtpClient {
             framer: Framer::new(),
             began: now,
             next_heartbeat_at: now,
-            frames: 0,
+            frame_sequence: 0,
             own_system: DEFAULT_SYSTEM_ID,
-            system,
+            target_system: system,
             sequence,
             session: 0,
             retransmission: Retransmission::new(now),
@@ -96,12 +96,12 @@ impl FtpClient {
     }
 
     fn send_frame(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
-        self.frames = self.frames.wrapping_add(1);
+        self.frame_sequence = self.frame_sequence.wrapping_add(1);
         self.link.send(bytes).context("link lost")
     }
 
     fn header(&self) -> Header {
-        Header { system: self.own_system, component: COMPONENT_ID, sequence: self.frames }
+        Header { system: self.own_system, component: COMPONENT_ID, sequence: self.frame_sequence }
     }
 
     /// The frames that have arrived from the companion; waits a moment if no bytes have arrived.
@@ -129,7 +129,7 @@ impl FtpClient {
         let mut input = &buffer[..length];
         let mut frames = Vec::new();
         while let Some(frame) = self.framer.next(now, &mut input) {
-            let ours = self.system.is_none_or(|system| system == frame.system);
+            let ours = self.target_system.is_none_or(|system| system == frame.system);
             frames.extend((ours && frame.component == COMPANION_COMPONENT).then_some(frame));
         }
         Ok(frames)
@@ -144,21 +144,21 @@ impl FtpClient {
         let began = self.link.now();
         while self.link.now().duration_since(began) < ANSWER_TIMEOUT {
             if let Some(frame) = self.receive_frames()?.first() {
-                self.system = Some(frame.system);
+                self.target_system = Some(frame.system);
                 return Ok(frame.system);
             }
         }
         bail!(
             "no companion heard: component {COMPANION_COMPONENT}{} said nothing for {} s\nhint: between two of its ports PX4 passes \
              messages on where MAV_x_FORWARD is set for both",
-            self.system.map_or(String::new(), |system| format!(" of system {system}")),
+            self.target_system.map_or(String::new(), |system| format!(" of system {system}")),
             ANSWER_TIMEOUT.as_secs()
         )
     }
 
     fn request_payload(&mut self, opcode: u8, offset: u32, data: &[u8]) -> [u8; PAYLOAD_LEN] {
         let mut payload = [0; PAYLOAD_LEN];
-        (payload[1], payload[2]) = (self.system.unwrap_or(0), COMPANION_COMPONENT);
+        (payload[1], payload[2]) = (self.target_system.unwrap_or(0), COMPANION_COMPONENT);
         payload[3..5].copy_from_slice(&self.sequence.to_le_bytes());
         payload[5..8].copy_from_slice(&[self.session, opcode, data.len() as u8]);
         payload[11..15].copy_from_slice(&offset.to_le_bytes());
@@ -184,7 +184,7 @@ impl FtpClient {
         let read = |p: &[u8; 255]| FtpReply {
             sequence: u16::from_le_bytes([p[3], p[4]]),
             session: p[5],
-            yes: p[6] == ACK,
+            is_ack: p[6] == ACK,
             request_opcode: p[8],
             data: p[15..15 + usize::from(p[7]).min(MAX_DATA)].to_vec(),
         };
@@ -198,14 +198,14 @@ impl FtpClient {
         let mut asked_at = began;
         self.send_request(&request)?;
         while self.link.now().duration_since(began) < ANSWER_TIMEOUT {
-            if self.retransmission.check_timeout(asked_at, self.link.now()) {
+            if self.retransmission.back_off_if_timed_out(asked_at, self.link.now()) {
                 self.send_request(&request)?;
                 asked_at = self.link.now();
             }
             let sequence = self.sequence;
             let mine = |a: &FtpReply| a.sequence == sequence && a.request_opcode == opcode;
             if let Some(answer) = self.receive_answers()?.into_iter().find(mine) {
-                if !answer.yes {
+                if !answer.is_ack {
                     bail!("{}", nak_reason(&answer.data));
                 }
                 return Ok(answer);
@@ -242,7 +242,7 @@ impl FtpClient {
                 self.send_request(&request)?;
                 let piece = PendingWrite {
                     request,
-                    length: piece.len(),
+                    data_len: piece.len(),
                     sent_at: self.link.now(),
                     repeated: false,
                 };
@@ -255,11 +255,11 @@ impl FtpClient {
                 if answer.request_opcode != WRITE {
                     continue;
                 }
-                if !answer.yes {
+                if !answer.is_ack {
                     bail!("{}", nak_reason(&answer.data));
                 }
                 if let Some(piece) = under_way.remove(&answer.sequence) {
-                    arrived += piece.length;
+                    arrived += piece.data_len;
                     heard_at = self.link.now();
                     // For a piece that was sent twice it is unknown which copy was answered.
                     if !piece.repeated {
@@ -273,7 +273,7 @@ impl FtpClient {
                 bail!("the companion does not answer any more, after {arrived} bytes");
             }
             for piece in under_way.values_mut() {
-                if self.retransmission.check_timeout(piece.sent_at, self.link.now()) {
+                if self.retransmission.back_off_if_timed_out(piece.sent_at, self.link.now()) {
                     self.send_request(&piece.request)?;
                     (piece.sent_at, piece.repeated) = (self.link.now(), true);
                 }

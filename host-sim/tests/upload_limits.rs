@@ -16,8 +16,8 @@ fn file(nodes: usize, next: usize) -> Vec<u8> {
         edge_max_m: 100.0,
         tested_clearance_m: 0.3,
         max_clearance_m: 6.0,
-        starts: 1,
-        goals: 1,
+        start_count: 1,
+        goal_count: 1,
     };
     let places: Vec<Point> = (0..nodes).map(|i| Point::new(0.5 * i as f32, 0.0, 1.5)).collect();
     let pairs = (0..nodes)

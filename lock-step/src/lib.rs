@@ -25,9 +25,9 @@
 /// `-semihosting-config arg=…`).
 pub const COMMAND_LINE: &str = "lock-step";
 /// Bytes of a record's header.
-pub const HEAD: usize = 16;
+pub const HEADER_LEN: usize = 16;
 /// Longest message, bytes, without its length field.
-pub const LONGEST: usize = 256 << 10;
+pub const MAX_MESSAGE_LEN: usize = 256 << 10;
 
 /// A record that the host sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,8 +99,8 @@ pub enum FromBoard {
 /// Fields of a record's header: kind, port, payload length, address, time or argument.
 type HeaderFields = (u8, u8, u16, u32, u64);
 
-fn to_bytes((kind, port, len, address, time): HeaderFields) -> [u8; HEAD] {
-    let mut head = [0; HEAD];
+fn to_bytes((kind, port, len, address, time): HeaderFields) -> [u8; HEADER_LEN] {
+    let mut head = [0; HEADER_LEN];
     (head[0], head[1]) = (kind, port);
     head[2..4].copy_from_slice(&len.to_le_bytes());
     head[4..8].copy_from_slice(&address.to_le_bytes());
@@ -108,7 +108,7 @@ fn to_bytes((kind, port, len, address, time): HeaderFields) -> [u8; HEAD] {
     head
 }
 
-fn from_bytes(head: &[u8; HEAD]) -> HeaderFields {
+fn from_bytes(head: &[u8; HEADER_LEN]) -> HeaderFields {
     let [kind, port, l0, l1, a0, a1, a2, a3, time @ ..] = *head;
     (
         kind,
@@ -121,7 +121,7 @@ fn from_bytes(head: &[u8; HEAD]) -> HeaderFields {
 
 impl ToBoard {
     /// Encodes the record's header.
-    pub fn to_bytes(self) -> [u8; HEAD] {
+    pub fn to_bytes(self) -> [u8; HEADER_LEN] {
         to_bytes(match self {
             Self::Bytes { port, len, due_us } => (0, port, len, 0, due_us),
             Self::Run { until_us } => (1, 0, 0, 0, until_us),
@@ -132,7 +132,7 @@ impl ToBoard {
     }
 
     /// Decodes a record's header; `None` for an unknown kind.
-    pub fn from_bytes(head: &[u8; HEAD]) -> Option<Self> {
+    pub fn from_bytes(head: &[u8; HEADER_LEN]) -> Option<Self> {
         let (kind, port, len, address, time) = from_bytes(head);
         Some(match kind {
             0 => Self::Bytes { port, len, due_us: time },
@@ -155,7 +155,7 @@ impl ToBoard {
 
 impl FromBoard {
     /// Encodes the record's header.
-    pub fn to_bytes(self) -> [u8; HEAD] {
+    pub fn to_bytes(self) -> [u8; HEADER_LEN] {
         to_bytes(match self {
             Self::Started => (0, 0, 0, 0, 0),
             Self::Sent { port, len, at_us } => (1, port, len, 0, at_us),
@@ -165,7 +165,7 @@ impl FromBoard {
     }
 
     /// Decodes a record's header; `None` for an unknown kind.
-    pub fn from_bytes(head: &[u8; HEAD]) -> Option<Self> {
+    pub fn from_bytes(head: &[u8; HEADER_LEN]) -> Option<Self> {
         let (kind, port, len, _, time) = from_bytes(head);
         Some(match kind {
             0 => Self::Started,

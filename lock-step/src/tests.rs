@@ -20,6 +20,6 @@ fn records_arrive_as_they_were_sent() {
     ] {
         assert_eq!(FromBoard::from_bytes(&record.to_bytes()), Some(record));
     }
-    assert_eq!(ToBoard::from_bytes(&[9; HEAD]), None);
-    assert_eq!(FromBoard::from_bytes(&[9; HEAD]), None);
+    assert_eq!(ToBoard::from_bytes(&[9; HEADER_LEN]), None);
+    assert_eq!(FromBoard::from_bytes(&[9; HEADER_LEN]), None);
 }

@@ -21,7 +21,8 @@ fn main() {
     let terminals: Vec<Point> = row(4.0).chain(row(36.0)).collect();
     let (nodes, seed, sampling) = (400, 1, prm::Sampling::Uniform);
     let (edge_min_m, edge_max_m, clearance_m, max_clearance_m) = (0.5, 8.0, 0.8, 4.0);
-    let build = prm::PrmConfig { nodes, edge_min_m, edge_max_m, clearance_m, seed, sampling };
+    let build =
+        prm::PrmConfig { random_nodes: nodes, edge_min_m, edge_max_m, clearance_m, seed, sampling };
     let mut points = vec![Point::zeros(); terminals.len() + nodes];
     prm::sample_nodes(&grid, None, &terminals, &build, &mut points).expect("the hall is free");
     let (mut edges, clear) = (Vec::new(), prm::edge_clearance);
@@ -33,10 +34,11 @@ fn main() {
 
     // The file that a board reads in place.
     let origin = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
-    let (starts, goals, tested_clearance_m) = (10, 10, clearance_m);
+    let (start_count, goal_count, tested_clearance_m) = (10, 10, clearance_m);
     #[rustfmt::skip]
     let header = RoadmapHeader {
-        origin, edge_min_m, edge_max_m, tested_clearance_m, max_clearance_m, starts, goals,
+        origin, edge_min_m, edge_max_m, tested_clearance_m, max_clearance_m,
+        start_count, goal_count,
     };
     let mut file = vec![0; roadmap::encoded_len(points.len(), edges.len(), 0).expect("small")];
     roadmap::write(&header, &points, &edges, &mut file).expect("it fits");
@@ -47,7 +49,8 @@ fn main() {
     let (mode, max_gates) = (GoalMode::Unlabelled(Objective::TotalDistance), 64);
     let (separation_m, parked_separation_m, cruise_mps, vertical_mps) = (2.0, 1.6, 2.0, 1.0);
     let schedule = ScheduleConfig { separation_m, parked_separation_m, cruise_mps, vertical_mps };
-    let request = PlanRequest { vehicles: &vehicles, descents_m, mode, schedule, max_gates };
+    let request =
+        PlanRequest { vehicles: &vehicles, goal_descents_m: descents_m, mode, schedule, max_gates };
     let mut memory = Box::new(plan::PlanWorkspace::<512, 10, 2048>::new());
     let (mut swarm, mut own) = (SwarmPlan::<10, 64>::new(), flight::VehiclePlan::<64, 64>::new());
     plan::plan_swarm(&view, &request, &mut memory, &mut swarm).expect("all goals are reached");

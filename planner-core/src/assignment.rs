@@ -30,11 +30,11 @@ use self::state::{AugmentingPaths, MatchingState, UNASSIGNED};
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Assignment {
     /// Number of pairs: the largest possible.
-    pub pairs: usize,
+    pub pair_count: usize,
     /// Sum of the pairs' costs.
-    pub total: f64,
+    pub total_cost: f64,
     /// The largest cost of a pair; minus infinity if there is none.
-    pub largest: f32,
+    pub largest_cost: f32,
 }
 
 /// Memory for matrices of up to `N` rows and `N` columns: 46 · `N` bytes. All-zero when new.
@@ -44,12 +44,12 @@ pub struct AssignmentWorkspace<const N: usize> {
     distance: [f64; N],
     settled_price: [f64; N],
     settled_distance: [f64; N],
-    row: [f32; N],
-    previous: [u16; N],
-    settled: [u16; N],
+    row_buffer: [f32; N],
+    predecessor_row: [u16; N],
+    settled_cols: [u16; N],
     row_of_col: [u16; N],
     col_of_row: [u16; N],
-    free: [u16; N],
+    free_rows: [u16; N],
 }
 
 impl<const N: usize> AssignmentWorkspace<N> {
@@ -61,12 +61,12 @@ impl<const N: usize> AssignmentWorkspace<N> {
             distance: [0.0; N],
             settled_price: [0.0; N],
             settled_distance: [0.0; N],
-            row: [0.0; N],
-            previous: [0; N],
-            settled: [0; N],
+            row_buffer: [0.0; N],
+            predecessor_row: [0; N],
+            settled_cols: [0; N],
             row_of_col: [0; N],
             col_of_row: [0; N],
-            free: [0; N],
+            free_rows: [0; N],
         }
     }
 
@@ -79,13 +79,13 @@ impl<const N: usize> AssignmentWorkspace<N> {
             price: &mut self.price[..cols],
             row_of_col: &mut self.row_of_col[..cols],
             col_of_row: &mut self.col_of_row[..rows],
-            row: &mut self.row[..cols],
-            free_rows: &mut self.free[..rows],
+            row_buffer: &mut self.row_buffer[..cols],
+            free_rows: &mut self.free_rows[..rows],
         };
         let paths = AugmentingPaths {
             distance: &mut self.distance[..cols],
-            previous: &mut self.previous[..cols],
-            settled: &mut self.settled[..cols],
+            predecessor_row: &mut self.predecessor_row[..cols],
+            settled_cols: &mut self.settled_cols[..cols],
             settled_price: &mut self.settled_price[..cols],
             settled_distance: &mut self.settled_distance[..cols],
         };
@@ -137,7 +137,7 @@ pub fn assign_bottleneck<const N: usize>(
     while let Some(largest) = augment::augment_bottleneck(&costs, &mut state, &mut paths) {
         limit = fmaxf(limit, largest);
     }
-    costs.limit = limit;
+    costs.max_cost = limit;
     solve(&costs, ws);
     Ok(write_assignment(&costs, &ws.col_of_row, out))
 }
@@ -176,16 +176,16 @@ fn write_assignment(
     out: &mut [Option<u16>],
 ) -> Assignment {
     out.fill(None);
-    let mut result = Assignment { pairs: 0, total: 0.0, largest: f32::NEG_INFINITY };
+    let mut result = Assignment { pair_count: 0, total_cost: 0.0, largest_cost: f32::NEG_INFINITY };
     for (row, &col) in
         col_of_row[..costs.rows].iter().enumerate().filter(|(_, col)| **col != UNASSIGNED)
     {
         let cost = costs.cost_at(row as u16, col);
         let (from, to) = if costs.transposed { (usize::from(col), row as u16) } else { (row, col) };
         out[from] = Some(to);
-        result.pairs += 1;
-        result.total += f64::from(cost);
-        result.largest = fmaxf(result.largest, cost);
+        result.pair_count += 1;
+        result.total_cost += f64::from(cost);
+        result.largest_cost = fmaxf(result.largest_cost, cost);
     }
     result
 }

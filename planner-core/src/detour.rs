@@ -90,7 +90,7 @@ impl KeepOutZone {
     /// that lies there, too.
     fn clipped_to_ground(&self, view: &RoadmapView<'_>) -> Self {
         let falls = self.to.z < self.from.z;
-        let Some((low_m, high_m)) = view.ground_range_near(&self.from).filter(|_| falls) else {
+        let Some((low_m, high_m)) = view.ground_z_range_near(&self.from).filter(|_| falls) else {
             return *self;
         };
         let (mut from, mut to) = (self.from, self.to);
@@ -229,16 +229,16 @@ fn count_waypoints_up_to<const W: usize>(path: &Path<W>, along_m: f32) -> usize 
 
 /// Target of a detour.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Goal {
+pub enum DetourGoal {
     /// A goal of the roadmap, by its index among the goals.
-    Node(u16),
+    RoadmapGoal(u16),
     /// Over a height field, without a roadmap: the vehicle's own pad.
     Home {
         /// Point above the pad at which the detour ends, ENU metres in the mission frame.
-        over: Point,
+        above_pad: Point,
         /// Height of the layer in which the vehicle crosses the field, metres up in the mission
         /// frame.
-        layer_m: f32,
+        layer_z_m: f32,
     },
 }
 
@@ -247,7 +247,7 @@ pub enum Goal {
 pub struct DetourRequest {
     /// Whether the target is not `goal` but the nearest roadmap node (without a roadmap: free
     /// point) outside all zones, to land below it.
-    pub aside: bool,
+    pub land_aside: bool,
     /// Position where the vehicle hovers, on the leg `leg`.
     pub here: Point,
     /// Ends of the leg on which the vehicle hovers: roadmap nodes, except that one end may be where
@@ -256,7 +256,7 @@ pub struct DetourRequest {
     /// Distance from `leg` to the nearest obstacle, metres.
     pub leg_clearance_m: f32,
     /// Target of the detour.
-    pub goal: Goal,
+    pub goal: DetourGoal,
     /// Height of the goal above the ground below it, metres.
     pub descent_m: f32,
     /// Vehicle radius + safety margin, metres: edges must have more clearance.
@@ -279,7 +279,7 @@ impl DetourRequest {
         check_finite("here", &self.here)?;
         check_finite("leg", &self.leg[0])?;
         check_finite("leg", &self.leg[1])?;
-        if let Goal::Home { over, layer_m } = &self.goal {
+        if let DetourGoal::Home { above_pad: over, layer_z_m: layer_m } = &self.goal {
             check_finite("over", over)?;
             check_finite("layer_m", &Point::repeat(*layer_m))?;
         }
@@ -342,25 +342,25 @@ pub fn plan_detour<const N: usize, const W: usize>(
     // The fence is a box, so only the ends of legs are checked. The first leg may begin outside,
     // where the vehicle has strayed.
     let free = |a: &Point, b: &Point| request.is_inside_fence(b) && clear(a, b);
-    let Goal::Node(number) = request.goal else {
+    let DetourGoal::RoadmapGoal(number) = request.goal else {
         return Err(DetourError::Search(SearchError::NoPath));
     };
-    let goal = view.header().starts.saturating_add(number);
-    if number >= view.header().goals {
+    let goal = view.header().start_count.saturating_add(number);
+    if number >= view.header().goal_count {
         return Err(DetourError::Search(SearchError::BadNode(goal)));
     }
     let above = view.node(goal);
-    if !request.aside && !clear(&above, &(above - Point::new(0.0, 0.0, request.descent_m))) {
+    if !request.land_aside && !clear(&above, &(above - Point::new(0.0, 0.0, request.descent_m))) {
         return Err(DetourError::GoalBlocked);
     }
     let passable = |from: u16, edge: &HalfEdge| {
         let to = view.node(edge.target);
-        let near = !request.aside || (to - here).length() < MAX_SIDESTEP_M;
+        let near = !request.land_aside || (to - here).length() < MAX_SIDESTEP_M;
         near && view.has_clearance(edge, request.required_clearance_m)
             && free(&view.node(from), &to)
     };
     let mut search = |entry: u16, nodes: &mut Vec<u16, W>| {
-        if !request.aside {
+        if !request.land_aside {
             return search::astar(view, entry, goal, passable, ws, nodes);
         }
         search::dijkstra_all(view, entry, passable, ws)?;
@@ -431,12 +431,12 @@ pub fn plan_detour_for_vehicle<const N: usize, const W: usize, const G: usize>(
 ) -> Result<(), DetourError> {
     plan_detour(view, request, obstacles, ws, nodes, &mut out.path)?;
     out.task = match request.goal {
-        Goal::Node(goal) => Task::Goto(goal),
-        Goal::Home { .. } => Task::Stay,
+        DetourGoal::RoadmapGoal(goal) => Task::Goto(goal),
+        DetourGoal::Home { .. } => Task::Stay,
     };
     (out.climb_m, out.descent_m, out.depart_s) = (0.0, request.descent_m, 0.0);
     out.gates.clear();
-    out.plan_crc = 0;
+    out.swarm_plan_crc = 0;
     Ok(())
 }
 

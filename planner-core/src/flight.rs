@@ -15,7 +15,7 @@ pub use self::path::{Path, PathError, Waypoint};
 pub use self::photographs::{HeadingMode, PicturePlan, PictureStretch, Trigger, WaypointOrder};
 
 /// Most metres by which the progress that a standing vehicle reports may be behind its reference.
-pub const PROGRESS_ERROR_M: f32 = 0.25;
+pub const MAX_REPORTED_PROGRESS_LAG_M: f32 = 0.25;
 
 /// Task of a vehicle on its flight: to stay, to fly to a goal, or to photograph.
 ///
@@ -61,7 +61,7 @@ impl From<Option<u16>> for Task {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flight<const W: usize> {
     /// Id of the vehicle, unique in the swarm.
-    pub id: u8,
+    pub vehicle_id: u8,
     /// Task of the vehicle.
     pub task: Task,
     /// The part of the flight along the path, from above the pad to above the landing place; times
@@ -74,18 +74,18 @@ pub struct Flight<const W: usize> {
     /// Scheduled take-off, seconds after the mission's start at nominal speeds.
     pub depart_s: f32,
     /// Length of the flight's longest timed segment, metres:
-    /// [`crate::schedule::MAX_TIMED_SEGMENT_M`], or a multiple of it on a long flight.
-    pub segment_m: f32,
+    /// [`crate::schedule::DEFAULT_MAX_SEGMENT_M`], or a multiple of it on a long flight.
+    pub max_segment_m: f32,
 }
 
-/// "Before arc length `at_m` of its own path the vehicle waits until vehicle `id` has reported
-/// progress of at least `until_m`."
+/// "Before arc length `at_m` of its own path the vehicle waits until vehicle `wait_for_id` has
+/// reported progress of at least `open_from_progress_m`."
 ///
 /// Reported progress opens gates, so vehicles report it by these rules:
 /// - On its pad a vehicle reports −climb, in its climb minus the height that is left; in its
 ///   descent it reports the path's length plus the height that it has come down.
 /// - It reports no more than the arc length that its reference has reached, and at most
-///   [`PROGRESS_ERROR_M`] less once it stands.
+///   [`MAX_REPORTED_PROGRESS_LAG_M`] less once it stands.
 /// - It reports more than the path's length plus the descent only when it stands on the ground,
 ///   disarmed.
 ///
@@ -96,9 +96,9 @@ pub struct Gate {
     /// Arc length on the own path before which the vehicle waits, metres; −climb is on the pad.
     pub at_m: f32,
     /// Id of the vehicle to wait for.
-    pub id: u8,
+    pub wait_for_id: u8,
     /// Reported progress of that vehicle from which the gate is open, metres along its path.
-    pub until_m: f32,
+    pub open_from_progress_m: f32,
 }
 
 /// The part of the swarm's plan that one companion needs.
@@ -119,7 +119,7 @@ pub struct VehiclePlan<const W: usize, const G: usize> {
     pub gates: Vec<Gate, G>,
     /// CRC-32 over the plan of the whole swarm. Vehicles with the same CRC agree on the order at
     /// every gate.
-    pub plan_crc: u32,
+    pub swarm_plan_crc: u32,
 }
 
 impl<const W: usize, const G: usize> VehiclePlan<W, G> {
@@ -132,7 +132,7 @@ impl<const W: usize, const G: usize> VehiclePlan<W, G> {
             descent_m: 0.0,
             depart_s: 0.0,
             gates: Vec::new(),
-            plan_crc: 0,
+            swarm_plan_crc: 0,
         }
     }
 }

@@ -51,7 +51,7 @@ pub use geo::{Length, Point};
 pub struct SettingError(pub &'static str);
 
 /// Returns an error with the name of the first setting that is not a positive, finite number.
-pub(crate) fn all_positive(settings: &[(&'static str, f32)]) -> Result<(), SettingError> {
+pub(crate) fn check_positive(settings: &[(&'static str, f32)]) -> Result<(), SettingError> {
     match settings.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
         Some((name, _)) => Err(SettingError(name)),
         None => Ok(()),

@@ -7,10 +7,10 @@
 //! length over all pairs (unlabelled). The paper leaves out the order at shared stretches, which
 //! [`crate::schedule`] decides.
 //!
-//! Cost: one search per vehicle, one assignment, then at most 2 · (min(vehicles, 64) + 9) rounds, and
-//! 9 more where a vehicle would hover for long. In a round each vehicle takes one to three A*, up to a
-//! dozen searches of the schedule (one per departure tried) and one pass over all scheduled timed
-//! segments. Twice that for more than `MAX_VEHICLES_WITHOUT_HANDOVER` vehicles that cannot be
+//! Cost: one search per vehicle, one assignment, then at most 2 · (min(vehicles, 64) + 9) rounds,
+//! and 9 more where a vehicle would hover for long. In a round each vehicle takes one to three A*,
+//! up to a dozen searches of the schedule (one per departure tried) and one pass over all scheduled
+//! timed segments. Twice that for more than `MAX_VEHICLES_WITHOUT_HANDOVER` vehicles that cannot be
 //! planned with a handover.
 
 mod departures;
@@ -28,7 +28,7 @@ use crate::flight::{Flight, Path, VehiclePlan};
 use crate::roadmap::search;
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::{
-    self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace,
+    self, DEFAULT_MAX_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace,
 };
 
 /// Plans the whole swarm: [`compute_costs`], then [`assign_goals`], then [`schedule_flights()`]. A
@@ -39,14 +39,14 @@ pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
-    let mut goals = Goals::new();
+    let mut goals = AssignedGoals::new();
     compute_costs(view, request, ws)?;
     assign_goals(request, ws, &mut goals)?;
     schedule_flights(view, request, &goals, ws, out)
 }
 
 /// The goal of each vehicle of a request, `None` for one that stays on its pad.
-pub type Goals<const V: usize> = Vec<Option<u16>, V>;
+pub type AssignedGoals<const V: usize> = Vec<Option<u16>, V>;
 
 /// First step: writes the length of the shortest path from every start to every goal into the
 /// workspace; with labelled goals only to the vehicle's own goal. One search per vehicle, or one
@@ -56,10 +56,10 @@ pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
     request: &PlanRequest<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
 ) -> Result<(), PlanError> {
-    let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
+    let (starts, goals) = (request.vehicles.len(), request.goal_descents_m.len());
     request.check()?;
     let header = view.header();
-    if usize::from(header.starts) != starts || usize::from(header.goals) != goals {
+    if usize::from(header.start_count) != starts || usize::from(header.goal_count) != goals {
         return Err(PlanError::Terminals);
     }
     if starts > V || goals > V {
@@ -101,9 +101,9 @@ pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
 pub fn assign_goals<const N: usize, const V: usize, const P: usize>(
     request: &PlanRequest<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
-    assigned: &mut Goals<V>,
+    assigned: &mut AssignedGoals<V>,
 ) -> Result<(), PlanError> {
-    let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
+    let (starts, goals) = (request.vehicles.len(), request.goal_descents_m.len());
     if starts > V || goals > V {
         return Err(PlanError::SwarmFull);
     }
@@ -132,14 +132,14 @@ pub fn assign_goals<const N: usize, const V: usize, const P: usize>(
 pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    assigned: &Goals<V>,
+    assigned: &AssignedGoals<V>,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
     let header = view.header();
-    let counts = [usize::from(header.starts), usize::from(header.goals)];
+    let counts = [usize::from(header.start_count), usize::from(header.goal_count)];
     if assigned.len() != request.vehicles.len()
-        || counts != [assigned.len(), request.descents_m.len()]
+        || counts != [assigned.len(), request.goal_descents_m.len()]
     {
         return Err(PlanError::Terminals);
     }
@@ -149,20 +149,21 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
         let mut path = Path::new();
         path.push(view.node(i as u16), 0.0).map_err(|e| PlanError::Path(vehicle.id, e))?;
         let descent_m = match goal {
-            Some(goal) => {
-                *request.descents_m.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?
-            }
+            Some(goal) => *request
+                .goal_descents_m
+                .get(usize::from(goal))
+                .ok_or(PlanError::BadGoal(vehicle.id))?,
             None => 0.0,
         };
         let (id, climb_m) = (vehicle.id, vehicle.climb_m);
         let flight = Flight {
-            id,
+            vehicle_id: id,
             task: goal.into(),
             path,
             climb_m,
             descent_m,
             depart_s: 0.0,
-            segment_m: MAX_TIMED_SEGMENT_M,
+            max_segment_m: DEFAULT_MAX_SEGMENT_M,
         };
         // Cannot overflow: there are as many flights as entries in `assigned`.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
@@ -210,7 +211,7 @@ fn schedule_with_handover<const N: usize, const V: usize, const W: usize, const 
             request.max_gates,
             &mut ws.schedule,
         )
-        .map_err(|e| PlanError::Schedule(flight.id, e))?;
+        .map_err(|e| PlanError::Schedule(flight.vehicle_id, e))?;
     }
     Ok(())
 }
@@ -230,7 +231,7 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     out.climb_m = flight.climb_m;
     out.descent_m = flight.descent_m;
     out.depart_s = flight.depart_s;
-    out.plan_crc = plan.crc;
+    out.swarm_plan_crc = plan.crc;
     schedule::gates(cfg, &plan.flights, index, ws, &mut out.gates)
 }
 
@@ -248,13 +249,13 @@ fn crc<const V: usize, const W: usize>(cfg: &ScheduleConfig, plan: &SwarmPlan<V,
         |numbers: &[f32]| numbers.iter().for_each(|c| digest.update(&c.to_le_bytes()));
     numbers(&[cfg.separation_m, cfg.parked_separation_m, cfg.cruise_mps, cfg.vertical_mps]);
     for flight in &plan.flights {
-        numbers(&[flight.climb_m, flight.descent_m, flight.depart_s, flight.segment_m]);
+        numbers(&[flight.climb_m, flight.descent_m, flight.depart_s, flight.max_segment_m]);
         for w in flight.path.waypoints() {
             numbers(&[w.position.x, w.position.y, w.position.z, w.arrive_s, w.leave_s]);
         }
     }
     for flight in &plan.flights {
-        digest.update(&[flight.id]);
+        digest.update(&[flight.vehicle_id]);
         digest.update(&flight.task.goal().unwrap_or(u16::MAX).to_le_bytes());
         digest.update(&(flight.path.waypoints().len() as u32).to_le_bytes());
     }

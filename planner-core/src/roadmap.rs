@@ -16,7 +16,7 @@
 //!
 //! A roadmap may also store each node's height above the ground, four bytes per node, so that a
 //! board without a map knows the ground height below a vehicle
-//! ([`RoadmapView::ground_range_near`]).
+//! ([`RoadmapView::ground_z_range_near`]).
 //!
 //! [`RoadmapView::parse`] checks the file once, in O(nodes + half-edges · log degree). After that
 //! no accessor can meet an offset or a target out of range, and A* finds shortest paths, whatever
@@ -32,11 +32,11 @@ mod write;
 
 pub(crate) use format::decode_target;
 pub use format::{
-    HEADER_LEN, HalfEdge, LANDMARKS, MAGIC, MAX_CLEARANCE_M, MAX_COORDINATE_M, MAX_EDGE_M,
+    HEADER_LEN, HalfEdge, LANDMARK_COUNT, MAGIC, MAX_CLEARANCE_M, MAX_COORDINATE_M, MAX_EDGE_M,
     MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, RoadmapHeader, VERSION, declared_len,
     encoded_len,
 };
-pub use ground::GROUND_REACH_M;
+pub use ground::MAX_GROUND_NODE_DISTANCE_M;
 pub use view::RoadmapView;
 pub use write::{Edge, write, write_with_landmarks};
 

@@ -1,6 +1,6 @@
 //! Conflict-free schedules: which vehicle flies first where two paths come close.
 //!
-//! A flight is cut into timed segments of at most [`MAX_TIMED_SEGMENT_M`] metres, from the pad
+//! A flight is cut into timed segments of at most [`DEFAULT_MAX_SEGMENT_M`] metres, from the pad
 //! along the path to the ground below the goal. Vehicles are scheduled one after the other
 //! (prioritised planning, Erdmann and Lozano-Pérez 1987). Each waits on its pad for the shortest
 //! time after which its segments are never too near to those that vehicles scheduled before it hold
@@ -33,9 +33,9 @@ use self::blocks::{
     BlockSet, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, segments_in_blocks, set_bit_indices,
 };
 pub use self::config::{ScheduleConfig, ScheduleError};
-pub use self::timed_segments::{MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS};
+pub use self::timed_segments::{DEFAULT_MAX_SEGMENT_M, MAX_TIMED_SEGMENTS};
 use self::timed_segments::{TimedSegment, cut_into_segments, is_conflict};
-use crate::flight::{Flight, Gate, PROGRESS_ERROR_M};
+use crate::flight::{Flight, Gate, MAX_REPORTED_PROGRESS_LAG_M};
 use crate::sort;
 
 /// Most forbidden intervals that are kept apart during the search for a take-off time. Any further
@@ -131,7 +131,7 @@ pub(crate) fn departure_with_conflict_counts<const W: usize>(
         let (mut own_in_conflict, mut others_in_conflict) =
             ([0u64; MAX_TIMED_SEGMENTS.div_ceil(64)], 0);
         for (part, near) in blocks.parts_near(cfg, other) {
-            part.check_segment_count(other.segment_m, MAX_TIMED_SEGMENTS)?;
+            part.check_segment_count(other.max_segment_m, MAX_TIMED_SEGMENTS)?;
             let mut compare = |some: &[TimedSegment]| {
                 let (Some(first), Some(last)) = (some.first(), some.last()) else { return };
                 blocks.segments_near_line(near, own, (first.from, last.to), &mut near_own);
@@ -141,8 +141,8 @@ pub(crate) fn departure_with_conflict_counts<const W: usize>(
                     for (i, p) in near.filter(|(_, p)| is_conflict(cfg, p, q)) {
                         // Both segments are held at once iff p.from + d < q.to and q.from < p.to +
                         // d, for a take-off at d.
-                        let from_s = other.depart_s + q.from_s - handover_s - p.to_s;
-                        let to_s = other.depart_s + q.to_s + handover_s - p.from_s;
+                        let from_s = other.depart_s + q.held_from_s - handover_s - p.held_until_s;
+                        let to_s = other.depart_s + q.held_until_s + handover_s - p.held_from_s;
                         add_forbidden_interval(forbidden, from_s, to_s);
                         own_in_conflict[i / 64] |= 1 << (i % 64);
                         meets = true;
@@ -151,7 +151,7 @@ pub(crate) fn departure_with_conflict_counts<const W: usize>(
                 }
             };
             let mut block = Vec::<TimedSegment, SEGMENTS_PER_BLOCK>::new();
-            part.for_each_segment(other.segment_m, &mut |segment| {
+            part.for_each_segment(other.max_segment_m, &mut |segment| {
                 if block.is_full() {
                     compare(&block);
                     block.clear();
@@ -169,7 +169,7 @@ pub(crate) fn departure_with_conflict_counts<const W: usize>(
 /// The interval of differences in take-off time, `a` minus `b`, outside which the two flights have
 /// no conflict, seconds. If they never conflict, the first end is greater than the second. A place
 /// counts as free `handover_s` after its vehicle has left it.
-pub(crate) fn forbidden_differences<const W: usize>(
+pub(crate) fn forbidden_departure_differences_s<const W: usize>(
     cfg: &ScheduleConfig,
     a: &Flight<W>,
     b: &Flight<W>,
@@ -182,7 +182,10 @@ pub(crate) fn forbidden_differences<const W: usize>(
     for q in &ws.other {
         for p in &ws.own {
             // A pair of segments that would not widen the interval need not be compared.
-            let (low, high) = (q.from_s - handover_s - p.to_s, q.to_s + handover_s - p.from_s);
+            let (low, high) = (
+                q.held_from_s - handover_s - p.held_until_s,
+                q.held_until_s + handover_s - p.held_from_s,
+            );
             if (low < from_s || high > to_s) && is_conflict(cfg, p, q) {
                 (from_s, to_s) = (fminf(from_s, low), fmaxf(to_s, high));
             }
@@ -220,16 +223,16 @@ fn last_allowed_departure(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
 /// The reported progress from which a vehicle counts as having left timed segment `q`, metres.
 ///
 /// At the segment's end the vehicle may have to wait at a gate for another one, which itself waits
-/// until this segment is left. So [`PROGRESS_ERROR_M`], by which a standing vehicle may report too
-/// little, is subtracted. The next segment begins at that end: either it is in conflict too and
-/// counts by itself, or it is clear, and then so is the end. A vehicle has left its pad when it is
-/// [`OFF_PAD_HEIGHT_M`] above the pad, however low its climb ends, and its descent when it stands
-/// on the ground.
+/// until this segment is left. So [`MAX_REPORTED_PROGRESS_LAG_M`], by which a standing vehicle may
+/// report too little, is subtracted. The next segment begins at that end: either it is in conflict
+/// too and counts by itself, or it is clear, and then so is the end. A vehicle has left its pad
+/// when it is [`OFF_PAD_HEIGHT_M`] above the pad, however low its climb ends, and its descent when
+/// it stands on the ground.
 fn progress_when_left_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
-    if q.to_m < flight.path.length_m() + flight.descent_m {
-        fmaxf(q.to_m - PROGRESS_ERROR_M, OFF_PAD_HEIGHT_M - flight.climb_m)
+    if q.end_m < flight.path.length_m() + flight.descent_m {
+        fmaxf(q.end_m - MAX_REPORTED_PROGRESS_LAG_M, OFF_PAD_HEIGHT_M - flight.climb_m)
     } else {
-        q.to_m + BEYOND_DESCENT_END_M
+        q.end_m + BEYOND_DESCENT_END_M
     }
 }
 
@@ -251,7 +254,9 @@ pub fn gates<const W: usize, const G: usize>(
     out.clear();
     let mut full = false;
     for_each_gate(cfg, flights, index, merged_m, ws, |gate| full |= out.push(gate).is_err())?;
-    sort::sort_by(out, |a, b| a.at_m.total_cmp(&b.at_m).then(a.id.cmp(&b.id)));
+    sort::heapsort_by(out, |a, b| {
+        a.at_m.total_cmp(&b.at_m).then(a.wait_for_id.cmp(&b.wait_for_id))
+    });
     if full { Err(ScheduleError::GatesFull) } else { Ok(()) }
 }
 
@@ -306,7 +311,7 @@ fn for_each_gate<const W: usize>(
     mut found: impl FnMut(Gate),
 ) -> Result<(), ScheduleError> {
     // Hovers are left out: wherever a hover conflicts, so do the segments that end and begin there.
-    let moves = |segment: &&TimedSegment| segment.parked || segment.to_m > segment.from_m;
+    let moves = |segment: &&TimedSegment| segment.parked || segment.end_m > segment.wait_at_m;
     let flight = &flights[index];
     for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {
         if ws.blocks.parts_near(cfg, other).next().is_none() {
@@ -319,9 +324,10 @@ fn for_each_gate<const W: usize>(
         let mut highest = f32::NEG_INFINITY;
         let own = ws.own.iter().enumerate().map(|(i, p)| (near[i / SEGMENTS_PER_BLOCK], p));
         for (near, p) in own.filter(|(near, p)| *near != 0 && moves(p)) {
-            let start_s = flight.depart_s + p.from_s;
+            let start_s = flight.depart_s + p.held_from_s;
             let earlier = |q: &&TimedSegment| {
-                other.depart_s + 0.5 * (q.from_s + q.to_s) < start_s && is_conflict(cfg, p, q)
+                other.depart_s + 0.5 * (q.held_from_s + q.held_until_s) < start_s
+                    && is_conflict(cfg, p, q)
             };
             let (mut until_m, mut open_s) = (highest, f32::NEG_INFINITY);
             for q in
@@ -329,7 +335,7 @@ fn for_each_gate<const W: usize>(
             {
                 let left_m = progress_when_left_m(q, other);
                 if left_m > until_m {
-                    (until_m, open_s) = (left_m, other.depart_s + q.to_s);
+                    (until_m, open_s) = (left_m, other.depart_s + q.held_until_s);
                 }
             }
             if until_m <= highest {
@@ -338,13 +344,17 @@ fn for_each_gate<const W: usize>(
             highest = until_m;
             match &mut last {
                 Some((gate, passed_s))
-                    if p.from_m <= gate.at_m
-                        || (p.from_m <= gate.at_m + merged_m && open_s <= *passed_s) =>
+                    if p.wait_at_m <= gate.at_m
+                        || (p.wait_at_m <= gate.at_m + merged_m && open_s <= *passed_s) =>
                 {
-                    gate.until_m = until_m;
+                    gate.open_from_progress_m = until_m;
                 }
                 _ => {
-                    let gate = Gate { at_m: p.from_m, id: other.id, until_m };
+                    let gate = Gate {
+                        at_m: p.wait_at_m,
+                        wait_for_id: other.vehicle_id,
+                        open_from_progress_m: until_m,
+                    };
                     if let Some((before, _)) = last.replace((gate, start_s)) {
                         found(before);
                     }

@@ -10,7 +10,7 @@ use core::cmp::Ordering;
 /// Sorts in place by `order`, the least element first.
 // Not inlined: callers are large, and every caller would hold a copy.
 #[inline(never)]
-pub(crate) fn sort_by<T>(items: &mut [T], mut order: impl FnMut(&T, &T) -> Ordering) {
+pub(crate) fn heapsort_by<T>(items: &mut [T], mut order: impl FnMut(&T, &T) -> Ordering) {
     let mut len = items.len();
     let mut root = len / 2;
     while len > 1 {

@@ -17,7 +17,7 @@ use libm::{fabsf, fmaxf, fminf};
 
 use crate::flight::{Path, Waypoint};
 use crate::track::deconflict::Advice;
-use crate::{Point, SettingError, all_positive};
+use crate::{Point, SettingError, check_positive};
 
 /// Limits of speed, acceleration and deviation for [`advance`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,7 +55,7 @@ impl TrackConfig {
     /// Checks that all numbers are positive and finite, and `deviation_min_m` is at most
     /// `deviation_max_m`; the error names the first that is not.
     pub fn check(&self) -> Result<(), SettingError> {
-        all_positive(&[
+        check_positive(&[
             ("cruise_mps", self.cruise_mps),
             ("climb_mps", self.climb_mps),
             ("descend_mps", self.descend_mps),
@@ -109,20 +109,20 @@ pub struct Reference {
     /// Arc length of the position, metres.
     pub along_m: f32,
     /// Greatest distance of the vehicle behind the reference that is allowed here, metres.
-    pub lead_m: f32,
+    pub lead_limit_m: f32,
     /// Whether the reference has reached the end of the path.
     pub finished: bool,
 }
 
-/// Least value of [`Reference::lead_m`], metres: an autopilot's lag at walking speed.
-const MIN_LEAD_M: f32 = 0.4;
+/// Least value of [`Reference::lead_limit_m`], metres: an autopilot's lag at walking speed.
+const MIN_LEAD_LIMIT_M: f32 = 0.4;
 /// Additional lead in the open per m/s above [`WALKING_SPEED_MPS`], seconds: twice the delay of
 /// setpoint, response and report together, since the reference slows from half the lead.
 pub(crate) const LEAD_PER_SPEED_S: f32 = 0.8;
-/// Walking speed, m/s: at this speed [`MIN_LEAD_M`] covers an autopilot's lag.
+/// Walking speed, m/s: at this speed [`MIN_LEAD_LIMIT_M`] covers an autopilot's lag.
 pub(crate) const WALKING_SPEED_MPS: f32 = 2.0;
 /// Distance from the end of the path at which the path counts as flown, metres.
-const PATH_END_M: f32 = 0.01;
+const PATH_END_TOLERANCE_M: f32 = 0.01;
 
 /// Deviation from the path that a leg of this clearance allows: half of what the clearance leaves
 /// beyond the vehicle's radius, within the configured bounds, metres.
@@ -137,7 +137,7 @@ fn unit_direction(from: &Waypoint, to: &Waypoint) -> Point {
 
 /// Greatest speed and acceleration along a direction, with which horizontal and vertical parts stay
 /// within their own limits.
-fn limits_along(cfg: &TrackConfig, direction: &Point) -> (f32, f32) {
+fn speed_and_accel_limits(cfg: &TrackConfig, direction: &Point) -> (f32, f32) {
     let up = direction.z;
     if fabsf(up) < 1e-3 {
         return (cfg.cruise_mps, cfg.accel_mps2);
@@ -151,27 +151,27 @@ fn limits_along(cfg: &TrackConfig, direction: &Point) -> (f32, f32) {
 
 /// Square of the greatest speed at a corner from unit direction `before` to `after`, m²/s². A
 /// square, so that no square root is needed: on a board it is slow.
-fn corner_speed_sq(cfg: &TrackConfig, clearance_m: f32, before: &Point, after: &Point) -> f32 {
+fn max_corner_speed_sq(cfg: &TrackConfig, clearance_m: f32, before: &Point, after: &Point) -> f32 {
     let change_sq = (after - before).norm_squared();
     let sweep = allowed_deviation_m(cfg, clearance_m) / cfg.response_s;
     fminf(cfg.cruise_mps * cfg.cruise_mps, sweep * sweep / fmaxf(change_sq, 1e-6))
 }
 
-/// Greatest speed from which a vehicle can stop within `room / (2 · accel)` metres if it begins to
-/// brake after `later_s`, m/s.
-fn braking_speed(accel: f32, room: f32, later_s: f32) -> f32 {
+/// Greatest speed from which a vehicle can stop within `twice_accel_distance / (2 · accel)` metres
+/// if it begins to brake after `later_s`, m/s.
+fn max_stoppable_speed(accel: f32, twice_accel_distance: f32, later_s: f32) -> f32 {
     let lost = accel * later_s;
-    sqrtf(lost * lost + fmaxf(room, 0.0)) - lost
+    sqrtf(lost * lost + fmaxf(twice_accel_distance, 0.0)) - lost
 }
 
 /// The part of the path ahead of the reference.
 struct PathAhead<'a> {
-    points: &'a [Waypoint],
+    waypoints: &'a [Waypoint],
     /// Index of the next waypoint ahead.
-    next: usize,
+    next_waypoint: usize,
     along_m: f32,
     /// Distance from the reference within which it has to stop, metres.
-    stop_m: f32,
+    stop_within_m: f32,
     /// Unit direction of the current leg.
     direction: Point,
     /// Acceleration limit of the current leg, m/s².
@@ -182,15 +182,16 @@ impl PathAhead<'_> {
     /// Square of the greatest speed now from which the reference can brake for every corner ahead,
     /// for the end of the path and for the stop that is required, m²/s². Summed leg by leg, since
     /// each leg has its own acceleration limit.
-    fn braking_sq(&self, cfg: &TrackConfig) -> f32 {
+    fn max_stoppable_speed_sq(&self, cfg: &TrackConfig) -> f32 {
         let mut before = self.direction;
-        let mut braking_sq = f32::INFINITY;
+        let mut max_stoppable_speed_sq = f32::INFINITY;
         let (mut room, mut from_m, mut leg_accel) = (0.0, self.along_m, self.accel);
         let enough = 4.0 * (cfg.cruise_mps * cfg.cruise_mps + self.accel * self.accel);
-        for (i, waypoint) in self.points.iter().enumerate().skip(self.next) {
-            let stops_at = self.along_m + self.stop_m;
+        for (i, waypoint) in self.waypoints.iter().enumerate().skip(self.next_waypoint) {
+            let stops_at = self.along_m + self.stop_within_m;
             if stops_at <= waypoint.along_m {
-                braking_sq = fminf(braking_sq, room + 2.0 * leg_accel * (stops_at - from_m));
+                max_stoppable_speed_sq =
+                    fminf(max_stoppable_speed_sq, room + 2.0 * leg_accel * (stops_at - from_m));
                 break;
             }
             room += 2.0 * leg_accel * (waypoint.along_m - from_m);
@@ -198,21 +199,21 @@ impl PathAhead<'_> {
                 // With this much room the vehicle can stop before any corner beyond.
                 break;
             }
-            let corner_sq = match self.points.get(i + 1) {
+            let corner_sq = match self.waypoints.get(i + 1) {
                 Some(end) => {
                     let after = unit_direction(waypoint, end);
-                    let clearance_m = fminf(waypoint.clearance_m, end.clearance_m);
-                    let (fastest, after_accel) = limits_along(cfg, &after);
-                    let corner_sq = corner_speed_sq(cfg, clearance_m, &before, &after);
+                    let clearance_m = fminf(waypoint.leg_clearance_m, end.leg_clearance_m);
+                    let (fastest, after_accel) = speed_and_accel_limits(cfg, &after);
+                    let corner_sq = max_corner_speed_sq(cfg, clearance_m, &before, &after);
                     (before, leg_accel) = (after, after_accel);
                     fminf(corner_sq, fastest * fastest)
                 }
                 None => 0.0,
             };
-            braking_sq = fminf(braking_sq, corner_sq + room);
+            max_stoppable_speed_sq = fminf(max_stoppable_speed_sq, corner_sq + room);
             from_m = waypoint.along_m;
         }
-        braking_sq
+        max_stoppable_speed_sq
     }
 }
 
@@ -240,32 +241,41 @@ pub fn advance<const W: usize>(
         _ => Point::zeros(),
     };
     let before = along_leg(leg);
-    let (top_mps, accel) = limits_along(cfg, &before);
+    let (top_mps, accel) = speed_and_accel_limits(cfg, &before);
     // A NaN scale stops the reference.
     let top_mps =
         if advice.speed_scale > 0.0 { top_mps * fminf(advice.speed_scale, 1.0) } else { 0.0 };
     let stop_m = if advice.stop_within_m > 0.0 { advice.stop_within_m } else { 0.0 };
-    let ahead =
-        PathAhead { points, next, along_m: tracker.along_m, stop_m, direction: before, accel };
-    let braking_sq = ahead.braking_sq(cfg);
+    let ahead = PathAhead {
+        waypoints: points,
+        next_waypoint: next,
+        along_m: tracker.along_m,
+        stop_within_m: stop_m,
+        direction: before,
+        accel,
+    };
+    let max_stoppable_speed_sq = ahead.max_stoppable_speed_sq(cfg);
     let speed_before = tracker.speed_mps;
     // No faster than the leg's acceleration can brake from, if braking begins with the next step.
-    let most = fminf(top_mps, braking_speed(accel, braking_sq, dt_s));
+    let most = fminf(top_mps, max_stoppable_speed(accel, max_stoppable_speed_sq, dt_s));
     let change = accel * dt_s;
     tracker.speed_mps = fmaxf(fminf(most, speed_before + change), speed_before - change);
     let crawls = most < ABOUT_TO_STOP_MPS && tracker.speed_mps >= 0.0;
     tracker.along_m = fminf(fmaxf(tracker.along_m + tracker.speed_mps * dt_s, 0.0), length_m);
     // The last centimetres of braking take many steps; within one centimetre the end counts as
     // reached.
-    if crawls && length_m - tracker.along_m < PATH_END_M && stop_m >= length_m - tracker.along_m {
+    if crawls
+        && length_m - tracker.along_m < PATH_END_TOLERANCE_M
+        && stop_m >= length_m - tracker.along_m
+    {
         tracker.along_m = length_m;
         tracker.speed_mps = 0.0;
     }
-    let clearance_m = points.get(leg).map_or(f32::INFINITY, |w| w.clearance_m);
+    let clearance_m = points.get(leg).map_or(f32::INFINITY, |w| w.leg_clearance_m);
     Some(Reference {
         position: path.point_at(tracker.along_m)?,
         along_m: tracker.along_m,
-        lead_m: max_lead_m(cfg, clearance_m, tracker.speed_mps),
+        lead_limit_m: lead_limit_m(cfg, clearance_m, tracker.speed_mps),
         finished: tracker.along_m >= length_m,
     })
 }
@@ -280,16 +290,16 @@ pub fn braking_distance_m<const W: usize>(
     let next = points.partition_point(|w| w.along_m <= tracker.along_m);
     let leg = next.clamp(1, max_usize(points.len(), 2) - 1);
     let (Some(from), Some(to)) = (points.get(leg - 1), points.get(leg)) else { return 0.0 };
-    let (_, accel) = limits_along(cfg, &unit_direction(from, to));
+    let (_, accel) = speed_and_accel_limits(cfg, &unit_direction(from, to));
     let speed_mps = fmaxf(tracker.speed_mps, 0.0);
     speed_mps * speed_mps / (2.0 * accel)
 }
 
 /// Greatest distance of the vehicle behind the reference on a leg of this clearance, at this speed
 /// of the reference, metres.
-fn max_lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
+fn lead_limit_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
     let deviation_m = allowed_deviation_m(cfg, clearance_m);
-    let lead_m = fminf(cfg.lead_max_m, fmaxf(4.0 * deviation_m, MIN_LEAD_M));
+    let lead_m = fminf(cfg.lead_max_m, fmaxf(4.0 * deviation_m, MIN_LEAD_LIMIT_M));
     // Between walls the lead does not grow with the speed: a vehicle that lags could cut a corner.
     let open = deviation_m >= cfg.deviation_max_m;
     if open {

@@ -134,9 +134,9 @@ pub struct Copter {
     pub params: Params,
     /// Values of the parameters that have an effect.
     pub tuning: CopterTuning,
-    ready_us: u64,
+    position_ready_us: u64,
     reported_origin_and_position: [bool; 2],
-    runtime_us: u64,
+    runtime_sent_us: u64,
     armed: bool,
     since: PhaseStartTimes,
     /// Whether the position controller starts in flight in this step, so that its integral is
@@ -145,15 +145,15 @@ pub struct Copter {
     landed: bool,
     mode: CopterMode,
     failsafe: Option<Failsafe>,
-    position_ok: bool,
+    has_gps_fix: bool,
     position_lost_us: Option<u64>,
-    gcs_heartbeat_us: Option<u64>,
+    last_gcs_heartbeat_us: Option<u64>,
     takeoff: Option<TakeOff>,
     goal: GuidedGoal,
-    goal_us: u64,
+    goal_set_us: u64,
     reference: CopterReference,
-    speed: Option<f32>,
-    leg: RtlLeg,
+    commanded_speed: Option<f32>,
+    rtl_leg: RtlLeg,
     auto: Auto,
 }
 
@@ -164,24 +164,24 @@ impl Copter {
         Self {
             tuning: CopterTuning::new(&params),
             params,
-            ready_us: micros_from_s(ready_s),
+            position_ready_us: micros_from_s(ready_s),
             reported_origin_and_position: [false; 2],
-            runtime_us: 0,
+            runtime_sent_us: 0,
             armed: false,
             since: PhaseStartTimes::default(),
             controller_starts: false,
             landed: true,
             mode: CopterMode::Stabilize,
             failsafe: None,
-            position_ok: true,
+            has_gps_fix: true,
             position_lost_us: None,
-            gcs_heartbeat_us: None,
+            last_gcs_heartbeat_us: None,
             takeoff: None,
             goal: GuidedGoal::STOP,
-            goal_us: 0,
+            goal_set_us: 0,
             reference: CopterReference::new(Point::zeros(), Point::zeros()),
-            speed: None,
-            leg: RtlLeg::Land,
+            commanded_speed: None,
+            rtl_leg: RtlLeg::Land,
             auto: Auto::default(),
         }
     }
@@ -203,11 +203,11 @@ impl Copter {
 
     /// Sets whether GPS has a fix, without which the estimator has no position.
     pub fn set_gps_fix(&mut self, fix: GpsFix) {
-        self.position_ok = fix == GpsFix::Held;
+        self.has_gps_fix = fix == GpsFix::Held;
     }
 
     fn position_known(&self, now_us: u64) -> bool {
-        self.position_ok && now_us >= self.ready_us
+        self.has_gps_fix && now_us >= self.position_ready_us
     }
 
     /// State that telemetry reports.
@@ -221,7 +221,7 @@ impl Copter {
             intended_mode: self.mode.number(),
             // Flags custom mode, stabilized and manual input; and guided, except in STABILIZE and
             // ALT_HOLD.
-            flags: 0x51 | if sticks { 0 } else { 8 } | if self.armed { 0x80 } else { 0 },
+            base_mode: 0x51 | if sticks { 0 } else { 8 } | if self.armed { 0x80 } else { 0 },
             system_status: match self.failsafe {
                 Some(_) => 5,
                 None if now_us < micros_from_s(BOOT_TO_STANDBY_S) => 1,
@@ -234,11 +234,11 @@ impl Copter {
                 _ if self.takeoff.is_some() => 3,
                 CopterMode::Land => 4,
                 CopterMode::Auto if self.is_landing_in_auto() => 4,
-                CopterMode::Rtl if self.leg == RtlLeg::Land => 4,
+                CopterMode::Rtl if self.rtl_leg == RtlLeg::Land => 4,
                 _ => 2,
             },
-            guided: self.mode == CopterMode::Guided,
-            ekf_flags: if now_us < micros_from_s(BOOT_TO_ATTITUDE_S).min(self.ready_us) {
+            reports_position_target: self.mode == CopterMode::Guided,
+            ekf_flags: if now_us < micros_from_s(BOOT_TO_ATTITUDE_S).min(self.position_ready_us) {
                 0x400
             } else if known {
                 0x33F
@@ -251,7 +251,7 @@ impl Copter {
     }
 
     fn origin_known(&self, now_us: u64) -> bool {
-        now_us as f32 >= BOOT_TO_ORIGIN_SHARE * self.ready_us as f32
+        now_us as f32 >= BOOT_TO_ORIGIN_SHARE * self.position_ready_us as f32
     }
 
     /// Handles a setpoint message of type `id`; ignored outside Guided.
@@ -264,16 +264,16 @@ impl Copter {
         } else {
             setpoint::read_global_int(fields, platform)
         };
-        self.fly_to(goal, &platform.sensors());
+        self.set_guided_goal(goal, &platform.sensors());
     }
 
     /// Sets the goal of Guided, which ends a take-off in progress.
-    fn fly_to(&mut self, goal: GuidedGoal, sensors: &SensorReadings) {
+    fn set_guided_goal(&mut self, goal: GuidedGoal, sensors: &SensorReadings) {
         if self.takeoff.take().is_some() || goal.position.is_some() != self.goal.position.is_some()
         {
             self.reference = CopterReference::new(sensors.position, sensors.velocity);
         }
-        (self.goal, self.goal_us) = (goal, sensors.now_us);
+        (self.goal, self.goal_set_us) = (goal, sensors.now_us);
     }
 
     /// Handles another system's HEARTBEAT: only that of `SYSID_MYGCS` counts for the failsafe.
@@ -281,7 +281,7 @@ impl Copter {
         if from.system != self.tuning.gcs_system {
             return;
         }
-        self.gcs_heartbeat_us = Some(platform.time_us);
+        self.last_gcs_heartbeat_us = Some(platform.time_us);
         if self.failsafe == Some(Failsafe::GroundStation) {
             // The vehicle stays in the mode that the failsafe chose.
             self.failsafe = None;
@@ -314,7 +314,7 @@ impl Copter {
         self.mode = mode;
         self.takeoff = None;
         self.goal = GuidedGoal::STOP;
-        self.leg = RtlLeg::Climb { up: f32::NAN };
+        self.rtl_leg = RtlLeg::Climb { up: f32::NAN };
     }
 
     /// Starts a take-off (NAV_TAKEOFF) to height `up` (mission frame). Refused if not possible.
@@ -341,7 +341,7 @@ impl Copter {
         self.send_unsolicited_messages(platform, now_us);
         if self.armed {
             self.update_failsafe(platform, sensors);
-            self.update_timers(platform, sensors);
+            self.disarm_if_due(platform, sensors);
             self.fly_mission(platform, sensors);
         }
         if !self.armed {
@@ -406,21 +406,27 @@ impl Copter {
         }
         let silent =
             |at: u64| since(at) >= micros_from_s(self.tuning.gcs_timeout_s + GCS_REACTION_S);
-        if self.tuning.gcs_failsafe && self.gcs_heartbeat_us.is_some_and(silent) {
+        if self.tuning.gcs_failsafe && self.last_gcs_heartbeat_us.is_some_and(silent) {
             self.failsafe = Some(Failsafe::GroundStation);
             platform.send_text(4, "GCS Failsafe");
             self.force_mode(CopterMode::Rtl, sensors);
-        } else if sensors.battery < self.tuning.battery_low && self.tuning.battery_action > 0 {
+        } else if sensors.battery < self.tuning.battery_low_share
+            && self.tuning.low_battery_action > 0
+        {
             self.failsafe = Some(Failsafe::Battery);
             platform.send_text(4, "Battery 1 is low");
             self.force_mode(
-                if self.tuning.battery_action == 1 { CopterMode::Land } else { CopterMode::Rtl },
+                if self.tuning.low_battery_action == 1 {
+                    CopterMode::Land
+                } else {
+                    CopterMode::Rtl
+                },
                 sensors,
             );
         }
     }
 
-    fn update_timers(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
+    fn disarm_if_due(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         let since = |start: u64| sensors.now_us.saturating_sub(start);
         if !self.landed || self.takeoff.is_some() {
             self.since.idle_us = sensors.now_us;

@@ -42,14 +42,14 @@ pub struct Photo {
 #[derive(Clone, Debug, Default)]
 pub struct CameraTrigger {
     /// Distance between pictures while the camera triggers by distance, metres; else `None`.
-    distance_m: Option<f32>,
+    trigger_distance_m: Option<f32>,
     /// Estimated position (east, north; metres) from which the distance is measured.
-    last: Option<[f32; 2]>,
+    measured_from: Option<[f32; 2]>,
     /// Whether a single picture was requested.
     picture_requested: bool,
     next_poll_us: u64,
     /// Number of pictures since boot.
-    taken: u32,
+    pictures_taken: u32,
     photos: Vec<Photo>,
 }
 
@@ -58,8 +58,8 @@ impl CameraTrigger {
     /// triggering off; parameter 3 requests one picture at once.
     pub(super) fn handle_trigger_distance(&mut self, command: &ReceivedCommand) {
         let distance_m = command.param[0];
-        self.distance_m = (distance_m > 0.0).then_some(distance_m);
-        self.last = None;
+        self.trigger_distance_m = (distance_m > 0.0).then_some(distance_m);
+        self.measured_from = None;
         self.picture_requested |= command.param[2] > 0.0;
     }
 
@@ -80,7 +80,7 @@ impl CameraTrigger {
 
     /// Number of pictures since boot.
     pub(super) fn picture_count(&self) -> u32 {
-        self.taken
+        self.pictures_taken
     }
 
     /// Time of the next trigger check, microseconds since boot.
@@ -103,24 +103,25 @@ impl CameraTrigger {
         }
         let mut shoot = (looks || !px4) && core::mem::take(&mut self.picture_requested);
         if shoot {
-            self.last = estimate.map(|at| [at.x, at.y]);
+            self.measured_from = estimate.map(|at| [at.x, at.y]);
         }
-        if let (Some(distance_m), Some(at)) = (self.distance_m, estimate)
+        if let (Some(distance_m), Some(at)) = (self.trigger_distance_m, estimate)
             && looks
         {
-            let far =
-                self.last.map(|last| libm::hypotf(at.x - last[0], at.y - last[1]) >= distance_m);
+            let far = self
+                .measured_from
+                .map(|last| libm::hypotf(at.x - last[0], at.y - last[1]) >= distance_m);
             // PX4 takes a picture where triggering starts; ArduPilot only measures from there.
             let due = far.unwrap_or(px4);
             if due || far.is_none() {
-                self.last = Some([at.x, at.y]);
+                self.measured_from = Some([at.x, at.y]);
             }
             shoot |= due;
         }
         if !shoot {
             return None;
         }
-        self.taken += 1;
+        self.pictures_taken += 1;
         if self.photos.len() < MAX_KEPT_PHOTOS {
             self.photos.push(truth);
         }

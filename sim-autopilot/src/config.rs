@@ -57,7 +57,7 @@ pub struct AutopilotConfig {
     /// Mean wind, ENU m/s.
     pub wind: Point,
     /// Largest speed of gusts beyond the mean wind, m/s.
-    pub gust_mps: f32,
+    pub gust_peak_mps: f32,
     /// Standard deviation of a random error of the position estimate, metres.
     pub position_noise_m: f32,
     /// Error model of the estimator.
@@ -77,7 +77,7 @@ pub struct AutopilotConfig {
     /// Whether there is one more port, for a ground station, with its stream rates.
     pub ground_port: bool,
     /// Whether messages for other systems are forwarded from port to port.
-    pub forwards: bool,
+    pub forwards_between_ports: bool,
 }
 
 impl Default for AutopilotConfig {
@@ -96,7 +96,7 @@ impl Default for AutopilotConfig {
             heading_rad: 0.0,
             vehicle,
             wind: Point::zeros(),
-            gust_mps: 0.0,
+            gust_peak_mps: 0.0,
             position_noise_m: 0.0,
             estimator: EstimatorErrors::Perfect,
             distance_sensor: false,
@@ -105,7 +105,7 @@ impl Default for AutopilotConfig {
             estimator_ready_s: 40.0,
             ports: 1,
             ground_port: false,
-            forwards: false,
+            forwards_between_ports: false,
         }
     }
 }
@@ -130,35 +130,35 @@ pub enum AutopilotConfigError {
     #[error(
         "{0} is no place on earth: latitude within ±90°, longitude within ±180°, finite altitude"
     )]
-    Place(&'static str),
+    InvalidGeodetic(&'static str),
     /// A number that is not finite, or negative where it must not be.
     #[error("{0} must be finite and not negative")]
-    Number(&'static str),
+    NotFiniteOrNegative(&'static str),
     /// An integer parameter that the autopilot does not have.
     #[error("no integer parameter `{0}`")]
-    Parameter(&'static str),
+    NoIntegerParameter(&'static str),
     /// System id 0, which MAVLink uses for broadcasts.
     #[error("system id 0 means everybody: choose 1 to 255")]
-    SystemId,
+    SystemIdZero,
 }
 
 /// Checks a configuration; an error names the first invalid value.
 pub(super) fn check(config: &AutopilotConfig) -> Result<(), AutopilotConfigError> {
     if config.system_id == 0 {
-        return Err(AutopilotConfigError::SystemId);
+        return Err(AutopilotConfigError::SystemIdZero);
     }
     let home = config.home.unwrap_or(config.world_origin);
     for (name, place) in
         [("world origin", config.world_origin), ("EKF origin", config.ekf_origin), ("home", home)]
     {
         if !place.is_valid() {
-            return Err(AutopilotConfigError::Place(name));
+            return Err(AutopilotConfigError::InvalidGeodetic(name));
         }
     }
     if !config.start.iter().chain(config.wind.iter()).all(|x| x.is_finite())
         || !config.heading_rad.is_finite()
     {
-        return Err(AutopilotConfigError::Number("start position, heading and wind"));
+        return Err(AutopilotConfigError::NotFiniteOrNegative("start position, heading and wind"));
     }
     let v = &config.vehicle;
     let positive = [
@@ -173,12 +173,14 @@ pub(super) fn check(config: &AutopilotConfig) -> Result<(), AutopilotConfigError
         v.drag_per_s,
         v.wind_per_s,
         v.endurance_s,
-        config.gust_mps,
+        config.gust_peak_mps,
         config.position_noise_m,
         config.estimator_ready_s,
     ];
     if positive.iter().any(|x| !x.is_finite() || *x < 0.0) {
-        return Err(AutopilotConfigError::Number("every vehicle limit, gust and noise"));
+        return Err(AutopilotConfigError::NotFiniteOrNegative(
+            "every vehicle limit, gust and noise",
+        ));
     }
     Ok(())
 }

@@ -190,7 +190,7 @@ impl Firmware {
     }
 
     /// Copies the parameters from before a reboot.
-    pub(super) fn keep_params(&mut self, before: &Self) {
+    pub(super) fn copy_params_from(&mut self, before: &Self) {
         match (self, before) {
             (Self::Px4(now), Self::Px4(before)) => {
                 (now.params, now.tuning) = (before.params.clone(), before.tuning);

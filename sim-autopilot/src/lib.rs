@@ -136,7 +136,7 @@ impl Autopilot {
         }
         let now_us = self.platform.time_us;
         while let Some(frame) = self.platform.ports[port].next_frame(now_us, &mut bytes) {
-            if self.platform.config.forwards {
+            if self.platform.config.forwards_between_ports {
                 routing::forward_to_other_ports(
                     &mut self.platform.ports,
                     port,
@@ -205,7 +205,7 @@ impl Autopilot {
         }
         platform.last_demand = armed.then_some(output.demand);
         platform.vehicle.advance(output.motors, &platform.disturbance.wind, ground_up_m, dt_s);
-        platform.frame.recentre(platform.vehicle.position());
+        platform.frame.recentre_if_far(platform.vehicle.position());
         platform.update_camera();
         self.transmit();
         if self.platform.reboot_us.is_some_and(|at_us| self.platform.time_us >= at_us) {
@@ -290,18 +290,21 @@ impl Autopilot {
             system_id: platform.config.system_id,
             status,
             armed,
-            mission: (platform.missions.progress.current, platform.missions.items().len() as u16),
+            mission_item_and_count: (
+                platform.missions.progress.current_item,
+                platform.missions.items().len() as u16,
+            ),
             pictures: platform.camera.picture_count(),
             ned: platform.frame.ned_from_enu(&position),
             velocity: platform.frame.ned_velocity_from_enu(&sensors.velocity),
             geodetic: platform.frame.geodetic_from_enu(&position),
-            gps,
+            gps_error_and_fix: gps,
             home: (platform.home, platform.frame.ned_from_enu(&platform.home_enu.cast::<f64>())),
             ekf_origin: *platform.frame.ekf_origin(),
             specific_force: frames::swap_enu_ned(&force),
-            heading: (sensors.heading, heading_rate),
+            heading_and_rate: (sensors.heading, heading_rate),
             target,
-            height: platform.height_above_ground,
+            height_above_ground: platform.height_above_ground,
             accuracy: platform.config.estimator.accuracy_m(),
             battery: sensors.battery,
             attitude: OnceCell::new(),
@@ -322,7 +325,7 @@ impl Autopilot {
             booted.platform.vehicle.set_battery(battery);
             booted.platform.missions = self.platform.missions.clone();
             booted.platform.camera = self.platform.camera.after_reboot();
-            booted.firmware.keep_params(&self.firmware);
+            booted.firmware.copy_params_from(&self.firmware);
             *self = booted;
         }
     }
@@ -361,15 +364,16 @@ impl Autopilot {
 
     /// Adds `offset` (ENU metres) to the position estimate from now on.
     pub fn jump_estimated_position(&mut self, offset: &Point) {
-        self.platform.position_offset += offset;
+        self.platform.imposed_position_error += offset;
     }
 
     /// Sets the errors of the estimate (estimated minus true): position (ENU metres), velocity (ENU
     /// m/s) and rate of change of the height's error (m/s). A replay uses this to impose recorded
     /// errors.
     pub fn set_estimate_error(&mut self, position: &Point, velocity: &Point, height_rate: f32) {
-        (self.platform.position_offset, self.platform.velocity_bias) = (*position, *velocity);
-        self.platform.height_error_rate = height_rate;
+        (self.platform.imposed_position_error, self.platform.imposed_velocity_error) =
+            (*position, *velocity);
+        self.platform.imposed_height_error_rate = height_rate;
     }
 
     /// Estimated position (ENU metres) and velocity (ENU m/s).
@@ -394,7 +398,7 @@ impl Autopilot {
     /// Sets PX4's failsafe after a loss of setpoints to Land (`COM_OBL_RC_ACT` 4), for flights
     /// under a ceiling: PX4's default is to climb and return. ArduCopter has no such parameter; it
     /// brakes.
-    pub fn land_on_offboard_loss(&mut self) {
+    pub fn set_land_on_offboard_loss(&mut self) {
         if self.platform.config.autopilot == SimulatedKind::Px4 {
             self.set_parameter("COM_OBL_RC_ACT", 4).expect("PX4 has this parameter");
         }
@@ -412,7 +416,7 @@ impl Autopilot {
         if self.firmware.set_integer(name, value) {
             Ok(())
         } else {
-            Err(AutopilotConfigError::Parameter(name))
+            Err(AutopilotConfigError::NoIntegerParameter(name))
         }
     }
 

@@ -7,7 +7,7 @@ use planner_core::geo::frames::{self, Geodetic};
 use crate::SimulatedKind;
 use crate::camera::{CameraTrigger, Photo};
 use crate::config::AutopilotConfig;
-use crate::link::command::{ACCEPTED, CommandOutcome, ReceivedCommand, message_id};
+use crate::link::command::{ACCEPTED, CommandOutcome, ReceivedCommand, message_id_from_param};
 use crate::link::msg::{GPS_GLOBAL_ORIGIN, HOME_POSITION, MESSAGE_INTERVAL};
 use crate::link::port::{PendingAck, Port, Sender};
 use crate::link::wire::PayloadReader;
@@ -43,7 +43,7 @@ pub struct SensorReadings {
     pub touching: bool,
     /// Reading of the distance sensor: height of the body above where it would rest on the ground,
     /// metres; infinite without a sensor.
-    pub distance: f32,
+    pub ground_distance: f32,
     /// Home position, ENU metres.
     pub home: Point,
     /// Remaining battery charge, 0 to 1.
@@ -83,11 +83,11 @@ pub struct Platform {
     pub(super) vehicle: Multicopter,
     pub(super) disturbance: Disturbance,
     pub(super) errors: EstimateErrorState,
-    pub(super) position_offset: Point,
+    pub(super) imposed_position_error: Point,
     /// Error of the velocity estimate (estimated minus true) that a replay imposes, ENU m/s.
-    pub(super) velocity_bias: Point,
+    pub(super) imposed_velocity_error: Point,
     /// Rate of change of the height estimate's error that a replay imposes, m/s.
-    pub(super) height_error_rate: f32,
+    pub(super) imposed_height_error_rate: f32,
     pub(super) gps_ok: bool,
     pub(super) frame: LocalFrame,
     pub(super) home: Geodetic,
@@ -121,14 +121,14 @@ impl Platform {
             next_noise_us: 0,
             disturbance: Disturbance::new(
                 config.wind,
-                config.gust_mps,
+                config.gust_peak_mps,
                 config.position_noise_m,
                 seed,
             ),
             errors: EstimateErrorState::new(config.estimator, config.autopilot, seed),
-            position_offset: Point::zeros(),
-            velocity_bias: Point::zeros(),
-            height_error_rate: 0.0,
+            imposed_position_error: Point::zeros(),
+            imposed_velocity_error: Point::zeros(),
+            imposed_height_error_rate: 0.0,
             gps_ok: true,
             home,
             home_enu: frames::geodetic_to_enu(&config.world_origin, &home),
@@ -165,13 +165,15 @@ impl Platform {
             position: state.position + self.position_error(),
             velocity: state.velocity
                 + self.disturbance.velocity_error
-                + self.velocity_bias
+                + self.imposed_velocity_error
                 + self.errors.velocity,
-            height_rate: state.velocity.z + self.height_error_rate + self.errors.rate.z,
+            height_rate: state.velocity.z
+                + self.imposed_height_error_rate
+                + self.errors.position_rate.z,
             acceleration: state.acceleration,
             heading: state.heading_rad,
             touching: state.touching,
-            distance: if self.config.distance_sensor {
+            ground_distance: if self.config.distance_sensor {
                 self.height_above_ground
             } else {
                 f32::INFINITY
@@ -183,7 +185,7 @@ impl Platform {
 
     /// Error of the position estimate: estimated minus true, ENU metres.
     pub(super) fn position_error(&self) -> Point {
-        self.disturbance.position_error + self.errors.position + self.position_offset
+        self.disturbance.position_error + self.errors.position + self.imposed_position_error
     }
 
     pub(super) fn set_fixed_home(&mut self, home: Geodetic) {
@@ -195,7 +197,7 @@ impl Platform {
 
     /// Sets home to the estimated position and sends HOME_POSITION, as both autopilots do on
     /// arming; not if home was set by command or configuration.
-    pub(super) fn set_home_here(&mut self) {
+    pub(super) fn set_home_here_unless_fixed(&mut self) {
         if self.home_fixed {
             return;
         }
@@ -279,8 +281,8 @@ impl Platform {
     /// latitude, longitude or altitude is invalid.
     pub(super) fn reposition_target(&self, command: &ReceivedCommand) -> Option<Point> {
         let here = self.frame.geodetic_from_enu(self.vehicle.position());
-        let [lat_deg, lon_deg] = command.place;
-        let base = if command.relative { self.home.alt_m } else { 0.0 };
+        let [lat_deg, lon_deg] = command.lat_lon_deg;
+        let base = if command.relative_to_home { self.home.alt_m } else { 0.0 };
         let across = lat_deg.is_finite() && lon_deg.is_finite();
         let asked = Geodetic {
             lat_deg: if across { lat_deg } else { here.lat_deg },
@@ -297,7 +299,7 @@ impl Platform {
 
     /// Executes DO_SET_HOME. Refused if the commanded position is invalid.
     pub(super) fn handle_set_home(&mut self, command: &ReceivedCommand) -> CommandOutcome {
-        let [lat_deg, lon_deg] = command.place;
+        let [lat_deg, lon_deg] = command.lat_lon_deg;
         let home = if command.param[0] == 1.0 {
             self.frame.geodetic_from_enu(self.vehicle.position())
         } else {
@@ -320,7 +322,7 @@ impl Platform {
         streams: &[(u32, u32)],
         refused: u8,
     ) -> u8 {
-        let Some(id) = message_id(command.param[0]) else { return refused };
+        let Some(id) = message_id_from_param(command.param[0]) else { return refused };
         let interval = match command.param[1] {
             0.0 => streams.iter().find(|stream| stream.0 == id).map_or(0, |stream| stream.1),
             us if us < 0.0 => 0,
@@ -334,8 +336,8 @@ impl Platform {
     /// for an unknown message id.
     pub(super) fn report_interval(&mut self, from: Sender, id: f32, refused: u8) -> u8 {
         let port = &mut self.ports[from.port];
-        let Some(stream) =
-            message_id(id).and_then(|id| port.streams.iter().find(|stream| stream.id == id))
+        let Some(stream) = message_id_from_param(id)
+            .and_then(|id| port.streams.iter().find(|stream| stream.id == id))
         else {
             return refused;
         };

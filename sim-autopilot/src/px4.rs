@@ -73,11 +73,11 @@ enum ReturnLeg {
 #[derive(Clone, Copy, Debug, Default)]
 struct MissionFlight {
     /// Whether a mission is stored.
-    ready: bool,
+    is_stored: bool,
     /// Leg of the mission that is flown; `None` outside AUTO.MISSION.
     leg: Option<MissionLeg>,
     /// Start of that leg, ENU metres.
-    from: Point,
+    leg_start: Point,
 }
 
 /// PX4's state machine.
@@ -87,7 +87,7 @@ pub struct Commander {
     landed: bool,
     flown_since_arming: bool,
     intended_mode: Px4Mode,
-    after_disarm: Px4Mode,
+    mode_after_disarm: Px4Mode,
     failsafe: Option<Px4Mode>,
     phase: FlightPhase,
     armed_us: u64,
@@ -97,14 +97,14 @@ pub struct Commander {
     setpoint_us: u64,
     hold_point: Point,
     /// Smoothed path to `hold_point`.
-    glide: SmoothedApproach,
+    approach: SmoothedApproach,
     hold_heading: f32,
     takeoff_up: f32,
-    cruise: Option<f32>,
-    leg: ReturnLeg,
+    commanded_cruise_speed: Option<f32>,
+    return_leg: ReturnLeg,
     /// Descent rate in Land, and the time of its last update, microseconds.
     descent: Option<(u64, JerkLimitedRate)>,
-    position_ok: bool,
+    has_gps_fix: bool,
     mission: MissionFlight,
 }
 
@@ -122,7 +122,7 @@ impl Commander {
             landed: true,
             flown_since_arming: false,
             intended_mode: Px4Mode::Hold,
-            after_disarm: Px4Mode::Hold,
+            mode_after_disarm: Px4Mode::Hold,
             failsafe: None,
             phase: FlightPhase::Ground,
             armed_us: 0,
@@ -131,13 +131,13 @@ impl Commander {
             setpoint: None,
             setpoint_us: 0,
             hold_point: Point::zeros(),
-            glide: SmoothedApproach::new(0, &Point::zeros(), &Point::zeros()),
+            approach: SmoothedApproach::new(0, &Point::zeros(), &Point::zeros()),
             hold_heading: 0.0,
             takeoff_up: f32::NAN,
-            cruise: None,
-            leg: ReturnLeg::Descend,
+            commanded_cruise_speed: None,
+            return_leg: ReturnLeg::Descend,
             descent: None,
-            position_ok: true,
+            has_gps_fix: true,
             mission: MissionFlight::default(),
         }
     }
@@ -175,7 +175,7 @@ impl Commander {
             Px4Mode::Mission if matches!(self.mission.leg, Some(MissionLeg::TakeOff { .. })) => 3,
             Px4Mode::Mission if matches!(self.mission.leg, Some(MissionLeg::Land { .. })) => 4,
             Px4Mode::Land => 4,
-            Px4Mode::Return if self.leg == ReturnLeg::Land => 4,
+            Px4Mode::Return if self.return_leg == ReturnLeg::Land => 4,
             _ => 2,
         }
     }
@@ -208,12 +208,12 @@ impl Commander {
 
     /// Sets whether GPS has a fix, without which the estimator has no position.
     pub fn set_gps_fix(&mut self, fix: GpsFix) {
-        self.position_ok = fix == GpsFix::Held;
+        self.has_gps_fix = fix == GpsFix::Held;
     }
 
     /// Notes whether a mission is stored that AUTO.MISSION can fly.
-    pub fn note_mission(&mut self, platform: &Platform) {
-        self.mission.ready = platform.has_mission();
+    pub fn note_stored_mission(&mut self, platform: &Platform) {
+        self.mission.is_stored = platform.has_mission();
     }
 
     /// Stores a valid setpoint and its time.
@@ -224,7 +224,7 @@ impl Commander {
 
     /// Whether the last setpoint is recent enough for Offboard.
     pub fn is_setpoint_stream_fresh(&self, now_us: u64, tuning: &Px4Tuning) -> bool {
-        let limit = micros_from_s(tuning.offboard_loss_s + LOSS_REACTION_S);
+        let limit = micros_from_s(tuning.offboard_loss_timeout_s + LOSS_REACTION_S);
         self.setpoint.is_some() && now_us.saturating_sub(self.setpoint_us) <= limit
     }
 
@@ -254,11 +254,11 @@ impl Commander {
         let runs = match self.intended_mode {
             Px4Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
             Px4Mode::Hold | Px4Mode::Takeoff => true,
-            Px4Mode::Mission => self.mission.ready,
+            Px4Mode::Mission => self.mission.is_stored,
             Px4Mode::Land | Px4Mode::Return => false,
             Px4Mode::Manual | Px4Mode::Altitude | Px4Mode::Position => false,
         };
-        runs && self.position_ok && sensors.battery >= tuning.battery_low
+        runs && self.has_gps_fix && sensors.battery >= tuning.battery_low_share
     }
 
     /// Disarms. Refused in the air, unless forced.
@@ -269,9 +269,9 @@ impl Commander {
         self.armed = false;
         self.failsafe = None;
         self.phase = FlightPhase::Ground;
-        self.cruise = None;
+        self.commanded_cruise_speed = None;
         if self.intended_mode.is_left_on_disarm() {
-            self.intended_mode = self.after_disarm;
+            self.intended_mode = self.mode_after_disarm;
         }
         CommandOutcome::Done
     }
@@ -286,7 +286,7 @@ impl Commander {
     ) -> CommandOutcome {
         let runs = match mode {
             Px4Mode::Offboard => self.is_setpoint_stream_fresh(sensors.now_us, tuning),
-            Px4Mode::Mission => self.mission.ready,
+            Px4Mode::Mission => self.mission.is_stored,
             mode => !mode.needs_sticks(),
         };
         if self.armed && !runs {
@@ -300,7 +300,7 @@ impl Commander {
     pub fn force_mode(&mut self, mode: Px4Mode, sensors: &SensorReadings) {
         self.intended_mode = mode;
         if !mode.is_left_on_disarm() {
-            self.after_disarm = mode;
+            self.mode_after_disarm = mode;
         }
         if mode != Px4Mode::Takeoff {
             self.takeoff_up = f32::NAN;
@@ -351,8 +351,8 @@ impl Commander {
 
     /// Sets the cruise speed of the automatic modes (DO_CHANGE_SPEED), m/s; 0 or less: the
     /// parameter's.
-    pub fn set_cruise(&mut self, speed: f32) {
-        self.cruise = (speed > 0.0).then_some(speed);
+    pub fn set_cruise_speed(&mut self, speed: f32) {
+        self.commanded_cruise_speed = (speed > 0.0).then_some(speed);
     }
 
     /// Advances one step: failsafe, timers, flight phase, and the demand of the mode.
@@ -360,7 +360,7 @@ impl Commander {
         let now = sensors.now_us;
         if self.armed {
             self.update_failsafe(sensors, tuning);
-            self.update_timers(sensors, tuning);
+            self.disarm_if_due(sensors, tuning);
         }
         if !self.armed {
             // A vehicle that is disarmed in the air falls; it has landed when it touches the
@@ -402,7 +402,7 @@ impl Commander {
                     self.phase = FlightPhase::Flying;
                 } else {
                     demand.climb_max = limit;
-                    demand.thrust_min = 0.0;
+                    demand.min_thrust_per_weight = 0.0;
                     demand.acceleration.z = f32::NAN;
                 }
             }
@@ -420,9 +420,9 @@ impl Commander {
     fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) {
         let stream_lost = self.intended_mode == Px4Mode::Offboard
             && !self.is_setpoint_stream_fresh(sensors.now_us, tuning);
-        let battery_out =
-            sensors.battery < tuning.battery_critical && !self.intended_mode.is_left_on_disarm();
-        let action = if !self.position_ok {
+        let battery_out = sensors.battery < tuning.battery_critical_share
+            && !self.intended_mode.is_left_on_disarm();
+        let action = if !self.has_gps_fix {
             (self.intended_mode != Px4Mode::Land).then_some(Px4Mode::Land)
         } else if stream_lost {
             match tuning.offboard_loss_action {
@@ -449,7 +449,7 @@ impl Commander {
         }
     }
 
-    fn update_timers(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) {
+    fn disarm_if_due(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) {
         let since = |start: u64| sensors.now_us.saturating_sub(start);
         let idle = self.landed && self.phase == FlightPhase::Ground;
         if idle && !self.flown_since_arming && tuning.disarm_preflight_s > 0.0 {
@@ -458,8 +458,9 @@ impl Commander {
             }
         } else if idle
             && self.flown_since_arming
-            && tuning.disarm_land_s > 0.0
-            && since(self.landed_us) >= micros_from_s(tuning.disarm_land_s + DISARM_REACTION_S)
+            && tuning.disarm_after_landing_s > 0.0
+            && since(self.landed_us)
+                >= micros_from_s(tuning.disarm_after_landing_s + DISARM_REACTION_S)
         {
             self.disarm(Arming::Checked);
         }

@@ -12,7 +12,7 @@ pub struct AutopilotStatus {
     /// `custom_mode` of the mode that was last requested, even while a failsafe flies another.
     pub intended_mode: u32,
     /// `base_mode` of HEARTBEAT (MAV_MODE_FLAG).
-    pub flags: u8,
+    pub base_mode: u8,
     /// `system_status` of HEARTBEAT (MAV_STATE).
     pub system_status: u8,
     /// Whether the arming checks pass.
@@ -20,7 +20,7 @@ pub struct AutopilotStatus {
     /// MAV_LANDED_STATE.
     pub landed_state: u8,
     /// Whether the mode reports its target by POSITION_TARGET_LOCAL_NED.
-    pub guided: bool,
+    pub reports_position_target: bool,
     /// `flags` of ArduPilot's EKF_STATUS_REPORT.
     pub ekf_flags: u16,
     /// Whether the estimator has an origin.

@@ -80,7 +80,7 @@ impl Snapshot {
             | msg::CURRENT_EVENT_SEQUENCE
             | msg::GNSS_INTEGRITY => messages::send_recorded(id, port),
             msg::MISSION_CURRENT => {
-                let (current, total) = self.mission;
+                let (current, total) = self.mission_item_and_count;
                 let [[a, b], [c, d]] =
                     [current.min(total.saturating_sub(1)), total].map(u16::to_le_bytes);
                 port.send_raw(msg::MISSION_CURRENT, &[a, b, c, d, 0, 0]);
@@ -126,7 +126,7 @@ impl Snapshot {
                     yaw,
                     rollspeed: 0.0,
                     pitchspeed: 0.0,
-                    yawspeed: self.heading.1,
+                    yawspeed: self.heading_and_rate.1,
                 });
             }
             msg::ATTITUDE_QUATERNION => {
@@ -139,7 +139,7 @@ impl Snapshot {
                     q4,
                     rollspeed: 0.0,
                     pitchspeed: 0.0,
-                    yawspeed: self.heading.1,
+                    yawspeed: self.heading_and_rate.1,
                 });
             }
             msg::ATTITUDE_TARGET => port.send(&dialect::ATTITUDE_TARGET_DATA {
@@ -147,7 +147,7 @@ impl Snapshot {
                 q: self.attitude().quaternion,
                 body_roll_rate: 0.0,
                 body_pitch_rate: 0.0,
-                body_yaw_rate: self.heading.1,
+                body_yaw_rate: self.heading_and_rate.1,
                 thrust: self.throttle(),
                 type_mask: dialect::AttitudeTargetTypemask::empty(),
             }),
@@ -191,7 +191,7 @@ impl Snapshot {
                     throttle: (100.0 * self.throttle()) as u16,
                 });
             }
-            msg::POSITION_TARGET_LOCAL_NED if !self.status.guided => {}
+            msg::POSITION_TARGET_LOCAL_NED if !self.status.reports_position_target => {}
             msg::POSITION_TARGET_LOCAL_NED => self.send_target(port),
             msg::ALTITUDE => port.send(&dialect::ALTITUDE_DATA {
                 time_usec: self.time_us,
@@ -199,8 +199,8 @@ impl Snapshot {
                 altitude_amsl: self.geodetic.alt_m as f32,
                 altitude_local: -self.ned.z as f32,
                 altitude_relative: (self.geodetic.alt_m - self.home.0.alt_m) as f32,
-                altitude_terrain: -self.ned.z as f32 - self.height,
-                bottom_clearance: self.height,
+                altitude_terrain: -self.ned.z as f32 - self.height_above_ground,
+                bottom_clearance: self.height_above_ground,
             }),
             msg::NAV_CONTROLLER_OUTPUT => {
                 port.send(&dialect::NAV_CONTROLLER_OUTPUT_DATA::default());
@@ -229,11 +229,9 @@ impl Snapshot {
             msg::EKF_STATUS_REPORT => self.send_ekf_status_report(port),
             msg::ESTIMATOR_STATUS => port.send(&dialect::ESTIMATOR_STATUS_DATA {
                 time_usec: self.time_us,
-                flags: dialect::EstimatorStatusFlags::from_bits_truncate(if self.gps.2 {
-                    895
-                } else {
-                    0x27
-                }),
+                flags: dialect::EstimatorStatusFlags::from_bits_truncate(
+                    if self.gps_error_and_fix.2 { 895 } else { 0x27 },
+                ),
                 vel_ratio: 0.05,
                 pos_horiz_ratio: 0.03,
                 pos_vert_ratio: 0.01,

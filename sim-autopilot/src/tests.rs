@@ -379,7 +379,7 @@ fn the_pilots_switch_wins_and_needs_no_stream() {
 fn the_same_seed_flies_the_same_flight_bit_for_bit() {
     let fly = |seed| {
         let config = AutopilotConfig {
-            gust_mps: 1.0,
+            gust_peak_mps: 1.0,
             wind: Point::new(3.0, 0.0, 0.0),
             position_noise_m: 0.2,
             seed,

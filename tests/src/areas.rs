@@ -3,7 +3,7 @@
 use rand_core::Rng;
 
 /// A scenario: three vehicles photograph a small field, without faults.
-pub const SMALL_FIELD: &str = "[area]
+pub const SMALL_FIELD_SCENARIO: &str = "[area]
 polygon = [[0, 0], [150, 10], [170, 90], [80, 120], [-10, 80]]
 camera = { fov_deg = 73.7, aspect = 1.5 }
 height_m = 25.0
@@ -34,17 +34,17 @@ pub enum Shape {
 }
 
 /// A uniformly distributed random number from 0 to below 1.
-pub fn unit(random: &mut impl Rng) -> f64 {
+pub fn unit_random(random: &mut impl Rng) -> f64 {
     f64::from(random.next_u32()) / (f64::from(u32::MAX) + 1.0)
 }
 
 /// A uniformly distributed random number from `low` to below `high`.
 pub fn between(random: &mut impl Rng, low: f64, high: f64) -> f64 {
-    low + (high - low) * unit(random)
+    low + (high - low) * unit_random(random)
 }
 
 /// A star-shaped polygon: the segment from `middle` to any of its points lies inside it.
-fn star(random: &mut impl Rng, middle: Corner, radius: f64, corners: usize) -> Vec<Corner> {
+fn star_polygon(random: &mut impl Rng, middle: Corner, radius: f64, corners: usize) -> Vec<Corner> {
     let mut angles: Vec<f64> =
         (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
     angles.sort_by(f64::total_cmp);
@@ -57,7 +57,7 @@ fn star(random: &mut impl Rng, middle: Corner, radius: f64, corners: usize) -> V
 }
 
 /// The corners of a convex polygon on a random ellipse around the origin, turned by a random angle.
-fn convex(random: &mut impl Rng, size: Corner, corners: usize) -> Vec<Corner> {
+fn convex_polygon(random: &mut impl Rng, size: Corner, corners: usize) -> Vec<Corner> {
     let mut angles: Vec<f64> =
         (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
     angles.sort_by(f64::total_cmp);
@@ -69,7 +69,7 @@ fn convex(random: &mut impl Rng, size: Corner, corners: usize) -> Vec<Corner> {
     angles.into_iter().map(corner).collect()
 }
 
-fn list(rings: &[Vec<Corner>]) -> String {
+fn toml_rings(rings: &[Vec<Corner>]) -> String {
     let ring = |ring: &Vec<Corner>| {
         let corners: Vec<String> = ring.iter().map(|[x, y]| format!("[{x:.3}, {y:.3}]")).collect();
         format!("[{}]", corners.join(", "))
@@ -186,21 +186,21 @@ pub fn scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String 
     let outer = match shape {
         Shape::Convex => {
             let flat = between(random, 0.2, 1.0);
-            convex(random, [radius, radius * flat], count.min(9))
+            convex_polygon(random, [radius, radius * flat], count.min(9))
         }
-        Shape::Any => star(random, [0.0, 0.0], radius, count),
+        Shape::Any => star_polygon(random, [0.0, 0.0], radius, count),
     };
-    let mut text = format!("[area]\npolygon = {}\n", list(&[outer]));
+    let mut text = format!("[area]\npolygon = {}\n", toml_rings(&[outer]));
     if shape == Shape::Any {
         for (key, most, size) in [("holes", 4, 0.15), ("no_fly", 4, 0.35)] {
             let rings = (0..random.next_u32() % most).map(|_| {
                 let middle = [0, 1].map(|_| between(random, -0.6, 0.6) * radius);
                 let size = size * radius * between(random, 0.2, 1.0);
                 let corners = 3 + (random.next_u32() % 7) as usize;
-                star(random, middle, size, corners)
+                star_polygon(random, middle, size, corners)
             });
             let rings: Vec<_> = rings.collect();
-            text += &format!("{key} = [{}]\n", list(&rings));
+            text += &format!("{key} = [{}]\n", toml_rings(&rings));
         }
         if random.next_u32().is_multiple_of(3) {
             text += &format!("angle_deg = {:.1}\n", between(random, 0.0, 180.0));

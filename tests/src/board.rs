@@ -11,19 +11,19 @@ use host_sim::scenario::CompanionHost;
 use host_sim::swarm::SwarmFlight;
 use planner_core::map::voxel::VoxelGrid;
 
-use crate::{Guard, free_port, workspace};
+use crate::{ChildGuard, free_port, workspace};
 
 /// Address of bank 2 of the emulated flash.
-const BANK2: u32 = 0x6000_0000;
+const BANK2_ADDRESS: u32 = 0x6000_0000;
 /// Longest wait until QEMU listens: on a loaded machine it starts late.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// Address at which the measuring programs expect a map.
-const MAP: u32 = 0x6080_0000;
+const MAP_ADDRESS: u32 = 0x6080_0000;
 
 /// Path of a program built for the board `qemu`, in the directory that `FLOCKMATE_FIRMWARE` names
 /// relative to the checkout; without that variable `None`, and a printed line that says what is
 /// skipped.
-pub fn program(name: &str) -> Option<PathBuf> {
+pub fn built_program(name: &str) -> Option<PathBuf> {
     let Some(folder) = std::env::var_os("FLOCKMATE_FIRMWARE") else {
         println!(
             "skipped: FLOCKMATE_FIRMWARE names no built firmware (`cargo xtask test` builds it)"
@@ -34,7 +34,7 @@ pub fn program(name: &str) -> Option<PathBuf> {
 }
 
 /// A command that runs a program on QEMU's board.
-fn qemu(program: &Path) -> Command {
+fn qemu_command(program: &Path) -> Command {
     let mut command = Command::new("qemu-system-arm");
     command
         .args(["-machine", "mps2-an500", "-display", "none"])
@@ -45,7 +45,7 @@ fn qemu(program: &Path) -> Command {
 }
 
 /// QEMU's option that loads a file to an address at every reset.
-fn loader(file: &Path, at: u32) -> String {
+fn loader_option(file: &Path, at: u32) -> String {
     format!("loader,file={},addr={at:#x},force-raw=on", file.display())
 }
 
@@ -66,7 +66,7 @@ pub fn map_image(grid: &VoxelGrid<'_>) -> Vec<u8> {
 ///
 /// # Panics
 /// The program does not run to its end.
-pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
+pub fn run_measuring_program(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a temporary directory");
     let file = |name: &str, bytes: &[u8]| {
         let file = folder.path().join(name);
@@ -75,7 +75,7 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
     };
     let (roadmap, map) = (file("roadmap.bin", roadmap), file("map.bin", map));
     // `-icount shift=0`: an instruction takes one nanosecond of the board's time.
-    let out = qemu(program)
+    let out = qemu_command(program)
         .args([
             "-monitor",
             "none",
@@ -84,7 +84,12 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
             "-semihosting-config",
             "enable=on,target=native",
         ])
-        .args(["-device", &loader(&roadmap, BANK2), "-device", &loader(&map, MAP)])
+        .args([
+            "-device",
+            &loader_option(&roadmap, BANK2_ADDRESS),
+            "-device",
+            &loader_option(&map, MAP_ADDRESS),
+        ])
         .output()
         .expect("qemu-system-arm runs");
     let text = String::from_utf8_lossy(&out.stdout);
@@ -96,9 +101,9 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
 ///
 /// # Panics
 /// QEMU does not start.
-pub fn start_by_wall_clock(program: &Path) -> (Guard, [LinkUrl; 2]) {
+pub fn start_by_wall_clock(program: &Path) -> (ChildGuard, [LinkUrl; 2]) {
     let ports = [free_port(), free_port()];
-    let mut qemu = qemu(program);
+    let mut qemu = qemu_command(program);
     qemu.args([
         "-monitor",
         "none",
@@ -110,7 +115,7 @@ pub fn start_by_wall_clock(program: &Path) -> (Guard, [LinkUrl; 2]) {
     for port in ports {
         qemu.args(["-serial", &format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on")]);
     }
-    let board = Guard(qemu.stdout(Stdio::null()).spawn().expect("qemu-system-arm starts"));
+    let board = ChildGuard(qemu.stdout(Stdio::null()).spawn().expect("qemu-system-arm starts"));
     let urls = ports.map(|port| LinkUrl::Tcp(format!("127.0.0.1:{port}")));
     // A connection succeeds as soon as QEMU listens.
     let began = Instant::now();
@@ -134,7 +139,7 @@ pub fn put_on_boards(mission: &mut PreparedMission, program: &Path, folder: &Pat
 ///
 /// # Panics
 /// The result cannot be written.
-pub fn record(flight: &SwarmFlight) -> String {
+pub fn observable_text(flight: &SwarmFlight) -> String {
     let result = serde_json::to_string(&flight.result).expect("a result");
     let log: Vec<_> =
         flight.log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect();

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use board_bench::calls::{Meter, coverage, coverage_missions};
-use host_sim::map::{Unknown, building};
+use host_sim::map::{UnknownSpace, building};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
@@ -82,12 +82,12 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("area::Area::new, 256", "edges²"),
     ("area::Area::is_in_no_fly_zone", "edges"),
     ("sweep::direction_of_least_width, 256", "n · log n of n vertices"),
-    ("transit::Transit::set_area, 32 corners", "corners² · edges, and corners³"),
-    ("transit::Transit::is_line_clear", "edges of no-fly zones"),
-    ("transit::Transit::distance_m", "corners² · edges"),
-    ("transit::Transit::shortest_path", "the same"),
-    ("transit::Transit::corners", "constant"),
-    ("transit::Transit::is_in_no_fly_zone", "edges of no-fly zones"),
+    ("transit::TransitGraph::set_area, 32 corners", "corners² · edges, and corners³"),
+    ("transit::TransitGraph::is_line_clear", "edges of no-fly zones"),
+    ("transit::TransitGraph::distance_m", "corners² · edges"),
+    ("transit::TransitGraph::shortest_path", "the same"),
+    ("transit::TransitGraph::corners", "constant"),
+    ("transit::TransitGraph::is_in_no_fly_zone", "edges of no-fly zones"),
     (
         "around::plan_detour, 128 things",
         "320² looks at most, each at edges of zones, all things, half nodes of a field",
@@ -141,11 +141,11 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("roster::RosterReport::encode", "22 entries"),
     ("roster::RosterReport::decode", "22 entries"),
     ("fleet::Fleet::step, 32", "v, and a CRC of divisions · v"),
-    ("fleet::Fleet::needs_division", "v"),
+    ("fleet::Fleet::is_division_to_be_computed", "v"),
     ("fleet::Fleet::set_hash_from_plan", "a CRC of divisions · v"),
-    ("fleet::Fleet::division_hash", "a CRC of divisions · v"),
-    ("fleet::Fleet::handle_roster, 32", "22 entries, and v"),
-    ("fleet::Fleet::roster_message", "22 entries"),
+    ("fleet::Fleet::division_inputs_hash", "a CRC of divisions · v"),
+    ("fleet::Fleet::handle_roster_report, 32", "22 entries, and v"),
+    ("fleet::Fleet::roster_report", "22 entries"),
     ("mission_file::write_mission, 32", "v, and the CRC of the file"),
     ("mission_file::MissionView::parse, 32", "v, and the CRC of the file"),
     ("mission_file::MissionView::companion_config, 32", "v²"),
@@ -170,7 +170,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("Companion::handle_timeout, else", "the same"),
     ("a control step, 32 near", "the same as `Companion::handle_timeout`"),
     ("a control step, coverage, 32 near", "the same, and v entries of the fleet"),
-    ("Companion::query_filter, 32 near", "v, and 4 neighbours × 9 × 9 legs"),
+    ("Companion::query_filter_blocker, 32 near", "v, and 4 neighbours × 9 × 9 legs"),
     ("Companion::handle_plan", "w and g copied"),
     ("Companion::detour_request", "v × 16 places"),
     ("Companion::poll_transmit", "one frame"),
@@ -185,13 +185,13 @@ pub struct CallCost {
     /// Greatest number of instructions counted.
     pub instructions: u64,
     /// Bytes of state or workspace that the call was lent.
-    pub bytes: u64,
+    pub lent_bytes: u64,
 }
 
 /// Makes the calls on the host without counting their instructions.
-struct Uncounted;
+struct UncountedCalls;
 
-impl Meter for Uncounted {
+impl Meter for UncountedCalls {
     fn call<T>(&mut self, _: &'static str, _: usize, work: impl FnOnce() -> T) -> T {
         work()
     }
@@ -203,15 +203,19 @@ impl Meter for Uncounted {
 /// # Errors
 /// The demo cannot be prepared, the program prints something else, or its coverage plans differ in
 /// any bit from those computed on the host.
-pub fn counted(program: &Path) -> Result<HashMap<String, CallCost>> {
+pub fn count_calls(program: &Path) -> Result<HashMap<String, CallCost>> {
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let mission = PreparedMission::prepare(scenario, &Progress::on_terminal())?;
-    let map = building::building_map(building::DEFAULT_SEED, 0.5)?.to_voxel_map(Unknown::Blocked);
-    let lines =
-        board::measure(program, &mission.roadmap_or_field_file, &board::map_image(&map.grid()));
-    let calls = coverage::measure_coverage_calls(&mut Uncounted, &mut Box::default());
+    let map =
+        building::building_map(building::DEFAULT_SEED, 0.5)?.to_voxel_map(UnknownSpace::Blocked);
+    let lines = board::run_measuring_program(
+        program,
+        &mission.roadmap_or_field_file,
+        &board::map_image(&map.grid()),
+    );
+    let calls = coverage::measure_coverage_calls(&mut UncountedCalls, &mut Box::default());
     let flights = coverage_missions::measure_coverage_flights(
-        &mut Uncounted,
+        &mut UncountedCalls,
         &mut Box::default(),
         &mut Box::default(),
         &mut Box::default(),
@@ -229,7 +233,7 @@ fn parse_call_line(line: &str) -> Result<(String, CallCost)> {
     let mut words = line.splitn(3, ' ');
     let mut word = || words.next().context("a line of `calls` is cut");
     let (instructions, bytes) = (word()?.parse()?, word()?.parse()?);
-    Ok((word()?.to_owned(), CallCost { instructions, bytes }))
+    Ok((word()?.to_owned(), CallCost { instructions, lent_bytes: bytes }))
 }
 
 /// The text of the page before its table, the table, and the text behind it.
@@ -248,7 +252,7 @@ pub fn split_page(page: &str) -> Result<[&str; 3]> {
 ///
 /// # Errors
 /// A call of [`BOUNDS`] was not counted.
-pub fn table(calls: &HashMap<String, CallCost>) -> Result<String> {
+pub fn table_text(calls: &HashMap<String, CallCost>) -> Result<String> {
     let mut table =
         "| call | bound | instructions seen | bytes lent |\n|---|---|---:|---:|\n".to_owned();
     for (name, bound) in BOUNDS {
@@ -256,15 +260,15 @@ pub fn table(calls: &HashMap<String, CallCost>) -> Result<String> {
         writeln!(
             table,
             "| `{name}` | {bound} | {} | {} |",
-            rounded(call.instructions),
-            call.bytes
+            rounded_text(call.instructions),
+            call.lent_bytes
         )?;
     }
     Ok(table)
 }
 
 /// A count as the table prints it: two significant digits, rounded up.
-pub fn rounded(count: u64) -> String {
+pub fn rounded_text(count: u64) -> String {
     let mut unit = 1;
     while count / unit > 99 {
         unit *= 10;
@@ -280,8 +284,8 @@ pub fn rounded(count: u64) -> String {
     }
 }
 
-/// The number that [`rounded`] printed as `text`; `None` if it did not.
-pub fn parsed(text: &str) -> Option<f64> {
+/// The number that [`rounded_text`] printed as `text`; `None` if it did not.
+pub fn parse_rounded(text: &str) -> Option<f64> {
     let (number, unit) = text.split_once(' ').unwrap_or((text, ""));
     let unit = match unit {
         "" => 1.0,

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use crate::areas::{self, Shape};
 
 /// Ratio of two costs above which one counts as greater: more than rounding.
-const ROUNDING: f32 = 1.0001;
+const GREATER_RATIO: f32 = 1.0001;
 
 /// Comparison of the methods over all areas.
 #[derive(Clone, Copy, Debug)]
@@ -25,9 +25,9 @@ pub struct Costs {
     /// Number of areas where POWELL-BINPAT costs more than SIMPLE-BINPAT.
     pub powell_over_simple: usize,
     /// Number of plans by SIMPLE-BINPAT, BINPAT or POWELL-BINPAT that cost less than `exact`.
-    pub below_exact: usize,
+    pub plans_below_exact: usize,
     /// Median excess of SIMPLE-BINPAT, BINPAT and POWELL-BINPAT over `exact`, percent of the cost.
-    pub gaps: [f32; 3],
+    pub median_gaps_percent: [f32; 3],
 }
 
 impl Costs {
@@ -36,10 +36,11 @@ impl Costs {
     /// # Panics
     /// A cost is below the lower bound of all divisions, or no area could be planned.
     pub fn of(seeds: Range<u64>) -> Self {
-        let mut all: Vec<[f32; 4]> = seeds.into_par_iter().filter_map(costs).collect();
+        let mut all: Vec<[f32; 4]> = seeds.into_par_iter().filter_map(costs_by_method).collect();
         assert!(!all.is_empty(), "no area could be planned");
-        let over =
-            |a: usize, b: usize| all.iter().filter(|costs| costs[a] > costs[b] * ROUNDING).count();
+        let over = |a: usize, b: usize| {
+            all.iter().filter(|costs| costs[a] > costs[b] * GREATER_RATIO).count()
+        };
         let (powell_over_binpat, powell_over_simple) = (over(2, 1), over(2, 0));
         let below_exact = (0..3).map(|method| over(3, method)).sum();
         let gaps = [0, 1, 2].map(|method| {
@@ -47,13 +48,19 @@ impl Costs {
             all.sort_by(|a, b| gap(a).total_cmp(&gap(b)));
             100.0 * (gap(&all[all.len() / 2]) - 1.0)
         });
-        Self { areas: all.len(), powell_over_binpat, powell_over_simple, below_exact, gaps }
+        Self {
+            areas: all.len(),
+            powell_over_binpat,
+            powell_over_simple,
+            plans_below_exact: below_exact,
+            median_gaps_percent: gaps,
+        }
     }
 }
 
 /// Greatest costs of SIMPLE-BINPAT, BINPAT, POWELL-BINPAT and `exact` on one area, seconds; `None`
 /// if a method cannot plan it.
-fn costs(seed: u64) -> Option<[f32; 4]> {
+fn costs_by_method(seed: u64) -> Option<[f32; 4]> {
     let mut random = Pcg32::seed_from_u64(seed);
     let text = areas::scenario(&mut random, Shape::Convex, 2 + (seed % 9) as usize);
     let scenario = scenario::parse(&text, "random").ok()?;

@@ -28,11 +28,11 @@ pub const EARLY_LANDING_TEXTS: [&str; 11] = [
 ];
 
 /// Log text of a vehicle that lands beside its pad, since another one may lie or come down there.
-pub const LANDS_ASIDE: &str = "No room to land: seeking a place aside";
+pub const LANDS_ASIDE_TEXT: &str = "No room to land: seeking a place aside";
 
 /// When the last of the other vehicles began to land or to fly home, seconds, by [`log_lines`]: no
 /// vehicle is left to take over what `vehicle` leaves after that.
-pub fn others_until_s(log: &str, vehicle: u8) -> f64 {
+pub fn last_other_ended_s(log: &str, vehicle: u8) -> f64 {
     let mut ended: Vec<(&str, f64)> = Vec::new();
     for line in log.lines().filter(|line| line.contains("landing") || line.contains("the way home"))
     {
@@ -60,26 +60,26 @@ pub fn has_logged(log: &str, vehicle: u8, reasons: &[&str]) -> bool {
 /// # Errors
 /// Reason why it cannot be planned, flown or judged.
 pub fn fly(mission: &mut PreparedMission) -> anyhow::Result<(MissionResult, Vec<LogEvent>)> {
-    fly_on(mission, &mut Vec::new())
+    fly_adding_pictures(mission, &mut Vec::new())
 }
 
 /// As [`fly`], judged by `pictures` of earlier flights too, to which it adds this flight's.
 ///
 /// # Errors
 /// As [`fly`].
-pub fn fly_on(
+pub fn fly_adding_pictures(
     mission: &mut PreparedMission,
     pictures: &mut Vec<Picture>,
 ) -> anyhow::Result<(MissionResult, Vec<LogEvent>)> {
-    let flight = flight(mission, pictures)?;
+    let flight = fly_with_record(mission, pictures)?;
     Ok((flight.result, flight.log))
 }
 
-/// As [`fly_on`], but returns all that the flight recorded.
+/// As [`fly_adding_pictures`], but returns all that the flight recorded.
 ///
 /// # Errors
 /// As [`fly`].
-pub fn flight(
+pub fn fly_with_record(
     mission: &mut PreparedMission,
     pictures: &mut Vec<Picture>,
 ) -> anyhow::Result<SwarmFlight> {
@@ -119,7 +119,7 @@ pub fn log_lines(log: &[LogEvent]) -> String {
 }
 
 /// Text of the result if the flight was unsafe or is not complete; `None` if it was clean.
-pub fn faults(result: &MissionResult) -> Option<String> {
+pub fn faults_text(result: &MissionResult) -> Option<String> {
     let safety = &result.safety;
     let clean = (safety.wall_contacts, safety.violations, safety.deadlocks) == (0, 0, 0);
     (!(clean && result.complete))

@@ -11,14 +11,14 @@ use host_sim::scenario::{self, Fault};
 use host_sim::swarm::{self, SwarmFlight};
 
 use crate::swarms::Random;
-use crate::vehicle::ahead;
+use crate::vehicle::widest_late_leg_middle;
 
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
 /// Time limit of a flight, seconds: every flight has ended by then.
 const TIME_LIMIT_S: f32 = 600.0;
 /// TOML lines of each fault besides `at_s` and `vehicle`; AHEAD becomes a point on the vehicle's
 /// path.
-pub const SCRIPTS: [&str; 9] = [
+pub const FAULT_SCRIPTS: [&str; 9] = [
     "kind = 'pilot-takeover'",
     "kind = 'pilot-takeover'\nduration_s = 30",
     "kind = 'companion-reset'",
@@ -32,13 +32,13 @@ pub const SCRIPTS: [&str; 9] = [
 
 /// A mission with a short radio range, its plan, and when each vehicle leaves the range of all
 /// others.
-pub struct Edge {
+pub struct RadioEdgeMission {
     /// Radio range of the mission, metres.
     pub range_m: f32,
     mission: PreparedMission,
     plan: Box<HostPlan>,
     /// Each time, seconds, at which a vehicle leaves the range of all others, and its index.
-    leaves: Vec<(f32, usize)>,
+    range_exits: Vec<(f32, usize)>,
     rng: Random,
 }
 
@@ -46,22 +46,22 @@ pub struct Edge {
 #[derive(Debug, Default)]
 pub struct Outcome {
     /// Text: the radio range, the struck vehicle, when, and by which fault.
-    pub what: String,
+    pub description: String,
     /// The log of companions, faults and referee, in order.
     pub log: Vec<String>,
     /// Log lines of what must not happen: contacts, and pairs too near of which neither was struck.
-    pub wrong: Vec<String>,
+    pub forbidden: Vec<String>,
     /// Log lines of vehicles nearer than the safety distance to the struck one, or hit by it.
     pub near_struck: Vec<String>,
     /// Vehicles without a fault that had not landed at the end.
-    pub aloft: Vec<String>,
+    pub not_landed: Vec<String>,
     /// Number of deadlocks that the referee counted (no progress for 20 s).
     pub deadlocks: u32,
     /// Number of vehicles that landed at their goals.
-    pub arrived: usize,
+    pub arrived_count: usize,
 }
 
-impl Edge {
+impl RadioEdgeMission {
     /// Draws the mission of a seed, and flies it once without a fault.
     ///
     /// # Errors
@@ -75,12 +75,12 @@ impl Edge {
         let mut mission = PreparedMission::prepare(scenario, &Progress::hidden())?;
         let plan = mission.plan()?;
         let flight = swarm::fly(&mission, &plan, "fly", swarm::Pace::Fastest, &Progress::hidden())?;
-        let leaves = leaves(&flight, range_m);
-        Ok(Self { range_m, mission, plan, leaves, rng })
+        let leaves = range_exits(&flight, range_m);
+        Ok(Self { range_m, mission, plan, range_exits: leaves, rng })
     }
 
     /// Lets every vehicle hear every other one from now on, so that only the faults have an effect.
-    pub fn hear_all(&mut self) {
+    pub fn let_all_hear(&mut self) {
         self.mission.scenario.simulation.radio_range_m = 500.0;
     }
 
@@ -88,15 +88,15 @@ impl Edge {
     ///
     /// # Errors
     /// The mission cannot be flown.
-    pub fn strike(&mut self) -> anyhow::Result<Option<Outcome>> {
-        if self.leaves.is_empty() {
+    pub fn fly_with_fault(&mut self) -> anyhow::Result<Option<Outcome>> {
+        if self.range_exits.is_empty() {
             return Ok(None);
         }
-        let (left_s, index) = self.leaves[self.rng.below(self.leaves.len())];
-        let script = SCRIPTS[self.rng.below(SCRIPTS.len())];
+        let (left_s, index) = self.range_exits[self.rng.below(self.range_exits.len())];
+        let script = FAULT_SCRIPTS[self.rng.below(FAULT_SCRIPTS.len())];
         let at_s = (left_s + self.rng.uniform(-3.0, 12.0)).max(1.0);
-        let id = self.plan.flights[index].id;
-        self.mission.scenario.faults = self.faults(script, at_s, id, index)?;
+        let id = self.plan.flights[index].vehicle_id;
+        self.mission.scenario.faults = self.parse_fault(script, at_s, id, index)?;
         let flight = swarm::fly(
             &self.mission,
             &self.plan,
@@ -105,11 +105,17 @@ impl Edge {
             &Progress::hidden(),
         )?;
         let what = format!("range {:.1} m, vehicle {id} at {at_s:.1} s, {script:?}", self.range_m);
-        Ok(Some(Outcome { what, ..judge(&flight, id) }))
+        Ok(Some(Outcome { description: what, ..judge_flight(&flight, id) }))
     }
 
-    fn faults(&self, script: &str, at_s: f32, id: u8, index: usize) -> anyhow::Result<Vec<Fault>> {
-        let [x, y, z] = ahead(&self.plan.flights[index].path).into();
+    fn parse_fault(
+        &self,
+        script: &str,
+        at_s: f32,
+        id: u8,
+        index: usize,
+    ) -> anyhow::Result<Vec<Fault>> {
+        let [x, y, z] = widest_late_leg_middle(&self.plan.flights[index].path).into();
         let script = script.replace("AHEAD", &format!("[{x}, {y}, {z}]"));
         let text = format!("{DEMO}\n[[faults]]\nat_s = {at_s}\nvehicle = {id}\n{script}\n");
         Ok(scenario::parse(&text, "faults.toml")?.faults)
@@ -117,7 +123,7 @@ impl Edge {
 }
 
 /// Each time at which a vehicle that moves leaves the range of all others, and its index.
-fn leaves(flight: &SwarmFlight, range_m: f32) -> Vec<(f32, usize)> {
+fn range_exits(flight: &SwarmFlight, range_m: f32) -> Vec<(f32, usize)> {
     let tracks = &flight.tracks;
     let mut leaves = Vec::new();
     for (i, own) in tracks.iter().enumerate() {
@@ -137,7 +143,7 @@ fn leaves(flight: &SwarmFlight, range_m: f32) -> Vec<(f32, usize)> {
     leaves
 }
 
-fn judge(flight: &SwarmFlight, struck: u8) -> Outcome {
+fn judge_flight(flight: &SwarmFlight, struck: u8) -> Outcome {
     let mut outcome = Outcome { deadlocks: flight.result.safety.deadlocks, ..Outcome::default() };
     for e in &flight.log {
         let text = format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text);
@@ -148,16 +154,16 @@ fn judge(flight: &SwarmFlight, struck: u8) -> Outcome {
         if e.text.contains("nearer than") && by_struck {
             outcome.near_struck.push(text);
         } else if e.text.contains("nearer than") || (e.text.contains("touches") && !own_wall) {
-            outcome.wrong.push(text);
+            outcome.forbidden.push(text);
         } else if e.text.contains("is hit by falling") {
             outcome.near_struck.push(text);
         }
     }
     for v in &flight.result.vehicles {
-        outcome.arrived += usize::from(v.reached && v.landed);
+        outcome.arrived_count += usize::from(v.reached && v.landed);
         let stays = v.landed || v.end.starts_with("Ready") || v.end.starts_with("Scheduled");
         if !stays && v.id != struck {
-            outcome.aloft.push(format!("vehicle {} ends in {}", v.id, v.end));
+            outcome.not_landed.push(format!("vehicle {} ends in {}", v.id, v.end));
         }
     }
     outcome

@@ -4,7 +4,7 @@
 //!
 //! Two things in a PX4 recording are no property of the autopilot. First, the drift of its estimate
 //! moves the vehicle: a replay imposes the recorded errors (estimate minus truth) on the simulated
-//! estimate, or those of another flight, or flies without any ([`Estimator`]). Second, the
+//! estimate, or those of another flight, or flies without any ([`EstimateErrors`]). Second, the
 //! companion answered that drift in the accelerations it sent: a replay sends either those, or what
 //! the same control law gives for the simulated vehicle ([`Correction`]).
 //!
@@ -22,10 +22,10 @@ pub use self::recording::{Recording, Sample};
 use crate::shared_data;
 
 /// A horizontal vector, metres: east and north.
-type Across = Vector2<f64>;
+type Horizontal = Vector2<f64>;
 
 /// Names of the recorded runs.
-pub const RUNS: [&str; 15] = [
+pub const RECORDED_RUNS: [&str; 15] = [
     "a_demo",
     "a_lobby",
     "px4_c1_demo",
@@ -44,7 +44,7 @@ pub const RUNS: [&str; 15] = [
 ];
 /// Which errors the simulated estimate has in a replay.
 #[derive(Clone, Copy, Debug)]
-pub enum Estimator<'a> {
+pub enum EstimateErrors<'a> {
     /// No errors: the estimate is the truth.
     Perfect,
     /// The recorded errors of the same flight.
@@ -70,7 +70,7 @@ pub enum Correction {
 /// Allowed RMS difference of a flight's replay, metres, under the recorded errors and with the
 /// setpoints as they were sent; `None` for a flight in which a person or a failsafe took the
 /// vehicle.
-pub fn allowed_m(recording: &Recording) -> Option<f64> {
+pub fn allowed_rms_m(recording: &Recording) -> Option<f64> {
     match recording.run.as_str() {
         "a_demo" => Some(0.45),
         "a_lobby" | "x_rearm_lobby" => Some(0.30),
@@ -100,30 +100,34 @@ pub fn recordings(run: &str) -> Vec<Recording> {
 
 impl Recording {
     /// The recorded estimates between arming and disarming.
-    pub fn flown(&self) -> impl Iterator<Item = &Sample> {
-        self.estimate.iter().filter(|s| (self.armed_s.0..=self.armed_s.1).contains(&s.t_s))
+    pub fn flown_estimates(&self) -> impl Iterator<Item = &Sample> {
+        self.estimate
+            .iter()
+            .filter(|s| (self.armed_span_s.0..=self.armed_span_s.1).contains(&s.t_s))
     }
 
     /// Recorded estimate minus setpoint, metres, at each estimate's time since the start of Follow.
-    fn tracking(&self) -> Vec<(f64, Vector3<f64>)> {
+    fn tracking_errors(&self) -> Vec<(f64, Vector3<f64>)> {
         let mut later = self.setpoints.as_slice();
         let mut errors = Vec::new();
-        for seen in
-            self.estimate.iter().filter(|s| s.t_s >= self.follow_s.0 && s.t_s < self.follow_s.1)
+        for seen in self
+            .estimate
+            .iter()
+            .filter(|s| s.t_s >= self.follow_span_s.0 && s.t_s < self.follow_span_s.1)
         {
             while later.len() > 1 && later[1].t_s <= seen.t_s {
                 later = &later[1..];
             }
             let asked = Vector3::from(later[0].position.map(f64::from));
-            errors.push((seen.t_s - self.follow_s.0, seen.position - asked));
+            errors.push((seen.t_s - self.follow_span_s.0, seen.position - asked));
         }
         errors
     }
 
     /// How differently this and another recorded flight of the same mission kept to their
     /// setpoints: RMS, metres.
-    pub fn spread(&self, other: &Self) -> f64 {
-        let (own, others) = (self.tracking(), other.tracking());
+    pub fn tracking_difference_m(&self, other: &Self) -> f64 {
+        let (own, others) = (self.tracking_errors(), other.tracking_errors());
         let (mut squares, mut n, mut at) = (0.0, 0_u32, 0);
         for (t_s, error) in &own {
             while at + 1 < others.len() && others[at + 1].0 <= *t_s {
@@ -139,17 +143,18 @@ impl Recording {
 
     /// How far errors of the estimate alone move a replay: RMS, metres. A replay without these
     /// errors is that far off the recording, however well the autopilot is simulated.
-    pub fn moved_by_errors_m(&self, errors: Estimator<'_>, correction: Correction) -> f64 {
+    pub fn moved_by_errors_m(&self, errors: EstimateErrors<'_>, correction: Correction) -> f64 {
         let [with, without] =
-            [errors, Estimator::Perfect].map(|errors| self.replay(errors, correction));
-        Difference::of(with.iter().zip(&without).map(|(a, b)| (a.position - b.position).norm())).rms
+            [errors, EstimateErrors::Perfect].map(|errors| self.replay(errors, correction));
+        Difference::of(with.iter().zip(&without).map(|(a, b)| (a.position - b.position).norm()))
+            .rms_m
     }
 
     /// Correlation coefficient of the horizontal estimate errors of two flights at the same times.
     /// PX4's SIH draws its sensor noise from `rand()` without a seed: the noise repeats in another
     /// flight, unless threads draw in another order.
     pub fn error_correlation(&self, other: &Self) -> f64 {
-        let (own, others) = (self.errors(), other.errors());
+        let (own, others) = (self.estimate_errors(), other.estimate_errors());
         let mut later = others.as_slice();
         let mut pairs = Vec::new();
         for (t_s, error, _) in &own {
@@ -161,21 +166,23 @@ impl Recording {
             }
         }
         let n = pairs.len() as f64;
-        let mean =
-            |of: &dyn Fn(&(Across, Across)) -> Across| pairs.iter().map(of).sum::<Across>() / n;
+        let mean = |of: &dyn Fn(&(Horizontal, Horizontal)) -> Horizontal| {
+            pairs.iter().map(of).sum::<Horizontal>() / n
+        };
         let (a, b) = (mean(&|p| p.0), mean(&|p| p.1));
-        let product = |of: &dyn Fn(&(Across, Across)) -> f64| pairs.iter().map(of).sum::<f64>();
+        let product =
+            |of: &dyn Fn(&(Horizontal, Horizontal)) -> f64| pairs.iter().map(of).sum::<f64>();
         let both = product(&|p| (p.0 - a).dot(&(p.1 - b)));
         both / (product(&|p| (p.0 - a).norm_squared()) * product(&|p| (p.1 - b).norm_squared()))
             .sqrt()
     }
 
     /// Replays the flight, and compares the simulated with the recorded estimates.
-    pub fn compare(&self, estimator: Estimator<'_>, correction: Correction) -> Comparison {
+    pub fn compare(&self, estimator: EstimateErrors<'_>, correction: Correction) -> Comparison {
         let simulated = self.replay(estimator, correction);
-        let pairs: Vec<_> = self.flown().zip(&simulated).collect();
+        let pairs: Vec<_> = self.flown_estimates().zip(&simulated).collect();
         let apart = |(a, b): &(&Sample, &Sample)| (a.position - b.position).norm();
-        let in_follow = |s: &Sample| s.t_s >= self.follow_s.0 && s.t_s < self.follow_s.1;
+        let in_follow = |s: &Sample| s.t_s >= self.follow_span_s.0 && s.t_s < self.follow_span_s.1;
         let height = |(a, b): &(&Sample, &Sample)| (a.position.z - b.position.z).abs();
         let part = |pick: &dyn Fn(&Sample) -> bool, of: &dyn Fn(&(&Sample, &Sample)) -> f64| {
             Difference::of(pairs.iter().filter(|(a, _)| pick(a)).map(of))
@@ -183,8 +190,8 @@ impl Recording {
         Comparison {
             whole: part(&|_| true, &apart),
             follow: part(&in_follow, &apart),
-            lift_off: part(&|s| s.t_s < self.follow_s.0, &height),
-            landing: part(&|s| s.t_s >= self.follow_s.1, &height),
+            lift_off: part(&|s| s.t_s < self.follow_span_s.0, &height),
+            landing: part(&|s| s.t_s >= self.follow_span_s.1, &height),
         }
     }
 }
@@ -193,9 +200,9 @@ impl Recording {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// Root of the mean square, metres.
-    pub rms: f64,
+    pub rms_m: f64,
     /// Greatest difference, metres.
-    pub max: f64,
+    pub max_m: f64,
 }
 
 impl Difference {
@@ -206,7 +213,7 @@ impl Difference {
             max = value.max(max);
             n += 1;
         }
-        Self { rms: (squares / f64::from(n)).sqrt(), max }
+        Self { rms_m: (squares / f64::from(n)).sqrt(), max_m: max }
     }
 }
 

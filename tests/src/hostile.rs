@@ -3,7 +3,7 @@
 //!
 //! What must hold: no panic; every setpoint finite, inside the fence and near the last one; no
 //! arming without a start; the pilot's mode left alone; a bounded number of answers. One target
-//! ([`attack`]) serves the fuzzer and the bench.
+//! ([`attack_with_bytes`]) serves the fuzzer and the bench.
 
 use core::ops::Range;
 
@@ -21,23 +21,23 @@ use planner_core::geo::frames::{self, Geodetic};
 
 use crate::meeting::autopilot::Autopilot;
 use crate::meeting::dice::Dice;
-use crate::setpoints::{Limits, SetpointCheck, SetpointStats, rounding_m};
+use crate::setpoints::{SetpointCheck, SetpointLimits, SetpointStats, rounding_m};
 
 mod entropy;
 mod forge;
 
-pub use self::entropy::{Bytes, Entropy};
+pub use self::entropy::{Entropy, FuzzBytes};
 
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
-const ID: u8 = 42;
-const NEIGHBOUR: u8 = 77;
+const VICTIM_ID: u8 = 42;
+const NEIGHBOUR_ID: u8 = 77;
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
 const STEP: Duration = Duration::from_millis(25);
 /// Most frames that a companion may send in a second of simulated time, to the autopilot and by
 /// radio.
-const ANSWERS_MOST: [u32; 2] = [200, 60];
+const MAX_FRAMES_PER_S: [u32; 2] = [200, 60];
 /// Ids of the messages that a companion reads, and of one that it does not.
-const READ: [u32; 20] = [
+const READ_MESSAGE_IDS: [u32; 20] = [
     0,
     1,
     20,
@@ -60,57 +60,57 @@ const READ: [u32; 20] = [
     TUNNEL_DATA::ID,
 ];
 /// Speed limit of setpoints, m/s.
-const SPEED_MPS: f32 = 2.2;
+const MAX_SETPOINT_SPEED_MPS: f32 = 2.2;
 
 type Victim = Companion<4, 16, 8>;
 
 /// What an attack found.
 #[derive(Clone, Debug, Default)]
-pub struct Report {
+pub struct AttackReport {
     /// Number of forged frames given to the companion.
     pub frames: u64,
     /// Statistics of the setpoints sent during the attack.
     pub setpoints: SetpointStats,
     /// Most frames sent in a second, to the autopilot and by radio.
-    pub most_sent: [u32; 2],
+    pub max_sent_per_s: [u32; 2],
     /// Rules that the companion broke: time, state and what it did.
-    pub broken: Vec<String>,
+    pub broken_rules: Vec<String>,
     /// Setpoints that were not fit to be flown: time and why.
-    pub unfit: Vec<String>,
+    pub unfit_setpoints: Vec<String>,
     /// Number of steps that ended in each state, by the state's number.
-    pub states: Vec<u64>,
+    pub steps_in_state: Vec<u64>,
 }
 
-impl Report {
+impl AttackReport {
     /// Adds the findings of another attack.
     pub fn merge(&mut self, other: Self) {
         self.frames += other.frames;
         self.setpoints.merge(&other.setpoints);
-        for (most, sent) in self.most_sent.iter_mut().zip(other.most_sent) {
+        for (most, sent) in self.max_sent_per_s.iter_mut().zip(other.max_sent_per_s) {
             *most = (*most).max(sent);
         }
-        self.broken.extend(other.broken);
-        self.unfit.extend(other.unfit);
-        self.states.resize(self.states.len().max(other.states.len()), 0);
-        self.states.iter_mut().zip(&other.states).for_each(|(sum, n)| *sum += n);
+        self.broken_rules.extend(other.broken_rules);
+        self.unfit_setpoints.extend(other.unfit_setpoints);
+        self.steps_in_state.resize(self.steps_in_state.len().max(other.steps_in_state.len()), 0);
+        self.steps_in_state.iter_mut().zip(&other.steps_in_state).for_each(|(sum, n)| *sum += n);
     }
 }
 
 /// A companion under attack with its simulated autopilot, at some time of its mission.
 #[derive(Clone, Debug)]
-pub struct Flight {
+pub struct AttackedFlight {
     companion: Victim,
     autopilot: Autopilot,
     now: Instant,
     started: bool,
     framers: [Framer; 2],
-    check: SetpointCheck,
+    setpoint_check: SetpointCheck,
     bytes: Vec<u8>,
-    commands: u8,
+    command_sequence: u8,
     sequence: u8,
-    sent: [u32; 2],
-    second_at: Instant,
-    report: Report,
+    sent_in_second: [u32; 2],
+    second_began: Instant,
+    report: AttackReport,
     mission: Mission,
 }
 
@@ -123,7 +123,7 @@ enum Mission {
     Area,
 }
 
-fn plan(mission: Mission) -> Plan16 {
+fn victim_plan(mission: Mission) -> Plan16 {
     let mut path = Path::new();
     for point in
         [Point::new(8.0, 12.0, 3.0), Point::new(20.0, 12.0, 3.0), Point::new(20.0, 30.0, 6.0)]
@@ -139,33 +139,33 @@ fn plan(mission: Mission) -> Plan16 {
         Mission::Goal => Task::Goto(0),
         Mission::Area => Task::Photograph(photographs),
     };
-    Plan16 { task, path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
+    Plan16 { task, path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, swarm_plan_crc: 5 }
 }
 
 type Plan16 = planner_core::flight::VehiclePlan<16, 8>;
 
 /// Number of phases of a mission in which the companion is attacked.
-pub const PHASES: usize = 8;
+pub const PHASE_COUNT: usize = 8;
 
-impl Flight {
+impl AttackedFlight {
     /// A vehicle on its pad, just switched on.
     fn new(kind: AutopilotKind, mission: Mission) -> Self {
         let start = Point::new(8.0, 12.0, 3.0);
-        let mut config: Config<4> = Config::new(ID, start, ORIGIN);
+        let mut config: Config<4> = Config::new(VICTIM_ID, start, ORIGIN);
         config.mission_crc = 0xC0FFEE;
         config.geofence = Some(FENCE);
-        config.lost_vehicle_down_s = (mission == Mission::Area).then_some(60.0);
-        let other = RosterEntry { system_id: NEIGHBOUR, start: Point::new(8.0, 30.0, 3.0) };
+        config.lost_vehicle_down_after_s = (mission == Mission::Area).then_some(60.0);
+        let other = RosterEntry { system_id: NEIGHBOUR_ID, path_start: Point::new(8.0, 30.0, 3.0) };
         config.roster.push(other).expect("room for two");
-        let limits = Limits { speed_mps: SPEED_MPS, fence: Some(FENCE) };
+        let limits = SetpointLimits { max_speed_mps: MAX_SETPOINT_SPEED_MPS, fence: Some(FENCE) };
         let ekf_origin = Geodetic { lat_deg: 40.3328, lon_deg: -3.7657, alt_m: 702.0 };
         let pad = Point::new(8.0, 12.0, 0.0);
-        let none = Limits { fence: None, ..limits };
+        let none = SetpointLimits { fence: None, ..limits };
         Self {
             companion: Victim::new(config).expect("a sound configuration"),
             autopilot: Autopilot::new(
                 kind,
-                ID,
+                VICTIM_ID,
                 (ORIGIN, ekf_origin),
                 pad,
                 0,
@@ -174,60 +174,60 @@ impl Flight {
             now: Instant::ZERO,
             started: false,
             framers: [Framer::new(), Framer::new()],
-            check: SetpointCheck::new(limits),
+            setpoint_check: SetpointCheck::new(limits),
             bytes: Vec::new(),
-            commands: 0,
+            command_sequence: 0,
             sequence: 0,
-            sent: [0; 2],
-            second_at: Instant::ZERO,
-            report: Report::default(),
+            sent_in_second: [0; 2],
+            second_began: Instant::ZERO,
+            report: AttackReport::default(),
             mission,
         }
     }
 
-    /// A flight brought to this phase without an attack; phases from [`PHASES`] on are the same
-    /// phases in a coverage mission.
+    /// A flight brought to this phase without an attack; phases from [`PHASE_COUNT`] on are the
+    /// same phases in a coverage mission.
     pub fn at_phase(phase: usize) -> Self {
         let kind =
             if phase.is_multiple_of(2) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
-        let mission = if phase >= PHASES { Mission::Area } else { Mission::Goal };
+        let mission = if phase >= PHASE_COUNT { Mission::Area } else { Mission::Goal };
         let mut flight = Self::new(kind, mission);
-        let phase = phase % PHASES;
-        flight.run(3.0);
+        let phase = phase % PHASE_COUNT;
+        flight.run_without_attack(3.0);
         if phase < 2 {
             return flight;
         }
         flight.command(MavCmd::MAV_CMD_MISSION_START, 0.0);
         flight.started = true;
         let fly_s = [0.0, 6.0, 14.0, 14.0][phase / 2];
-        flight.run(fly_s);
+        flight.run_without_attack(fly_s);
         if phase / 2 == 3 {
-            flight.autopilot.take_over(Point::zeros());
-            flight.run(2.0);
+            flight.autopilot.pilot_takes_over(Point::zeros());
+            flight.run_without_attack(2.0);
         }
         flight
     }
 
-    fn run(&mut self, seconds: f32) {
+    fn run_without_attack(&mut self, seconds: f32) {
         for _ in 0..(seconds * 40.0) as u32 {
             self.step(|_| {});
         }
-        self.report = Report::default();
-        self.check.stats = SetpointStats::default();
-        self.check.faults.clear();
+        self.report = AttackReport::default();
+        self.setpoint_check.stats = SetpointStats::default();
+        self.setpoint_check.faults.clear();
     }
 
     fn command(&mut self, command: MavCmd, param1: f32) {
         let data = COMMAND_LONG_DATA {
             command,
             param1,
-            target_system: ID,
+            target_system: VICTIM_ID,
             target_component: COMPANION_COMPONENT,
             ..Default::default()
         };
         let mut out = [0; MAX_FRAME_LEN];
-        let header = Header { system: 255, component: 190, sequence: self.commands };
-        self.commands = self.commands.wrapping_add(1);
+        let header = Header { system: 255, component: 190, sequence: self.command_sequence };
+        self.command_sequence = self.command_sequence.wrapping_add(1);
         let length = frame::encode(header, &data, &mut out);
         self.companion.handle_bytes(Link::Swarm, self.now, &out[..length]);
         self.drain();
@@ -236,15 +236,15 @@ impl Flight {
     /// One step of 25 ms, in which `attack` may give the companion frames.
     fn step(&mut self, attack: impl FnOnce(&mut Self)) {
         self.now = self.now + STEP;
-        if self.now - self.second_at >= Duration::from_secs(1) {
-            let sent = core::mem::take(&mut self.sent);
-            for (most, sent) in self.report.most_sent.iter_mut().zip(sent) {
+        if self.now - self.second_began >= Duration::from_secs(1) {
+            let sent = core::mem::take(&mut self.sent_in_second);
+            for (most, sent) in self.report.max_sent_per_s.iter_mut().zip(sent) {
                 *most = (*most).max(sent);
             }
-            if sent.iter().zip(ANSWERS_MOST).any(|(sent, most)| *sent > most) {
-                self.broken(&format!("{sent:?} frames in a second"));
+            if sent.iter().zip(MAX_FRAMES_PER_S).any(|(sent, most)| *sent > most) {
+                self.note_broken_rule(&format!("{sent:?} frames in a second"));
             }
-            self.second_at = self.now;
+            self.second_began = self.now;
         }
         let mut bytes = core::mem::take(&mut self.bytes);
         self.autopilot.step(self.now, 0.0, &mut bytes);
@@ -258,8 +258,8 @@ impl Flight {
         }
         self.drain();
         let state = self.companion.state() as usize;
-        self.report.states.resize(self.report.states.len().max(state + 1), 0);
-        self.report.states[state] += 1;
+        self.report.steps_in_state.resize(self.report.steps_in_state.len().max(state + 1), 0);
+        self.report.steps_in_state[state] += 1;
     }
 
     /// An honest neighbour that stands on its pad reports its intent and position, five times a
@@ -272,7 +272,7 @@ impl Flight {
         let intent = Intent {
             flags: companion::link::intent::GROUNDED | companion::link::intent::ON_PLAN,
             progress_m: -3.0,
-            ..intent()
+            ..neighbour_intent()
         };
         self.deliver_neighbour_report(&intent, &place);
     }
@@ -286,8 +286,11 @@ impl Flight {
             alt: (geodetic.alt_m * 1e3) as i32,
             ..Default::default()
         };
-        let mut header =
-            Header { system: NEIGHBOUR, component: COMPANION_COMPONENT, sequence: self.sequence };
+        let mut header = Header {
+            system: NEIGHBOUR_ID,
+            component: COMPANION_COMPONENT,
+            sequence: self.sequence,
+        };
         let mut out = [0; MAX_FRAME_LEN];
         let length = frame::encode(header, &data, &mut out);
         self.companion.handle_bytes(Link::Swarm, self.now, &out[..length]);
@@ -300,10 +303,10 @@ impl Flight {
         self.sequence = self.sequence.wrapping_add(2);
     }
 
-    fn broken(&mut self, what: &str) {
-        if self.report.broken.len() < 8 {
+    fn note_broken_rule(&mut self, what: &str) {
+        if self.report.broken_rules.len() < 8 {
             let (state, at_s) = (self.companion.state(), self.now.as_micros() as f64 * 1e-6);
-            self.report.broken.push(format!("{at_s:.2} s, {state:?}: {what}"));
+            self.report.broken_rules.push(format!("{at_s:.2} s, {state:?}: {what}"));
         }
     }
 
@@ -315,9 +318,9 @@ impl Flight {
                 if length == 0 {
                     break;
                 }
-                self.sent[link as usize] += 1;
+                self.sent_in_second[link as usize] += 1;
                 if link == Link::Autopilot {
-                    self.look_at(&buffer[..length]);
+                    self.check_frame(&buffer[..length]);
                     self.autopilot.handle_bytes(self.now, &buffer[..length], &mut self.bytes);
                 }
             }
@@ -327,7 +330,7 @@ impl Flight {
                 let answer = if self.companion.detour_request(|_| {}).is_some() {
                     Err(companion::PlanFailure::Unreachable)
                 } else {
-                    Ok(plan(self.mission))
+                    Ok(victim_plan(self.mission))
                 };
                 self.companion.handle_plan(
                     self.now,
@@ -339,17 +342,17 @@ impl Flight {
     }
 
     /// Checks a frame to the autopilot against the rules.
-    fn look_at(&mut self, bytes: &[u8]) {
+    fn check_frame(&mut self, bytes: &[u8]) {
         let mut input = bytes;
         let Some(frame) = self.framers[0].next(self.now, &mut input) else { return };
         if let Some(command) = frame.decode::<COMMAND_LONG_DATA>() {
             let arms =
                 command.command == MavCmd::MAV_CMD_COMPONENT_ARM_DISARM && command.param1 == 1.0;
             if arms && !self.started {
-                self.broken("armed without a start");
+                self.note_broken_rule("armed without a start");
             }
             if arms && self.companion.state() != State::Arming {
-                self.broken("armed outside Arming");
+                self.note_broken_rule("armed outside Arming");
             }
             let flies = matches!(
                 command.command,
@@ -358,13 +361,13 @@ impl Flight {
                     | MavCmd::MAV_CMD_NAV_LAND
             );
             if (flies || arms) && self.companion.state() == State::PilotControl {
-                self.broken(&format!("{:?} under the pilot", command.command));
+                self.note_broken_rule(&format!("{:?} under the pilot", command.command));
             }
         }
         if let Some(mut data) = frame.decode::<SET_POSITION_TARGET_LOCAL_NED_DATA>() {
             // Checked by the EKF origin that the companion believes: a forged one is not the
             // autopilot's.
-            self.check.rounded_m = rounding_m(&data);
+            self.setpoint_check.extra_rounding_m = rounding_m(&data);
             if let Some(origin) = self.companion.telemetry().ekf_origin {
                 let ned = nalgebra::Vector3::new(data.x, data.y, data.z).cast::<f64>();
                 let kind = self.companion.telemetry().kind.unwrap_or_default();
@@ -375,21 +378,21 @@ impl Flight {
                 (data.vx, data.vy, data.vz) = (velocity.x, velocity.y, velocity.z);
             }
             if self.autopilot.mode != self.autopilot.kind.setpoint_mode() {
-                self.check.restart();
+                self.setpoint_check.begin_stream();
             }
             // While the autopilot's reported mode takes no setpoints, setpoints follow the vehicle.
             let telemetry = self.companion.telemetry();
-            self.check.follows =
+            self.setpoint_check.follows_vehicle =
                 telemetry.custom_mode != telemetry.kind.unwrap_or_default().setpoint_mode();
-            self.check.urgent = self.companion.is_in_urgent_stop();
-            self.check.take(self.now.as_micros() as f64 * 1e-6, &data);
+            self.setpoint_check.in_urgent_stop = self.companion.is_in_urgent_stop();
+            self.setpoint_check.check_setpoint(self.now.as_micros() as f64 * 1e-6, &data);
         }
     }
 
     /// Gives forged frames until `entropy` is spent or `frames` are given. Each attack has a theme:
     /// some of the links, some of the messages, few or many frames a step. An attack that forged
     /// everything at once would soon end every mission.
-    pub fn attacked(mut self, entropy: &mut impl Entropy, frames: usize) -> Report {
+    pub fn run_attack(mut self, entropy: &mut impl Entropy, frames: usize) -> AttackReport {
         let mut left = frames;
         let bits = entropy.bits();
         let burst = 1 << (bits % 8);
@@ -398,8 +401,11 @@ impl Flight {
             1 => &[Link::Autopilot, Link::Swarm],
             _ => &[Link::Swarm],
         };
-        let (first, kinds) = ((bits >> 8) as usize, 1 + (bits >> 16) as usize % READ.len());
-        let messages: Vec<u32> = (0..kinds).map(|i| READ[(first + 7 * i) % READ.len()]).collect();
+        let (first, kinds) =
+            ((bits >> 8) as usize, 1 + (bits >> 16) as usize % READ_MESSAGE_IDS.len());
+        let messages: Vec<u32> = (0..kinds)
+            .map(|i| READ_MESSAGE_IDS[(first + 7 * i) % READ_MESSAGE_IDS.len()])
+            .collect();
         while left > 0 && !entropy.is_spent() {
             self.step(|flight| {
                 for _ in 0..burst.min(left) {
@@ -411,16 +417,17 @@ impl Flight {
             });
             left = left.saturating_sub(burst);
         }
-        self.report.setpoints = self.check.stats;
-        let faults = self.check.faults.iter();
-        self.report.unfit = faults.map(|(at_s, what)| format!("{at_s:.2} s: {what}")).collect();
+        self.report.setpoints = self.setpoint_check.stats;
+        let faults = self.setpoint_check.faults.iter();
+        self.report.unfit_setpoints =
+            faults.map(|(at_s, what)| format!("{at_s:.2} s: {what}")).collect();
         self.report
     }
 }
 
-fn intent() -> Intent {
+fn neighbour_intent() -> Intent {
     Intent {
-        system_id: NEIGHBOUR,
+        system_id: NEIGHBOUR_ID,
         mission_crc: 0xC0FFEE,
         plan_crc: 5,
         heard_bits: u32::MAX,
@@ -431,54 +438,55 @@ fn intent() -> Intent {
 /// Number of forged frames of one attack.
 const FRAMES_PER_ATTACK: u64 = 10_000;
 /// Most findings that are kept, of each kind.
-const KEPT: usize = 40;
+const MAX_KEPT_FINDINGS: usize = 40;
 
 /// Gives at least `frames` forged frames to flights with a goal, in attacks with seeds from `seed`
 /// on.
-pub fn attacks(seed: u64, frames: u64) -> Report {
-    attacks_in(0..PHASES, seed, frames)
+pub fn attacks(seed: u64, frames: u64) -> AttackReport {
+    attacks_in(0..PHASE_COUNT, seed, frames)
 }
 
 /// As [`attacks`], to vehicles that photograph an area, with roster reports among the frames.
-pub fn attacks_over_area(seed: u64, frames: u64) -> Report {
-    attacks_in(PHASES..2 * PHASES, seed, frames)
+pub fn attacks_over_area(seed: u64, frames: u64) -> AttackReport {
+    attacks_in(PHASE_COUNT..2 * PHASE_COUNT, seed, frames)
 }
 
-fn attacks_in(phases: Range<usize>, seed: u64, frames: u64) -> Report {
+fn attacks_in(phases: Range<usize>, seed: u64, frames: u64) -> AttackReport {
     use rayon::prelude::*;
-    let phases: Vec<Flight> = phases.map(Flight::at_phase).collect();
+    let phases: Vec<AttackedFlight> = phases.map(AttackedFlight::at_phase).collect();
     let attack = |seed: u64| {
-        let flight = phases[seed as usize % PHASES].clone();
-        let mut report = flight.attacked(&mut Dice::new(seed), FRAMES_PER_ATTACK as usize);
-        for what in [&mut report.broken, &mut report.unfit] {
+        let flight = phases[seed as usize % PHASE_COUNT].clone();
+        let mut report = flight.run_attack(&mut Dice::new(seed), FRAMES_PER_ATTACK as usize);
+        for what in [&mut report.broken_rules, &mut report.unfit_setpoints] {
             what.truncate(1);
             what.iter_mut().for_each(|what| *what = format!("seed {seed}: {what}"));
         }
         report
     };
-    let both = |mut a: Report, b: Report| {
+    let both = |mut a: AttackReport, b: AttackReport| {
         a.merge(b);
-        a.broken.truncate(KEPT);
-        a.unfit.truncate(KEPT);
+        a.broken_rules.truncate(MAX_KEPT_FINDINGS);
+        a.unfit_setpoints.truncate(MAX_KEPT_FINDINGS);
         a
     };
     (seed..seed + frames.div_ceil(FRAMES_PER_ATTACK))
         .into_par_iter()
         .map(attack)
-        .reduce(Report::default, both)
+        .reduce(AttackReport::default, both)
 }
 
 /// The fuzzer's target: the first byte of `data` chooses the phase, the rest are forged frames.
 ///
 /// # Panics
 /// The companion breaks a rule.
-pub fn attack(data: &[u8]) {
+pub fn attack_with_bytes(data: &[u8]) {
     use std::sync::OnceLock;
-    static PHASES_REACHED: OnceLock<Vec<Flight>> = OnceLock::new();
+    static PHASES_REACHED: OnceLock<Vec<AttackedFlight>> = OnceLock::new();
     let Some((&first, rest)) = data.split_first() else { return };
-    let phases = PHASES_REACHED.get_or_init(|| (0..PHASES).map(Flight::at_phase).collect());
-    let flight = phases[usize::from(first) % PHASES].clone();
-    let report = flight.attacked(&mut Bytes(rest), usize::MAX);
-    assert!(report.broken.is_empty(), "{:?}", report.broken);
-    assert!(report.unfit.is_empty(), "{:?}", report.unfit);
+    let phases =
+        PHASES_REACHED.get_or_init(|| (0..PHASE_COUNT).map(AttackedFlight::at_phase).collect());
+    let flight = phases[usize::from(first) % PHASE_COUNT].clone();
+    let report = flight.run_attack(&mut FuzzBytes(rest), usize::MAX);
+    assert!(report.broken_rules.is_empty(), "{:?}", report.broken_rules);
+    assert!(report.unfit_setpoints.is_empty(), "{:?}", report.unfit_setpoints);
 }

@@ -60,7 +60,7 @@ pub fn python() -> Option<String> {
 /// Path of `host-sim`, in the profile of the test that asks. It is built first, because cargo
 /// gives tests no path to another package's binaries, unless `FLOCKMATE_BUILT` says that it was
 /// built with the tests.
-pub fn host_sim() -> PathBuf {
+pub fn host_sim_path() -> PathBuf {
     let test = std::env::current_exe().expect("a test knows its own path");
     // TARGET/PROFILE/deps/TEST-HASH
     let built = test.ancestors().nth(2).expect("tests lie two levels deep in their profile");
@@ -76,9 +76,9 @@ pub fn host_sim() -> PathBuf {
 }
 
 /// A child process that is killed when this is dropped, also by a test that panics.
-pub struct Guard(pub Child);
+pub struct ChildGuard(pub Child);
 
-impl Guard {
+impl ChildGuard {
     /// Waits for the child to end by itself; `None` if it has not ended within the limit.
     pub fn wait_for(&mut self, limit: Duration) -> Option<ExitStatus> {
         let began = Instant::now();
@@ -92,7 +92,7 @@ impl Guard {
     }
 }
 
-impl Drop for Guard {
+impl Drop for ChildGuard {
     fn drop(&mut self) {
         // The child may have ended by itself, so errors are ignored.
         let _ = self.0.kill();
@@ -105,10 +105,10 @@ impl Drop for Guard {
 ///
 /// # Panics
 /// The program does not start, or does not open all links.
-pub fn listening(mut command: Command, links: usize) -> (Guard, Vec<String>) {
+pub fn start_listening(mut command: Command, links: usize) -> (ChildGuard, Vec<String>) {
     let mut child = command.stdout(Stdio::piped()).spawn().expect("host-sim starts");
     let lines = BufReader::new(child.stdout.take().expect("stdout is piped")).lines();
-    let guard = Guard(child);
+    let guard = ChildGuard(child);
     let address = |line: std::io::Result<String>| {
         let line = line.expect("it prints a line for each link");
         let url = line.strip_prefix("listening ").unwrap_or_else(|| panic!("no link in {line:?}"));
@@ -123,13 +123,13 @@ pub fn listening(mut command: Command, links: usize) -> (Guard, Vec<String>) {
 ///
 /// # Panics
 /// The program does not start.
-pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
-    let mut command = Command::new(host_sim());
+pub fn start_autopilot(listen: &[&str], options: &[&str]) -> (ChildGuard, Vec<String>) {
+    let mut command = Command::new(host_sim_path());
     command.arg("autopilot").args(options);
     for url in listen {
         command.args(["--listen", url]);
     }
-    listening(command, listen.len())
+    start_listening(command, listen.len())
 }
 
 /// A port that is free now for TCP and UDP, and that no other test of this process gets. It is
@@ -171,7 +171,7 @@ pub fn chromium() -> Option<PathBuf> {
 /// `name`_FROM set another number of seeds and another first seed. Fails if `one` returns
 /// `Some(true)` (wrong) for any seed, or `None` (not planned) for half of them or more.
 pub fn assert_no_seed_is_wrong(name: &str, usual: u64, one: impl Fn(u64) -> Option<bool> + Sync) {
-    let (from, count) = (number(&format!("{name}_FROM"), 0), number(name, usual));
+    let (from, count) = (number_from_env(&format!("{name}_FROM"), 0), number_from_env(name, usual));
     let flown: Vec<(u64, bool)> =
         (from..from + count).into_par_iter().filter_map(|seed| Some((seed, one(seed)?))).collect();
     let wrong: Vec<u64> = flown.iter().filter(|(_, wrong)| *wrong).map(|(seed, _)| *seed).collect();
@@ -181,6 +181,6 @@ pub fn assert_no_seed_is_wrong(name: &str, usual: u64, one: impl Fn(u64) -> Opti
 
 /// A number from the environment variable `name`, by which a test can draw more instances than
 /// usual.
-pub fn number(name: &str, usual: u64) -> u64 {
+pub fn number_from_env(name: &str, usual: u64) -> u64 {
     std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(usual)
 }

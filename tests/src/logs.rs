@@ -7,7 +7,7 @@ use crate::shared_data;
 
 /// One record of a log: time, and the bytes of its frame, as many as its header states.
 #[derive(Clone, Debug)]
-pub struct Recorded {
+pub struct LogRecord {
     /// Time stamp, microseconds; 0 in a plain stream.
     pub at_us: u64,
     /// Bytes of the frame; its checksum is not checked.
@@ -15,7 +15,7 @@ pub struct Recorded {
 }
 
 /// Paths of all logs of the shared data, sorted; empty, with a printed line, if these are absent.
-pub fn all() -> Vec<PathBuf> {
+pub fn all_logs() -> Vec<PathBuf> {
     let Some(folder) = shared_data("mavlink") else { return Vec::new() };
     let entries = std::fs::read_dir(folder).expect("a folder can be read");
     let mut logs: Vec<_> = entries.map(|entry| entry.expect("its entries too").path()).collect();
@@ -27,7 +27,7 @@ pub fn all() -> Vec<PathBuf> {
 ///
 /// # Panics
 /// The file cannot be read.
-pub fn read(path: &Path) -> Vec<Recorded> {
+pub fn read_log(path: &Path) -> Vec<LogRecord> {
     let file = std::fs::read(path).expect("a log can be read");
     let stamp = if path.extension().is_some_and(|extension| extension == "tlog") { 8 } else { 0 };
     let mut rest = file.as_slice();
@@ -36,7 +36,7 @@ pub fn read(path: &Path) -> Vec<Recorded> {
         && let Some(bytes) = rest.get(stamp..stamp + length)
     {
         let at_us = rest[..stamp].iter().fold(0, |us, &byte| us << 8 | u64::from(byte));
-        records.push(Recorded { at_us, bytes: bytes.to_vec() });
+        records.push(LogRecord { at_us, bytes: bytes.to_vec() });
         rest = &rest[stamp + length..];
     }
     records

@@ -22,14 +22,14 @@ use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, MavCmd, STATUSTEXT_DATA, TUNNEL_DATA,
 };
 
-use self::autopilot::{Flown, STEP_S};
+use self::autopilot::{ControlSource, STEP_S};
 use self::dice::Dice;
-use self::forged::{forge, place_of};
+use self::forged::{forge_report, reported_position_and_velocity};
 use self::oracle::Oracle;
-pub use self::outcome::{Outcome, Summary, line, summary};
+pub use self::outcome::{Outcome, Summary, outcome_line, summary};
 use self::packet::{Packet, RadioContent};
 use self::planner::detour_in_the_open;
-use self::scene::{MeetingEvent, Scene, floor_z, landing};
+use self::scene::{MeetingEvent, Scene, floor_z, landing_point};
 use self::vehicle::MeetingVehicle;
 use crate::setpoints::SetpointStats;
 
@@ -37,14 +37,14 @@ use crate::setpoints::SetpointStats;
 const AFTERMATH_S: f32 = 3.0;
 /// Horizontal distance beyond the safety distance within which a vehicle counts as above another
 /// one, metres.
-const LANDING_DRIFT_M: f32 = 1.0;
+const MAX_LANDING_DRIFT_M: f32 = 1.0;
 /// Distance from its path beyond which a vehicle is off it, metres.
 const OFF_PATH_M: f32 = 1.2;
 /// Horizontal distance within which a vehicle is still where its pilot left it, metres.
-const LEFT_THERE_M: f32 = 1.0;
+const STILL_WHERE_LEFT_M: f32 = 1.0;
 /// Step in which the distance from the path is computed, metres.
 const PATH_STEP_M: f32 = 0.1;
-const STEP_MS: u64 = 25;
+const STEP_TIME_MS: u64 = 25;
 
 struct World<'a> {
     scene: &'a Scene,
@@ -84,22 +84,23 @@ impl<'a> World<'a> {
         let mut ended_s = 0.0;
         for step in 0..steps {
             let now_s = step as f32 * STEP_S;
-            self.now = Instant::from_millis(step as u64 * STEP_MS);
-            while let Some(happening) = scene.happenings.get(next).filter(|h| h.at_s <= now_s) {
-                self.happens(happening.vehicle, happening.what);
+            self.now = Instant::from_millis(step as u64 * STEP_TIME_MS);
+            while let Some(happening) = scene.events.get(next).filter(|h| h.at_s <= now_s) {
+                self.apply_event(happening.vehicle, happening.what);
                 next += 1;
             }
             self.step();
-            let seen: Vec<_> = self.vehicles.iter().map(|vehicle| vehicle.seen(now_s)).collect();
+            let seen: Vec<_> =
+                self.vehicles.iter().map(|vehicle| vehicle.state_for_judge(now_s)).collect();
             let heard = |a: usize, b: usize| self.vehicles[a].heard[b].clone();
             oracle.observe(&seen, heard, |place| floor_z(&scene.vehicles, place));
             if self.trace.is_some() && step % 20 == 0 {
-                self.trace_places(now_s);
+                self.trace_positions(now_s);
             }
             ended_s = now_s;
-            let rest = next == scene.happenings.len()
+            let rest = next == scene.events.len()
                 && now_s > scene::START_S + 5.0
-                && self.vehicles.iter().all(MeetingVehicle::rests);
+                && self.vehicles.iter().all(MeetingVehicle::is_at_rest);
             rested_s = if rest { rested_s + STEP_S } else { 0.0 };
             if rested_s > AFTERMATH_S {
                 break;
@@ -109,14 +110,14 @@ impl<'a> World<'a> {
         self.outcome(oracle, ended_s)
     }
 
-    fn say(&mut self, vehicle: usize, what: &str) {
+    fn trace_event(&mut self, vehicle: usize, what: &str) {
         let (now, id) = (self.now, self.scene.vehicles[vehicle].id);
         if let Some(trace) = &mut self.trace {
             trace.push(format!("{:7.2} s  {id}: {what}", now.as_micros() as f64 * 1e-6));
         }
     }
 
-    fn trace_places(&mut self, now_s: f32) {
+    fn trace_positions(&mut self, now_s: f32) {
         let mut line = format!("{now_s:7.2} s ");
         for vehicle in &self.vehicles {
             let (p, v) = (vehicle.autopilot.position, vehicle.autopilot.velocity);
@@ -130,7 +131,7 @@ impl<'a> World<'a> {
                 v.y,
                 v.z
             );
-            if let Some(target) = vehicle.autopilot.asked() {
+            if let Some(target) = vehicle.autopilot.last_setpoint_position() {
                 line += &format!(" to {:.2} {:.2} {:.2}", target.x, target.y, target.z);
             }
             if vehicle.companion.waiting_for() != 0 {
@@ -151,43 +152,53 @@ impl<'a> World<'a> {
         }
     }
 
-    fn happens(&mut self, index: usize, what: MeetingEvent) {
-        self.say(index, &format!("{what:?}"));
+    fn apply_event(&mut self, index: usize, what: MeetingEvent) {
+        self.trace_event(index, &format!("{what:?}"));
         let now = self.now;
         let vehicle = &mut self.vehicles[index];
         let airborne = vehicle.autopilot.is_airborne();
         match what {
-            MeetingEvent::Start => self.command(index, MavCmd::MAV_CMD_MISSION_START, 0.0),
-            MeetingEvent::Pause => self.command(index, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
-            MeetingEvent::Resume => self.command(index, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0),
-            MeetingEvent::Return => {
-                self.command(index, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0);
+            MeetingEvent::Start => self.send_command(index, MavCmd::MAV_CMD_MISSION_START, 0.0),
+            MeetingEvent::Pause => self.send_command(index, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
+            MeetingEvent::Resume => {
+                self.send_command(index, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0);
             }
-            MeetingEvent::Land => self.command(index, MavCmd::MAV_CMD_NAV_LAND, 0.0),
-            MeetingEvent::PilotTakes(velocity) if airborne => vehicle.autopilot.take_over(velocity),
-            MeetingEvent::PilotReturns if airborne => vehicle.autopilot.give_back(now),
-            MeetingEvent::PilotLands if airborne && vehicle.autopilot.flown() == Flown::Other => {
+            MeetingEvent::Return => {
+                self.send_command(index, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0);
+            }
+            MeetingEvent::Land => self.send_command(index, MavCmd::MAV_CMD_NAV_LAND, 0.0),
+            MeetingEvent::PilotTakes(velocity) if airborne => {
+                vehicle.autopilot.pilot_takes_over(velocity);
+            }
+            MeetingEvent::PilotReturns if airborne => vehicle.autopilot.pilot_gives_back(now),
+            MeetingEvent::PilotLands
+                if airborne && vehicle.autopilot.control_source() == ControlSource::Other =>
+            {
                 vehicle.autopilot.pilot_lands();
             }
             // The autopilot of a dead companion may still be in Guided (ArduCopter).
-            MeetingEvent::PilotLands if airborne && vehicle.dead => vehicle.autopilot.pilot_lands(),
-            MeetingEvent::Fails(how) if airborne => vehicle.autopilot.fail(how),
+            MeetingEvent::PilotLands if airborne && vehicle.companion_dead => {
+                vehicle.autopilot.pilot_lands();
+            }
+            MeetingEvent::EntersFailsafe(how) if airborne => vehicle.autopilot.enter_failsafe(how),
             MeetingEvent::PilotTakes(_)
             | MeetingEvent::PilotReturns
             | MeetingEvent::PilotLands
-            | MeetingEvent::Fails(_) => {}
-            MeetingEvent::Dies => vehicle.dead = true,
-            MeetingEvent::Cut { sends, hears } => (vehicle.sends, vehicle.hears) = (!sends, !hears),
+            | MeetingEvent::EntersFailsafe(_) => {}
+            MeetingEvent::CompanionDies => vehicle.companion_dead = true,
+            MeetingEvent::RadioCut { sending_fails: sends, receiving_fails: hears } => {
+                (vehicle.radio_sends, vehicle.radio_hears) = (!sends, !hears);
+            }
             MeetingEvent::Caught(how) if airborne => vehicle.autopilot.catch(how),
             MeetingEvent::Caught(_) => {}
-            MeetingEvent::Healed => (vehicle.sends, vehicle.hears) = (true, true),
+            MeetingEvent::RadioHealed => (vehicle.radio_sends, vehicle.radio_hears) = (true, true),
         }
     }
 
     /// Sends a vehicle a command of the ground station, without loss or delay.
-    fn command(&mut self, index: usize, command: MavCmd, param1: f32) {
+    fn send_command(&mut self, index: usize, command: MavCmd, param1: f32) {
         let vehicle = &mut self.vehicles[index];
-        if vehicle.dead {
+        if vehicle.companion_dead {
             return;
         }
         let data = COMMAND_LONG_DATA {
@@ -198,11 +209,11 @@ impl<'a> World<'a> {
             ..Default::default()
         };
         let mut out = [0; MAX_FRAME_LEN];
-        let header = Header { system: 255, component: 190, sequence: vehicle.commands };
-        vehicle.commands = vehicle.commands.wrapping_add(1);
+        let header = Header { system: 255, component: 190, sequence: vehicle.command_sequence };
+        vehicle.command_sequence = vehicle.command_sequence.wrapping_add(1);
         let len = frame::encode(header, &data, &mut out);
         vehicle.companion.handle_bytes(Link::Swarm, self.now, &out[..len]);
-        self.drain(index);
+        self.drain_outputs(index);
     }
 
     fn step(&mut self) {
@@ -210,31 +221,35 @@ impl<'a> World<'a> {
         for i in 0..self.vehicles.len() {
             let floor = floor_z(&self.scene.vehicles, &self.vehicles[i].autopilot.position);
             let vehicle = &mut self.vehicles[i];
-            let mut bytes = core::mem::take(&mut vehicle.bytes);
+            let mut bytes = core::mem::take(&mut vehicle.bytes_to_companion);
             vehicle.autopilot.step(now, floor, &mut bytes);
             let mut arrived = Vec::new();
             vehicle.inbox.retain_mut(|packet| {
-                let due = packet.at <= now;
+                let due = packet.due_at <= now;
                 if due {
-                    let none =
-                        Packet { at: now, from: 0, bytes: Vec::new(), said: RadioContent::Other };
+                    let none = Packet {
+                        due_at: now,
+                        from: 0,
+                        bytes: Vec::new(),
+                        content: RadioContent::Other,
+                    };
                     arrived.push(core::mem::replace(packet, none));
                 }
                 !due
             });
-            if vehicle.dead {
+            if vehicle.companion_dead {
                 continue;
             }
             if !bytes.is_empty() {
                 vehicle.companion.handle_bytes(Link::Autopilot, now, &bytes);
             }
             bytes.clear();
-            vehicle.bytes = bytes;
-            for packet in arrived.into_iter().filter(|_| vehicle.hears) {
+            vehicle.bytes_to_companion = bytes;
+            for packet in arrived.into_iter().filter(|_| vehicle.radio_hears) {
                 vehicle.companion.handle_bytes(Link::Swarm, now, &packet.bytes);
                 let heard = &mut vehicle.heard[packet.from];
                 let now_s = now.as_micros() as f32 * 1e-6;
-                match packet.said {
+                match packet.content {
                     RadioContent::Position(place, velocity, boot_ms) => {
                         if heard.position.is_none_or(|(_, _, known, _)| boot_ms > known) {
                             heard.position = Some((place, velocity, boot_ms, now_s));
@@ -248,11 +263,11 @@ impl<'a> World<'a> {
                 vehicle.companion.handle_timeout(now);
                 vehicle.note_stops(now);
             }
-            self.drain(i);
+            self.drain_outputs(i);
         }
     }
 
-    fn drain(&mut self, i: usize) {
+    fn drain_outputs(&mut self, i: usize) {
         let mut buffer = [0; MAX_FRAME_LEN];
         loop {
             let length = self.vehicles[i].companion.poll_transmit(Link::Autopilot, &mut buffer);
@@ -260,8 +275,8 @@ impl<'a> World<'a> {
                 break;
             }
             let (now, vehicle) = (self.now, &mut self.vehicles[i]);
-            vehicle.autopilot.check.urgent = vehicle.companion.is_in_urgent_stop();
-            vehicle.autopilot.handle_bytes(now, &buffer[..length], &mut vehicle.bytes);
+            vehicle.autopilot.setpoint_check.in_urgent_stop = vehicle.companion.is_in_urgent_stop();
+            vehicle.autopilot.handle_bytes(now, &buffer[..length], &mut vehicle.bytes_to_companion);
         }
         loop {
             let length = self.vehicles[i].companion.poll_transmit(Link::Swarm, &mut buffer);
@@ -272,15 +287,15 @@ impl<'a> World<'a> {
         }
         while let Some(event) = self.vehicles[i].companion.poll_event() {
             match event {
-                Event::PlanRequested(_) => self.plan(i),
+                Event::PlanRequested(_) => self.answer_plan_request(i),
                 Event::StateChanged { from, to, text, .. } => {
-                    self.vehicles[i].blocked +=
+                    self.vehicles[i].blocked_count +=
                         u32::from((from, to) == (State::Follow, State::Blocked));
-                    self.say(i, &format!("{from:?} → {to:?} {text}"));
+                    self.trace_event(i, &format!("{from:?} → {to:?} {text}"));
                 }
                 Event::RestartRequested
-                | Event::WaitsForStart { .. }
-                | Event::FlownAround { .. } => {}
+                | Event::WaitsForUnstartedVehicle { .. }
+                | Event::DetourSkippedWaypoints { .. } => {}
             }
         }
     }
@@ -292,14 +307,14 @@ impl<'a> World<'a> {
         let mut bytes = bytes.to_vec();
         if let Some((liar, lie)) = self.scene.liar
             && liar == from
-            && let Some(forged) = forge(&frame, lie)
+            && let Some(forged) = forge_report(&frame, lie)
         {
             bytes = forged;
             let mut input = &bytes[..];
             frame = Framer::new().next(now, &mut input).expect("a forged frame is whole");
         }
         let said = if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
-            let (place, velocity) = place_of(&data);
+            let (place, velocity) = reported_position_and_velocity(&data);
             RadioContent::Position(place, velocity, data.time_boot_ms)
         } else if frame.message_id == TUNNEL_DATA::ID {
             Intent::decode(frame.padded_payload(), frame.system)
@@ -308,26 +323,27 @@ impl<'a> World<'a> {
             if let Some(data) = frame.decode::<STATUSTEXT_DATA>()
                 && let Ok(text) = data.text.to_str()
             {
-                self.say(from, &format!("\"{text}\""));
+                self.trace_event(from, &format!("\"{text}\""));
             }
             RadioContent::Other
         };
-        if !self.vehicles[from].sends {
+        if !self.vehicles[from].radio_sends {
             return;
         }
-        let (low, high) = self.scene.delay_s;
+        let (low, high) = self.scene.radio_delay_s;
         for to in (0..self.vehicles.len()).filter(|to| *to != from) {
-            let lost = self.dice.chance(self.scene.loss);
+            let lost = self.dice.chance(self.scene.radio_loss);
             let delay_s = self.dice.real(low, high);
             if !lost {
                 let at = now + companion::Duration::from_micros((delay_s * 1e6) as u64);
-                let packet = Packet { at, from, bytes: bytes.clone(), said: said.clone() };
+                let packet =
+                    Packet { due_at: at, from, bytes: bytes.clone(), content: said.clone() };
                 self.vehicles[to].inbox.push(packet);
             }
         }
     }
 
-    fn plan(&mut self, i: usize) {
+    fn answer_plan_request(&mut self, i: usize) {
         let own = &self.scene.vehicles[i].plan;
         let mut keep = Vec::new();
         let vehicle = &mut self.vehicles[i];
@@ -337,7 +353,7 @@ impl<'a> World<'a> {
                 let text = if answer.is_some() { "a way around" } else { "no way around" };
                 let answer = answer.as_ref().ok_or(PlanFailure::Unreachable);
                 vehicle.companion.handle_plan(self.now, PlanKind::Detour, answer);
-                self.say(i, text);
+                self.trace_event(i, text);
             }
             None => vehicle.companion.handle_plan(self.now, PlanKind::Mission, Ok(own)),
         }
@@ -350,7 +366,7 @@ impl<'a> World<'a> {
         let place = own.autopilot.position;
         let below = |other: &MeetingVehicle| {
             let away = place - other.autopilot.position;
-            away.z > 0.0 && away.xy().norm() < scene::SAFETY_M + LANDING_DRIFT_M
+            away.z > 0.0 && away.xy().norm() < scene::SAFETY_DISTANCE_M + MAX_LANDING_DRIFT_M
         };
         let others = self.vehicles.iter().enumerate().filter(|(j, _)| *j != i);
         (own.autopilot.is_caught() || self.was_left_off_path(i))
@@ -363,7 +379,9 @@ impl<'a> World<'a> {
         let (autopilot, path) = (&self.vehicles[i].autopilot, &self.scene.vehicles[i].plan.path);
         let steps = (path.length_m() / PATH_STEP_M).ceil() as usize;
         let away = |step| Some(path.point_at(step as f32 * PATH_STEP_M)? - autopilot.position);
-        autopilot.left_at.is_some_and(|at| (at - autopilot.position).xy().norm() < LEFT_THERE_M)
+        autopilot
+            .given_back_at
+            .is_some_and(|at| (at - autopilot.position).xy().norm() < STILL_WHERE_LEFT_M)
             && (0..=steps).filter_map(away).all(|away| away.norm() > OFF_PATH_M)
     }
 
@@ -374,16 +392,21 @@ impl<'a> World<'a> {
         let (mut stuck, mut held) = (Vec::new(), 0);
         let mut arrived = 0;
         for (i, vehicle) in self.vehicles.iter().enumerate() {
-            setpoints.merge(&vehicle.autopilot.check.stats);
+            setpoints.merge(&vehicle.autopilot.setpoint_check.stats);
             unfit.extend(
-                vehicle.autopilot.check.faults.iter().map(|(at_s, what)| (i, *at_s, what.clone())),
+                vehicle
+                    .autopilot
+                    .setpoint_check
+                    .faults
+                    .iter()
+                    .map(|(at_s, what)| (i, *at_s, what.clone())),
             );
             match vehicle.autopilot.armed || vehicle.autopilot.is_airborne() {
                 true if self.is_held_above_another(i) => held += 1,
                 true => stuck.push((i, vehicle.companion.state())),
                 false => {}
             }
-            let goal = landing(&scene.vehicles[i].plan);
+            let goal = landing_point(&scene.vehicles[i].plan);
             arrived += usize::from(
                 goal.is_some_and(|goal| (goal - vehicle.autopilot.position).norm() < 0.7),
             );
@@ -392,29 +415,29 @@ impl<'a> World<'a> {
             seed: scene.seed,
             kind: scene.kind,
             on_plan: scene.on_plan,
-            lies: scene.liar.is_some(),
-            vehicles: scene.vehicles.len(),
+            has_liar: scene.liar.is_some(),
+            vehicle_count: scene.vehicles.len(),
             violations: oracle.violations,
             touches: oracle.touches,
-            unforeseen: oracle.unforeseen,
-            stuck,
-            held,
-            least_m: oracle.least_m,
+            unforeseen_touches: oracle.unforeseen_touches,
+            not_landed: stuck,
+            held_above_another: held,
+            min_distance_m: oracle.min_distance_m,
             ended_s,
             setpoints,
-            unfit,
-            arrived,
-            filter_stops: self.vehicles.iter().map(|vehicle| vehicle.stops).sum(),
+            unfit_setpoints: unfit,
+            arrived_count: arrived,
+            filter_stops: self.vehicles.iter().map(|vehicle| vehicle.filter_stops).sum(),
             longest_stop_s: self.vehicles.iter().map(|m| m.longest_stop_s).fold(0.0, f32::max),
             longest_unheard_stop_s: self
                 .vehicles
                 .iter()
                 .map(|m| m.longest_unheard_stop_s)
                 .fold(0.0, f32::max),
-            most_blocked: self
+            max_blocked_count: self
                 .vehicles
                 .iter()
-                .map(|vehicle| vehicle.blocked)
+                .map(|vehicle| vehicle.blocked_count)
                 .max()
                 .unwrap_or_default(),
             trace: self.trace.unwrap_or_default(),

@@ -20,25 +20,25 @@ use crate::covered;
 type Owned = BTreeMap<u8, BTreeSet<u32>>;
 
 /// A mission that was flown.
-pub struct Flown {
+pub struct FlownMission {
     /// Its result.
     pub result: MissionResult,
     /// Its log, by [`covered::log_lines`].
     pub log: String,
     /// What is wrong with the ownership of waypoints ([`Owners::faults`]).
-    pub owned: Vec<String>,
+    pub ownership_faults: Vec<String>,
 }
 
 /// Flies a scenario in which the vehicles `struck` are lost.
 ///
 /// # Errors
 /// Reason why it cannot be planned, flown or judged.
-pub fn fly(text: &str, struck: &[u8]) -> Result<Flown, String> {
+pub fn fly(text: &str, struck: &[u8]) -> Result<FlownMission, String> {
     let said = |error: anyhow::Error| format!("{error:#}");
     let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
     let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).map_err(said)?;
     let mut pictures = Vec::new();
-    let flight = covered::flight(&mut mission, &mut pictures).map_err(said)?;
+    let flight = covered::fly_with_record(&mut mission, &mut pictures).map_err(said)?;
     let plan = mission.plan().map_err(said)?;
     let owners = Owners::of(&mission, &plan, &flight).map_err(said)?;
     // On a detour around an obstacle pictures are taken beside the lane, also of waypoints that
@@ -46,7 +46,11 @@ pub fn fly(text: &str, struck: &[u8]) -> Result<Flown, String> {
     pictures.retain(|picture| !is_beside_path(&flight.log, picture));
     let planned = CoveragePlan::plan_as_companions(&mission.scenario).map_err(said)?;
     let owned = owners.faults(&planned, &pictures, struck);
-    Ok(Flown { result: flight.result, log: covered::log_lines(&flight.log), owned })
+    Ok(FlownMission {
+        result: flight.result,
+        log: covered::log_lines(&flight.log),
+        ownership_faults: owned,
+    })
 }
 
 /// Whether a picture was taken while its vehicle flew around an obstacle, by the vehicle's log.
@@ -69,13 +73,13 @@ pub struct Owners {
     /// After the plan, and after each chain of divisions that a vehicle reported.
     plans: Vec<Owned>,
     /// Indices in `plans` of the plans that each vehicle reported to fly, besides the first plan.
-    flown: BTreeMap<u8, BTreeSet<usize>>,
+    reported_plans: BTreeMap<u8, BTreeSet<usize>>,
     /// Vehicles that a division counts as lost, or as gone before the end of their parts.
     gone: BTreeSet<u8>,
     /// Waypoints that a plan gives to two vehicles.
     faults: Vec<String>,
     /// Two vehicles that disagree on a division, and its two sets of inputs.
-    disagreed: Vec<([u8; 2], String)>,
+    disagreements: Vec<([u8; 2], String)>,
 }
 
 impl Owners {
@@ -90,19 +94,19 @@ impl Owners {
     ) -> anyhow::Result<Self> {
         let mut owners = Self {
             plans: Vec::new(),
-            flown: BTreeMap::new(),
+            reported_plans: BTreeMap::new(),
             gone: BTreeSet::new(),
             faults: Vec::new(),
-            disagreed: Vec::new(),
+            disagreements: Vec::new(),
         };
-        match flight.done.is_empty() {
+        match flight.photographed_before.is_empty() {
             true => owners.add(plan),
             false => {
                 let none = std::iter::empty::<&[VehicleDivisionInput]>();
-                owners.add(&*mission.plan_remaining(&flight.done, none)?);
+                owners.add(&*mission.plan_remaining(&flight.photographed_before, none)?);
             }
         }
-        let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.id).collect();
+        let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.vehicle_id).collect();
         ids.sort_unstable();
         // The first report of each division, and its reporter; the divisions that each vehicle
         // reported; the chains of divisions whose plan is known.
@@ -118,7 +122,7 @@ impl Owners {
             match first.get(before) {
                 Some(known) if *known != inputs => {
                     let said = format!("division {number}: {known:?} and {inputs:?}");
-                    owners.disagreed.push(([begun[before], vehicle], said));
+                    owners.disagreements.push(([begun[before], vehicle], said));
                 }
                 Some(_) => {}
                 None => {
@@ -136,10 +140,12 @@ impl Owners {
             let known = planned.iter().position(|known| known == chain);
             let at = known.unwrap_or(planned.len());
             if known.is_none() {
-                owners.add(&*mission.plan_remaining(&flight.done, chain.iter().copied())?);
+                owners.add(
+                    &*mission.plan_remaining(&flight.photographed_before, chain.iter().copied())?,
+                );
                 planned.push(chain.clone());
             }
-            owners.flown.entry(vehicle).or_default().insert(at);
+            owners.reported_plans.entry(vehicle).or_default().insert(at);
         }
         Ok(owners)
     }
@@ -159,12 +165,12 @@ impl Owners {
             let every = WaypointRange { first: 0, end: u32::MAX };
             for range in photographs.waypoints_of_pictures(&flight.path, every) {
                 for number in range.first..range.end {
-                    owned.entry(flight.id).or_default().insert(number);
-                    if let Some(other) = all.insert(number, flight.id) {
+                    owned.entry(flight.vehicle_id).or_default().insert(number);
+                    if let Some(other) = all.insert(number, flight.vehicle_id) {
                         let at = self.plans.len();
                         self.faults.push(format!(
                             "after {at} divisions {other} and {} own {number}",
-                            flight.id
+                            flight.vehicle_id
                         ));
                     }
                 }
@@ -175,7 +181,7 @@ impl Owners {
 
     fn has_owned(&self, vehicle: u8, number: u32) -> bool {
         let owns = |at: &usize| self.plans[*at].get(&vehicle).is_some_and(|o| o.contains(&number));
-        owns(&0) || self.flown.get(&vehicle).is_some_and(|plans| plans.iter().any(owns))
+        owns(&0) || self.reported_plans.get(&vehicle).is_some_and(|plans| plans.iter().any(owns))
     }
 
     /// Whether a waypoint is the first or last one of an unbroken range that a plan gives to a
@@ -214,7 +220,7 @@ impl Owners {
         let said = wrong.map(|(number, vehicles)| format!("{number} by {vehicles:?}"));
         // A disagreement with a vehicle that was lost does not count: its own flight is over before
         // others take its part.
-        let split = self.disagreed.iter().filter(|(owners, _)| !owners.iter().any(lost));
+        let split = self.disagreements.iter().filter(|(owners, _)| !owners.iter().any(lost));
         let split = split.map(|(_, said)| said.clone());
         self.faults.iter().cloned().chain(split).chain(said).collect()
     }

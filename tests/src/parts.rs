@@ -7,7 +7,7 @@ pub const WAYPOINT_DM: u16 = 100;
 
 /// The waypoints of each of `count` vehicles, in the order of their flight, after the divisions
 /// that `fleet` knows, and a hash of these divisions.
-pub fn parts<const V: usize>(
+pub fn divide_waypoints<const V: usize>(
     whole: &[u32],
     fleet: &Fleet<V>,
     count: usize,

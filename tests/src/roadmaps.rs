@@ -1,8 +1,8 @@
 //! Forged roadmap files with a right CRC and wrong contents: each must be refused, or every search
 //! on it must be right and end within its bound.
 //!
-//! One body ([`Forger::forge`]) serves the fuzzer ([`attack`]) and the test. What a search must
-//! find is computed by Dijkstra 1959 in f64. A search may read each half-edge once.
+//! One body ([`Forger::forge`]) serves the fuzzer ([`attack_with_bytes`]) and the test. What a
+//! search must find is computed by Dijkstra 1959 in f64. A search may read each half-edge once.
 
 use std::cell::Cell;
 use std::cmp::Reverse;
@@ -18,25 +18,25 @@ use planner_core::roadmap::search::{
     SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, path_lengths_to,
 };
 use planner_core::roadmap::{
-    Edge, HEADER_LEN, HalfEdge, LANDMARKS, RoadmapError, RoadmapHeader, RoadmapView, encoded_len,
-    write_with_landmarks,
+    Edge, HEADER_LEN, HalfEdge, LANDMARK_COUNT, RoadmapError, RoadmapHeader, RoadmapView,
+    encoded_len, write_with_landmarks,
 };
 use planner_core::schedule::sipp::{self, RouteQuery, SippWorkspace};
-use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleConfig};
+use planner_core::schedule::{DEFAULT_MAX_SEGMENT_M, ScheduleConfig};
 
-use crate::hostile::{Bytes, Entropy};
+use crate::hostile::{Entropy, FuzzBytes};
 use crate::meeting::dice::Dice;
 
 /// Most nodes of a file: 300, with some room.
-const NODES: usize = 512;
+const MAX_NODES: usize = 512;
 const HEADER: RoadmapHeader = RoadmapHeader {
     origin: Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 },
     edge_min_m: 0.5,
     edge_max_m: 8.0,
     tested_clearance_m: 0.25,
     max_clearance_m: 10.0,
-    starts: 2,
-    goals: 2,
+    start_count: 2,
+    goal_count: 2,
 };
 const SCHEDULE: ScheduleConfig = ScheduleConfig {
     separation_m: 2.0,
@@ -45,25 +45,25 @@ const SCHEDULE: ScheduleConfig = ScheduleConfig {
     vertical_mps: 1.0,
 };
 /// Required clearance of a wide vehicle, for which some edges are too narrow, metres.
-const WIDE_M: f32 = 1.5;
+const WIDE_CLEARANCE_M: f32 = 1.5;
 /// Bytes of a word, of a node, and of a node's distances to the landmarks.
-const WORD: usize = 4;
-const NODE: usize = 12;
-const WAYS: usize = WORD * LANDMARKS;
+const WORD_BYTES: usize = 4;
+const NODE_BYTES: usize = 12;
+const LANDMARK_ROW_BYTES: usize = WORD_BYTES * LANDMARK_COUNT;
 
 /// Forges files from one random roadmap, one after the other.
 pub struct Forger {
     original: Vec<u8>,
-    search: Box<SearchWorkspace<NODES>>,
-    sipp: Box<SippWorkspace<NODES, 8>>,
+    search: Box<SearchWorkspace<MAX_NODES>>,
+    sipp: Box<SippWorkspace<MAX_NODES, 8>>,
 }
 
 /// Forges one file as a fuzzer's bytes choose.
 ///
 /// # Panics
 /// The file is accepted, and a search on it is wrong.
-pub fn attack(data: &[u8]) {
-    let mut bytes = Bytes(data);
+pub fn attack_with_bytes(data: &[u8]) {
+    let mut bytes = FuzzBytes(data);
     let seed = bytes.bits() % 256;
     let _ = Forger::new(&mut Dice::new(seed)).forge(&mut bytes);
 }
@@ -77,7 +77,7 @@ impl Forger {
         let mut search = Box::new(SearchWorkspace::new());
         let original = random_roadmap(dice, &mut search);
         let mut forger = Self { original, search, sipp: Box::new(SippWorkspace::new()) };
-        forger.check(&forger.original.clone(), dice).expect("nothing is changed yet");
+        forger.check_if_accepted(&forger.original.clone(), dice).expect("nothing is changed yet");
         forger
     }
 
@@ -92,37 +92,41 @@ impl Forger {
     pub fn forge(&mut self, entropy: &mut impl Entropy) -> Result<(), RoadmapError> {
         let mut bytes = self.original.clone();
         if entropy.bits().is_multiple_of(8) {
-            lengthen_ways(&mut bytes);
+            lengthen_landmark_distances(&mut bytes);
         } else {
             mutate(entropy, &mut bytes);
         }
-        let end = bytes.len() - WORD;
+        let end = bytes.len() - WORD_BYTES;
         let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&bytes[..end]);
         bytes[end..].copy_from_slice(&crc.to_le_bytes());
-        self.check(&bytes, entropy)
+        self.check_if_accepted(&bytes, entropy)
     }
 
-    fn check(&mut self, bytes: &[u8], entropy: &mut impl Entropy) -> Result<(), RoadmapError> {
+    fn check_if_accepted(
+        &mut self,
+        bytes: &[u8],
+        entropy: &mut impl Entropy,
+    ) -> Result<(), RoadmapError> {
         let view = RoadmapView::parse(bytes)?;
-        read_all(&view);
+        assert_readable(&view);
         if view.node_count() == 0 {
             return Ok(());
         }
         if view.has_landmarks() {
-            landmarks_are_right(&view, bytes);
+            assert_landmarks_right(&view, bytes);
         }
-        for required_m in [0.0, WIDE_M] {
+        for required_m in [0.0, WIDE_CLEARANCE_M] {
             let mut node = || (entropy.bits() % view.node_count() as u64) as u16;
             let (from, to) = ([node(), node()], [node(), node()]);
-            searches_are_right(&view, from, to, required_m, &mut self.search);
+            assert_searches_right(&view, from, to, required_m, &mut self.search);
         }
-        self.routes_are_right(&view);
+        self.assert_routes_right(&view);
         Ok(())
     }
 
     /// Without other flights, the route that safe-interval search finds must be the shortest path.
-    fn routes_are_right(&mut self, view: &RoadmapView<'_>) {
-        let (starts, goals) = (view.header().starts, view.header().goals);
+    fn assert_routes_right(&mut self, view: &RoadmapView<'_>) {
+        let (starts, goals) = (view.header().start_count, view.header().goal_count);
         if starts == 0 || goals == 0 {
             return;
         }
@@ -134,15 +138,15 @@ impl Forger {
             parked: &[],
             handover_s: 0.0,
         };
-        let way = lengths_from(view, route.from, 0.0)[usize::from(route.to)];
-        let mut flight = Flight::<NODES> {
-            id: 1,
+        let way = shortest_lengths_from(view, route.from, 0.0)[usize::from(route.to)];
+        let mut flight = Flight::<MAX_NODES> {
+            vehicle_id: 1,
             task: Task::Goto(0),
             path: Path::new(),
             climb_m: 1.5,
             descent_m: 1.5,
             depart_s: 0.0,
-            segment_m: MAX_TIMED_SEGMENT_M,
+            max_segment_m: DEFAULT_MAX_SEGMENT_M,
         };
         let asked = Cell::new(0);
         let any = |_: u16, _: &HalfEdge| {
@@ -152,7 +156,7 @@ impl Forger {
         let found = sipp::find_route(view, &route, any, [].iter(), &mut self.sipp, &mut flight);
         assert!(asked.get() <= view.half_edge_count(), "{} half-edges asked about", asked.get());
         match found {
-            Ok(()) => near(f64::from(flight.path.length_m()), way),
+            Ok(()) => assert_near(f64::from(flight.path.length_m()), way),
             Err(error) => assert!(way.is_infinite(), "{error:?} {way}"),
         }
     }
@@ -160,12 +164,12 @@ impl Forger {
 
 /// Asserts that the length `found` equals the expected length `way` up to rounding, metres.
 #[track_caller]
-fn near(found: f64, way: f64) {
+fn assert_near(found: f64, way: f64) {
     assert!(found == way || (found - way).abs() <= 1e-5 * (1.0 + way), "{found} in place of {way}");
 }
 
 /// A file of random nodes, of which near ones are joined at random: some may be unreachable.
-fn random_roadmap(dice: &mut Dice, search: &mut SearchWorkspace<NODES>) -> Vec<u8> {
+fn random_roadmap(dice: &mut Dice, search: &mut SearchWorkspace<MAX_NODES>) -> Vec<u8> {
     let count = 20 + dice.below(281);
     let side_m = 4.0 * (count as f32).cbrt() * dice.real(0.5, 1.5);
     let corner = Point::new(side_m, side_m, side_m);
@@ -180,30 +184,37 @@ fn random_roadmap(dice: &mut Dice, search: &mut SearchWorkspace<NODES>) -> Vec<u
     // Half of the files are of version 1 of the format, without heights.
     let heights_m: Vec<f32> =
         if dice.chance(0.5) { nodes.iter().map(|node| node.z).collect() } else { Vec::new() };
-    let columns = LANDMARKS + usize::from(!heights_m.is_empty());
+    let columns = LANDMARK_COUNT + usize::from(!heights_m.is_empty());
     let mut out = vec![0; encoded_len(nodes.len(), edges.len(), columns).expect("it is small")];
     let written = write_with_landmarks(&HEADER, &nodes, &edges, &heights_m, search, &mut out);
     assert_eq!(written, Ok(out.len()));
     out
 }
 
-fn word(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(bytes[at..at + WORD].try_into().expect("four bytes"))
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + WORD_BYTES].try_into().expect("four bytes"))
 }
 
 /// Bytes of header, nodes, offsets, half-edges, distances to the landmarks and heights, as the
 /// file's header states them.
-fn sizes(bytes: &[u8]) -> [usize; 6] {
-    let (nodes, half_edges) = (word(bytes, 60) as usize, word(bytes, 64) as usize);
-    let heights = if bytes[8] == 2 { nodes * WORD } else { 0 };
-    [HEADER_LEN, nodes * NODE, (nodes + 1) * WORD, half_edges * WORD, nodes * WAYS, heights]
+fn section_bytes(bytes: &[u8]) -> [usize; 6] {
+    let (nodes, half_edges) = (u32_at(bytes, 60) as usize, u32_at(bytes, 64) as usize);
+    let heights = if bytes[8] == 2 { nodes * WORD_BYTES } else { 0 };
+    [
+        HEADER_LEN,
+        nodes * NODE_BYTES,
+        (nodes + 1) * WORD_BYTES,
+        half_edges * WORD_BYTES,
+        nodes * LANDMARK_ROW_BYTES,
+        heights,
+    ]
 }
 
 /// Changes one to three words of a file: of the header, a node, an offset, a half-edge, a distance
 /// to a landmark; or all distances to a landmark by a constant, which the differences between
 /// neighbours do not show.
 fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
-    let sizes = sizes(bytes);
+    let sizes = section_bytes(bytes);
     for _ in 0..1 + entropy.bits() % 3 {
         let (choice, value) = (entropy.bits(), entropy.bits());
         // Four of nine changes go to the distances to the landmarks, which no other part of the
@@ -211,8 +222,8 @@ fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
         let part = [0, 1, 2, 3, 4, 4, 4, 4, 5][(choice % 9) as usize];
         let begin: usize = sizes[..part].iter().sum();
         // Without heights this word is the CRC, which is corrected afterwards.
-        let at = begin + (choice >> 32) as usize % (sizes[part] / WORD).max(1) * WORD;
-        let (old, share) = (word(bytes, at), (value >> 40) as f32 / (1 << 24) as f32);
+        let at = begin + (choice >> 32) as usize % (sizes[part] / WORD_BYTES).max(1) * WORD_BYTES;
+        let (old, share) = (u32_at(bytes, at), (value >> 40) as f32 / (1 << 24) as f32);
         let new = match (choice >> 8) % 8 {
             0 => old ^ 1 << (value % 32),
             1 => value as u32,
@@ -222,30 +233,31 @@ fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
             5 => [f32::NAN, f32::INFINITY, -0.0, 0.0, 1e30, -1.0, 16_384.0, 65_536.0]
                 [(value % 8) as usize]
                 .to_bits(),
-            6 => word(
+            6 => u32_at(
                 bytes,
-                HEADER_LEN + value as usize % ((bytes.len() - HEADER_LEN) / WORD) * WORD,
+                HEADER_LEN
+                    + value as usize % ((bytes.len() - HEADER_LEN) / WORD_BYTES) * WORD_BYTES,
             ),
             _ => {
                 let landmarks = sizes[..4].iter().sum::<usize>();
-                let column = bytes[landmarks..landmarks + sizes[4]].as_chunks_mut::<WORD>().0;
-                for way in column.iter_mut().skip((value % 2) as usize).step_by(LANDMARKS) {
+                let column = bytes[landmarks..landmarks + sizes[4]].as_chunks_mut::<WORD_BYTES>().0;
+                for way in column.iter_mut().skip((value % 2) as usize).step_by(LANDMARK_COUNT) {
                     *way = (f32::from_le_bytes(*way) + 60_000.0 * share).to_le_bytes();
                 }
                 continue;
             }
         };
-        bytes[at..at + WORD].copy_from_slice(&new.to_le_bytes());
+        bytes[at..at + WORD_BYTES].copy_from_slice(&new.to_le_bytes());
     }
 }
 
 /// Replaces the shortest distances to the landmarks by lengths along paths of fewest edges: each is
 /// a sum of edges, and many are right.
-fn lengthen_ways(bytes: &mut [u8]) {
+fn lengthen_landmark_distances(bytes: &mut [u8]) {
     let view = RoadmapView::parse(bytes).expect("nothing is changed yet");
-    let mut ways = vec![[0.0_f32; LANDMARKS]; view.node_count()];
+    let mut ways = vec![[0.0_f32; LANDMARK_COUNT]; view.node_count()];
     let mut landmark = 0;
-    for column in 0..LANDMARKS {
+    for column in 0..LANDMARK_COUNT {
         let (mut seen, mut open) = (vec![false; ways.len()], VecDeque::from([landmark]));
         seen[usize::from(landmark)] = true;
         while let Some(node) = open.pop_front() {
@@ -263,22 +275,24 @@ fn lengthen_ways(bytes: &mut [u8]) {
         landmark = (0..ways.len() as u16)
             .fold(0, |best, node| if farther(best, node) { node } else { best });
     }
-    let sizes = sizes(bytes);
+    let sizes = section_bytes(bytes);
     let begin: usize = sizes[..4].iter().sum();
     let column = &mut bytes[begin..begin + sizes[4]];
-    for (stored, way) in column.as_chunks_mut::<WORD>().0.iter_mut().zip(ways.iter().flatten()) {
+    for (stored, way) in
+        column.as_chunks_mut::<WORD_BYTES>().0.iter_mut().zip(ways.iter().flatten())
+    {
         *stored = way.to_le_bytes();
     }
 }
 
 /// Asserts that every node and half-edge of an accepted file can be read and is sound.
-fn read_all(view: &RoadmapView<'_>) {
+fn assert_readable(view: &RoadmapView<'_>) {
     for node in 0..view.node_count() as u16 {
         let at = view.node(node);
         assert!(at.iter().all(|c| c.is_finite()));
-        assert!(view.ground_m(node).is_none_or(|ground_m| ground_m <= at.z));
+        assert!(view.ground_z_m(node).is_none_or(|ground_m| ground_m <= at.z));
         assert!(
-            view.ground_range_near(&at)
+            view.ground_z_range_near(&at)
                 .is_none_or(|(low_m, high_m)| low_m <= high_m && high_m <= at.z)
         );
         for edge in view.half_edges(node) {
@@ -290,7 +304,7 @@ fn read_all(view: &RoadmapView<'_>) {
 }
 
 /// Lengths of the shortest paths from a node over edges with a clearance, in f64 (Dijkstra 1959).
-fn lengths_from(view: &RoadmapView<'_>, from: u16, required_m: f32) -> Vec<f64> {
+fn shortest_lengths_from(view: &RoadmapView<'_>, from: u16, required_m: f32) -> Vec<f64> {
     let mut ways = vec![f64::INFINITY; view.node_count()];
     ways[usize::from(from)] = 0.0;
     // `f64` is not `Ord`; non-negative floats order like their bits.
@@ -313,28 +327,28 @@ fn lengths_from(view: &RoadmapView<'_>, from: u16, required_m: f32) -> Vec<f64> 
 
 /// Asserts that the distances to the landmarks (node 0, and the node farthest from it) are as
 /// stored in the file; 0 for unreachable nodes.
-fn landmarks_are_right(view: &RoadmapView<'_>, bytes: &[u8]) {
-    let begin: usize = sizes(bytes)[..4].iter().sum();
+fn assert_landmarks_right(view: &RoadmapView<'_>, bytes: &[u8]) {
+    let begin: usize = section_bytes(bytes)[..4].iter().sum();
     let stored = |node: usize, landmark: usize| {
-        f32::from_bits(word(bytes, begin + node * WAYS + landmark * WORD))
+        f32::from_bits(u32_at(bytes, begin + node * LANDMARK_ROW_BYTES + landmark * WORD_BYTES))
     };
     let farthest = (0..view.node_count())
         .fold(0, |best, node| if stored(node, 0) > stored(best, 0) { node } else { best });
     for (landmark, from) in [0, farthest as u16].into_iter().enumerate() {
-        for (node, way) in lengths_from(view, from, 0.0).into_iter().enumerate() {
-            near(f64::from(stored(node, landmark)), if way.is_finite() { way } else { 0.0 });
+        for (node, way) in shortest_lengths_from(view, from, 0.0).into_iter().enumerate() {
+            assert_near(f64::from(stored(node, landmark)), if way.is_finite() { way } else { 0.0 });
         }
     }
 }
 
 /// Asserts that every kind of search between four nodes finds the shortest paths, and reads each
 /// half-edge at most once.
-fn searches_are_right(
+fn assert_searches_right(
     view: &RoadmapView<'_>,
     from: [u16; 2],
     to: [u16; 2],
     required_m: f32,
-    ws: &mut SearchWorkspace<NODES>,
+    ws: &mut SearchWorkspace<MAX_NODES>,
 ) {
     let asked = Cell::new(0);
     let passable = |_: u16, edge: &HalfEdge| {
@@ -349,20 +363,20 @@ fn searches_are_right(
         );
         asked.set(0);
     };
-    let ways = from.map(|node| lengths_from(view, node, required_m));
+    let ways = from.map(|node| shortest_lengths_from(view, node, required_m));
     let way = |i: usize, node: u16| ways[i][usize::from(node)];
 
-    let mut path = Few::<u16, NODES>::new();
+    let mut path = Few::<u16, MAX_NODES>::new();
     match astar(view, from[0], to[0], passable, ws, &mut path) {
         Ok(length_m) => {
-            near(f64::from(length_m), way(0, to[0]));
+            assert_near(f64::from(length_m), way(0, to[0]));
             assert_eq!((path.first(), path.last()), (Some(&from[0]), Some(&to[0])));
             let legs = path.windows(2).map(|leg| {
                 let edge = view.edge_between(leg[0], leg[1]).expect("a path joins nodes by edges");
                 assert!(view.has_clearance(&edge, required_m), "{edge:?}");
                 f64::from(view.distance_m(leg[0], leg[1]))
             });
-            near(legs.sum(), way(0, to[0]));
+            assert_near(legs.sum(), way(0, to[0]));
         }
         error => {
             assert!(error == Err(SearchError::NoPath) && way(0, to[0]).is_infinite(), "{error:?}");
@@ -377,12 +391,12 @@ fn searches_are_right(
     cost_matrix(view, &from, &to, passable, ws, &mut matrix).expect("the nodes exist");
     bounded(2);
     for (j, &node) in to.iter().enumerate() {
-        near(f64::from(row[j]), way(0, node));
-        (0..2).for_each(|i| near(f64::from(matrix[2 * i + j]), way(i, node)));
+        assert_near(f64::from(row[j]), way(0, node));
+        (0..2).for_each(|i| assert_near(f64::from(matrix[2 * i + j]), way(i, node)));
     }
 
     dijkstra_all(view, from[1], passable, ws).expect("the node exists");
     bounded(1);
     (0..view.node_count() as u16)
-        .for_each(|node| near(f64::from(ws.distance_m(node)), way(1, node)));
+        .for_each(|node| assert_near(f64::from(ws.distance_m(node)), way(1, node)));
 }

@@ -18,14 +18,14 @@ const VEHICLES: usize = 32;
 /// Most waypoints of a path.
 pub const WAYPOINTS: usize = 64;
 const GATES: usize = 128;
-const PIECES: usize = 2048;
+const TIMED_SEGMENTS: usize = 2048;
 /// Distance that the schedule keeps between centres beyond the safety distance, metres.
-const STRAY_M: f32 = 0.5;
+const SEPARATION_MARGIN_M: f32 = 0.5;
 
 /// The plan of a whole swarm, with a board's capacities.
 pub type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 /// One vehicle's part of the plan, with its gates.
-pub type Own = VehiclePlan<WAYPOINTS, GATES>;
+pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
 
 /// A seeded generator of random numbers.
 #[derive(Debug)]
@@ -127,15 +127,15 @@ impl Space {
         )
     }
 
-    fn holds(&self, p: &Point) -> bool {
+    fn contains(&self, p: &Point) -> bool {
         let inside =
             |(low, high): &(Point, Point)| (0..3).all(|a| low[a] <= p[a] && p[a] <= high[a]);
         self.boxes.iter().any(inside)
     }
 
-    fn sees(&self, a: &Point, b: &Point) -> bool {
+    fn sees_straight(&self, a: &Point, b: &Point) -> bool {
         let steps = ((b - a).norm() / 0.5).ceil() as usize;
-        (1..steps).all(|i| self.holds(&(a + (b - a) * (i as f32 / steps as f32))))
+        (1..steps).all(|i| self.contains(&(a + (b - a) * (i as f32 / steps as f32))))
     }
 }
 
@@ -150,16 +150,16 @@ pub struct Swarm {
     /// Separation and speeds of the schedule.
     pub schedule: ScheduleConfig,
     /// Safety distance between centres, metres.
-    pub safety_m: f32,
+    pub safety_distance_m: f32,
 }
 
 /// Parameters of a random swarm.
-struct Draw {
+struct SwarmParameters {
     space: Space,
     vehicles: usize,
     goals: usize,
     /// Greatest height of a climb or descent, metres.
-    highest_m: f32,
+    max_climb_m: f32,
     safety_m: f32,
 }
 
@@ -173,17 +173,29 @@ impl Swarm {
             if rng.one_in(8) { 1 + rng.below(vehicles + 2).min(VEHICLES - 1) } else { vehicles };
         let highest_m = [1.5, 8.0, 30.0][rng.below(3)];
         let safety_m = if rng.one_in(2) { 1.5 } else { rng.uniform(0.8, 3.0) };
-        Self::drawn(&Draw { space, vehicles, goals, highest_m, safety_m }, rng)
+        Self::draw(
+            &SwarmParameters { space, vehicles, goals, max_climb_m: highest_m, safety_m },
+            rng,
+        )
     }
 
     /// A small swarm in a small space, where vehicles often meet.
     pub fn small(count: usize, rng: &mut Random) -> Self {
         let space = Space::small(rng);
         let highest_m = [1.5, 3.0][rng.below(2)];
-        Self::drawn(&Draw { space, vehicles: count, goals: count, highest_m, safety_m: 1.5 }, rng)
+        Self::draw(
+            &SwarmParameters {
+                space,
+                vehicles: count,
+                goals: count,
+                max_climb_m: highest_m,
+                safety_m: 1.5,
+            },
+            rng,
+        )
     }
 
-    fn drawn(draw: &Draw, rng: &mut Random) -> Self {
+    fn draw(draw: &SwarmParameters, rng: &mut Random) -> Self {
         let safety_m = draw.safety_m;
         let parked_separation_m = safety_m + [0.25, 0.25, 0.4, 0.8][rng.below(4)];
         // Distance between vehicles that stand: mostly so large that a plan can be expected.
@@ -193,7 +205,7 @@ impl Swarm {
             let (mut places, mut heights): (Vec<Point>, Vec<f32>) = Default::default();
             for _ in 0..40 * wanted {
                 let place = draw.space.point(rng);
-                let height = rng.uniform(0.5, draw.highest_m);
+                let height = rng.uniform(0.5, draw.max_climb_m);
                 let height = if one_floor { place.z + 0.5 } else { height };
                 let ground = place - Point::new(0.0, 0.0, height);
                 let apart = |(p, h): (&Point, &f32)| {
@@ -220,7 +232,7 @@ impl Swarm {
             for b in a + 1..nodes.len() {
                 let length = (nodes[a] - nodes[b]).norm();
                 if (0.1..draw.space.edge_max_m).contains(&length)
-                    && draw.space.sees(&nodes[a], &nodes[b])
+                    && draw.space.sees_straight(&nodes[a], &nodes[b])
                 {
                     let clearance_m = if one_size { 1.0 } else { rng.uniform(0.6, 2.0) };
                     edges.push(Edge { a: a as u16, b: b as u16, clearance_m });
@@ -233,8 +245,8 @@ impl Swarm {
             edge_max_m: draw.space.edge_max_m,
             tested_clearance_m: 0.0,
             max_clearance_m: 4.0,
-            starts: starts as u16,
-            goals: goal_count as u16,
+            start_count: starts as u16,
+            goal_count: goal_count as u16,
         };
         let mut bytes = vec![0; roadmap::encoded_len(nodes.len(), edges.len(), 0).unwrap()];
         roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
@@ -251,12 +263,12 @@ impl Swarm {
         let objective = if rng.one_in(3) { Objective::Makespan } else { Objective::TotalDistance };
         let mode = if labelled { GoalMode::Labelled } else { GoalMode::Unlabelled(objective) };
         let schedule = ScheduleConfig {
-            separation_m: safety_m + STRAY_M,
+            separation_m: safety_m + SEPARATION_MARGIN_M,
             parked_separation_m,
             cruise_mps: rng.uniform(0.5, 5.0),
             vertical_mps: rng.uniform(0.5, 2.0),
         };
-        Self { roadmap: bytes, tasks, descents_m, mode, schedule, safety_m }
+        Self { roadmap: bytes, tasks, descents_m, mode, schedule, safety_distance_m: safety_m }
     }
 
     /// Plans the swarm.
@@ -267,12 +279,12 @@ impl Swarm {
         let view = RoadmapView::parse(&self.roadmap).expect("written here");
         let request = PlanRequest {
             vehicles: &self.tasks,
-            descents_m: &self.descents_m,
+            goal_descents_m: &self.descents_m,
             mode: self.mode,
             schedule: self.schedule,
             max_gates: GATES,
         };
-        let mut ws = on_heap(PlanWorkspace::<NODES, VEHICLES, PIECES>::new);
+        let mut ws = on_heap(PlanWorkspace::<NODES, VEHICLES, TIMED_SEGMENTS>::new);
         let mut out = Box::new(Plan::new());
         plan::plan_swarm(&view, &request, &mut ws, &mut out).map(|()| out)
     }
@@ -281,10 +293,10 @@ impl Swarm {
     ///
     /// # Errors
     /// A part does not fit into a vehicle's memory.
-    pub fn vehicle_plans(&self, plan: &Plan) -> Result<Vec<Own>, ScheduleError> {
+    pub fn vehicle_plans(&self, plan: &Plan) -> Result<Vec<OwnPlan>, ScheduleError> {
         let mut ws = ScheduleWorkspace::default();
         let own = |index: usize| {
-            let mut own = Own::default();
+            let mut own = OwnPlan::default();
             plan::vehicle_plan(plan, index, &self.schedule, &mut ws, &mut own).map(|()| own)
         };
         (0..plan.flights.len()).map(own).collect()
@@ -292,13 +304,13 @@ impl Swarm {
 }
 
 /// Position of a vehicle at an arc length; before 0 and beyond the path's end below its ends.
-pub fn place(flight: &Flight<WAYPOINTS>, along_m: f32) -> Point {
+pub fn position_at(flight: &Flight<WAYPOINTS>, along_m: f32) -> Point {
     let below_m = (-along_m).max(along_m - flight.path.length_m()).max(0.0);
     flight.path.point_at(along_m).unwrap() - Point::new(0.0, 0.0, below_m)
 }
 
 /// Arc length at which a vehicle's flight ends, metres: its landing, or its pad if it stays there.
-pub fn end_m(flight: &Flight<WAYPOINTS>) -> f32 {
+pub fn end_arc_length_m(flight: &Flight<WAYPOINTS>) -> f32 {
     if flight.task.leaves_pad() {
         flight.path.length_m() + flight.descent_m
     } else {
@@ -307,6 +319,6 @@ pub fn end_m(flight: &Flight<WAYPOINTS>) -> f32 {
 }
 
 /// A number from the environment variable `name`, or `default`.
-pub fn number(name: &str, default: u64) -> u64 {
+pub fn number_from_env(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }

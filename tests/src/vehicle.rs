@@ -28,7 +28,7 @@ const STEP: Duration = Duration::from_millis(4);
 /// Longest wait for an event, vehicle's time: a megabyte of garbage takes 100 s.
 const PATIENCE: Duration = Duration::from_secs(400);
 /// Time between two commands to start the mission.
-const AGAIN: Duration = Duration::from_secs(1);
+const START_COMMAND_PERIOD: Duration = Duration::from_secs(1);
 /// States of a companion whose vehicle has not left its pad.
 const ON_PAD: [State; 6] = [
     State::WaitAutopilot,
@@ -39,11 +39,11 @@ const ON_PAD: [State; 6] = [
     State::PadReplanning,
 ];
 /// Time until the simulated estimator is ready, seconds: sooner than ArduCopter's real one.
-const READY_S: f32 = 2.0;
+const ESTIMATOR_READY_S: f32 = 2.0;
 
 /// Messages received from the board.
 #[derive(Debug, Default)]
-pub struct Heard {
+pub struct BoardMessages {
     /// STATUSTEXT messages received by radio.
     pub texts: Vec<String>,
     /// Setpoints that the board sent to the autopilot.
@@ -56,8 +56,8 @@ pub struct Heard {
     pub state: State,
     /// Number of frames missing on each port, by their sequence numbers. A companion that restarts
     /// counts from zero, which shows here too.
-    pub missing: [u32; 2],
-    last: [Option<u8>; 2],
+    pub missing_frames: [u32; 2],
+    last_sequence: [Option<u8>; 2],
 }
 
 /// A vehicle whose companion runs on an emulated board.
@@ -67,18 +67,18 @@ pub struct Vehicle {
     /// Its simulated autopilot and airframe.
     pub autopilot: Autopilot,
     /// Messages received from the board since the caller last emptied this.
-    pub heard: Heard,
+    pub heard: BoardMessages,
     /// Bytes received from the board's radio, for an upload client to read.
-    pub radio: Vec<u8>,
+    pub radio_bytes: Vec<u8>,
     /// Simulated time so far.
     pub time: Duration,
     program: PathBuf,
     folder: tempfile::TempDir,
     /// Simulated time at which the board last started.
-    started: Duration,
-    plugged: [bool; 2],
+    board_started: Duration,
+    is_plugged_in: [bool; 2],
     /// Bytes that the board receives with the next step.
-    pieces: Vec<PortBytes>,
+    pending_bytes: Vec<PortBytes>,
     framers: [Framer; 2],
     ground_m: f32,
     sequence: u8,
@@ -88,7 +88,7 @@ pub struct Vehicle {
 ///
 /// # Panics
 /// The scenario is invalid, or the mission cannot be prepared.
-pub fn mission(text: &str) -> PreparedMission {
+pub fn prepare_mission(text: &str) -> PreparedMission {
     let scenario = scenario::parse(text, "vehicle.toml").expect("the scenario is good");
     PreparedMission::prepare(scenario, &Progress::on_terminal()).expect("it can be prepared")
 }
@@ -97,10 +97,11 @@ pub fn mission(text: &str) -> PreparedMission {
 ///
 /// # Panics
 /// The path has no legs.
-pub fn ahead<const W: usize>(path: &Path<W>) -> Point {
+pub fn widest_late_leg_middle<const W: usize>(path: &Path<W>) -> Point {
     let late = path.waypoints().windows(2).filter(|leg| leg[0].along_m > 0.5 * path.length_m());
-    let widest =
-        late.max_by(|a, b| a[1].clearance_m.total_cmp(&b[1].clearance_m)).expect("a path has legs");
+    let widest = late
+        .max_by(|a, b| a[1].leg_clearance_m.total_cmp(&b[1].leg_clearance_m))
+        .expect("a path has legs");
     (widest[0].position + widest[1].position) * 0.5
 }
 
@@ -124,18 +125,18 @@ impl Vehicle {
         let mut config = config(mission);
         config.seed = seed;
         let mut autopilot = Autopilot::new(&config).expect("the scenario is good");
-        autopilot.land_on_offboard_loss();
+        autopilot.set_land_on_offboard_loss();
         Self {
             board,
             autopilot,
-            heard: Heard::default(),
-            radio: Vec::new(),
+            heard: BoardMessages::default(),
+            radio_bytes: Vec::new(),
             time: Duration::ZERO,
             program: program.to_owned(),
             folder,
-            started: Duration::ZERO,
-            plugged: [true; 2],
-            pieces: Vec::new(),
+            board_started: Duration::ZERO,
+            is_plugged_in: [true; 2],
+            pending_bytes: Vec::new(),
             framers: [Framer::new(), Framer::new()],
             ground_m: config.start.z - config.vehicle.radius_m,
             sequence: 0,
@@ -149,34 +150,34 @@ impl Vehicle {
 
     /// Plugs in the cable of a port.
     pub fn plug_in(&mut self, port: Port) {
-        self.plugged[port as usize] = true;
+        self.is_plugged_in[port as usize] = true;
         self.begin_stream(port);
     }
 
     /// Pulls out the cable of a port: without it no byte passes.
     pub fn pull_out(&mut self, port: Port) {
-        self.plugged[port as usize] = false;
+        self.is_plugged_in[port as usize] = false;
         self.begin_stream(port);
     }
 
     /// The next byte from this port begins a frame.
     fn begin_stream(&mut self, port: Port) {
         self.framers[port as usize] = Framer::new();
-        self.heard.last[port as usize] = None;
+        self.heard.last_sequence[port as usize] = None;
     }
 
     /// Makes the board fail now; it restarts by itself.
-    pub fn bring_down(&mut self, how: BoardFailure) {
+    pub fn fail_board(&mut self, how: BoardFailure) {
         how.inflict(&mut self.board, &self.program);
-        self.starts();
+        self.note_restart();
         // Until the board has restarted, nothing is received from it.
-        for _ in 0..how.lasts().as_micros() / STEP.as_micros() {
+        for _ in 0..how.hang_time().as_micros() / STEP.as_micros() {
             self.step_autopilot();
-            self.pieces.clear();
+            self.pending_bytes.clear();
             self.time += STEP;
         }
-        self.started = self.time;
-        self.heard = Heard::default();
+        self.board_started = self.time;
+        self.heard = BoardMessages::default();
     }
 
     /// Makes the board's planner raise a fault whenever it plans, until the next restart.
@@ -190,11 +191,11 @@ impl Vehicle {
     }
 
     /// The board has restarted: its time begins at 0.
-    fn starts(&mut self) {
-        self.started = self.time;
-        self.pieces.clear();
+    fn note_restart(&mut self) {
+        self.board_started = self.time;
+        self.pending_bytes.clear();
         self.framers = [Framer::new(), Framer::new()];
-        self.heard.last = [None; 2];
+        self.heard.last_sequence = [None; 2];
     }
 
     /// Sends the companion a command by its radio, as a ground station.
@@ -220,9 +221,9 @@ impl Vehicle {
 
     /// Sends bytes to a port of the board with the next step, if its cable is plugged in.
     pub fn send(&mut self, port: Port, bytes: &[u8]) {
-        if self.plugged[port as usize] {
-            let at_us = (self.time - self.started).as_micros() as u64;
-            self.pieces.push(PortBytes { port, at_us, bytes: bytes.to_owned() });
+        if self.is_plugged_in[port as usize] {
+            let at_us = (self.time - self.board_started).as_micros() as u64;
+            self.pending_bytes.push(PortBytes { port, at_us, bytes: bytes.to_owned() });
         }
     }
 
@@ -230,13 +231,13 @@ impl Vehicle {
     pub fn step(&mut self) {
         self.step_autopilot();
         self.time += STEP;
-        let until_us = (self.time - self.started).as_micros() as u64;
-        let pieces = core::mem::take(&mut self.pieces);
+        let until_us = (self.time - self.board_started).as_micros() as u64;
+        let pieces = core::mem::take(&mut self.pending_bytes);
         let answer = self.board.run_grant(until_us, &pieces).expect("a board");
         if answer.restarted {
-            self.starts();
+            self.note_restart();
         }
-        answer.sent.iter().for_each(|piece| self.hear(piece));
+        answer.sent.iter().for_each(|piece| self.receive(piece));
     }
 
     fn step_autopilot(&mut self) {
@@ -252,7 +253,7 @@ impl Vehicle {
     }
 
     /// Steps until `time` has passed in the simulation.
-    pub fn run(&mut self, time: Duration) {
+    pub fn step_for(&mut self, time: Duration) {
         (0..time.as_micros() / STEP.as_micros()).for_each(|_| self.step());
     }
 
@@ -260,7 +261,7 @@ impl Vehicle {
     ///
     /// # Panics
     /// That does not happen within 400 s.
-    pub fn until(&mut self, what: &str, mut holds: impl FnMut(&mut Self) -> bool) {
+    pub fn step_until(&mut self, what: &str, mut holds: impl FnMut(&mut Self) -> bool) {
         let began = self.time;
         while !holds(self) {
             let place = self.autopilot.true_state().position;
@@ -278,17 +279,19 @@ impl Vehicle {
     ///
     /// # Panics
     /// That does not happen within 400 s.
-    pub fn until_said(&mut self, text: &str) {
-        self.until(text, |vehicle| vehicle.heard.texts.iter().any(|said| said.starts_with(text)));
+    pub fn step_until_said(&mut self, text: &str) {
+        self.step_until(text, |vehicle| {
+            vehicle.heard.texts.iter().any(|said| said.starts_with(text))
+        });
     }
 
     /// Commands the start whenever the companion is ready, and steps until its state is none of
     /// `ON_PAD`. A reported state is up to a second old, and a board that has just lost its
     /// autopilot may still seem ready.
-    pub fn start(&mut self) {
+    pub fn start_mission(&mut self) {
         let mut last = None;
-        self.until("started", |vehicle| {
-            let due = last.is_none_or(|last| vehicle.time - last > AGAIN);
+        self.step_until("started", |vehicle| {
+            let due = last.is_none_or(|last| vehicle.time - last > START_COMMAND_PERIOD);
             if vehicle.heard.state == State::Ready && due {
                 last = Some(vehicle.time);
                 vehicle.send_command(MavCmd::MAV_CMD_MISSION_START, 0.0);
@@ -298,20 +301,20 @@ impl Vehicle {
     }
 
     /// Whether the vehicle is off the ground, by its true state.
-    pub fn flies(&self) -> bool {
+    pub fn is_off_ground(&self) -> bool {
         !self.autopilot.true_state().touching
     }
 
     /// Receives what the board sent through a port, if its cable is plugged in.
-    fn hear(&mut self, PortBytes { port, at_us, bytes }: &PortBytes) {
+    fn receive(&mut self, PortBytes { port, at_us, bytes }: &PortBytes) {
         let line = *port as usize;
-        if !self.plugged[line] {
+        if !self.is_plugged_in[line] {
             return;
         }
         if *port == Port::Autopilot {
             self.autopilot.handle_bytes(bytes);
         } else {
-            self.radio.extend_from_slice(bytes);
+            self.radio_bytes.extend_from_slice(bytes);
         }
         let mut input = &bytes[..];
         while let Some(frame) = self.framers[line].next(Instant::from_micros(*at_us), &mut input) {
@@ -320,10 +323,11 @@ impl Vehicle {
     }
 }
 
-impl Heard {
+impl BoardMessages {
     fn note(&mut self, line: usize, frame: &Frame, at_us: u64) {
-        if let Some(last) = self.last[line].replace(frame.sequence) {
-            self.missing[line] += u32::from(frame.sequence.wrapping_sub(last).wrapping_sub(1));
+        if let Some(last) = self.last_sequence[line].replace(frame.sequence) {
+            self.missing_frames[line] +=
+                u32::from(frame.sequence.wrapping_sub(last).wrapping_sub(1));
         }
         let by_radio = line == Port::Swarm as usize;
         match frame.message_id {
@@ -360,7 +364,7 @@ fn config(mission: &PreparedMission) -> AutopilotConfig {
         world_origin: origin,
         ekf_origin: pad,
         start,
-        estimator_ready_s: READY_S,
+        estimator_ready_s: ESTIMATOR_READY_S,
         ..AutopilotConfig::default()
     }
 }

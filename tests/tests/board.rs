@@ -7,11 +7,11 @@
 
 use std::collections::HashMap;
 
-use board_bench::calls::limits::{self, Listener, Results};
+use board_bench::calls::limits::{self, CallListener, Results};
 use board_bench::calls::limits_routes::{self, RouteWorkspaces};
-use board_bench::cases::{self, Workspace};
+use board_bench::cases::{self, PlanCaseWorkspace};
 use flockmate_tests::{board, workspace};
-use host_sim::map::{Unknown, building};
+use host_sim::map::{UnknownSpace, building};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
@@ -28,23 +28,26 @@ const LIMITS: [(&str, u64); 4] = [
 
 #[test]
 fn the_board_computes_what_the_host_computes() {
-    let Some(program) = board::program("measure") else { return };
+    let Some(program) = board::built_program("measure") else { return };
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))
         .expect("the demo is good");
     let mission = PreparedMission::prepare(scenario, &Progress::on_terminal())
         .expect("the demo can be prepared");
     let map = building::building_map(building::DEFAULT_SEED, 0.5)
         .expect("the building")
-        .to_voxel_map(Unknown::Blocked);
-    let lines =
-        board::measure(&program, &mission.roadmap_or_field_file, &board::map_image(&map.grid()));
+        .to_voxel_map(UnknownSpace::Blocked);
+    let lines = board::run_measuring_program(
+        &program,
+        &mission.roadmap_or_field_file,
+        &board::map_image(&map.grid()),
+    );
 
     let view = mission.roadmap_view();
-    let mut ws = Box::new(Workspace::new());
+    let mut ws = Box::new(PlanCaseWorkspace::new());
     for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, &mut ws);
         let [costs, assignment, paths, scales] =
-            [case.costs, case.assignment, case.paths, case.scales];
+            [case.costs_crc, case.assignment_crc, case.paths_crc, case.advice_crc];
         let line = format!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
         assert!(lines.contains(&line), "the host has {line:?}, the board\n{}", lines.join("\n"));
     }
@@ -72,15 +75,15 @@ fn the_board_computes_what_the_host_computes() {
 /// Counts calls.
 struct Calls(usize);
 
-impl Listener for Calls {
-    fn next(&mut self, _name: &'static str) {
+impl CallListener for Calls {
+    fn before_call(&mut self, _name: &'static str) {
         self.0 += 1;
     }
 }
 
 #[test]
 fn at_its_limits_the_board_answers_as_the_host_does() {
-    let Some(program) = board::program("limits") else { return };
+    let Some(program) = board::built_program("limits") else { return };
     let mut calls = Calls(0);
     let mut answers = Results::new(&mut calls);
     limits::call_without_roadmap(&mut answers);
@@ -88,7 +91,7 @@ fn at_its_limits_the_board_answers_as_the_host_does() {
     let routes = limits_routes::call_all(&mut answers, &mut Box::new(RouteWorkspaces::new()));
     let expected = format!("limits {} {places:08x} {routes:08x?}", calls.0);
     // Neither roadmap nor map is read.
-    let lines = board::measure(&program, &[0], &[0]);
+    let lines = board::run_measuring_program(&program, &[0], &[0]);
     println!("{}", lines.join("\n"));
     assert_eq!(lines.first(), Some(&expected));
 }
@@ -106,7 +109,7 @@ fn swarm_crc(mission: &PreparedMission) -> u32 {
 
 /// The values that `measure` prints for a roadmap built on board, computed on the host.
 fn built(grid: &planner_core::map::voxel::VoxelGrid<'_>, config: &PrmConfig) -> String {
-    let mut nodes = vec![planner_core::Point::zeros(); config.nodes];
+    let mut nodes = vec![planner_core::Point::zeros(); config.random_nodes];
     prm::sample_nodes(grid, None, &[], config, &mut nodes).expect("free space");
     let mut index = Box::new(prm::NodeIndex::<4096, 8192>::new());
     let mut edges = vec![prm::PrmEdge::default(); 1 << 15];

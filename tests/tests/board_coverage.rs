@@ -3,7 +3,7 @@
 //! loses all power in flight, the other two divide what it left.
 
 use flockmate_tests::hills::Hills;
-use flockmate_tests::vehicle::mission;
+use flockmate_tests::vehicle::prepare_mission;
 use flockmate_tests::{board, covered};
 use host_sim::mission::PreparedMission;
 use host_sim::swarm::SwarmFlight;
@@ -39,12 +39,12 @@ radio_loss = 0.1
 
 #[test]
 fn three_boards_photograph_an_area_whole() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     let folder = tempfile::tempdir().expect("a temporary directory");
     let hills = Hills::new(&mut Pcg32::seed_from_u64(4), 25.0);
-    let text = hills.under(FIELD, &folder.path().join("hills.asc"), 4.0);
-    let mut mission = mission(&text);
-    let up_m = |place: [f64; 2]| hills.at(place[0], place[1]);
+    let text = hills.put_under_scenario(FIELD, &folder.path().join("hills.asc"), 4.0);
+    let mut mission = prepare_mission(&text);
+    let up_m = |place: [f64; 2]| hills.height_at(place[0], place[1]);
     let heights_m = [[0.0, 0.0], [70.0, 0.0], [80.0, 45.0], [10.0, 50.0], [40.0, 24.0]].map(up_m);
     let [low_m, high_m] =
         [f64::min, f64::max].map(|which| heights_m.into_iter().reduce(which).expect("some"));
@@ -53,7 +53,7 @@ fn three_boards_photograph_an_area_whole() {
     let (result, log) = covered::fly(&mut mission).expect("the boards fly it");
     let said =
         || log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect::<Vec<_>>();
-    assert_eq!(covered::faults(&result), None, "{:?}", said());
+    assert_eq!(covered::faults_text(&result), None, "{:?}", said());
     println!("{:?}", result.coverage);
     for vehicle in &result.vehicles {
         assert!(vehicle.flown_m > 60.0, "a board had no part of the area: {vehicle:?}");
@@ -109,18 +109,19 @@ fn divides_as_planned(mission: &PreparedMission, flight: &SwarmFlight, left: [u8
 
 #[test]
 fn two_boards_photograph_what_a_third_leaves_that_is_switched_off() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     let folder = tempfile::tempdir().expect("a temporary directory");
-    let mut mission = mission(LOSS);
-    let host = covered::flight(&mut mission, &mut Vec::new()).expect("the host flies it");
+    let mut mission = prepare_mission(LOSS);
+    let host = covered::fly_with_record(&mut mission, &mut Vec::new()).expect("the host flies it");
     board::put_on_boards(&mut mission, &program, folder.path());
-    let boards = covered::flight(&mut mission, &mut Vec::new()).expect("the boards fly it");
+    let boards =
+        covered::fly_with_record(&mut mission, &mut Vec::new()).expect("the boards fly it");
     for flight in [&host, &boards] {
         let said = || flight.log.iter().map(|e| (e.t_s, e.vehicle, &e.text)).collect::<Vec<_>>();
-        assert_eq!(covered::faults(&flight.result), None, "{:?}", said());
+        assert_eq!(covered::faults_text(&flight.result), None, "{:?}", said());
         println!(
             "{:.0} s in {:.1} s: {:?}",
-            flight.simulated_s, flight.took_s, flight.result.coverage
+            flight.simulated_s, flight.wall_time_s, flight.result.coverage
         );
         let third = &flight.result.vehicles[2];
         assert!(

@@ -203,8 +203,8 @@ fn roadmap(nodes: u32, shift_m: f32) -> Vec<u8> {
         edge_max_m: 8.0,
         tested_clearance_m: 0.8,
         max_clearance_m: 6.0,
-        starts: 1,
-        goals: 1,
+        start_count: 1,
+        goal_count: 1,
     };
     let mut bytes =
         vec![0; roadmap::encoded_len(points.len(), edges.len(), 0).expect("it is small")];
@@ -343,7 +343,7 @@ fn cut_again_and_again(program: &Path, cuts: usize, seed: u64) -> Tally {
 
 #[test]
 fn an_upload_cut_anywhere_leaves_the_old_or_the_new() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     let cuts = std::env::var("FLOCKMATE_CUTS").map_or(CUTS, |n| n.parse().expect("a number"));
     let began = Instant::now();
     let mut tally = Tally::default();
@@ -361,7 +361,7 @@ fn an_upload_cut_anywhere_leaves_the_old_or_the_new() {
 
 #[test]
 fn an_armed_board_erases_nothing() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     let folder = tempfile::tempdir().expect("a temporary directory");
     let board = start(&program, folder.path());
     let file = roadmap(20, 0.0);

@@ -17,7 +17,7 @@ use companion::storage::store::File;
 use companion::{Link as Port, State};
 use flockmate_tests::board;
 use flockmate_tests::board_failure::{self, BoardFailure};
-use flockmate_tests::vehicle::{Heard, Vehicle, ahead, mission};
+use flockmate_tests::vehicle::{BoardMessages, Vehicle, prepare_mission, widest_late_leg_middle};
 use host_sim::link::ByteLink;
 use host_sim::mission::PreparedMission;
 use host_sim::upload::FtpClient;
@@ -86,24 +86,24 @@ fn reset_in_flight(
     kind: AutopilotKind,
     rng: &mut Pcg32,
 ) -> Option<String> {
-    vehicle.start();
-    vehicle.run(Duration::from_millis(u64::from(rng.next_u32() % FLIGHT_MS)));
+    vehicle.start_mission();
+    vehicle.step_for(Duration::from_millis(u64::from(rng.next_u32() % FLIGHT_MS)));
     if is_over(vehicle) {
         return None;
     }
     let (state, place) = (vehicle.heard.state, vehicle.autopilot.true_state().position);
     // The autopilot flies a commanded take-off to its end.
     let top_m = place.z.max(CLIMBS_TO_M);
-    vehicle.bring_down(how);
+    vehicle.fail_board(how);
     // From here on only the autopilot flies the vehicle.
     let began = vehicle.autopilot.time_us();
     let mut highest_m = 0_f32;
     let mut farthest_m = 0_f32;
     let mut in_air = Duration::ZERO;
-    vehicle.until("landed by itself, or hovering", |vehicle| {
+    vehicle.step_until("landed by itself, or hovering", |vehicle| {
         let truth = vehicle.autopilot.true_state();
         let (away, armed, flies): (Point, _, _) =
-            (truth.position - place, truth.armed, vehicle.flies());
+            (truth.position - place, truth.armed, vehicle.is_off_ground());
         (farthest_m, highest_m) =
             (farthest_m.max(away.xy().norm()), highest_m.max(truth.position.z - top_m));
         let passed = Duration::from_micros(vehicle.autopilot.time_us() - began);
@@ -116,10 +116,10 @@ fn reset_in_flight(
     });
     if vehicle.autopilot.true_state().armed {
         vehicle.autopilot.set_pilot_mode(ardupilot::CopterMode::Land.number());
-        vehicle.until("landed", |vehicle| !vehicle.autopilot.true_state().armed);
+        vehicle.step_until("landed", |vehicle| !vehicle.autopilot.true_state().armed);
     }
-    vehicle.until_said(FOUND);
-    vehicle.run(FINDS);
+    vehicle.step_until_said(FOUND);
+    vehicle.step_for(FINDS);
     let heard = &vehicle.heard;
     let context = format!("{how:?} in {state:?} at {place:?}: {heard:?}");
     assert!(!vehicle.autopilot.true_state().armed, "{context}");
@@ -133,7 +133,7 @@ fn reset_in_flight(
         "{farthest_m} m away, {highest_m} m up, {context}"
     );
     let said = |text: &str| heard.texts.iter().any(|said| said == text);
-    assert!(heard.texts.iter().any(|said| said.starts_with(how.said())), "{context}");
+    assert!(heard.texts.iter().any(|said| said.starts_with(how.restart_message())), "{context}");
     if in_air > FINDS {
         assert!(said("Found in flight: no mission"), "{context}");
         assert!(said("Landed after failsafe: mission over"), "{context}");
@@ -173,9 +173,9 @@ fn reset_again_and_again(
 
 #[test]
 fn a_companion_reset_in_flight_leaves_it_to_the_autopilot_and_says_so() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     let resets = std::env::var("FLOCKMATE_RESETS").map_or(RESETS, |n| n.parse().expect("a number"));
-    let missions = [mission(LOBBY), mission(&format!("{LOBBY}{ARDUPILOT}"))];
+    let missions = [prepare_mission(LOBBY), prepare_mission(&format!("{LOBBY}{ARDUPILOT}"))];
     let (began, mut lines) = (Instant::now(), Vec::new());
     scope(|scope| {
         let of_board = |i: usize| {
@@ -203,43 +203,46 @@ fn is_over(vehicle: &mut Vehicle) -> bool {
 
 #[test]
 fn cables_are_pulled_and_put_back_without_a_restart() {
-    let Some(program) = board::program("flockmate") else { return };
-    let mission = mission(LOBBY);
+    let Some(program) = board::built_program("flockmate") else { return };
+    let mission = prepare_mission(LOBBY);
     let mut vehicle = Vehicle::new(&program, &mission, &mission, 1);
-    vehicle.until("ready", |vehicle| vehicle.heard.state == State::Ready);
+    vehicle.step_until("ready", |vehicle| vehicle.heard.state == State::Ready);
     // On the pad the companion reports that the autopilot is silent, and that it is back; then it
     // is ready again. The last report counts.
     let last = |vehicle: &Vehicle, text| vehicle.heard.texts.iter().rposition(|said| said == text);
     let heard = |vehicle: &Vehicle| last(vehicle, FOUND) > last(vehicle, SILENT);
     vehicle.pull_out(Port::Autopilot);
-    vehicle.until(SILENT, |vehicle| !heard(vehicle));
+    vehicle.step_until(SILENT, |vehicle| !heard(vehicle));
     vehicle.plug_in(Port::Autopilot);
-    vehicle.until(FOUND, |vehicle| heard(vehicle));
-    vehicle.start();
-    vehicle.until("on its way", |vehicle| vehicle.heard.state == State::Follow || is_over(vehicle));
-    vehicle.run(Duration::from_secs(1));
+    vehicle.step_until(FOUND, |vehicle| heard(vehicle));
+    vehicle.start_mission();
+    vehicle.step_until("on its way", |vehicle| {
+        vehicle.heard.state == State::Follow || is_over(vehicle)
+    });
+    vehicle.step_for(Duration::from_secs(1));
     // In flight: the autopilot's cable for less than its timeout, the radio's for any time.
     vehicle.pull_out(Port::Autopilot);
-    vehicle.run(Duration::from_millis(500));
+    vehicle.step_for(Duration::from_millis(500));
     vehicle.plug_in(Port::Autopilot);
-    vehicle.run(Duration::from_secs(1));
+    vehicle.step_for(Duration::from_secs(1));
     vehicle.pull_out(Port::Swarm);
-    vehicle.run(Duration::from_secs(2));
+    vehicle.step_for(Duration::from_secs(2));
     vehicle.plug_in(Port::Swarm);
-    vehicle.until("over", is_over);
+    vehicle.step_until("over", is_over);
     let heard = &vehicle.heard;
     println!("{:?}", heard.texts);
     assert!(!heard.texts.iter().any(|text| text.starts_with("Restarted")), "{:?}", heard.texts);
-    assert_eq!(heard.missing, [0, 0], "frames were lost: {:?}", heard.texts);
+    assert_eq!(heard.missing_frames, [0, 0], "frames were lost: {:?}", heard.texts);
     done(&vehicle);
 }
 
 #[test]
 fn a_board_beside_an_autopilot_that_the_mission_does_not_name_says_so() {
-    let Some(program) = board::program("flockmate") else { return };
-    let [ours, others] = [mission(LOBBY), mission(&LOBBY.replace("id = 1", "id = 7"))];
+    let Some(program) = board::built_program("flockmate") else { return };
+    let [ours, others] =
+        [prepare_mission(LOBBY), prepare_mission(&LOBBY.replace("id = 1", "id = 7"))];
     let mut vehicle = Vehicle::new(&program, &ours, &others, 1);
-    vehicle.until_said("This system id is not in the mission: no plan");
+    vehicle.step_until_said("This system id is not in the mission: no plan");
 }
 
 /// STATUSTEXT about a mission that the board no longer plans.
@@ -247,27 +250,27 @@ const ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
 
 #[test]
 fn a_mission_that_brings_the_planner_down_in_three_starts_is_set_aside() {
-    let Some(program) = board::program("flockmate") else { return };
-    let mission = mission(LOBBY);
+    let Some(program) = board::built_program("flockmate") else { return };
+    let mission = prepare_mission(LOBBY);
     let mut vehicle = Vehicle::new(&program, &mission, &mission, 1);
     for in_a_row in 1..=3 {
         vehicle.break_planner();
-        vehicle.heard = Heard::default();
+        vehicle.heard = BoardMessages::default();
         let crashed = |vehicle: &Vehicle| {
             vehicle.heard.texts.iter().any(|text| text.starts_with("Restarted: fault"))
         };
-        vehicle.until("planning", |vehicle| crashed(vehicle));
+        vehicle.step_until("planning", |vehicle| crashed(vehicle));
         let texts = &vehicle.heard.texts;
         let aside = texts.iter().any(|text| text == ASIDE);
         assert!(in_a_row == 3 || !aside, "after {in_a_row} in a row: {texts:?}");
     }
     // From that start on the mission is not planned: the planner is broken again, but the board
     // stays up.
-    vehicle.until_said(ASIDE);
-    vehicle.run(FINDS);
+    vehicle.step_until_said(ASIDE);
+    vehicle.step_for(FINDS);
     vehicle.break_planner();
-    vehicle.heard = Heard::default();
-    vehicle.run(2 * FINDS);
+    vehicle.heard = BoardMessages::default();
+    vehicle.step_for(2 * FINDS);
     let heard = &vehicle.heard;
     assert!(!heard.texts.iter().any(|text| text.starts_with("Restarted")), "{heard:?}");
     assert_eq!(heard.state, State::Aborted, "there is no plan");
@@ -315,13 +318,13 @@ impl ByteLink for Radio {
 
 #[test]
 fn setpoints_flow_through_planning_uploading_and_garbage() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     let length =
         std::env::var("FLOCKMATE_GARBAGE").map_or(GARBAGE, |n| n.parse().expect("a number"));
     let (mut vehicle, place) = demo_on_its_way(&program);
     // An upload by radio of another roadmap than the one in use.
     let ((turn, turns), (sends, sent)) = (sync_channel(1), sync_channel(1));
-    let other = mission(LOBBY).roadmap_or_field_file;
+    let other = prepare_mission(LOBBY).roadmap_or_field_file;
     let began = Instant::now();
     let upload = thread::spawn(move || {
         let radio = Radio { turns, sends, now: began, heard: Vec::new(), sent: Vec::new() };
@@ -331,7 +334,7 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
     block(&mut vehicle, &place);
     let mut rng = Pcg32::seed_from_u64(1);
     let (mut left, mut steps, mut uploads) = (length, 0, true);
-    vehicle.until("done with garbage and upload", |vehicle| {
+    vehicle.step_until("done with garbage and upload", |vehicle| {
         steps += 1;
         let handful = (4 * PER_MS).min(left);
         for port in [Port::Autopilot, Port::Swarm] {
@@ -340,7 +343,7 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
             vehicle.send(port, &garbage[..handful]);
         }
         left -= handful;
-        let heard = core::mem::take(&mut vehicle.radio);
+        let heard = core::mem::take(&mut vehicle.radio_bytes);
         if uploads {
             // The client may end in its turn.
             match sent.recv() {
@@ -369,7 +372,7 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
         late_us(heard)
     );
     assert_eq!(count, heard.setpoints.len(), "setpoints were lost");
-    assert_eq!(heard.missing, [0, 0], "frames were lost");
+    assert_eq!(heard.missing_frames, [0, 0], "frames were lost");
     done(&vehicle);
     assert_eq!(left, 0, "over before the end of the garbage: {:?}", heard.texts);
     upload.join().expect("a client").expect("the upload arrives");
@@ -381,12 +384,13 @@ fn setpoints_flow_through_planning_uploading_and_garbage() {
 /// The demo's first vehicle alone, in flight on its path, and a place ahead of it.
 fn demo_on_its_way(program: &Path) -> (Vehicle, Geodetic) {
     let demo = DEMO.match_indices(VEHICLE).nth(1).map_or(DEMO, |(second, _)| &DEMO[..second]);
-    let mut demo = mission(demo);
+    let mut demo = prepare_mission(demo);
     let plan = demo.plan().expect("the demo has a plan");
-    let place = enu_to_geodetic(&demo.scenario.map.origin, &ahead(&plan.flights[0].path));
+    let place =
+        enu_to_geodetic(&demo.scenario.map.origin, &widest_late_leg_middle(&plan.flights[0].path));
     let mut vehicle = Vehicle::new(program, &demo, &demo, 1);
-    vehicle.start();
-    vehicle.until("on its way", |vehicle| vehicle.heard.state == State::Follow);
+    vehicle.start_mission();
+    vehicle.step_until("on its way", |vehicle| vehicle.heard.state == State::Follow);
     (vehicle, place)
 }
 
@@ -406,7 +410,7 @@ fn block(vehicle: &mut Vehicle, place: &Geodetic) {
 
 /// Number of setpoints that a board reports, and the longest time between two, milliseconds.
 fn reported(vehicle: &mut Vehicle) -> (usize, u64) {
-    vehicle.until_said("Setpoints: ");
+    vehicle.step_until_said("Setpoints: ");
     let mut texts = vehicle.heard.texts.iter();
     let said = texts.find_map(|text| text.strip_prefix("Setpoints: ")?.strip_suffix(" ms apart"));
     let (count, gap) = said.and_then(|said| said.split_once(", at most ")).expect("two numbers");
@@ -415,23 +419,23 @@ fn reported(vehicle: &mut Vehicle) -> (usize, u64) {
 
 /// How late a setpoint was at most, microseconds of the board's time. A setpoint due to a change of
 /// state comes early.
-fn late_us(heard: &Heard) -> u64 {
+fn late_us(heard: &BoardMessages) -> u64 {
     let gaps = heard.setpoints_us.windows(2).map(|pair| pair[1] - pair[0]);
     gaps.max().expect("many").saturating_sub(PERIOD_US)
 }
 
 #[test]
 fn a_plan_of_38_ms_in_the_air_moves_no_setpoint() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     let fly = |blocks: bool, burst: Duration| {
         let (mut vehicle, place) = demo_on_its_way(&program);
         if blocks {
             vehicle.slow_planner(burst);
             block(&mut vehicle, &place);
-            vehicle.until_said("Flying around");
+            vehicle.step_until_said("Flying around");
         }
         let planned = vehicle.time;
-        vehicle.until("over", is_over);
+        vehicle.step_until("over", is_over);
         done(&vehicle);
         (late_us(&vehicle.heard), planned)
     };
@@ -449,11 +453,11 @@ fn a_plan_of_38_ms_in_the_air_moves_no_setpoint() {
 
 #[test]
 fn a_setpoint_that_is_held_up_is_reported_with_its_gap() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     for held_up in HELD_UP {
         let (mut vehicle, _) = demo_on_its_way(&program);
-        board_failure::block(&mut vehicle.board, held_up);
-        vehicle.until("over", is_over);
+        board_failure::block_tasks(&mut vehicle.board, held_up);
+        vehicle.step_until("over", is_over);
         let (_, gap_ms) = reported(&mut vehicle);
         // The board counts whole milliseconds.
         let times = vehicle.heard.setpoints_us.iter().map(|us| us / 1000).collect::<Vec<_>>();

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{available_parallelism, scope};
 
 use flockmate_tests::board;
-use flockmate_tests::vehicle::mission;
+use flockmate_tests::vehicle::prepare_mission;
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::swarm::{self, SwarmFlight};
@@ -41,9 +41,9 @@ fn fly(mission: &mut PreparedMission) -> SwarmFlight {
 
 #[test]
 fn a_flight_of_boards_is_the_same_twice_on_any_load() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     let folder = tempfile::tempdir().expect("a temporary directory");
-    let mut mission = mission(THREE);
+    let mut mission = prepare_mission(THREE);
     board::put_on_boards(&mut mission, &program, folder.path());
     let first = fly(&mut mission);
     assert!(
@@ -65,10 +65,10 @@ fn a_flight_of_boards_is_the_same_twice_on_any_load() {
     });
     println!(
         "{:.0} s in {:.1} s, beside a load {:.1} s",
-        first.simulated_s, first.took_s, second.took_s
+        first.simulated_s, first.wall_time_s, second.wall_time_s
     );
     assert!(
-        board::record(&first) == board::record(&second),
+        board::observable_text(&first) == board::observable_text(&second),
         "{:?}\n{:?}",
         first.result,
         second.result
@@ -77,7 +77,7 @@ fn a_flight_of_boards_is_the_same_twice_on_any_load() {
 
 #[test]
 fn by_the_wall_clock_a_board_answers_through_its_port() {
-    let Some(program) = board::program("flockmate") else { return };
+    let Some(program) = board::built_program("flockmate") else { return };
     let (_board, [autopilot, _]) = board::start_by_wall_clock(&program);
     let mut client = FtpClient::new(autopilot.open().expect("its port is open"), None);
     assert_eq!(client.wait_for_companion().expect("it speaks"), 250);

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use flockmate_tests::shared_data;
 use host_sim::capacity::{BOARDS, BoardCapacity};
-use host_sim::map::{self, Occupancy, OccupancyMap, Unknown, VoxelMap};
+use host_sim::map::{self, Occupancy, OccupancyMap, UnknownSpace, VoxelMap};
 use host_sim::roadmap::{self, BuiltRoadmap};
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
@@ -23,7 +23,7 @@ const MOST: f32 = 1.15;
 
 fn config(nodes: usize) -> PrmConfig {
     PrmConfig {
-        nodes,
+        random_nodes: nodes,
         edge_min_m: 0.5,
         edge_max_m: 8.0,
         clearance_m: 0.2,
@@ -120,8 +120,9 @@ fn scanned_maps_fit_and_paths_stay_short() {
         [("geb079", 0.08), ("manufacturing", 0.086_642_2), ("maze", 0.195_32)]
     {
         let Some(path) = shared_data(&format!("maps3d/{name}.bt")) else { return };
-        let map =
-            map::load(path.to_str().unwrap(), resolution_m).unwrap().to_voxel_map(Unknown::Blocked);
+        let map = map::load(path.to_str().unwrap(), resolution_m)
+            .unwrap()
+            .to_voxel_map(UnknownSpace::Blocked);
         // The method of cutting down was chosen with the first seed.
         for seed in 1..=seeds {
             holds(name, &map, PrmConfig { seed, ..config(2300) }, &BOARDS[0]);
@@ -141,7 +142,7 @@ fn hall() -> VoxelMap {
             map.fill([x, y, 4], [x + 16, y + 110, 40 + 10 * shelf], Occupancy::Occupied);
         }
     }
-    map.to_voxel_map(Unknown::Blocked)
+    map.to_voxel_map(UnknownSpace::Blocked)
 }
 
 /// Takes eight seconds in a release build.

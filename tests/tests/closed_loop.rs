@@ -7,7 +7,9 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use flockmate_tests::{Guard, autopilot, free_port, host_sim, shared_data, workspace};
+use flockmate_tests::{
+    ChildGuard, free_port, host_sim_path, shared_data, start_autopilot, workspace,
+};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
@@ -48,7 +50,7 @@ fn demo_result_is_the_same_twice() {
     let dir = tempfile::tempdir().expect("a directory");
     let results = ["first", "second"].map(|name| {
         let out = dir.path().join(name);
-        let demo = Command::new(host_sim()).args(["demo", "--out"]).arg(&out).output();
+        let demo = Command::new(host_sim_path()).args(["demo", "--out"]).arg(&out).output();
         let demo = demo.expect("it runs");
         assert!(demo.status.success(), "{name}: {}", String::from_utf8_lossy(&demo.stderr));
         assert!(out.join("report.html").exists() && out.join("timing.json").exists());
@@ -105,8 +107,8 @@ fn companion_and_autopilot_fly_in_two_processes() {
     let pad = mission.pad_position(mission.index_of(7).expect("the demo has a vehicle 7"));
     let home = format!("{:.8},{:.8},{:.3}", pad.lat_deg, pad.lon_deg, pad.alt_m);
     let (_autopilot, addresses) =
-        autopilot(&["udp-listen:127.0.0.1:0"], &["--sysid", "7", "--home", &home]);
-    let companion = Command::new(host_sim())
+        start_autopilot(&["udp-listen:127.0.0.1:0"], &["--sysid", "7", "--home", &home]);
+    let companion = Command::new(host_sim_path())
         .args([
             "companion",
             "--autopilot",
@@ -119,7 +121,7 @@ fn companion_and_autopilot_fly_in_two_processes() {
         .stdout(Stdio::null())
         .spawn()
         .expect("the companion starts");
-    let ended = Guard(companion).wait_for(Duration::from_secs(150));
+    let ended = ChildGuard(companion).wait_for(Duration::from_secs(150));
     assert!(ended.is_some_and(|status| status.success()), "the companion ended with {ended:?}");
 }
 
@@ -137,7 +139,7 @@ fn fly_beside_a_process(vehicles: usize, options: &[&str]) {
     let dir = tempfile::tempdir().expect("a directory");
     let scenario = dir.path().join("scenario.toml");
     first_of_the_demo(vehicles, &scenario);
-    let program = host_sim();
+    let program = host_sim_path();
     let mut companion = Command::new(&program);
     let mut fly = Command::new(&program);
     companion.args(["companion", "--id", "1"]).arg(&scenario);
@@ -147,7 +149,8 @@ fn fly_beside_a_process(vehicles: usize, options: &[&str]) {
         companion.args([listens, &format!("tcp-listen:127.0.0.1:{port}")]);
         fly.args([*option, &format!("tcp:127.0.0.1:{port}")]);
     }
-    let _companion = Guard(companion.stdout(Stdio::null()).spawn().expect("the companion starts"));
+    let _companion =
+        ChildGuard(companion.stdout(Stdio::null()).spawn().expect("the companion starts"));
     let listens = |port: &u16| TcpStream::connect(("127.0.0.1", *port)).is_ok();
     let began = Instant::now();
     while !ports.iter().all(listens) {

@@ -11,7 +11,9 @@ use std::process::{Command, Stdio};
 use std::time::Duration;
 
 use companion::config::parameters;
-use flockmate_tests::{Guard, autopilot, free_port, host_sim, python, shared_data, workspace};
+use flockmate_tests::{
+    ChildGuard, free_port, host_sim_path, python, shared_data, start_autopilot, workspace,
+};
 
 const TIME_LIMIT: Duration = Duration::from_secs(160);
 /// ArduCopter, whose estimator is ready sooner than the real one's.
@@ -26,7 +28,7 @@ fn run(python: &str, script: &str, arguments: &[&str]) {
         .stdout(Stdio::piped())
         .spawn()
         .unwrap_or_else(|why| panic!("{python} does not start: {why}"));
-    let mut child = Guard(child);
+    let mut child = ChildGuard(child);
     let output = BufReader::new(child.0.stdout.take().expect("stdout is piped"));
     let reader =
         std::thread::spawn(move || output.lines().map_while(Result::ok).collect::<Vec<_>>());
@@ -42,7 +44,7 @@ fn run(python: &str, script: &str, arguments: &[&str]) {
 /// Runs a pymavlink script against an autopilot that listens.
 fn pymavlink(script: &str, scheme: &str, listen: &str, options: &[&str]) {
     let Some(python) = python() else { return };
-    let (_autopilot, addresses) = autopilot(&[listen], options);
+    let (_autopilot, addresses) = start_autopilot(&[listen], options);
     run(&python, script, &[&format!("{scheme}:{}", addresses[0])]);
 }
 
@@ -50,7 +52,7 @@ fn pymavlink(script: &str, scheme: &str, listen: &str, options: &[&str]) {
 fn mavsdk(script: &str, arguments: &[&str], options: &[&str]) {
     let Some(python) = python() else { return };
     let address = format!("127.0.0.1:{}", free_port());
-    let _autopilot = autopilot(&[&format!("udp:{address}")], options);
+    let _autopilot = start_autopilot(&[&format!("udp:{address}")], options);
     run(&python, script, &[&[format!("udpin://{address}").as_str()], arguments].concat());
 }
 
@@ -109,7 +111,7 @@ fn survey(autopilot: &str, vehicles: usize, camera: &str, out: &Path) -> Option<
     }
     let file = out.join("survey.toml");
     std::fs::write(&file, scenario).expect("a scenario");
-    let cover = Command::new(host_sim()).arg("cover").arg(file).arg("--out").arg(out).status();
+    let cover = Command::new(host_sim_path()).arg("cover").arg(file).arg("--out").arg(out).status();
     assert!(cover.expect("host-sim starts").success(), "it is planned and covers everything");
     Some(())
 }
@@ -124,7 +126,7 @@ fn vehicle_flies(python: &str, out: &Path, vehicle: usize, autopilot_kind: &str,
         options.extend(ARDUPILOT);
     }
     let (_autopilot, at) =
-        autopilot(&[&format!("udp:{address}"), "udp-listen:127.0.0.1:0"], &options);
+        start_autopilot(&[&format!("udp:{address}"), "udp-listen:127.0.0.1:0"], &options);
     let urls = [format!("udpin://{address}"), format!("udpout:{}", at[1])];
     let folder = out.display().to_string();
     run(python, "plan_flight.py", &[&urls[0], &urls[1], &folder, &id, autopilot_kind, trigger]);
@@ -164,7 +166,7 @@ fn mavsdk_has_the_simulated_ardupilot_fly_survey_plans() {
 /// A companion of the lobby's first vehicle, for the autopilot that sends to a port, and the two
 /// files that may be uploaded to it.
 struct Onboard {
-    _companion: Guard,
+    _companion: ChildGuard,
     files: tempfile::TempDir,
 }
 
@@ -179,7 +181,7 @@ impl Onboard {
         assert!(text.contains("245"));
         let lobby = files.path().join("lobby.toml");
         std::fs::write(&lobby, text).expect("a scenario");
-        let program = host_sim();
+        let program = host_sim_path();
         let plan =
             Command::new(&program).arg("plan").arg(&lobby).arg("--out").arg(files.path()).status();
         assert!(plan.expect("host-sim starts").success());
@@ -196,7 +198,7 @@ impl Onboard {
             .arg(lobby)
             .spawn()
             .expect("host-sim starts");
-        Self { _companion: Guard(companion), files }
+        Self { _companion: ChildGuard(companion), files }
     }
 
     fn file(&self, name: &str) -> String {
@@ -208,7 +210,7 @@ impl Onboard {
 fn onboard(script: &str, listen: &str, options: &[&str], address: impl Fn(&str) -> String) {
     let Some(python) = python() else { return };
     let port = free_port();
-    let (_autopilot, at) = autopilot(&[listen, &format!("udp:127.0.0.1:{port}")], &[]);
+    let (_autopilot, at) = start_autopilot(&[listen, &format!("udp:127.0.0.1:{port}")], &[]);
     let companion = Onboard::new(port);
     let (address, roadmap, mission) =
         (address(&at[0]), companion.file("roadmap.bin"), companion.file("mission.bin"));
@@ -244,13 +246,13 @@ fn pymavlink_watches_the_swarm_and_talks_to_each_vehicle() {
     let Some(python) = python() else { return };
     let out = tempfile::tempdir().expect("a directory");
     let address = format!("udp:127.0.0.1:{}", free_port());
-    let fly = Command::new(host_sim())
+    let fly = Command::new(host_sim_path())
         .arg("fly")
         .arg(workspace().join("host-sim/scenarios/demo.toml"))
         .args(["--qgc", &address, "--out"])
         .arg(out.path())
         .spawn()
         .expect("host-sim starts");
-    let _fly = Guard(fly);
+    let _fly = ChildGuard(fly);
     run(&python, "ground_station.py", &[&address.replace("udp:", "udpin:")]);
 }

@@ -40,7 +40,7 @@ fn random_areas_are_covered() {
             Err(error) if error.contains("no-fly zone") => return Ok(false),
             Err(error) => return Err(format!("seed {seed}: {error}\n{text}")),
         };
-        if findings.is_clean() && findings.cells > 0 {
+        if findings.is_clean() && findings.cells_to_cover > 0 {
             Ok(true)
         } else {
             Err(format!(
@@ -107,8 +107,11 @@ fn powell_is_no_worse_than_binpat_and_exact_is_the_best() {
     println!("{costs:?}");
     assert!(costs.areas as u64 > count / 2, "{}", costs.areas);
     assert_eq!(costs.powell_over_binpat, 0, "POWELL is worse than BINPAT");
-    assert_eq!(costs.below_exact, 0, "`exact` is not the best");
-    assert!(costs.powell_over_simple * 20 <= costs.areas && costs.gaps[2] <= 8.0, "{costs:?}");
+    assert_eq!(costs.plans_below_exact, 0, "`exact` is not the best");
+    assert!(
+        costs.powell_over_simple * 20 <= costs.areas && costs.median_gaps_percent[2] <= 8.0,
+        "{costs:?}"
+    );
 }
 
 /// `[area]` for a real file: one picture shows about 15 by 10 lanes' units.
@@ -152,7 +155,7 @@ fn real_areas_are_covered() {
                 method.name(),
                 planned.tracks.lanes().len(),
                 found.photos,
-                found.cells,
+                found.cells_to_cover,
                 planned.plan.max_cost_s(),
                 planned.lower_bound_s
             );
@@ -279,7 +282,7 @@ fn bad_areas_are_refused_by_name_or_covered() {
         };
         match found {
             Ok(found) if why.is_empty() => {
-                let judged = found.cells > 0 && found.is_clean();
+                let judged = found.cells_to_cover > 0 && found.is_clean();
                 assert!(
                     judged,
                     "{shown}: {:?}",
@@ -307,8 +310,9 @@ fn what_cannot_be_flown_is_refused_by_name() {
         let scenario = scenario::parse(&text, "asked").map_err(|error| error.to_string())?;
         let planned = CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)
             .map_err(|error| error.to_string())?;
-        let longest_s = planned.sorties.iter().map(|sortie| sortie.flown_s).fold(0.0, f32::max);
-        let costs_s = planned.max_sorties_cost_s();
+        let longest_s =
+            planned.sorties.iter().map(|sortie| sortie.flight_duration_s).fold(0.0, f32::max);
+        let costs_s = planned.max_sorties_and_swaps_cost_s();
         drop(planned);
         PreparedMission::prepare(scenario, &Progress::hidden())
             .map_err(|error| format!("flown: {error}"))?;

@@ -4,7 +4,7 @@
 //! `FLOCKMATE_ALONE=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_ALONE_FROM=SEED` from
 //! another seed on.
 
-use flockmate_tests::owners::{self, Flown};
+use flockmate_tests::owners::{self, FlownMission};
 use flockmate_tests::{areas, assert_no_seed_is_wrong, covered};
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
@@ -43,13 +43,15 @@ fn the_last_vehicle_photographs_all_that_is_left() {
             println!("{text}");
         }
         let lost: Vec<u8> = (2..=2 + (seed % 2) as u8).collect();
-        let Flown { result, log, owned } = owners::fly(&text, &lost).ok()?;
+        let FlownMission { result, log, ownership_faults: owned } =
+            owners::fly(&text, &lost).ok()?;
         let (safety, coverage) = (result.safety, result.coverage.expect("it has an area"));
         let last = result.vehicles.iter().find(|vehicle| vehicle.id == 1).expect("it has one");
         // A vehicle without a part, or kept on its pad by one that fell beside it, takes over no
         // part; nor does one that has landed with all of its own part flown.
         let flies = last.flown_m > 20.0;
-        let landed = last.end == "Done" && covered::others_until_s(&log, 0) < struck_s + NOTICED_S;
+        let landed =
+            last.end == "Done" && covered::last_other_ended_s(&log, 0) < struck_s + NOTICED_S;
         let broken = safety.violations + safety.wall_contacts + safety.deadlocks > 0;
         let whole = coverage.covered_share >= 1.0;
         let wrong = broken || !owned.is_empty() || (flies && !landed && !whole);
@@ -57,7 +59,7 @@ fn the_last_vehicle_photographs_all_that_is_left() {
             println!(
                 "seed {seed}: {:.2} %, left {}, {safety:?}, {owned:?}\n{log}",
                 100.0 * coverage.covered_share,
-                coverage.left
+                coverage.missed_waypoints
             );
         }
         Some(wrong)

@@ -4,7 +4,7 @@
 //! `FLOCKMATE_BESIDE=N` looks for such vehicles in N missions in place of [`MISSIONS`],
 //! `FLOCKMATE_BESIDE_FROM=SEED` from another seed on.
 
-use flockmate_tests::{areas, covered, number};
+use flockmate_tests::{areas, covered, number_from_env};
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -68,7 +68,7 @@ fn struck(seed: u64) -> (bool, Option<String>) {
     let Ok((_, log)) = covered::fly_text(&text) else { return (false, None) };
     let Some((from_s, vehicle)) = flies_around(&log) else { return (false, None) };
     let kind = STRIKES[random.next_u32() as usize % STRIKES.len()];
-    text += &fault(kind, from_s + 0.1 + 30.0 * areas::unit(&mut random) as f32, vehicle);
+    text += &fault(kind, from_s + 0.1 + 30.0 * areas::unit_random(&mut random) as f32, vehicle);
     let (result, log) = covered::fly_text(&text).expect("it was flown before");
     let safety = &result.safety;
     let touches = (safety.wall_contacts, safety.violations, safety.deadlocks) != (0, 0, 0);
@@ -86,7 +86,10 @@ fn struck(seed: u64) -> (bool, Option<String>) {
 
 #[test]
 fn a_vehicle_struck_on_its_detour_touches_nothing() {
-    let (from, count) = (number("FLOCKMATE_BESIDE_FROM", 0), number("FLOCKMATE_BESIDE", MISSIONS));
+    let (from, count) = (
+        number_from_env("FLOCKMATE_BESIDE_FROM", 0),
+        number_from_env("FLOCKMATE_BESIDE", MISSIONS),
+    );
     let all: Vec<_> = (from..from + count).into_par_iter().map(struck).collect();
     let around = all.iter().filter(|(around, _)| *around).count();
     let wrong: Vec<_> = all.iter().filter_map(|(_, wrong)| wrong.as_ref()).collect();
@@ -178,7 +181,8 @@ fn met_fast(seed: u64) -> Result<[usize; 2], String> {
 /// `FLOCKMATE_FAST=N` flies N missions, `FLOCKMATE_FAST_FROM=SEED` from another seed on.
 #[test]
 fn a_fast_vehicle_flies_around_one_that_hovers() {
-    let (from, count) = (number("FLOCKMATE_FAST_FROM", 82), number("FLOCKMATE_FAST", 1));
+    let (from, count) =
+        (number_from_env("FLOCKMATE_FAST_FROM", 82), number_from_env("FLOCKMATE_FAST", 1));
     let all: Vec<_> = (from..from + count).into_par_iter().map(met_fast).collect();
     let wrong: Vec<_> = all.iter().filter_map(|met| met.as_ref().err()).collect();
     let sum = |k: usize| all.iter().flatten().map(|met| met[k]).sum::<usize>();

@@ -5,7 +5,7 @@
 
 use companion::swarm::fleet::VehicleDivisionInput;
 use flockmate_tests::areas::Shape;
-use flockmate_tests::{areas, number};
+use flockmate_tests::{areas, number_from_env};
 use host_sim::capacity::WAYPOINTS;
 use host_sim::coverage::CoveragePlan;
 use host_sim::mission::PreparedMission;
@@ -115,7 +115,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
         }
         [divided, 0]
     };
-    let count = number("FLOCKMATE_DIVIDED", 40);
+    let count = number_from_env("FLOCKMATE_DIVIDED", 40);
     let all: Vec<[usize; 2]> = (0..count).into_par_iter().map(one).collect();
     let [divided, blocked] = [0, 1].map(|k| all.iter().map(|n| n[k]).sum::<usize>());
     println!("{divided} divisions of {count} areas, in {blocked} vehicles cannot pass each other");
@@ -156,7 +156,7 @@ fn stretches_leave_nothing_out_and_give_nothing_twice() {
         assert_eq!(kept.len(), count, "seed {seed}");
         losses.len()
     };
-    let count = number("FLOCKMATE_DIVIDED", 40);
+    let count = number_from_env("FLOCKMATE_DIVIDED", 40);
     let divided: Vec<usize> = (0..count).into_par_iter().map(one).collect();
     let all: usize = divided.iter().sum();
     println!("{all} divisions of {count} areas, at most {:?}", divided.iter().max());

@@ -8,7 +8,9 @@ use host_sim::progress::Progress;
 use host_sim::scenario;
 use host_sim::scenario::coverage::CoverageMethod;
 use planner_core::coverage::Flat;
-use planner_core::coverage::pack::{RouteDirection, RoutePlan, TrackUnit, Vehicle, Work};
+use planner_core::coverage::pack::{
+    CoverageProblem, RouteDirection, RoutePlan, TrackUnit, Vehicle,
+};
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -90,7 +92,7 @@ impl Lengths {
             };
             places.iter().map(way).collect()
         };
-        let out_m = vehicles.iter().map(|vehicle| all_m(vehicle.place)).collect();
+        let out_m = vehicles.iter().map(|vehicle| all_m(vehicle.transit_start)).collect();
         let home_m = vehicles.iter().map(|vehicle| all_m(vehicle.home)).collect();
         let steps = places.windows(2).map(|pair| ways.shortest_m(&pair[0], &pair[1]));
         Self { out_m, home_m, steps_m: steps.collect(), bent }
@@ -101,7 +103,11 @@ impl Lengths {
 /// vehicles and layers, by brute force.
 fn brute_force(
     lengths: &Lengths,
-    work: &Work<'_, { host_sim::coverage::MAX_LANES }, { host_sim::coverage::MAX_NO_FLY_CORNERS }>,
+    work: &CoverageProblem<
+        '_,
+        { host_sim::coverage::MAX_LANES },
+        { host_sim::coverage::MAX_NO_FLY_CORNERS },
+    >,
     from: usize,
     vehicles: &[usize],
     layers: &[u8],
@@ -116,8 +122,8 @@ fn brute_force(
         for (j, &layer) in layers.iter().enumerate() {
             let vehicle = &work.vehicles[v];
             let (out_m, home_m) = (&lengths.out_m[v], &lengths.home_m[v]);
-            let top_m =
-                f64::from(heights.mission_m) + f64::from(layer) * f64::from(heights.layer_m);
+            let top_m = f64::from(heights.max_picture_height_m)
+                + f64::from(layer) * f64::from(heights.layer_spacing_m);
             let delay_s =
                 top_m / f64::from(vehicle.climb_mps) + top_m / f64::from(vehicle.descend_mps);
             let mut inside_m = 0.0;
@@ -178,7 +184,7 @@ fn tried(seed: u64, shape: Shape) -> Option<Tried> {
         return None;
     }
     let vehicles = vehicles(seed, &planned);
-    let work = Work {
+    let work = CoverageProblem {
         tracks: &planned.tracks,
         transit: &planned.transit,
         vehicles: &vehicles,

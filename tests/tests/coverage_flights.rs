@@ -3,9 +3,9 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use companion::margins::{self, TRACKING_M};
+use companion::margins::{self, CRUISE_TRACKING_ERROR_M};
 use flockmate_tests::areas::{self, Shape};
-use flockmate_tests::{covered, number};
+use flockmate_tests::{covered, number_from_env};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
@@ -41,14 +41,15 @@ fn large_random_areas_are_photographed_whole_in_stretches() {
 
 /// Flies random areas of `draw`; at least `stretched` of them must be flown in stretches.
 fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String, stretched: usize) {
-    let (from, count) = (number("FLOCKMATE_FLOWN_FROM", 0), number("FLOCKMATE_FLOWN", 16));
+    let (from, count) =
+        (number_from_env("FLOCKMATE_FLOWN_FROM", 0), number_from_env("FLOCKMATE_FLOWN", 16));
     let in_stretches = AtomicUsize::new(0);
     let outcome = |seed: u64| -> Result<Option<&str>, String> {
         let mut random = Pcg32::seed_from_u64(seed);
         let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
         let text = draw(&mut random, shape, [1, 3, 5][(seed % 3) as usize]);
         match covered::fly_text(&text) {
-            Ok((result, log)) => match covered::faults(&result) {
+            Ok((result, log)) => match covered::faults_text(&result) {
                 None => {
                     let divided = log.contains("Area divided again");
                     in_stretches.fetch_add(usize::from(divided), Ordering::Relaxed);
@@ -116,7 +117,7 @@ fn track([east_m, north_m]: [u32; 2], vehicles: usize, autopilot: &str, estimato
 #[test]
 fn the_papers_tracks_are_photographed_whole() {
     let mut cases = Vec::new();
-    for (name, sides) in &TRACKS[..number("FLOCKMATE_TRACKS", 1) as usize] {
+    for (name, sides) in &TRACKS[..number_from_env("FLOCKMATE_TRACKS", 1) as usize] {
         for vehicles in [3, 5] {
             for autopilot in ["px4", "ardupilot"] {
                 for estimator in ["rtk", "recorded"] {
@@ -136,11 +137,11 @@ fn the_papers_tracks_are_photographed_whole() {
                 result.totals.makespan_s,
                 coverage.photos,
                 100.0 * coverage.covered_share,
-                coverage.left,
-                coverage.twice,
+                coverage.missed_waypoints,
+                coverage.repeated_waypoints,
                 result.safety.min_separation_m.unwrap_or(f64::NAN),
             );
-            covered::faults(&result).map(|faults| format!("{case}: {faults}\n{log}"))
+            covered::faults_text(&result).map(|faults| format!("{case}: {faults}\n{log}"))
         };
     let wrong: Vec<String> = cases.par_iter().filter_map(one).collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n").chars().take(4000).collect::<String>());
@@ -156,12 +157,16 @@ fn without_a_trigger_a_mission_is_complete_once_it_is_flown() {
     let fly = |more: &str| covered::fly_text(&format!("{field}{more}")).expect("it is flown").0;
     let whole = fly("");
     let coverage = whole.coverage.as_ref().expect("it has an area");
-    let found = (coverage.trigger, coverage.photos, coverage.covered_share, coverage.left);
+    let found =
+        (coverage.trigger, coverage.photos, coverage.covered_share, coverage.missed_waypoints);
     assert_eq!((whole.complete, found), (true, ("none", 0, 1.0, 0)));
     let cut = fly("[[faults]]\nkind = \"kill\"\nat_s = 70.0\nvehicle = 1\n");
     let coverage = cut.coverage.as_ref().expect("it has an area");
     assert!(!cut.complete && coverage.photos == 0, "{coverage:?}");
-    assert!((0.1..0.9).contains(&coverage.covered_share) && coverage.left > 5, "{coverage:?}");
+    assert!(
+        (0.1..0.9).contains(&coverage.covered_share) && coverage.missed_waypoints > 5,
+        "{coverage:?}"
+    );
 }
 
 /// A vehicle that is paused and resumed photographs its part, whether on the pad, during its start
@@ -183,9 +188,9 @@ fn a_vehicle_paused_at_any_time_goes_on_when_it_is_resumed() {
              duration_s = {duration_s}\nvehicle = {vehicle}\n"
         );
         let (result, log) = covered::fly_text(&text).expect("it is flown");
-        covered::faults(&result).map(|faults| format!("seed {seed}: {faults}\n{log}{text}"))
+        covered::faults_text(&result).map(|faults| format!("seed {seed}: {faults}\n{log}{text}"))
     };
-    let count = number("FLOCKMATE_PAUSES", 40);
+    let count = number_from_env("FLOCKMATE_PAUSES", 40);
     let wrong: Vec<String> = (0..count).into_par_iter().filter_map(one).collect();
     assert!(
         wrong.is_empty(),
@@ -204,7 +209,7 @@ fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
         let mut between =
             |low: f32, high: f32| low + (high - low) * (random.next_u32() as f32 / u32::MAX as f32);
         let safety_m = between(0.8, 2.0);
-        let separation_m = safety_m + 2.0 * TRACKING_M + between(0.0, 8.0);
+        let separation_m = safety_m + 2.0 * CRUISE_TRACKING_ERROR_M + between(0.0, 8.0);
         let text = format!(
             "[area]\npolygon = [[0, 0], [90, 0], [90, 70]]\ncamera = {{ fov_deg = 73.7, aspect = 1.5 }}\nheight_m = 30.0\n\
              [mission]\ncruise_mps = 12.0\n[[vehicles]]\nid = 1\nstart = [0, -20, 0]\nspeed_max_mps = 15.0\n\
@@ -214,9 +219,13 @@ fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
         let mission = PreparedMission::prepare(scenario, &Progress::hidden()).expect("a mission");
         let radius_m = mission.scenario.vehicles[0].radius_m;
         let pace = |bound_m: f32| {
-            margins::speed_share_for_bound(bound_m, mission.tasks[0].required_clearance_m, radius_m)
+            margins::speed_share_for_error_bound(
+                bound_m,
+                mission.tasks[0].required_clearance_m,
+                radius_m,
+            )
         };
-        let room_m = (separation_m - safety_m) / 2.0 - TRACKING_M;
+        let room_m = (separation_m - safety_m) / 2.0 - CRUISE_TRACKING_ERROR_M;
         assert_eq!(pace(room_m - 0.01), 1.0, "{separation_m} m beyond {safety_m} m");
         assert!(pace(room_m + 0.01) < 1.0, "{separation_m} m beyond {safety_m} m");
     }
@@ -239,12 +248,12 @@ fn pictures_look_along_all_lanes_alike_or_the_way_that_is_flown() {
         let mut mission =
             PreparedMission::prepare(scenario, &Progress::hidden()).expect("a mission");
         let mut pictures = Vec::new();
-        covered::fly_on(&mut mission, &mut pictures).expect("a flight");
+        covered::fly_adding_pictures(&mut mission, &mut pictures).expect("a flight");
         // Pictures in the middle of lanes: the angle between the nose and the direction of flight.
         let off_deg = pictures.windows(3).filter_map(|three| {
             let way = three[2].position - three[0].position;
             let along_lane = way.y.abs() < 1.0 && (20.0..130.0).contains(&three[1].position.x);
-            let off = three[1].heading - way.y.atan2(way.x);
+            let off = three[1].yaw_enu_rad - way.y.atan2(way.x);
             along_lane.then(|| f64::from(off).sin().atan2(f64::from(off).cos()).to_degrees().abs())
         });
         let off_deg: Vec<f64> = off_deg.collect();
@@ -299,14 +308,14 @@ fn vehicles_land_on_pads_as_near_as_they_may_be() {
         }
         let apart_cm = accepted.ok_or("no pads are far enough apart")?;
         let (result, log) = covered::fly_text(&text)?;
-        match covered::faults(&result) {
+        match covered::faults_text(&result) {
             None => Ok(()),
             Some(faults) => {
                 Err(format!("seed {seed}, pads {apart_cm} cm apart: {faults}\n{log}{text}"))
             }
         }
     };
-    let count = number("FLOCKMATE_PADS", 16);
+    let count = number_from_env("FLOCKMATE_PADS", 16);
     let wrong: Vec<_> = (0..count).into_par_iter().filter_map(|seed| outcome(seed).err()).collect();
     println!("{count} flown, {} wrong", wrong.len());
     assert!(wrong.is_empty(), "{}", wrong.join("\n").chars().take(3000).collect::<String>());
@@ -327,7 +336,7 @@ fn pictures_are_refused_so_low_that_an_error_reaches_the_ground() {
                 .map(|mission| mission.scenario.vehicles[0].radius_m)
         };
         let radius_m = prepared(35.0).expect("a mission");
-        let least_m = lower_m + radius_m + TRACKING_M;
+        let least_m = lower_m + radius_m + CRUISE_TRACKING_ERROR_M;
         assert!(prepared(least_m + 0.01).is_ok(), "{estimator} {autopilot}");
         let error = prepared(least_m - 0.01).expect_err("too low");
         assert!(format!("{error:#}").contains("pictures too low"), "{error:#}");

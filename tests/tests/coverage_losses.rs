@@ -5,8 +5,8 @@
 //! from another seed on.
 
 use flockmate_tests::areas::Shape;
-use flockmate_tests::owners::{self, Flown};
-use flockmate_tests::{areas, covered, number};
+use flockmate_tests::owners::{self, FlownMission};
+use flockmate_tests::{areas, covered, number_from_env};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::result::{MissionResult, VehicleResult};
@@ -143,7 +143,7 @@ const NO_FLIGHT: [&str; 7] = [
     "no-fly zone",
 ];
 
-fn flown(text: &str, struck: &[u8]) -> Result<Flown, String> {
+fn flown(text: &str, struck: &[u8]) -> Result<FlownMission, String> {
     if std::env::var("FLOCKMATE_LOSSES").is_ok_and(|n| n == "1") {
         println!("{text}");
     }
@@ -161,12 +161,12 @@ fn flown_around(log: &str) -> u64 {
 fn left_unstruck(text: &str) -> u64 {
     let sound = text.split("[[faults]]").next().unwrap_or(text);
     let (result, _) = covered::fly_text(sound).expect("it was flown before");
-    result.coverage.expect("it has an area").left
+    result.coverage.expect("it has an area").missed_waypoints
 }
 
 fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     let (text, kind, struck, at_s) = drawn(draw, seed);
-    let Flown { result, log, owned } = match flown(&text, &struck) {
+    let FlownMission { result, log, ownership_faults: owned } = match flown(&text, &struck) {
         Ok(flown) => flown,
         Err(error) => {
             assert!(NO_FLIGHT.iter().any(|why| error.contains(why)), "seed {seed}: {error}");
@@ -186,13 +186,13 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
         (vehicles.iter().filter(fell_short).count(), coverage.covered_share >= 1.0);
     let rough = (draw.radio == Radio::Rough).then_some(GIVEN_AWAY).into_iter().flatten();
     // Once nothing is left to photograph, a vehicle may land where there is room.
-    let aside = whole.then_some(covered::LANDS_ASIDE);
+    let aside = whole.then_some(covered::LANDS_ASIDE_TEXT);
     let reasons: Vec<&str> =
         covered::EARLY_LANDING_TEXTS.into_iter().chain(rough).chain(aside).collect();
     // A vehicle stays on its pad if no vehicle flies any more that could take its part.
     let waits = |v: &VehicleResult| {
         v.end.starts_with("Scheduled")
-            && covered::others_until_s(&log, v.id) < f64::from(at_s) + START_BARRED_S
+            && covered::last_other_ended_s(&log, v.id) < f64::from(at_s) + START_BARRED_S
     };
     // All that were not struck have no part: such a vehicle does not take over.
     let had_none = |v: &VehicleResult| struck.contains(&v.id) || v.end.starts_with("no goal");
@@ -203,11 +203,11 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
         // If no vehicle landed short and the area is whole, a majority lived to the end.
         left_out: landed_short == 0
             && whole
-            && coverage.left > reported
-            && coverage.left > reported + left_unstruck(&text),
-        left: coverage.left,
+            && coverage.missed_waypoints > reported
+            && coverage.missed_waypoints > reported + left_unstruck(&text),
+        left: coverage.missed_waypoints,
         reported,
-        twice: coverage.twice,
+        twice: coverage.repeated_waypoints,
         owned,
         landed_short,
         broken: [safety.wall_contacts, safety.violations, safety.deadlocks]
@@ -265,7 +265,7 @@ fn a_vehicle_that_lands_keeps_off_where_another_may_have_fallen() {
             format!("{text}[[faults]]\nat_s = {at_s:.1}\nkind = \"kill\"\nvehicle = {fallen}\n");
         let scenario = scenario::parse(&struck, "area").ok()?;
         let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).ok()?;
-        let flight = covered::flight(&mut mission, &mut Vec::new()).ok()?;
+        let flight = covered::fly_with_record(&mut mission, &mut Vec::new()).ok()?;
         let vehicles = || flight.result.vehicles.iter().zip(&flight.tracks);
         let lies = |wanted: u8| {
             vehicles().find(|(v, _)| v.id == wanted).and_then(|(_, track)| track.last())
@@ -285,7 +285,8 @@ fn a_vehicle_that_lands_keeps_off_where_another_may_have_fallen() {
         }
         Some((seed, nearest_m, near || !all_down))
     };
-    let (from, count) = (number("FLOCKMATE_FALLEN_FROM", 0), number("FLOCKMATE_FALLEN", 20));
+    let (from, count) =
+        (number_from_env("FLOCKMATE_FALLEN_FROM", 0), number_from_env("FLOCKMATE_FALLEN", 20));
     let all: Vec<_> = (from..from + count).into_par_iter().filter_map(one).collect();
     let wrong: Vec<u64> =
         all.iter().filter(|(_, _, wrong)| *wrong).map(|(seed, ..)| *seed).collect();
@@ -330,7 +331,8 @@ fn a_vehicle_that_lands_keeps_off_all_that_an_unheard_one_may_still_fly() {
         }
         Some((seed, broken))
     };
-    let (from, count) = (number("FLOCKMATE_UNHEARD_FROM", 0), number("FLOCKMATE_UNHEARD", 40));
+    let (from, count) =
+        (number_from_env("FLOCKMATE_UNHEARD_FROM", 0), number_from_env("FLOCKMATE_UNHEARD", 40));
     let all: Vec<(u64, bool)> = (from..from + count).into_par_iter().filter_map(one).collect();
     let broken: Vec<u64> =
         all.iter().filter(|(_, broken)| *broken).map(|(seed, _)| *seed).collect();
@@ -371,7 +373,10 @@ const EVEN: Draw = Draw {
 const TWO: Draw = Draw { struck: 2, most_in_three: 2, ..EVEN };
 
 fn are_whole(draw: Draw) {
-    let (from, count) = (number("FLOCKMATE_LOSSES_FROM", 0), number("FLOCKMATE_LOSSES", MISSIONS));
+    let (from, count) = (
+        number_from_env("FLOCKMATE_LOSSES_FROM", 0),
+        number_from_env("FLOCKMATE_LOSSES", MISSIONS),
+    );
     // Twelve seeds have three vehicles, the next twelve have five; of few missions half have three.
     let skip = |k| if count == MISSIONS && k >= count / 2 { 12 - count / 2 } else { 0 };
     let one = |k| outcome(draw, from + k + skip(k));

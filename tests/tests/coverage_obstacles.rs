@@ -4,11 +4,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use flockmate_tests::areas::{self, Shape};
-use flockmate_tests::{covered, number};
+use flockmate_tests::{covered, number_from_env};
 use host_sim::coverage::CoveragePlan;
 use host_sim::coverage::check::check_plan;
 use host_sim::coverage::obstacles::MapObstacles;
-use host_sim::map::{Occupancy, OccupancyMap, Unknown, bt};
+use host_sim::map::{Occupancy, OccupancyMap, UnknownSpace, bt};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::scenario::coverage::CoverageMethod;
@@ -77,8 +77,8 @@ fn wrong(scenario: &Scenario, planned: &CoveragePlan<'_>, boxes: &[Block]) -> Op
     let area = scenario.area.as_ref().expect("an area");
     let obstacles = area.obstacles.as_ref().expect("a map");
     // Default clearance: 0.3 m and half of 2.4 m.
-    if (obstacles.clearance_m - 1.5).abs() > 1e-5 {
-        return Some(format!("the clearance is {} m", obstacles.clearance_m));
+    if (obstacles.required_clearance_m - 1.5).abs() > 1e-5 {
+        return Some(format!("the clearance is {} m", obstacles.required_clearance_m));
     }
     for (_, points, _) in planned.flights() {
         for leg in points.windows(2) {
@@ -97,11 +97,11 @@ fn wrong(scenario: &Scenario, planned: &CoveragePlan<'_>, boxes: &[Block]) -> Op
     if !findings.is_clean() {
         return Some(format!(
             "missing {:?}, {} in zones",
-            findings.first_missing_cell, findings.legs_in_no_fly_zones
+            findings.first_missing_cell_centre, findings.legs_in_no_fly_zones
         ));
     }
     // What is not photographed must be little more than what no vehicle may fly over.
-    let low_m = f64::from(area.heights.mission_m) - 1.5 - 0.02;
+    let low_m = f64::from(area.heights.max_picture_height_m) - 1.5 - 0.02;
     let tall: Vec<_> = boxes.iter().filter(|block| block[1][2] > low_m).collect();
     let own = scenario.text.lines().find(|line| line.starts_with("no_fly"));
     let own = own.map_or(0, |line| line.matches("[[").count().saturating_sub(1));
@@ -137,7 +137,8 @@ fn plans_keep_clear_of_all_that_a_map_holds_at_their_height() {
         let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
         let text = areas::scenario(&mut random, shape, 1 + (seed % 4) as usize);
         let Ok(plain) = scenario::parse(&text, "random") else { return Ok(None) };
-        let height_m = plain.area.as_ref().map_or(0.0, |area| f64::from(area.heights.mission_m));
+        let height_m =
+            plain.area.as_ref().map_or(0.0, |area| f64::from(area.heights.max_picture_height_m));
         let cell_m = [0.5, 1.0, 2.0][(seed % 3) as usize];
         let boxes = random_boxes(&mut random, cell_m, height_m);
         let path = folder.path().join(format!("{seed}.bt"));
@@ -166,7 +167,7 @@ fn plans_keep_clear_of_all_that_a_map_holds_at_their_height() {
             }
         }
     };
-    let count = number("FLOCKMATE_OBSTACLES", 100);
+    let count = number_from_env("FLOCKMATE_OBSTACLES", 100);
     let all: Vec<_> = (0..count).into_par_iter().map(one).collect();
     let wrong: Vec<_> = all.iter().filter_map(|outcome| outcome.as_ref().err()).collect();
     let of = |what: bool| all.iter().filter(|all| **all == Ok(Some(what))).count() as u64;
@@ -202,8 +203,8 @@ fn an_area_with_towers_is_photographed_without_contact() {
         let scenario = scenario::parse(&text, "area").expect("a scenario");
         PreparedMission::prepare(scenario, &Progress::hidden()).expect("a mission")
     };
-    let flight = covered::flight(&mut prepared(), &mut Vec::new()).expect("it is flown");
-    if let Some(faults) = covered::faults(&flight.result) {
+    let flight = covered::fly_with_record(&mut prepared(), &mut Vec::new()).expect("it is flown");
+    if let Some(faults) = covered::faults_text(&flight.result) {
         panic!("{faults}\n{}", covered::log_lines(&flight.log));
     }
     let places = flight.tracks.iter().flatten().map(|(_, place)| place.cast::<f64>());
@@ -218,7 +219,7 @@ fn an_area_with_towers_is_photographed_without_contact() {
     let mut mission = prepared();
     let mast = [[60.0, 0.0, 0.0], [61.0, 60.0, 45.0]];
     let map = map_of(&[&BLOCKS[..], &[mast]].concat(), 0.5);
-    let obstacles = MapObstacles::new(&map, Unknown::Free, 1.5);
+    let obstacles = MapObstacles::new(&map, UnknownSpace::Free, 1.5);
     mission.scenario.area.as_mut().expect("an area").obstacles = Some(Arc::new(obstacles));
     let (result, _) = covered::fly(&mut mission).expect("it is flown");
     assert!(result.safety.wall_contacts > 0);

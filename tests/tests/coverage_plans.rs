@@ -85,16 +85,16 @@ impl Client {
         self.send(44, &[low, high, 1, 1, 0]);
         for (k, item) in items.iter().enumerate() {
             let mut payload = [0; 37];
-            for (at, param) in item.params.iter().enumerate() {
+            for (at, param) in item.params_1_to_4.iter().enumerate() {
                 let value = param.map_or(f32::NAN, |value| value as f32);
                 payload[4 * at..4 * at + 4].copy_from_slice(&value.to_le_bytes());
             }
             let scale = if item.frame == 2 { 1.0 } else { 1e7 };
-            for (at, value) in [(16, item.place[0]), (20, item.place[1])] {
+            for (at, value) in [(16, item.params_5_to_7[0]), (20, item.params_5_to_7[1])] {
                 payload[at..at + 4]
                     .copy_from_slice(&((value * scale).round() as i32).to_le_bytes());
             }
-            payload[24..28].copy_from_slice(&(item.place[2] as f32).to_le_bytes());
+            payload[24..28].copy_from_slice(&(item.params_5_to_7[2] as f32).to_le_bytes());
             payload[28..30].copy_from_slice(&(k as u16).to_le_bytes());
             payload[30..32].copy_from_slice(&item.command.to_le_bytes());
             payload[32..37].copy_from_slice(&[1, 1, item.frame, 0, 1]);
@@ -147,7 +147,12 @@ fn fly(
     if autopilot == SimulatedKind::Ardupilot {
         items.insert(
             0,
-            ExportedItem { command: 16, frame: 0, params: [Some(0.0); 4], place: [0.0; 3] },
+            ExportedItem {
+                command: 16,
+                frame: 0,
+                params_1_to_4: [Some(0.0); 4],
+                params_5_to_7: [0.0; 3],
+            },
         );
     }
     client.upload(&items);
@@ -335,13 +340,13 @@ fn plans_flown_without_a_companion_photograph_the_whole_area() {
                         vehicle: None,
                         t_s: photo.time_us as f32 * 1e-6,
                         position: photo.position,
-                        heading: FRAC_PI_2 - photo.heading_rad,
+                        yaw_enu_rad: FRAC_PI_2 - photo.heading_rad,
                     }
                 }));
             }
             let found = check::check_pictures(&planned, pictures);
             assert_eq!(
-                (found.covered_share, found.first_missing_cell),
+                (found.covered_share, found.first_missing_cell_centre),
                 (1.0, None),
                 "{autopilot:?}, {trigger}"
             );

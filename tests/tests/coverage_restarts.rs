@@ -7,8 +7,8 @@
 
 use std::fmt::Write as _;
 
-use flockmate_tests::areas::SMALL_FIELD;
-use flockmate_tests::{covered, number};
+use flockmate_tests::areas::SMALL_FIELD_SCENARIO;
+use flockmate_tests::{covered, number_from_env};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
@@ -35,7 +35,7 @@ fn fault(lines: &mut String, kind: &str, vehicle: u32, at_s: u32) {
 /// divide what is left; once all are down, some are restarted together.
 fn restarted(seed: u64) -> String {
     let mut random = Pcg32::seed_from_u64(seed);
-    let mut text = SMALL_FIELD.replace("id =", "endurance_s = 4000.0\nid =");
+    let mut text = SMALL_FIELD_SCENARIO.replace("id =", "endurance_s = 4000.0\nid =");
     let together = random.next_u32().is_multiple_of(2);
     let mut at_s = 30 + random.next_u32() % 60;
     for vehicle in 1..=3 {
@@ -53,16 +53,18 @@ fn restarted(seed: u64) -> String {
 fn wrong(seed: u64, text: &str) -> Option<String> {
     let (result, log) = fly(text);
     let coverage = result.coverage.expect("it has an area");
-    let whole = coverage.covered_share >= 1.0 && coverage.left == 0;
+    let whole = coverage.covered_share >= 1.0 && coverage.missed_waypoints == 0;
     let safe = result.safety.violations == 0;
     let fine = whole && safe && !log.contains(START_CANCELLED);
-    let said = || format!("seed {seed}: {} left\n{text}\n{log}", coverage.left);
+    let said = || format!("seed {seed}: {} left\n{text}\n{log}", coverage.missed_waypoints);
     (!fine).then(said)
 }
 
 fn none_is_wrong(drawn: impl Fn(u64) -> String + Sync) {
-    let (from, count) =
-        (number("FLOCKMATE_RESTARTED_FROM", 0), number("FLOCKMATE_RESTARTED", MISSIONS));
+    let (from, count) = (
+        number_from_env("FLOCKMATE_RESTARTED_FROM", 0),
+        number_from_env("FLOCKMATE_RESTARTED", MISSIONS),
+    );
     let all: Vec<String> =
         (from..from + count).into_par_iter().filter_map(|seed| wrong(seed, &drawn(seed))).collect();
     all.iter().take(2).for_each(|said| println!("{said}"));
@@ -81,7 +83,7 @@ fn what_landed_vehicles_report_of_their_flight_does_not_count_in_the_next() {
 fn a_vehicle_that_comes_up_late_flies_its_part() {
     none_is_wrong(|seed| {
         let mut random = Pcg32::seed_from_u64(seed);
-        let low = SMALL_FIELD.replace("height_m = 25.0", "height_m = 15.0");
+        let low = SMALL_FIELD_SCENARIO.replace("height_m = 25.0", "height_m = 15.0");
         let mut text = low.replace("id =", "descend_mps = 5.0\nid =");
         let (vehicle, late_s) = (1 + random.next_u32() % 3, 72 + random.next_u32() % 10);
         for (kind, until_s) in [("gps-loss", late_s + 2), ("radio-cut", late_s)] {
@@ -98,7 +100,7 @@ fn a_vehicle_that_comes_up_late_flies_its_part() {
 fn any_number_of_restarts_on_the_ground_keeps_nobody_from_dividing() {
     none_is_wrong(|seed| {
         let mut random = Pcg32::seed_from_u64(seed);
-        let mut text = SMALL_FIELD.replace("id =", "endurance_s = 4000.0\nid =");
+        let mut text = SMALL_FIELD_SCENARIO.replace("id =", "endurance_s = 4000.0\nid =");
         let (lands, again) = (1 + random.next_u32() % 3, random.next_u32() % 3);
         let other = 1 + (lands + again % 2) % 3;
         fault(&mut text, "land-order", lands, 50);

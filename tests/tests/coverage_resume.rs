@@ -12,9 +12,9 @@ use std::path::Path;
 use std::process::Command;
 
 use companion::config::parameters::Parameters;
-use companion::storage::store::{ErasePermission, MAX_READ, Store};
-use flockmate_tests::areas::{self, SMALL_FIELD};
-use flockmate_tests::{covered, host_sim, number};
+use companion::storage::store::{ErasePermission, MAX_READ_LEN, Store};
+use flockmate_tests::areas::{self, SMALL_FIELD_SCENARIO};
+use flockmate_tests::{covered, host_sim_path, number_from_env};
 use host_sim::coverage::check::Picture;
 use host_sim::flash::{HOST_FLASH_LAYOUT, HostFlash};
 use host_sim::mission::PreparedMission;
@@ -74,7 +74,7 @@ fn fly(
         vehicle.companion = CompanionHost::InProcess { flash };
     }
     let mut mission = PreparedMission::prepare(scenario, &Progress::hidden()).map_err(said)?;
-    let (result, log) = covered::fly_on(&mut mission, pictures).map_err(said)?;
+    let (result, log) = covered::fly_adding_pictures(&mut mission, pictures).map_err(said)?;
     Ok((result, covered::log_lines(&log)))
 }
 
@@ -114,7 +114,7 @@ fn outcome(seed: u64) -> Option<Outcome> {
         // In a start without faults all come home.
         let home = |end: &str| end == "Done" || end.starts_with("no goal");
         outcome.broken |= start >= faults.len() && !result.vehicles.iter().all(|v| home(&v.end));
-        outcome.twice = coverage.twice;
+        outcome.twice = coverage.repeated_waypoints;
         let _ = writeln!(
             said,
             "start {start}: {:.2} % {:?}\n{log}",
@@ -132,8 +132,10 @@ fn outcome(seed: u64) -> Option<Outcome> {
 
 #[test]
 fn what_an_interrupted_mission_left_is_photographed_after_the_next_start() {
-    let (from, count) =
-        (number("FLOCKMATE_RESUMED_FROM", 0), number("FLOCKMATE_RESUMED", MISSIONS));
+    let (from, count) = (
+        number_from_env("FLOCKMATE_RESUMED_FROM", 0),
+        number_from_env("FLOCKMATE_RESUMED", MISSIONS),
+    );
     let all: Vec<Outcome> = (from..from + count).into_par_iter().filter_map(outcome).collect();
     let wrong = |o: &&Outcome| o.broken || o.starts.is_none();
     for o in all.iter().filter(wrong) {
@@ -159,7 +161,7 @@ fn set_parameter(dir: &Path, name: &str, value: f32) {
         let mut store = Store::mount(HOST_FLASH_LAYOUT, &mut flash);
         let index = Parameters::index_of(name.as_bytes()).expect("a parameter");
         store.set_parameter(index, value).expect("in range");
-        let mut read = [0; MAX_READ];
+        let mut read = [0; MAX_READ_LEN];
         while let Some(request) = store.poll_request(ErasePermission::Allowed) {
             let outcome = flash.execute_request(request, &mut read);
             store.handle_flash_outcome(outcome);
@@ -175,20 +177,20 @@ fn flk_resume_0_photographs_the_whole_area_again() {
         let low = |vehicle| {
             format!("[[faults]]\nkind = \"battery-low\"\nvehicle = {vehicle}\nat_s = 90.0\n")
         };
-        let struck = format!("{SMALL_FIELD}{}{}{}", low(1), low(2), low(3));
+        let struck = format!("{SMALL_FIELD_SCENARIO}{}{}{}", low(1), low(2), low(3));
         let (mut first, mut second) = (Vec::new(), Vec::new());
         fly(&struck, dir.path(), &mut first).expect("it flies");
         set_parameter(dir.path(), "FLK_RESUME", resume);
-        let (result, log) = fly(SMALL_FIELD, dir.path(), &mut second).expect("it flies");
+        let (result, log) = fly(SMALL_FIELD_SCENARIO, dir.path(), &mut second).expect("it flies");
         let coverage = result.coverage.expect("it has an area");
         assert!(first.len() > 20, "{} pictures before the batteries were low", first.len());
         (coverage, second.len() as u64, log)
     };
     let (whole, pictures, log) = flown(0.0);
-    assert!(whole.covered_share >= 1.0 && whole.left == 0, "{whole:?}\n{log}");
-    assert!(pictures >= u64::from(whole.waypoints), "{pictures} pictures: {whole:?}");
+    assert!(whole.covered_share >= 1.0 && whole.missed_waypoints == 0, "{whole:?}\n{log}");
+    assert!(pictures >= u64::from(whole.waypoint_count), "{pictures} pictures: {whole:?}");
     let (rest, fewer, _) = flown(1.0);
-    assert!(rest.left > 20 && fewer + 20 < pictures, "{fewer} pictures: {rest:?}");
+    assert!(rest.missed_waypoints > 20 && fewer + 20 < pictures, "{fewer} pictures: {rest:?}");
 }
 
 /// A pilot takes a vehicle, which hovers, and others fly around it. Returns whether they left
@@ -206,7 +208,7 @@ fn around(seed: u64) -> (bool, Option<String>) {
     let dir = tempfile::tempdir().expect("a directory");
     let mut pictures = Vec::new();
     let Ok((result, log)) = fly(&struck, dir.path(), &mut pictures) else { return (false, None) };
-    let left = result.coverage.expect("it has an area").left;
+    let left = result.coverage.expect("it has an area").missed_waypoints;
     let around =
         |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<usize>().ok();
     let reported: usize = log.lines().filter_map(around).sum();
@@ -218,13 +220,13 @@ fn around(seed: u64) -> (bool, Option<String>) {
     let (coverage, second) = (result.coverage.expect("it has an area"), pictures.len() - first);
     // A new start of an area that counts as whole would fly all of it.
     let wrong = coverage.covered_share < 1.0
-        || coverage.left > 0
+        || coverage.missed_waypoints > 0
         || second < reported
         || 2 * second > first;
     let said = || {
         let after = format!(
             "{left} left, then {} of {:.2} %",
-            coverage.left,
+            coverage.missed_waypoints,
             100.0 * coverage.covered_share
         );
         format!(
@@ -237,7 +239,8 @@ fn around(seed: u64) -> (bool, Option<String>) {
 
 #[test]
 fn what_was_flown_around_is_photographed_after_the_next_start() {
-    let (from, count) = (number("FLOCKMATE_RESUMED_FROM", 0), number("FLOCKMATE_AROUND", 12));
+    let (from, count) =
+        (number_from_env("FLOCKMATE_RESUMED_FROM", 0), number_from_env("FLOCKMATE_AROUND", 12));
     let all: Vec<_> = (from..from + count).into_par_iter().map(around).collect();
     let left = all.iter().filter(|(left, _)| *left).count();
     let wrong: Vec<_> = all.iter().filter_map(|(_, wrong)| wrong.as_ref()).collect();
@@ -250,13 +253,13 @@ fn what_was_flown_around_is_photographed_after_the_next_start() {
 /// area that was whole before is still judged whole.
 #[test]
 fn an_area_that_was_whole_is_judged_whole_at_the_next_start() {
-    let program = host_sim();
+    let program = host_sim_path();
     let flown = |at_s: u64| -> Result<usize, String> {
         let dir = tempfile::tempdir().expect("a directory");
         let at = |name: &str| dir.path().join(name);
         let fault = format!("[[faults]]\nkind = \"battery-low\"\nvehicle = 1\nat_s = {at_s}.0\n");
-        fs::write(at("struck.toml"), format!("{SMALL_FIELD}{fault}")).expect("a file");
-        fs::write(at("sound.toml"), SMALL_FIELD).expect("a file");
+        fs::write(at("struck.toml"), format!("{SMALL_FIELD_SCENARIO}{fault}")).expect("a file");
+        fs::write(at("sound.toml"), SMALL_FIELD_SCENARIO).expect("a file");
         let mut whole = Vec::new();
         for name in ["struck.toml", "sound.toml", "sound.toml", "sound.toml"] {
             let done = Command::new(&program)
@@ -301,7 +304,7 @@ fn cut_short(seed: u64) -> (String, Vec<String>) {
     let mut random = Pcg32::seed_from_u64(seed);
     let autopilot = ["px4", "ardupilot"][(seed % 2) as usize];
     let place = format!("personality = \"{autopilot}\"\nstart");
-    let mut text = SMALL_FIELD.replace("start", &place);
+    let mut text = SMALL_FIELD_SCENARIO.replace("start", &place);
     if seed > 0 {
         let cruise = areas::between(&mut random, 3.0, 5.0);
         text = text.replace("cruise_mps = 5.0", &format!("cruise_mps = {cruise:.1}"));
@@ -337,11 +340,12 @@ fn seam(seed: u64) -> Result<usize, String> {
             fly(&format!("{text}{fault}"), dir.path(), &mut pictures).expect("it flies");
         let coverage = result.coverage.expect("it has an area");
         let _ = writeln!(said, "{fault}{coverage:?}\n{log}");
-        let (left, waypoints) = (coverage.left, u64::from(coverage.waypoints));
+        let (left, waypoints) = (coverage.missed_waypoints, u64::from(coverage.waypoint_count));
         // For each flight that is cut short, a few waypoints of each of the three vehicles are
         // flown again.
         let again = 3 * 4 * cut as u64;
-        let right = coverage.twice <= again && pictures.len() as u64 <= waypoints + 2 * again;
+        let right =
+            coverage.repeated_waypoints <= again && pictures.len() as u64 <= waypoints + 2 * again;
         let forty =
             seed > 0 || cut > 0 || (35..=45).contains(&(100 * (waypoints - left) / waypoints));
         match (coverage.covered_share >= 1.0 && left == 0, right && forty) {
@@ -357,7 +361,8 @@ fn seam(seed: u64) -> Result<usize, String> {
 /// last flight that was cut short flies all of the rest.
 #[test]
 fn what_low_batteries_left_is_flown_by_the_next_start_and_nothing_is_left_at_the_seam() {
-    let (from, count) = (number("FLOCKMATE_SEAMS_FROM", 0), number("FLOCKMATE_SEAMS", 12));
+    let (from, count) =
+        (number_from_env("FLOCKMATE_SEAMS_FROM", 0), number_from_env("FLOCKMATE_SEAMS", 12));
     let all: Vec<_> = (from..from + count).into_par_iter().map(seam).collect();
     let wrong: Vec<_> = all.iter().filter_map(|outcome| outcome.as_ref().err()).collect();
     wrong.iter().for_each(|wrong| println!("{wrong}"));

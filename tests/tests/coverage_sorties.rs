@@ -30,31 +30,42 @@ fn flown_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
         .last()
         .copied()
         .expect("a flight has points");
-    let (speed, accel) = (planned.vehicles[usize::from(route.vehicle)].cruise_mps, 1.5f32);
+    let (speed, accel) = (planned.vehicles[usize::from(route.vehicle_index)].cruise_mps, 1.5f32);
     // Time lost by stops at both ends of a leg, seconds.
     let lost_s = |leg_m: f32| match leg_m < speed * speed / accel {
         true => 2.0 * (leg_m / accel).sqrt() - leg_m / speed,
         false => speed / accel,
     };
     let count = lanes(planned, route).len();
-    let steps_s = (1..count).map(|_| lost_s(planned.area_settings.spacing.lane_m)).sum::<f32>();
+    let steps_s =
+        (1..count).map(|_| lost_s(planned.area_settings.spacing.max_lane_spacing_m)).sum::<f32>();
     steady_s + (count + 2) as f32 * lost_s(f32::INFINITY) + steps_s
 }
 
 /// A route's lanes in path order, each cut to the waypoints that belong to the route.
 fn lanes(planned: &CoveragePlan<'_>, route: &Route) -> Vec<Route> {
-    let numbers: Vec<u32> = (route.first..route.end).collect();
+    let numbers: Vec<u32> = (route.lowest_waypoint..route.waypoint_end).collect();
     let lanes = numbers.chunk_by(|a, b| planned.tracks.lane_of(*a) == planned.tracks.lane_of(*b));
-    lanes.map(|lane| Route { first: lane[0], end: lane[lane.len() - 1] + 1, ..*route }).collect()
+    lanes
+        .map(|lane| Route {
+            lowest_waypoint: lane[0],
+            waypoint_end: lane[lane.len() - 1] + 1,
+            ..*route
+        })
+        .collect()
 }
 
 /// The fewest sorties of at most `most_s` each: lanes are added to a sortie as long as they fit,
 /// since no part takes longer than the whole. `None` if a lane alone does not fit.
 fn fewest(planned: &CoveragePlan<'_>, route: &Route, most_s: f32) -> Option<usize> {
-    let (mut count, mut first) = (1, route.first);
+    let (mut count, mut first) = (1, route.lowest_waypoint);
     for lane in lanes(planned, route) {
-        if flown_s(planned, &Route { first, end: lane.end, ..*route }) > most_s {
-            (count, first) = (count + 1, lane.first);
+        if flown_s(
+            planned,
+            &Route { lowest_waypoint: first, waypoint_end: lane.waypoint_end, ..*route },
+        ) > most_s
+        {
+            (count, first) = (count + 1, lane.lowest_waypoint);
             if flown_s(planned, &lane) > most_s {
                 return None;
             }
@@ -68,12 +79,15 @@ fn least_s(planned: &CoveragePlan<'_>, route: &Route, count: usize, most_s: f32)
     let lanes = lanes(planned, route);
     let cuts = (0..1u32 << (lanes.len() - 1)).filter(|cut| cut.count_ones() as usize == count - 1);
     let total_s = |cut: u32| {
-        let (mut sum_s, mut first) = (0.0, route.first);
+        let (mut sum_s, mut first) = (0.0, route.lowest_waypoint);
         for (i, lane) in lanes.iter().enumerate() {
             if i + 1 == lanes.len() || cut & (1 << i) != 0 {
-                let own_s = flown_s(planned, &Route { first, end: lane.end, ..*route });
+                let own_s = flown_s(
+                    planned,
+                    &Route { lowest_waypoint: first, waypoint_end: lane.waypoint_end, ..*route },
+                );
                 sum_s += if own_s <= most_s { own_s } else { f32::INFINITY };
-                first = lane.end;
+                first = lane.waypoint_end;
             }
         }
         sum_s
@@ -100,11 +114,17 @@ fn judge_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32, seen: &mu
         "the route's waypoints in their order"
     );
     for (sortie, number) in sorties.iter().zip(1..) {
-        assert_eq!((sortie.number, usize::from(sortie.of)), (number, sorties.len()));
+        assert_eq!(
+            (sortie.number, usize::from(sortie.sorties_of_vehicle)),
+            (number, sorties.len())
+        );
         assert_eq!((sortie.route.layer, sortie.route.direction), (route.layer, route.direction));
         let own_s = flown_s(planned, &sortie.route);
         assert!(own_s <= most_s * ROUNDING, "{own_s} s of {most_s}");
-        assert!((own_s - sortie.flown_s).abs() <= own_s * (ROUNDING - 1.0), "{own_s} {sortie:?}");
+        assert!(
+            (own_s - sortie.flight_duration_s).abs() <= own_s * (ROUNDING - 1.0),
+            "{own_s} {sortie:?}"
+        );
     }
     let few = [most_s * ROUNDING, most_s / ROUNDING].map(|most_s| fewest(planned, route, most_s));
     assert!(few[0].is_some_and(|few| few <= sorties.len()), "{few:?} {}", sorties.len());
@@ -116,7 +136,7 @@ fn judge_route(planned: &CoveragePlan<'_>, route: &Route, most_s: f32, seen: &mu
     }
     seen.several += 1;
     if few[0] == few[1] && lanes(planned, route).len() <= MOST_LANES {
-        let own_s: f32 = sorties.iter().map(|sortie| sortie.flown_s).sum();
+        let own_s: f32 = sorties.iter().map(|sortie| sortie.flight_duration_s).sum();
         let least_s = least_s(planned, route, sorties.len(), most_s * ROUNDING);
         assert!(own_s <= least_s * ROUNDING, "{own_s} s instead of {least_s}");
         seen.every_cut += 1;
@@ -129,9 +149,9 @@ fn judge_rounds(planned: &CoveragePlan<'_>) {
     let rounds: Vec<_> = planned.sorties.chunk_by(|a, b| a.number == b.number).collect();
     let mut begin_s = 0.0;
     for round in rounds {
-        assert!(round.iter().all(|sortie| sortie.begin_s == begin_s), "{round:?}");
-        assert!(round.iter().any(|sortie| sortie.depart_s == 0.0), "{round:?}");
-        begin_s = round.iter().map(Sortie::end_s).fold(0.0, f32::max) + BATTERY_SWAP_S;
+        assert!(round.iter().all(|sortie| sortie.round_begin_s == begin_s), "{round:?}");
+        assert!(round.iter().any(|sortie| sortie.departure_delay_s == 0.0), "{round:?}");
+        begin_s = round.iter().map(Sortie::landing_s).fold(0.0, f32::max) + BATTERY_SWAP_S;
     }
 }
 
@@ -158,7 +178,7 @@ fn judge(seed: u64) -> Option<Seen> {
     let alone = routes.iter().flat_map(|route| lanes(&whole, route));
     let least_s = 0.95 * alone.map(|lane| flown_s(&whole, &lane)).fold(0.0, f32::max);
     let longest_s = routes.iter().map(|route| flown_s(&whole, route)).fold(0.0, f32::max);
-    let between_s = least_s + (1.1 * longest_s - least_s) * areas::unit(&mut random) as f32;
+    let between_s = least_s + (1.1 * longest_s - least_s) * areas::unit_random(&mut random) as f32;
     let endurance_s = (between_s / USABLE_CHARGE * 10.0).round() / 10.0;
     let most_s = endurance_s * USABLE_CHARGE;
     let scenario: Scenario = scenario::parse(&with_batteries(&text, endurance_s), "batteries")
@@ -174,7 +194,7 @@ fn judge(seed: u64) -> Option<Seen> {
             let named = |route: &&Route| {
                 error.contains(&format!(
                     "vehicle {} would fly",
-                    plain.vehicles[usize::from(route.vehicle)].id
+                    plain.vehicles[usize::from(route.vehicle_index)].id
                 ))
             };
             assert!(routes.iter().any(named), "seed {seed}: {error}");
@@ -192,10 +212,10 @@ fn judge(seed: u64) -> Option<Seen> {
         judge_route(&planned, route, most_s, &mut seen);
     }
     judge_rounds(&planned);
-    if whole.sorties.iter().all(|sortie| sortie.flown_s <= most_s) {
+    if whole.sorties.iter().all(|sortie| sortie.flight_duration_s <= most_s) {
         let both = [&whole, &planned].map(|planned| written(planned, &planned.flights()));
         assert_eq!(both[0], both[1], "seed {seed}: one battery suffices");
-        assert!(planned.sorties.iter().all(|sortie| sortie.of == 1));
+        assert!(planned.sorties.iter().all(|sortie| sortie.sorties_of_vehicle == 1));
     }
     Some(Seen { planned: 1, ..seen })
 }

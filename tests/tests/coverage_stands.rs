@@ -37,7 +37,10 @@ fn fly_all(draw: fn(&mut Pcg32) -> String, wrong: impl Fn(&MissionResult, &str) 
         let wrong = safety.violations + safety.wall_contacts > 0 || wrong(&result, &log);
         if wrong {
             let share = 100.0 * coverage.covered_share;
-            println!("seed {seed}: {share:.2} %, left {}, {safety:?}\n{log}", coverage.left);
+            println!(
+                "seed {seed}: {share:.2} %, left {}, {safety:?}\n{log}",
+                coverage.missed_waypoints
+            );
         }
         Some(wrong)
     };

@@ -30,15 +30,15 @@ fn drawn(seed: u64, folder: &std::path::Path) -> String {
     let mut random = Pcg32::seed_from_u64(seed);
     let hills = Hills::new(&mut random, 80.0);
     let mut text = areas::scenario(&mut random, Shape::Any, 1 + (seed % 4) as usize);
-    let tolerance_m = 0.5 + 5.0 * areas::unit(&mut random);
+    let tolerance_m = 0.5 + 5.0 * areas::unit_random(&mut random);
     let trigger = ["distance", "waypoint", "none"][(seed % 3) as usize];
     text = text.replace("camera = ", &format!("trigger = \"{trigger}\"\ncamera = "));
-    let [climb, descend] = [0, 1].map(|_| 0.5 + 4.0 * areas::unit(&mut random));
+    let [climb, descend] = [0, 1].map(|_| 0.5 + 4.0 * areas::unit_random(&mut random));
     let speeds = format!(
         "climb_mps = {climb:.1}\ndescend_mps = {descend:.1}\nendurance_s = 36000.0\nspeed_max_mps"
     );
     text = text.replace("speed_max_mps", &speeds);
-    hills.under(&text, &folder.join(format!("hills-{seed}.asc")), tolerance_m)
+    hills.put_under_scenario(&text, &folder.join(format!("hills-{seed}.asc")), tolerance_m)
 }
 
 /// The ceiling of a plan without the tolerance: the highest ground near, or higher ground far away,
@@ -54,13 +54,13 @@ struct Ceiling<'a> {
 impl<'a> Ceiling<'a> {
     fn of(planned: &CoveragePlan<'a>) -> Self {
         let terrain = planned.area_settings.terrain.as_ref().unwrap();
-        let field = FieldView::parse(&terrain.field).unwrap();
+        let field = FieldView::parse(&terrain.field_file).unwrap();
         let margin_m = margins::required_distances(
             &planned.scenario.simulation,
             0.0,
             &planned.scenario.vehicles,
         )
-        .margin_m;
+        .wall_margin_m;
         let near_m = 3.0 * field.shape().cell_m + margin_m + 2.0 * terrain.grid.cell_m();
         Self {
             grid: &terrain.grid,
@@ -100,22 +100,25 @@ fn hidden(planned: &CoveragePlan<'_>, points: &[&FlightPoint], places: usize) ->
         .map(|point| point.position)
         .collect();
     let mut random = Pcg32::seed_from_u64(pictures.len() as u64);
-    let mut beside = |side: f32| (areas::unit(&mut random) as f32 - 0.5) * side;
+    let mut beside = |side: f32| (areas::unit_random(&mut random) as f32 - 0.5) * side;
     let hidden = (0..places).filter(|k| {
         let near = pictures[k * pictures.len() / places].xy();
-        let (u, v) = (beside(area.spacing.waypoint_m), beside(area.spacing.lane_m));
+        let (u, v) =
+            (beside(area.spacing.max_waypoint_spacing_m), beside(area.spacing.max_lane_spacing_m));
         let place = near + along * u + Flat::new(-along.y, along.x) * v;
         let shown = |ground_m: &dyn Fn(&Point) -> f32| {
             pictures.iter().any(|camera| {
-                let (off, half) =
-                    (place - camera.xy(), (camera.z - ground_m(camera)) / area.height_m / 2.0);
+                let (off, half) = (
+                    place - camera.xy(),
+                    (camera.z - ground_m(camera)) / area.picture_height_m / 2.0,
+                );
                 let footprint = area.spacing.footprint;
                 off.dot(&along).abs() <= footprint.along_m * half
                     && off.perp(&along).abs() <= footprint.across_m * half
             })
         };
-        let ground_m = area.ground_m(&place);
-        shown(&|camera| area.ground_m(&camera.xy())) && !shown(&|_| ground_m)
+        let ground_m = area.ground_height_m(&place);
+        shown(&|camera| area.ground_height_m(&camera.xy())) && !shown(&|_| ground_m)
     });
     hidden.count()
 }
@@ -126,7 +129,7 @@ fn hidden(planned: &CoveragePlan<'_>, points: &[&FlightPoint], places: usize) ->
 fn check_cost(planned: &CoveragePlan<'_>, flight: &SortieFlight) -> Result<(), String> {
     let (sortie, points, times_s) = flight;
     let (area, route) = (planned.area_settings, &sortie.route);
-    let vehicle = &planned.vehicles[usize::from(route.vehicle)];
+    let vehicle = &planned.vehicles[usize::from(route.vehicle_index)];
     let vertical_s = |up_m: f32| match up_m > 0.0 {
         true => up_m / vehicle.climb_mps,
         false => -up_m / vehicle.descend_mps,
@@ -138,7 +141,7 @@ fn check_cost(planned: &CoveragePlan<'_>, flight: &SortieFlight) -> Result<(), S
         .map(|pair| vertical_s(pair[1].position.z - pair[0].position.z))
         .sum();
     let pad_m = points[0].position.z;
-    let left_out_s = there_and_back_s(f32::from(route.layer) * area.heights.layer_m)
+    let left_out_s = there_and_back_s(f32::from(route.layer) * area.heights.layer_spacing_m)
         + along_lanes_s
         - there_and_back_s(pad_m).copysign(pad_m);
     let flown_s = times_s[times_s.len() - 1] - times_s[0];
@@ -176,7 +179,7 @@ fn judge(scenario: &Scenario, looks: usize) -> Result<CoverageFindings, String> 
         return Err(format!("{hidden} of 500 places are hidden by their own height"));
     }
     for point in low.iter().step_by(1 + low.len() / looks) {
-        let most_m = ceiling.over(&point.position.xy()) + area.height_m + tolerance_m + 0.2;
+        let most_m = ceiling.over(&point.position.xy()) + area.picture_height_m + tolerance_m + 0.2;
         if point.position.z > most_m {
             return Err(format!("too high: {:?}, not {most_m}", point.position));
         }
@@ -267,7 +270,8 @@ fn plans_above_real_terrain_keep_their_heights() {
         let heights = findings.heights.unwrap();
         println!("{name}: {heights:?}");
         assert!(
-            heights.least_m >= height_m - 0.02 && heights.most_m > height_m + 3.0,
+            heights.min_above_ground_m >= height_m - 0.02
+                && heights.max_above_ground_m > height_m + 3.0,
             "{name}: {heights:?}"
         );
     }

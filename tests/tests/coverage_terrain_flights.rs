@@ -4,7 +4,7 @@
 
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::hills::Hills;
-use flockmate_tests::{covered, number};
+use flockmate_tests::{covered, number_from_env};
 use host_sim::result::VehicleResult;
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
@@ -18,11 +18,11 @@ const NO_FLIGHT: [&str; 5] =
 fn drawn(seed: u64, folder: &std::path::Path, draw: impl Fn(&mut Pcg32) -> String) -> String {
     let mut random = Pcg32::seed_from_u64(seed);
     let hills = Hills::new(&mut random, 60.0);
-    let tolerance_m = 2.0 + 8.0 * areas::unit(&mut random);
+    let tolerance_m = 2.0 + 8.0 * areas::unit_random(&mut random);
     let text = draw(&mut random);
-    let [climb, descend] = [0, 1].map(|_| 1.0 + 2.0 * areas::unit(&mut random));
+    let [climb, descend] = [0, 1].map(|_| 1.0 + 2.0 * areas::unit_random(&mut random));
     let speeds = format!("climb_mps = {climb:.1}\ndescend_mps = {descend:.1}\nspeed_max_mps");
-    hills.under(
+    hills.put_under_scenario(
         &text.replace("speed_max_mps", &speeds),
         &folder.join(format!("{seed}.asc")),
         tolerance_m,
@@ -63,7 +63,7 @@ fn areas_above_random_hills_are_photographed_whole() {
         };
         let text = drawn(seed, folder.path(), draw);
         match covered::fly_text(&text) {
-            Ok((result, log)) => match covered::faults(&result) {
+            Ok((result, log)) => match covered::faults_text(&result) {
                 None => Ok(true),
                 Some(faults) => Err(format!("seed {seed}: {faults}\n{log}{text}")),
             },
@@ -71,7 +71,12 @@ fn areas_above_random_hills_are_photographed_whole() {
             Err(error) => Err(format!("seed {seed}: {error}\n{text}")),
         }
     };
-    all_flown("hills", number("FLOCKMATE_HILLS_FROM", 0), number("FLOCKMATE_HILLS", 12), one);
+    all_flown(
+        "hills",
+        number_from_env("FLOCKMATE_HILLS_FROM", 0),
+        number_from_env("FLOCKMATE_HILLS", 12),
+        one,
+    );
 }
 
 /// The others, which follow the ground too, photograph what a lost vehicle leaves, or the log says
@@ -95,7 +100,7 @@ fn losses_above_random_hills_touch_nothing() {
                 let clean =
                     (safety.wall_contacts, safety.violations, safety.deadlocks) == (0, 0, 0);
                 let share = result.coverage.as_ref().map_or(0.0, |coverage| coverage.covered_share);
-                if number("FLOCKMATE_HILLS", 0) == 1 {
+                if number_from_env("FLOCKMATE_HILLS", 0) == 1 {
                     println!("{log}{text}");
                 }
                 // All that were not struck have no part: such a vehicle does not take over.
@@ -117,5 +122,10 @@ fn losses_above_random_hills_touch_nothing() {
             Err(error) => Err(format!("seed {seed}: {error}\n{text}")),
         }
     };
-    all_flown("losses", number("FLOCKMATE_HILLS_FROM", 0), number("FLOCKMATE_HILLS", 12), one);
+    all_flown(
+        "losses",
+        number_from_env("FLOCKMATE_HILLS_FROM", 0),
+        number_from_env("FLOCKMATE_HILLS", 12),
+        one,
+    );
 }

@@ -9,15 +9,15 @@ use flockmate_tests::meeting::dice::Dice;
 use flockmate_tests::shared_data;
 use heapless::Vec as Few;
 use host_sim::capacity::BOARDS;
-use host_sim::map::{self, Unknown, VoxelMap, building};
+use host_sim::map::{self, UnknownSpace, VoxelMap, building};
 use host_sim::roadmap::{self, BuiltRoadmap};
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
+use planner_core::detour::{self, DetourError, DetourGoal, DetourRequest, KeepOutZone, ZoneKind};
 use planner_core::flight::Path;
 use planner_core::geo::frames::Geodetic;
 use planner_core::roadmap::prm::{PrmConfig, Sampling};
 use planner_core::roadmap::search::{SearchWorkspace, astar};
-use planner_core::roadmap::{LANDMARKS, RoadmapView, encoded_len, write_with_landmarks};
+use planner_core::roadmap::{LANDMARK_COUNT, RoadmapView, encoded_len, write_with_landmarks};
 
 /// Number of terminals (goals) of the roadmap: random nodes.
 const GOALS: u16 = 40;
@@ -51,7 +51,7 @@ struct Files {
 
 fn files(map: &VoxelMap, clearance_m: f32) -> Files {
     let config = PrmConfig {
-        nodes: 2300,
+        random_nodes: 2300,
         edge_min_m: 0.5,
         edge_max_m: 8.0,
         clearance_m,
@@ -62,7 +62,8 @@ fn files(map: &VoxelMap, clearance_m: f32) -> Files {
     let roadmap = roadmap.fit_to_board(&BOARDS[0]).expect("it can be cut down");
     let header = roadmap::header(&config, Geodetic::default(), 0, GOALS);
     let BuiltRoadmap { nodes, edges, .. } = &roadmap;
-    let mut old = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).expect("it is small")];
+    let mut old =
+        vec![0; encoded_len(nodes.len(), edges.len(), LANDMARK_COUNT).expect("it is small")];
     let mut ws = Box::new(SearchWorkspace::<HOST>::new());
     write_with_landmarks(&header, nodes, edges, &[], &mut ws, &mut old).expect("it is a roadmap");
     Files { new: roadmap::encode(&roadmap, &header).expect("it is a roadmap"), old }
@@ -87,8 +88,8 @@ fn grounds(name: &str, map: &VoxelMap, view: &RoadmapView<'_>, dice: &mut Dice) 
     let mut wide_m = 0.0;
     for _ in 0..PLACES {
         let place = on_edge(view, dice);
-        let truth_m = map.ground_below(&place).unwrap_or(f32::NEG_INFINITY);
-        match view.ground_range_near(&place) {
+        let truth_m = map.ground_z_below_m(&place).unwrap_or(f32::NEG_INFINITY);
+        match view.ground_z_range_near(&place) {
             None => unknown += 1,
             Some((low_m, high_m)) => {
                 deeper += usize::from(truth_m < low_m - 0.5);
@@ -145,23 +146,24 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
         let ahead = 1 + dice.below(nodes.len() - 2);
         let (a, b) = (new.node(nodes[ahead]), new.node(nodes[ahead + 1]));
         let silent = a + (b - a) * dice.real(0.0, 1.0);
-        let Some(ground_m) = map.ground_below(&silent) else { continue };
+        let Some(ground_m) = map.ground_z_below_m(&silent) else { continue };
         // Somewhere inside its hull is the position that a vehicle reports.
         let at =
             |height_m: f32| Point::new(silent.x, silent.y, (ground_m + height_m).min(silent.z));
         let lies = at(dice.real(0.0, HULL_M));
-        let descent_m =
-            map.ground_below(&new.node(goal)).map_or(1.0, |ground_m| new.node(goal).z - ground_m);
+        let descent_m = map
+            .ground_z_below_m(&new.node(goal))
+            .map_or(1.0, |ground_m| new.node(goal).z - ground_m);
         if (lies - here).norm() < KEPT_M + 1.0 {
             continue;
         }
         cases += 1;
         let request = DetourRequest {
-            aside: false,
+            land_aside: false,
             here,
             leg: [new.node(nodes[1]), here],
             leg_clearance_m: 1.0,
-            goal: Goal::Node(goal),
+            goal: DetourGoal::RoadmapGoal(goal),
             descent_m,
             required_clearance_m: clearance_m,
             fence: None,
@@ -211,12 +213,12 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
 #[test]
 fn host_and_board_find_the_detours_that_the_map_gives() {
     let map = building::building_map(building::DEFAULT_SEED, 0.25).expect("the building");
-    detours("building", &map.to_voxel_map(Unknown::Blocked), 0.8);
+    detours("building", &map.to_voxel_map(UnknownSpace::Blocked), 0.8);
     for (name, resolution_m, clearance_m) in
         [("geb079", 0.08, 0.2), ("manufacturing", 0.086_642_2, 0.3), ("maze", 0.195_32, 0.3)]
     {
         let Some(path) = shared_data(&format!("maps3d/{name}.bt")) else { continue };
         let map = map::load(path.to_str().expect("UTF-8"), resolution_m).expect("a map");
-        detours(name, &map.to_voxel_map(Unknown::Blocked), clearance_m);
+        detours(name, &map.to_voxel_map(UnknownSpace::Blocked), clearance_m);
     }
 }

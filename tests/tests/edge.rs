@@ -5,8 +5,8 @@
 //! flies other seeds; the bench `range --strikes 8` does the same. A sweep still finds failures:
 //! docs/safety.md, "Figures".
 
-use flockmate_tests::edge::Edge;
-use flockmate_tests::swarms::number;
+use flockmate_tests::edge::RadioEdgeMission;
+use flockmate_tests::swarms::number_from_env;
 use rayon::prelude::*;
 
 /// Number of flights with a fault per seed.
@@ -14,16 +14,18 @@ const STRIKES: usize = 3;
 
 #[test]
 fn a_failure_at_the_edge_of_the_range_brings_no_two_others_together() {
-    let from = number("FLOCKMATE_EDGES_FROM", 1);
+    let from = number_from_env("FLOCKMATE_EDGES_FROM", 1);
     let of_seed = |seed: u64| -> (usize, Vec<String>) {
-        let mut edge = Edge::new(seed).expect("the demo can be flown");
-        let struck: Vec<_> =
-            (0..STRIKES).filter_map(|_| edge.strike().expect("the fault can be played")).collect();
+        let mut edge = RadioEdgeMission::new(seed).expect("the demo can be flown");
+        let struck: Vec<_> = (0..STRIKES)
+            .filter_map(|_| edge.fly_with_fault().expect("the fault can be played"))
+            .collect();
         let text = |wrong: &String, what: &str| format!("seed {seed}, {what}: {wrong}");
-        let wrong = struck.iter().flat_map(|o| o.wrong.iter().map(|wrong| text(wrong, &o.what)));
+        let wrong =
+            struck.iter().flat_map(|o| o.forbidden.iter().map(|wrong| text(wrong, &o.description)));
         (struck.len(), wrong.collect())
     };
-    let seeds = from..from + number("FLOCKMATE_EDGES", 4);
+    let seeds = from..from + number_from_env("FLOCKMATE_EDGES", 4);
     let flown: Vec<_> = seeds.into_par_iter().map(of_seed).collect();
     let flights: usize = flown.iter().map(|(flights, _)| flights).sum();
     println!("{flights} flights with a failure at the edge of the range");

@@ -38,7 +38,7 @@ fn the_default_margin_and_separation_are_refused_with_the_metres_that_are_missin
     let scenario = demo(1, 0.9, 3.3).unwrap();
     assert_eq!(scenario.simulation.estimator, PositionErrors::Recorded);
     let needed = margins::required_distances(&scenario.simulation, 1.5, &scenario.vehicles);
-    assert!((needed.margin_m - 0.9).abs() < 1e-4 && (needed.separation_m - 3.3).abs() < 1e-4);
+    assert!((needed.wall_margin_m - 0.9).abs() < 1e-4 && (needed.separation_m - 3.3).abs() < 1e-4);
 }
 
 #[test]

@@ -13,12 +13,12 @@
 //! twenty seeds and prints a line for each kind. `FLOCKMATE_FAULT_ONLY=kill` flies only the kinds
 //! whose lines contain this text, `FLOCKMATE_FAULT_SEED=17` one seed, and prints its logs.
 
-use flockmate_tests::vehicle::ahead;
+use flockmate_tests::vehicle::widest_late_leg_middle;
 use host_sim::mission::{HostPlan, PreparedMission};
 use host_sim::progress::Progress;
 use host_sim::report::LogEvent;
 use host_sim::result::VehicleResult;
-use host_sim::scenario::{self, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence};
+use host_sim::scenario::{self, FAULT_OBSTACLE, Fault, Geofence, VEHICLE_FAULT_KINDS};
 use host_sim::swarm::{self, SwarmFlight};
 use planner_core::Point;
 use rayon::prelude::*;
@@ -110,7 +110,7 @@ impl Case {
     }
 
     fn faults(&self, at_s: f32, vehicle: u8, plan: &HostPlan) -> Vec<Fault> {
-        let [x, y, z] = ahead(&plan.flights[usize::from(vehicle) - 1].path).into();
+        let [x, y, z] = widest_late_leg_middle(&plan.flights[usize::from(vehicle) - 1].path).into();
         let script = self
             .script
             .replace("LATER", &(at_s + 8.0).to_string())
@@ -260,8 +260,9 @@ fn fence_for_some(plan: &HostPlan) -> (Vec<u8>, Geofence) {
     };
     let mut best = (0.0, Vec::new(), 0, 1.0, 0.0);
     for (axis, sign) in [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0), (2, 1.0)] {
-        let mut reaches: Vec<_> =
-            (0..plan.flights.len()).map(|i| (reach(axis, sign, i), plan.flights[i].id)).collect();
+        let mut reaches: Vec<_> = (0..plan.flights.len())
+            .map(|i| (reach(axis, sign, i), plan.flights[i].vehicle_id))
+            .collect();
         reaches.sort_by(|a, b| b.0.total_cmp(&a.0));
         for out in 1..=3 {
             let (last, next) = (reaches[out - 1].0, reaches[out].0);
@@ -298,7 +299,7 @@ fn print_log(flight: &SwarmFlight) {
 
 #[test]
 fn every_kind_of_fault_has_a_case() {
-    for kind in FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]) {
+    for kind in VEHICLE_FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]) {
         assert!(
             CASES.iter().any(|case| case.script.contains(&format!("'{kind}'"))),
             "no case of {kind}"
@@ -402,7 +403,7 @@ fn plans_stay_inside_the_geofence_and_no_flight_meets_it() {
 #[test]
 fn a_struck_flight_is_the_same_each_time() {
     let (mut mission, plan) = prepare(1);
-    mission.scenario.simulation.serial_corruption = 1e-4;
+    mission.scenario.simulation.serial_corruption_per_byte = 1e-4;
     mission.scenario.simulation.radio_loss = 0.1;
     let some = CASES.iter().filter(|case| !case.on_ground()).step_by(2);
     mission.scenario.faults =

@@ -1,54 +1,57 @@
 //! Simulated autopilots fly what the recorded ones flew: `cargo xtask bench --only fidelity` prints
 //! the whole table.
 
-use flockmate_tests::fidelity::{Correction, Estimator, RUNS, Recording, allowed_m, recordings};
+use flockmate_tests::fidelity::{
+    Correction, EstimateErrors, RECORDED_RUNS, Recording, allowed_rms_m, recordings,
+};
 use sim_autopilot::SimulatedKind;
 
 /// The recorded flights that no pilot or failsafe interrupted, with their allowed difference,
 /// metres.
 fn plain() -> impl Iterator<Item = (Recording, f64)> {
-    RUNS.iter()
+    RECORDED_RUNS
+        .iter()
         .flat_map(|run| recordings(run))
-        .filter_map(|r| allowed_m(&r).map(|allowed_m| (r, allowed_m)))
+        .filter_map(|r| allowed_rms_m(&r).map(|allowed_m| (r, allowed_m)))
 }
 
 #[test]
 fn plain_flights_are_flown_again_as_they_were_recorded() {
     for (recording, allowed_m) in plain() {
-        let c = recording.compare(Estimator::Recorded, Correction::Simulated);
+        let c = recording.compare(EstimateErrors::Recorded, Correction::Simulated);
         let name = format!("{} {}: {c:.2?}", recording.run, recording.vehicle);
         println!("{name}");
-        assert!(c.whole.rms <= allowed_m.min(0.2), "{name}");
+        assert!(c.whole.rms_m <= allowed_m.min(0.2), "{name}");
         // NaN where the flight has no such part.
-        assert!(!(c.lift_off.rms > 0.3 || c.landing.rms > 0.3), "{name}");
+        assert!(!(c.lift_off.rms_m > 0.3 || c.landing.rms_m > 0.3), "{name}");
         let in_follow_m = if recording.autopilot == SimulatedKind::Ardupilot { 0.08 } else { 0.12 };
-        assert!(c.follow.rms.is_nan() || c.follow.rms <= in_follow_m, "{name}");
+        assert!(c.follow.rms_m.is_nan() || c.follow.rms_m <= in_follow_m, "{name}");
     }
 }
 
 #[test]
 fn plain_flights_do_not_need_the_recorded_errors_to_come_near() {
     for (recording, allowed_m) in plain() {
-        let c = recording.compare(Estimator::Perfect, Correction::Simulated);
+        let c = recording.compare(EstimateErrors::Perfect, Correction::Simulated);
         // Two recorded flights of one mission differ by 0.24 to 0.51 m with PX4.
         let px4 = recording.autopilot == SimulatedKind::Px4;
         let name = format!("{} {}: {c:.2?}", recording.run, recording.vehicle);
         println!("{name}");
-        assert!(c.whole.rms <= if px4 { 0.45 } else { allowed_m }, "{name}");
-        assert!(!(c.lift_off.rms > 0.3 || c.landing.rms > 0.3), "{name}");
+        assert!(c.whole.rms_m <= if px4 { 0.45 } else { allowed_m }, "{name}");
+        assert!(!(c.lift_off.rms_m > 0.3 || c.landing.rms_m > 0.3), "{name}");
     }
 }
 
 #[test]
 fn setpoints_as_they_were_sent_are_flown_as_recorded_under_the_recorded_errors() {
     for (recording, allowed_m) in plain() {
-        let c = recording.compare(Estimator::Recorded, Correction::Recorded);
+        let c = recording.compare(EstimateErrors::Recorded, Correction::Recorded);
         let name = format!("{} {}: {c:.2?}", recording.run, recording.vehicle);
         println!("{name}");
-        assert!(c.whole.rms <= allowed_m.min(0.25), "{name}");
-        assert!(!(c.lift_off.rms > 0.3 || c.landing.rms > 0.3), "{name}");
+        assert!(c.whole.rms_m <= allowed_m.min(0.25), "{name}");
+        assert!(!(c.lift_off.rms_m > 0.3 || c.landing.rms_m > 0.3), "{name}");
         let in_follow_m = if recording.autopilot == SimulatedKind::Ardupilot { 0.08 } else { 0.2 };
-        assert!(c.follow.rms.is_nan() || c.follow.rms <= in_follow_m, "{name}");
+        assert!(c.follow.rms_m.is_nan() || c.follow.rms_m <= in_follow_m, "{name}");
     }
 }
 
@@ -57,9 +60,9 @@ fn interrupted_px4s_stop_as_far_on_as_they_did() {
     // A failsafe lands it from 1.85 m/s, a pilot takes Hold from 1.4 and 1.9.
     let runs = ["px4_c1_demo", "x_drift_demo", "x_drift_demo_1"];
     for recording in runs.iter().flat_map(|run| recordings(run)) {
-        let c = recording.compare(Estimator::Recorded, Correction::Recorded);
+        let c = recording.compare(EstimateErrors::Recorded, Correction::Recorded);
         println!("{}: {c:.2?}", recording.run);
-        assert!(c.whole.rms <= 0.35 && c.whole.max <= 0.8, "{}: {c:?}", recording.run);
+        assert!(c.whole.rms_m <= 0.35 && c.whole.max_m <= 0.8, "{}: {c:?}", recording.run);
     }
 }
 
@@ -79,19 +82,19 @@ fn errors_of_another_flight_with_the_same_noise_do_as_well() {
             return;
         };
         let alike = recording.error_correlation(&other);
-        let c = recording.compare(Estimator::Of(&other), Correction::Recorded);
+        let c = recording.compare(EstimateErrors::Of(&other), Correction::Recorded);
         println!("{run} under the errors of {}: {alike:.2} {c:.2?}", other.run);
-        let allowed_m = allowed_m(&recording).expect("a plain flight");
-        assert!(alike >= 0.8 && c.whole.rms <= allowed_m, "{run}, {}: {alike} {c:?}", other.run);
+        let allowed_m = allowed_rms_m(&recording).expect("a plain flight");
+        assert!(alike >= 0.8 && c.whole.rms_m <= allowed_m, "{run}, {}: {alike} {c:?}", other.run);
     }
 }
 
 #[test]
 fn setpoints_as_they_were_sent_bring_it_as_near_as_real_flights_repeat() {
     for (recording, _) in plain() {
-        let c = recording.compare(Estimator::Perfect, Correction::Recorded);
+        let c = recording.compare(EstimateErrors::Perfect, Correction::Recorded);
         let name = format!("{} {}: {c:.2?}", recording.run, recording.vehicle);
         println!("{name}");
-        assert!(c.whole.rms <= 0.55, "{name}");
+        assert!(c.whole.rms_m <= 0.55, "{name}");
     }
 }

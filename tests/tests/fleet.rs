@@ -17,8 +17,8 @@ use std::collections::VecDeque;
 use companion::link::roster::{RosterReport, ShareStatus};
 use companion::swarm::fleet::{Fleet, FleetTimeouts, OwnReport, StartStatus, VehicleReception};
 use companion::time::{Duration, Instant};
-use flockmate_tests::number;
-use flockmate_tests::parts::{WAYPOINT_DM, parts};
+use flockmate_tests::number_from_env;
+use flockmate_tests::parts::{WAYPOINT_DM, divide_waypoints};
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -145,7 +145,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             let mut fleet =
                 Whole::new(own, count, FleetTimeouts::of_flight(Duration::from_secs(60)));
             fleet.begin_flight(zero);
-            let part = parts(&whole, &fleet, count).0.swap_remove(own);
+            let part = divide_waypoints(&whole, &fleet, count).0.swap_remove(own);
             Vehicle {
                 fleet,
                 part,
@@ -188,7 +188,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 vehicle.heard_at[from] = Some(now);
                 vehicle.heard_bits[from] = bits;
                 if let Some(roster) = roster {
-                    vehicle.fleet.handle_roster(from, &roster, StartStatus::Started);
+                    vehicle.fleet.handle_roster_report(from, &roster, StartStatus::Started);
                 }
             }
             let fresh =
@@ -199,7 +199,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 hears_us: bits[rank] >> own & 1 != 0,
                 heard_by_others: (0..count)
                     .any(|j| j != rank && fresh(heard_at[j]) && bits[j] >> rank & 1 != 0),
-                hears: bits[rank],
+                heard_bits: bits[rank],
             };
             let at = usize::from(vehicle.along_dm / WAYPOINT_DM);
             let (path, goes_on) = vehicle.path();
@@ -226,11 +226,11 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 vehicle.fleet.commitment_dm().is_some_and(|dm| vehicle.along_dm >= dm || done);
             let own_view = OwnReport {
                 status: standing,
-                waits: false,
+                waits_for_start: false,
                 airborne: true,
-                division: vehicle.division,
+                path_division_count: vehicle.division,
                 progress_dm: vehicle.along_dm,
-                commitment_dm: Some(promise_dm),
+                new_commitment_dm: Some(promise_dm),
                 holds,
                 wants_division: asks,
             };
@@ -238,8 +238,8 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             if vehicle.fleet.is_dividing() {
                 detected_s.get_or_insert(t_s);
             }
-            if vehicle.fleet.needs_division() {
-                let hash = parts(&whole, &vehicle.fleet, count).1;
+            if vehicle.fleet.is_division_to_be_computed() {
+                let hash = divide_waypoints(&whole, &vehicle.fleet, count).1;
                 vehicle.fleet.set_hash_from_plan(hash);
             }
             if vehicle.fleet.division_count() > vehicle.division {
@@ -289,7 +289,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             });
             let bits = bits.fold(0u32, |bits, j| bits | 1 << j);
             let due = step.is_multiple_of(2) || vehicles[own].fleet.is_dividing();
-            let roster = due.then(|| vehicles[own].fleet.roster_message(0));
+            let roster = due.then(|| vehicles[own].fleet.roster_report(0));
             for (to, vehicle) in vehicles.iter_mut().enumerate() {
                 let cut = apart.is_some_and(|(from_s, to_s, side)| {
                     (from_s..to_s).contains(&t_s) && (side >> own & 1) != (side >> to & 1)
@@ -305,7 +305,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
         step += 1;
     }
     let alive = vehicles.iter().filter(|vehicle| !vehicle.down).count();
-    if number("FLOCKMATE_FLEET_SHOWN", 0) != 0 {
+    if number_from_env("FLOCKMATE_FLEET_SHOWN", 0) != 0 {
         println!(
             "seed {seed}: loss {loss} delay {delay_s} apart {apart:?} losses {losses:?} fails {fails:?}"
         );
@@ -345,14 +345,15 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
 
 /// Whether the vehicle knows that all living vehicles have computed the same division.
 fn has_all_hashes(fleet: &Whole) -> bool {
-    let roster = fleet.roster_message(0);
-    roster.hash != 0 && roster.entries.iter().all(|e| e.status != ShareStatus::Alive || e.agrees)
+    let roster = fleet.roster_report(0);
+    roster.pending_hash != 0
+        && roster.entries.iter().all(|e| e.status != ShareStatus::Alive || e.agrees)
 }
 
 /// Each vehicle's part by the divisions that count, without one under way.
 fn counted_parts(whole: &[u32], fleet: &Whole, count: usize) -> Vec<Vec<u32>> {
-    assert!(!fleet.needs_division(), "what begins to count leaves nothing under way");
-    parts(whole, fleet, count).0
+    assert!(!fleet.is_division_to_be_computed(), "what begins to count leaves nothing under way");
+    divide_waypoints(whole, fleet, count).0
 }
 
 /// Text about a waypoint that two vehicles may still photograph; `None` without one.
@@ -378,7 +379,8 @@ fn owned_twice(vehicles: &[Vehicle], whole: &[u32], lease: Lease, now: Instant) 
 
 #[test]
 fn no_waypoint_has_two_owners_and_none_is_left_out() {
-    let (from, count) = (number("FLOCKMATE_FLEETS_FROM", 0), number("FLOCKMATE_FLEETS", FLEETS));
+    let (from, count) =
+        (number_from_env("FLOCKMATE_FLEETS_FROM", 0), number_from_env("FLOCKMATE_FLEETS", FLEETS));
     let all: Vec<Outcome> =
         (from..from + count).into_par_iter().map(|seed| fly(seed, Lease::Obeyed)).collect();
     let wrong: Vec<&String> = all.iter().filter_map(|outcome| outcome.wrong.as_ref()).collect();
@@ -429,13 +431,13 @@ fn vehicles_that_fly_on_without_their_lease_are_found() {
 fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
     let mut fleet = Whole::new(1, 3, FleetTimeouts::of_flight(Duration::from_secs(60)));
     fleet.begin_flight(Instant::ZERO);
-    let own = OwnReport { commitment_dm: Some(WAYPOINT_DM), ..OwnReport::default() };
+    let own = OwnReport { new_commitment_dm: Some(WAYPOINT_DM), ..OwnReport::default() };
     let step = |fleet: &mut Whole, at_s: u64, heard: usize| {
         let now = Instant::from_millis(1000 * at_s);
         let hears = VehicleReception {
             heard_at: Some(now),
             hears_us: true,
-            hears: u32::MAX,
+            heard_bits: u32::MAX,
             ..VehicleReception::default()
         };
         fleet.step(
@@ -446,9 +448,9 @@ fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
     };
     (1..50).for_each(|at_s| step(&mut fleet, at_s, 0));
     assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM), "vehicle 2 is lost");
-    let mut finished = fleet.roster_message(0);
+    let mut finished = fleet.roster_report(0);
     finished.entries[2].status = ShareStatus::Finished;
-    fleet.handle_roster(2, &finished, StartStatus::Started);
+    fleet.handle_roster_report(2, &finished, StartStatus::Started);
     step(&mut fleet, 50, 2);
     assert_eq!(fleet.commitment_dm(), Some(WAYPOINT_DM));
 }

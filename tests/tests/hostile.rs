@@ -10,21 +10,26 @@ const FRAMES: u64 = 1_000_000;
 fn forged_frames_break_no_rule() {
     let report = hostile::attacks(1, FRAMES);
     println!("{}", report.setpoints);
-    println!("{} frames, most sent in a second: {:?}", report.frames, report.most_sent);
+    println!("{} frames, most sent in a second: {:?}", report.frames, report.max_sent_per_s);
     assert!(report.frames >= FRAMES);
-    assert!(report.broken.is_empty(), "{:#?}", report.broken);
+    assert!(report.broken_rules.is_empty(), "{:#?}", report.broken_rules);
     let setpoints = report.setpoints;
-    let unfit = (setpoints.jumps, setpoints.jerky, setpoints.outside, setpoints.not_finite);
-    assert_eq!(unfit, (0, 0, 0, 0), "{:#?}", report.unfit);
-    let seen = report.states.iter().filter(|steps| **steps > 0).count();
+    let unfit = (
+        setpoints.too_far_apart,
+        setpoints.too_jerky,
+        setpoints.outside_fence,
+        setpoints.not_finite,
+    );
+    assert_eq!(unfit, (0, 0, 0, 0), "{:#?}", report.unfit_setpoints);
+    let seen = report.steps_in_state.iter().filter(|steps| **steps > 0).count();
     assert!(seen >= 12, "only {seen} states were attacked");
 }
 
 #[test]
 fn forged_rosters_break_no_rule() {
     let report = hostile::attacks_over_area(1, FRAMES / 4);
-    assert!(report.broken.is_empty() && report.unfit.is_empty(), "{report:#?}");
-    let seen = report.states.iter().filter(|steps| **steps > 0).count();
+    assert!(report.broken_rules.is_empty() && report.unfit_setpoints.is_empty(), "{report:#?}");
+    let seen = report.steps_in_state.iter().filter(|steps| **steps > 0).count();
     println!("{} frames in {seen} states", report.frames);
     assert!(seen >= 10, "only {seen} states were attacked");
 }
@@ -42,6 +47,6 @@ const ONCE_BROKEN: [u64; 29] = [
 fn attacks_that_once_broke_a_rule_break_none() {
     for seed in ONCE_BROKEN {
         let report = hostile::attacks(seed, 1);
-        assert!(report.broken.is_empty() && report.unfit.is_empty(), "{report:#?}");
+        assert!(report.broken_rules.is_empty() && report.unfit_setpoints.is_empty(), "{report:#?}");
     }
 }

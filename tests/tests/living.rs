@@ -38,7 +38,7 @@ impl Pair {
             ..sim_autopilot::AutopilotConfig::default()
         };
         let mut autopilot = Autopilot::new(&config).unwrap();
-        autopilot.land_on_offboard_loss();
+        autopilot.set_land_on_offboard_loss();
         Self {
             autopilot,
             companion: Companion::new(Config::new(1, START, config.world_origin)).unwrap(),
@@ -109,8 +109,8 @@ impl Pair {
         while let Some(event) = self.companion.poll_event() {
             match event {
                 Event::RestartRequested
-                | Event::WaitsForStart { .. }
-                | Event::FlownAround { .. } => {}
+                | Event::WaitsForUnstartedVehicle { .. }
+                | Event::DetourSkippedWaypoints { .. } => {}
                 Event::PlanRequested(wanted) => {
                     self.companion.handle_plan(self.now(), wanted, Ok(&plan()));
                 }
@@ -198,7 +198,7 @@ fn plan() -> VehiclePlan<16, 8> {
         descent_m: 1.7,
         depart_s: 0.0,
         gates,
-        plan_crc: 5,
+        swarm_plan_crc: 5,
     }
 }
 
@@ -208,7 +208,7 @@ fn px4s_flood_with_messages_nobody_knows_is_lived_with() {
     pair.until(State::Done);
     pair.assert_at_goal();
     let counters = pair.companion.counters(Link::Autopilot);
-    assert!(counters.unknown > 20, "GNSS_INTEGRITY every second: {counters:?}");
+    assert!(counters.unknown_id > 20, "GNSS_INTEGRITY every second: {counters:?}");
     assert_eq!((counters.bad_crc, counters.noise_bytes), (0, 0));
 }
 

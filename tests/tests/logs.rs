@@ -39,7 +39,7 @@ struct Counts {
 
 /// Reads a log's frames in pieces as a serial port gives them.
 fn counts(path: &Path) -> (Vec<Frame>, Counts) {
-    let bytes: Vec<u8> = logs::read(path).into_iter().flat_map(|record| record.bytes).collect();
+    let bytes: Vec<u8> = logs::read_log(path).into_iter().flat_map(|record| record.bytes).collect();
     let (mut framer, mut frames) = (Framer::new(), Vec::new());
     let mut hear = |now, mut piece: &[u8]| {
         while let Some(frame) = framer.next(now, &mut piece) {
@@ -51,7 +51,7 @@ fn counts(path: &Path) -> (Vec<Frame>, Counts) {
     hear(Instant::from_millis(200), &[]);
     let counters = framer.counters();
     assert_eq!((counters.bad_crc, counters.noise_bytes), (0, 0), "{path:?}");
-    let mut counts = Counts { unknown: counters.unknown as usize, ..Counts::default() };
+    let mut counts = Counts { unknown: counters.unknown_id as usize, ..Counts::default() };
     for frame in &frames {
         *counts.known.entry(frame.message_id).or_default() += 1;
     }
@@ -60,9 +60,9 @@ fn counts(path: &Path) -> (Vec<Frame>, Counts) {
 
 #[test]
 fn every_known_frame_is_decoded_and_every_unknown_one_skipped_whole() {
-    for path in logs::all() {
+    for path in logs::all_logs() {
         let (frames, counts) = counts(&path);
-        assert_eq!(frames.len() + counts.unknown, logs::read(&path).len(), "{path:?}");
+        assert_eq!(frames.len() + counts.unknown, logs::read_log(&path).len(), "{path:?}");
         let refused: BTreeSet<_> = frames
             .iter()
             .filter(|f| MavMessage::parse(f.version, f.message_id, f.payload()).is_err())
@@ -79,7 +79,7 @@ fn every_known_frame_is_decoded_and_every_unknown_one_skipped_whole() {
 
 #[test]
 fn messages_are_counted_as_pymavlink_counts_them() {
-    let (paths, Some(python)) = (logs::all(), python()) else { return };
+    let (paths, Some(python)) = (logs::all_logs(), python()) else { return };
     let script = workspace().join("tests/conformance/log_counts.py");
     let output = Command::new(python).arg(script).args(&paths).output().expect("Python starts");
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
@@ -203,7 +203,7 @@ impl Victims {
         }
         let counters = self.heard[at].counters();
         // PX4 sends GNSS_INTEGRITY, which no dialect here knows.
-        assert!(counters.unknown == 0 || at == 2, "{counters:?}");
+        assert!(counters.unknown_id == 0 || at == 2, "{counters:?}");
         assert_eq!((counters.bad_crc, counters.noise_bytes), (0, 0));
     }
 
@@ -233,7 +233,7 @@ fn plan() -> VehiclePlan<16, 8> {
         descent_m: 2.7,
         depart_s: 0.0,
         gates,
-        plan_crc: 5,
+        swarm_plan_crc: 5,
     }
 }
 
@@ -245,10 +245,10 @@ fn below(rng: &mut Pcg32, end: usize) -> usize {
 fn on_every_log(damage: impl Fn(&mut Victims, &[Vec<u8>], &mut Pcg32) + Sync) {
     let rounds = std::env::var("FLOCKMATE_FUZZ_ROUNDS")
         .map_or(1, |n| n.parse().expect("a number of rounds"));
-    let work: Vec<_> = logs::all().into_iter().enumerate().collect();
+    let work: Vec<_> = logs::all_logs().into_iter().enumerate().collect();
     work.par_iter().for_each(|(place, path)| {
         let records: Vec<Vec<u8>> =
-            logs::read(path).into_iter().map(|record| record.bytes).collect();
+            logs::read_log(path).into_iter().map(|record| record.bytes).collect();
         for round in 0..rounds {
             let mut rng = Pcg32::seed_from_u64(*place as u64 + 1000 * round);
             let from = if round == 0 { 0 } else { below(&mut rng, records.len()) };

@@ -6,7 +6,7 @@ use flockmate_tests::meeting::autopilot::Catch;
 use flockmate_tests::meeting::scene::MeetingEvent;
 use flockmate_tests::meeting::{self, Outcome, scene};
 use flockmate_tests::setpoints::SetpointStats;
-use flockmate_tests::swarms::number;
+use flockmate_tests::swarms::number_from_env;
 use rayon::prelude::*;
 
 /// Number of random meetings.
@@ -23,26 +23,28 @@ const UNHEARD_STOP_S: f32 = 1.5;
 fn report(outcomes: &[Outcome]) {
     outcomes
         .iter()
-        .filter(|o| o.is_bad())
-        .for_each(|outcome| println!("{}", meeting::line(outcome)));
+        .filter(|o| o.breaks_rule())
+        .for_each(|outcome| println!("{}", meeting::outcome_line(outcome)));
     println!("{}", meeting::summary(outcomes));
 }
 
 #[test]
 fn no_vehicle_that_passes_at_the_scheduled_separation_is_stopped() {
-    let outcomes: Vec<Outcome> =
-        (0..PASSINGS).into_par_iter().map(|seed| meeting::fly(&scene::passing(seed))).collect();
+    let outcomes: Vec<Outcome> = (0..PASSINGS)
+        .into_par_iter()
+        .map(|seed| meeting::fly(&scene::passing_scene(seed)))
+        .collect();
     report(&outcomes);
     let stops: u32 = outcomes.iter().map(|outcome| outcome.filter_stops).sum();
     println!("{stops} stops by the safety filter in {PASSINGS} passings");
     for outcome in &outcomes {
-        assert!(!outcome.is_bad(), "{}", meeting::line(outcome));
-        assert_eq!(outcome.arrived, 2, "{}", meeting::line(outcome));
+        assert!(!outcome.breaks_rule(), "{}", meeting::outcome_line(outcome));
+        assert_eq!(outcome.arrived_count, 2, "{}", meeting::outcome_line(outcome));
         assert!(
             outcome.longest_stop_s <= STOP_S,
             "{:.2} s: {}",
             outcome.longest_stop_s,
-            meeting::line(outcome)
+            meeting::outcome_line(outcome)
         );
         // After a second of silence the neighbour may be anywhere in a ball: the vehicle waits
         // until it is heard again.
@@ -50,7 +52,7 @@ fn no_vehicle_that_passes_at_the_scheduled_separation_is_stopped() {
             outcome.longest_unheard_stop_s <= UNHEARD_STOP_S,
             "{:.2} s unheard: {}",
             outcome.longest_unheard_stop_s,
-            meeting::line(outcome)
+            meeting::outcome_line(outcome)
         );
     }
 }
@@ -60,14 +62,16 @@ const CATCHES: u64 = 100;
 
 #[test]
 fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
-    let (first, catches) =
-        (number("FLOCKMATE_CATCHES_FROM", 1), number("FLOCKMATE_CATCHES", CATCHES));
+    let (first, catches) = (
+        number_from_env("FLOCKMATE_CATCHES_FROM", 1),
+        number_from_env("FLOCKMATE_CATCHES", CATCHES),
+    );
     let outcomes: Vec<(bool, Outcome)> = (first..first + catches)
         .into_par_iter()
         .map(|seed| {
-            let scene = scene::caught(seed);
+            let scene = scene::scene_with_caught_vehicle(seed);
             let windy = scene
-                .happenings
+                .events
                 .iter()
                 .any(|happening| happening.what == MeetingEvent::Caught(Catch::Wind));
             (windy, meeting::fly(&scene))
@@ -75,18 +79,18 @@ fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
         .collect();
     // A vehicle that the wind carries off may be carried into others.
     let bad = |(windy, outcome): &&(bool, Outcome)| match windy {
-        true => !outcome.stuck.is_empty(),
-        false => outcome.is_bad(),
+        true => !outcome.not_landed.is_empty(),
+        false => outcome.breaks_rule(),
     };
     if let Some((_, bad)) = outcomes.iter().find(bad) {
-        println!("{}", meeting::line(bad));
-        meeting::fly_traced(&scene::caught(bad.seed))
+        println!("{}", meeting::outcome_line(bad));
+        meeting::fly_traced(&scene::scene_with_caught_vehicle(bad.seed))
             .trace
             .iter()
             .for_each(|line| println!("{line}"));
     }
     let bad: Vec<_> =
-        outcomes.iter().filter(bad).map(|(_, outcome)| meeting::line(outcome)).collect();
+        outcomes.iter().filter(bad).map(|(_, outcome)| meeting::outcome_line(outcome)).collect();
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
@@ -101,9 +105,12 @@ const NOT_LANDED_ONCE: [u64; 14] =
 
 #[test]
 fn nobody_stays_in_the_air_where_a_wait_once_had_no_end() {
-    let outcomes: Vec<Outcome> =
-        NOT_LANDED_ONCE.into_par_iter().map(|seed| meeting::fly(&scene::scene(seed))).collect();
-    let bad: Vec<_> = outcomes.iter().filter(|one| one.is_bad()).map(meeting::line).collect();
+    let outcomes: Vec<Outcome> = NOT_LANDED_ONCE
+        .into_par_iter()
+        .map(|seed| meeting::fly(&scene::random_scene(seed)))
+        .collect();
+    let bad: Vec<_> =
+        outcomes.iter().filter(|one| one.breaks_rule()).map(meeting::outcome_line).collect();
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
@@ -116,19 +123,26 @@ const BLOCKED_MOST: u32 = 15;
 
 #[test]
 fn companions_that_meet_at_random_keep_apart() {
-    let outcomes: Vec<Outcome> =
-        (1..=MEETINGS).into_par_iter().map(|seed| meeting::fly(&scene::scene(seed))).collect();
+    let outcomes: Vec<Outcome> = (1..=MEETINGS)
+        .into_par_iter()
+        .map(|seed| meeting::fly(&scene::random_scene(seed)))
+        .collect();
     report(&outcomes);
     let sum = meeting::summary(&outcomes);
     // Among 10 000 meetings some failures are left: `docs/safety.md`.
-    assert_eq!((sum.too_near[0], sum.touches, sum.stuck), (0, [0; 2], [0; 2]), "{sum}");
-    let blocked = outcomes.iter().map(|outcome| outcome.most_blocked).max();
+    assert_eq!((sum.too_near[0], sum.touches, sum.not_landed), (0, [0; 2], [0; 2]), "{sum}");
+    let blocked = outcomes.iter().map(|outcome| outcome.max_blocked_count).max();
     assert!(blocked <= Some(BLOCKED_MOST), "a vehicle found its path blocked {blocked:?} times");
     assert!(sum.unavoidable[0] as f32 <= UNAVOIDABLE_MOST * sum.meetings[0] as f32, "{sum}");
     let mut setpoints = SetpointStats::default();
     outcomes.iter().for_each(|outcome| setpoints.merge(&outcome.setpoints));
     println!("{setpoints}");
-    let unfit = (setpoints.jumps, setpoints.jerky, setpoints.outside, setpoints.not_finite);
+    let unfit = (
+        setpoints.too_far_apart,
+        setpoints.too_jerky,
+        setpoints.outside_fence,
+        setpoints.not_finite,
+    );
     assert_eq!(unfit, (0, 0, 0, 0), "{setpoints}");
-    assert!(setpoints.count > 100_000 && setpoints.accel_mps2 < ACCEL_MPS2, "{setpoints}");
+    assert!(setpoints.count > 100_000 && setpoints.max_accel_mps2 < ACCEL_MPS2, "{setpoints}");
 }

@@ -115,8 +115,8 @@ fn fly(seed: u64) -> Errors {
     let mut members = vehicles_on_pads(&mission).expect("good vehicles");
     // The radio has one station more than vehicles, which only listens.
     let listener = members.len();
-    let mut radio =
-        Radio::new(RadioConfig { range_m: 1e6, loss: 0.0, delay_s: 0.05 }, listener + 1, seed);
+    let config = RadioConfig { range_m: 1e6, loss_probability: 0.0, delay_s: 0.05 };
+    let mut radio = Radio::new(config, listener + 1, seed);
     let (mut framer, mut ground_station, mut log) =
         (Framer::new(), GroundStation::new(255), Vec::new());
     let mut places: Vec<Point> =

@@ -30,9 +30,9 @@ struct Recorded {
 }
 
 fn recording(path: &Path) -> Vec<Recorded> {
-    let records = logs::read(path);
+    let records = logs::read_log(path);
     let first_us = records.first().map_or(0, |record| record.at_us);
-    let decoded = |record: logs::Recorded| {
+    let decoded = |record: logs::LogRecord| {
         let frame = Framer::new().next(Instant::ZERO, &mut record.bytes.as_slice());
         Recorded { t_s: (record.at_us - first_us) as f64 * 1e-6, bytes: record.bytes, frame }
     };
@@ -209,7 +209,9 @@ fn play(
             seen.modes.push(telemetry.custom_mode);
         }
         let on_ground = telemetry.reports_ground(now);
-        if (on_ground || telemetry.reports_flight()) && seen.grounded.last() != Some(&on_ground) {
+        if (on_ground || telemetry.last_reported_flight())
+            && seen.grounded.last() != Some(&on_ground)
+        {
             seen.grounded.push(on_ground);
         }
         let Some(heard) = &entry.frame else { continue };

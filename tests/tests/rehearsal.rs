@@ -10,7 +10,9 @@ use std::time::{Duration, Instant as Clock};
 
 use companion::Instant;
 use companion::link::frame::{self, Framer, Header};
-use flockmate_tests::{Guard, autopilot, free_port, host_sim, listening, workspace};
+use flockmate_tests::{
+    ChildGuard, free_port, host_sim_path, start_autopilot, start_listening, workspace,
+};
 use host_sim::link::{ByteLink, LinkUrl};
 use serialport::TTYPort;
 
@@ -24,14 +26,14 @@ const PX4_OFFBOARD: [f32; 3] = [1.0, 6.0, 0.0];
 
 /// A companion of the lobby's first vehicle, started at once, and what it prints.
 struct Flight {
-    process: Guard,
+    process: ChildGuard,
     lines: Receiver<String>,
     seen: Vec<String>,
 }
 
 impl Flight {
     fn begin(autopilot: &str) -> Self {
-        let mut child = Command::new(host_sim())
+        let mut child = Command::new(host_sim_path())
             .args(["companion", "--id", "1", "--start", "--autopilot", autopilot])
             .arg(workspace().join("host-sim/scenarios/lobby.toml"))
             .stdout(Stdio::piped())
@@ -42,7 +44,7 @@ impl Flight {
         thread::spawn(move || {
             output.lines().map_while(Result::ok).try_for_each(|line| sender.send(line))
         });
-        Self { process: Guard(child), lines, seen: Vec::new() }
+        Self { process: ChildGuard(child), lines, seen: Vec::new() }
     }
 
     /// Waits for a line that contains `text`, and calls `meanwhile` every half second.
@@ -145,18 +147,18 @@ fn assert_done((code, lines): (Option<i32>, Vec<String>)) {
 }
 
 /// A radio with this share of losses, and the addresses of its links.
-fn radio(links: usize, loss: &str) -> (Guard, Vec<String>) {
-    let mut command = Command::new(host_sim());
+fn radio(links: usize, loss: &str) -> (ChildGuard, Vec<String>) {
+    let mut command = Command::new(host_sim_path());
     command.args(["radio", "--delay", "0.02", "--loss", loss]);
     (0..links).for_each(|_| {
         command.args(["--listen", "udp-listen:127.0.0.1:0"]);
     });
-    listening(command, links)
+    start_listening(command, links)
 }
 
 /// Uploads a file; returns what the program prints.
 fn upload(link: &str, file: &std::path::Path) -> String {
-    let done = Command::new(host_sim()).args(["upload", "--link", link]).arg(file).output();
+    let done = Command::new(host_sim_path()).args(["upload", "--link", link]).arg(file).output();
     let done = done.expect("the upload starts");
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
     String::from_utf8_lossy(&done.stdout).into_owned()
@@ -189,7 +191,7 @@ fn wire() -> [String; 2] {
 
 #[test]
 fn arducopter_is_flown_over_tcp_and_waits_for_a_companion_that_stalls() {
-    let (_autopilot, at) = autopilot(&["tcp-listen:127.0.0.1:0"], ARDUPILOT);
+    let (_autopilot, at) = start_autopilot(&["tcp-listen:127.0.0.1:0"], ARDUPILOT);
     let mut flight = Flight::begin(&format!("tcp:{}", at[0]));
     flight.until("Climb → Follow", || ());
     flight.signal("-STOP");
@@ -201,7 +203,7 @@ fn arducopter_is_flown_over_tcp_and_waits_for_a_companion_that_stalls() {
 #[test]
 fn arducopter_is_flown_over_a_serial_line() {
     let [near, far] = wire();
-    let _autopilot = autopilot(&[&format!("serial:{near}:57600")], ARDUPILOT);
+    let _autopilot = start_autopilot(&[&format!("serial:{near}:57600")], ARDUPILOT);
     assert_done(Flight::begin(&format!("serial:{far}:57600")).end());
 }
 
@@ -209,7 +211,7 @@ fn arducopter_is_flown_over_a_serial_line() {
 fn px4_is_flown_over_udp_and_given_back_by_its_pilot() {
     let port = free_port();
     let (_autopilot, at) =
-        autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
+        start_autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let mut pilot = Ground::new(&format!("udp:{}", at[1]));
     let mut operator = Ground::new(&format!("udp:127.0.0.1:{port}"));
     let mut flight = Flight::begin(&format!("udp-listen:127.0.0.1:{port}"));
@@ -227,7 +229,7 @@ fn px4_is_flown_over_udp_and_given_back_by_its_pilot() {
 fn px4_lands_when_its_companion_stalls_and_gets_no_setpoint_afterwards() {
     let port = free_port();
     let (_autopilot, at) =
-        autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
+        start_autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let mut pilot = Ground::new(&format!("udp:{}", at[1]));
     let mut flight = Flight::begin(&format!("udp-listen:127.0.0.1:{port}"));
     // The message is repeated: an address that is silent for long is sent nothing any more.
@@ -247,12 +249,12 @@ fn px4_lands_when_its_companion_stalls_and_gets_no_setpoint_afterwards() {
 #[test]
 fn an_arducopter_that_reboots_in_flight_ends_the_mission_on_the_ground() {
     let port = free_port();
-    let (mut first, at) = autopilot(&[&format!("tcp-listen:127.0.0.1:{port}")], ARDUPILOT);
+    let (mut first, at) = start_autopilot(&[&format!("tcp-listen:127.0.0.1:{port}")], ARDUPILOT);
     let mut flight = Flight::begin(&format!("tcp:{}", at[0]));
     flight.until("Climb → Follow", || ());
     let killed = |child: &mut Child| child.kill().and_then(|()| child.wait());
     killed(&mut first.0).expect("it can be ended");
-    let _second = autopilot(&[&format!("tcp-listen:{}", at[0])], ARDUPILOT);
+    let _second = start_autopilot(&[&format!("tcp-listen:{}", at[0])], ARDUPILOT);
     flight.until("Disarmed in flight: mission over", || ());
     let (code, lines) = flight.end();
     assert_eq!(code, Some(1), "{lines:#?}");
@@ -262,21 +264,21 @@ fn an_arducopter_that_reboots_in_flight_ends_the_mission_on_the_ground() {
 fn files_go_up_through_the_autopilot_and_over_a_radio_that_loses() {
     let files = tempfile::tempdir().expect("a directory");
     let lobby = workspace().join("host-sim/scenarios/lobby.toml");
-    let mut plan = Command::new(host_sim());
+    let mut plan = Command::new(host_sim_path());
     plan.arg("plan").arg(&lobby).arg("--out").arg(files.path()).stdout(Stdio::null());
     assert!(plan.status().expect("host-sim starts").success());
     let port = free_port();
     let (_autopilot, at) =
-        autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
+        start_autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let (_radio, ends) = radio(2, "0.1");
-    let companion = Command::new(host_sim())
+    let companion = Command::new(host_sim_path())
         .args(["companion", "--id", "1", "--autopilot", &format!("udp-listen:127.0.0.1:{port}")])
         .args(["--swarm", &format!("udp:{}", ends[0])])
         .arg(&lobby)
         .stdout(Stdio::null())
         .spawn()
         .expect("the companion starts");
-    let _companion = Guard(companion);
+    let _companion = ChildGuard(companion);
     let said = upload(&format!("udp:{}", ends[1]), &files.path().join("mission.bin"));
     assert!(said.contains("vehicle 1's mission.bin") && said.contains("CRC-32 right"), "{said}");
     let said = upload(&format!("udp:{}", at[1]), &files.path().join("roadmap.bin"));

@@ -10,8 +10,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use flockmate_tests::areas::SMALL_FIELD;
-use flockmate_tests::{Guard, chromium, host_sim};
+use flockmate_tests::areas::SMALL_FIELD_SCENARIO;
+use flockmate_tests::{ChildGuard, chromium, host_sim_path};
 use host_sim::report::{
     Curve, Level, LogEvent, MapSurface, Plot, PlotLimit, ReportData, ReportVehicle, RoadmapLines,
     TrackPoint, page as page_of, vehicle_color,
@@ -67,9 +67,9 @@ fn vehicle(id: u8, path: Vec<Point>) -> ReportVehicle {
         goal_index: Some(0),
         start,
         goal,
-        planned: path,
+        planned_path: path,
         track,
-        lost_s: None,
+        power_lost_at_s: None,
     }
 }
 
@@ -206,7 +206,7 @@ fn browse(chromium: &Path, page: &Path, hash: &str, screenshot: &Path) -> String
         .stderr(File::create(&err).expect("a file for stderr"))
         .spawn()
         .expect("Chromium starts");
-    let status = Guard(child).wait_for(BROWSER_LIMIT).expect("Chromium ends in time");
+    let status = ChildGuard(child).wait_for(BROWSER_LIMIT).expect("Chromium ends in time");
     let log = String::from_utf8_lossy(&fs::read(&err).expect("stderr")).into_owned();
     assert!(status.success(), "Chromium failed: {log}");
     // Reading pixels back for the screenshot makes the driver itself complain.
@@ -293,7 +293,7 @@ fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
 fn page_of_the_demo_opens_clean_and_shows_every_vehicle_move() {
     let Some(chromium) = chromium() else { return };
     let dir = tempfile::tempdir().expect("a directory");
-    let demo = Command::new(host_sim()).args(["demo", "--out"]).arg(dir.path()).output();
+    let demo = Command::new(host_sim_path()).args(["demo", "--out"]).arg(dir.path()).output();
     assert!(demo.expect("the demo runs").status.success());
     let page = dir.path().join("report.html");
     assert!(fs::metadata(&page).expect("the page is there").len() < 6_000_000);
@@ -345,8 +345,9 @@ fn page_of_a_coverage_flight_shows_what_each_vehicle_photographs_after_a_loss() 
     let scenario = dir.path().join("lost.toml");
     // One of three loses all power over the area.
     let fault = "[[faults]]\nat_s = 90.0\nkind = \"kill\"\nvehicle = 2\n";
-    fs::write(&scenario, format!("seed = 7\n{SMALL_FIELD}{fault}")).expect("it is written");
-    let mut fly = Command::new(host_sim());
+    fs::write(&scenario, format!("seed = 7\n{SMALL_FIELD_SCENARIO}{fault}"))
+        .expect("it is written");
+    let mut fly = Command::new(host_sim_path());
     let flown =
         fly.arg("fly").arg(&scenario).arg("--out").arg(dir.path()).output().expect("it flies");
     assert!(flown.status.success(), "{}", String::from_utf8_lossy(&flown.stdout));
@@ -418,8 +419,8 @@ fn page_of_a_plan_offers_no_flown_tracks() {
     let Some(chromium) = chromium() else { return };
     let dir = tempfile::tempdir().expect("a directory");
     let scenario = dir.path().join("field.toml");
-    fs::write(&scenario, SMALL_FIELD).expect("it is written");
-    let mut cover = Command::new(host_sim());
+    fs::write(&scenario, SMALL_FIELD_SCENARIO).expect("it is written");
+    let mut cover = Command::new(host_sim_path());
     let planned = cover.arg("cover").arg(&scenario).arg("--out").arg(dir.path()).output();
     assert!(planned.expect("it plans").status.success());
     let opened = open(&chromium, &dir.path().join("report.html"), "#t=60&view=top");

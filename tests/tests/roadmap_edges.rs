@@ -2,14 +2,14 @@
 //! segment check.
 
 use flockmate_tests::shared_data;
-use host_sim::map::{self, BoxTree, Unknown, VoxelMap};
+use host_sim::map::{self, BoxTree, UnknownSpace, VoxelMap};
 use host_sim::roadmap::{self, MAX_STORED_CLEARANCE_M};
 use planner_core::roadmap::prm::{self, NodeIndex, PrmConfig, Sampling};
 
 const SEEDS: u64 = 20;
 
 fn load(file: &str, resolution_m: f32) -> VoxelMap {
-    map::load(file, resolution_m).expect("the map is good").to_voxel_map(Unknown::Blocked)
+    map::load(file, resolution_m).expect("the map is good").to_voxel_map(UnknownSpace::Blocked)
 }
 
 fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
@@ -19,7 +19,7 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
     let tree = BoxTree::new(&grid);
     for seed in 1..=SEEDS {
         let config = PrmConfig {
-            nodes,
+            random_nodes: nodes,
             edge_min_m: 0.5,
             edge_max_m: 8.0,
             clearance_m,

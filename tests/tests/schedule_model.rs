@@ -25,9 +25,9 @@
 
 use std::collections::{HashSet, VecDeque};
 
-use flockmate_tests::swarms::{self, Plan, Random, Swarm, end_m, place};
+use flockmate_tests::swarms::{self, Plan, Random, Swarm, end_arc_length_m, position_at};
 use planner_core::Point;
-use planner_core::flight::{Gate, PROGRESS_ERROR_M};
+use planner_core::flight::{Gate, MAX_REPORTED_PROGRESS_LAG_M};
 use rayon::prelude::*;
 
 /// Number of plans searched for each number of vehicles, each with a gate that matters.
@@ -94,15 +94,19 @@ enum Outcome {
 impl Model {
     fn new(plan: &Plan, gates: &[Vec<Gate>], obeys: Obeys, safety_m: f32) -> Self {
         let flights = &plan.flights;
-        let index = |id: u8| flights.iter().position(|f| f.id == id).unwrap();
+        let index = |id: u8| flights.iter().position(|f| f.vehicle_id == id).unwrap();
         let mut courses = Vec::new();
         for (i, flight) in flights.iter().enumerate() {
-            let (pad_m, end) = (-flight.climb_m, end_m(flight));
+            let (pad_m, end) = (-flight.climb_m, end_arc_length_m(flight));
             let waypoints = flight.path.waypoints().iter().map(|w| w.along_m);
             let waits = gates[i].iter().map(|g| g.at_m);
-            let heard = gates.iter().flatten().filter(|g| g.id == flight.id);
-            let reports =
-                heard.flat_map(|g| [g.until_m - PROGRESS_ERROR_M, g.until_m + PROGRESS_ERROR_M]);
+            let heard = gates.iter().flatten().filter(|g| g.wait_for_id == flight.vehicle_id);
+            let reports = heard.flat_map(|g| {
+                [
+                    g.open_from_progress_m - MAX_REPORTED_PROGRESS_LAG_M,
+                    g.open_from_progress_m + MAX_REPORTED_PROGRESS_LAG_M,
+                ]
+            });
             let all = waypoints.chain(waits).chain(reports).chain([end]);
             let mut marks: Vec<f32> = all.filter(|&m| m > pad_m + ROUNDING_M && m <= end).collect();
             // The stretch from mark 0 to mark 1, which is the same place, is the pad.
@@ -116,12 +120,14 @@ impl Model {
                 (1..marks.len()).rfind(|&k| marks[k] <= at_m + ROUNDING_M).unwrap()
             };
             let mut at: Vec<Vec<(usize, f32)>> = vec![Vec::new(); marks.len()];
-            gates[i].iter().for_each(|g| at[begins(g.at_m)].push((index(g.id), g.until_m)));
+            gates[i].iter().for_each(|g| {
+                at[begins(g.at_m)].push((index(g.wait_for_id), g.open_from_progress_m));
+            });
             let stretch = |k: usize| {
                 let (from, to) = (marks[k], marks.get(k + 1).copied().unwrap_or(marks[k]));
                 let steps = ((to - from) / 0.1).ceil().max(1.0) as usize;
                 (0..=steps)
-                    .map(|s| place(flight, from + (to - from) * s as f32 / steps as f32))
+                    .map(|s| position_at(flight, from + (to - from) * s as f32 / steps as f32))
                     .collect()
             };
             let points = (0..marks.len()).map(stretch).collect();
@@ -163,11 +169,10 @@ impl Model {
                 _ if landed => other.marks[k] + 1.0,
                 // The other vehicle may be anywhere on its stretch: some report is this high, but
                 // none is beyond the ground ...
-                (_, Reports::Highest) => {
-                    (other.marks[k] + PROGRESS_ERROR_M).min(other.marks[usize::from(other.last())])
-                }
+                (_, Reports::Highest) => (other.marks[k] + MAX_REPORTED_PROGRESS_LAG_M)
+                    .min(other.marks[usize::from(other.last())]),
                 // ... and once it stands at the end of the stretch, no report is lower than this.
-                (_, Reports::Lowest) => other.marks[k + 1] - PROGRESS_ERROR_M,
+                (_, Reports::Lowest) => other.marks[k + 1] - MAX_REPORTED_PROGRESS_LAG_M,
             };
             match self.obeys {
                 Obeys::Right => reported_m >= until_m - ROUNDING_M,
@@ -278,12 +283,16 @@ impl Short {
         let mut rng = Random::new(seed);
         let swarm = Swarm::small(count, &mut rng);
         let plan = if swarm.tasks.len() == count { swarm.plan().ok()? } else { return None };
-        if plan.flights.iter().any(|f| !f.task.leaves_pad() || end_m(f) + f.climb_m > LONGEST_M) {
+        if plan
+            .flights
+            .iter()
+            .any(|f| !f.task.leaves_pad() || end_arc_length_m(f) + f.climb_m > LONGEST_M)
+        {
             return None;
         }
         let owns = swarm.vehicle_plans(&plan).expect("an Ok plan has all parts");
         let gates = owns.iter().map(|own| own.gates.to_vec()).collect();
-        Some(Self { plan, gates, safety_m: swarm.safety_m })
+        Some(Self { plan, gates, safety_m: swarm.safety_distance_m })
     }
 
     fn model(&self, obeys: Obeys) -> Model {
@@ -340,7 +349,7 @@ fn one(seed: u64, count: usize) -> Option<Sum> {
 }
 
 fn search(count: usize) {
-    let wanted = swarms::number("FLOCKMATE_MODELS", PLANS as u64) as usize;
+    let wanted = swarms::number_from_env("FLOCKMATE_MODELS", PLANS as u64) as usize;
     let mut all = Sum::default();
     let mut seed = 0;
     while all.plans < wanted {

@@ -10,8 +10,10 @@
 
 use std::collections::BTreeMap;
 
-use flockmate_tests::swarms::{self, Own, Plan, Random, Swarm, WAYPOINTS, end_m, place};
-use planner_core::flight::{Flight, Gate, PROGRESS_ERROR_M};
+use flockmate_tests::swarms::{
+    self, OwnPlan, Plan, Random, Swarm, WAYPOINTS, end_arc_length_m, position_at,
+};
+use planner_core::flight::{Flight, Gate, MAX_REPORTED_PROGRESS_LAG_M};
 use planner_core::plan::PlanError;
 use planner_core::schedule::ScheduleError;
 use rayon::prelude::*;
@@ -53,15 +55,19 @@ struct Awaited {
 }
 
 /// Flies a plan by progress; the error says which vehicles came too near, or are stuck.
-fn fly(plan: &Plan, owns: &[Own], safety_m: f32, rng: &mut Random) -> Result<f32, String> {
+fn fly(plan: &Plan, owns: &[OwnPlan], safety_m: f32, rng: &mut Random) -> Result<f32, String> {
     let flights = &plan.flights;
     let count = flights.len();
     let manners: Vec<Manner> = (0..count).map(|_| Manner::random(rng)).collect();
     let step_s = STEP_M / manners.iter().map(|m| m.speed_mps).fold(0.0, f32::max);
     let index = |id: u8| {
-        flights.iter().position(|f| f.id == id).expect("a gate names a vehicle of the plan")
+        flights.iter().position(|f| f.vehicle_id == id).expect("a gate names a vehicle of the plan")
     };
-    let awaited = |g: &Gate| Awaited { at_m: g.at_m, other: index(g.id), until_m: g.until_m };
+    let awaited = |g: &Gate| Awaited {
+        at_m: g.at_m,
+        other: index(g.wait_for_id),
+        until_m: g.open_from_progress_m,
+    };
     let gates: Vec<Vec<Awaited>> =
         owns.iter().map(|own| own.gates.iter().map(awaited).collect()).collect();
     assert!(
@@ -82,10 +88,9 @@ fn fly(plan: &Plan, owns: &[Own], safety_m: f32, rng: &mut Random) -> Result<f32
         let reported: Vec<f32> = (0..count)
             .map(|i| match along[i] {
                 m if m <= -flights[i].climb_m => m,
-                m if flights[i].task.leaves_pad() && m >= end_m(&flights[i]) => m + 1.0,
-                m => {
-                    (m + rng.uniform(-1.0, 1.0).signum() * PROGRESS_ERROR_M).min(end_m(&flights[i]))
-                }
+                m if flights[i].task.leaves_pad() && m >= end_arc_length_m(&flights[i]) => m + 1.0,
+                m => (m + rng.uniform(-1.0, 1.0).signum() * MAX_REPORTED_PROGRESS_LAG_M)
+                    .min(end_arc_length_m(&flights[i])),
             })
             .collect();
         let mut moved = false;
@@ -105,32 +110,36 @@ fn fly(plan: &Plan, owns: &[Own], safety_m: f32, rng: &mut Random) -> Result<f32
             let passed = gates[i].partition_point(|g| g.at_m < along[i] - 1e-3);
             let shut = |g: &&Awaited| reported[g.other] < g.until_m;
             let free = gates[i][passed..].iter().find(shut).map_or(f32::INFINITY, |g| g.at_m);
-            let to_m = (along[i] + manners[i].speed_mps * step_s).min(free).min(end_m(flight));
+            let to_m =
+                (along[i] + manners[i].speed_mps * step_s).min(free).min(end_arc_length_m(flight));
             if to_m > along[i] {
                 along[i] = to_m;
                 moved = true;
             }
         }
-        let moves = |i: usize| along[i] > -flights[i].climb_m && along[i] < end_m(&flights[i]);
+        let moves =
+            |i: usize| along[i] > -flights[i].climb_m && along[i] < end_arc_length_m(&flights[i]);
         for i in 0..count {
             for j in (0..i).filter(|&j| moves(i) || moves(j)) {
-                let apart = (place(&flights[i], along[i]) - place(&flights[j], along[j])).norm();
+                let apart = (position_at(&flights[i], along[i])
+                    - position_at(&flights[j], along[j]))
+                .norm();
                 smallest = smallest.min(apart);
                 if apart < safety_m - 1e-3 {
-                    let [i, j] =
-                        [i, j].map(|i| format!("vehicle {} at {} m", flights[i].id, along[i]));
+                    let [i, j] = [i, j]
+                        .map(|i| format!("vehicle {} at {} m", flights[i].vehicle_id, along[i]));
                     return Err(format!("{apart:.2} m apart at {t_s:.1} s: {i}, {j}"));
                 }
             }
         }
-        if (0..count).all(|i| along[i] >= end_m(&flights[i])) {
+        if (0..count).all(|i| along[i] >= end_arc_length_m(&flights[i])) {
             return Ok(smallest);
         }
         // The error of a report changes each step: a gate may open later.
         still = if moved { 0 } else { still + 1 };
         if still > 40 {
-            let stuck = |i: &usize| along[*i] < end_m(&flights[*i]);
-            let ids: Vec<u8> = (0..count).filter(stuck).map(|i| flights[i].id).collect();
+            let stuck = |i: &usize| along[*i] < end_arc_length_m(&flights[*i]);
+            let ids: Vec<u8> = (0..count).filter(stuck).map(|i| flights[i].vehicle_id).collect();
             return Err(format!("stuck at {t_s:.1} s: {ids:?}"));
         }
     }
@@ -169,7 +178,7 @@ fn one(seed: u64) -> Sum {
             return sum;
         }
     };
-    let owns: Result<Vec<Own>, ScheduleError> = swarm.vehicle_plans(&plan);
+    let owns: Result<Vec<OwnPlan>, ScheduleError> = swarm.vehicle_plans(&plan);
     let owns = match owns {
         Ok(owns) => owns,
         Err(error) => {
@@ -190,7 +199,7 @@ fn one(seed: u64) -> Sum {
     sum.long_hovers = u64::from(plan.flights.iter().any(|f| longest_hover_s(f) > LONG_HOVER_S));
     sum.makespan_s = f64::from(plan.flights.iter().map(landed_s).fold(0.0, f32::max));
     for _ in 0..2 {
-        if let Err(error) = fly(&plan, &owns, swarm.safety_m, &mut rng) {
+        if let Err(error) = fly(&plan, &owns, swarm.safety_distance_m, &mut rng) {
             sum.failures.push(format!("seed {seed}: {error}"));
             break;
         }
@@ -201,8 +210,8 @@ fn one(seed: u64) -> Sum {
 #[test]
 fn random_swarms_stay_apart_and_arrive_by_gates_alone() {
     let (first, count) = (
-        swarms::number("FLOCKMATE_SCHEDULES_FROM", 1),
-        swarms::number("FLOCKMATE_SCHEDULES", SWARMS),
+        swarms::number_from_env("FLOCKMATE_SCHEDULES_FROM", 1),
+        swarms::number_from_env("FLOCKMATE_SCHEDULES", SWARMS),
     );
     let sums: Vec<Sum> = (first..first + count).into_par_iter().map(one).collect();
     let mut all = Sum::default();

@@ -24,7 +24,7 @@ pub struct Region {
     /// Name of its row in `cargo xtask size`.
     pub name: &'static str,
     /// Address of its first byte.
-    pub at: u64,
+    pub address: u64,
     /// Its size, bytes.
     pub len: usize,
     /// Budget of statics in it, bytes.
@@ -65,7 +65,13 @@ impl Board {
     /// The board's RAMs, as in its `memory.x`, with the budget of statics in each.
     pub fn regions(self) -> &'static [Region] {
         const fn region(name: &'static str, at: u64, len: usize, most: usize) -> Region {
-            Region { name, at, len: len << 10, statics_budget: most << 10, has_stack: false }
+            Region {
+                name,
+                address: at,
+                len: len << 10,
+                statics_budget: most << 10,
+                has_stack: false,
+            }
         }
         // In DTCM companion, crash record and stack guard have 40 kB; the stack has the rest.
         const H743: &[Region] = &[
@@ -128,7 +134,7 @@ impl Board {
 }
 
 /// The programs that were built for a board.
-pub struct Built {
+pub struct BuiltPrograms {
     /// Directory that holds them.
     pub folder: PathBuf,
     /// Number of the compiler's warnings, repeated ones of earlier builds included.
@@ -136,13 +142,13 @@ pub struct Built {
 }
 
 /// Builds a board's programs and copies them to a directory of that board.
-pub fn build(board: Board) -> Result<Built> {
+pub fn build(board: Board) -> Result<BuiltPrograms> {
     let target = board.target();
     let packages = board.packages().iter().flat_map(|name| ["-p", name]);
     let programs = board.programs().iter().flat_map(|name| ["--bin", name]);
     let products = target_dir().join("firmware");
     let mut flags = String::new();
-    let mut building = if rustup_has(target) {
+    let mut building = if rustup_has_target(target) {
         println!("{}: rustup's {target}", board.name());
         cargo()
     } else {
@@ -154,7 +160,7 @@ pub fn build(board: Board) -> Result<Built> {
         cargo
             .env("RUSTC_BOOTSTRAP", "1")
             .env("RUSTC", "/usr/bin/rustc")
-            .env(variable(target, "LINKER"), "/usr/bin/ld.lld")
+            .env(cargo_target_variable(target, "LINKER"), "/usr/bin/ld.lld")
             .env_remove("RUSTUP_TOOLCHAIN")
             .env_remove("CARGO");
         cargo.args(["-Zbuild-std=core,alloc", "-Zbuild-std-features=compiler-builtins-mem"]);
@@ -173,7 +179,7 @@ pub fn build(board: Board) -> Result<Built> {
         .args(["--features", board.name()])
         .args(packages)
         .args(programs)
-        .env(variable(target, "RUSTFLAGS"), flags);
+        .env(cargo_target_variable(target, "RUSTFLAGS"), flags);
     // Either variable would replace the flags set above.
     building.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
     building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info");
@@ -195,15 +201,15 @@ pub fn build(board: Board) -> Result<Built> {
     for program in board.programs() {
         std::fs::copy(products.join(target).join("release").join(program), aside.join(program))?;
     }
-    Ok(Built { folder: aside, warnings })
+    Ok(BuiltPrograms { folder: aside, warnings })
 }
 
 /// Name of cargo's environment variable for a setting of a target.
-fn variable(target: &str, name: &str) -> String {
+fn cargo_target_variable(target: &str, name: &str) -> String {
     format!("CARGO_TARGET_{}_{name}", target.to_uppercase().replace(['-', '.'], "_"))
 }
 
-fn rustup_has(target: &str) -> bool {
+fn rustup_has_target(target: &str) -> bool {
     let installed = command("rustup").args(["target", "list", "--installed"]).output();
     installed
         .is_ok_and(|out| String::from_utf8_lossy(&out.stdout).lines().any(|line| line == target))

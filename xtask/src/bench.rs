@@ -7,10 +7,10 @@ use anyhow::{Context, Result, ensure};
 
 use crate::bare_metal::{self, Board};
 use crate::install;
-use crate::shell::{cargo, command, root, run, target_dir};
+use crate::shell::{cargo, checkout_root, command, run, target_dir};
 
 /// Source of the C++ baseline, relative to the checkout.
-const PEER: &str = "../shared/peers/algorithm1.cpp";
+const BASELINE_SOURCE: &str = "../shared/peers/algorithm1.cpp";
 
 /// Arguments of `bench`.
 #[derive(clap::Args)]
@@ -64,7 +64,7 @@ pub fn run_bench(args: &Args) -> Result<()> {
         }
         return run(&mut bench);
     }
-    install::install_missing(install::COUNTER)?;
+    install::install_missing(install::INSTRUCTION_COUNTER)?;
     bench.args(["bench", "--"]);
     let runs = |group: &str| args.only.as_deref().is_none_or(|only| group.contains(only));
     if runs("worst-case") || runs("boards") {
@@ -112,14 +112,15 @@ fn compare_profiles() -> Result<()> {
 /// Builds the C++ baseline with the options that its file's header gives, if its source is newer
 /// than the program. Returns the program's path.
 fn build_baseline() -> Result<PathBuf> {
-    let source = root().join(PEER);
+    let source = checkout_root().join(BASELINE_SOURCE);
     let modified = |file: &Path| file.metadata().and_then(|m| m.modified());
-    let source_time = modified(&source).with_context(|| format!("{PEER} is not there"))?;
+    let source_time =
+        modified(&source).with_context(|| format!("{BASELINE_SOURCE} is not there"))?;
     let program = target_dir().join("algorithm1");
     if modified(&program).is_ok_and(|built| built >= source_time) {
         return Ok(program);
     }
-    install::install_missing(install::PEER)?;
+    install::install_missing(install::CPP_BASELINE)?;
     std::fs::create_dir_all(target_dir())?;
     run(command("g++")
         .args(["-O3", "-march=native", "-o"])

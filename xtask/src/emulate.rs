@@ -12,15 +12,15 @@ use anyhow::{Context, Result, ensure};
 
 use crate::bare_metal::{self, Board};
 use crate::install;
-use crate::shell::{cargo, command, root, run, target_dir};
+use crate::shell::{cargo, checkout_root, command, run, target_dir};
 
 /// The scenario whose first vehicles fly.
-const DEMO: &str = "host-sim/scenarios/demo.toml";
+const DEMO_SCENARIO: &str = "host-sim/scenarios/demo.toml";
 /// Line with which each vehicle's table begins in the scenario.
-const VEHICLE: &str = "[[vehicles]]";
+const VEHICLE_TABLE_LINE: &str = "[[vehicles]]";
 /// Longest permitted gap between two setpoints, milliseconds: they are due every 50 ms, and a board
 /// whose tasks run in time adds less than 1 ms.
-const GAP_MS: usize = 51;
+const MAX_SETPOINT_GAP_MS: usize = 51;
 
 /// Arguments of `emulate`.
 #[derive(clap::Args)]
@@ -62,55 +62,55 @@ pub fn fly_for_stack_use(args: &Args) -> Result<usize> {
     std::fs::create_dir_all(&out).with_context(|| format!("cannot write: {}", out.display()))?;
     let (scenario, boards) = (out.join("scenario.toml"), usize::from(args.vehicles));
     std::fs::write(&scenario, cut_demo(boards)?)?;
-    let Reported { gaps_ms, stacks } = fly(&host_sim, &firmware, &scenario, &out)?;
+    let BoardReports { gaps_ms, stack_bytes: stacks } = fly(&host_sim, &firmware, &scenario, &out)?;
     ensure!(
         gaps_ms.len() == boards,
         "{} of {boards} boards reported their setpoints",
         gaps_ms.len()
     );
     ensure!(
-        gaps_ms.iter().all(|gap| *gap <= GAP_MS),
-        "setpoints were {gaps_ms:?} ms apart: {GAP_MS} are allowed"
+        gaps_ms.iter().all(|gap| *gap <= MAX_SETPOINT_GAP_MS),
+        "setpoints were {gaps_ms:?} ms apart: {MAX_SETPOINT_GAP_MS} are allowed"
     );
     stacks.into_iter().max().context("no board reported its stack")
 }
 
 /// Numbers that boards reported by STATUSTEXT or log, one of each board.
 #[derive(Default)]
-struct Reported {
+struct BoardReports {
     /// Longest gap between two setpoints of each board, milliseconds.
     gaps_ms: Vec<usize>,
     /// Deepest use of each board's stack, bytes.
-    stacks: Vec<usize>,
+    stack_bytes: Vec<usize>,
 }
 
 /// Runs `host-sim fly`, prints its output and collects the boards' reports from it.
-fn fly(host_sim: &Path, firmware: &Path, scenario: &Path, out: &Path) -> Result<Reported> {
+fn fly(host_sim: &Path, firmware: &Path, scenario: &Path, out: &Path) -> Result<BoardReports> {
     let mut fly = command(host_sim);
     fly.arg("fly").arg(scenario).arg("--out").arg(out).arg("--emulate").arg(firmware);
     let mut fly = fly.stdout(Stdio::piped()).spawn()?;
-    let mut reported = Reported::default();
+    let mut reported = BoardReports::default();
     for line in BufReader::new(fly.stdout.take().context("its output is piped")?).lines() {
         let line = line?;
         println!("{line}");
-        reported.gaps_ms.extend(number(&line, "Setpoints: ", ", at most "));
-        reported.stacks.extend(number(&line, "stack:", " "));
+        reported.gaps_ms.extend(number_after(&line, "Setpoints: ", ", at most "));
+        reported.stack_bytes.extend(number_after(&line, "stack:", " "));
     }
     ensure!(fly.wait()?.success(), "the mission was not complete and clean");
     Ok(reported)
 }
 
 /// The number that follows `before`, searched in the part of `line` after `name`.
-fn number(line: &str, name: &str, before: &str) -> Option<usize> {
+fn number_after(line: &str, name: &str, before: &str) -> Option<usize> {
     let (_, rest) = line.split_once(name)?.1.split_once(before)?;
     rest.split(' ').next()?.parse().ok()
 }
 
 /// The demo scenario cut to its first vehicles.
 fn cut_demo(vehicles: usize) -> Result<String> {
-    let demo = std::fs::read_to_string(root().join(DEMO))
-        .with_context(|| format!("cannot read: {DEMO}"))?;
-    let parts: Vec<_> = demo.split(VEHICLE).take(1 + vehicles).collect();
-    ensure!(parts.len() == 1 + vehicles, "{DEMO} has only {} vehicles", parts.len() - 1);
-    Ok(parts.join(VEHICLE))
+    let demo = std::fs::read_to_string(checkout_root().join(DEMO_SCENARIO))
+        .with_context(|| format!("cannot read: {DEMO_SCENARIO}"))?;
+    let parts: Vec<_> = demo.split(VEHICLE_TABLE_LINE).take(1 + vehicles).collect();
+    ensure!(parts.len() == 1 + vehicles, "{DEMO_SCENARIO} has only {} vehicles", parts.len() - 1);
+    Ok(parts.join(VEHICLE_TABLE_LINE))
 }

@@ -3,7 +3,7 @@
 use anyhow::{Result, bail, ensure};
 
 use crate::bare_metal::{self, Board};
-use crate::shell::{command, find, run};
+use crate::shell::{command, find_on_path, run};
 
 /// Arguments of `flash`.
 #[derive(clap::Args)]
@@ -21,7 +21,7 @@ pub fn run_flash(args: &Args) -> Result<()> {
         Board::Pico2 => "RP235x",
     };
     ensure!(
-        find("probe-rs").is_some(),
+        find_on_path("probe-rs").is_some(),
         "probe-rs is not on the path: cargo install probe-rs-tools --locked"
     );
     let program = bare_metal::build(args.board)?.folder.join("flockmate");

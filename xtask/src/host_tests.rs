@@ -13,7 +13,7 @@ use serde_json::Value;
 use crate::shell::{self, cargo, command, compile};
 
 /// Programs in the order in which they start before all others: those that take longest.
-const FIRST: [&str; 9] = [
+const STARTED_FIRST: [&str; 9] = [
     "closed_loop",
     "coverage_losses",
     "schedules",
@@ -25,7 +25,7 @@ const FIRST: [&str; 9] = [
     "report",
 ];
 /// Programs that need boards, a browser or Python clients. The others run while these are built.
-const NEED_OTHERS: [&str; 9] = [
+const NEED_BOARDS_OR_CLIENTS: [&str; 9] = [
     "board",
     "board_coverage",
     "board_cuts",
@@ -37,14 +37,15 @@ const NEED_OTHERS: [&str; 9] = [
     "worst_case",
 ];
 /// Variables by which tests find boards, browser and Python clients.
-const OTHERS: [&str; 3] = ["FLOCKMATE_FIRMWARE", "FLOCKMATE_CHROMIUM", "FLOCKMATE_PYTHON"];
+const BOARD_AND_CLIENT_VARIABLES: [&str; 3] =
+    ["FLOCKMATE_FIRMWARE", "FLOCKMATE_CHROMIUM", "FLOCKMATE_PYTHON"];
 /// Programs whose tests measure the companion by the wall clock: they run alone.
-const ALONE: [&str; 1] = ["rehearsal"];
+const RUN_ALONE: [&str; 1] = ["rehearsal"];
 /// Number of tests of one program that run at once. Tests with boards mostly wait, so it is more
 /// than one.
 const TESTS_AT_ONCE: &str = "2";
 /// The same number for programs whose tests wait for Python clients or for processes in real time.
-const WAITING_AT_ONCE: [(&str, &str); 3] =
+const WAITING_TESTS_AT_ONCE: [(&str, &str); 3] =
     [("closed_loop", "4"), ("conformance", "4"), ("rehearsal", "6")];
 
 /// Environment variables with which programs run: name and value.
@@ -52,47 +53,47 @@ pub type Environment = Vec<(&'static str, OsString)>;
 
 /// A program of tests, or an example, which fails if its own checks fail.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Program {
+pub struct TestProgram {
     name: String,
     path: PathBuf,
     /// Directory of its package: tests find their files from there.
-    package: PathBuf,
+    package_folder: PathBuf,
 }
 
 /// The program of tests or example that cargo built; `None` for any other artifact.
-fn program(artifact: &Value) -> Option<Program> {
+fn test_program_of(artifact: &Value) -> Option<TestProgram> {
     let target = &artifact["target"];
     if artifact["profile"]["test"] != true && target["kind"][0] != "example" {
         return None;
     }
     let manifest = PathBuf::from(artifact["manifest_path"].as_str()?);
-    Some(Program {
+    Some(TestProgram {
         name: target["name"].as_str()?.to_owned(),
         path: artifact["executable"].as_str()?.into(),
-        package: manifest.parent()?.to_owned(),
+        package_folder: manifest.parent()?.to_owned(),
     })
 }
 
 /// Builds all of the workspace and returns its test programs and examples; a warning is an error.
-pub fn build() -> Result<Vec<Program>> {
+pub fn build() -> Result<Vec<TestProgram>> {
     let built = compile(cargo().args(["test", "--workspace", "--no-run", "--locked"]))?;
     ensure!(built.warnings == 0, "{} warnings", built.warnings);
-    let programs: Vec<_> = built.artifacts.iter().filter_map(program).collect();
+    let programs: Vec<_> = built.artifacts.iter().filter_map(test_program_of).collect();
     ensure!(!programs.is_empty(), "cargo names no program of tests");
     Ok(programs)
 }
 
 /// Sort key of a program: those with a smaller number start earlier.
-fn turn(program: &Program) -> usize {
-    FIRST.iter().position(|first| *first == program.name).unwrap_or(FIRST.len())
+fn start_order(program: &TestProgram) -> usize {
+    STARTED_FIRST.iter().position(|first| *first == program.name).unwrap_or(STARTED_FIRST.len())
 }
 
 /// Runs one program and prints all that it printed. True if it passed.
-fn passes(program: &Program, environment: &Environment) -> Result<bool> {
+fn run_program(program: &TestProgram, environment: &Environment) -> Result<bool> {
     let begun = Instant::now();
     let mut tests = command(&program.path);
-    tests.current_dir(&program.package).env("CARGO_MANIFEST_DIR", &program.package);
-    let waiting = WAITING_AT_ONCE.iter().find(|(name, _)| *name == program.name);
+    tests.current_dir(&program.package_folder).env("CARGO_MANIFEST_DIR", &program.package_folder);
+    let waiting = WAITING_TESTS_AT_ONCE.iter().find(|(name, _)| *name == program.name);
     let at_once = waiting.map_or(TESTS_AT_ONCE, |(_, at_once)| *at_once);
     tests.env("RUST_TEST_THREADS", at_once).envs(environment.iter().cloned());
     // The programs that tests run were built together with the tests.
@@ -105,8 +106,8 @@ fn passes(program: &Program, environment: &Environment) -> Result<bool> {
 }
 
 /// Runs `programs`, `at_once` of them at a time, and names those that failed.
-fn failures(
-    programs: Vec<Program>,
+fn run_all_and_name_failed(
+    programs: Vec<TestProgram>,
     at_once: usize,
     environment: &Environment,
 ) -> Result<Vec<String>> {
@@ -115,7 +116,7 @@ fn failures(
     let runner = || -> Result<Vec<String>> {
         let mut failed = Vec::new();
         while let Some(program) = next() {
-            if !passes(&program, environment)? {
+            if !run_program(&program, environment)? {
                 failed.push(program.name);
             }
         }
@@ -130,28 +131,35 @@ fn failures(
 
 /// Runs all tests and examples, also those in documentation, even if some fail. `others` builds
 /// boards, browser and clients and returns the variables that name them; the programs of
-/// `NEED_OTHERS` run after it. With `None` they run without these variables.
+/// `NEED_BOARDS_OR_CLIENTS` run after it. With `None` they run without these variables.
 ///
 /// # Errors
 ///
 /// The names of the programs that failed.
 pub fn run(
-    programs: Vec<Program>,
+    programs: Vec<TestProgram>,
     others: Option<impl FnOnce() -> Result<Environment>>,
 ) -> Result<()> {
-    let belongs = |list: &'static [&str]| move |program: &Program| list.contains(&&*program.name);
-    let (alone, mut programs): (Vec<_>, Vec<_>) = programs.into_iter().partition(belongs(&ALONE));
-    programs.sort_by_key(turn);
-    let (waiting, free): (Vec<_>, Vec<_>) = programs.into_iter().partition(belongs(&NEED_OTHERS));
+    let belongs =
+        |list: &'static [&str]| move |program: &TestProgram| list.contains(&&*program.name);
+    let (alone, mut programs): (Vec<_>, Vec<_>) =
+        programs.into_iter().partition(belongs(&RUN_ALONE));
+    programs.sort_by_key(start_order);
+    let (waiting, free): (Vec<_>, Vec<_>) =
+        programs.into_iter().partition(belongs(&NEED_BOARDS_OR_CLIENTS));
     // One more than there are cores: some wait for processes or clients that keep real time.
     let at_once = 1 + std::thread::available_parallelism().map_or(2, usize::from);
     // With these variables a test that needs a board, browser or client fails; without them it
     // would be skipped.
-    let absent = || OTHERS.map(|name| (name, "/not/built/yet".into())).into();
-    let mut failed = failures(free, at_once, &others.as_ref().map_or_else(Vec::new, |_| absent()))?;
+    let absent = || BOARD_AND_CLIENT_VARIABLES.map(|name| (name, "/not/built/yet".into())).into();
+    let mut failed = run_all_and_name_failed(
+        free,
+        at_once,
+        &others.as_ref().map_or_else(Vec::new, |_| absent()),
+    )?;
     let found = others.map_or_else(|| Ok(Vec::new()), |bring| bring())?;
-    failed.extend(failures(waiting, at_once, &found)?);
-    failed.extend(failures(alone, 1, &found)?);
+    failed.extend(run_all_and_name_failed(waiting, at_once, &found)?);
+    failed.extend(run_all_and_name_failed(alone, 1, &found)?);
     let documentation = shell::run(cargo().args(["test", "--workspace", "--doc", "--locked"]));
     ensure!(failed.is_empty(), "failed: {}", failed.join(", "));
     documentation

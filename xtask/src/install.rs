@@ -6,7 +6,7 @@ use std::process::Stdio;
 
 use anyhow::{Result, bail};
 
-use crate::shell::{command, find, run, target_dir};
+use crate::shell::{command, find_on_path, run, target_dir};
 
 /// A Debian package, and a file whose presence shows that it is installed.
 pub struct Package {
@@ -30,12 +30,13 @@ pub const EMULATOR: &[Package] =
 /// The browser in which tests open reports.
 pub const BROWSER: &[Package] = &[Package { name: "chromium", file: "/usr/bin/chromium" }];
 /// What the C++ baseline of the roadmap bench needs.
-pub const PEER: &[Package] = &[
+pub const CPP_BASELINE: &[Package] = &[
     Package { name: "liboctomap-dev", file: "/usr/include/octomap/octomap.h" },
     Package { name: "g++", file: "/usr/bin/g++" },
 ];
 /// The program that counts instructions on the host.
-pub const COUNTER: &[Package] = &[Package { name: "valgrind", file: "/usr/bin/valgrind" }];
+pub const INSTRUCTION_COUNTER: &[Package] =
+    &[Package { name: "valgrind", file: "/usr/bin/valgrind" }];
 const PYTHON_CLIENTS: &[&str] = &["mavsdk<4", "pymavlink", "MAVProxy"];
 
 /// Installs those of `packages` that are missing, if root on Debian; otherwise the error names
@@ -47,7 +48,7 @@ pub fn install_missing(packages: &[Package]) -> Result<()> {
         return Ok(());
     }
     let list = missing.join(" ");
-    if find("apt-get").is_none() || !is_root() {
+    if find_on_path("apt-get").is_none() || !is_root() {
         bail!("missing Debian packages: apt-get install {list}");
     }
     println!("installing {list}");
@@ -68,7 +69,7 @@ fn is_root() -> bool {
 
 /// Path of the Python of a venv with MAVSDK, pymavlink and MAVProxy. The first call creates the
 /// venv in the target directory.
-pub fn python_clients() -> Result<PathBuf> {
+pub fn install_python_clients() -> Result<PathBuf> {
     let venv = target_dir().join("venv");
     let python = venv.join("bin/python");
     let ready = venv.join("flockmate-ready");

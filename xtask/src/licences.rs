@@ -64,12 +64,12 @@ struct Node {
 ///
 /// # Errors
 /// Names each crate whose licence is not allowed, and each exception that no crate needs.
-pub fn check() -> Result<()> {
+pub fn check_licences() -> Result<()> {
     let text = fs::read_to_string("deny.toml").context("deny.toml")?;
     let deny: Deny = toml::from_str(&text).context("deny.toml")?;
     let mut used = BTreeMap::new();
     for target in &deny.graph.targets {
-        used.extend(dependencies(target)?);
+        used.extend(licences_of_dependencies(target)?);
     }
     let mut wrong = Vec::new();
     let mut needed = BTreeSet::new();
@@ -93,7 +93,7 @@ pub fn check() -> Result<()> {
 }
 
 /// Name and licence of each dependency that is built for `target`.
-fn dependencies(target: &str) -> Result<BTreeMap<String, String>> {
+fn licences_of_dependencies(target: &str) -> Result<BTreeMap<String, String>> {
     let mut metadata = cargo();
     metadata.args(["metadata", "--locked", "--format-version=1", "--filter-platform", target]);
     let answer = metadata.output().context("cargo metadata")?;

@@ -48,7 +48,7 @@ fn main() -> ExitCode {
         Command::Emulate(args) => emulate::fly_for_stack_use(&args).map(drop),
         Command::Size(args) => size::run(&args),
         Command::Structure => structure::run(),
-        Command::Licences => licences::check(),
+        Command::Licences => licences::check_licences(),
         Command::Flash(args) => flash::run_flash(&args),
     };
     match done {

@@ -9,20 +9,20 @@ use anyhow::{Context, Result, bail, ensure};
 use serde_json::Value;
 
 /// Root directory of the checkout.
-pub fn root() -> &'static Path {
+pub fn checkout_root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("xtask lies in the checkout")
 }
 
 /// Directory of build products: `CARGO_TARGET_DIR`, else `target` in the checkout.
 pub fn target_dir() -> PathBuf {
     std::env::var_os("CARGO_TARGET_DIR")
-        .map_or_else(|| root().join("target"), |dir| root().join(dir))
+        .map_or_else(|| checkout_root().join("target"), |dir| checkout_root().join(dir))
 }
 
 /// A command that runs in the checkout's root, without standard input.
 pub fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
-    command.current_dir(root()).stdin(Stdio::null());
+    command.current_dir(checkout_root()).stdin(Stdio::null());
     command
 }
 
@@ -72,7 +72,7 @@ pub fn compile(building: &mut Command) -> Result<Compiled> {
 }
 
 /// Path of a program in the first directory of `PATH` that has it; `None` if none has.
-pub fn find(program: &str) -> Option<PathBuf> {
+pub fn find_on_path(program: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     std::env::split_paths(&path).map(|dir| dir.join(program)).find(|file| file.is_file())
 }

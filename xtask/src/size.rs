@@ -13,7 +13,7 @@ use serde_json::json;
 
 use crate::bare_metal::{self, Board, Region};
 use crate::emulate;
-use crate::shell::root;
+use crate::shell::checkout_root;
 
 /// Arguments of `size`.
 #[derive(clap::Args)]
@@ -29,7 +29,7 @@ pub struct Args {
 /// Flies emulated boards for the stack, then builds the firmware for the board and prints its rows.
 pub fn run(args: &Args) -> Result<()> {
     let stack = emulate::fly_for_stack_use(&emulate::Args::default())?;
-    let rows = rows(args.board, stack)?;
+    let rows = print_and_check_rows(args.board, stack)?;
     if let Some(out) = &args.out {
         let row = |(name, ours, theirs): &Row| {
             let ratio = *theirs as f64 / (*ours).max(1) as f64;
@@ -46,9 +46,9 @@ pub fn run(args: &Args) -> Result<()> {
 pub type Row = (&'static str, usize, usize);
 
 /// Prints and returns the rows of a board. An error if a part takes more than its budget.
-pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
+pub fn print_and_check_rows(board: Board, stack: usize) -> Result<Vec<Row>> {
     let program = bare_metal::build(board)?.folder.join("flockmate");
-    let Parts { code, constants, initialised, regions } = parts(&program, board)?;
+    let SectionBytes { code, constants, initialised, regions } = section_bytes(&program, board)?;
     let flash_budget = board.flash_budget();
     let flash = code + constants + initialised;
     let mut rows = vec![
@@ -63,7 +63,7 @@ pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
             .zip(regions)
             .map(|(region, bytes)| (region.name, bytes, region.statics_budget)),
     );
-    rows.push(("stack_bytes", stack, STACK_BUDGET));
+    rows.push(("stack_bytes", stack, STACK_BUDGET_BYTES));
     println!("{}", board.name());
     for (name, ours, most) in &rows {
         println!("  {name:16} {ours:>8} of {most}");
@@ -87,11 +87,11 @@ pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
 }
 
 /// Budget of the stack, bytes.
-const STACK_BUDGET: usize = 64 << 10;
+const STACK_BUDGET_BYTES: usize = 64 << 10;
 
 /// Bytes that a program takes, by kind of section.
 #[derive(Default)]
-struct Parts {
+struct SectionBytes {
     code: usize,
     constants: usize,
     /// Statics with initial values, which take flash and RAM.
@@ -101,13 +101,14 @@ struct Parts {
 }
 
 /// Adds up the sizes of a program's sections by kind and memory.
-fn parts(program: &Path, board: Board) -> Result<Parts> {
+fn section_bytes(program: &Path, board: Board) -> Result<SectionBytes> {
     let bytes =
         std::fs::read(program).with_context(|| format!("cannot read: {}", program.display()))?;
     let elf = object::File::parse(&*bytes)
         .with_context(|| format!("no program for a board: {}", program.display()))?;
-    ensure_placed(&elf, board)?;
-    let mut parts = Parts { regions: vec![0; board.regions().len()], ..Parts::default() };
+    ensure_named_statics_exist(&elf, board)?;
+    let mut parts =
+        SectionBytes { regions: vec![0; board.regions().len()], ..SectionBytes::default() };
     for section in elf.sections() {
         let SectionFlags::Elf { sh_type, sh_flags } = section.flags() else { continue };
         let has = |flag| sh_flags & flag == flag;
@@ -123,7 +124,9 @@ fn parts(program: &Path, board: Board) -> Result<Parts> {
         }
         if size > 0 && (sh_type == SHT_NOBITS || has(SHF_WRITE)) {
             let at = section.address();
-            let lies = |region: &Region| (region.at..region.at + region.len as u64).contains(&at);
+            let lies = |region: &Region| {
+                (region.address..region.address + region.len as u64).contains(&at)
+            };
             let region = board.regions().iter().position(lies);
             let region =
                 region.with_context(|| format!("{:?} lies nowhere: {at:#x}", section.name()))?;
@@ -135,12 +138,12 @@ fn parts(program: &Path, board: Board) -> Result<Parts> {
 
 /// Checks that each static that the board's `memory.x` places by name is in the program: one that
 /// was renamed would silently lie in the default memory.
-fn ensure_placed(elf: &object::File<'_>, board: Board) -> Result<()> {
+fn ensure_named_statics_exist(elf: &object::File<'_>, board: Board) -> Result<()> {
     let path = match board {
         // QEMU's `memory.x` also places statics that only the measuring programs have.
         Board::Qemu => return Ok(()),
-        Board::NucleoH743 => root().join("memory.x"),
-        Board::Pico2 => root().join("firmware/src/boards/pico2/memory.x"),
+        Board::NucleoH743 => checkout_root().join("memory.x"),
+        Board::Pico2 => checkout_root().join("firmware/src/boards/pico2/memory.x"),
     };
     let map = std::fs::read_to_string(&path)
         .with_context(|| format!("cannot read: {}", path.display()))?;

@@ -43,32 +43,32 @@ const CRATES: [&str; 10] = [
 pub fn run() -> Result<()> {
     let (mut wrong, mut beyond) = (0, Vec::new());
     let mut records = BTreeSet::new();
-    for tree in Tree::of_crate(Path::new("planner-core"))? {
+    for tree in Tree::trees_of_crate(Path::new("planner-core"))? {
         records.extend(writes::public_fields(&tree));
     }
     let state_names = states::state_names()?;
     for name in CRATES {
-        for tree in Tree::of_crate(Path::new(name))? {
-            for cycle in imports::cycles(&tree) {
+        for tree in Tree::trees_of_crate(Path::new(name))? {
+            for cycle in imports::import_cycles(&tree) {
                 println!("{name}: import cycle:\n  {}", cycle.join("\n  "));
                 wrong += 1;
             }
-            let places = layers::upward(&tree)
+            let places = layers::upward_imports(&tree)
                 .into_iter()
-                .chain(writes::foreign(&tree, &records))
-                .chain(states::sets(&tree, &state_names));
+                .chain(writes::foreign_writes(&tree, &records))
+                .chain(states::written_out_state_sets(&tree, &state_names));
             for place in places {
                 println!("{name}: {place}");
                 wrong += 1;
             }
-            for (what, reason) in shape::beyond(&tree) {
+            for (what, reason) in shape::beyond_size_limits(&tree) {
                 println!("{name}: {what}: {}", reason.unwrap_or("no reason given"));
                 wrong += usize::from(reason.is_none());
                 beyond.push(what);
             }
         }
     }
-    for (what, reason) in lines::beyond()? {
+    for (what, reason) in lines::faults_of_files()? {
         println!("{what}: {}", reason.unwrap_or("no reason given"));
         wrong += usize::from(reason.is_none());
     }

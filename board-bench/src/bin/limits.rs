@@ -6,7 +6,7 @@
 
 use core::cell::Cell;
 
-use board_bench::calls::limits::{self, Listener, Results};
+use board_bench::calls::limits::{self, CallListener, Results};
 use board_bench::calls::limits_routes::{self, RouteWorkspaces};
 use critical_section::Mutex;
 use firmware::boards::stack;
@@ -26,8 +26,8 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 /// Counts calls and keeps the last call's name.
 struct CallCounter(usize);
 
-impl Listener for CallCounter {
-    fn next(&mut self, name: &'static str) {
+impl CallListener for CallCounter {
+    fn before_call(&mut self, name: &'static str) {
         self.0 += 1;
         critical_section::with(|cs| CALL.borrow(cs).set(name));
     }
@@ -41,6 +41,6 @@ fn main() -> ! {
     let places = answers.sum();
     let routes = limits_routes::call_all(&mut answers, LENT.take());
     println!("limits {} {places:08x} {routes:08x?}", calls.0);
-    println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
+    println!("stack {} {}", stack::max_used_bytes(), stack::size_bytes());
     semihosting::process::exit(0)
 }

@@ -13,7 +13,7 @@ use firmware::boards::stack;
 use firmware::capacity::{ROADMAP_NODES, VEHICLES, WAYPOINTS};
 use firmware::workspace::{PlannerWorkspace, WorkspaceOverlay};
 use heapless::Vec;
-use planner_core::plan::{self, Goals, SwarmPlan};
+use planner_core::plan::{self, AssignedGoals, SwarmPlan};
 use planner_core::roadmap::prm::PrmConfig;
 use planner_core::roadmap::search::{self, SearchWorkspace};
 use planner_core::roadmap::{HalfEdge, RoadmapView};
@@ -27,7 +27,8 @@ type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 static WORKSPACE: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static PLAN: ConstStaticCell<Plan> = ConstStaticCell::new(Plan::new());
-static CASES: ConstStaticCell<cases::Workspace> = ConstStaticCell::new(cases::Workspace::new());
+static CASES: ConstStaticCell<cases::PlanCaseWorkspace> =
+    ConstStaticCell::new(cases::PlanCaseWorkspace::new());
 
 #[panic_handler]
 fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
@@ -49,11 +50,11 @@ fn main() -> ! {
     let ws = CASES.take();
     for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, ws);
-        let [costs, assignment, paths, scales] =
-            [case.costs, case.assignment, case.paths, case.scales];
-        println!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
+        let [costs, assignment, paths, advice] =
+            [case.costs_crc, case.assignment_crc, case.paths_crc, case.advice_crc];
+        println!("case {number} {costs:08x} {assignment:08x} {paths:08x} {advice:08x}");
     }
-    println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
+    println!("stack {} {}", stack::max_used_bytes(), stack::size_bytes());
     semihosting::process::exit(0)
 }
 
@@ -78,26 +79,26 @@ fn measure_plan(view: &RoadmapView<'_>, ws: &mut PlannerWorkspace) {
     let plan = PLAN.take();
     let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
     let request = cases::plan_request(&vehicles, &descents_m);
-    let mut goals = Goals::new();
+    let mut goals = AssignedGoals::new();
     print_instructions("costs", || plan::compute_costs(view, &request, ws)).expect("a cost matrix");
     print_instructions("assign", || plan::assign_goals(&request, ws, &mut goals))
         .expect("an assignment");
-    print_instructions("paths", || measure_paths(view, &goals, &mut ws.search));
+    print_instructions("paths", || find_shortest_paths(view, &goals, &mut ws.search));
     print_instructions("schedule", || plan::schedule_flights(view, &request, &goals, ws, plan))
         .expect("a schedule");
     println!("plan {:08x}", plan.crc);
 }
 
 /// Finds the shortest path of each vehicle to its goal, by A*.
-fn measure_paths(
+fn find_shortest_paths(
     view: &RoadmapView<'_>,
-    goals: &Goals<VEHICLES>,
+    goals: &AssignedGoals<VEHICLES>,
     search: &mut SearchWorkspace<ROADMAP_NODES>,
 ) {
     let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
     for (start, goal) in (0u16..).zip(goals) {
         let mut nodes: Vec<u16, WAYPOINTS> = Vec::new();
-        let target = view.header().starts + goal.expect("every vehicle has a goal");
+        let target = view.header().start_count + goal.expect("every vehicle has a goal");
         search::astar(view, start, target, passable, search, &mut nodes).expect("a path");
         black_box(&nodes);
     }

@@ -9,11 +9,11 @@ use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::bound::lower_bound_s;
 use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
-use planner_core::coverage::pack::{self, Heights, RoutePlan, TrackUnit, Vehicle, Work};
+use planner_core::coverage::pack::{self, CoverageProblem, Heights, RoutePlan, TrackUnit, Vehicle};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
-use planner_core::coverage::transit::Transit;
+use planner_core::coverage::transit::TransitGraph;
 use planner_core::coverage::{Flat, around, powell, sweep};
-use planner_core::detour::{DetourRequest, Goal, KeepOutZone, ZoneKind};
+use planner_core::detour::{DetourGoal, DetourRequest, KeepOutZone, ZoneKind};
 use planner_core::flight::{VehiclePlan, WaypointRange};
 
 use super::Meter;
@@ -22,10 +22,10 @@ use super::coverage_workspace::CoverageWorkspace;
 /// Most changes of the lanes' order that the planner tries.
 pub const BOARD_SEARCH_STEPS: u32 = companion::planner::coverage::BOARD_SEARCH_STEPS;
 /// Vehicles in the plans for which the bench sets a limit of instructions.
-const LIMITED_VEHICLES: usize = 3;
+const SMALL_SWARM_VEHICLES: usize = 3;
 /// Settings of the POWELL search, as on the host.
 const POWELL_SEARCH: powell::PowellConfig = powell::PowellConfig::USUAL;
-const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
+const HEIGHTS: Heights = Heights { max_picture_height_m: 35.0, layer_spacing_m: 5.0 };
 
 /// Checksum of numbers that depends on their order.
 struct Checksum(u32);
@@ -41,18 +41,22 @@ impl Checksum {
 
     fn add_tracks(&mut self, tracks: &Tracks<LANES>) {
         for lane in tracks.lanes() {
-            self.add_floats(&[lane.from.x, lane.from.y, lane.to.x, lane.to.y, lane.start_m]);
-            self.add(lane.count);
+            self.add_floats(&[lane.from.x, lane.from.y, lane.to.x, lane.to.y, lane.start_along_m]);
+            self.add(lane.waypoint_count);
         }
     }
 
     fn add_plan(&mut self, plan: &RoutePlan<VEHICLES>) {
         for route in &plan.routes {
-            let numbers =
-                [u32::from(route.vehicle), route.first, route.end, u32::from(route.layer)];
+            let numbers = [
+                u32::from(route.vehicle_index),
+                route.lowest_waypoint,
+                route.waypoint_end,
+                u32::from(route.layer),
+            ];
             numbers.into_iter().for_each(|number| self.add(number));
             self.add(route.direction as u32);
-            self.add_floats(&[route.ground_m, route.cost_m, route.cost_s]);
+            self.add_floats(&[route.ground_length_m, route.cost_m, route.cost_s]);
         }
     }
 }
@@ -79,27 +83,46 @@ fn flat([x, y]: [f32; 2]) -> Flat {
 }
 
 /// The lanes to be divided among `vehicles`, waypoint by waypoint.
-fn work_on<'a, const L: usize, const N: usize>(
+fn work_of_lanes<'a, const L: usize, const N: usize>(
     tracks: &'a Tracks<L>,
-    transit: &'a Transit<'a, N>,
+    transit: &'a TransitGraph<'a, N>,
     vehicles: &'a [Vehicle],
-) -> Work<'a, L, N> {
-    Work { tracks, transit, vehicles, heights: HEIGHTS, unit: TrackUnit::Waypoint, following: None }
+) -> CoverageProblem<'a, L, N> {
+    CoverageProblem {
+        tracks,
+        transit,
+        vehicles,
+        heights: HEIGHTS,
+        unit: TrackUnit::Waypoint,
+        following: None,
+    }
 }
 
 fn vehicles(count: usize) -> Vec<Vehicle, VEHICLES> {
     let vehicle = |i: usize| {
         let place = Flat::new(5.0 * i as f32, -10.0);
         let (cruise_mps, climb_mps, descend_mps) = (5.0, 3.0, 1.0);
-        Vehicle { place, home: place, cruise_mps, climb_mps, descend_mps, weight: 1.0 }
+        Vehicle {
+            transit_start: place,
+            home: place,
+            cruise_mps,
+            climb_mps,
+            descend_mps,
+            weight: 1.0,
+        }
     };
     (0..count).map(vehicle).collect()
 }
 
 fn pattern(angle_deg: Option<f32>, lane_m: f32) -> LanePattern {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
-    let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
-    LanePattern { spacing, angle_deg, margin_m: 0.0, search_steps: BOARD_SEARCH_STEPS }
+    let spacing = Spacing { footprint, max_lane_spacing_m: lane_m, max_waypoint_spacing_m: lane_m };
+    LanePattern {
+        spacing,
+        angle_from_east_deg: angle_deg,
+        border_overshoot_m: 0.0,
+        max_search_steps: BOARD_SEARCH_STEPS,
+    }
 }
 
 fn measure_cameras(meter: &mut impl Meter, sum: &mut Checksum) {
@@ -121,18 +144,19 @@ fn measure_plans(
     lent: &mut CoverageWorkspace,
     sum: &mut Checksum,
 ) {
-    let transit = Transit::<1>::empty();
-    let few = vehicles(LIMITED_VEHICLES);
-    let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
+    let transit = TransitGraph::<1>::empty();
+    let few = vehicles(SMALL_SWARM_VEHICLES);
+    let CoverageWorkspace { tracks, remaining: left, lane_workspace: build, powell, plan, .. } =
+        lent;
     let bytes = size_of_val(tracks) + size_of_val(build) + size_of_val(powell);
     meter.call("a coverage plan, 3", bytes, || {
         tracks::build_lanes(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
-        let work = work_on(tracks, &transit, &few);
+        let work = work_of_lanes(tracks, &transit, &few);
         powell::powell(&work, &POWELL_SEARCH, powell, plan).expect("routes");
     });
     sum.add_tracks(tracks);
     sum.add_plan(plan);
-    let work = work_on(tracks, &transit, &few);
+    let work = work_of_lanes(tracks, &transit, &few);
     meter
         .call("powell::powell, 3", size_of_val(powell), || {
             powell::powell(&work, &POWELL_SEARCH, powell, plan)
@@ -140,7 +164,7 @@ fn measure_plans(
         .expect("routes");
     let pack = &mut powell.pack;
     for unit in [TrackUnit::Lane, TrackUnit::Waypoint] {
-        let work = Work { unit, ..work };
+        let work = CoverageProblem { unit, ..work };
         meter
             .call("pack::binpat, 3", size_of_val(pack), || pack::binpat(&work, pack, plan))
             .expect("routes");
@@ -155,7 +179,7 @@ fn measure_plans(
     let bytes = size_of_val(left) + size_of_val(pack);
     meter.call("left and binpat, 3", bytes, || {
         divide::remaining_lanes(tracks, &done, &transit, left).expect("something is left");
-        let work = work_on(left, &transit, rest);
+        let work = work_of_lanes(left, &transit, rest);
         pack::binpat(&work, pack, plan).expect("routes");
     });
     sum.add_tracks(left);
@@ -166,7 +190,10 @@ fn flown_ranges(plan: &RoutePlan<VEHICLES>, count: u32) -> Vec<WaypointRange, VE
     let mut done: Vec<WaypointRange, VEHICLES> = plan
         .routes
         .iter()
-        .map(|r| WaypointRange { first: r.first, end: (r.first + count).min(r.end) })
+        .map(|r| WaypointRange {
+            first: r.lowest_waypoint,
+            end: (r.lowest_waypoint + count).min(r.waypoint_end),
+        })
         .collect();
     done.sort_unstable_by_key(|range| range.first);
     done
@@ -178,7 +205,7 @@ fn flown_lanes(tracks: &Tracks<LANES>, plan: &RoutePlan<VEHICLES>) -> Vec<Waypoi
     let whole = |range: WaypointRange| {
         let lane = |number: u32| &tracks.lanes()[tracks.lane_of(number)];
         let (from, to) = (lane(range.first), lane(range.end - 1));
-        WaypointRange { first: from.first, end: to.first + to.count }
+        WaypointRange { first: from.first_waypoint, end: to.first_waypoint + to.waypoint_count }
     };
     let mut done: Vec<WaypointRange, VEHICLES> =
         flown_ranges(plan, 10).into_iter().map(whole).collect();
@@ -195,9 +222,10 @@ fn measure_division(
     lent: &mut CoverageWorkspace,
     sum: &mut Checksum,
 ) {
-    let transit = Transit::<1>::empty();
+    let transit = TransitGraph::<1>::empty();
     let many = vehicles(VEHICLES);
-    let CoverageWorkspace { tracks, left, build, powell, plan, .. } = lent;
+    let CoverageWorkspace { tracks, remaining: left, lane_workspace: build, powell, plan, .. } =
+        lent;
     let pack = &mut powell.pack;
     // Lanes along y: 2559 m / 5 m are 512; in this convex area their order is not searched.
     let pattern = pattern(Some(90.0), 5.0);
@@ -208,7 +236,7 @@ fn measure_division(
         .expect("lanes");
     assert_eq!(tracks.lanes().len(), LANES);
     sum.add_tracks(tracks);
-    let work = work_on(tracks, &transit, &many);
+    let work = work_of_lanes(tracks, &transit, &many);
     meter
         .call("pack::binpat, 32", size_of_val(pack), || pack::binpat(&work, pack, plan))
         .expect("routes");
@@ -226,7 +254,7 @@ fn measure_division(
     let rest = &many[1..];
     meter.call("left and binpat, 32", size_of_val(left) + size_of_val(pack), || {
         divide::remaining_lanes(tracks, &done, &transit, left).expect("something is left");
-        let work = work_on(left, &transit, rest);
+        let work = work_of_lanes(left, &transit, rest);
         pack::binpat(&work, pack, plan).expect("routes");
     });
     sum.add_tracks(left);
@@ -239,14 +267,14 @@ fn measure_division(
 
 /// Plans three detours home and one to a place beside the path, among no-fly zones and 128 keep-out
 /// zones.
-fn measure_ways_home(
+fn measure_detours_home(
     meter: &mut impl Meter,
-    transit: &Transit<'_, NO_FLY_CORNERS>,
+    transit: &TransitGraph<'_, NO_FLY_CORNERS>,
     sum: &mut Checksum,
 ) {
     let mut own = VehiclePlan::<WAYPOINTS, GATES>::new();
-    meter.call("transit::Transit::corners", 0, || transit.corners().len());
-    meter.call("transit::Transit::is_in_no_fly_zone", 0, || {
+    meter.call("transit::TransitGraph::corners", 0, || transit.corners().len());
+    meter.call("transit::TransitGraph::is_in_no_fly_zone", 0, || {
         transit.is_in_no_fly_zone(&Flat::zeros())
     });
     for case in 0..4 {
@@ -259,11 +287,11 @@ fn measure_ways_home(
         };
         let mut things: Vec<KeepOutZone, { 4 * VEHICLES }> = (0..4 * VEHICLES).map(thing).collect();
         let request = DetourRequest {
-            aside: case == 3,
+            land_aside: case == 3,
             here,
             leg: [here; 2],
             leg_clearance_m: 10.0,
-            goal: Goal::Home { over: Point::new(-150.0, -80.0, 3.0), layer_m: 40.0 },
+            goal: DetourGoal::Home { above_pad: Point::new(-150.0, -80.0, 3.0), layer_z_m: 40.0 },
             descent_m: 3.0,
             required_clearance_m: 1.2,
             fence: None,
@@ -281,11 +309,11 @@ fn measure_ways_home(
 }
 
 /// No-fly zones of the largest area.
-const ZONES: usize = NO_FLY_CORNERS / 4;
+const NO_FLY_ZONE_COUNT: usize = NO_FLY_CORNERS / 4;
 
 /// The vertices and rings of an area with as many vertices and corners of no-fly zones as a board
 /// holds.
-fn largest_area() -> (Vec<Flat, AREA_VERTICES>, Vec<Ring, { ZONES + 1 }>) {
+fn largest_area() -> (Vec<Flat, AREA_VERTICES>, Vec<Ring, { NO_FLY_ZONE_COUNT + 1 }>) {
     const OUTER: usize = AREA_VERTICES - NO_FLY_CORNERS;
     let mut vertices: Vec<Flat, AREA_VERTICES> = Vec::new();
     for k in 0..OUTER {
@@ -293,9 +321,9 @@ fn largest_area() -> (Vec<Flat, AREA_VERTICES>, Vec<Ring, { ZONES + 1 }>) {
         let radius_m = if k % 2 == 0 { 200.0 } else { 190.0 };
         vertices.push(Flat::new(radius_m * cos, radius_m * sin)).expect("there is room");
     }
-    let mut rings: Vec<Ring, { ZONES + 1 }> = Vec::new();
+    let mut rings: Vec<Ring, { NO_FLY_ZONE_COUNT + 1 }> = Vec::new();
     rings.push(Ring { end: OUTER as u16, kind: RingKind::Outer }).expect("there is room");
-    for zone in 0..ZONES {
+    for zone in 0..NO_FLY_ZONE_COUNT {
         let (x, y) = (-120.0 + 70.0 * (zone % 4) as f32, if zone < 4 { -60.0 } else { 50.0 });
         for [east, north] in [[0.0, 0.0], [20.0, 0.0], [20.0, 20.0], [0.0, 20.0]] {
             vertices.push(Flat::new(x + east, y + north)).expect("there is room");
@@ -312,21 +340,21 @@ fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, su
     let (vertices, rings) = largest_area();
     let area =
         meter.call("area::Area::new, 256", 0, || Area::new(&vertices, &rings)).expect("an area");
-    let mut transit = Transit::<NO_FLY_CORNERS>::empty();
+    let mut transit = TransitGraph::<NO_FLY_CORNERS>::empty();
     let bytes = size_of_val(&transit);
     meter
-        .call("transit::Transit::set_area, 32 corners", bytes, || transit.set_area(area))
+        .call("transit::TransitGraph::set_area, 32 corners", bytes, || transit.set_area(area))
         .expect("they fit");
     for k in 0..16 {
         let (from, to) =
             (Flat::new(-150.0, 10.0 * k as f32 - 80.0), Flat::new(150.0, 70.0 - 9.0 * k as f32));
-        let clear =
-            meter.call("transit::Transit::is_line_clear", 0, || transit.is_line_clear(&from, &to));
+        let clear = meter
+            .call("transit::TransitGraph::is_line_clear", 0, || transit.is_line_clear(&from, &to));
         let far_m =
-            meter.call("transit::Transit::distance_m", 0, || transit.distance_m(&from, &to));
+            meter.call("transit::TransitGraph::distance_m", 0, || transit.distance_m(&from, &to));
         let mut corners: Vec<Flat, NO_FLY_CORNERS> = Vec::new();
         meter
-            .call("transit::Transit::shortest_path", 0, || {
+            .call("transit::TransitGraph::shortest_path", 0, || {
                 transit.shortest_path(&from, &to, &mut corners)
             })
             .expect("a way");
@@ -334,8 +362,8 @@ fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, su
             meter.call("area::Area::is_in_no_fly_zone", 0, || area.is_in_no_fly_zone(&from));
         sum.add(far_m.to_bits() ^ corners.len() as u32 ^ u32::from(clear) ^ u32::from(inside));
     }
-    measure_ways_home(meter, &transit, sum);
-    let CoverageWorkspace { tracks, build, powell, plan, .. } = lent;
+    measure_detours_home(meter, &transit, sum);
+    let CoverageWorkspace { tracks, lane_workspace: build, powell, plan, .. } = lent;
     let mut hull: Vec<Flat, AREA_VERTICES> = Vec::new();
     let direction = meter.call("sweep::direction_of_least_width, 256", size_of_val(&hull), || {
         sweep::direction_of_least_width(&area, &mut hull)
@@ -349,8 +377,8 @@ fn measure_largest_area(meter: &mut impl Meter, lent: &mut CoverageWorkspace, su
         })
         .expect("lanes");
     sum.add_tracks(tracks);
-    let few = vehicles(LIMITED_VEHICLES);
-    let work = work_on(tracks, &transit, &few);
+    let few = vehicles(SMALL_SWARM_VEHICLES);
+    let work = work_of_lanes(tracks, &transit, &few);
     meter
         .call("pack::binpat, 3 around zones", size_of_val(&powell.pack), || {
             pack::binpat(&work, &mut powell.pack, plan)

@@ -10,9 +10,9 @@ use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
 use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::losses::{self, Loss, VehicleStatus};
-use planner_core::coverage::pack::{self, Heights, TrackUnit, Vehicle, Work};
+use planner_core::coverage::pack::{self, CoverageProblem, Heights, TrackUnit, Vehicle};
 use planner_core::coverage::tracks::{self, LanePattern};
-use planner_core::coverage::transit::Transit;
+use planner_core::coverage::transit::TransitGraph;
 use planner_core::flight::{HeadingMode, Trigger};
 use planner_core::plan::SwarmPlan;
 use planner_core::schedule::ScheduleConfig;
@@ -24,8 +24,8 @@ use super::coverage_workspace::CoverageWorkspace;
 pub type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 /// Vehicles in the plans for which the bench sets a limit of instructions.
-pub(super) const LIMITED_VEHICLES: usize = 3;
-pub(super) const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
+pub(super) const SMALL_SWARM_VEHICLES: usize = 3;
+pub(super) const HEIGHTS: Heights = Heights { max_picture_height_m: 35.0, layer_spacing_m: 5.0 };
 pub(super) const CRUISE_MPS: f32 = 5.0;
 pub(super) const CLIMB_MPS: f32 = 3.0;
 pub(super) const DESCEND_MPS: f32 = 1.0;
@@ -39,15 +39,15 @@ pub(super) const SCHEDULE: ScheduleConfig = ScheduleConfig {
 pub(super) const FLIGHT_INPUTS: FlightInputs<'static> = FlightInputs {
     pads: &[],
     capture: CaptureSettings {
-        waypoint_m: 10.0,
-        heading_mode: HeadingMode::Fixed(0.0),
+        max_picture_spacing_m: 10.0,
+        heading_mode: HeadingMode::FixedEnuRad(0.0),
         trigger: Trigger::Distance,
     },
-    clearance_m: 10.0,
+    assumed_clearance_m: 10.0,
     schedule: SCHEDULE,
     max_gates: GATES,
     photographed: &[],
-    held_layers: 0,
+    occupied_layers: 0,
     following: None,
 };
 /// Height of a path's first point above its pad, metres.
@@ -80,8 +80,8 @@ pub(super) fn rings(corners: usize, zones: usize) -> Vec<Ring, 4> {
 pub(super) fn spacing(lane_m: f32) -> Spacing {
     Spacing {
         footprint: Footprint { along_m: lane_m, across_m: lane_m },
-        lane_m,
-        waypoint_m: lane_m,
+        max_lane_spacing_m: lane_m,
+        max_waypoint_spacing_m: lane_m,
     }
 }
 
@@ -103,7 +103,7 @@ pub(super) fn measure_plan_parts(
             area: Area::new(&vertices, &rings).expect("an area"),
             angle_deg: None,
             lane_m: 10.0,
-            count: LIMITED_VEHICLES,
+            vehicle_count: SMALL_SWARM_VEHICLES,
         };
         measure_division(meter, &case, names, lent, out, &mut sum);
     }
@@ -113,7 +113,7 @@ pub(super) fn measure_plan_parts(
         area: Area::new(&wide, &rings).expect("an area"),
         angle_deg: Some(90.0),
         lane_m: 5.0,
-        count: VEHICLES,
+        vehicle_count: VEHICLES,
     };
     measure_division(
         meter,
@@ -131,13 +131,13 @@ struct Case<'a> {
     area: Area<'a>,
     angle_deg: Option<f32>,
     lane_m: f32,
-    count: usize,
+    vehicle_count: usize,
 }
 
 fn vehicles(count: usize) -> (Vec<Vehicle, VEHICLES>, Vec<Pad, VEHICLES>) {
     let place = |k: usize| Flat::new(PAD_SPACING_M * k as f32, -10.0);
     let vehicle = |k: usize| Vehicle {
-        place: place(k),
+        transit_start: place(k),
         home: place(k),
         cruise_mps: CRUISE_MPS,
         climb_mps: CLIMB_MPS,
@@ -145,10 +145,10 @@ fn vehicles(count: usize) -> (Vec<Vehicle, VEHICLES>, Vec<Pad, VEHICLES>) {
         weight: 1.0,
     };
     let pad = |k: usize| Pad {
-        id: 1 + k as u8,
-        start: Point::new(place(k).x, place(k).y, CLIMB_M),
+        vehicle_id: 1 + k as u8,
+        path_start: Point::new(place(k).x, place(k).y, CLIMB_M),
         climb_m: CLIMB_M,
-        end_z_m: CLIMB_M,
+        path_end_z_m: CLIMB_M,
         descent_m: CLIMB_M,
         airborne: false,
     };
@@ -163,19 +163,27 @@ fn measure_division(
     out: &mut Flights,
     sum: &mut u32,
 ) {
-    let mut transit = Transit::<NO_FLY_CORNERS>::empty();
+    let mut transit = TransitGraph::<NO_FLY_CORNERS>::empty();
     transit.set_area(case.area).expect("they fit");
-    let CoverageWorkspace { tracks, build, powell, plan: routes, losses, schedule, .. } = lent;
+    let CoverageWorkspace {
+        tracks,
+        lane_workspace: build,
+        powell,
+        plan: routes,
+        losses,
+        schedule,
+        ..
+    } = lent;
     let pack = &mut powell.pack;
     let pattern = LanePattern {
         spacing: spacing(case.lane_m),
-        angle_deg: case.angle_deg,
-        margin_m: 0.0,
-        search_steps: super::coverage::BOARD_SEARCH_STEPS,
+        angle_from_east_deg: case.angle_deg,
+        border_overshoot_m: 0.0,
+        max_search_steps: super::coverage::BOARD_SEARCH_STEPS,
     };
     tracks::build_lanes(&case.area, &pattern, &transit, build, tracks).expect("lanes");
-    let (vehicles, pads) = vehicles(case.count);
-    let work = Work {
+    let (vehicles, pads) = vehicles(case.vehicle_count);
+    let work = CoverageProblem {
         tracks,
         transit: &transit,
         vehicles: &vehicles,
@@ -185,7 +193,7 @@ fn measure_division(
     };
     losses.reset_with_done(tracks, &transit, &[]).expect("nothing is done");
     pack::binpat(&work, pack, routes).expect("routes");
-    let manner = CaptureSettings { waypoint_m: case.lane_m, ..FLIGHT_INPUTS.capture };
+    let manner = CaptureSettings { max_picture_spacing_m: case.lane_m, ..FLIGHT_INPUTS.capture };
     let flight_inputs = FlightInputs { pads: &pads, capture: manner, ..FLIGHT_INPUTS };
     meter
         .call(flights_name, size_of_val(schedule), || {
@@ -195,10 +203,12 @@ fn measure_division(
     add_to_checksum(sum, out);
     let bytes = size_of_val(losses) + size_of_val(pack) + size_of_val(schedule);
     // The first vehicle is lost; all others go on from halfway along their paths.
-    let fate =
-        |k: usize| VehicleStatus { alive: k > 0, along_m: 0.5 * out.flights[k].path.length_m() };
-    let statuses: Vec<VehicleStatus, VEHICLES> = (0..case.count).map(fate).collect();
-    let loss = Loss { work: &work, flight_inputs: &flight_inputs, statuses: &statuses };
+    let fate = |k: usize| VehicleStatus {
+        continues: k > 0,
+        photographed_to_m: 0.5 * out.flights[k].path.length_m(),
+    };
+    let statuses: Vec<VehicleStatus, VEHICLES> = (0..case.vehicle_count).map(fate).collect();
+    let loss = Loss { problem: &work, flight_inputs: &flight_inputs, statuses: &statuses };
     meter
         .call(again_name, bytes, || {
             losses::redivide_work(&loss, losses, pack, schedule, routes, out)

@@ -3,7 +3,7 @@
 
 use companion::planner::coverage::{self, Request};
 use companion::storage::mission_file::coverage::{
-    CoverageHeader, CoverageParts, HeadingRule, PartEligibility, VehicleShare,
+    CoverageBlock, CoverageHeader, HeadingRule, PartEligibility, VehicleShare,
 };
 use companion::storage::mission_file::{
     self, MAX_BYTES, MissionBlock, MissionHeader, MissionKind, MissionVehicle, MissionView,
@@ -21,14 +21,14 @@ use planner_core::schedule::ScheduleConfig;
 use planner_core::track::deconflict::Method;
 
 use super::coverage_flights::{
-    CLIMB_M, CLIMB_MPS, CRUISE_MPS, DESCEND_MPS, FIVE_VERTICES, Flights, HEIGHTS, LIMITED_VEHICLES,
-    NO_FLY_ZONES, PAD_SPACING_M, SCHEDULE, WIDE_VERTICES, add_to_checksum, rings, spacing,
+    CLIMB_M, CLIMB_MPS, CRUISE_MPS, DESCEND_MPS, FIVE_VERTICES, Flights, HEIGHTS, NO_FLY_ZONES,
+    PAD_SPACING_M, SCHEDULE, SMALL_SWARM_VEHICLES, WIDE_VERTICES, add_to_checksum, rings, spacing,
 };
 use super::coverage_workspace::CoverageWorkspace;
 use super::{Meter, coverage_flights, flight};
 
 /// Most divisions of a mission that are measured.
-const DIVISIONS: usize = 3;
+const MAX_DIVISIONS: usize = 3;
 
 /// A coverage mission, and the names of its calls' rows in `docs/worst-case.md`.
 struct Mission<'a> {
@@ -37,14 +37,14 @@ struct Mission<'a> {
     angle_deg: Option<f32>,
     lane_m: f32,
     separation_m: f32,
-    count: usize,
+    vehicle_count: usize,
     /// Row of the plan before take-off.
-    plan: &'static str,
+    plan_row: &'static str,
     /// Row of a division after one further loss: the board has planned all divisions before it.
-    further: &'static str,
+    further_loss_row: &'static str,
     /// Row of a division of which the board has planned nothing yet: the board was restarted, or
     /// the division before was withdrawn.
-    whole: &'static str,
+    whole_division_row: &'static str,
 }
 
 const PLAIN: Mission<'static> = Mission {
@@ -53,10 +53,10 @@ const PLAIN: Mission<'static> = Mission {
     angle_deg: None,
     lane_m: 10.0,
     separation_m: SCHEDULE.separation_m,
-    count: LIMITED_VEHICLES,
-    plan: "planner::coverage::plan_flights, 3",
-    further: "a division, 3",
-    whole: "a division, 3, nothing known",
+    vehicle_count: SMALL_SWARM_VEHICLES,
+    plan_row: "planner::coverage::plan_flights, 3",
+    further_loss_row: "a division, 3",
+    whole_division_row: "a division, 3, nothing known",
 };
 
 /// Measures all coverage plans and divisions; returns a checksum of the results.
@@ -79,19 +79,19 @@ fn measure_missions(
 ) -> u32 {
     let zones = Mission {
         zones: &NO_FLY_ZONES,
-        plan: "planner::coverage::plan_flights, 3, zones",
-        further: "a division, 3, zones",
-        whole: "a division, 3, zones, nothing known",
+        plan_row: "planner::coverage::plan_flights, 3, zones",
+        further_loss_row: "a division, 3, zones",
+        whole_division_row: "a division, 3, zones, nothing known",
         ..PLAIN
     };
     let wide = Mission {
         outline: &WIDE_VERTICES,
         angle_deg: Some(90.0),
         lane_m: 5.0,
-        count: VEHICLES,
-        plan: "planner::coverage::plan_flights, 32",
-        further: "a division, 32",
-        whole: "a division, 32, nothing known",
+        vehicle_count: VEHICLES,
+        plan_row: "planner::coverage::plan_flights, 32",
+        further_loss_row: "a division, 32",
+        whole_division_row: "a division, 32, nothing known",
         ..PLAIN
     };
     let mut sum = 1;
@@ -117,7 +117,7 @@ fn write_mission(mission: &Mission<'_>, out: &mut [u8]) -> usize {
         schedule: ScheduleConfig { separation_m: mission.separation_m, ..SCHEDULE },
         safety_distance_m: 1.5,
         geofence: None,
-        ground_stations: companion::config::USUAL_GROUND_STATIONS,
+        ground_stations: companion::config::DEFAULT_GROUND_STATION_IDS,
     };
     let vehicle = |k: usize| MissionVehicle {
         task: VehicleTask {
@@ -126,28 +126,28 @@ fn write_mission(mission: &Mission<'_>, out: &mut [u8]) -> usize {
             climb_m: CLIMB_M,
             goal: None,
         },
-        start: Point::new(PAD_SPACING_M * k as f32, -10.0, CLIMB_M),
+        path_start: Point::new(PAD_SPACING_M * k as f32, -10.0, CLIMB_M),
         radius_m: 0.3,
         speed_max_mps: 8.0,
     };
-    let vehicles: Vec<_, VEHICLES> = (0..mission.count).map(vehicle).collect();
+    let vehicles: Vec<_, VEHICLES> = (0..mission.vehicle_count).map(vehicle).collect();
     let area = CoverageHeader {
-        unit: TrackUnit::Waypoint,
-        parts: PartEligibility::Anyone,
-        heading: HeadingRule::Sweep,
+        assignment_unit: TrackUnit::Waypoint,
+        part_eligibility: PartEligibility::Anyone,
+        heading_rule: HeadingRule::SameOnAllLanes,
         trigger: Trigger::Distance,
         search_steps: super::coverage::BOARD_SEARCH_STEPS,
         heights: HEIGHTS,
         spacing: spacing(mission.lane_m),
-        angle_deg: mission.angle_deg,
-        margin_m: 0.0,
+        lane_angle_deg: mission.angle_deg,
+        lane_overshoot_m: 0.0,
         ground: None,
     };
     let share = VehicleShare { weight: 1.0, climb_mps: CLIMB_MPS, descend_mps: DESCEND_MPS };
-    let shares: Vec<_, VEHICLES> = core::iter::repeat_n(share, mission.count).collect();
+    let shares: Vec<_, VEHICLES> = core::iter::repeat_n(share, mission.vehicle_count).collect();
     let corners = mission.outline.iter().chain(mission.zones.iter().flatten());
     let vertices: Vec<Flat, 16> = corners.map(|[x, y]| Flat::new(*x, *y)).collect();
-    let parts = CoverageParts {
+    let parts = CoverageBlock {
         header: area,
         shares: &shares,
         rings: &rings(mission.outline.len(), mission.zones.len()),
@@ -167,7 +167,7 @@ struct Board<'a> {
 }
 
 /// The inputs of all divisions of a mission.
-type Divisions = Vec<DivisionInputs<VEHICLES>, DIVISIONS>;
+type Divisions = Vec<DivisionInputs<VEHICLES>, MAX_DIVISIONS>;
 
 impl Board<'_> {
     /// Measures the whole call: the swarm's flights, and the plan of the last vehicle.
@@ -205,14 +205,14 @@ impl Board<'_> {
 
     /// Inputs of a division: the first `lost` vehicles are lost, and all others hold at the
     /// fraction `share` of their paths' lengths.
-    fn inputs(&self, lost: usize, share: f32) -> DivisionInputs<VEHICLES> {
+    fn division_inputs(&self, lost: usize, share: f32) -> DivisionInputs<VEHICLES> {
         let input = |k: usize| {
             let flight = &self.out.flights[k];
             let along_m =
                 if flight.task.leaves_pad() { flight.path.length_m() * share } else { 0.0 };
             VehicleDivisionInput { alive: k >= lost, along_dm: (along_m * 10.0) as u16 }
         };
-        (0..self.mission.count).map(input).collect()
+        (0..self.mission.vehicle_count).map(input).collect()
     }
 }
 
@@ -220,13 +220,14 @@ impl Board<'_> {
 /// division again with other inputs (the first ones were withdrawn), and one after both losses at
 /// once.
 fn measure_losses(meter: &mut impl Meter, board: &mut Board<'_>) {
-    let Mission { plan, further, whole, .. } = *board.mission;
+    let Mission { plan_row: plan, further_loss_row: further, whole_division_row: whole, .. } =
+        *board.mission;
     let mut losses = Divisions::new();
     board.measure(meter, plan, &losses);
-    let both = board.inputs(2, 0.5);
-    losses.push(board.inputs(1, 0.5)).expect("there is room");
+    let both = board.division_inputs(2, 0.5);
+    losses.push(board.division_inputs(1, 0.5)).expect("there is room");
     board.measure(meter, further, &losses);
-    let (second, other) = (board.inputs(2, 0.5), board.inputs(2, 0.4));
+    let (second, other) = (board.division_inputs(2, 0.5), board.division_inputs(2, 0.4));
     losses.push(second).expect("there is room");
     board.measure(meter, further, &losses);
     losses[1] = other;

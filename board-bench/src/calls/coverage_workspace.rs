@@ -11,9 +11,9 @@ pub struct CoverageWorkspace {
     /// All lanes of the area, along one path.
     pub tracks: Tracks<LANES>,
     /// Lanes that are not photographed after a vehicle was lost.
-    pub left: Tracks<LANES>,
+    pub remaining: Tracks<LANES>,
     /// Workspace for computing lanes.
-    pub build: tracks::LaneWorkspace<AREA_VERTICES>,
+    pub lane_workspace: tracks::LaneWorkspace<AREA_VERTICES>,
     /// Workspace for dividing lanes among vehicles.
     pub powell: powell::PowellWorkspace<VEHICLES>,
     /// Each vehicle's route over its lanes.
@@ -29,8 +29,8 @@ impl CoverageWorkspace {
     pub const fn new() -> Self {
         Self {
             tracks: Tracks::new(),
-            left: Tracks::new(),
-            build: tracks::LaneWorkspace::new(),
+            remaining: Tracks::new(),
+            lane_workspace: tracks::LaneWorkspace::new(),
             powell: powell::PowellWorkspace::new(),
             plan: RoutePlan::new(),
             losses: losses::LossesWorkspace::new(),

@@ -22,38 +22,38 @@ mod drawn;
 pub use self::drawn::{
     CRUISE_MPS, ORIGIN, area_config, config, random_area_plan, random_path, random_plan,
 };
-use self::drawn::{MISSION_CRC, PLAN_CRC, SYSTEM};
+use self::drawn::{MISSION_CRC, OWN_ID, PLAN_CRC};
 use super::Meter;
 use crate::cases::{random_below, random_between, random_point};
 
 /// Row of the table in `docs/worst-case.md`: a control step while all neighbours are heard.
-pub const STEP: &str = "Companion::handle_timeout, 32 speak";
+pub const STEP_ROW: &str = "Companion::handle_timeout, 32 speak";
 /// Row of the table: a control step after most neighbours left the plan or fell silent.
-pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
+pub const HARD_STEP_ROW: &str = "Companion::handle_timeout, most gone";
 /// Row of the table: a control step while all neighbours are near, on the plan or off it, but few
 /// are on the path, so that the safety filter compares all of them.
-pub const NEAR_STEP: &str = "a control step, 32 near";
+pub const NEAR_STEP_ROW: &str = "a control step, 32 near";
 /// Row of the table: a control step of a coverage mission beside 32 neighbours, in flight or while
 /// the work is divided.
-pub const AREA_STEP: &str = "a control step, coverage, 32 near";
+pub const AREA_STEP_ROW: &str = "a control step, coverage, 32 near";
 /// Row of the table: the safety filter alone, which is part of each control step.
-pub const FILTER: &str = "Companion::query_filter, 32 near";
+pub const FILTER_ROW: &str = "Companion::query_filter_blocker, 32 near";
 /// Row of the table: any other control step.
-pub const OTHER_STEP: &str = "Companion::handle_timeout, else";
+pub const OTHER_STEP_ROW: &str = "Companion::handle_timeout, else";
 /// Least distance of a neighbour beside this vehicle, metres.
 const MIN_BESIDE_M: f32 = 4.0;
 /// Least distance by which a silent neighbour is moved away in a flight of [`has_silent_far_away`],
 /// metres.
-const MIN_FAR_M: f32 = 70.0;
+const MIN_SILENT_AWAY_M: f32 = 70.0;
 /// Greatest such distance, metres.
-const MAX_FAR_M: f32 = 120.0;
+const MAX_SILENT_AWAY_M: f32 = 120.0;
 /// Control steps counted in each flight.
 const COUNTED_STEPS: usize = 200;
 /// Most steps of 0.9 s before the counted ones, in which silent neighbours' last messages grow old.
 /// After a longer step the companion would find its own position stale.
 const MAX_AGEING_STEPS: usize = 100;
 const STEP_TIME: Duration = Duration::from_millis(50);
-const AGEING_TIME: Duration = Duration::from_millis(900);
+const AGEING_STEP_TIME: Duration = Duration::from_millis(900);
 /// Number of steps of 50 ms within which the vehicle must be on its path.
 const MAX_TAKE_OFF_STEPS: usize = 400;
 
@@ -73,7 +73,7 @@ const ARM_DISARM: u16 = 400;
 const REQUEST_MESSAGE: u16 = 512;
 
 struct SimulatedNeighbour {
-    place: Point,
+    enu_m: Point,
     flags: u8,
     progress_m: f32,
     silent: bool,
@@ -84,7 +84,7 @@ pub struct BenchFlight<'a, M> {
     companion: &'a mut BoardCompanion,
     meter: &'a mut M,
     now: Instant,
-    place: Point,
+    enu_m: Point,
     target: Option<Point>,
     mode: u32,
     armed: bool,
@@ -134,11 +134,11 @@ pub fn measure_flight<M: Meter>(
         };
         // The first neighbour is always heard, so that this vehicle does not lose its swarm link.
         (other.flags, other.silent) = (flags, silent && i > 0);
-        other.place =
-            flight.place + offset_to_neighbour(seed, &mut rng, if hard { 6.0 } else { 20.0 });
+        other.enu_m =
+            flight.enu_m + offset_to_neighbour(seed, &mut rng, if hard { 6.0 } else { 20.0 });
         if other.silent && has_silent_far_away(seed) {
-            other.place += random_point(&mut rng, 1.0).try_normalize(1e-3).unwrap_or_default()
-                * random_between(&mut rng, MIN_FAR_M, MAX_FAR_M);
+            other.enu_m += random_point(&mut rng, 1.0).try_normalize(1e-3).unwrap_or_default()
+                * random_between(&mut rng, MIN_SILENT_AWAY_M, MAX_SILENT_AWAY_M);
         }
         other.progress_m = random_between(&mut rng, 0.0, 60.0);
     }
@@ -146,7 +146,7 @@ pub fn measure_flight<M: Meter>(
     if hard {
         for _ in 0..random_below(&mut rng, MAX_AGEING_STEPS) {
             flight.send_state_from(0, &mut rng);
-            flight.tick(OTHER_STEP, AGEING_TIME);
+            flight.tick(OTHER_STEP_ROW, AGEING_STEP_TIME);
         }
     }
     for step in 0..COUNTED_STEPS {
@@ -154,16 +154,18 @@ pub fn measure_flight<M: Meter>(
             return step;
         }
         if step.is_multiple_of(8) {
-            let here = flight.place;
+            let here = flight.enu_m;
             for other in flight.others.iter_mut().filter(|other| !other.silent) {
-                other.place =
+                other.enu_m =
                     here + offset_to_neighbour(seed, &mut rng, if hard { 3.0 } else { 12.0 });
             }
             flight.send_states_from(&mut rng, |other| !other.silent);
         }
         let (now, companion) = (flight.now, &mut *flight.companion);
-        flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.query_filter(now));
-        flight.tick(if hard { HARD_STEP } else { STEP }, STEP_TIME);
+        flight
+            .meter
+            .call(FILTER_ROW, size_of::<BoardCompanion>(), || companion.query_filter_blocker(now));
+        flight.tick(if hard { HARD_STEP_ROW } else { STEP_ROW }, STEP_TIME);
     }
     COUNTED_STEPS
 }
@@ -184,39 +186,41 @@ pub fn measure_safety_filter<M: Meter>(
     flight.take_off();
     for round in 0..FILTER_ROUNDS {
         for i in 0..flight.others.len() {
-            flight.others[i].place = flight.place + far_away();
-            flight.others[i].flags = FILTERED[random_below(&mut rng, FILTERED.len())];
+            flight.others[i].enu_m = flight.enu_m + far_offset();
+            flight.others[i].flags = NEAR_FLAGS[random_below(&mut rng, NEAR_FLAGS.len())];
         }
         if round % 2 == 1 {
-            flight.others[0].place = flight.place;
+            flight.others[0].enu_m = flight.enu_m;
         }
         flight.send_states_from(&mut rng, |_| true);
         for _ in 0..4 {
-            flight.tick(OTHER_STEP, STEP_TIME);
+            flight.tick(OTHER_STEP_ROW, STEP_TIME);
         }
         let (nearest_m, furthest_m) =
             (random_between(&mut rng, 3.0, 12.0), random_between(&mut rng, 6.0, 24.0));
         for i in 0..flight.others.len() {
             let way = random_point(&mut rng, 1.0);
             let away_m = random_between(&mut rng, nearest_m, nearest_m.max(furthest_m) + 0.1);
-            flight.others[i].place = flight.place + way * (away_m / way.norm().max(0.01));
+            flight.others[i].enu_m = flight.enu_m + way * (away_m / way.norm().max(0.01));
         }
         flight.send_states_from(&mut rng, |_| true);
         let (now, companion) = (flight.now, &mut *flight.companion);
-        flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.query_filter(now));
+        flight
+            .meter
+            .call(FILTER_ROW, size_of::<BoardCompanion>(), || companion.query_filter_blocker(now));
         // A whole step beside these neighbours. Time passes, so that their next messages are newer.
-        flight.tick(NEAR_STEP, STEP_TIME);
+        flight.tick(NEAR_STEP_ROW, STEP_TIME);
     }
 }
 
 /// Offset of a neighbour that is too far away to matter, metres.
-fn far_away() -> Point {
+fn far_offset() -> Point {
     Point::new(300.0, 0.0, 0.0)
 }
 
 /// Rounds of a flight in which the filter is measured.
 const FILTER_ROUNDS: usize = 40;
-const FILTERED: [u8; 4] =
+const NEAR_FLAGS: [u8; 4] =
     [AIR, AIR | intent::ON_DETOUR, intent::FLYING, intent::FLYING | intent::OUT_OF_PLAN];
 const AIR: u8 = intent::FLYING | intent::ON_PLAN;
 /// Pairs of which each neighbour gets one at random: its intent's flags, and whether it falls
@@ -241,13 +245,13 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         companion: &'a mut BoardCompanion,
         meter: &'a mut M,
     ) -> Self {
-        let far =
-            || SimulatedNeighbour { place: far_away(), flags: AIR, progress_m: 1e3, silent: false };
+        let (enu_m, progress_m) = (far_offset(), 1e3);
+        let far = || SimulatedNeighbour { enu_m, flags: AIR, progress_m, silent: false };
         Self {
             companion,
             meter,
             now: Instant::ZERO,
-            place: Point::new(0.0, 0.0, 9.0),
+            enu_m: Point::new(0.0, 0.0, 9.0),
             target: None,
             mode: 0,
             armed: false,
@@ -259,7 +263,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
 
     fn flies(&self) -> bool {
         let state = self.companion.state();
-        state.follows_path() || state == companion::State::Dividing
+        state.follows_path_or_is_blocked() || state == companion::State::Dividing
     }
 
     fn has_area(&self) -> bool {
@@ -278,10 +282,10 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
             if self.companion.state() == companion::State::Ready {
                 let mut order = [0; 33];
                 order[28..30].copy_from_slice(&MISSION_START.to_le_bytes());
-                (order[30], order[31]) = (SYSTEM, companion::COMPANION_COMPONENT);
+                (order[30], order[31]) = (OWN_ID, companion::COMPANION_COMPONENT);
                 self.feed_frame(Link::Swarm, (255, 190), COMMAND_LONG, &order);
             }
-            self.tick(OTHER_STEP, STEP_TIME);
+            self.tick(OTHER_STEP_ROW, STEP_TIME);
             if self.companion.state() == companion::State::Follow {
                 return;
             }
@@ -293,37 +297,37 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
     /// autopilot's motion and telemetry.
     fn tick(&mut self, name: &'static str, time: Duration) {
         self.now = self.now + time;
-        let name = if self.has_area() { AREA_STEP } else { name };
+        let name = if self.has_area() { AREA_STEP_ROW } else { name };
         let (now, companion) = (self.now, &mut *self.companion);
         self.meter.call(name, size_of::<BoardCompanion>(), || companion.handle_timeout(now));
         self.drain_outputs();
         if let Some(target) = self.target.filter(|_| self.armed) {
-            let way = target - self.place;
+            let way = target - self.enu_m;
             let reach_m = CRUISE_MPS * 0.05;
-            self.place += way * (reach_m / way.norm().max(reach_m));
+            self.enu_m += way * (reach_m / way.norm().max(reach_m));
         }
         if time > STEP_TIME || self.now.as_micros().is_multiple_of(1_000_000) {
             let [a, b, c, d] = self.mode.to_le_bytes();
             let armed = if self.armed { 129 } else { 1 };
             self.feed_frame(
                 Link::Autopilot,
-                (SYSTEM, 1),
+                (OWN_ID, 1),
                 HEARTBEAT,
                 &[a, b, c, d, 2, 12, armed, 4, 3],
             );
-            let landed = if self.place.z > 9.05 { 2 } else { 1 };
-            self.feed_frame(Link::Autopilot, (SYSTEM, 1), EXTENDED_SYS_STATE, &[0, landed]);
+            let landed = if self.enu_m.z > 9.05 { 2 } else { 1 };
+            self.feed_frame(Link::Autopilot, (OWN_ID, 1), EXTENDED_SYS_STATE, &[0, landed]);
             let mut status = [0; 31];
             status[30] = 90;
-            self.feed_frame(Link::Autopilot, (SYSTEM, 1), SYS_STATUS, &status);
+            self.feed_frame(Link::Autopilot, (OWN_ID, 1), SYS_STATUS, &status);
             // All accuracies of the estimator are 0 m.
-            self.feed_frame(Link::Autopilot, (SYSTEM, 1), ESTIMATOR_STATUS, &[0; 42]);
+            self.feed_frame(Link::Autopilot, (OWN_ID, 1), ESTIMATOR_STATUS, &[0; 42]);
         }
-        let ned = swap_enu_ned(&self.place);
+        let ned = swap_enu_ned(&self.enu_m);
         let mut position = [0; 28];
         position[..4].copy_from_slice(&self.now.as_boot_ms().to_le_bytes());
         put_floats(&mut position[4..], &[ned.x, ned.y, ned.z]);
-        self.feed_frame(Link::Autopilot, (SYSTEM, 1), LOCAL_POSITION_NED, &position);
+        self.feed_frame(Link::Autopilot, (OWN_ID, 1), LOCAL_POSITION_NED, &position);
     }
 
     /// Passes a frame with this payload to the companion, as received on `link` from `from`
@@ -353,9 +357,9 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
 
     /// Passes neighbour `i`'s intent and position to the companion.
     fn send_state_from(&mut self, i: usize, rng: &mut Pcg32) {
-        let SimulatedNeighbour { place, flags, progress_m, .. } = self.others[i];
+        let SimulatedNeighbour { enu_m, flags, progress_m, .. } = self.others[i];
         let system_id = 2 + i as u8;
-        let points = (0..intent::MAX_POINTS).map(|_| place + random_point(rng, 3.0)).collect();
+        let points = (0..intent::MAX_POINTS).map(|_| enu_m + random_point(rng, 3.0)).collect();
         let intent = Intent {
             system_id,
             flags,
@@ -378,7 +382,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
         if self.has_area() {
             self.send_roster_from(system_id);
         }
-        let at = frames::enu_to_geodetic(&ORIGIN, &place);
+        let at = frames::enu_to_geodetic(&ORIGIN, &enu_m);
         let mut position = [0; 28];
         position[..4].copy_from_slice(&self.now.as_boot_ms().to_le_bytes());
         let whole = [(at.lat_deg * 1e7) as i32, (at.lon_deg * 1e7) as i32, (at.alt_m * 1e3) as i32];
@@ -404,8 +408,8 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
             let mission_crc = MISSION_CRC;
             let roster = RosterReport {
                 system_id,
-                first: first as u8,
-                plan: PLAN_CRC as u8,
+                first_rank: first as u8,
+                plan_crc8: PLAN_CRC as u8,
                 mission_crc,
                 entries,
                 ..RosterReport::default()
@@ -476,7 +480,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
                     for (to, number) in origin.chunks_exact_mut(4).zip(whole) {
                         to.copy_from_slice(&(number as i32).to_le_bytes());
                     }
-                    self.feed_frame(Link::Autopilot, (SYSTEM, 1), GPS_GLOBAL_ORIGIN, &origin);
+                    self.feed_frame(Link::Autopilot, (OWN_ID, 1), GPS_GLOBAL_ORIGIN, &origin);
                 }
                 _ => {}
             },

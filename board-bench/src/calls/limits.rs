@@ -16,12 +16,12 @@ use planner_core::track::deconflict::{
 };
 use planner_core::track::{self, ReferenceState, TrackConfig};
 
-use super::limits_results::{HARD_NUMBERS, extreme_points};
-pub use super::limits_results::{Listener, Results};
+pub use super::limits_results::{CallListener, Results};
+use super::limits_results::{EXTREME_NUMBERS, extreme_points};
 use super::limits_safety::call_reachable_sets;
 
 /// Makes all calls that need no roadmap.
-pub fn call_without_roadmap(to: &mut Results<'_, impl Listener>) {
+pub fn call_without_roadmap(to: &mut Results<'_, impl CallListener>) {
     call_frames(to);
     call_grids(to);
     call_segments(to);
@@ -31,7 +31,7 @@ pub fn call_without_roadmap(to: &mut Results<'_, impl Listener>) {
     call_reachable_sets(to);
 }
 
-fn call_frames(to: &mut Results<'_, impl Listener>) {
+fn call_frames(to: &mut Results<'_, impl CallListener>) {
     for p in extreme_points() {
         let hard = Geodetic { lat_deg: p.x.into(), lon_deg: p.y.into(), alt_m: p.z.into() };
         let good = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
@@ -60,11 +60,11 @@ const SHAPE: GridShape =
     GridShape { dims: [5, 6, 3], min: Point::new(0.0, 0.0, 0.0), resolution_m: 0.5 };
 const WORDS: [u64; 4] = [1 << 17, 0, 0, 0];
 
-fn call_grids(to: &mut Results<'_, impl Listener>) {
+fn call_grids(to: &mut Results<'_, impl CallListener>) {
     let dims = [0, 1, 4, MAX_DIM, MAX_DIM + 1, u32::MAX];
     for i in 0..dims.len() * dims.len() {
         let shape = GridShape { dims: [dims[i % 6], dims[i / 6], dims[(i * 5 + 1) % 6]], ..SHAPE };
-        let bricks = to.call("voxel::GridShape::bricks", || shape.bricks());
+        let bricks = to.call("voxel::GridShape::brick_dims", || shape.brick_dims());
         let count = to.call("voxel::GridShape::word_count", || shape.word_count());
         assert!(bricks.iter().all(|&b| b as usize <= count.max(b as usize)));
         to.call("voxel::GridShape::max", || shape.max());
@@ -77,7 +77,7 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
         // None of these shapes has four words, so `new` must refuse `WORDS`, which fit [`SHAPE`].
         assert!(grid.is_err(), "{shape:?}");
     }
-    for hard in HARD_NUMBERS {
+    for hard in EXTREME_NUMBERS {
         let shape = GridShape { resolution_m: hard, ..SHAPE };
         let grid = VoxelGrid::new(shape, Outside::Free, &WORDS);
         assert_eq!(grid.is_ok(), hard > 0.0 && hard.is_finite());
@@ -99,7 +99,7 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
     }
     for outside in [Outside::Free, Outside::Blocked] {
         let grid = VoxelGrid::new(SHAPE, outside, &WORDS).expect("a good grid");
-        assert_eq!(to.call("voxel::VoxelGrid::outside", || grid.outside()), outside);
+        assert_eq!(to.call("voxel::VoxelGrid::beyond_map", || grid.beyond_map()), outside);
         assert_eq!(to.call("voxel::VoxelGrid::shape", || grid.shape().dims), SHAPE.dims);
         assert_eq!(to.call("voxel::VoxelGrid::words", || grid.words().len()), 4);
         for cell in [[5, 0, 0], [0, 6, 0], [0, 0, 3], [u32::MAX; 3], [4, u32::MAX, 2]] {
@@ -113,13 +113,13 @@ fn call_grids(to: &mut Results<'_, impl Listener>) {
     }
 }
 
-fn call_segments(to: &mut Results<'_, impl Listener>) {
+fn call_segments(to: &mut Results<'_, impl CallListener>) {
     for outside in [Outside::Free, Outside::Blocked] {
         let grid = VoxelGrid::new(SHAPE, outside, &WORDS).expect("a good grid");
         let inside = Point::new(2.2, 2.7, 1.2);
         for p in extreme_points() {
             let snapped = to.call("lattice::snap", || segment::snap(&SHAPE, &p));
-            for hard in HARD_NUMBERS {
+            for hard in EXTREME_NUMBERS {
                 let clear = to.call("segment::segment_is_clear", || {
                     segment::segment_is_clear(&grid, &p, &inside, hard)
                 });
@@ -140,8 +140,9 @@ fn call_segments(to: &mut Results<'_, impl Listener>) {
                 to.add(distance[1]);
             }
         }
-        for cells in HARD_NUMBERS {
-            let error = to.call("lattice::snap_error_cells", || segment::snap_error_cells(cells));
+        for cells in EXTREME_NUMBERS {
+            let error =
+                to.call("lattice::max_snap_error_cells", || segment::max_snap_error_cells(cells));
             to.add(error);
         }
         let edge = [MAX_SNAPPED, -MAX_SNAPPED, 0, i32::MAX, i32::MIN];
@@ -156,12 +157,12 @@ fn call_segments(to: &mut Results<'_, impl Listener>) {
     }
 }
 
-fn call_sampling(to: &mut Results<'_, impl Listener>) {
+fn call_sampling(to: &mut Results<'_, impl CallListener>) {
     let grid = VoxelGrid::new(SHAPE, Outside::Blocked, &WORDS).expect("a good grid");
     let solid = VoxelGrid::new(GridShape { dims: [4; 3], ..SHAPE }, Outside::Blocked, &[u64::MAX])
         .expect("it is");
     let good = PrmConfig {
-        nodes: 6,
+        random_nodes: 6,
         edge_min_m: 0.1,
         edge_max_m: 2.0,
         clearance_m: 0.1,
@@ -171,12 +172,12 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
     let mut nodes = [Point::zeros(); 8];
     let mut index = to.call("neighbours::NodeIndex::new", prm::NodeIndex::<8, 16>::new);
     assert!(to.call("neighbours::NodeIndex::is_empty", || index.is_empty()));
-    for hard in HARD_NUMBERS {
+    for hard in EXTREME_NUMBERS {
         for config in [
             PrmConfig { edge_min_m: hard, ..good },
             PrmConfig { edge_max_m: hard, ..good },
             PrmConfig { clearance_m: hard, ..good },
-            PrmConfig { nodes: hard as usize, ..good },
+            PrmConfig { random_nodes: hard as usize, ..good },
         ] {
             let checked = to.call("config::PrmConfig::check", || config.check());
             let sampled = to.call("prm::sample_nodes", || {
@@ -237,7 +238,7 @@ fn call_sampling(to: &mut Results<'_, impl Listener>) {
     }
 }
 
-fn call_paths(to: &mut Results<'_, impl Listener>) {
+fn call_paths(to: &mut Results<'_, impl CallListener>) {
     let mut path: Path<4> = to.call("path::Path::new", Path::new);
     let track = TrackConfig::default();
     assert!(
@@ -255,10 +256,12 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
         let _ = path.push(Point::new(round as f32, 0.0, 1.0), 1.0);
         let length_m = to.call("path::Path::length_m", || path.length_m());
         assert!(length_m.is_finite() && length_m >= 0.0, "{length_m}");
-        for (i, &hard) in HARD_NUMBERS.iter().enumerate() {
-            let other = HARD_NUMBERS[(i * 5 + round) % HARD_NUMBERS.len()];
+        for (i, &hard) in EXTREME_NUMBERS.iter().enumerate() {
+            let other = EXTREME_NUMBERS[(i * 5 + round) % EXTREME_NUMBERS.len()];
             to.call("path::Path::set_times_at_speed", || path.set_times_at_speed(hard, other));
-            to.call("path::Path::set_last_times", || path.set_last_times(hard, other));
+            to.call("path::Path::set_last_waypoint_times", || {
+                path.set_last_waypoint_times(hard, other);
+            });
             to.call("path::Path::set_times_by_leg", || {
                 path.set_times_by_leg(hard, |from, to| (to - from).norm() * other);
             });
@@ -281,12 +284,12 @@ fn call_paths(to: &mut Results<'_, impl Listener>) {
 }
 
 /// Calls of the reference along a path, with extreme advice, time steps and limits.
-fn call_tracking(to: &mut Results<'_, impl Listener>, path: &Path<4>, hard: f32, other: f32) {
+fn call_tracking(to: &mut Results<'_, impl CallListener>, path: &Path<4>, hard: f32, other: f32) {
     let track = TrackConfig::default();
     let advice = |scale: f32, within_m: f32| Advice {
         speed_scale: scale,
         stop_within_m: within_m,
-        waiting_for: 0,
+        waiting_for_id: 0,
     };
     let length_m = path.length_m();
     for dt_s in [0.05, hard] {
@@ -313,14 +316,14 @@ fn call_tracking(to: &mut Results<'_, impl Listener>, path: &Path<4>, hard: f32,
 }
 
 /// Calls of the pictures along a path, with extreme spacings.
-fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
+fn call_tasks(to: &mut Results<'_, impl CallListener>, path: &Path<4>) {
     let last =
         to.call("path::Path::last_index", || path.last_index()).expect("a path with waypoints");
     let waypoints = WaypointRange {
         first: PicturePlan::MAX_AREA_WAYPOINTS - 1,
         end: PicturePlan::MAX_AREA_WAYPOINTS,
     };
-    for spacing_m in HARD_NUMBERS {
+    for spacing_m in EXTREME_NUMBERS {
         let new = || PicturePlan::new(spacing_m, HeadingMode::Ahead, Trigger::Distance);
         let mut plan = to.call("photographs::PicturePlan::new", new);
         for (from, until) in
@@ -331,10 +334,10 @@ fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
             });
             assert_eq!(marked.is_ok(), from <= until && until < PicturePlan::MAX_PATH_WAYPOINTS);
         }
-        let plan = to.call("photographs::PicturePlan::with_area", || {
+        let plan = to.call("photographs::PicturePlan::with_area_waypoints", || {
             let order =
                 if spacing_m > 0.0 { WaypointOrder::Falling } else { WaypointOrder::Rising };
-            plan.with_area(u32::MAX, order)
+            plan.with_area_waypoints(u32::MAX, order)
         });
         assert_eq!(
             to.call("photographs::PicturePlan::area_waypoint_count", || plan.area_waypoint_count()),
@@ -371,7 +374,7 @@ fn call_tasks(to: &mut Results<'_, impl Listener>, path: &Path<4>) {
 
 /// Calls for the waypoints that pictures show, and for the pictures' places.
 fn call_pictures(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     path: &Path<4>,
     plan: &PicturePlan,
     all: u32,
@@ -395,12 +398,12 @@ fn waypoint_count<const W: usize>(path: &Path<W>) -> usize {
     path.waypoints().len()
 }
 
-fn call_deconfliction(to: &mut Results<'_, impl Listener>) {
+fn call_deconfliction(to: &mut Results<'_, impl CallListener>) {
     let mut path: Path<4> = Path::new();
     let empty: Path<4> = Path::new();
     [0.0, 4.0].iter().for_each(|&x| path.push(Point::new(x, 0.0, 1.0), 1.0).expect("two points"));
     for (i, p) in extreme_points().enumerate() {
-        let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
+        let hard = EXTREME_NUMBERS[i % EXTREME_NUMBERS.len()];
         let all: Vec<Neighbour, 4> = (0..4)
             .map(|k| Neighbour {
                 id: k,
@@ -412,8 +415,11 @@ fn call_deconfliction(to: &mut Results<'_, impl Listener>) {
                 ..Neighbour::default()
             })
             .collect();
-        let gates =
-            [hard, p.x, -hard].map(|at_m| planner_core::flight::Gate { at_m, id: 2, until_m: p.y });
+        let gates = [hard, p.x, -hard].map(|at_m| planner_core::flight::Gate {
+            at_m,
+            wait_for_id: 2,
+            open_from_progress_m: p.y,
+        });
         for method in [Method::Off, Method::Algorithm2, Method::Priority] {
             let cfg = DeconflictConfig {
                 method,
@@ -423,7 +429,7 @@ fn call_deconfliction(to: &mut Results<'_, impl Listener>) {
             };
             for path in [&path, &empty] {
                 let own =
-                    OwnVehicle { rank: 0, position: p, along_m: hard, path, detours: i % 2 == 0 };
+                    OwnVehicle { rank: 0, position: p, along_m: hard, path, on_detour: i % 2 == 0 };
                 let advice =
                     to.call("deconflict::advise", || deconflict::advise(&cfg, &own, &gates, &all));
                 assert!((0.0..=1.0).contains(&advice.speed_scale), "{p:?} {hard} {advice:?}");

@@ -5,10 +5,10 @@ use planner_core::Point;
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
 use planner_core::coverage::losses::{self, Loss, VehicleStatus};
 use planner_core::coverage::pack::{
-    Heights, PackWorkspace, Route, RouteDirection, RoutePlan, TrackUnit, Vehicle, Work,
+    CoverageProblem, PackWorkspace, Route, RouteDirection, RoutePlan, TrackUnit, Vehicle,
 };
 use planner_core::coverage::{CoverageError, Flat, around};
-use planner_core::detour::{DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
+use planner_core::detour::{DetourError, DetourGoal, DetourRequest, KeepOutZone, ZoneKind};
 use planner_core::flight::{HeadingMode, Path, Trigger, VehiclePlan, WaypointRange};
 use planner_core::map::field::follow::TerrainFollowing;
 use planner_core::map::field::{self, FieldShape, FieldView};
@@ -19,7 +19,10 @@ use super::coverage_flights;
 use super::limits_coverage::{
     self as coverage, CORNERS, FLEET, HEIGHTS, LANES, Lanes, VEHICLES, ZoneTransit,
 };
-use super::limits_results::{HARD_NUMBERS, Listener, Results, extreme_points, is_good};
+use super::limits_results::{
+    CallListener, EXTREME_NUMBERS, Results, extreme_points, heights_with_extreme_number,
+    is_positive_and_finite,
+};
 
 /// Capacities of these calls: waypoints and gates of one vehicle's plan.
 const WAYPOINTS: usize = 24;
@@ -30,9 +33,9 @@ type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 /// A closure that plans the flights of given routes by `flights::plan_flights`, and checks the
 /// result.
 type PlanCall<'p> =
-    dyn FnMut(&AreaWork<'_>, &RoutePlan<VEHICLES>, &FlightInputs<'_>) -> Planned + 'p;
-type AreaWork<'w> = Work<'w, LANES, CORNERS>;
-type Planned = Result<(), PlanError>;
+    dyn FnMut(&AreaWork<'_>, &RoutePlan<VEHICLES>, &FlightInputs<'_>) -> PlanResult + 'p;
+type AreaWork<'w> = CoverageProblem<'w, LANES, CORNERS>;
+type PlanResult = Result<(), PlanError>;
 
 /// Memory that is lent to the calls.
 pub(super) struct FlightWorkspaces {
@@ -55,22 +58,22 @@ impl FlightWorkspaces {
 }
 
 const PAD: Pad = Pad {
-    id: 1,
-    start: Point::new(-5.0, -5.0, 1.5),
+    vehicle_id: 1,
+    path_start: Point::new(-5.0, -5.0, 1.5),
     climb_m: 1.5,
-    end_z_m: 1.5,
+    path_end_z_m: 1.5,
     descent_m: 1.5,
     airborne: false,
 };
 const PADS: [Pad; VEHICLES] = [
     PAD,
-    Pad { id: 2, start: Point::new(5.0, -5.0, 1.5), ..PAD },
-    Pad { id: 3, start: Point::new(15.0, -5.0, 1.5), ..PAD },
+    Pad { vehicle_id: 2, path_start: Point::new(5.0, -5.0, 1.5), ..PAD },
+    Pad { vehicle_id: 3, path_start: Point::new(15.0, -5.0, 1.5), ..PAD },
 ];
 const FLIGHT_INPUTS: FlightInputs<'_> = FlightInputs {
     pads: &PADS,
     capture: CaptureSettings {
-        waypoint_m: 10.0,
+        max_picture_spacing_m: 10.0,
         heading_mode: HeadingMode::Ahead,
         trigger: Trigger::None,
     },
@@ -80,7 +83,7 @@ const FLIGHT_INPUTS: FlightInputs<'_> = FlightInputs {
 
 /// Makes all calls on coverage: areas and lanes, flights, divisions, detours home.
 pub(super) fn call_area_flights(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     schedule: &mut ScheduleWorkspace,
     lent: &mut FlightWorkspaces,
 ) {
@@ -92,11 +95,14 @@ pub(super) fn call_area_flights(
     call_flight_plans(to, &good, &area.plan, schedule, out);
     let pack = &mut area.powell.pack;
     call_divisions(to, &good, &area.plan, &mut BorrowedWorkspaces { losses, pack, schedule, out });
-    call_ways_home(to, &transit, own);
+    call_detours_home(to, &transit, own);
 }
 
-fn division_work<'a>(tracks: &'a Lanes, transit: &'a ZoneTransit<'a>) -> Work<'a, LANES, CORNERS> {
-    Work {
+fn division_work<'a>(
+    tracks: &'a Lanes,
+    transit: &'a ZoneTransit<'a>,
+) -> CoverageProblem<'a, LANES, CORNERS> {
+    CoverageProblem {
         tracks,
         transit,
         vehicles: &FLEET,
@@ -107,55 +113,50 @@ fn division_work<'a>(tracks: &'a Lanes, transit: &'a ZoneTransit<'a>) -> Work<'a
 }
 
 /// Whether all waypoints of all flights have finite coordinates.
-fn is_finite(out: &Flights) -> bool {
+fn has_finite_waypoints(out: &Flights) -> bool {
     let places = out.flights.iter().flat_map(|flight| flight.path.waypoints());
     places.into_iter().all(|waypoint| waypoint.position.iter().all(|c| c.is_finite()))
 }
 
 fn call_flight_plans(
-    to: &mut Results<'_, impl Listener>,
-    good: &Work<'_, LANES, CORNERS>,
+    to: &mut Results<'_, impl CallListener>,
+    good: &CoverageProblem<'_, LANES, CORNERS>,
     routes: &RoutePlan<VEHICLES>,
     ws: &mut ScheduleWorkspace,
     out: &mut Flights,
 ) {
-    let mut plan = |work: &Work<'_, LANES, CORNERS>,
+    let mut plan = |work: &CoverageProblem<'_, LANES, CORNERS>,
                     routes: &RoutePlan<VEHICLES>,
                     flight_inputs: &FlightInputs<'_>| {
         let result = to.call("flights::plan_flights", || {
             flights::plan_flights(work, routes, flight_inputs, ws, out)
         });
         to.add_count(usize::from(result.is_ok()));
-        assert!(result.is_err() || is_finite(out), "{flight_inputs:?}");
+        assert!(result.is_err() || has_finite_waypoints(out), "{flight_inputs:?}");
         result
     };
     assert_eq!(plan(good, routes, &FLIGHT_INPUTS), Ok(()));
-    for hard in HARD_NUMBERS {
-        for heights in
-            [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }]
-        {
-            let planned = plan(&Work { heights, ..*good }, routes, &FLIGHT_INPUTS);
-            assert_eq!(matches!(planned, Err(PlanError::Config(_))), !is_good(hard));
+    for hard in EXTREME_NUMBERS {
+        for heights in heights_with_extreme_number(HEIGHTS, hard) {
+            let planned = plan(&CoverageProblem { heights, ..*good }, routes, &FLIGHT_INPUTS);
+            assert_eq!(matches!(planned, Err(PlanError::Config(_))), !is_positive_and_finite(hard));
         }
         call_hard_vehicles(&mut plan, good, routes, hard);
-        for look in [HeadingMode::Ahead, HeadingMode::Fixed(hard)] {
-            for clearance_m in [10.0, hard] {
-                let manner = CaptureSettings {
-                    waypoint_m: hard,
+        for look in [HeadingMode::Ahead, HeadingMode::FixedEnuRad(hard)] {
+            for assumed_clearance_m in [10.0, hard] {
+                let capture = CaptureSettings {
+                    max_picture_spacing_m: hard,
                     heading_mode: look,
                     ..FLIGHT_INPUTS.capture
                 };
-                let planned = plan(
-                    good,
-                    routes,
-                    &FlightInputs { capture: manner, clearance_m, ..FLIGHT_INPUTS },
-                );
-                assert!(is_good(hard) || planned.is_err());
+                let inputs = FlightInputs { capture, assumed_clearance_m, ..FLIGHT_INPUTS };
+                let planned = plan(good, routes, &inputs);
+                assert!(is_positive_and_finite(hard) || planned.is_err());
             }
         }
         let schedule = ScheduleConfig { separation_m: hard, ..FLIGHT_INPUTS.schedule };
         let planned = plan(good, routes, &FlightInputs { schedule, ..FLIGHT_INPUTS });
-        assert!(is_good(hard) || matches!(planned, Err(PlanError::Config(_))));
+        assert!(is_positive_and_finite(hard) || matches!(planned, Err(PlanError::Config(_))));
     }
     let pads = [PADS[0], PADS[0], PADS[2]];
     assert_eq!(
@@ -172,17 +173,17 @@ fn call_flight_plans(
     for done in [&ranges[..1], &ranges[1..]] {
         let _ = plan(good, routes, &FlightInputs { photographed: done, ..FLIGHT_INPUTS });
     }
-    for (max_gates, held_layers) in [(0, 0), (usize::MAX, u64::MAX)] {
-        let _ = plan(good, routes, &FlightInputs { max_gates, held_layers, ..FLIGHT_INPUTS });
+    for (max_gates, occupied_layers) in [(0, 0), (usize::MAX, u64::MAX)] {
+        let _ = plan(good, routes, &FlightInputs { max_gates, occupied_layers, ..FLIGHT_INPUTS });
     }
-    unusual_routes(&mut plan, good, routes);
+    call_unusual_routes(&mut plan, good, routes);
     call_field_plans(&mut plan, good, routes);
 }
 
 /// Plans with `hard` in one field of the second vehicle or of its pad.
 fn call_hard_vehicles(
     plan: &mut PlanCall<'_>,
-    good: &Work<'_, LANES, CORNERS>,
+    good: &CoverageProblem<'_, LANES, CORNERS>,
     routes: &RoutePlan<VEHICLES>,
     hard: f32,
 ) {
@@ -194,16 +195,17 @@ fn call_hard_vehicles(
         Vehicle { descend_mps: hard, ..vehicle },
     ] {
         let vehicles = [FLEET[0], vehicle, FLEET[2]];
-        let planned = plan(&Work { vehicles: &vehicles, ..*good }, routes, &FLIGHT_INPUTS);
+        let planned =
+            plan(&CoverageProblem { vehicles: &vehicles, ..*good }, routes, &FLIGHT_INPUTS);
         assert!(hard.is_finite() || planned == Err(PlanError::BadTask(2)));
     }
     let pad = PADS[1];
     for pad in [
-        Pad { start: Point::new(5.0, -5.0, hard), ..pad },
-        Pad { end_z_m: hard, ..pad },
+        Pad { path_start: Point::new(5.0, -5.0, hard), ..pad },
+        Pad { path_end_z_m: hard, ..pad },
         Pad { climb_m: hard, ..pad },
         Pad { descent_m: hard, ..pad },
-        Pad { start: Point::new(hard, hard, 30.0), climb_m: 0.0, airborne: true, ..pad },
+        Pad { path_start: Point::new(hard, hard, 30.0), climb_m: 0.0, airborne: true, ..pad },
     ] {
         let pads = [PADS[0], pad, PADS[2]];
         let planned = plan(good, routes, &FlightInputs { pads: &pads, ..FLIGHT_INPUTS });
@@ -213,18 +215,18 @@ fn call_hard_vehicles(
 
 /// Plans with unusual routes. An unknown vehicle or a wrong waypoint range must be refused; an odd
 /// direction or layer may be planned or refused; no routes at all must be planned.
-fn unusual_routes(
+fn call_unusual_routes(
     plan: &mut PlanCall<'_>,
-    good: &Work<'_, LANES, CORNERS>,
+    good: &CoverageProblem<'_, LANES, CORNERS>,
     routes: &RoutePlan<VEHICLES>,
 ) {
     let first = routes.routes[0];
     let count = good.tracks.waypoint_count();
     for route in [
-        Route { vehicle: u8::MAX, ..first },
-        Route { end: first.first, ..first },
-        Route { end: count + 1, ..first },
-        Route { first: u32::MAX, end: u32::MAX, ..first },
+        Route { vehicle_index: u8::MAX, ..first },
+        Route { waypoint_end: first.lowest_waypoint, ..first },
+        Route { waypoint_end: count + 1, ..first },
+        Route { lowest_waypoint: u32::MAX, waypoint_end: u32::MAX, ..first },
     ] {
         let mut routes = routes.clone();
         routes.routes[0] = route;
@@ -236,7 +238,7 @@ fn unusual_routes(
         let _ = plan(good, &routes, &FLIGHT_INPUTS);
     }
     let aloft = PADS.map(|pad| Pad {
-        start: pad.start + Point::new(0.0, 0.0, 40.0),
+        path_start: pad.path_start + Point::new(0.0, 0.0, 40.0),
         airborne: true,
         ..pad
     });
@@ -250,16 +252,17 @@ fn unusual_routes(
 /// Plans flights above a height field, with extreme settings for terrain following.
 fn call_field_plans(
     plan: &mut PlanCall<'_>,
-    good: &Work<'_, LANES, CORNERS>,
+    good: &CoverageProblem<'_, LANES, CORNERS>,
     routes: &RoutePlan<VEHICLES>,
 ) {
     let mut file = [0; 64];
     let field = uneven_field(&mut file);
-    for hard in HARD_NUMBERS {
-        let usual = TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, max_slope: 0.5 };
+    for hard in EXTREME_NUMBERS {
+        let usual =
+            TerrainFollowing { field, min_height_m: 30.0, tolerance_m: 3.0, max_slope: 0.5 };
         for following in [
             usual,
-            TerrainFollowing { height_m: hard, ..usual },
+            TerrainFollowing { min_height_m: hard, ..usual },
             TerrainFollowing { tolerance_m: hard, ..usual },
             TerrainFollowing { max_slope: hard, ..usual },
         ] {
@@ -271,7 +274,8 @@ fn call_field_plans(
 
 /// A height field with uneven ground below the area.
 fn uneven_field(file: &mut [u8]) -> FieldView<'_> {
-    let shape = FieldShape { low: Flat::new(-20.0, -20.0), cell_m: 40.0, columns: 2, rows: 3 };
+    let shape =
+        FieldShape { south_west: Flat::new(-20.0, -20.0), cell_m: 40.0, columns: 2, rows: 3 };
     let length = field::write(&shape, &[0, 20, 40, 10, -30, 50], file).expect("it fits");
     FieldView::parse(&file[..length]).expect("a field")
 }
@@ -284,8 +288,8 @@ struct BorrowedWorkspaces<'m> {
 }
 
 fn call_divisions(
-    to: &mut Results<'_, impl Listener>,
-    good: &Work<'_, LANES, CORNERS>,
+    to: &mut Results<'_, impl CallListener>,
+    good: &CoverageProblem<'_, LANES, CORNERS>,
     routes: &RoutePlan<VEHICLES>,
     memory: &mut BorrowedWorkspaces<'_>,
 ) {
@@ -302,12 +306,13 @@ fn call_divisions(
         let done = to.call("losses::LossesWorkspace::done", || memory.losses.done().len());
         assert!(done <= 1);
     }
-    let fate = VehicleStatus { alive: true, along_m: 60.0 };
-    let lost = VehicleStatus { alive: false, along_m: 60.0 };
-    for hard in HARD_NUMBERS {
-        for hit in
-            [VehicleStatus { along_m: hard, ..fate }, VehicleStatus { along_m: hard, ..lost }]
-        {
+    let fate = VehicleStatus { continues: true, photographed_to_m: 60.0 };
+    let lost = VehicleStatus { continues: false, photographed_to_m: 60.0 };
+    for hard in EXTREME_NUMBERS {
+        for hit in [
+            VehicleStatus { photographed_to_m: hard, ..fate },
+            VehicleStatus { photographed_to_m: hard, ..lost },
+        ] {
             for statuses in
                 [&[fate, hit, fate][..], &[hit; VEHICLES], &[lost, hit, lost], &[hit, fate], &[]]
             {
@@ -318,7 +323,7 @@ fn call_divisions(
                 flights::plan_flights(good, routes, &FLIGHT_INPUTS, memory.schedule, memory.out)
                     .expect("as before");
                 let mut routes = routes.clone();
-                let loss = Loss { work: good, flight_inputs: &FLIGHT_INPUTS, statuses };
+                let loss = Loss { problem: good, flight_inputs: &FLIGHT_INPUTS, statuses };
                 let divided = call_redivide(to, &loss, memory, &mut routes);
                 assert!(
                     statuses.len() == VEHICLES || divided == Err(CoverageError::Vehicles.into())
@@ -329,7 +334,7 @@ fn call_divisions(
                 // The same loss again: waypoints that are already done must not be divided again.
                 let _ = call_redivide(to, &loss, memory, &mut routes);
                 if let Some(route) = routes.routes.first_mut() {
-                    route.vehicle = u8::MAX;
+                    route.vehicle_index = u8::MAX;
                     let unknown = call_redivide(to, &loss, memory, &mut routes);
                     assert_eq!(unknown, Err(CoverageError::Vehicles.into()));
                 }
@@ -339,7 +344,7 @@ fn call_divisions(
 }
 
 fn call_redivide(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     loss: &Loss<'_, LANES, CORNERS>,
     memory: &mut BorrowedWorkspaces<'_>,
     routes: &mut RoutePlan<VEHICLES>,
@@ -348,13 +353,13 @@ fn call_redivide(
     let divided = to.call("losses::redivide_work", || {
         losses::redivide_work(loss, losses, pack, schedule, routes, out)
     });
-    assert!(divided.is_err() || is_finite(out), "{:?}", loss.statuses);
+    assert!(divided.is_err() || has_finite_waypoints(out), "{:?}", loss.statuses);
     to.add_count(usize::from(divided.is_ok()));
     divided
 }
 
-fn call_ways_home(
-    to: &mut Results<'_, impl Listener>,
+fn call_detours_home(
+    to: &mut Results<'_, impl CallListener>,
     transit: &ZoneTransit<'_>,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
 ) {
@@ -363,29 +368,29 @@ fn call_ways_home(
     let here = Point::new(30.0, 20.0, 35.0);
     let over = Point::new(-5.0, -5.0, 1.5);
     let good = DetourRequest {
-        aside: false,
+        land_aside: false,
         here,
         leg: [here; 2],
         leg_clearance_m: 10.0,
-        goal: Goal::Home { over, layer_m: 40.0 },
+        goal: DetourGoal::Home { above_pad: over, layer_z_m: 40.0 },
         descent_m: 1.5,
         required_clearance_m: 0.8,
         fence: None,
     };
     let natures = [ZoneKind::Static, ZoneKind::Descending, ZoneKind::Grounded];
     for (i, p) in extreme_points().enumerate() {
-        let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
+        let hard = EXTREME_NUMBERS[i % EXTREME_NUMBERS.len()];
         let thing = KeepOutZone { from: p, to: here, radius_m: hard, kind: natures[i % 3] };
         for request in [
             good,
-            DetourRequest { aside: true, ..good },
+            DetourRequest { land_aside: true, ..good },
             DetourRequest { here: p, ..good },
-            DetourRequest { here: p, aside: true, ..good },
+            DetourRequest { here: p, land_aside: true, ..good },
             DetourRequest { descent_m: hard, ..good },
             DetourRequest { required_clearance_m: hard, ..good },
-            DetourRequest { goal: Goal::Home { over: p, layer_m: 40.0 }, ..good },
-            DetourRequest { goal: Goal::Home { over, layer_m: hard }, ..good },
-            DetourRequest { goal: Goal::Node(0), ..good },
+            DetourRequest { goal: DetourGoal::Home { above_pad: p, layer_z_m: 40.0 }, ..good },
+            DetourRequest { goal: DetourGoal::Home { above_pad: over, layer_z_m: hard }, ..good },
+            DetourRequest { goal: DetourGoal::RoadmapGoal(0), ..good },
             DetourRequest { fence: Some((p, here)), ..good },
         ] {
             for field in [None, Some(field)] {

@@ -4,16 +4,17 @@ use heapless::Vec;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::footprint::Spacing;
 use planner_core::coverage::pack::{
-    self, Heights, PackWorkspace, Route, RouteDirection, RoutePlan, TrackUnit, Vehicle, Work,
+    self, CoverageProblem, Heights, PackWorkspace, Route, RouteDirection, RoutePlan, TrackUnit,
+    Vehicle,
 };
 use planner_core::coverage::powell::{self, powell};
 use planner_core::coverage::tracks::{self, Lane, LanePattern, Tracks};
-use planner_core::coverage::transit::Transit;
+use planner_core::coverage::transit::TransitGraph;
 use planner_core::coverage::{CoverageError, Flat, bound, divide, exact, given, sweep};
 use planner_core::flight::{WaypointRange, WaypointSet};
 
 use super::limits_cameras::{SPACING, call_cameras};
-use super::limits_results::{HARD_NUMBERS, Listener, Results};
+use super::limits_results::{CallListener, EXTREME_NUMBERS, Results, heights_with_extreme_number};
 
 /// Capacities of these calls: lanes, vertices, corners of no-fly zones, vehicles.
 pub(super) const LANES: usize = 8;
@@ -23,7 +24,7 @@ pub(super) const VEHICLES: usize = 3;
 /// Waypoint numbers and range ends that are tried.
 const WAYPOINT_NUMBERS: [u32; 6] = [0, 1, 7, 1 << 24, u32::MAX - 1, u32::MAX];
 
-const CORNERS_OF_ALL: [Flat; 8] = [
+const AREA_AND_ZONE_VERTICES: [Flat; 8] = [
     Flat::new(0.0, 0.0),
     Flat::new(40.0, 0.0),
     Flat::new(40.0, 30.0),
@@ -35,11 +36,16 @@ const CORNERS_OF_ALL: [Flat; 8] = [
 ];
 const RINGS: [Ring; 2] =
     [Ring { end: 4, kind: RingKind::Outer }, Ring { end: 8, kind: RingKind::NoFly }];
-const PATTERN: LanePattern =
-    LanePattern { spacing: SPACING, angle_deg: None, margin_m: 0.0, search_steps: 100 };
-pub(super) const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
+const PATTERN: LanePattern = LanePattern {
+    spacing: SPACING,
+    angle_from_east_deg: None,
+    border_overshoot_m: 0.0,
+    max_search_steps: 100,
+};
+pub(super) const HEIGHTS: Heights = Heights { max_picture_height_m: 35.0, layer_spacing_m: 5.0 };
+
 const VEHICLE: Vehicle = Vehicle {
-    place: Flat::new(-5.0, -5.0),
+    transit_start: Flat::new(-5.0, -5.0),
     home: Flat::new(-5.0, -5.0),
     cruise_mps: 5.0,
     climb_mps: 3.0,
@@ -48,18 +54,18 @@ const VEHICLE: Vehicle = Vehicle {
 };
 pub(super) const FLEET: [Vehicle; VEHICLES] = [
     VEHICLE,
-    Vehicle { place: Flat::new(5.0, -5.0), home: Flat::new(5.0, -5.0), ..VEHICLE },
-    Vehicle { place: Flat::new(15.0, -5.0), home: Flat::new(15.0, -5.0), ..VEHICLE },
+    Vehicle { transit_start: Flat::new(5.0, -5.0), home: Flat::new(5.0, -5.0), ..VEHICLE },
+    Vehicle { transit_start: Flat::new(15.0, -5.0), home: Flat::new(15.0, -5.0), ..VEHICLE },
 ];
 const SHARES: [f32; VEHICLES] = [1.0; VEHICLES];
 
 pub(super) type Lanes = Tracks<LANES>;
-pub(super) type ZoneTransit<'a> = Transit<'a, CORNERS>;
+pub(super) type ZoneTransit<'a> = TransitGraph<'a, CORNERS>;
 
 /// Memory that is lent to the coverage calls with extreme arguments.
 pub(super) struct CoverageMemory {
     pub(super) tracks: Lanes,
-    left: Lanes,
+    remaining: Lanes,
     build: tracks::LaneWorkspace<VERTICES>,
     pub(super) powell: powell::PowellWorkspace<VEHICLES>,
     pub(super) plan: RoutePlan<VEHICLES>,
@@ -70,7 +76,7 @@ impl CoverageMemory {
     pub(super) const fn new() -> Self {
         Self {
             tracks: Tracks::new(),
-            left: Tracks::new(),
+            remaining: Tracks::new(),
             build: tracks::LaneWorkspace::new(),
             powell: powell::PowellWorkspace::new(),
             plan: RoutePlan::new(),
@@ -80,12 +86,12 @@ impl CoverageMemory {
 
 /// Makes all calls on areas, lanes and divisions. Leaves lanes and routes of [`test_area`] in
 /// `lent`.
-pub(super) fn call_coverage(to: &mut Results<'_, impl Listener>, lent: &mut CoverageMemory) {
+pub(super) fn call_coverage(to: &mut Results<'_, impl CallListener>, lent: &mut CoverageMemory) {
     call_waypoint_sets(to);
     call_cameras(to);
     call_areas(to);
     let area = test_area();
-    let mut transit = to.call("transit::Transit::empty", ZoneTransit::empty);
+    let mut transit = to.call("transit::TransitGraph::empty", ZoneTransit::empty);
     call_transits(to, &mut transit);
     call_lanes(to, &area, &transit, lent);
     call_divisions(to, &transit, lent);
@@ -95,13 +101,13 @@ pub(super) fn call_coverage(to: &mut Results<'_, impl Listener>, lent: &mut Cove
 
 /// An area of 40 by 30 m with a no-fly zone inside.
 pub(super) fn test_area() -> Area<'static> {
-    Area::new(&CORNERS_OF_ALL, &RINGS).expect("an area")
+    Area::new(&AREA_AND_ZONE_VERTICES, &RINGS).expect("an area")
 }
 
-fn call_areas(to: &mut Results<'_, impl Listener>) {
-    for x in HARD_NUMBERS {
-        for y in HARD_NUMBERS {
-            let mut vertices = CORNERS_OF_ALL;
+fn call_areas(to: &mut Results<'_, impl CallListener>) {
+    for x in EXTREME_NUMBERS {
+        for y in EXTREME_NUMBERS {
+            let mut vertices = AREA_AND_ZONE_VERTICES;
             vertices[2] = Flat::new(x, y);
             let found = to.call("area::Area::new", || Area::new(&vertices, &RINGS));
             to.add_count(usize::from(found.is_ok()));
@@ -129,7 +135,7 @@ fn call_areas(to: &mut Results<'_, impl Listener>) {
         (4, RingKind::Hole),
     ] {
         for rings in [rings([end, 8], kind), rings([4, end], kind), rings([end, end], kind)] {
-            let found = to.call("area::Area::new", || Area::new(&CORNERS_OF_ALL, &rings));
+            let found = to.call("area::Area::new", || Area::new(&AREA_AND_ZONE_VERTICES, &rings));
             assert!(found.is_err());
         }
     }
@@ -146,35 +152,35 @@ fn call_areas(to: &mut Results<'_, impl Listener>) {
     assert!(sweep::direction_of_least_width(&area, &mut none).is_err(), "no room for the hull");
 }
 
-fn call_transits(to: &mut Results<'_, impl Listener>, transit: &mut ZoneTransit<'static>) {
-    let mut small = Transit::<3>::empty();
-    let full = to.call("transit::Transit::set_area", || small.set_area(test_area()));
+fn call_transits(to: &mut Results<'_, impl CallListener>, transit: &mut ZoneTransit<'static>) {
+    let mut small = TransitGraph::<3>::empty();
+    let full = to.call("transit::TransitGraph::set_area", || small.set_area(test_area()));
     assert_eq!(full, Err(CoverageError::NoFlyFull));
     for known in [false, true] {
         if known {
             assert_eq!(
-                to.call("transit::Transit::set_area", || transit.set_area(test_area())),
+                to.call("transit::TransitGraph::set_area", || transit.set_area(test_area())),
                 Ok(())
             );
         }
-        let corners = to.call("transit::Transit::corners", || transit.corners().len());
+        let corners = to.call("transit::TransitGraph::corners", || transit.corners().len());
         assert_eq!(corners, if known { CORNERS } else { 0 });
-        for x in HARD_NUMBERS {
-            for y in HARD_NUMBERS {
+        for x in EXTREME_NUMBERS {
+            for y in EXTREME_NUMBERS {
                 let (from, there) = (Flat::new(x, y), Flat::new(15.0, 40.0));
-                let forbids = to.call("transit::Transit::is_in_no_fly_zone", || {
+                let forbids = to.call("transit::TransitGraph::is_in_no_fly_zone", || {
                     transit.is_in_no_fly_zone(&from)
                 });
                 assert!(known || !forbids);
-                let clear = to.call("transit::Transit::is_line_clear", || {
+                let clear = to.call("transit::TransitGraph::is_line_clear", || {
                     transit.is_line_clear(&from, &there)
                 });
                 to.add_count(usize::from(clear));
-                let far_m =
-                    to.call("transit::Transit::distance_m", || transit.distance_m(&from, &there));
+                let distance_m = || transit.distance_m(&from, &there);
+                let far_m = to.call("transit::TransitGraph::distance_m", distance_m);
                 to.add(far_m);
                 let mut corners: Vec<Flat, CORNERS> = Vec::new();
-                let way = to.call("transit::Transit::shortest_path", || {
+                let way = to.call("transit::TransitGraph::shortest_path", || {
                     transit.shortest_path(&from, &there, &mut corners)
                 });
                 to.add_count(usize::from(way.is_ok()));
@@ -187,7 +193,7 @@ fn call_transits(to: &mut Results<'_, impl Listener>, transit: &mut ZoneTransit<
 }
 
 fn call_lanes(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     area: &Area<'_>,
     transit: &ZoneTransit<'_>,
     lent: &mut CoverageMemory,
@@ -196,17 +202,17 @@ fn call_lanes(
     *build = to.call("strips::LaneWorkspace::new", tracks::LaneWorkspace::new);
     *tracks = to.call("lanes::Tracks::new", Tracks::new);
     call_waypoint_numbers(to, tracks);
-    for hard in HARD_NUMBERS {
+    for hard in EXTREME_NUMBERS {
         for pattern in [
-            LanePattern { angle_deg: Some(hard), ..PATTERN },
-            LanePattern { margin_m: hard, ..PATTERN },
-            LanePattern { spacing: Spacing { lane_m: hard, ..SPACING }, ..PATTERN },
+            LanePattern { angle_from_east_deg: Some(hard), ..PATTERN },
+            LanePattern { border_overshoot_m: hard, ..PATTERN },
+            LanePattern { spacing: Spacing { max_lane_spacing_m: hard, ..SPACING }, ..PATTERN },
             LanePattern {
-                spacing: Spacing { waypoint_m: hard, ..SPACING },
-                search_steps: u32::MAX,
+                spacing: Spacing { max_waypoint_spacing_m: hard, ..SPACING },
+                max_search_steps: u32::MAX,
                 ..PATTERN
             },
-            LanePattern { search_steps: 0, ..PATTERN },
+            LanePattern { max_search_steps: 0, ..PATTERN },
         ] {
             let built = to.call("tracks::build_lanes", || {
                 tracks::build_lanes(area, &pattern, transit, build, tracks)
@@ -216,10 +222,12 @@ fn call_lanes(
                 call_waypoint_numbers(to, tracks);
             }
         }
-        for end in HARD_NUMBERS {
+        for end in EXTREME_NUMBERS {
             let (from, end) = (Flat::new(hard, 0.0), Flat::new(0.0, end));
             for count in WAYPOINT_NUMBERS {
-                let lane = Lane { from, to: end, first: count, count, start_m: 0.0, strip: 0 };
+                let (first_waypoint, waypoint_count, start_along_m) = (count, count, 0.0);
+                let lane =
+                    Lane { from, to: end, first_waypoint, waypoint_count, start_along_m, strip: 0 };
                 let length_m = to.call("lanes::Lane::length_m", || lane.length_m());
                 to.add(length_m);
                 let place = to.call("lanes::Lane::waypoint", || lane.waypoint(u32::MAX));
@@ -228,7 +236,7 @@ fn call_lanes(
         }
     }
     call_given_lanes(to, transit, tracks);
-    let many = LanePattern { spacing: Spacing { lane_m: 1.0, ..SPACING }, ..PATTERN };
+    let many = LanePattern { spacing: Spacing { max_lane_spacing_m: 1.0, ..SPACING }, ..PATTERN };
     assert_eq!(
         tracks::build_lanes(area, &many, transit, build, tracks),
         Err(CoverageError::LanesFull)
@@ -239,12 +247,12 @@ fn call_lanes(
 
 /// Calls of `given::order_given_lanes`: with no lanes, with parallel ones, and with extreme ends.
 fn call_given_lanes(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     transit: &ZoneTransit<'_>,
     tracks: &mut Lanes,
 ) {
     let lane = |x: f32, y: f32| [Flat::new(0.0, y), Flat::new(x, y)];
-    for hard in HARD_NUMBERS {
+    for hard in EXTREME_NUMBERS {
         let lanes = [lane(30.0, 0.0), lane(30.0, 8.0), lane(hard, 16.0), lane(9.0, hard)];
         for count in [0, 2, 3, 4] {
             let ordered = to.call("given::order_given_lanes", || {
@@ -257,7 +265,7 @@ fn call_given_lanes(
 }
 
 /// Calls with waypoint numbers that exist and that do not.
-fn call_waypoint_numbers(to: &mut Results<'_, impl Listener>, tracks: &Lanes) {
+fn call_waypoint_numbers(to: &mut Results<'_, impl CallListener>, tracks: &Lanes) {
     let count = to.call("lanes::Tracks::waypoint_count", || tracks.waypoint_count());
     let lanes = to.call("lanes::Tracks::lanes", || tracks.lanes().len());
     let along = to.call("lanes::Tracks::lane_direction", || tracks.lane_direction());
@@ -276,11 +284,11 @@ fn call_waypoint_numbers(to: &mut Results<'_, impl Listener>, tracks: &Lanes) {
 }
 
 fn call_divisions(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     transit: &ZoneTransit<'_>,
     lent: &mut CoverageMemory,
 ) {
-    let CoverageMemory { tracks, left, .. } = lent;
+    let CoverageMemory { tracks, remaining: left, .. } = lent;
     for first in WAYPOINT_NUMBERS {
         for end in WAYPOINT_NUMBERS {
             let done = [WaypointRange { first: 0, end: 2 }, WaypointRange { first, end }];
@@ -310,10 +318,10 @@ fn call_divisions(
 }
 
 /// [`FLEET`] six times, each time with `hard` in another field of the second vehicle.
-fn fleets_with_hard_number(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
+fn fleets_with_extreme_number(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
     let with = |vehicle: Vehicle| [FLEET[0], vehicle, FLEET[2]];
     [
-        with(Vehicle { place: Flat::new(hard, 0.0), ..VEHICLE }),
+        with(Vehicle { transit_start: Flat::new(hard, 0.0), ..VEHICLE }),
         with(Vehicle { home: Flat::new(0.0, hard), ..VEHICLE }),
         with(Vehicle { cruise_mps: hard, ..VEHICLE }),
         with(Vehicle { climb_mps: hard, ..VEHICLE }),
@@ -326,13 +334,13 @@ fn fleets_with_hard_number(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
 fn whole_work<'a>(
     tracks: &'a Tracks<LANES>,
     transit: &'a ZoneTransit<'_>,
-) -> Work<'a, LANES, CORNERS> {
+) -> CoverageProblem<'a, LANES, CORNERS> {
     let unit = TrackUnit::Waypoint;
-    Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit, following: None }
+    CoverageProblem { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit, following: None }
 }
 
 fn call_packing(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     transit: &ZoneTransit<'_>,
     lent: &mut CoverageMemory,
 ) {
@@ -342,52 +350,51 @@ fn call_packing(
     *ws = to.call("pack::PackWorkspace::new", PackWorkspace::new);
     let good = whole_work(tracks, transit);
     let pack = |to: &mut Results<'_, _>,
-                work: &Work<'_, LANES, CORNERS>,
+                work: &CoverageProblem<'_, LANES, CORNERS>,
                 ws: &mut _,
                 plan: &mut RoutePlan<_>| {
-        let checked = to.call("pack::Work::check", || work.check::<VEHICLES>());
+        let checked = to.call("pack::CoverageProblem::check", || work.check::<VEHICLES>());
         let packed = to.call("pack::binpat", || pack::binpat(work, ws, plan));
         assert!(checked.is_ok() || packed == checked);
         to.add_count(usize::from(packed.is_ok()));
         let shares = to.call("pack::PackWorkspace::shares", || *ws.shares());
         shares.iter().for_each(|share| to.add(*share));
         for vehicle in work.vehicles {
-            let delay_s =
-                to.call("pack::Work::altitude_delay_s", || work.altitude_delay_s(vehicle, u8::MAX));
+            let delay_s = || work.altitude_delay_s(vehicle, u8::MAX);
+            let delay_s = to.call("pack::CoverageProblem::altitude_delay_s", delay_s);
             to.add(delay_s);
         }
         let max_s = to.call("pack::RoutePlan::max_cost_s", || plan.max_cost_s());
         to.add(max_s);
         for route in &plan.routes {
             let mut waypoints = to.call("pack::Route::waypoints", || route.waypoints());
-            let ends = to.call("pack::Route::end_waypoints", || route.end_waypoints());
+            let ends = to.call("pack::Route::first_and_last", || route.first_and_last());
             assert_eq!(waypoints.next(), Some(ends.0));
             to.add_count((ends.0 ^ ends.1) as usize);
         }
     };
-    for hard in HARD_NUMBERS {
+    for hard in EXTREME_NUMBERS {
         for unit in [TrackUnit::Lane, TrackUnit::Waypoint] {
-            for heights in
-                [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }]
-            {
-                pack(to, &Work { unit, heights, ..good }, ws, plan);
+            for heights in heights_with_extreme_number(HEIGHTS, hard) {
+                pack(to, &CoverageProblem { unit, heights, ..good }, ws, plan);
             }
-            for vehicles in &fleets_with_hard_number(hard) {
-                pack(to, &Work { unit, vehicles, ..good }, ws, plan);
+            for vehicles in &fleets_with_extreme_number(hard) {
+                pack(to, &CoverageProblem { unit, vehicles, ..good }, ws, plan);
             }
-            call_packing_by_shares(to, &Work { unit, ..good }, hard, ws, plan);
+            call_packing_by_shares(to, &CoverageProblem { unit, ..good }, hard, ws, plan);
         }
     }
     let crowd = [VEHICLE; VEHICLES + 1];
     for vehicles in [&crowd[..], &[]] {
-        pack(to, &Work { vehicles, ..good }, ws, plan);
+        pack(to, &CoverageProblem { vehicles, ..good }, ws, plan);
     }
-    for (first, end) in WAYPOINT_NUMBERS.into_iter().zip(WAYPOINT_NUMBERS.into_iter().rev()) {
+    let ends = WAYPOINT_NUMBERS.into_iter().zip(WAYPOINT_NUMBERS.into_iter().rev());
+    for (lowest_waypoint, waypoint_end) in ends {
         for direction in [RouteDirection::Forward, RouteDirection::Backward] {
-            let whole =
-                Route { vehicle: u8::MAX, first, end, direction, layer: 0, ..plan.routes[0] };
-            for route in [whole, Route { first: end, ..whole }] {
-                let ends = to.call("pack::Route::end_waypoints", || route.end_waypoints());
+            let whole = Route { lowest_waypoint, waypoint_end, direction, ..plan.routes[0] };
+            let whole = Route { vehicle_index: u8::MAX, layer: 0, ..whole };
+            for route in [whole, Route { lowest_waypoint: waypoint_end, ..whole }] {
+                let ends = to.call("pack::Route::first_and_last", || route.first_and_last());
                 let waypoints =
                     to.call("pack::Route::waypoints", || route.waypoints().take(3).count());
                 to.add_count((ends.0 ^ ends.1) as usize + waypoints);
@@ -397,8 +404,8 @@ fn call_packing(
 }
 
 fn call_packing_by_shares(
-    to: &mut Results<'_, impl Listener>,
-    work: &Work<'_, LANES, CORNERS>,
+    to: &mut Results<'_, impl CallListener>,
+    work: &CoverageProblem<'_, LANES, CORNERS>,
     hard: f32,
     ws: &mut PackWorkspace<VEHICLES>,
     plan: &mut RoutePlan<VEHICLES>,
@@ -418,7 +425,7 @@ fn call_packing_by_shares(
 }
 
 fn call_share_searches(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     transit: &ZoneTransit<'_>,
     lent: &mut CoverageMemory,
 ) {
@@ -428,23 +435,23 @@ fn call_share_searches(
     let mut ways_m = [0.0; 512];
     let mut reaches = [0; 1024];
     let mut states = [(0, 0); 1 << (2 * VEHICLES)];
-    for hard in HARD_NUMBERS {
-        for vehicles in &fleets_with_hard_number(hard) {
-            let work = Work { vehicles, ..good };
+    for hard in EXTREME_NUMBERS {
+        for vehicles in &fleets_with_extreme_number(hard) {
+            let work = CoverageProblem { vehicles, ..good };
             let checked = work.check::<VEHICLES>();
             let bound = to.call("bound::lower_bound_s", || bound::lower_bound_s(&work));
             assert_eq!(bound.is_ok(), checked.is_ok());
             to.add(bound.unwrap_or(0.0));
             for evaluations in [0, 20] {
-                let config = powell::PowellConfig { evaluations };
+                let config = powell::PowellConfig { max_evaluations: evaluations };
                 let found = to.call("powell::powell", || powell(&work, &config, ws, plan));
                 assert!(checked.is_ok() || found == checked);
                 to.add_count(usize::from(found.is_ok()));
                 to.add(plan.max_cost_s());
             }
             let mut memory = exact::ExactWorkspace {
-                ways_m: &mut ways_m,
-                reaches: &mut reaches,
+                transit_lengths_m: &mut ways_m,
+                reachable_ends: &mut reaches,
                 states: &mut states,
             };
             let found = to.call("exact::plan_exact", || {
@@ -463,16 +470,17 @@ fn call_share_searches(
             assert!(lengths[2] <= 1 << (2 * exact::MAX_EXACT_VEHICLES));
         }
     }
-    let mut small = exact::ExactWorkspace { ways_m: &mut [], reaches: &mut [], states: &mut [] };
+    let (transit_lengths_m, reachable_ends) = (&mut [][..], &mut [][..]);
+    let mut small = exact::ExactWorkspace { transit_lengths_m, reachable_ends, states: &mut [] };
     assert_eq!(
         exact::plan_exact(&good, &mut small, &mut ws.pack, plan),
         Err(CoverageError::WorkspaceTooSmall)
     );
-    assert_eq!(powell(&good, &powell::PowellConfig { evaluations: 50 }, ws, plan), Ok(()));
+    assert_eq!(powell(&good, &powell::PowellConfig { max_evaluations: 50 }, ws, plan), Ok(()));
 }
 
 /// Inserts ranges into a set of waypoints: reversed, touching, covering all, or without room.
-fn call_waypoint_sets(to: &mut Results<'_, impl Listener>) {
+fn call_waypoint_sets(to: &mut Results<'_, impl CallListener>) {
     let ends = [0, 1, 2, 9, 10, 11, 40, u32::MAX - 1, u32::MAX];
     let mut done = to.call("done::WaypointSet::new", WaypointSet::<2>::new);
     for (first, end) in ends.into_iter().flat_map(|first| ends.map(|end| (first, end))) {

@@ -5,26 +5,29 @@ use planner_core::coverage::Flat;
 use planner_core::map::field::follow::TerrainFollowing;
 use planner_core::map::field::{self, FieldShape, FieldView, MAX_NODES};
 
-use super::limits_results::{HARD_NUMBERS, Listener, Results};
+use super::limits_results::{CallListener, EXTREME_NUMBERS, Results};
 
 const COLUMNS: u16 = 3;
 const ROWS: u16 = 2;
-const NODES: [i16; 6] = [0, i16::MAX, i16::MIN, -1, 100, 7];
-const BYTES: usize = 64;
+const NODE_HEIGHTS: [i16; 6] = [0, i16::MAX, i16::MIN, -1, 100, 7];
+const FILE_BYTES: usize = 64;
 
-const ENDS: [f32; 3] = [0.0, 7.5, -1.0];
+const END_COORDINATES: [f32; 3] = [0.0, 7.5, -1.0];
 /// Coordinates so far away that a path to them has tens of thousands of samples: to save time each
 /// is tried with one slope only.
 const FAR_COORDINATES: [f32; 3] = [-1e19, f32::INFINITY, f32::NAN];
 
-pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
-    let good = FieldShape { low: Flat::new(-1.0, 2.0), cell_m: 5.0, columns: COLUMNS, rows: ROWS };
-    let mut file = [0; BYTES];
-    for hard in HARD_NUMBERS {
-        for shape in
-            [FieldShape { cell_m: hard, ..good }, FieldShape { low: Flat::new(hard, 0.0), ..good }]
-        {
-            let written = to.call("field::write", || field::write(&shape, &NODES, &mut file));
+pub(super) fn call_fields(to: &mut Results<'_, impl CallListener>) {
+    let good =
+        FieldShape { south_west: Flat::new(-1.0, 2.0), cell_m: 5.0, columns: COLUMNS, rows: ROWS };
+    let mut file = [0; FILE_BYTES];
+    for hard in EXTREME_NUMBERS {
+        for shape in [
+            FieldShape { cell_m: hard, ..good },
+            FieldShape { south_west: Flat::new(hard, 0.0), ..good },
+        ] {
+            let written =
+                to.call("field::write", || field::write(&shape, &NODE_HEIGHTS, &mut file));
             to.add_count(usize::from(written.is_ok()));
         }
     }
@@ -33,12 +36,12 @@ pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
         let nodes = to.call("field::FieldShape::node_count", || shape.node_count());
         let length = to.call("field::FieldShape::encoded_len", || shape.encoded_len());
         assert!(length > 2 * nodes);
-        let written = to.call("field::write", || field::write(&shape, &NODES, &mut file));
+        let written = to.call("field::write", || field::write(&shape, &NODE_HEIGHTS, &mut file));
         assert!(written.is_err(), "{columns} by {rows}, at most {MAX_NODES}");
     }
     let length =
-        to.call("field::write", || field::write(&good, &NODES, &mut file)).expect("a field");
-    for bytes in [&file, &[0; BYTES]] {
+        to.call("field::write", || field::write(&good, &NODE_HEIGHTS, &mut file)).expect("a field");
+    for bytes in [&file, &[0; FILE_BYTES]] {
         let head = bytes.first_chunk().expect("it is longer");
         let declared = to.call("field::declared_len", || field::declared_len(head));
         assert_eq!(declared.is_ok_and(|declared| declared == length), bytes[0] != 0);
@@ -54,8 +57,8 @@ pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
     to.add_count(crc as usize);
     let highest_m = to.call("field::FieldView::highest_m", || field.highest_m());
     to.add(highest_m);
-    for x in HARD_NUMBERS {
-        for y in HARD_NUMBERS {
+    for x in EXTREME_NUMBERS {
+        for y in EXTREME_NUMBERS {
             let height_m =
                 to.call("field::FieldView::height_at", || field.height_at(&Flat::new(x, y)));
             to.add(height_m);
@@ -64,15 +67,16 @@ pub(super) fn call_fields(to: &mut Results<'_, impl Listener>) {
     call_field_paths(to, field);
 }
 
-fn call_field_paths(to: &mut Results<'_, impl Listener>, field: FieldView<'_>) {
-    for (i, hard) in HARD_NUMBERS.into_iter().enumerate() {
-        for end in ENDS.into_iter().chain(FAR_COORDINATES.get(i).copied()) {
+fn call_field_paths(to: &mut Results<'_, impl CallListener>, field: FieldView<'_>) {
+    for (i, hard) in EXTREME_NUMBERS.into_iter().enumerate() {
+        for end in END_COORDINATES.into_iter().chain(FAR_COORDINATES.get(i).copied()) {
             let following =
-                TerrainFollowing { field, height_m: 30.0, tolerance_m: 3.0, max_slope: hard };
+                TerrainFollowing { field, min_height_m: 30.0, tolerance_m: 3.0, max_slope: hard };
             let (here, there) = (Flat::new(0.0, 3.0), Flat::new(end, 4.0));
-            let lowest_m =
-                to.call("follow::TerrainFollowing::lowest_m", || following.lowest_m(&there));
-            let top_m = to.call("follow::TerrainFollowing::top_m", || following.top_m());
+            let lowest_m = to
+                .call("follow::TerrainFollowing::min_path_z_m", || following.min_path_z_m(&there));
+            let top_m =
+                to.call("follow::TerrainFollowing::max_path_z_m", || following.max_path_z_m());
             let begin = to.call("follow::TerrainFollowing::start_point", || {
                 following.start_point(&here, &there)
             });

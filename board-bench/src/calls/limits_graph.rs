@@ -5,9 +5,9 @@ use planner_core::Point;
 use planner_core::assignment::{self, AssignmentError, AssignmentWorkspace};
 use planner_core::geo::frames::Geodetic;
 use planner_core::roadmap::search::{self, RoadmapWithLengths, SearchError, SearchWorkspace};
-use planner_core::roadmap::{self, Edge, HalfEdge, LANDMARKS, RoadmapHeader, RoadmapView};
+use planner_core::roadmap::{self, Edge, HalfEdge, LANDMARK_COUNT, RoadmapHeader, RoadmapView};
 
-use super::limits_results::{HARD_NUMBERS, Listener, Results, extreme_points};
+use super::limits_results::{CallListener, EXTREME_NUMBERS, Results, extreme_points};
 
 /// Most nodes of the search workspace in these calls.
 pub(super) const MAX_NODES: usize = 8;
@@ -18,12 +18,12 @@ const HEADER: RoadmapHeader = RoadmapHeader {
     edge_max_m: 9.0,
     tested_clearance_m: 0.0,
     max_clearance_m: 2.0,
-    starts: 2,
-    goals: 2,
+    start_count: 2,
+    goal_count: 2,
 };
 
 /// Positions of the roadmap's nodes, m (ENU): two starts, two goals opposite, two nodes between.
-pub(super) const NODE_PLACES: [Point; 6] = [
+pub(super) const NODE_POSITIONS: [Point; 6] = [
     Point::new(0.0, 0.0, 2.0),
     Point::new(0.0, 6.0, 2.0),
     Point::new(12.0, 6.0, 2.0),
@@ -33,7 +33,7 @@ pub(super) const NODE_PLACES: [Point; 6] = [
 ];
 
 /// Height of each node above the ground, metres; infinite: no ground is known below the last one.
-const HEIGHTS_M: [f32; 6] = [2.0, 2.0, 2.0, 2.0, 2.0, f32::INFINITY];
+const HEIGHTS_ABOVE_GROUND_M: [f32; 6] = [2.0, 2.0, 2.0, 2.0, 2.0, f32::INFINITY];
 
 fn edges() -> Vec<Edge, 9> {
     let pairs = [(0, 4), (0, 5), (1, 4), (1, 5), (2, 4), (2, 5), (3, 4), (3, 5), (4, 5)];
@@ -47,7 +47,7 @@ pub(super) fn any_edge_passable(_: u16, _: &HalfEdge) -> bool {
 /// Writes roadmap files from good and bad inputs. Leaves a good file in `file` and returns its
 /// length.
 pub(super) fn call_roadmap_files(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     ws: &mut SearchWorkspace<MAX_NODES>,
     file: &mut [u8; 512],
 ) -> usize {
@@ -59,17 +59,17 @@ pub(super) fn call_roadmap_files(
         assert!(len.is_none_or(|len| len <= u32::MAX as usize));
     }
     let edges = edges();
-    for hard in HARD_NUMBERS {
+    for hard in EXTREME_NUMBERS {
         for header in [
             RoadmapHeader { edge_min_m: hard, ..HEADER },
             RoadmapHeader { edge_max_m: hard, ..HEADER },
             RoadmapHeader { tested_clearance_m: hard, ..HEADER },
             RoadmapHeader { max_clearance_m: hard, ..HEADER },
-            RoadmapHeader { starts: hard as u16, goals: u16::MAX, ..HEADER },
+            RoadmapHeader { start_count: hard as u16, goal_count: u16::MAX, ..HEADER },
             RoadmapHeader { origin: Geodetic { lat_deg: hard.into(), ..HEADER.origin }, ..HEADER },
         ] {
             let written =
-                to.call("write::write", || roadmap::write(&header, &NODE_PLACES, &edges, file));
+                to.call("write::write", || roadmap::write(&header, &NODE_POSITIONS, &edges, file));
             // A file that `write` accepts must parse.
             let read =
                 written.and_then(|len| RoadmapView::parse(&file[..len]).map(|view| view.crc()));
@@ -77,39 +77,47 @@ pub(super) fn call_roadmap_files(
             to.add_count(usize::from(written.is_ok()));
         }
         let with = [Edge { clearance_m: hard, ..edges[0] }];
-        to.add_count(usize::from(roadmap::write(&HEADER, &NODE_PLACES, &with, file).is_ok()));
+        to.add_count(usize::from(roadmap::write(&HEADER, &NODE_POSITIONS, &with, file).is_ok()));
     }
     for (a, b) in [(0, 0), (0, 6), (u16::MAX, 0)] {
         assert!(
-            roadmap::write(&HEADER, &NODE_PLACES, &[Edge { a, b, clearance_m: 1.0 }], file)
+            roadmap::write(&HEADER, &NODE_POSITIONS, &[Edge { a, b, clearance_m: 1.0 }], file)
                 .is_err()
         );
     }
     for p in extreme_points() {
-        let mut places = NODE_PLACES;
+        let mut places = NODE_POSITIONS;
         places[5] = p;
         to.add_count(usize::from(roadmap::write(&HEADER, &places, &edges, file).is_ok()));
     }
-    assert!(roadmap::write(&HEADER, &NODE_PLACES, &edges, &mut file[..100]).is_err());
+    assert!(roadmap::write(&HEADER, &NODE_POSITIONS, &edges, &mut file[..100]).is_err());
     let mut small = SearchWorkspace::<2>::new();
     assert!(
-        roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &[], &mut small, file)
+        roadmap::write_with_landmarks(&HEADER, &NODE_POSITIONS, &edges, &[], &mut small, file)
             .is_err()
     );
-    for hard in HARD_NUMBERS {
+    for hard in EXTREME_NUMBERS {
         let heights_m = [2.0, hard, 2.0, 2.0, 2.0, f32::INFINITY];
         let written =
-            roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &heights_m, ws, file);
+            roadmap::write_with_landmarks(&HEADER, &NODE_POSITIONS, &edges, &heights_m, ws, file);
         let good =
             (0.0..=roadmap::MAX_LANDMARK_DISTANCE_M).contains(&hard) || hard == f32::INFINITY;
         assert_eq!(written.is_ok(), good, "{hard}");
     }
     assert!(
-        roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &[1.0; 5], ws, file).is_err()
+        roadmap::write_with_landmarks(&HEADER, &NODE_POSITIONS, &edges, &[1.0; 5], ws, file)
+            .is_err()
     );
     let len = to
         .call("write::write_with_landmarks", || {
-            roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &HEIGHTS_M, ws, file)
+            roadmap::write_with_landmarks(
+                &HEADER,
+                &NODE_POSITIONS,
+                &edges,
+                &HEIGHTS_ABOVE_GROUND_M,
+                ws,
+                file,
+            )
         })
         .expect("a good roadmap");
     let mut head = [0; roadmap::HEADER_LEN];
@@ -124,14 +132,17 @@ pub(super) fn call_roadmap_files(
     for cut in 0..len {
         assert!(RoadmapView::parse(&file[..cut]).is_err());
     }
-    assert_eq!(roadmap::encoded_len(NODE_PLACES.len(), edges.len(), LANDMARKS + 1), Some(len));
+    assert_eq!(
+        roadmap::encoded_len(NODE_POSITIONS.len(), edges.len(), LANDMARK_COUNT + 1),
+        Some(len)
+    );
     len
 }
 
 /// Node numbers that are tried: the roadmap has nodes 0 to 5, so the last three are invalid.
 pub(super) const NODE_INDICES: [u16; 6] = [0, 1, 5, 6, 8, u16::MAX];
 
-pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &RoadmapView<'_>) {
+pub(super) fn call_roadmap_views(to: &mut Results<'_, impl CallListener>, view: &RoadmapView<'_>) {
     let nodes = to.call("view::RoadmapView::node_count", || view.node_count());
     let half_edges = to.call("view::RoadmapView::half_edge_count", || view.half_edge_count());
     assert_eq!((nodes, half_edges), (6, 18));
@@ -151,7 +162,7 @@ pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &Roa
         assert_eq!(length_m.is_finite(), there);
         let edge = to.call("view::RoadmapView::edge_between", || view.edge_between(a, b));
         assert!(there || edge.is_none());
-        let ground_m = to.call("ground::RoadmapView::ground_m", || view.ground_m(a));
+        let ground_m = to.call("ground::RoadmapView::ground_z_m", || view.ground_z_m(a));
         assert_eq!(ground_m, (a < 5).then_some(0.0));
         let degree = to.call("view::RoadmapView::half_edges", || view.half_edges(a).count());
         assert!(usize::from(a) < nodes || degree == 0);
@@ -159,12 +170,12 @@ pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &Roa
     }
     for p in extreme_points() {
         let around =
-            to.call("ground::RoadmapView::ground_range_near", || view.ground_range_near(&p));
+            to.call("ground::RoadmapView::ground_z_range_near", || view.ground_z_range_near(&p));
         assert!(around.is_none_or(|(low_m, high_m)| low_m == 0.0 && high_m == 0.0 && p.z >= 0.0));
         to.add_count(usize::from(around.is_some()));
     }
     let edge = view.edge_between(0, 4).expect("an edge");
-    for hard in HARD_NUMBERS {
+    for hard in EXTREME_NUMBERS {
         let clears =
             to.call("view::RoadmapView::has_clearance", || view.has_clearance(&edge, hard));
         assert_eq!(clears, hard < 1.0, "{hard}");
@@ -172,7 +183,7 @@ pub(super) fn call_roadmap_views(to: &mut Results<'_, impl Listener>, view: &Roa
 }
 
 pub(super) fn call_searches(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     view: &RoadmapView<'_>,
     ws: &mut SearchWorkspace<MAX_NODES>,
 ) {
@@ -231,7 +242,7 @@ pub(super) fn call_searches(
     assert_eq!(search::cost_matrix(view, &[], &[1], any_edge_passable, ws, &mut []), Ok(()));
 }
 
-pub(super) fn call_assignments(to: &mut Results<'_, impl Listener>) {
+pub(super) fn call_assignments(to: &mut Results<'_, impl CallListener>) {
     let mut ws = to.call("assignment::AssignmentWorkspace::new", AssignmentWorkspace::<3>::new);
     let mut out = [None; 3];
     let mut both = |costs: &[f32], rows: usize, cols: usize, out: &mut [Option<u16>]| {
@@ -240,12 +251,15 @@ pub(super) fn call_assignments(to: &mut Results<'_, impl Listener>) {
         let most = to.call("assignment::assign_bottleneck", || {
             assignment::assign_bottleneck(costs, rows, cols, &mut ws, out)
         });
-        assert_eq!(total.map(|a| a.pairs), most.map(|a| a.pairs));
-        to.add(most.map_or(-1.0, |a| a.largest));
+        assert_eq!(total.map(|a| a.pair_count), most.map(|a| a.pair_count));
+        to.add(most.map_or(-1.0, |a| a.largest_cost));
         total
     };
-    for i in 0..HARD_NUMBERS.len() * HARD_NUMBERS.len() {
-        let (a, b) = (HARD_NUMBERS[i / HARD_NUMBERS.len()], HARD_NUMBERS[i % HARD_NUMBERS.len()]);
+    for i in 0..EXTREME_NUMBERS.len() * EXTREME_NUMBERS.len() {
+        let (a, b) = (
+            EXTREME_NUMBERS[i / EXTREME_NUMBERS.len()],
+            EXTREME_NUMBERS[i % EXTREME_NUMBERS.len()],
+        );
         let costs = [a, b, a, b, a, 1.0, 2.0, b, a];
         let bad = costs.iter().any(|c| c.is_nan() || *c == f32::NEG_INFINITY);
         for (rows, cols) in [(3, 3), (1, 3), (3, 1), (2, 3)] {

@@ -1,9 +1,10 @@
 //! Extreme arguments for the calls, and the checksum of the calls' results.
 
 use planner_core::Point;
+use planner_core::coverage::pack::Heights;
 
 /// Extreme and invalid arguments, which make code fail that does not check them.
-pub(super) const HARD_NUMBERS: [f32; 14] = [
+pub(super) const EXTREME_NUMBERS: [f32; 14] = [
     0.0,
     -0.0,
     1.0,
@@ -21,9 +22,9 @@ pub(super) const HARD_NUMBERS: [f32; 14] = [
 ];
 
 /// Receives the name of each call before the call is made, so that a panic can be attributed to it.
-pub trait Listener {
+pub trait CallListener {
     /// Called before each call; `name` is the callee's file, type (if any) and function.
-    fn next(&mut self, name: &'static str);
+    fn before_call(&mut self, name: &'static str);
 }
 
 /// Makes calls and keeps a checksum of their results.
@@ -32,7 +33,7 @@ pub struct Results<'a, L> {
     sum: u32,
 }
 
-impl<'a, L: Listener> Results<'a, L> {
+impl<'a, L: CallListener> Results<'a, L> {
     /// A checksum of no results.
     pub fn new(listener: &'a mut L) -> Self {
         Self { listener, sum: 0 }
@@ -40,7 +41,7 @@ impl<'a, L: Listener> Results<'a, L> {
 
     /// Reports `name` to the listener, then calls `work`.
     pub(super) fn call<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
-        self.listener.next(name);
+        self.listener.before_call(name);
         work()
     }
 
@@ -64,13 +65,21 @@ impl<'a, L: Listener> Results<'a, L> {
     }
 }
 
-/// Points whose coordinates are [`HARD_NUMBERS`].
+/// Points whose coordinates are [`EXTREME_NUMBERS`].
 pub(super) fn extreme_points() -> impl Iterator<Item = Point> {
-    let at = |i: usize| HARD_NUMBERS[i % HARD_NUMBERS.len()];
-    (0..HARD_NUMBERS.len() * 3)
+    let at = |i: usize| EXTREME_NUMBERS[i % EXTREME_NUMBERS.len()];
+    (0..EXTREME_NUMBERS.len() * 3)
         .map(move |i| Point::new(at(i), at(i * 5 + i / 14), at(i * 9 + i / 7)))
 }
 
-pub(super) fn is_good(number: f32) -> bool {
+/// These heights, each with one of the two replaced by `extreme`.
+pub(super) fn heights_with_extreme_number(heights: Heights, extreme: f32) -> [Heights; 2] {
+    [
+        Heights { max_picture_height_m: extreme, ..heights },
+        Heights { layer_spacing_m: extreme, ..heights },
+    ]
+}
+
+pub(super) fn is_positive_and_finite(number: f32) -> bool {
     number > 0.0 && number.is_finite()
 }

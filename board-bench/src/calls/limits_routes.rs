@@ -3,10 +3,11 @@
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone, ZoneKind};
+use planner_core::detour::{self, DetourError, DetourGoal, DetourRequest, KeepOutZone, ZoneKind};
 use planner_core::flight::{Flight, Gate, Path, VehiclePlan};
 use planner_core::plan::{
-    self, GoalMode, Goals, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
+    self, AssignedGoals, GoalMode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan,
+    VehicleTask,
 };
 use planner_core::roadmap::RoadmapView;
 use planner_core::roadmap::search::SearchWorkspace;
@@ -15,8 +16,10 @@ use planner_core::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorksp
 
 use super::limits_area_flights as area_flights;
 use super::limits_field as field;
-use super::limits_graph::{self as graph, MAX_NODES, NODE_INDICES, NODE_PLACES, any_edge_passable};
-use super::limits_results::{HARD_NUMBERS, Listener, Results, extreme_points};
+use super::limits_graph::{
+    self as graph, MAX_NODES, NODE_INDICES, NODE_POSITIONS, any_edge_passable,
+};
+use super::limits_results::{CallListener, EXTREME_NUMBERS, Results, extreme_points};
 
 /// Capacities of these calls: vehicles, waypoints, timed segments, gates.
 const VEHICLES: usize = 3;
@@ -24,12 +27,12 @@ const WAYPOINTS: usize = 8;
 const TIMED_SEGMENTS: usize = 256;
 const GATES: usize = 16;
 
-type Workspace = PlanWorkspace<MAX_NODES, VEHICLES, TIMED_SEGMENTS>;
+type PlanCallWorkspace = PlanWorkspace<MAX_NODES, VEHICLES, TIMED_SEGMENTS>;
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 /// Memory that is lent to the calls.
 pub struct RouteWorkspaces {
-    ws: Workspace,
+    ws: PlanCallWorkspace,
     plan: Plan,
     own: VehiclePlan<WAYPOINTS, GATES>,
     file: [u8; 512],
@@ -40,7 +43,7 @@ impl RouteWorkspaces {
     /// Empty workspaces, whose bytes are all zeros.
     pub const fn new() -> Self {
         Self {
-            ws: Workspace::new(),
+            ws: PlanCallWorkspace::new(),
             plan: Plan::new(),
             own: VehiclePlan::new(),
             file: [0; 512],
@@ -57,7 +60,7 @@ impl Default for RouteWorkspaces {
 
 /// Makes all calls but those of `call_without_roadmap`. Returns the checksum after each part:
 /// fields and files, roadmaps, searches, assignments, plans, schedules, detours, coverage.
-pub fn call_all(to: &mut Results<'_, impl Listener>, lent: &mut RouteWorkspaces) -> [u32; 8] {
+pub fn call_all(to: &mut Results<'_, impl CallListener>, lent: &mut RouteWorkspaces) -> [u32; 8] {
     field::call_fields(to);
     let len = graph::call_roadmap_files(to, &mut lent.ws.search, &mut lent.file);
     let mut sums = [to.sum(); 8];
@@ -94,7 +97,7 @@ const TASKS: [VehicleTask; 2] = [TASK, VehicleTask { id: 2, goal: Some(1), ..TAS
 fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
     PlanRequest {
         vehicles,
-        descents_m,
+        goal_descents_m: descents_m,
         mode: GoalMode::Labelled,
         schedule: SCHEDULE,
         max_gates: GATES,
@@ -102,9 +105,9 @@ fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanReques
 }
 
 fn call_plans(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     view: &RoadmapView<'_>,
-    ws: &mut Workspace,
+    ws: &mut PlanCallWorkspace,
     out: &mut Plan,
 ) {
     *out = to.call("workspace::SwarmPlan::new", Plan::new);
@@ -123,7 +126,7 @@ fn call_plans(
             Ok(())
         );
         assert!(out.flights.iter().all(|flight| flight.task.leaves_pad()));
-        let total_m = to.call("workspace::SwarmPlan::total_m", || out.total_m());
+        let total_m = to.call("workspace::SwarmPlan::total_path_m", || out.total_path_m());
         to.add(total_m as f32);
         to.add_count(out.crc as usize);
     }
@@ -131,7 +134,7 @@ fn call_plans(
         assert_eq!(to.call("request::PlanRequest::check", || request.check()), Err(error));
         assert_eq!(plan::plan_swarm(view, request, ws, out), Err(error));
     };
-    for hard in HARD_NUMBERS.into_iter().filter(|&x| !(x >= 0.0 && x.is_finite())) {
+    for hard in EXTREME_NUMBERS.into_iter().filter(|&x| !(x >= 0.0 && x.is_finite())) {
         for task in [
             VehicleTask { required_clearance_m: hard, ..TASKS[1] },
             VehicleTask { climb_m: hard, ..TASKS[1] },
@@ -141,7 +144,7 @@ fn call_plans(
         }
         refused(&request(&TASKS, &[1.5, hard]), PlanError::BadDescent(1));
     }
-    for hard in HARD_NUMBERS.into_iter().filter(|&x| !(x > 0.0 && x.is_finite())) {
+    for hard in EXTREME_NUMBERS.into_iter().filter(|&x| !(x > 0.0 && x.is_finite())) {
         for schedule in [
             ScheduleConfig { separation_m: hard, ..SCHEDULE },
             ScheduleConfig { parked_separation_m: hard, ..SCHEDULE },
@@ -174,7 +177,7 @@ fn call_plans(
             to.call("plan::compute_costs", || plan::compute_costs(view, &request, ws)),
             Err(PlanError::Terminals)
         );
-        let mut assigned = Goals::<VEHICLES>::new();
+        let mut assigned = AssignedGoals::<VEHICLES>::new();
         let many =
             to.call("plan::assign_goals", || plan::assign_goals(&request, ws, &mut assigned));
         assert!(vehicles.len() <= VEHICLES || many == Err(PlanError::SwarmFull));
@@ -186,7 +189,7 @@ fn call_plans(
     for (first, second) in
         [(Some(2), None), (None, Some(u16::MAX)), (Some(1), Some(1)), (None, None)]
     {
-        let mut assigned = Goals::<VEHICLES>::new();
+        let mut assigned = AssignedGoals::<VEHICLES>::new();
         assigned.extend([first, second]);
         let planned = plan::schedule_flights(view, &good, &assigned, ws, out);
         assert_eq!(planned.is_ok(), first.is_none() && second.is_none(), "{first:?} {second:?}");
@@ -202,9 +205,9 @@ fn call_plans(
 }
 
 fn call_schedules(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     view: &RoadmapView<'_>,
-    ws: &mut Workspace,
+    ws: &mut PlanCallWorkspace,
     plan: &mut Plan,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
 ) {
@@ -222,8 +225,8 @@ fn call_schedules(
         });
         assert!(answer.is_ok() || index > 1 || answer == Err(ScheduleError::GatesFull));
     }
-    for (i, hard) in HARD_NUMBERS.into_iter().enumerate() {
-        let other = HARD_NUMBERS[(i * 5) % HARD_NUMBERS.len()];
+    for (i, hard) in EXTREME_NUMBERS.into_iter().enumerate() {
+        let other = EXTREME_NUMBERS[(i * 5) % EXTREME_NUMBERS.len()];
         let cfg = ScheduleConfig { separation_m: other, cruise_mps: hard, ..SCHEDULE };
         let good = |x: f32| x > 0.0 && x.is_finite();
         let checked = to.call("config::ScheduleConfig::check", || cfg.check());
@@ -233,7 +236,7 @@ fn call_schedules(
             Flight { climb_m: hard, ..flights[0].clone() },
             Flight { descent_m: hard, ..flights[0].clone() },
             Flight { depart_s: hard, ..flights[0].clone() },
-            Flight { segment_m: hard, ..flights[0].clone() },
+            Flight { max_segment_m: hard, ..flights[0].clone() },
             Flight { path: Path::new(), ..flights[0].clone() },
         ] {
             for cfg in [SCHEDULE, cfg] {
@@ -296,18 +299,18 @@ fn call_schedules(
 }
 
 fn call_detours(
-    to: &mut Results<'_, impl Listener>,
+    to: &mut Results<'_, impl CallListener>,
     view: &RoadmapView<'_>,
     ws: &mut SearchWorkspace<MAX_NODES>,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
 ) {
     let mut nodes: Vec<u16, WAYPOINTS> = Vec::new();
     let good = DetourRequest {
-        aside: false,
-        here: NODE_PLACES[0],
-        leg: [NODE_PLACES[0], NODE_PLACES[4]],
+        land_aside: false,
+        here: NODE_POSITIONS[0],
+        leg: [NODE_POSITIONS[0], NODE_POSITIONS[4]],
         leg_clearance_m: 1.0,
-        goal: Goal::Node(0),
+        goal: DetourGoal::RoadmapGoal(0),
         descent_m: 1.5,
         required_clearance_m: 0.8,
         fence: None,
@@ -316,25 +319,29 @@ fn call_detours(
     let path = own.path.clone();
     let empty: Path<WAYPOINTS> = Path::new();
     for (i, p) in extreme_points().enumerate() {
-        let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
+        let hard = EXTREME_NUMBERS[i % EXTREME_NUMBERS.len()];
         let thing =
-            KeepOutZone { from: p, to: NODE_PLACES[5], radius_m: hard, kind: natures[i % 3] };
+            KeepOutZone { from: p, to: NODE_POSITIONS[5], radius_m: hard, kind: natures[i % 3] };
         for request in [
             good,
-            DetourRequest { aside: true, ..good },
+            DetourRequest { land_aside: true, ..good },
             DetourRequest { here: p, ..good },
             DetourRequest { leg: [p, p], ..good },
             DetourRequest { descent_m: hard, leg_clearance_m: hard, ..good },
             DetourRequest { required_clearance_m: hard, ..good },
-            DetourRequest { goal: Goal::Home { over: p, layer_m: hard }, ..good },
-            DetourRequest { fence: Some((p, NODE_PLACES[5])), ..good },
+            DetourRequest { goal: DetourGoal::Home { above_pad: p, layer_z_m: hard }, ..good },
+            DetourRequest { fence: Some((p, NODE_POSITIONS[5])), ..good },
         ] {
             let bad = [
                 to.call("detour::DetourRequest::check", || request.check()).is_err(),
                 to.call("detour::KeepOutZone::check", || thing.check()).is_err(),
             ];
             let finite = |places: &[Point]| places.iter().flatten().all(|c| c.is_finite());
-            let over = if let Goal::Home { over, .. } = request.goal { over } else { request.here };
+            let over = if let DetourGoal::Home { above_pad: over, .. } = request.goal {
+                over
+            } else {
+                request.here
+            };
             assert!(finite(&[request.here, request.leg[0], request.leg[1], over]) || bad[0]);
             assert!((finite(&[thing.from, thing.to]) && hard >= 0.0 && hard.is_finite()) != bad[1]);
             let answer = to.call("detour::plan_detour", || {
@@ -360,13 +367,13 @@ fn call_detours(
             assert_eq!(again, answer);
         }
         for goal in [2, 4, u16::MAX - 1, u16::MAX] {
-            let request = DetourRequest { goal: Goal::Node(goal), ..good };
+            let request = DetourRequest { goal: DetourGoal::RoadmapGoal(goal), ..good };
             assert!(
                 detour::plan_detour(view, &request, &mut [thing], ws, &mut nodes, &mut own.path)
                     .is_err()
             );
         }
-        let holds = to.call("detour::KeepOutZone::contains", || thing.contains(&NODE_PLACES[5]));
+        let holds = to.call("detour::KeepOutZone::contains", || thing.contains(&NODE_POSITIONS[5]));
         assert!(!holds || hard > 0.0 || hard.is_nan());
         for path in [&path, &empty] {
             let blocked = to.call("detour::is_path_blocked", || {

@@ -5,15 +5,15 @@ use std::fs;
 use std::path::Path;
 use std::string::{String, ToString};
 
-use super::limits::{Listener, Results, call_without_roadmap};
+use super::limits::{CallListener, Results, call_without_roadmap};
 use super::limits_routes::{RouteWorkspaces, call_all};
 use super::public_functions::public_functions;
 
 #[derive(Default)]
 struct Called(BTreeSet<&'static str>);
 
-impl Listener for Called {
-    fn next(&mut self, name: &'static str) {
+impl CallListener for Called {
+    fn before_call(&mut self, name: &'static str) {
         self.0.insert(name);
     }
 }

@@ -35,7 +35,7 @@ pub(crate) struct ArmingHandshake {
     /// When arming was last requested.
     requested_at: Option<Instant>,
     /// Arming requests since the last COMMAND_ACK that denied one.
-    unanswered: u8,
+    unanswered_requests: u8,
     /// Whether the autopilot denied the last arming request.
     denied: bool,
     /// When the autopilot accepted arming: from then on arming is not requested again.
@@ -54,7 +54,7 @@ pub(crate) struct ArmingHandshake {
     /// Estimated height with which the vehicle was last disarmed, metres.
     disarmed_z_m: f32,
     /// Refusals reported in this state: `MAV_CMD` and `MAV_RESULT`.
-    reported: [Option<(u16, u8)>; MAX_REPORTED_REFUSALS],
+    reported_refusals: [Option<(u16, u8)>; MAX_REPORTED_REFUSALS],
 }
 
 impl ArmingHandshake {
@@ -63,7 +63,7 @@ impl ArmingHandshake {
     /// Then, and after `PilotReturned`, the autopilot counts as in the companion's own mode.
     /// Entering `CancelStart` notes whether the climb had begun.
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
-        self.reported = [None; MAX_REPORTED_REFUSALS];
+        self.reported_refusals = [None; MAX_REPORTED_REFUSALS];
         if to == State::Arming {
             let disarmed_z_m = self.disarmed_z_m;
             *self = Self { in_own_mode: true, disarmed_z_m, ..Self::default() };
@@ -80,7 +80,7 @@ impl ArmingHandshake {
     /// bit and landing detector.
     pub(crate) fn update_mode_and_landed(&mut self, state: State, t: &Telemetry, now: Instant) {
         let kind = t.kind.unwrap_or_default();
-        let on_ground = !t.reports_flight();
+        let on_ground = !t.last_reported_flight();
         self.in_own_mode &=
             t.custom_mode == kind.setpoint_mode() || t.custom_mode == kind.land_mode();
         if !t.armed {
@@ -114,7 +114,7 @@ impl ArmingHandshake {
     pub(crate) fn is_arming_unanswered(&self, now: Instant) -> bool {
         let waited = self.requested_at.is_some_and(|at| now - at >= ARMED_TIMEOUT);
         let silent = !self.denied && self.accepted_at.is_none();
-        waited && silent && (self.unanswered >= MAX_ARMING_TRIES || self.heartbeat_gap)
+        waited && silent && (self.unanswered_requests >= MAX_ARMING_TRIES || self.heartbeat_gap)
     }
 
     /// Whether arming has not been requested since the state `Arming` was entered.
@@ -129,14 +129,14 @@ impl ArmingHandshake {
             Some(at) if self.denied => now - at >= ARMING_RETRY_EVERY,
             Some(at) => {
                 now - at >= ARMED_TIMEOUT
-                    && self.unanswered < MAX_ARMING_TRIES
+                    && self.unanswered_requests < MAX_ARMING_TRIES
                     && !self.heartbeat_gap
             }
         };
         let asks = due && !telemetry.armed && self.accepted_at.is_none();
         if asks {
             (self.requested_at, self.denied, self.heartbeat_gap) = (Some(now), false, false);
-            self.unanswered += 1;
+            self.unanswered_requests += 1;
         }
         asks
     }
@@ -182,15 +182,17 @@ impl ArmingHandshake {
             (State::Arming, ARM_DISARM) if ack.result == ACCEPTED => {
                 self.accepted_at.get_or_insert(now);
             }
-            (State::Arming, ARM_DISARM) if refused => (self.denied, self.unanswered) = (true, 0),
+            (State::Arming, ARM_DISARM) if refused => {
+                (self.denied, self.unanswered_requests) = (true, 0);
+            }
             _ => {}
         }
         let refusal = Some((ack.command, ack.result));
         let reports = matches!(ack.command, DO_SET_MODE | ARM_DISARM | NAV_TAKEOFF);
-        if !refused || !reports || self.reported.contains(&refusal) {
+        if !refused || !reports || self.reported_refusals.contains(&refusal) {
             return None;
         }
-        *self.reported.iter_mut().find(|slot| slot.is_none())? = refusal;
+        *self.reported_refusals.iter_mut().find(|slot| slot.is_none())? = refusal;
         let text = match ack.command {
             DO_SET_MODE => "Autopilot refuses the mode: # (result #)",
             ARM_DISARM => "Autopilot refuses to arm or disarm: # (result #)",

@@ -50,7 +50,7 @@ const PARAM_TYPE_REAL32: u8 = 9;
 const STREAM_LOST_AFTER: Duration = Duration::from_millis(4000);
 /// Times from one request for a mode to the next while HEARTBEAT is silent, seconds: after the last
 /// none is made, since a pilot may fly the vehicle by now. At 50 % loss one in 16 loses them all.
-const UNHEARD_MODE_RETRY_S: [u64; 3] = [1, 5, 20];
+const MODE_RETRY_WHILE_SILENT_S: [u64; 3] = [1, 5, 20];
 /// Greatest age of the reported battery charge with which a vehicle takes off.
 const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
 
@@ -60,7 +60,7 @@ pub(crate) struct HandshakeContext {
     pub(crate) now: Instant,
     pub(crate) state: State,
     /// Time since the mission state was entered.
-    pub(crate) in_state: Duration,
+    pub(crate) time_in_state: Duration,
     /// Height of the climb above the pad, metres.
     pub(crate) climb_m: f32,
     /// Value for ArduCopter's `GUID_TIMEOUT`: how long Guided keeps flying the last velocity
@@ -70,7 +70,7 @@ pub(crate) struct HandshakeContext {
     /// descend.
     pub(crate) column_clear: bool,
     /// Whether the landing mode may be requested now.
-    pub(crate) may_land: bool,
+    pub(crate) may_request_land_mode: bool,
 }
 
 /// State of the requests to the autopilot.
@@ -86,7 +86,7 @@ pub(crate) struct Handshake {
     /// Index of the next of the kind's streams to be requested.
     next_stream: usize,
     /// Number of changes of mode requested since HEARTBEAT fell silent.
-    unheard_mode_requests: u8,
+    mode_requests_while_silent: u8,
 }
 
 impl Default for Handshake {
@@ -98,7 +98,7 @@ impl Default for Handshake {
             limits_read: 0,
             limit_requests_left: 0,
             next_stream: usize::MAX,
-            unheard_mode_requests: 0,
+            mode_requests_while_silent: 0,
         }
     }
 }
@@ -144,13 +144,13 @@ impl Handshake {
         }
         timers.set(Timer::Streams, s.now + STREAMS_RETRY_EVERY);
         if telemetry.kind() == AutopilotKind::ArduPilot {
-            links.push(Link::Autopilot, Outgoing::Parameter("GUID_TIMEOUT", s.guided_timeout_s));
+            links.push(Link::Autopilot, Outgoing::SetParameter("GUID_TIMEOUT", s.guided_timeout_s));
         }
         reads
     }
 
     /// Requests the next limit parameter that was not read yet, when its time has come.
-    fn request_next_limit(
+    fn request_next_limit_parameter(
         &mut self,
         kind: AutopilotKind,
         now: Instant,
@@ -206,7 +206,7 @@ impl Handshake {
         let heard = telemetry.heartbeat_at.is_some();
         let silent = telemetry.heartbeat_age(now) > MAX_HEARTBEAT_AGE;
         if !silent {
-            self.unheard_mode_requests = 0;
+            self.mode_requests_while_silent = 0;
             timers.set(Timer::UnheardMode, now);
         }
         if silent && s.state == State::Disarm {
@@ -214,7 +214,7 @@ impl Handshake {
             timers.set(Timer::Request, now + DISARM_EVERY);
         }
         if heard {
-            self.request_next_limit(kind, now, timers, links);
+            self.request_next_limit_parameter(kind, now, timers, links);
         }
         let lost = !silent && telemetry.position_age(now) > POSITION_STREAM_TIMEOUT;
         let limits_reset = lost
@@ -227,11 +227,11 @@ impl Handshake {
                 Timer::Origin,
                 now + if doubts { ORIGIN_RETRY_EVERY } else { REQUEST_RETRY_EVERY },
             );
-            links.push(Link::Autopilot, Outgoing::Request(GPS_GLOBAL_ORIGIN));
+            links.push(Link::Autopilot, Outgoing::RequestMessage(GPS_GLOBAL_ORIGIN));
         }
         for _ in 0..STREAM_REQUESTS_PER_STEP {
             if let Some(&(id, interval_us)) = kind.streams().get(self.next_stream) {
-                links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
+                links.push(Link::Autopilot, Outgoing::SetMessageInterval(id, interval_us));
                 self.next_stream += 1;
             }
         }
@@ -261,26 +261,28 @@ impl Handshake {
         timers: &mut Timers,
         links: &mut Links,
     ) {
-        let looks = s.state == State::Land && !s.may_land;
+        let looks = s.state == State::Land && !s.may_request_land_mode;
         if looks || !timers.take_due(Timer::Request, s.now, REQUEST_RETRY_EVERY) {
             return;
         }
         let (kind, mode) = (telemetry.kind(), telemetry.custom_mode);
         let change_to = |custom_mode| {
             let (main, sub) = kind.mode_params(custom_mode);
-            Outgoing::Mode(main, sub)
+            Outgoing::SetMode(main, sub)
         };
         let heartbeat_age = telemetry.heartbeat_age(s.now);
         let needs_mode = match s.state {
             // A HEARTBEAT from before this state may show the landing mode of an earlier landing.
-            State::Land => mode != kind.land_mode() || heartbeat_age > s.in_state,
+            State::Land => mode != kind.land_mode() || heartbeat_age > s.time_in_state,
             // The HEARTBEAT at hand may be older than the landing mode that was requested before.
-            State::LandingHeld => s.in_state < MAX_HEARTBEAT_AGE || mode != kind.setpoint_mode(),
+            State::LandingHeld => {
+                s.time_in_state < MAX_HEARTBEAT_AGE || mode != kind.setpoint_mode()
+            }
             _ => false,
         };
-        if heartbeat_age > MAX_HEARTBEAT_AGE && s.state.lands() {
+        if heartbeat_age > MAX_HEARTBEAT_AGE && s.state.lands_or_landing_is_held() {
             if needs_mode {
-                self.request_mode_unheard(kind, s, timers, links);
+                self.request_mode_while_silent(kind, s, timers, links);
             }
             return;
         }
@@ -306,24 +308,24 @@ impl Handshake {
 
     /// Requests the mode of a landing, or of one that is held, a few times while HEARTBEAT is
     /// silent.
-    fn request_mode_unheard(
+    fn request_mode_while_silent(
         &mut self,
         kind: AutopilotKind,
         s: &HandshakeContext,
         timers: &mut Timers,
         links: &mut Links,
     ) {
-        let made = usize::from(self.unheard_mode_requests);
-        let retry_s = UNHEARD_MODE_RETRY_S.get(made).copied().unwrap_or_default();
-        let may = made <= UNHEARD_MODE_RETRY_S.len();
+        let made = usize::from(self.mode_requests_while_silent);
+        let retry_s = MODE_RETRY_WHILE_SILENT_S.get(made).copied().unwrap_or_default();
+        let may = made <= MODE_RETRY_WHILE_SILENT_S.len();
         if !may || !timers.take_due(Timer::UnheardMode, s.now, Duration::from_secs(retry_s)) {
             return;
         }
-        self.unheard_mode_requests += 1;
+        self.mode_requests_while_silent += 1;
         let holds = s.state == State::LandingHeld;
         let (main, sub) =
             kind.mode_params(if holds { kind.setpoint_mode() } else { kind.land_mode() });
-        links.push(Link::Autopilot, Outgoing::Mode(main, sub));
+        links.push(Link::Autopilot, Outgoing::SetMode(main, sub));
     }
 
     /// Requests again each stream that has been silent for 4 s (`STREAM_LOST_AFTER`) or never came,
@@ -342,7 +344,7 @@ impl Handshake {
         for &(id, interval_us) in streams.iter().filter(|(_, interval_us)| *interval_us > 0.0) {
             if telemetry.stream_age(u32::from(id), now) > STREAM_LOST_AFTER {
                 timers.set(Timer::Streams, now + STREAMS_RETRY_EVERY);
-                links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
+                links.push(Link::Autopilot, Outgoing::SetMessageInterval(id, interval_us));
             }
         }
     }
@@ -369,8 +371,8 @@ impl Handshake {
 impl HandshakeContext {
     /// Whether, after this time in the state, the column below has been checked for long enough,
     /// 0.1 s (`LAND_REQUEST_AFTER`), to request the landing mode if it is clear.
-    pub(crate) fn is_column_checked(in_state: Duration) -> bool {
-        in_state >= LAND_REQUEST_AFTER
+    pub(crate) fn is_column_checked(time_in_state: Duration) -> bool {
+        time_in_state >= LAND_REQUEST_AFTER
     }
 }
 

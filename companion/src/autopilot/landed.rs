@@ -9,10 +9,10 @@ pub(super) const RISEN_M: f32 = 0.25;
 /// Age up to which a report of the ground holds whatever the position: reports come at 5 Hz.
 const SURELY_VALID_FOR: Duration = Duration::from_millis(400);
 /// Age up to which a report of the ground holds while the vehicle has not risen since.
-const VALID_ON_PAD_FOR: Duration = Duration::from_millis(3000);
+const VALID_UNLESS_RISEN_FOR: Duration = Duration::from_millis(3000);
 
 /// Age of the last report of a stream at 1 Hz, the default of PX4 where a request for 5 Hz is lost.
-const SLOW_REPORT_AGE: Duration = Duration::from_millis(1200);
+const MAX_SLOW_STREAM_REPORT_AGE: Duration = Duration::from_millis(1200);
 
 /// What the landing detector reported.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +20,7 @@ pub(super) struct LandedReport {
     /// Whether the vehicle is on the ground.
     pub(super) on_ground: bool,
     /// When the report was received.
-    pub(super) at: Instant,
+    pub(super) received_at: Instant,
     /// Estimated height then, metres.
     pub(super) z_m: f32,
 }
@@ -28,14 +28,16 @@ pub(super) struct LandedReport {
 impl LandedReport {
     /// Whether the report says that the vehicle is on the ground, and is no older than one of a
     /// slow stream.
-    pub(super) fn is_new_ground(&self, now: Instant) -> bool {
-        self.on_ground && now - self.at <= SLOW_REPORT_AGE
+    pub(super) fn is_recent_ground(&self, now: Instant) -> bool {
+        self.on_ground && now - self.received_at <= MAX_SLOW_STREAM_REPORT_AGE
     }
 
     /// Whether the report says that the vehicle is on the ground, and still holds: it is new, or
     /// the vehicle, at the estimated height `z_m` now, has not risen since. NaN: unknown height.
-    pub(super) fn holds_ground(&self, z_m: f32, now: Instant) -> bool {
+    pub(super) fn still_says_ground(&self, z_m: f32, now: Instant) -> bool {
         let rests = z_m < self.z_m + RISEN_M;
-        self.on_ground && now - self.at <= if rests { VALID_ON_PAD_FOR } else { SURELY_VALID_FOR }
+        self.on_ground
+            && now - self.received_at
+                <= if rests { VALID_UNLESS_RISEN_FOR } else { SURELY_VALID_FOR }
     }
 }

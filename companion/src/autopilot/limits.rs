@@ -8,19 +8,19 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
     /// Horizontal speed, m/s.
-    Speed,
+    SpeedXy,
     /// Speed upwards, m/s.
     Climb,
     /// Speed downwards, m/s.
     Descend,
     /// Horizontal acceleration, m/s².
-    Accel,
+    AccelXy,
     /// Acceleration upwards, m/s².
     AccelUp,
     /// Acceleration downwards, m/s².
     AccelDown,
     /// Horizontal jerk, m/s³.
-    Jerk,
+    JerkXy,
     /// Vertical jerk, upwards and downwards, m/s³.
     JerkZ,
 }
@@ -33,9 +33,9 @@ impl Limit {
     /// is a switch (0, −1) or a mistake, and is ignored.
     fn range(self) -> (f32, f32) {
         match self {
-            Self::Speed | Self::Climb | Self::Descend => (0.1, 50.0),
-            Self::Accel | Self::AccelUp | Self::AccelDown => (0.2, 20.0),
-            Self::Jerk | Self::JerkZ => (1.0, 100.0),
+            Self::SpeedXy | Self::Climb | Self::Descend => (0.1, 50.0),
+            Self::AccelXy | Self::AccelUp | Self::AccelDown => (0.2, 20.0),
+            Self::JerkXy | Self::JerkZ => (1.0, 100.0),
         }
     }
 }

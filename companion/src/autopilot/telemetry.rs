@@ -34,7 +34,7 @@ use crate::time::{Duration, Instant};
 /// and a late one is not yet silence.
 pub(crate) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 /// Gap between two HEARTBEATs that counts as a silence of the autopilot.
-const MAX_SILENCE: Duration = Duration::from_millis(4500);
+const MAX_HEARTBEAT_GAP: Duration = Duration::from_millis(4500);
 /// Age of a position from which a vehicle may have risen unseen: positions come at 30 Hz.
 pub(crate) const MAX_POSITION_AGE_ON_PAD: Duration = Duration::from_millis(150);
 /// Age from which a position counts as unknown.
@@ -114,7 +114,7 @@ pub struct Telemetry {
     /// When the last HEARTBEAT was received.
     pub heartbeat_at: Option<Instant>,
     /// When the first HEARTBEAT since the last silence was received.
-    heard_since: Instant,
+    heartbeats_since: Instant,
     /// Estimated height at the last HEARTBEAT, metres.
     pub(super) heartbeat_z_m: f32,
     /// Flight mode in the autopilot's own numbering.
@@ -145,7 +145,7 @@ pub struct Telemetry {
     pub(crate) origin_moved: bool,
     /// Error of the position that the estimator last reported, metres, and when; infinite for an
     /// unsound estimate.
-    accuracy: Option<(f32, Instant)>,
+    position_accuracy: Option<(f32, Instant)>,
     /// When the last usable position was received; `None` while the position is unknown.
     pub position_at: Option<Instant>,
     /// The same, kept while the position is unknown.
@@ -158,14 +158,14 @@ pub struct Telemetry {
     ack: Option<Ack>,
     /// When each stream of [`AutopilotKind::streams`] that is on was last received, in that order;
     /// `Instant::ZERO` for never.
-    streams: [Instant; MAX_STREAMS],
-    boot_ms: u32,
+    stream_received_at: [Instant; MAX_STREAMS],
+    last_boot_ms: u32,
     /// Autopilot's time (`time_boot_ms`) of the last position that passed the jump test,
     /// milliseconds.
     position_boot_ms: u32,
     /// When a position last passed the jump test, whether or not it was usable.
-    position_read_at: Option<Instant>,
-    settled_at: Instant,
+    position_accepted_at: Option<Instant>,
+    settling_until: Instant,
     /// From when on positions are usable after a gap.
     positions_valid_from: Instant,
     estimator_ready: bool,
@@ -206,7 +206,7 @@ impl Telemetry {
     /// (`ACCURACY_FACTOR`), and at least `vouched_m`, which the operator vouches for (`FLK_EST_M`).
     /// Infinite while no recent accuracy is known.
     pub(crate) fn estimate_error_bound_m(&self, now: Instant, vouched_m: f32) -> f32 {
-        match self.accuracy {
+        match self.position_accuracy {
             Some((accuracy_m, at)) if now - at <= margins::MAX_ACCURACY_AGE => {
                 libm::fmaxf(margins::ACCURACY_FACTOR * accuracy_m, vouched_m)
             }
@@ -222,8 +222,8 @@ impl Telemetry {
 
     /// Whether the position jumped, or the EKF origin changed, within the last second
     /// (`POSITION_SETTLE_TIME`).
-    pub fn is_settling(&self, now: Instant) -> bool {
-        now < self.settled_at
+    pub fn is_position_settling(&self, now: Instant) -> bool {
+        now < self.settling_until
     }
 
     /// Updates the telemetry from a frame of the autopilot's link; `mission_origin` is the origin
@@ -240,7 +240,7 @@ impl Telemetry {
         if !confirmed && !self.sequence.accept_if_new(frame.sequence, now) {
             return TelemetryChange::None;
         }
-        self.note_stream(frame.message_id, now);
+        self.note_stream_received(frame.message_id, now);
         match frame.message_id {
             // Decoded field by field: the command may be one that the crate does not know.
             COMMAND_ACK_DATA::ID => {
@@ -263,8 +263,8 @@ impl Telemetry {
                 self.armed = p[6] & FLAG_ARMED != 0;
                 self.update_origin_trust();
                 self.system_status = p[7];
-                if self.heartbeat_age(now) > MAX_SILENCE {
-                    self.heard_since = now;
+                if self.heartbeat_age(now) > MAX_HEARTBEAT_GAP {
+                    self.heartbeats_since = now;
                 }
                 (self.heartbeat_at, self.heartbeat_z_m) = (Some(now), self.position.z);
                 TelemetryChange::Updated
@@ -273,7 +273,8 @@ impl Telemetry {
                 let landed = frame.padded_payload()[1];
                 if landed != 0 {
                     let on_ground = landed == LANDED_STATE_ON_GROUND;
-                    self.landed = Some(LandedReport { on_ground, at: now, z_m: self.position.z });
+                    self.landed =
+                        Some(LandedReport { on_ground, received_at: now, z_m: self.position.z });
                 }
                 TelemetryChange::Updated
             }
@@ -305,7 +306,7 @@ impl Telemetry {
                     && [0, 4, 8, 12]
                         .into_iter()
                         .all(|at| ardupilot::is_variance_ratio_good(ratio(at)));
-                self.accuracy = Some((if sound { 0.0 } else { f32::INFINITY }, now));
+                self.position_accuracy = Some((if sound { 0.0 } else { f32::INFINITY }, now));
                 if !self.estimator_ready && self.kind == Some(AutopilotKind::ArduPilot) {
                     self.position_at = None;
                 }
@@ -320,7 +321,7 @@ impl Telemetry {
                 // A NaN or negative accuracy counts as unknown.
                 let known = across_m >= 0.0 && height_m >= 0.0;
                 let worst_m = if known { libm::fmaxf(across_m, height_m) } else { f32::INFINITY };
-                self.accuracy = Some((worst_m, now));
+                self.position_accuracy = Some((worst_m, now));
                 TelemetryChange::Updated
             }
             GLOBAL_POSITION_INT_DATA::ID => match frame.decode::<GLOBAL_POSITION_INT_DATA>() {
@@ -345,7 +346,8 @@ impl Telemetry {
 
     /// Time since a stream's message was last received; the greatest duration if it never was.
     pub(crate) fn stream_age(&self, message_id: u32, now: Instant) -> Duration {
-        let heard = self.stream_index(message_id).and_then(|at| self.streams.get(at)).copied();
+        let heard =
+            self.stream_index(message_id).and_then(|at| self.stream_received_at.get(at)).copied();
         time_since(heard.filter(|at| *at > Instant::ZERO), now)
     }
 
@@ -356,8 +358,8 @@ impl Telemetry {
         on.position(|(id, _)| u32::from(*id) == message_id)
     }
 
-    fn note_stream(&mut self, message_id: u32, now: Instant) {
-        let slot = self.stream_index(message_id).and_then(|at| self.streams.get_mut(at));
+    fn note_stream_received(&mut self, message_id: u32, now: Instant) {
+        let slot = self.stream_index(message_id).and_then(|at| self.stream_received_at.get_mut(at));
         if let Some(slot) = slot {
             *slot = now;
         }
@@ -389,20 +391,20 @@ impl Telemetry {
         }
         let away_m = frames::geodetic_to_enu(mission_origin, &origin).length();
         if away_m > MAX_ORIGIN_DISTANCE_M && self.origin_range == OriginRange::NearMission {
-            (self.ekf_origin, self.position_at, self.position_read_at) = (None, None, None);
-            self.settled_at = now + POSITION_SETTLE_TIME;
+            (self.ekf_origin, self.position_at, self.position_accepted_at) = (None, None, None);
+            self.settling_until = now + POSITION_SETTLE_TIME;
             return TelemetryChange::OriginFar((away_m * 1e-3) as u32);
         }
         if self.ekf_origin.is_some_and(|known| known != origin) {
             // A position received next may still be relative to the old origin.
-            self.settled_at = now + POSITION_SETTLE_TIME;
+            self.settling_until = now + POSITION_SETTLE_TIME;
         }
         if self.ekf_origin != Some(origin) {
             self.ekf_origin = Some(origin);
             // The next position is relative to the new origin: the jump test must not compare it
             // with the last.
             self.position_at = None;
-            self.position_read_at = None;
+            self.position_accepted_at = None;
         }
         self.update_origin_trust();
         TelemetryChange::Updated
@@ -416,7 +418,7 @@ impl Telemetry {
             return;
         }
         if self.origin_moved {
-            (self.ekf_origin, self.position_at, self.position_read_at) = (None, None, None);
+            (self.ekf_origin, self.position_at, self.position_accepted_at) = (None, None, None);
         }
         (self.armed_origin, self.origin_doubtful_since, self.origin_moved) = (None, None, false);
     }
@@ -428,13 +430,13 @@ impl Telemetry {
         d: &LOCAL_POSITION_NED_DATA,
     ) -> TelemetryChange {
         let fields = [d.x, d.y, d.z, d.vx, d.vy, d.vz];
-        let older = self.boot_ms.wrapping_sub(d.time_boot_ms);
+        let older = self.last_boot_ms.wrapping_sub(d.time_boot_ms);
         let rebooted = older > 10_000 && older < u32::MAX / 2;
-        let stale = older < u32::MAX / 2 && !rebooted && self.position_read_at.is_some();
+        let stale = older < u32::MAX / 2 && !rebooted && self.position_accepted_at.is_some();
         if fields.iter().any(|f| !f.is_finite()) || stale {
             return TelemetryChange::None;
         }
-        self.boot_ms = d.time_boot_ms;
+        self.last_boot_ms = d.time_boot_ms;
         let Some(kind) =
             self.kind.filter(|kind| *kind == AutopilotKind::Px4 || self.estimator_ready)
         else {
@@ -446,7 +448,7 @@ impl Telemetry {
         let ned = Vector3::new(f64::from(d.x), f64::from(d.y), f64::from(d.z));
         let geodetic = frames::ned_to_geodetic(kind.projection(), &ekf_origin, &ned);
         let position = frames::geodetic_to_enu(mission_origin, &geodetic);
-        if let Some(at) = self.position_read_at {
+        if let Some(at) = self.position_accepted_at {
             // Time by the autopilot's clock: delayed positions arrive all at once.
             let passed_s = d.time_boot_ms.wrapping_sub(self.position_boot_ms) as f32 * 1e-3;
             let dt_s = passed_s.min(MAX_EXTRAPOLATION_S);
@@ -458,12 +460,12 @@ impl Telemetry {
                 return self.lose_origin(now);
             }
         }
-        (self.position_read_at, self.position_boot_ms) = (Some(now), d.time_boot_ms);
+        (self.position_accepted_at, self.position_boot_ms) = (Some(now), d.time_boot_ms);
         self.position = position;
         // The norths of the mission frame and of the autopilot's frame differ by the convergence of
         // meridians, 1e-4 rad a kilometre; the velocity is not corrected for it.
         self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));
-        if !self.is_settling(now) && now >= self.positions_valid_from {
+        if !self.is_position_settling(now) && now >= self.positions_valid_from {
             self.position_at = Some(now);
             self.last_position_at = Some(now);
         }
@@ -473,8 +475,8 @@ impl Telemetry {
     fn lose_origin(&mut self, now: Instant) -> TelemetryChange {
         self.ekf_origin = None;
         self.position_at = None;
-        self.position_read_at = None;
-        self.settled_at = now + POSITION_SETTLE_TIME;
+        self.position_accepted_at = None;
+        self.settling_until = now + POSITION_SETTLE_TIME;
         TelemetryChange::OriginLost
     }
 

@@ -1,7 +1,7 @@
 //! Runs the mission table: the row that applies, and its action.
 
 use super::Companion;
-use super::division::CANNOT_COMMIT_MOST;
+use super::division::LEAVE_WITHOUT_COMMITMENT_AFTER;
 use crate::autopilot::handshake::DISARM_EVERY;
 use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
@@ -28,8 +28,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn apply_row(&mut self, row: &'static TransitionRow) {
         let now = self.now;
         // After an interruption, a vehicle that sought a landing place resumes with a landing.
-        let lands =
-            self.detours.seeks_landing() && !self.guidance.returning && !self.detours.is_homeward();
+        let lands = self.detours.seeks_landing_aside()
+            && !self.guidance.returning
+            && !self.detours.is_homeward();
         let after_search = if lands { State::Land } else { State::Blocked };
         let (from, to) =
             self.mission.enter_state(row, self.telemetry.custom_mode, after_search, now);
@@ -80,7 +81,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     if fleet.has_reported_leaving() {
                         // The vehicle takes part again: it leaves its share at the earliest after
                         // this time, since others have to hear it first.
-                        self.timers.set(Timer::LeaveWithoutCommitment, now + CANNOT_COMMIT_MOST);
+                        self.timers.set(
+                            Timer::LeaveWithoutCommitment,
+                            now + LEAVE_WITHOUT_COMMITMENT_AFTER,
+                        );
                     }
                     fleet.begin_flight(now);
                     self.detours.begin_flight();
@@ -120,11 +124,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.cancel_evasion();
                 self.request_detour_aside(from);
             }
-            Action::RequestLanding => self.request_detour(DetourPurpose::Landing),
+            Action::RequestLanding => self.request_detour(DetourPurpose::LandingAside),
             Action::NoteDetourFailure => self.handle_detour_failure(PlanFailure::Late),
             Action::FlyDetour => self.guidance.start_following(now),
             Action::FlyDivision => {
-                self.mission.note_division_flown();
+                self.mission.note_division_plan_begun();
                 self.detours.give_up_plan();
                 self.guidance.start_following(now);
             }
@@ -132,7 +136,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::Rejoin => self.resume_interrupted_state(from, to),
             Action::TurnBack => {
                 self.detours.begin_turn_back();
-                let along_m = self.guidance.progress_m(from, &self.guidance_inputs());
+                let along_m = self.guidance.reported_progress_m(from, &self.guidance_inputs());
                 let guidance = &mut self.guidance;
                 self.mission.reverse_path(along_m, |path| guidance.reverse_path(path, now));
             }
@@ -174,7 +178,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     // Counts as blocked until the next scan has checked the path.
                     self.detours.assume_blocked();
                 }
-                if !to.advances() {
+                if !to.setpoint_advances() {
                     self.guidance.cancel_evasion();
                 }
             }

@@ -17,7 +17,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub fn attach_store(&mut self, store: Store) {
         self.services.attach_store(store);
         let Self { services, mission, config, .. } = self;
-        mission.photographed_mut().restore(services.photographed(), config.mission_crc);
+        mission.photographed_mut().restore(services.photographed_record(), config.mission_crc);
         self.apply_parameters();
     }
 

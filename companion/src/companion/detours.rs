@@ -28,7 +28,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             guidance: &self.guidance,
             telemetry: &self.telemetry,
             neighbours: &self.neighbours,
-            scene: self.guidance_inputs(),
+            guidance_inputs: self.guidance_inputs(),
         }
     }
 
@@ -37,9 +37,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn update_place_before_jump(&mut self, to: State) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
-        let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.path_source());
-        let view =
-            DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
+        let guidance_inputs =
+            GuidanceInputs::new(mission.plan(), telemetry, own, detours.path_source());
+        let view = DetourView {
+            now: *now,
+            config,
+            mission,
+            guidance,
+            telemetry,
+            neighbours,
+            guidance_inputs,
+        };
         detours.update_place_before_jump(to, &view);
     }
 
@@ -48,9 +56,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, timers, .. } =
             self;
         let own = (neighbours.own_rank(), config.system_id);
-        let scene = GuidanceInputs::new(mission.plan(), telemetry, own, detours.path_source());
-        let view =
-            DetourView { now: *now, config, mission, guidance, telemetry, neighbours, scene };
+        let guidance_inputs =
+            GuidanceInputs::new(mission.plan(), telemetry, own, detours.path_source());
+        let view = DetourView {
+            now: *now,
+            config,
+            mission,
+            guidance,
+            telemetry,
+            neighbours,
+            guidance_inputs,
+        };
         if let Some(clear_at) = detours.scan_path(&view, timers) {
             self.neighbours.mark_path_clear(clear_at);
         }
@@ -60,7 +76,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn request_detour(&mut self, aim: DetourPurpose) {
         self.detours.note_request(aim);
         self.guidance.reset_trap_timer();
-        self.mission.forget_failure();
+        self.mission.forget_plan_failure();
         // The queue is full only if the shell does not drain the events; then the request is made
         // again.
         let _ = self.events.push_back(Event::PlanRequested(PlanKind::Detour));
@@ -71,7 +87,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn request_detour_aside(&mut self, from: State) {
         // A vehicle that flies back, or to a landing place aside, seeks another landing place.
         if self.guidance.returning || self.detours.lands_at_end() {
-            return self.request_detour(DetourPurpose::Landing);
+            return self.request_detour(DetourPurpose::LandingAside);
         }
         self.request_detour(DetourPurpose::Aside(self.rejoin_after_aside(from)));
     }
@@ -89,17 +105,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let holds = from == State::Dividing || self.is_holding_for_division();
         let promised_m = self.division_hold_m();
-        let own =
-            self.place_on_path(promised_m.filter(|_| holds).unwrap_or(self.guidance.along_m()))?;
+        let own = self.place_on_path(
+            promised_m.filter(|_| holds).unwrap_or(self.guidance.reference_along_m()),
+        )?;
         let beyond = if promised_m.is_none() { self.place_beyond_block() } else { None };
-        Some(RejoinPlaces { own, beyond: beyond.unwrap_or(own) })
+        Some(RejoinPlaces { first_choice: own, beyond_block: beyond.unwrap_or(own) })
     }
 
     /// The first free place along its path in a coverage mission beyond what blocks the path.
     // Inlined into both callers it would take half a kilobyte of flash.
     #[inline(never)]
     fn place_beyond_block(&self) -> Option<RejoinPlace> {
-        self.detours.rejoin_m(&self.detour_view()).and_then(|at_m| self.place_on_path(at_m))
+        self.detours.first_rejoin_m(&self.detour_view()).and_then(|at_m| self.place_on_path(at_m))
     }
 
     #[inline(never)]
@@ -112,14 +129,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// the path.
     pub(super) fn request_detour_back_to_path(&mut self) {
         let rejoin = match self.detours.is_beside_plan() {
-            true => self.detours.rejoin_from_aside(&self.detour_view()),
+            true => self.detours.rejoin_place_from_aside(&self.detour_view()),
             false => self.place_beyond_block(),
         };
         match rejoin {
             Some(back) => self.request_detour(DetourPurpose::Rejoin(back)),
             None => {
                 Detours::note_no_rejoin_place(self.now, &mut self.timers);
-                self.mission.set_failure(PlanFailure::Unreachable);
+                self.mission.set_plan_failure(PlanFailure::Unreachable);
             }
         }
     }
@@ -138,19 +155,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// elsewhere.
     pub(super) fn adopt_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let here = self.detours.start_of_detour(&self.detour_view());
-        let begins = here.is_some_and(|here| self.mission.starts_at(detour, &here));
-        let purpose = self.detours.sought().filter(|_| begins);
+        let begins = here.is_some_and(|here| self.mission.is_plan_valid_from(detour, &here));
+        let purpose = self.detours.requested_purpose().filter(|_| begins);
         let ends = detour.path.waypoints().last().map(|last| last.position);
         let Some(purpose) = purpose.and_then(|purpose| self.checked_purpose(purpose, ends)) else {
             self.handle_detour_failure(PlanFailure::Invalid);
             return;
         };
-        let progress_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
-        let ground_m = self.mission.plan().map(|plan| self.guidance.ground_m(plan));
+        let progress_m =
+            self.guidance.reported_progress_m(self.mission.state(), &self.guidance_inputs());
+        let ground_m = self.mission.plan().map(|plan| self.guidance.planned_ground_m(plan));
         self.mission.switch_to_detour(detour, progress_m, ground_m);
         let progress_at = self.guidance.last_progress_at();
         self.detours.adopt_detour(purpose, progress_m, self.now, progress_at, &mut self.timers);
-        self.neighbours.mark_avoided(self.now);
+        self.neighbours.mark_out_of_plan_avoided(self.now);
         // In the air the vehicle follows the detour from its start. On the pad the climb comes
         // first.
         if self.mission.state() == State::Replanning {
@@ -173,20 +191,24 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         match purpose {
             DetourPurpose::Rejoin(back) => {
                 // A late answer may belong to another request, and end elsewhere.
-                let leads_back = (ends? - back.position).length() < MAX_REJOIN_ERROR_M;
-                (leads_back && promised_m.is_none()).then_some(purpose)
+                let ends_on_plan_path = (ends? - back.position).length() < MAX_REJOIN_ERROR_M;
+                (ends_on_plan_path && promised_m.is_none()).then_some(purpose)
             }
             // From aside the vehicle comes back to its path no further than where it promised to
             // hold.
             DetourPurpose::Aside(Some(places)) => {
                 let allowed =
                     |place: &RejoinPlace| promised_m.is_none_or(|at_m| place.along_m <= at_m);
-                let holds_at_m =
-                    promised_m.filter(|_| !allowed(&places.own) || self.is_holding_for_division());
-                let own =
-                    holds_at_m.and_then(|at_m| self.place_on_path(at_m)).unwrap_or(places.own);
-                let beyond = if allowed(&places.beyond) { places.beyond } else { own };
-                Some(DetourPurpose::Aside(Some(RejoinPlaces { own, beyond })))
+                let holds_at_m = promised_m
+                    .filter(|_| !allowed(&places.first_choice) || self.is_holding_for_division());
+                let own = holds_at_m
+                    .and_then(|at_m| self.place_on_path(at_m))
+                    .unwrap_or(places.first_choice);
+                let beyond = if allowed(&places.beyond_block) { places.beyond_block } else { own };
+                Some(DetourPurpose::Aside(Some(RejoinPlaces {
+                    first_choice: own,
+                    beyond_block: beyond,
+                })))
             }
             _ => Some(purpose),
         }
@@ -195,15 +217,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Handles that the shell has found no detour: decides whether and when another search makes
     /// sense.
     pub(super) fn handle_detour_failure(&mut self, failure: PlanFailure) {
-        self.mission.set_failure(failure);
+        self.mission.set_plan_failure(failure);
         let outlook = if self.neighbours.any_comes_down_unheard(self.now) {
-            RetryOutlook::Settles
+            RetryOutlook::SilentVehicleComesDown
         } else if failure != PlanFailure::Late && self.neighbours.are_all_out_or_down(self.now) {
-            RetryOutlook::Closed
+            RetryOutlook::NoneWillMove
         } else {
-            RetryOutlook::Open
+            RetryOutlook::OthersMayMove
         };
-        let along_m = self.guidance.along_m();
+        let along_m = self.guidance.reference_along_m();
         self.detours.note_failure(along_m, outlook, self.now, &mut self.timers);
     }
 }

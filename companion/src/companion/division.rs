@@ -9,7 +9,7 @@ use crate::config::PlanFailure;
 use crate::events::{Event, PlanKind};
 use crate::link::roster::ShareStatus;
 use crate::link::severity::Severity;
-use crate::margins::PILOT_KEEPS_AFTER;
+use crate::margins::PILOTED_OUT_OF_PLAN_AFTER;
 use crate::replanning::detour::path_kind::RejoinPlace;
 use crate::state::State;
 use crate::swarm::fleet::{COMMITMENT_S, Fleet, LEASE, OwnReport, VehicleDivisionInput};
@@ -20,18 +20,18 @@ use crate::timers::Timer;
 const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
 /// A vehicle within this distance before the place where it promised to hold has reached it,
 /// metres.
-const AT_HOLD_M: f32 = 0.2;
+const AT_HOLD_WITHIN_M: f32 = 0.2;
 /// Time for which a vehicle on the ground that cannot make a commitment keeps its share while
 /// another one flies.
-pub(super) const CANNOT_COMMIT_MOST: Duration = Duration::from_secs(60);
+pub(super) const LEAVE_WITHOUT_COMMITMENT_AFTER: Duration = Duration::from_secs(60);
 /// Time for which a vehicle waits above its pad for missing vehicles: twice the time after which a
 /// missing one counts as lost, or leaves for want of a lease. A false report keeps no vehicle in
 /// the air for longer.
-const WAIT_FOR_MISSING_MOST: Duration = Duration::from_secs(180);
+const MAX_WAIT_FOR_MISSING: Duration = Duration::from_secs(180);
 /// Time after the last lost vehicle is down within which a division must become binding.
-const DIVIDES_WITHIN: Duration = Duration::from_secs(60);
+const DIVISION_DUE_AFTER_LAST_DOWN: Duration = Duration::from_secs(60);
 /// Used in place of the plan's CRC where the planner cannot divide the rest of the area.
-const DIVISION_IMPOSSIBLE: u32 = u32::MAX;
+const IMPOSSIBLE_DIVISION_CRC: u32 = u32::MAX;
 /// Time after which an unanswered request for a division is sent to the shell again.
 const DIVISION_RETRY_EVERY: Duration = Duration::from_secs(30);
 
@@ -54,20 +54,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.neighbours.fleet().is_none() {
             return;
         }
-        if !self.cannot_commit() {
-            self.timers.set(Timer::LeaveWithoutCommitment, now + CANNOT_COMMIT_MOST);
+        if !self.cannot_commit_on_ground() {
+            self.timers.set(Timer::LeaveWithoutCommitment, now + LEAVE_WITHOUT_COMMITMENT_AFTER);
         }
         if self.mission.state() != State::Dividing {
             self.timers.set(Timer::DivisionDue, now);
         } else if let Some(at) = self.neighbours.fleet().and_then(Fleet::last_down_at) {
-            self.timers.set_no_earlier(Timer::DivisionDue, at + DIVIDES_WITHIN);
+            self.timers.set_no_earlier(Timer::DivisionDue, at + DIVISION_DUE_AFTER_LAST_DOWN);
         }
         let own = self.own_fleet_report();
         self.neighbours.step_fleet(&own, now);
         let Some(fleet) = self.neighbours.fleet() else { return };
         let (home_m, around) = (self.last_descent_start_m(), self.detours.is_beside_plan());
         if !fleet.is_any_missing() {
-            self.timers.set(Timer::StopWaitingForMissing, now + WAIT_FOR_MISSING_MOST);
+            self.timers.set(Timer::StopWaitingForMissing, now + MAX_WAIT_FOR_MISSING);
         }
         let misses =
             fleet.is_any_missing() && !self.timers.is_due(Timer::StopWaitingForMissing, now);
@@ -76,13 +76,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let halt_m = match self.division_hold_m() {
             Some(holds_at_m) => holds_at_m,
             // On a detour the end of the path is not above the pad.
-            None if waits && !around && self.guidance.along_m() <= home_m + AT_HOLD_M => home_m,
+            None if waits
+                && !around
+                && self.guidance.reference_along_m() <= home_m + AT_HOLD_WITHIN_M =>
+            {
+                home_m
+            }
             None => f32::INFINITY,
         };
         let behind = fleet.division_count() > self.mission.division_count();
-        let wants = fleet.needs_division() || ((behind || around) && self.is_at_division_start());
-        let fingerprint = wants.then(|| fleet.division_hash());
-        self.guidance.set_halt_m(halt_m);
+        let wants = fleet.is_division_to_be_computed()
+            || ((behind || around) && self.is_at_division_start());
+        let fingerprint = wants.then(|| fleet.division_inputs_hash());
+        self.guidance.set_division_hold_m(halt_m);
         let timers = &mut self.timers;
         let requests = |hash| {
             self.mission.open_division_request_if_due(hash, now, DIVISION_RETRY_EVERY, timers)
@@ -107,19 +113,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ends = match state {
             _ if state.has_left_mission() => true,
             _ if state.is_left_to_pilot() => {
-                self.mission.time_since_pilot_takeover(self.now) >= PILOT_KEEPS_AFTER
+                self.mission.time_since_pilot_takeover(self.now) >= PILOTED_OUT_OF_PLAN_AFTER
             }
             _ => {
                 (off_plan && !beside)
-                    || (self.cannot_commit()
+                    || (self.cannot_commit_on_ground()
                         && self.timers.is_due(Timer::LeaveWithoutCommitment, self.now))
             }
         };
-        let on_pad = state.waits_with_plan();
-        let along_m = self.guidance.progress_m(state, &self.guidance_inputs());
-        let flies = self.guidance.along_m() >= 0.0 && !off_plan;
+        let on_pad = state.waits_on_pad_with_plan();
+        let along_m = self.guidance.reported_progress_m(state, &self.guidance_inputs());
+        let flies = self.guidance.reference_along_m() >= 0.0 && !off_plan;
         // A vehicle that holds above its pad may have overshot the start of its descent a little.
-        let descends = self.guidance.along_m() > self.last_descent_start_m() + AT_HOLD_M;
+        let descends =
+            self.guidance.reference_along_m() > self.last_descent_start_m() + AT_HOLD_WITHIN_M;
         let nearly_down = flies && descends && !on_pad && self.division_hold_m().is_none();
         let standing = match ends || nearly_down {
             true if self.mission.has_all_pictures(along_m) => ShareStatus::Finished,
@@ -128,16 +135,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         OwnReport {
             status: standing,
-            waits: self.is_not_started(),
+            waits_for_start: self.is_not_started(),
             // By the state: an autopilot may report the ground in flight.
-            airborne: !(self.is_not_started() || state.is_on_pad() || state.is_over()),
-            division: self.mission.division_count(),
+            airborne: !(self.is_not_started() || state.is_started_on_pad() || state.is_over()),
+            path_division_count: self.mission.division_count(),
             progress_dm: if flies {
                 (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16
             } else {
                 0
             },
-            commitment_dm: if on_pad { Some(0) } else { self.commitment_dm().filter(|_| flies) },
+            new_commitment_dm: if on_pad {
+                Some(0)
+            } else {
+                self.possible_commitment_dm().filter(|_| flies)
+            },
             // Beside its path the vehicle does not hold: it first flies its own plan to where it
             // promised to hold.
             holds: on_pad || (state == State::Dividing && !beside),
@@ -150,7 +161,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn wants_division(&self) -> bool {
         let Some(plan) = self.mission.plan() else { return false };
         let Task::Photograph(photographs) = &plan.task else { return false };
-        let soon_m = self.guidance.along_m() + COMMITMENT_S * self.config.cruise_mps;
+        let soon_m = self.guidance.reference_along_m() + COMMITMENT_S * self.config.cruise_mps;
         photographs.is_first_part
             && photographs.last_picture_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
     }
@@ -159,13 +170,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// could not divide the area. Either it is ready or started and no majority hears it; or
     /// another vehicle takes part, and this one has no autopilot, position or plan, is away from
     /// its pad, or hears another plan.
-    fn cannot_commit(&self) -> bool {
+    fn cannot_commit_on_ground(&self) -> bool {
         let Some(fleet) = self.neighbours.fleet() else { return false };
         let lacks = match self.mission.state() {
             state if state.is_before_plan() => true,
-            state if state.waits_with_plan() && !fleet.has_lease(self.now) => return true,
-            State::Ready => !self.is_at_start() || self.hears_another_plan(),
-            state => state.waits_on_pad() && self.hears_another_plan(),
+            state if state.waits_on_pad_with_plan() && !fleet.has_lease(self.now) => return true,
+            State::Ready => !self.is_at_pad() || self.hears_another_plan(),
+            state => state.waits_on_pad_after_start() && self.hears_another_plan(),
         };
         lacks && self.neighbours.is_another_in_flight(self.now, LEASE)
     }
@@ -177,10 +188,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether this vehicle resumes, or could resume, its part after it reported that it leaves:
     /// the others may have divided that part by then, so it must not.
-    fn resumes_too_late(&self) -> bool {
+    fn resumes_after_leaving(&self) -> bool {
         let resumes = match self.mission.state() {
             State::PilotReturned => self.mission.pending().resume,
-            state => state.flies_its_part(),
+            state => state.flies_or_holds_its_part(),
         };
         resumes
             && !self.will_land_off_plan()
@@ -188,8 +199,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether this vehicle was started after it reported that it leaves, and another one flies.
-    fn starts_too_late(&self) -> bool {
-        self.mission.state().is_before_arming()
+    fn starts_after_leaving(&self) -> bool {
+        self.mission.state().is_started_before_arming()
             && self
                 .neighbours
                 .fleet()
@@ -201,7 +212,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let home = self.guidance.returning || self.detours.is_homeward();
         home || (self.guidance.ends_away_from_goal && !self.detours.is_beside_plan())
             || self.detours.lands_at_end()
-            || self.detours.seeks_landing()
+            || self.detours.seeks_landing_aside()
     }
 
     /// Whether this vehicle must not fly its part any more: the others have divided that part, or
@@ -209,8 +220,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn is_excluded(&self) -> bool {
         let excluded = self.neighbours.fleet().is_some_and(Fleet::is_excluded);
         (excluded && !self.will_land_off_plan())
-            || self.resumes_too_late()
-            || self.starts_too_late()
+            || self.resumes_after_leaving()
+            || self.starts_after_leaving()
     }
 
     /// Place along its path where its last descent begins, above its pad, metres.
@@ -223,7 +234,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// path, at the last picture within `COMMITMENT_S` of flight, no further than gates and other
     /// vehicles let it fly, and no nearer than it can stop. `None` where it cannot make one, or has
     /// made one.
-    fn commitment_dm(&self) -> Option<u16> {
+    fn possible_commitment_dm(&self) -> Option<u16> {
         let fleet = self.neighbours.fleet()?;
         if !self.mission.state().may_promise_hold()
             || !(fleet.is_dividing() || self.wants_division())
@@ -233,7 +244,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let plan = self.mission.plan()?;
         let Task::Photograph(photographs) = &plan.task else { return None };
-        let along_m = self.guidance.along_m();
+        let along_m = self.guidance.reference_along_m();
         // A vehicle whose path is blocked promises to hold where it is.
         let promise_s = if self.mission.state().is_blocked() { 0.0 } else { COMMITMENT_S };
         let ahead_m = along_m + promise_s * self.config.cruise_mps;
@@ -262,7 +273,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether this vehicle stands where it is to hold for a division.
     pub(super) fn is_holding_for_division(&self) -> bool {
         self.division_hold_m().is_some_and(|at_m| {
-            self.guidance.along_m() >= at_m - AT_HOLD_M && self.guidance.stands_outside_descent()
+            self.guidance.reference_along_m() >= at_m - AT_HOLD_WITHIN_M
+                && self.guidance.is_setpoint_still_outside_descent()
         })
     }
 
@@ -279,20 +291,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// it held.
     fn is_at_division_start(&self) -> bool {
         match self.mission.state() {
-            State::Dividing => self.guidance.is_at_rest_on_raw_point(),
+            State::Dividing => self.guidance.is_raw_point_at_setpoint(),
             state => state.waits_to_fly_plan(),
         }
     }
 
     /// Takes up its own plan again beyond the obstacle that it flew around.
     fn resume_plan_beyond_detour(&mut self, plan: &VehiclePlan<W, G>) {
-        let Some(RejoinPlace { along_m: back_m, position }) = self.detours.rejoin() else {
+        let Some(RejoinPlace { along_m: back_m, position }) = self.detours.rejoin_place() else {
             return;
         };
         let back = plan.path.point_at(back_m);
         let here =
             self.mission.plan().and_then(|around| around.path.point_at(around.path.length_m()));
-        let near = |place: Point| (position - place).length() < AT_HOLD_M;
+        let near = |place: Point| (position - place).length() < AT_HOLD_WITHIN_M;
         let meets = back.is_some_and(near) && here.is_some_and(near);
         if meets {
             let left = self.mission.resume_own_path(plan, self.detours.left_at_m(), back_m);
@@ -304,7 +316,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 );
                 // The queue is full only if the shell does not drain the events; then this one is
                 // lost.
-                let _ = self.events.push_back(Event::FlownAround { left });
+                let _ = self.events.push_back(Event::DetourSkippedWaypoints { count: left });
             }
             self.neighbours.forget_avoided();
             self.guidance.begin_path_at(back_m, self.now);
@@ -322,7 +334,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     ) {
         let may_take = self.is_at_division_start();
         let Some(fleet) = self.neighbours.fleet_mut() else { return };
-        if !self.mission.take_division_request(fleet.division_hash()) {
+        if !self.mission.close_division_request(fleet.division_inputs_hash()) {
             return;
         }
         let (division, along_m) = (fleet.division_count(), f32::from(fleet.held_at_dm()) / 10.0);
@@ -331,8 +343,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Err(PlanFailure::Late) => {}
             // All vehicles fail alike: each keeps its part, and the waypoints of the lost vehicle
             // are left.
-            Err(_) if fleet.needs_division() => {
-                fleet.set_hash_from_plan(DIVISION_IMPOSSIBLE);
+            Err(_) if fleet.is_division_to_be_computed() => {
+                fleet.set_hash_from_plan(IMPOSSIBLE_DIVISION_CRC);
                 self.links.send_text(Severity::Warning, "What is left cannot be divided");
             }
             Err(_) if may_take && self.detours.is_beside_plan() => {
@@ -342,7 +354,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.mission.keep_plan_after_division(division);
             }
             Err(_) => {}
-            Ok(plan) if fleet.needs_division() => fleet.set_hash_from_plan(plan.plan_crc),
+            Ok(plan) if fleet.is_division_to_be_computed() => {
+                fleet.set_hash_from_plan(plan.swarm_plan_crc);
+            }
             Ok(plan)
                 if may_take
                     && division == self.mission.division_count()
@@ -353,9 +367,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Ok(plan) if may_take && division > self.mission.division_count() => {
                 let in_air = self.mission.state() == State::Dividing;
                 let own = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-                let here = self.detours.rejoin().map(|back| back.position).or(own);
+                let here = self.detours.rejoin_place().map(|back| back.position).or(own);
                 let place = here.filter(|_| in_air).unwrap_or(self.mission.path_start());
-                if self.mission.accept_division(plan, &place, division) {
+                if self.mission.accept_division_plan(plan, &place, division) {
                     self.neighbours.forget_plan();
                     self.detours.forget_plan(&mut self.timers);
                     // From now on places are measured along the new path.

@@ -44,7 +44,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let own = self.config.system_id;
         let sender =
             SenderKind::from_system_id(link, frame.system, own, &self.config.ground_stations);
-        let heard = ReceivedFrame { link, sender, frame, now: self.now, own };
+        let heard = ReceivedFrame { link, sender, frame, now: self.now, own_system_id: own };
         match frame.message_id {
             GLOBAL_POSITION_INT_DATA::ID | TUNNEL_DATA::ID if link == Link::Swarm => {
                 self.handle_neighbour_frame(frame);
@@ -110,7 +110,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn is_from_autopilot(&self, heard: &ReceivedFrame<'_>) -> bool {
-        heard.link == Link::Autopilot && heard.sender_ids() == (heard.own, AUTOPILOT_COMPONENT)
+        heard.link == Link::Autopilot
+            && heard.sender_ids() == (heard.own_system_id, AUTOPILOT_COMPONENT)
     }
 
     /// Handles a parameter of this vehicle's autopilot: its limits may follow from it.
@@ -131,7 +132,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let change = self.telemetry.handle_frame(now, &self.config.origin, frame);
         if let Some(ack) = self.telemetry.take_ack() {
             let state = self.mission.state();
-            self.handshake.handle_ack(&ack, heard.own, state, now, &mut self.links);
+            self.handshake.handle_ack(&ack, heard.own_system_id, state, now, &mut self.links);
             self.mission.handle_ack(&ack, &mut self.links);
         }
         self.handshake.update_mode_and_landed(self.mission.state(), &self.telemetry, now);
@@ -182,7 +183,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if let Some(intent) = Intent::decode(payload, id) {
             self.handle_intent(id, frame.sequence, &intent);
         } else if let Some(relay) = Relay::decode(payload, id) {
-            let ours = self.mission.plan().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
+            let ours =
+                self.mission.plan().is_some_and(|plan| plan.swarm_plan_crc == relay.plan_crc);
             if ours && relay.mission_crc == self.config.mission_crc {
                 self.neighbours.handle_relay(self.now, id, &relay);
             }
@@ -192,10 +194,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     true => StartStatus::NotStarted,
                     false => StartStatus::Started,
                 };
-                self.neighbours.handle_roster(id, &roster, own);
+                self.neighbours.handle_roster_report(id, &roster, own);
             }
         } else if let Some(report) = PhotographedReport::decode(payload, id) {
-            self.handle_done_report(&report);
+            self.handle_photographed_report(&report);
         }
     }
 
@@ -207,7 +209,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let text = "Vehicle # has another mission file";
             let numbers = [u32::from(id), 0, 0];
             let sender = SenderKind::Other;
-            self.links.send_sender_text(self.now, sender, Severity::Warning, text, numbers);
+            self.links.send_rate_limited_text(self.now, sender, Severity::Warning, text, numbers);
         }
         // A stranger's echo acknowledges nothing: whoever flies by the mission is in its roster.
         if !of_roster || intent.mission_crc != self.config.mission_crc {
@@ -216,12 +218,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
         let delay_s = echo.and_then(|echo| self.links.message_delay_s(&echo, self.now));
         if let Some(sent) = echo.and_then(|echo| self.links.sent_intents().note_arrival(&echo)) {
-            self.guidance.note_acknowledged_path(sent.at, sent.path.along_m, sent.path.ends_m);
+            self.guidance.note_acknowledged_path(
+                sent.at,
+                sent.path.along_m,
+                sent.path.points_end_m,
+            );
         }
         if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.message_delay(id)) {
             late.update(delay_s);
         }
-        let plan_crc = self.mission.plan().map(|plan| plan.plan_crc);
+        let plan_crc = self.mission.plan().map(|plan| plan.swarm_plan_crc);
         let mission_crc = self.config.mission_crc;
         self.neighbours.handle_numbered_intent(self.now, sequence, intent, mission_crc, plan_crc);
     }
@@ -234,7 +240,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let numbers =
             [u32::from(command.command), u32::from(command.from.0), u32::from(command.from.1)];
-        self.links.send_sender_text(
+        self.links.send_rate_limited_text(
             self.now,
             sender,
             Severity::Warning,

@@ -6,9 +6,9 @@ use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::handshake::is_battery_known_or_unchecked;
 use crate::autopilot::telemetry::MAX_POSITION_AGE;
 use crate::config::{PlanFailure, REACHES_ALL_M};
-use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
+use crate::guidance::{REJOIN_WINDOW_AFTER_LOSS_M, REJOIN_WINDOW_M};
 use crate::margins::{LEASE_S, MAX_HEIGHT_ERROR_ON_GROUND_M};
-use crate::mission::{GuardInputs, State, UNFOLLOWED_MOST};
+use crate::mission::{GuardInputs, MAX_UNFOLLOWED, State};
 use crate::swarm::fleet::{Fleet, MISSED_AFTER};
 use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::time::{Duration, Instant};
@@ -16,10 +16,10 @@ use crate::timers::Timer;
 
 /// Greatest horizontal distance from the place where landing was commanded in flight to the
 /// touchdown, metres: the stopping distance from cruise.
-const LANDING_DRIFT_M: f32 = 1.0;
+const MAX_LANDING_DRIFT_M: f32 = 1.0;
 /// Greatest horizontal distance from the place where landing was commanded to the touchdown, for a
 /// vehicle that stood still then, metres.
-const STANDING_DRIFT_M: f32 = 0.3;
+const MAX_LANDING_DRIFT_FROM_REST_M: f32 = 0.3;
 /// Time since the last renewal of its lease after which a vehicle in a coverage mission counts as
 /// unheard: 1 s before the lease ends. The row `NeighboursSilent` stops the vehicle 1 s later.
 const UNHEARD_AFTER: Duration = Duration::from_secs(LEASE_S - 1);
@@ -28,20 +28,20 @@ const UNHEARD_AFTER: Duration = Duration::from_secs(LEASE_S - 1);
 const MIN_PAUSE_HEIGHT_M: f32 = 1.0;
 /// Time without being heard after which a vehicle that has no part of the area no longer waits for
 /// one.
-const RESERVE_UNHEARD_MOST: Duration = Duration::from_secs(300);
-/// Time, in addition to [`UNFOLLOWED_MOST`], for which a vehicle in a coverage mission may be away
+const MAX_RESERVE_UNHEARD: Duration = Duration::from_secs(300);
+/// Time, in addition to [`MAX_UNFOLLOWED`], for which a vehicle in a coverage mission may be away
 /// from a setpoint that stands; then it lands. Gusts push it further there than walls would allow
 /// indoors.
-const EXTRA_SWAY_TIME: Duration = Duration::from_secs(60);
+const EXTRA_UNFOLLOWED_IN_SWAY: Duration = Duration::from_secs(60);
 /// Greatest distance from its setpoint at which that additional time applies, metres.
 const MAX_SWAY_M: f32 = 2.0;
 /// An unheard vehicle stops if its next closed gate is less than this ahead, metres.
-const MIN_GATE_AHEAD_M: f32 = 0.2;
+const MIN_CLOSED_GATE_AHEAD_M: f32 = 0.2;
 /// Time that a climb is assumed to take at most beyond 1 s for each metre of height, seconds:
 /// idling motors, and the stop at the top.
 const ASSUMED_CLIMB_OVERHEAD_S: f32 = 8.0;
 /// Vertical speed above which a vehicle does not rest on the ground, m/s.
-const MAX_RESTING_CLIMB_MPS: f32 = 0.5;
+const MAX_RESTING_VERTICAL_MPS: f32 = 0.5;
 
 /// Time after an unheard descent within which it makes room for a vehicle that waited for it.
 const DESCENT_LEAVES_ROOM_WITHIN: Duration = Duration::from_secs(30);
@@ -50,11 +50,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// The values of all guards' inputs now.
     pub(crate) fn guard_inputs(&self) -> GuardInputs {
         let (t, now, view) = (&self.telemetry, self.now, self.detour_view());
-        let scene = &view.scene;
+        let scene = &view.guidance_inputs;
         let (kind, handshake) = (self.autopilot_kind(), self.handshake.arming());
         let offboard = t.custom_mode == kind.setpoint_mode();
         let mode_foreign = match self.mission.state() {
-            state if state.is_before_arming() => {
+            state if state.is_started_before_arming() => {
                 !offboard && t.custom_mode != self.mission.mode_at_start()
             }
             // Disarming after a landing, the autopilot may change to another mode by itself.
@@ -64,37 +64,38 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             _ => !offboard,
         };
         let beneath = self.mission.uninterrupted_state();
-        let area = self.config.lost_vehicle_down_s.is_some();
+        let area = self.config.lost_vehicle_down_after_s.is_some();
         let follow = self.mission.state() == State::Follow;
         let on_ground = t.reports_ground(now);
         let fence = self.config.geofence;
-        let standing =
-            self.guidance.stands_outside_descent() && t.velocity.length() < MAX_HOVER_MPS;
-        let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
+        let standing = self.guidance.is_setpoint_still_outside_descent()
+            && t.velocity.length() < MAX_HOVER_MPS;
+        let drift_m = if standing { MAX_LANDING_DRIFT_FROM_REST_M } else { MAX_LANDING_DRIFT_M };
         let inside = |(low, high): (Point, Point)| {
             (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a])
         };
         let room_below =
             !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
         let (over_field, sought_home) =
-            (self.detours.home.can_turn(&view), self.detours.home.seeking_for(now));
-        let sways = area && self.guidance.lead_m(t) < MAX_SWAY_M;
-        let sways_for = if sways { EXTRA_SWAY_TIME } else { Duration::default() };
+            (self.detours.home.can_turn_home(&view), self.detours.home.seeking_for(now));
+        let sways = area && self.guidance.distance_to_setpoint_m(t) < MAX_SWAY_M;
+        let sways_for = if sways { EXTRA_UNFOLLOWED_IN_SWAY } else { Duration::default() };
         let unfollowed_for = self.guidance.unfollowed_for(now).saturating_sub(sways_for);
-        let (at_end, homeward) = (self.guidance.is_at_end(scene), self.is_homeward());
+        let (at_end, homeward) =
+            (self.guidance.is_reference_at_end(scene), self.returns_to_start());
         let blocked_for = self.detours.blocked_for(now);
         // A vehicle that something holds, or whose EKF origin moved, cannot fly home or aside: it
         // can only land.
-        let can_leave = unfollowed_for < UNFOLLOWED_MOST && !t.origin_moved;
+        let can_leave = unfollowed_for < MAX_UNFOLLOWED && !t.origin_moved;
         // A landing that is held began on the path, or where something else moved the vehicle.
         let joins =
             self.mission.state() != State::LandingHeld || self.guidance.can_join_path(scene);
         GuardInputs {
-            in_state: self.mission.time_in_state(now),
+            time_in_state: self.mission.time_in_state(now),
             heartbeat_age: t.heartbeat_age(now),
-            heard_for: t.heard_for(now),
+            autopilot_heard_for: t.heartbeats_heard_for(now),
             position_age: t.position_age(now),
-            jumped: t.is_settling(now),
+            position_jumped: t.is_position_settling(now),
             stalled_for: match self.mission.state() {
                 State::Follow => now - self.guidance.last_progress_at(),
                 // Where the vehicle can still fly home, its standstill at a gate before the block
@@ -104,67 +105,72 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 _ => Duration::default(),
             },
             unfollowed_for,
-            blocked_for,
+            path_blocked_for: blocked_for,
             unlinked_for: self.unlinked_for(),
             division_overdue: self.timers.is_due(Timer::DivisionDue, now),
-            way_free: self.is_flying_unheard(),
-            out_of_range: self.neighbours.are_all_out_of_range(),
-            neighbour_heard: self.is_linked(),
+            may_fly_on_unheard: self.is_flying_unheard(),
+            others_out_of_range: self.neighbours.are_all_out_of_range(),
+            swarm_linked: self.is_linked(),
             excluded: self.is_excluded(),
-            left_out_set_changed: self.mission.photographed().is_outdated(),
+            left_out_set_changed: self.mission.photographed().has_left_out_set_changed(),
             plans_differ: self.hears_another_plan(),
             holds_to_divide: self.is_holding_for_division(),
-            division_ready: self.mission.is_division_plan_ready(),
+            division_plan_ready: self.mission.is_division_plan_ready(),
             division_settled: self.is_division_settled() && !self.detours.is_off_own_path(),
             plan_ready: self.mission.plan().is_some(),
             plan_failed: self.mission.plan_failure().is_some(),
-            roadmap_bad: self.mission.plan_failure() == Some(PlanFailure::RoadmapUnusable),
-            has_goal: self.has_goal(),
+            roadmap_unusable: self.mission.plan_failure() == Some(PlanFailure::RoadmapUnusable),
+            plan_leaves_pad: self.plan_leaves_pad(),
             in_reserve: self.is_in_reserve(),
-            plans_as_others: self.plans_as_others(),
-            at_pad: self.is_at_start(),
-            imprecise: self.mission.state() == State::Ready
+            shares_plan_with_others: self.shares_plan_with_others(),
+            at_pad: self.is_at_pad(),
+            imprecise_at_cruise: self.mission.state() == State::Ready
                 && self.guidance.estimate_speed_share < 1.0,
-            imprecise_for: self.mission.estimate_imprecise_for(now),
+            imprecise_at_crawl_for: self.mission.imprecise_at_crawl_for(now),
             origin_moved: t.origin_moved,
-            start: self.mission.pending().start,
-            pause: self.mission.pending().pause,
-            lifting_off: self.mission.state() == State::Climb
+            start_pending: self.mission.pending().start,
+            pause_pending: self.mission.pending().pause,
+            climb_just_begun: self.mission.state() == State::Climb
                 && t.position.z - self.mission.pad_position().z
                     < MIN_PAUSE_HEIGHT_M.min(self.mission.climb_m() / 2.0),
-            resume: self.mission.pending().resume,
-            land: self.mission.pending().land,
-            turn_back: self.mission.pending().turn_back && !homeward,
-            area,
-            can_fly_home: over_field,
-            descends: self.guidance.is_descending(),
-            may_fly_beside: standing
+            resume_pending: self.mission.pending().resume,
+            land_pending: self.mission.pending().land,
+            return_pending: self.mission.pending().turn_back && !homeward,
+            is_coverage: area,
+            may_seek_path_home: over_field,
+            in_last_descent: self.guidance.is_in_descent(),
+            may_detour_and_rejoin: standing
                 && (self.is_division_settled() || self.detours.is_beside_plan())
                 && self.detours.may_detour_over_area(&view, &self.timers),
-            detour_flown: follow && self.detours.leads_back() && at_end && standing,
+            stands_at_detour_end: follow && self.detours.ends_on_plan_path() && at_end && standing,
             own_plan_ready: self.detours.is_own_plan_ready(),
-            own_plan_lost: self.detours.is_own_plan_lost(),
-            homeward: self.detours.is_homeward(),
+            own_plan_failed: self.detours.is_own_plan_lost(),
+            seeks_or_flies_path_home: self.detours.is_homeward(),
             seeking_home_for: sought_home,
-            stands_to_return: standing && self.detours.home.may_request(now, &self.timers),
+            ready_to_request_path_home: standing
+                && self.detours.home.may_request(now, &self.timers),
             in_climb: beneath.takes_off(),
             armed: t.armed,
-            armed_unseen: handshake.is_armed_bit_overdue(now),
+            armed_bit_overdue: handshake.is_armed_bit_overdue(now),
             arming_unrequested: handshake.is_arming_unrequested(),
             arming_unanswered: handshake.is_arming_unanswered(now),
-            own_mode: handshake.is_in_own_mode(),
-            landing: t.custom_mode == kind.land_mode(),
-            offboard,
+            in_own_mode: handshake.is_in_own_mode(),
+            in_land_mode: t.custom_mode == kind.land_mode(),
+            in_setpoint_mode: offboard,
             mode_foreign,
-            critical: t.is_critical(),
+            autopilot_critical: t.is_critical(),
             on_ground,
-            height_m: if t.last_reported_ground() { view.height_m() } else { f32::NAN },
+            height_if_ground_reported_m: if t.last_reported_ground() {
+                view.height_above_ground_m()
+            } else {
+                f32::NAN
+            },
             has_flown: handshake.has_flown(),
-            vertical: t.position_age(now) < MAX_POSITION_AGE
-                && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,
-            airborne: t.armed && t.reports_flight(),
-            lifted_off: !kind.takes_off_by_command() || t.reports_flight(),
-            gates_open: self.has_goal()
+            moves_vertically: t.position_age(now) < MAX_POSITION_AGE
+                && t.velocity.z.abs() > MAX_RESTING_VERTICAL_MPS,
+            airborne: t.armed && t.last_reported_flight(),
+            take_off_command_done: !kind.takes_off_by_command() || t.last_reported_flight(),
+            may_take_off: self.plan_leaves_pad()
                 && self.guidance.may_depart()
                 && self.guidance.filter.column_clear()
                 && self.mission.departure_due(now)
@@ -180,54 +186,55 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             climb_done: self.mission.state() == State::Climb && self.guidance.is_climb_done(scene),
             // The ground may be higher than the plan says: a reported landing ends the descent.
             path_done: follow
-                && (self.guidance.is_path_done(scene, now)
-                    || (self.guidance.is_descending() && on_ground)),
-            flies_back: homeward,
-            at_goal: self.guidance.is_at_goal(scene) && !self.detours.is_homeward(),
+                && (self.guidance.is_path_and_descent_done(scene, now)
+                    || (self.guidance.is_in_descent() && on_ground)),
+            returns_to_start: homeward,
+            reference_at_goal: self.guidance.is_reference_at_goal(scene)
+                && !self.detours.is_homeward(),
             near_path: match self.mission.state() {
-                state if !state.may_resume_off_path() => false,
+                state if !state.may_be_off_path_on_resume() => false,
                 _ if beneath.takes_off() => self.guidance.is_near_start(scene),
                 // Resuming a landing does not depend on a place along the path.
                 _ if beneath == State::Land && self.mission.interrupted_state() == State::Land => {
                     true
                 }
                 State::PilotReturned => self.guidance.is_near_path(scene, REJOIN_WINDOW_M),
-                _ => self.guidance.is_near_path(scene, LOST_WINDOW_M),
+                _ => self.guidance.is_near_path(scene, REJOIN_WINDOW_AFTER_LOSS_M),
             },
             battery_low: t.is_battery_below(self.config.battery_low_percent),
             battery_critical: t.is_battery_below(self.config.battery_low_percent / 2),
             column_blocked_for: self.guidance.filter.column_blocked_for(now),
             column_blocked_for_good_for: self.guidance.filter.column_blocked_for_good_for(now),
             start_barred_for: self.mission.start_barred_for(now),
-            others_fly: self.neighbours.may_leave_part_to_others(now, MISSED_AFTER),
+            may_leave_part_to_others: self.neighbours.may_leave_part_to_others(now, MISSED_AFTER),
             column_clear_for: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
             can_turn_back: can_leave
                 && joins
-                && self.guidance.along_m() >= 0.0
+                && self.guidance.reference_along_m() >= 0.0
                 && !self.guidance.returning
                 && (!area || self.detours.home.is_seeking())
                 && !self.neighbours.hears_nobody(now),
             pad_blocked_for: self.pad_blocked_for(),
-            way_back_blocked_for: self.way_back_blocked_for(),
+            way_back_blocked_for_good_for: self.way_back_blocked_for_good_for(),
             join_barred: follow && self.guidance.is_join_barred(scene),
             // Over an area the search checks the way from where the vehicle is.
             may_seek_landing_aside: can_leave
                 && (joins || area)
                 && self.detours.may_seek_landing_aside(&view),
-            seeks_landing: self.detours.seeks_landing(),
-            lands_aside: self.detours.seeks_landing() || self.detours.lands_at_end(),
+            seeks_landing_aside: self.detours.seeks_landing_aside(),
+            lands_aside: self.detours.seeks_landing_aside() || self.detours.lands_at_end(),
             landing_place_reached: follow && self.detours.lands_at_end() && at_end && standing,
             yielded_for: self.counted_hindrance(self.guidance.filter.yielded_for(now)),
             hindered_for: self.counted_hindrance(self.guidance.filter.hindered_for(now)),
-            room_below,
-            outside: self.guidance.is_standing_at_fence()
+            no_neighbour_below: room_below,
+            outside_geofence: self.guidance.is_standing_at_fence()
                 || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
-            blocked: self.detours.is_blocked(),
-            our_turn: self.detours.is_our_turn(&view),
+            path_blocked: self.detours.is_blocked(),
+            our_turn_to_detour: self.detours.is_our_turn(&view),
             detour_ready: self.detours.is_detour_ready(),
-            no_way_around: self.detours.has_given_up_detours(),
-            time_below_landing: self.detours.time_below_landing(&view),
+            detours_given_up: self.detours.has_given_up_detours(),
+            waited_below_landing_for: self.detours.time_below_landing(&view),
             standing,
         }
     }
@@ -237,18 +244,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let needed = |fleet: &Fleet<V>| {
             // A committed division whose plan has not come yet may give it a part.
             let behind = fleet.division_count() > self.mission.division_count();
-            (behind || fleet.is_reserve_needed())
-                && fleet.lease_age(self.now) < RESERVE_UNHEARD_MOST
+            (behind || fleet.is_reserve_needed()) && fleet.lease_age(self.now) < MAX_RESERVE_UNHEARD
         };
-        !self.has_goal() && self.neighbours.fleet().is_some_and(needed)
+        !self.plan_leaves_pad() && self.neighbours.fleet().is_some_and(needed)
     }
 
-    pub(super) fn has_goal(&self) -> bool {
+    pub(super) fn plan_leaves_pad(&self) -> bool {
         self.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
     }
 
     /// Whether this vehicle is at its start, within the tolerances.
-    pub(super) fn is_at_start(&self) -> bool {
+    pub(super) fn is_at_pad(&self) -> bool {
         let pad = self.mission.path_start() - Point::new(0.0, 0.0, self.mission.climb_m());
         let away = self.telemetry.position - pad;
         let height_tolerance_m = self.config.start_tolerance_m.min(MAX_HEIGHT_ERROR_ON_GROUND_M);
@@ -271,8 +277,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // it: it is about to land anyway. A vehicle that stands does: others assume after a while
         // that it is down.
         let stands = state.stands_until_resumed();
-        let is_landing =
-            self.guidance.returning || self.detours.lands_at_end() || self.detours.seeks_landing();
+        let is_landing = self.guidance.returning
+            || self.detours.lands_at_end()
+            || self.detours.seeks_landing_aside();
         match (is_landing && !stands) || self.is_flying_unheard() {
             true => Duration::default(),
             false if stands => self.neighbours.unlinked_duration(now, Instant::ZERO),
@@ -285,16 +292,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// longer than the limits for hindrances, and leaves room once it ends; if it has left none for
     /// [`DESCENT_LEAVES_ROOM_WITHIN`], all of `hindered_for` counts.
     fn counted_hindrance(&self, hindered_for: Duration) -> Duration {
-        let since = self.guidance.filter.time_since_blocked_by_descent(self.now);
+        let since = self.guidance.filter.time_since_blocked_by_unheard_descent(self.now);
         if since < DESCENT_LEAVES_ROOM_WITHIN { hindered_for.min(since) } else { hindered_for }
     }
 
     /// Time for which other vehicles have barred the descent to its pad, or the path there.
     fn pad_blocked_for(&self) -> Duration {
         let follow = self.mission.state() == State::Follow;
-        let homeward = self.is_homeward();
-        let descends = self.guidance.is_descending();
-        match follow && (homeward || (descends && self.config.lost_vehicle_down_s.is_some())) {
+        let homeward = self.returns_to_start();
+        let descends = self.guidance.is_in_descent();
+        match follow && (homeward || (descends && self.config.lost_vehicle_down_after_s.is_some()))
+        {
             true if homeward && descends => self.guidance.filter.hindered_for(self.now),
             // The end of its path in a coverage mission is above its pad: there is no other way
             // down to the pad.
@@ -304,16 +312,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Time for which a vehicle that rests for good has barred the way back to its pad.
-    fn way_back_blocked_for(&self) -> Duration {
-        match self.mission.state() == State::Follow && self.is_homeward() {
-            true if self.config.lost_vehicle_down_s.is_none() => {
+    fn way_back_blocked_for_good_for(&self) -> Duration {
+        match self.mission.state() == State::Follow && self.returns_to_start() {
+            true if self.config.lost_vehicle_down_after_s.is_none() => {
                 self.counted_hindrance(self.guidance.filter.blocked_for_good_for(self.now))
             }
             _ => Duration::default(),
         }
     }
 
-    fn is_homeward(&self) -> bool {
+    fn returns_to_start(&self) -> bool {
         self.guidance.returning || self.detours.is_homeward()
     }
 
@@ -336,7 +344,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ranged = self.config.radio_range_m < REACHES_ALL_M;
         // A vehicle slowed by a parameter or by its autopilot is not where the others predict it to
         // be. In a coverage mission this rule does not apply: the lease limits how long it flies.
-        let keeps_pace = self.guidance.cruise_mps() >= self.config.slowest_mps;
+        let keeps_pace = self.guidance.cruise_mps() >= self.config.slowest_vehicle_mps;
         ranged
             && keeps_pace
             && self.neighbours.fleet().is_none()
@@ -350,21 +358,26 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// or none is left.
     fn is_flying_unheard(&self) -> bool {
         let length_m = self.mission.plan().map_or(0.0, |plan| plan.path.length_m());
-        let clear_m = self.guidance.gates_open_up_to_m(&self.detour_view().scene);
+        let clear_m = self.guidance.gates_open_up_to_m(&self.detour_view().guidance_inputs);
         self.may_fly_unheard()
             && self.neighbours.are_all_out_of_range()
-            && (clear_m > self.guidance.along_m() + MIN_GATE_AHEAD_M || clear_m >= length_m)
+            && (clear_m > self.guidance.reference_along_m() + MIN_CLOSED_GATE_AHEAD_M
+                || clear_m >= length_m)
     }
 
     /// Place along its path up to which this vehicle flies while it is unheard, metres, and the
     /// seconds by which its gates and its climb delay it, compared with a flight from `progress_m`
     /// at 0.4 of the nominal speed; (−1e6, 0) where it does not fly on.
-    pub(super) fn unheard_reach(&self, progress_m: f32) -> (f32, u8) {
+    pub(super) fn unheard_end_m_and_delay_s(&self, progress_m: f32) -> (f32, u8) {
         match self.may_fly_unheard() {
             true => {
-                let scene = self.detour_view().scene;
-                let (clear_m, in_s) =
-                    self.guidance.unheard_reach(&scene, &self.neighbours, progress_m, self.now);
+                let scene = self.detour_view().guidance_inputs;
+                let (clear_m, in_s) = self.guidance.unheard_end_m_and_delay_s(
+                    &scene,
+                    &self.neighbours,
+                    progress_m,
+                    self.now,
+                );
                 // The climb is assumed at 1 m/s, or slower if the settings say so; idling motors
                 // before it and the stop at its top are added.
                 let climb_s = if progress_m < 0.0 {

@@ -16,7 +16,7 @@ use crate::timers::Timer;
 
 /// Period at which the photographed waypoints are noted and stored, and their number is sent on
 /// both links.
-const NOTE_EVERY: Duration = Duration::from_millis(1000);
+const NOTE_PHOTOGRAPHED_EVERY: Duration = Duration::from_millis(1000);
 /// Time within which each vehicle on the ground has heard the reports of the others: they come each
 /// second, and half of the messages may be lost.
 const OTHERS_REPORT_WITHIN: Duration = Duration::from_secs(5);
@@ -36,14 +36,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether this vehicle stands on its pad before its take-off, where it has to compute the same
     /// plan as the others.
-    fn is_before_take_off(&self) -> bool {
+    fn is_unstarted_or_scheduled(&self) -> bool {
         self.is_not_started() || self.mission.state() == State::Scheduled
     }
 
     /// How far this vehicle's flight is.
     fn flight_stage(&self) -> FlightStage {
         match self.mission.state() {
-            _ if self.is_before_take_off() => FlightStage::OnPad,
+            _ if self.is_unstarted_or_scheduled() => FlightStage::OnPad,
             state if state.is_over() => FlightStage::Over,
             _ => FlightStage::UnderWay,
         }
@@ -51,7 +51,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether the photographed waypoints are to be noted, stored and reported now, at 1 Hz.
     pub(super) fn take_photographed_due(&mut self) -> bool {
-        self.is_area_mission() && self.timers.take_due(Timer::Done, self.now, NOTE_EVERY)
+        self.is_area_mission()
+            && self.timers.take_due(Timer::Done, self.now, NOTE_PHOTOGRAPHED_EVERY)
     }
 
     /// Notes the photographed waypoints of its own path, up to `pictures_to_m` metres along it;
@@ -59,7 +60,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn note_photographed(&mut self, pictures_to_m: Option<f32>) {
         if self.flight_stage() == FlightStage::UnderWay
             && !self.detours.has_left_plan()
-            && self.guidance.along_m() >= 0.0
+            && self.guidance.reference_along_m() >= 0.0
             && let Some(along_m) = pictures_to_m
         {
             self.mission.note_photographed(along_m);
@@ -67,25 +68,25 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Stores and reports the photographed waypoints.
-    pub(super) fn keep_and_report_photographed(&mut self) {
+    pub(super) fn store_and_report_photographed(&mut self) {
         let (crc, stage) = (self.config.mission_crc, self.flight_stage());
         if let Some(kept) = self.mission.photographed_mut().record_to_store(crc, stage) {
             self.services.set_photographed_record(kept);
         }
         [Link::Autopilot, Link::Swarm]
             .into_iter()
-            .for_each(|link| self.links.set_due(link, OnDemandMessage::DoneCount));
+            .for_each(|link| self.links.set_due(link, OnDemandMessage::PhotographedCount));
         let every = match stage {
             FlightStage::UnderWay => done::PERIOD_IN_FLIGHT,
             FlightStage::OnPad | FlightStage::Over => done::PERIOD_ON_GROUND,
         };
         if self.timers.take_due(Timer::DoneReport, self.now, every) {
-            self.links.set_due(Link::Swarm, OnDemandMessage::Done);
+            self.links.set_due(Link::Swarm, OnDemandMessage::PhotographedReport);
         }
     }
 
     /// This vehicle's report of the photographed waypoints to the others.
-    pub(super) fn done_report(&mut self) -> PhotographedReport {
+    pub(super) fn photographed_report(&mut self) -> PhotographedReport {
         let stage = self.flight_stage();
         let report = self.mission.photographed_mut().next_report(stage);
         PhotographedReport {
@@ -96,13 +97,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Handles another vehicle's report of photographed waypoints.
-    pub(super) fn handle_done_report(&mut self, report: &PhotographedReport) {
+    pub(super) fn handle_photographed_report(&mut self, report: &PhotographedReport) {
         let ours = report.mission_crc == self.config.mission_crc
             && self.config.roster.iter().any(|entry| entry.system_id == report.system_id);
         if ours && self.is_area_mission() && self.config.skips_photographed {
-            let under_way = || self.neighbours.fleet().is_some_and(Fleet::has_flight_begun);
+            let under_way = || self.neighbours.fleet().is_some_and(Fleet::has_others_flight_begun);
             let planning = match self.mission.state() {
-                _ if !self.is_before_take_off() => PlanningPartners::Nobody,
+                _ if !self.is_unstarted_or_scheduled() => PlanningPartners::Nobody,
                 // Once started, it keeps its part of a flight in which others fly or have flown.
                 State::Scheduled if under_way() => PlanningPartners::ThoseInFlight,
                 _ => PlanningPartners::All,
@@ -112,7 +113,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// NAMED_VALUE_FLOAT with the number of waypoints that this vehicle knows to be photographed.
-    pub(super) fn done_count_message(&self) -> NAMED_VALUE_FLOAT_DATA {
+    pub(super) fn photographed_count_message(&self) -> NAMED_VALUE_FLOAT_DATA {
         NAMED_VALUE_FLOAT_DATA {
             time_boot_ms: self.now.as_boot_ms(),
             value: self.mission.photographed().count() as f32,
@@ -122,7 +123,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether this vehicle's plan agrees with the others': it has stood ready for as long as their
     /// reports take, and no vehicle was heard with another plan. True in a mission without an area.
-    pub(super) fn plans_as_others(&self) -> bool {
+    pub(super) fn shares_plan_with_others(&self) -> bool {
         !self.is_area_mission()
             || (self.mission.time_in_state(self.now) >= OTHERS_REPORT_WITHIN
                 && !self.hears_another_plan())

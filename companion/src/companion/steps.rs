@@ -18,9 +18,9 @@ use crate::timers::Timer;
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 /// Time after a start at which it is reported that it waits for the battery's charge: an autopilot
 /// that was just found reports it within a second.
-const CHARGE_REPORT_AFTER: Duration = Duration::from_secs(5);
+const UNKNOWN_CHARGE_REPORT_AFTER: Duration = Duration::from_secs(5);
 /// Period of that report.
-const CHARGE_REPORT_EVERY: Duration = Duration::from_secs(30);
+const UNKNOWN_CHARGE_REPORT_EVERY: Duration = Duration::from_secs(30);
 /// Period of steps in the states that stream no setpoints: before and after a flight, in a take-off
 /// by command, and in a failsafe.
 const IDLE_STEP_EVERY: Duration = Duration::from_millis(200);
@@ -88,8 +88,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         {
             self.apply_parameters();
         }
-        self.check_estimate_error();
-        self.neighbours.set_place(self.telemetry.position, self.config.radio_range_m);
+        self.update_estimate_speed_share();
+        self.neighbours
+            .set_own_position_and_range(self.telemetry.position, self.config.radio_range_m);
         let dt_s = self.timers.step_s(now).clamp(0.0, 0.2);
         let scene = GuidanceInputs::new(
             self.mission.plan(),
@@ -108,7 +109,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.step_division();
         self.report_unstarted_vehicle();
         self.scan_for_obstacles();
-        self.note_barred_start();
+        self.update_barred_start();
         self.run_mission_table();
         self.step_task();
         let situation = self.handshake_context();
@@ -138,10 +139,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.guidance.ends_away_from_goal
             || self.detours.is_on_detour();
         let along = PathProgress {
-            progress_m: self.guidance.progress_m(state, &self.guidance_inputs()),
-            reference_m: self.guidance.along_m(),
+            progress_m: self.guidance.reported_progress_m(state, &self.guidance_inputs()),
+            reference_m: self.guidance.reference_along_m(),
             // A vehicle that brakes along its path still takes the pictures that it passes.
-            place: match state.is_on_path() {
+            relation: match state.is_on_path() {
                 true if self.detours.is_beside_plan() && !self.guidance.returning => {
                     PathRelation::Beside
                 }
@@ -152,31 +153,33 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let leaves_path =
             self.mission.step_task(along, self.now, &mut self.timers, &mut self.links);
         // Braking to land, the vehicle goes on along its path, and takes no pictures.
-        let photographs = along.place == PathRelation::OnPath
-            || (!off_plan && (leaves_path || self.guidance.is_at_end(&self.guidance_inputs())));
+        let photographs = along.relation == PathRelation::OnPath
+            || (!off_plan
+                && (leaves_path || self.guidance.is_reference_at_end(&self.guidance_inputs())));
         let pictures_to_m = photographs.then_some(along.progress_m);
         let due = self.take_photographed_due();
         if due || leaves_path {
             self.note_photographed(pictures_to_m);
         }
         if due {
-            self.keep_and_report_photographed();
+            self.store_and_report_photographed();
         }
     }
 
     /// Notes whether a vehicle that is due to depart is kept on its pad by another vehicle in the
     /// column above the pad, or by a blocked path. Also warns, at most each 30 s
-    /// (`CHARGE_REPORT_EVERY`), that the start waits for the battery's charge to be reported.
-    fn note_barred_start(&mut self) {
+    /// (`UNKNOWN_CHARGE_REPORT_EVERY`), that the start waits for the battery's charge to be
+    /// reported.
+    fn update_barred_start(&mut self) {
         let due = self.mission.departure_due(self.now) && self.guidance.may_depart();
         let waits =
             due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
         let least = self.config.battery_low_percent;
         if waits
-            && self.has_goal()
-            && self.mission.time_in_state(self.now) >= CHARGE_REPORT_AFTER
+            && self.plan_leaves_pad()
+            && self.mission.time_in_state(self.now) >= UNKNOWN_CHARGE_REPORT_AFTER
             && !is_battery_known_or_unchecked(&self.telemetry, least, self.now)
-            && self.timers.take_due(Timer::ChargeReport, self.now, CHARGE_REPORT_EVERY)
+            && self.timers.take_due(Timer::ChargeReport, self.now, UNKNOWN_CHARGE_REPORT_EVERY)
         {
             self.links.send_text(Severity::Warning, "Battery charge unknown: start waits");
         }
@@ -190,7 +193,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Reports, by text and event, a vehicle that this one waits for and that was not started.
     fn report_unstarted_vehicle(&mut self) {
         let waits = self.mission.state().may_wait_at_gate();
-        let waited = Some(self.guidance.advice.waiting_for).filter(|id| waits && *id != 0);
+        let waited = Some(self.guidance.advice.waiting_for_id).filter(|id| waits && *id != 0);
         let id = waited.filter(|id| self.neighbours.is_not_started(*id)).unwrap_or(0);
         if self.mission.should_report_wait(id, self.now, &mut self.timers) {
             self.links.send_text_with_numbers(
@@ -199,19 +202,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 [u32::from(id), 0],
             );
             // The queue is full only if the shell does not drain the events.
-            let _ = self.events.push_back(Event::WaitsForStart { id });
+            let _ = self.events.push_back(Event::WaitsForUnstartedVehicle { id });
         }
     }
 
     /// Sets the share of the cruise speed at which the error bound of the position estimate fits
     /// into the margin to walls, and reports a change.
-    pub(super) fn check_estimate_error(&mut self) {
+    pub(super) fn update_estimate_speed_share(&mut self) {
         let (now, config) = (self.now, &self.config);
-        let bound_m = self.telemetry.estimate_error_bound_m(now, config.estimate_m);
+        let bound_m = self.telemetry.estimate_error_bound_m(now, config.min_estimate_error_m);
         // A bound as good as the best receiver's refuses nothing: the operator chose the margin.
-        let pace = match bound_m <= margins::MIN_ESTIMATE_ERROR_M {
+        let pace = match bound_m <= margins::MIN_ESTIMATE_ERROR_BOUND_M {
             true => 1.0,
-            false => margins::speed_share_for_bound(
+            false => margins::speed_share_for_error_bound(
                 bound_m,
                 config.required_clearance_m,
                 config.radius_m,
@@ -228,7 +231,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let room_m = margins::estimate_margin_m(
             config.required_clearance_m,
             config.radius_m,
-            margins::TRACKING_M,
+            margins::CRUISE_TRACKING_ERROR_M,
         );
         let room_cm = libm::fmaxf(room_m * 100.0, 0.0) as u32;
         let (severity, text) = match now_allowed {

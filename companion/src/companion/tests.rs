@@ -50,8 +50,8 @@ fn states(bench: &Bench) -> Vec<State> {
         Event::StateChanged { to, .. } => Some(*to),
         Event::PlanRequested(_)
         | Event::RestartRequested
-        | Event::WaitsForStart { .. }
-        | Event::FlownAround { .. } => None,
+        | Event::WaitsForUnstartedVehicle { .. }
+        | Event::DetourSkippedWaypoints { .. } => None,
     };
     bench.events.iter().filter_map(to).collect()
 }
@@ -88,7 +88,8 @@ fn looks_where_its_task_says() {
     for look in [None, Some(0.7f32), Some(-2.5)] {
         let mut bench = Bench::new(config());
         if let Some(heading) = look {
-            let mut photographs = PicturePlan::new(2.0, HeadingMode::Fixed(heading), Trigger::None);
+            let mut photographs =
+                PicturePlan::new(2.0, HeadingMode::FixedEnuRad(heading), Trigger::None);
             photographs.add_stretch(1, 2, WaypointRange { first: 0, end: 2 }).unwrap();
             bench.answer_plan =
                 Some(Ok(Plan { task: Task::Photograph(photographs), ..field_plan() }));
@@ -310,7 +311,10 @@ fn an_unsound_plan_is_refused() {
 #[test]
 fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
     let mut gated = plan();
-    gated.gates.push(planner_core::flight::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
+    gated
+        .gates
+        .push(planner_core::flight::Gate { at_m: -1.5, wait_for_id: 77, open_from_progress_m: 6.0 })
+        .unwrap();
     let mut bench = Bench::new(two_vehicles());
     bench.answer_plan = Some(Ok(gated));
     bench.run_until(State::Ready, 6.0);
@@ -344,7 +348,14 @@ fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
     let flying = crate::link::intent::ON_PLAN | crate::link::intent::FLYING;
     for (flags, expected) in [(None, 2..5), (Some(grounded), 2..5), (Some(flying), 0..1)] {
         let mut gated = plan();
-        gated.gates.push(planner_core::flight::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
+        gated
+            .gates
+            .push(planner_core::flight::Gate {
+                at_m: -1.5,
+                wait_for_id: 77,
+                open_from_progress_m: 6.0,
+            })
+            .unwrap();
         let mut bench = Bench::new(two_vehicles());
         bench.answer_plan = Some(Ok(gated));
         bench.run_until(State::Ready, 6.0);
@@ -355,7 +366,7 @@ fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
         }
         // Each text is sent on both links.
         assert!(expected.contains(&named(&bench)), "{flags:?}: {:?}", bench.texts);
-        let reported = bench.events.contains(&Event::WaitsForStart { id: 77 });
+        let reported = bench.events.contains(&Event::WaitsForUnstartedVehicle { id: 77 });
         assert_eq!(reported, flags != Some(flying), "{:?}", bench.events);
     }
 }

@@ -15,11 +15,11 @@ use crate::guidance::Setpoint;
 use crate::link::echo::ReportedPath;
 use crate::link::frame::{self, AUTOPILOT_COMPONENT};
 use crate::link::intent::{self, Intent};
-use crate::link::rate_limit::{ARMED_BYTES_PER_S, DISARMED_BYTES_PER_S};
+use crate::link::rate_limit::{ARMED_EXTRA_BYTES_PER_S, DISARMED_EXTRA_BYTES_PER_S};
 use crate::link::roster;
 use crate::link::severity::Severity;
 use crate::link::{OnDemandMessage, done};
-use crate::margins::{LEASE_DELAY_S, LEASE_S, UNHEARD_NOTICED_S};
+use crate::margins::{LEASE_RENEWAL_DELAY_S, LEASE_S, UNHEARD_NOTICED_AFTER_S};
 use crate::services;
 use crate::state::{State, SystemStatus};
 use crate::swarm::neighbours::relay;
@@ -27,7 +27,8 @@ use crate::swarm::neighbours::relay;
 /// Longest time for which a vehicle in a coverage mission flies on along its part after it was last
 /// heard, seconds: its lease of 20 s, 1.8 s for the age of the report that renewed it, 2 s of
 /// message delay, and half of the longest stop.
-const LEASE_FLIGHT_S: f32 = LEASE_S as f32 + UNHEARD_NOTICED_S + LEASE_DELAY_S + 2.5;
+const MAX_FLIGHT_ON_LEASE_S: f32 =
+    LEASE_S as f32 + UNHEARD_NOTICED_AFTER_S + LEASE_RENEWAL_DELAY_S + 2.5;
 /// Bit of `type_mask` in SET_POSITION_TARGET_LOCAL_NED: the yaw is ignored.
 const MASK_YAW_IGNORED: u16 = 0x400;
 
@@ -73,14 +74,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let header = self.links.next_header(link, system);
             return encode_tunnel(header, &payload[..len], out);
         }
-        if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::Done) {
+        if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::PhotographedReport) {
             let mut payload = [0; done::MAX_LEN];
-            let len = self.done_report().encode(&mut payload);
+            let len = self.photographed_report().encode(&mut payload);
             let header = self.links.next_header(link, system);
             return encode_tunnel(header, &payload[..len], out);
         }
-        if self.links.take_due(link, OnDemandMessage::DoneCount) {
-            let data = self.done_count_message();
+        if self.links.take_due(link, OnDemandMessage::PhotographedCount) {
+            let data = self.photographed_count_message();
             return frame::encode(self.links.next_header(link, system), &data, out);
         }
         if link == Link::Swarm && !self.may_send_by_radio() {
@@ -96,7 +97,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether another frame may be sent to the radio beside the state messages.
     pub(super) fn may_send_by_radio(&mut self) -> bool {
-        let rate = if self.telemetry.armed { ARMED_BYTES_PER_S } else { DISARMED_BYTES_PER_S };
+        let rate =
+            if self.telemetry.armed { ARMED_EXTRA_BYTES_PER_S } else { DISARMED_EXTRA_BYTES_PER_S };
         self.links.may_send_by_radio(self.now, rate)
     }
 
@@ -117,7 +119,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         {
             return 0;
         }
-        let plan_crc = self.mission.plan().map_or(0, |plan| plan.plan_crc);
+        let plan_crc = self.mission.plan().map_or(0, |plan| plan.swarm_plan_crc);
         let crc = self.config.mission_crc;
         let relay = self.neighbours.next_relay(self.now, crc, plan_crc);
         if relay.is_empty() {
@@ -237,7 +239,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         GLOBAL_POSITION_INT_DATA {
             // The time at which the position was measured, so that receivers recognise a repeated
             // one.
-            time_boot_ms: reported.at.as_boot_ms(),
+            time_boot_ms: reported.measured_at.as_boot_ms(),
             lat: libm::round(place.lat_deg * 1e7) as i32,
             lon: libm::round(place.lon_deg * 1e7) as i32,
             alt: libm::round(place.alt_m * 1e3) as i32,
@@ -253,7 +255,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn intent_flags(&self) -> u8 {
         use State::*;
         let view = self.detour_view();
-        let flown_again = view.is_flown_after_mission();
+        let flown_again = view.is_piloted_after_mission();
         let grounded = match self.mission.state() {
             state if state.has_landed() => !flown_again,
             // On its path it flies, whatever the landing detector reports.
@@ -267,8 +269,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // In `SwarmLinkLost` a vehicle that may fly on unheard waits for its gates, so it still
             // follows the plan.
             || self.mission.state() == SwarmLinkLost && self.may_fly_unheard()
-            || (self.mission.state().lands() || self.mission.state().has_landed())
-                && self.guidance.is_at_goal(&self.guidance_inputs());
+            || (self.mission.state().lands_or_landing_is_held()
+                || self.mission.state().has_landed())
+                && self.guidance.is_reference_at_goal(&self.guidance_inputs());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
         let out = self.detours.is_own_vehicle_out_of_plan(&view);
         let flies = if grounded { intent::GROUNDED } else { intent::FLYING };
@@ -278,15 +281,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | flag(intent::OUT_OF_PLAN, out)
             | flag(intent::WAITING, self.detours.is_waiting_for_others(&view))
             | flag(intent::BLOCKED, self.detours.is_blocked())
-            | flag(intent::ON_DETOUR, self.is_detouring())
+            | flag(intent::ON_DETOUR, self.is_detouring_or_evading())
     }
 
     /// Whether this companion flies the vehicle off its plan, on a detour or to evade, or will.
     /// False while a pilot or a failsafe flies it: nothing then keeps it from coming down on
     /// others.
-    fn is_detouring(&self) -> bool {
+    fn is_detouring_or_evading(&self) -> bool {
         let state = self.mission.state();
-        !(state.is_flown_by_another() || state == State::Aborted)
+        !(state.is_left_to_pilot_or_failsafe() || state == State::Aborted)
             && (self.detours.is_on_detour()
                 || self.detours.has_left_plan()
                 || self.guidance.evading)
@@ -294,17 +297,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     pub(super) fn own_intent(&self) -> Intent {
         let plan = self.mission.plan();
-        let along_m = self.guidance.progress_m(self.mission.state(), &self.guidance_inputs());
-        let (mut points, column) = self.points_ahead();
+        let along_m =
+            self.guidance.reported_progress_m(self.mission.state(), &self.guidance_inputs());
+        let (mut points, column) = self.points_to_stop_and_may_come_down();
         let near = points.len();
         self.add_unheard_points(&mut points);
         let beyond = (points.len() - near) as u8;
-        let (clear_m, clear_in_s) = self.unheard_reach(along_m);
+        let (clear_m, clear_in_s) = self.unheard_end_m_and_delay_s(along_m);
         Intent {
             system_id: self.config.system_id,
             flags: self.intent_flags(),
             mission_crc: self.config.mission_crc,
-            plan_crc: plan.map_or(0, |plan| plan.plan_crc),
+            plan_crc: plan.map_or(0, |plan| plan.swarm_plan_crc),
             progress_m: if self.detours.is_on_detour() {
                 self.detours.left_at_m()
             } else {
@@ -312,12 +316,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
             heard_bits: self.neighbours.heard_bits(self.now),
             gates_open_up_to_m: clear_m,
-            unheard_delay_s: clear_in_s,
-            ground_m: plan.map_or(self.mission.path_start().z, |plan| self.guidance.ground_m(plan)),
+            unheard_flight_delay_s: clear_in_s,
+            ground_m: plan
+                .map_or(self.mission.path_start().z, |plan| self.guidance.planned_ground_m(plan)),
             may_come_down: column,
             echo: self.neighbours.next_echo(self.links.intents_sent(), self.now),
             points,
-            unheard_point_count: beyond,
+            unheard_flight_point_count: beyond,
         }
     }
 
@@ -325,14 +330,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// this vehicle flies if no other vehicle hears it: as far as its lease takes it, or to the end
     /// where it has left the mission and needs no lease.
     fn add_unheard_points(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
-        let flies = self.mission.state().flies_on_lease();
-        let descends = self.guidance.along_m() >= 0.0 && self.guidance.is_descending();
+        let flies = self.mission.state().may_fly_on_lease();
+        let descends = self.guidance.reference_along_m() >= 0.0 && self.guidance.is_in_descent();
         let Some(plan) = self.mission.plan().filter(|_| flies && !descends) else { return };
         // With `MAX_POINTS` points the list is full: later corners are not reported.
         let mut add = |point: Point| _ = points.push(point);
-        let (path, on_path) = (&plan.path, self.guidance.along_m() >= 0.0);
-        let from_m = if on_path { self.guidance.setpoint_m } else { 0.0 };
-        let Some(most_m) = self.unheard_limit_m() else { return };
+        let (path, on_path) = (&plan.path, self.guidance.reference_along_m() >= 0.0);
+        let from_m = if on_path { self.guidance.setpoint_along_m } else { 0.0 };
+        let Some(most_m) = self.coverage_unheard_end_m() else { return };
         if self.guidance.returning {
             let back = path.waypoints().iter().rev().filter(|w| w.along_m < from_m);
             return back.for_each(|w| add(w.position));
@@ -346,34 +351,36 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Place along this vehicle's path, metres, up to which it flies in a coverage mission while no
     /// other vehicle hears it; `None` in a mission without an area.
-    fn unheard_limit_m(&self) -> Option<f32> {
+    fn coverage_unheard_end_m(&self) -> Option<f32> {
         let (fleet, plan) = (self.neighbours.fleet()?, self.mission.plan()?);
-        let lease_m = LEASE_FLIGHT_S * self.config.cruise_mps;
-        let from_m = self.guidance.setpoint_m.max(0.0);
+        let lease_m = MAX_FLIGHT_ON_LEASE_S * self.config.cruise_mps;
+        let from_m = self.guidance.setpoint_along_m.max(0.0);
         let most_m = if fleet.takes_part() { from_m + lease_m } else { f32::INFINITY };
         Some(most_m.min(plan.path.length_m()))
     }
 
     /// Part of this vehicle's path that its intent reports.
     fn reported_path(&self) -> ReportedPath {
-        let from_m = self.guidance.setpoint_m;
+        let from_m = self.guidance.setpoint_along_m;
         let along_m =
             self.guidance.measured_progress_m(self.mission.state(), &self.guidance_inputs());
-        let flies = self.guidance.along_m() >= 0.0 && !self.guidance.hold.is_reported();
+        let flies = self.guidance.reference_along_m() >= 0.0 && !self.guidance.hold.is_reported();
         let Some(plan) = self.mission.plan().filter(|_| flies) else {
-            return ReportedPath { along_m, ends_m: from_m };
+            return ReportedPath { along_m, points_end_m: from_m };
         };
         // The setpoint and these waypoints are as many points as an intent holds.
         let last =
             plan.path.waypoints().iter().filter(|w| w.along_m > from_m).nth(intent::MAX_POINTS - 2);
         let last_m = last.map_or(f32::INFINITY, |last| last.along_m);
-        ReportedPath { along_m, ends_m: self.guidance.stops_at_m.max(from_m).min(last_m) }
+        ReportedPath { along_m, points_end_m: self.guidance.stops_at_m.max(from_m).min(last_m) }
     }
 
     /// Points along which this vehicle flies next, from its setpoint to where it will stop for now;
     /// and whether it may come down from where it is (it climbs, descends, lands, or does not
     /// stream setpoints).
-    fn points_ahead(&self) -> (heapless::Vec<Point, { intent::MAX_POINTS }>, bool) {
+    fn points_to_stop_and_may_come_down(
+        &self,
+    ) -> (heapless::Vec<Point, { intent::MAX_POINTS }>, bool) {
         use State::*;
         let mut points = heapless::Vec::new();
         let here = self.telemetry.position;
@@ -392,29 +399,32 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let mut column = true;
         match self.mission.state() {
             // On the pad too: it may have lifted off before its next intent is heard.
-            state if state.is_before_path() => {
+            state if state.is_started_before_path() => {
                 add(setpoint);
                 first.into_iter().for_each(add);
             }
             // A mission that is over in the air ends in a landing too.
-            state if state.lands() || state == Aborted => {
+            state if state.lands_or_landing_is_held() || state == Aborted => {
                 add(here);
-                add(Point::new(here.x, here.y, self.guidance.ground_m(plan)));
+                add(Point::new(here.x, here.y, self.guidance.planned_ground_m(plan)));
             }
             state if state.is_on_path() && self.guidance.hold.is_reported() => {
                 column = false;
                 add(setpoint);
             }
-            Follow if self.guidance.is_descending() => {
+            Follow if self.guidance.is_in_descent() => {
                 add(setpoint);
-                last.into_iter()
-                    .for_each(|last| add(Point::new(last.x, last.y, self.guidance.ground_m(plan))));
+                last.into_iter().for_each(|last| {
+                    add(Point::new(last.x, last.y, self.guidance.planned_ground_m(plan)));
+                });
             }
             state if state.is_on_path_or_stopping() => {
                 column = false;
                 add(setpoint);
-                let (from_m, most_m) =
-                    (self.guidance.setpoint_m, self.unheard_limit_m().unwrap_or(f32::INFINITY));
+                let (from_m, most_m) = (
+                    self.guidance.setpoint_along_m,
+                    self.coverage_unheard_end_m().unwrap_or(f32::INFINITY),
+                );
                 let to_m = self.guidance.stops_at_m.min(most_m);
                 let ahead =
                     path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);

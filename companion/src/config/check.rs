@@ -15,7 +15,7 @@ impl<const V: usize> Config<V> {
     pub fn checked(self) -> Result<CheckedConfig<V>, ConfigError> {
         self.check()?;
         let (_, own) = self.own_roster_entry().ok_or(ConfigError::NotInRoster)?;
-        Ok(CheckedConfig { start: own.start, config: self })
+        Ok(CheckedConfig { path_start: own.path_start, config: self })
     }
 
     /// Checks ids, order of the roster, ranges of all numbers, geofence, and limits with both
@@ -31,8 +31,8 @@ impl<const V: usize> Config<V> {
         }
         let positive = [
             self.cruise_mps,
-            self.slowest_mps,
-            self.fastest_mps,
+            self.slowest_vehicle_mps,
+            self.fastest_vehicle_mps,
             self.climb_mps,
             self.descend_mps,
             self.accel_mps2,
@@ -40,10 +40,10 @@ impl<const V: usize> Config<V> {
             self.required_clearance_m,
             self.safety_distance_m,
             self.start_tolerance_m,
-            self.estimate_m,
+            self.min_estimate_error_m,
             self.radio_range_m,
         ];
-        let starts = self.roster.iter().flat_map(|e| e.start.iter());
+        let starts = self.roster.iter().flat_map(|e| e.path_start.iter());
         let bad = positive.iter().any(|v| !(v.is_finite() && *v > 0.0)) || self.swarm_hz == 0;
         if bad || starts.into_iter().any(|c| !c.is_finite()) {
             return Err(ConfigError::NotPositive);
@@ -58,7 +58,7 @@ impl<const V: usize> Config<V> {
             return Err(ConfigError::Geofence);
         }
         let inside = |entry: &&RosterEntry| {
-            self.geofence.is_none_or(|fence| box_contains(&fence, &entry.start))
+            self.geofence.is_none_or(|fence| box_contains(&fence, &entry.path_start))
         };
         if let Some(outside) = self.roster.iter().find(|entry| !inside(entry)) {
             return Err(ConfigError::StartOutside(outside.system_id));

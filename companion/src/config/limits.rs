@@ -8,7 +8,7 @@ use planner_core::{Point, SettingError};
 
 use crate::autopilot::limits::{AutopilotLimits, Limit};
 use crate::config::Config;
-use crate::margins::UNHEARD_NOTICED_S;
+use crate::margins::UNHEARD_NOTICED_AFTER_S;
 
 /// Greatest jerk of a setpoint, m/s³, unless the autopilot's limit is lower.
 pub const MAX_JERK_MPS3: f32 = 4.0;
@@ -20,11 +20,11 @@ const MAX_SETPOINT_ACCEL_FACTOR: f32 = 1.5;
 
 /// Longest window of the smoother's moving averages, seconds. Where a low jerk limit would need a
 /// longer window, the acceleration is lowered.
-pub(crate) const MAX_SMOOTHING_S: f32 = 1.2;
+pub(crate) const MAX_SMOOTHING_WINDOW_S: f32 = 1.2;
 /// Least time that is assumed until a vehicle that no other one hears has stopped, seconds.
-const UNHEARD_STOPPED_S: f32 = 3.0;
+const MIN_UNHEARD_STOP_TIME_S: f32 = 3.0;
 /// Least limit of the speed on a straight leg (climb, join, descent), m/s.
-pub(crate) const MIN_LEG_SPEED_MPS: f32 = 1.0;
+pub(crate) const MIN_LEG_SPEED_LIMIT_MPS: f32 = 1.0;
 
 /// With how much jerk a setpoint may brake.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ pub struct MotionLimits {
     pub accel_z_mps2: f32,
     /// Greatest acceleration of a setpoint, horizontal and vertical, m/s². It is above that of the
     /// reference: at a corner the change of direction adds to braking and acceleration.
-    pub max_accel_mps2: [f32; 2],
+    pub max_setpoint_accel_mps2: [f32; 2],
     /// Greatest jerk of a setpoint, m/s³.
     pub jerk_mps3: f32,
 }
@@ -61,19 +61,19 @@ impl MotionLimits {
         let least = |of: &[Limit]| {
             of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)))
         };
-        let jerk_mps3 = fminf(MAX_JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
+        let jerk_mps3 = fminf(MAX_JERK_MPS3, least(&[Limit::JerkXy, Limit::JerkZ]));
         // Acceleration whose sudden change the longest average spreads to that jerk.
-        let smooth_mps2 = 0.5 * jerk_mps3 * MAX_SMOOTHING_S;
+        let smooth_mps2 = 0.5 * jerk_mps3 * MAX_SMOOTHING_WINDOW_S;
         let accel_mps2 = fminf(config.accel_mps2, smooth_mps2);
         let (across_mps2, vertical_mps2) =
-            (least(&[Limit::Accel]), least(&[Limit::AccelUp, Limit::AccelDown]));
+            (least(&[Limit::AccelXy]), least(&[Limit::AccelUp, Limit::AccelDown]));
         Self {
-            speed_mps: fminf(config.cruise_mps, least(&[Limit::Speed])),
+            speed_mps: fminf(config.cruise_mps, least(&[Limit::SpeedXy])),
             climb_mps: fminf(config.climb_mps, least(&[Limit::Climb])),
             descend_mps: fminf(config.descend_mps, least(&[Limit::Descend])),
             accel_mps2: fminf(accel_mps2, across_mps2),
             accel_z_mps2: fminf(accel_mps2, vertical_mps2),
-            max_accel_mps2: [across_mps2, vertical_mps2]
+            max_setpoint_accel_mps2: [across_mps2, vertical_mps2]
                 .map(|most| fminf(MAX_SETPOINT_ACCEL_FACTOR * accel_mps2, most)),
             jerk_mps3,
         }
@@ -99,7 +99,7 @@ impl MotionLimits {
     /// The acceleration, limited horizontally and vertically to that of a setpoint, m/s².
     pub(crate) fn clamp_accel(&self, accel: &Point) -> Point {
         let across = libm::hypotf(accel.x, accel.y);
-        let [most, most_z] = self.max_accel_mps2;
+        let [most, most_z] = self.max_setpoint_accel_mps2;
         let share = most / fmaxf(across, most);
         let z = fmaxf(fminf(accel.z, most_z), -most_z);
         Point::new(accel.x * share, accel.y * share, z)
@@ -121,7 +121,7 @@ pub(crate) struct GuidanceLimits {
     /// For advice.
     pub(crate) deconflict: DeconflictConfig,
     /// Speed that neighbours are assumed to fly at most, m/s.
-    pub(crate) fastest_mps: f32,
+    pub(crate) fastest_vehicle_mps: f32,
 }
 
 impl GuidanceLimits {
@@ -138,7 +138,7 @@ impl GuidanceLimits {
             ..TrackConfig::default()
         };
         let leg_track = TrackConfig {
-            cruise_mps: limits.max_speed_mps().min(MIN_LEG_SPEED_MPS.max(limits.climb_mps)),
+            cruise_mps: limits.max_speed_mps().min(MIN_LEG_SPEED_LIMIT_MPS.max(limits.climb_mps)),
             climb_mps: limits.climb_mps,
             descend_mps: limits.descend_mps,
             ..track
@@ -149,7 +149,7 @@ impl GuidanceLimits {
             cruise_mps: config.cruise_mps,
             accel_mps2: config.accel_mps2,
         };
-        Self { track, leg_track, deconflict, fastest_mps: config.fastest_mps }
+        Self { track, leg_track, deconflict, fastest_vehicle_mps: config.fastest_vehicle_mps }
     }
 
     /// Whether planner-core accepts these limits, and the safety filter's that follow from them.
@@ -157,18 +157,26 @@ impl GuidanceLimits {
         self.track.check()?;
         self.leg_track.check()?;
         self.deconflict.check()?;
-        filter_bounds(&self.track, self.fastest_mps).check()
+        neighbour_motion_bounds(&self.track, self.fastest_vehicle_mps).check()
     }
 }
 
 /// Limits within which neighbours are expected to fly and stop: the speed of the mission's fastest
 /// vehicle, which may be another, and the braking of this one.
-pub(crate) fn filter_bounds(track: &TrackConfig, fastest_mps: f32) -> MotionBounds {
+pub(crate) fn neighbour_motion_bounds(
+    track: &TrackConfig,
+    fastest_vehicle_mps: f32,
+) -> MotionBounds {
     let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: MAX_URGENT_JERK_MPS3 };
-    let speed_max_mps = fmaxf(track.cruise_mps, fastest_mps);
+    let speed_max_mps = fmaxf(track.cruise_mps, fastest_vehicle_mps);
     // Distance that an unheard vehicle flies until it has stopped, expressed as time at full speed.
-    let stopped_s = UNHEARD_NOTICED_S + braking.stop_m(speed_max_mps) / speed_max_mps;
-    MotionBounds { braking, speed_max_mps, silent_s: fmaxf(UNHEARD_STOPPED_S, stopped_s) }
+    let stopped_s =
+        UNHEARD_NOTICED_AFTER_S + braking.stop_distance_m(speed_max_mps) / speed_max_mps;
+    MotionBounds {
+        braking,
+        speed_max_mps,
+        stopped_when_unheard_for_s: fmaxf(MIN_UNHEARD_STOP_TIME_S, stopped_s),
+    }
 }
 
 #[cfg(test)]

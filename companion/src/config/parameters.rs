@@ -124,7 +124,7 @@ impl Parameters {
         config.climb_mps = libm::fminf(config.climb_mps, self.values[CLIMB_MAX]);
         config.descend_mps = libm::fminf(config.descend_mps, self.values[CLIMB_MAX]);
         config.cruise_mps = libm::fminf(config.cruise_mps, self.values[SPEED_MAX]);
-        config.estimate_m = self.values[EST_M];
+        config.min_estimate_error_m = self.values[EST_M];
         config.radio_range_m = self.values[RADIO_M];
         config.skips_photographed = self.values[RESUME] != 0.0;
         config.start_tolerance_m = self.values[START_TOL];

@@ -5,7 +5,7 @@ use super::*;
 fn config() -> Config<4> {
     let origin = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
     let mut config = Config::new(2, Point::new(3.0, 4.0, 1.5), origin);
-    let other = RosterEntry { system_id: 7, start: Point::new(9.0, 4.0, 1.5) };
+    let other = RosterEntry { system_id: 7, path_start: Point::new(9.0, 4.0, 1.5) };
     config.roster.push(other).expect("room for two");
     config
 }
@@ -14,8 +14,8 @@ type Number = fn(&mut Config<4>) -> &mut f32;
 /// Every number that must be positive.
 const POSITIVE: [Number; 12] = [
     |c| &mut c.cruise_mps,
-    |c| &mut c.slowest_mps,
-    |c| &mut c.fastest_mps,
+    |c| &mut c.slowest_vehicle_mps,
+    |c| &mut c.fastest_vehicle_mps,
     |c| &mut c.climb_mps,
     |c| &mut c.descend_mps,
     |c| &mut c.accel_mps2,
@@ -23,7 +23,7 @@ const POSITIVE: [Number; 12] = [
     |c| &mut c.required_clearance_m,
     |c| &mut c.safety_distance_m,
     |c| &mut c.start_tolerance_m,
-    |c| &mut c.estimate_m,
+    |c| &mut c.min_estimate_error_m,
     |c| &mut c.radio_range_m,
 ];
 
@@ -70,7 +70,7 @@ proptest! {
                 || p.z < low.z
                 || p.z > high.z
         };
-        let first = config.roster.iter().find(|entry| outside(&entry.start));
+        let first = config.roster.iter().find(|entry| outside(&entry.path_start));
         let expected =
             first.map_or(Ok(()), |entry| Err(ConfigError::StartOutside(entry.system_id)));
         prop_assert_eq!(config.check(), expected);

@@ -3,11 +3,11 @@
 //!
 //! A vehicle that left the plan and is still in the air is landed by its autopilot, which does not
 //! avoid others. No vehicle waits within [`EVADE_MARGIN_M`] beyond the safety distance of the
-//! column in which such a vehicle may come down (`Neighbours::landing_column`). A vehicle that is
-//! to wait at a place in the column waits at the nearest free place before that place on its path;
-//! one that holds there already flies back. It came along that path, so the path is free of walls.
-//! It comes no nearer to a vehicle behind it than [`TRAILING_VEHICLE_MARGIN_M`] beyond the safety
-//! distance.
+//! column in which such a vehicle may come down (`Neighbours::visit_landing_column`). A vehicle
+//! that is to wait at a place in the column waits at the nearest free place before that place on
+//! its path; one that holds there already flies back. It came along that path, so the path is free
+//! of walls. It comes no nearer to a vehicle behind it than [`TRAILING_VEHICLE_MARGIN_M`] beyond
+//! the safety distance.
 //!
 //! ENU metres. Cost: [`MAX_SEARCH_COST`] a control step. A search takes one control step for the
 //! column of one neighbour and a dozen for the most columns that there can be; in theory six for
@@ -72,10 +72,10 @@ pub struct EvadeSearch {
     scan: IncrementalScan,
     /// Place along the path where the search began, metres, and the number of places from there
     /// back that were found inside a column.
-    from_m: Option<f32>,
-    covered_places: u16,
+    search_from_m: Option<f32>,
+    places_inside_columns: u16,
     /// Result of the last search that has finished.
-    pub found: EvadeTarget,
+    pub last_target: EvadeTarget,
 }
 
 impl EvadeSearch {
@@ -91,21 +91,23 @@ impl EvadeSearch {
     ) {
         // While the vehicle steps back, `wait_m` falls and the search goes on. Where `wait_m`
         // grows, the search begins there.
-        let from_m =
-            self.from_m.filter(|from_m| wait_m <= from_m + PLACE_STEP_M).unwrap_or_else(|| {
-                self.covered_places = 0;
+        let from_m = self
+            .search_from_m
+            .filter(|from_m| wait_m <= from_m + PLACE_STEP_M)
+            .unwrap_or_else(|| {
+                self.places_inside_columns = 0;
                 self.scan.restart();
                 wait_m
             });
-        self.from_m = Some(from_m);
+        self.search_from_m = Some(from_m);
         let mut budget = MAX_SEARCH_COST;
         let found = loop {
-            let along_m = from_m - f32::from(self.covered_places) * PLACE_STEP_M;
+            let along_m = from_m - f32::from(self.places_inside_columns) * PLACE_STEP_M;
             // The last place compared is the start of the path.
-            let on_path = self.covered_places == 0 || along_m > -PLACE_STEP_M;
+            let on_path = self.places_inside_columns == 0 || along_m > -PLACE_STEP_M;
             let along_m = along_m.max(0.0);
             let place = path.point_at(along_m).filter(|_| on_path);
-            let Some(place) = place.filter(|_| self.covered_places <= MAX_PLACES) else {
+            let Some(place) = place.filter(|_| self.places_inside_columns <= MAX_PLACES) else {
                 break EvadeTarget::Nowhere;
             };
             budget = budget.saturating_sub(PLACE_COST);
@@ -114,17 +116,17 @@ impl EvadeSearch {
                 .continue_scan(neighbours, &mut budget, 1, &visit, |column| column.contains(&place))
             {
                 None => return,
-                Some(true) => self.covered_places += 1,
-                Some(false) if self.covered_places == 0 => break EvadeTarget::Here,
+                Some(true) => self.places_inside_columns += 1,
+                Some(false) if self.places_inside_columns == 0 => break EvadeTarget::Here,
                 Some(false) => break EvadeTarget::Back(along_m),
             }
         };
-        (self.found, self.from_m) = (found, None);
+        (self.last_target, self.search_from_m) = (found, None);
     }
 
     /// Forgets the result, and a search under way.
     pub fn reset(&mut self) {
-        (self.found, self.from_m) = (EvadeTarget::Here, None);
+        (self.last_target, self.search_from_m) = (EvadeTarget::Here, None);
     }
 }
 

@@ -29,7 +29,7 @@ const BRAKE_PLAN_JERK_SHARES: [f32; 2] = [0.577, 0.48];
 /// planned: horizontally, then vertically.
 const BRAKE_PLAN_ACCEL_SHARES: [[f32; 2]; 2] = [[0.7, 0.65], [1.0, 0.9]];
 /// Number of bisection steps between a jerk that is safe and one that is not.
-const STEP_HALVINGS: usize = 8;
+const JERK_HALVINGS: usize = 8;
 
 /// A box that setpoints do not leave.
 #[derive(Clone, Copy, Debug)]
@@ -114,7 +114,7 @@ impl Fence {
                 let away = if walls.can_stop_below_high(ahead, pace, push) { 1.0 } else { -1.0 };
                 let part = BRAKE_PLAN_JERK_SHARES[0] * most_mps3;
                 let accel_most =
-                    limits.max_accel_mps2[axis / 2] * BRAKE_PLAN_ACCEL_SHARES[axis / 2][0];
+                    limits.max_setpoint_accel_mps2[axis / 2] * BRAKE_PLAN_ACCEL_SHARES[axis / 2][0];
                 hardest[axis] =
                     away * fmaxf(fminf(part, (accel_most - away * accel) / dt_s), -part);
                 let wanted = fmaxf(fminf(jerk[axis], part), -part);
@@ -133,7 +133,10 @@ impl Fence {
             );
         }
         let across = (motion.acceleration + jerk * dt_s).xy().norm_squared();
-        if brakes[0] && brakes[1] && across > limits.max_accel_mps2[0] * limits.max_accel_mps2[0] {
+        if brakes[0]
+            && brakes[1]
+            && across > limits.max_setpoint_accel_mps2[0] * limits.max_setpoint_accel_mps2[0]
+        {
             (jerk.x, jerk.y) = (hardest.x, hardest.y);
             let left = sqrtf(fmaxf(most_mps3 * most_mps3 - hardest.xy().norm_squared(), 0.0));
             jerk.z = fmaxf(fminf(jerk.z, left), -left);
@@ -160,18 +163,18 @@ struct AxisBounds {
 impl AxisBounds {
     fn can_stop_between(&self, place: f32, speed: f32, accel: f32) -> bool {
         self.can_stop_below_high(place, speed, accel)
-            && place - stopping_distance_m(-speed, -accel, self.brake) >= self.low
+            && place - stop_distance_m(-speed, -accel, self.brake) >= self.low
     }
 
     fn can_stop_below_high(&self, place: f32, speed: f32, accel: f32) -> bool {
-        place + stopping_distance_m(speed, accel, self.brake) <= self.high
+        place + stop_distance_m(speed, accel, self.brake) <= self.high
     }
 }
 
 /// Acceleration and jerk with which the stops of an axis are planned.
 fn axis_brake(limits: &MotionLimits, axis: usize) -> BrakingLimits {
     BrakingLimits {
-        accel_mps2: BRAKE_PLAN_ACCEL_SHARES[axis / 2][1] * limits.max_accel_mps2[axis / 2],
+        accel_mps2: BRAKE_PLAN_ACCEL_SHARES[axis / 2][1] * limits.max_setpoint_accel_mps2[axis / 2],
         jerk_mps3: BRAKE_PLAN_JERK_SHARES[1] * limits.jerk(Urgency::Smooth),
     }
 }
@@ -179,7 +182,7 @@ fn axis_brake(limits: &MotionLimits, axis: usize) -> BrakingLimits {
 /// The number nearest to `wanted` for which `is_safe` holds, by bisection between it and `safe`.
 fn nearest_safe(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
     let (mut good, mut bad) = (safe, wanted);
-    for _ in 0..STEP_HALVINGS {
+    for _ in 0..JERK_HALVINGS {
         let middle = 0.5 * (good + bad);
         if is_safe(middle) {
             good = middle;
@@ -209,7 +212,7 @@ fn distribute_remaining_jerk(
     if brakes[0] != brakes[1] {
         let (axis, beside) = if brakes[0] { (0, 1) } else { (1, 0) };
         let taken = accel[axis] + jerk[axis] * dt_s;
-        let across = limits.max_accel_mps2[0];
+        let across = limits.max_setpoint_accel_mps2[0];
         let room = sqrtf(fmaxf(across * across - taken * taken, 0.0));
         let next = accel[beside] + others[beside] * dt_s;
         let next = fmaxf(fminf(next, room), -room);
@@ -225,7 +228,7 @@ fn distribute_remaining_jerk(
 
 /// Distance of a stop towards a wall, metres, from this speed and acceleration: the acceleration
 /// falls to −a at the greatest jerk, stays there, and returns to 0 as the speed does.
-fn stopping_distance_m(speed: f32, accel: f32, brake: BrakingLimits) -> f32 {
+fn stop_distance_m(speed: f32, accel: f32, brake: BrakingLimits) -> f32 {
     let BrakingLimits { accel_mps2: most, jerk_mps3: jerk } = brake;
     let accel = fmaxf(accel, -most);
     // If bringing the acceleration back to 0 already stops the motion, no further braking is

@@ -23,18 +23,18 @@ const RESUME_CLEAR_M: f32 = 1.0;
 const RESUME_CLEAR_FOR: Duration = Duration::from_millis(300);
 /// Greatest depth of the ground between pad and goal below the lower of both, metres: less than a
 /// storey.
-const GROUND_BELOW_PAD_M: f32 = 2.0;
+const MAX_GROUND_BELOW_PAD_M: f32 = 2.0;
 /// Longest stop for a stranger, a vehicle that the roster does not name; after it this vehicle
 /// continues slowly.
-const MAX_STOP_FOR_STRANGER: Duration = Duration::from_secs(10);
-/// Share of its speed at which a vehicle continues after [`MAX_STOP_FOR_STRANGER`].
-const PAST_STRANGER_SHARE: f32 = 0.15;
+const PASS_STRANGER_AFTER: Duration = Duration::from_secs(10);
+/// Share of its speed at which a vehicle continues after [`PASS_STRANGER_AFTER`].
+const PASS_STRANGER_SPEED_SHARE: f32 = 0.15;
 /// Greatest speed of the setpoint at which the reference, not the setpoint, decides whether the
 /// vehicle flies back along its path, m/s.
-const MAX_TURNING_SETPOINT_MPS: f32 = 0.05;
+const MAX_SETPOINT_WHEN_TURNING_MPS: f32 = 0.05;
 /// A setpoint that is further than this behind the reference still flies forward along the path,
 /// metres.
-const MAX_TURNING_SETPOINT_M: f32 = 0.03;
+const MAX_LAG_WHEN_TURNING_M: f32 = 0.03;
 /// A vehicle nearer than this to its advised stop counts as standing there, metres: a little more
 /// than the distance that advice looks ahead. A gate no further than this before or behind the
 /// reference counts as the one that the vehicle waits at.
@@ -42,16 +42,16 @@ const AT_ADVISED_STOP_M: f32 = 0.6;
 /// A vehicle that the filter kept from continuing within this time still counts as hindered.
 const HINDERED_WITHIN: Duration = Duration::from_millis(500);
 /// Time without a hindrance by the filter after which the next one begins a new count.
-const FREE_AFTER: Duration = Duration::from_secs(5);
+const UNHINDERED_AFTER: Duration = Duration::from_secs(5);
 /// A vehicle that yields in its descent climbs back up its column after standing for this long.
 const ABORT_DESCENT_AFTER: Duration = Duration::from_secs(1);
 
 /// A neighbour that may come nearer to this vehicle than the distance to be kept from it.
 struct FilterConflict {
     id: u8,
-    yields: bool,
+    own_yields: bool,
     stranger: bool,
-    rests: bool,
+    is_grounded_or_lost: bool,
 }
 
 /// State of the safety filter after the last step.
@@ -60,13 +60,13 @@ pub(crate) struct SafetyFilter {
     /// Since when the filter has kept the vehicle stopped.
     stopped_since: Option<Instant>,
     /// Since when, in this stop, the path ahead has been free.
-    clear_since: Option<Instant>,
+    path_clear_since: Option<Instant>,
     /// MAVLink system id of the neighbour that the filter stops for; 0 for none.
-    blocker: u8,
+    blocker_id: u8,
     /// Whether this vehicle yields to the neighbour that the filter stops for.
-    yields: bool,
+    yields_to_blocker: bool,
     /// Whether the neighbour that the filter stops for is on the ground, or lost.
-    blocker_rests: bool,
+    blocker_is_grounded_or_lost: bool,
     blocker_is_stranger: bool,
     /// Whether this vehicle's reachable set conflicted with that of a neighbour in the last step.
     sets_intersect: bool,
@@ -76,22 +76,22 @@ pub(crate) struct SafetyFilter {
     /// Whether no other vehicle may be in the column to the ground, or to the top of the climb.
     column_clear: bool,
     /// Since when `column_clear` has had its value.
-    column_since: Option<Instant>,
+    column_clear_changed_at: Option<Instant>,
     /// Since when a vehicle that is on the ground, or lost, has been in the landing column.
     column_blocked_for_good_since: Option<Instant>,
     /// Since when a landing has been waiting for a free column; short gaps do not end the wait.
     landing_held_since: Option<Instant>,
     /// Since when the filter has kept the vehicle from continuing, and when it last did; gaps
-    /// shorter than [`FREE_AFTER`] count as part of it.
+    /// shorter than [`UNHINDERED_AFTER`] count as part of it.
     hindered_since: Instant,
-    hindered_at: Instant,
+    last_hindered_at: Instant,
     /// Whether this vehicle was to yield when the filter last kept it from continuing.
-    hindered_yields: bool,
+    yielded_when_hindered: bool,
     /// When the filter last kept the vehicle from continuing because of a neighbour that comes down
     /// unheard.
-    blocked_by_descent_at: Instant,
+    blocked_by_unheard_descent_at: Instant,
     /// Number of times that the filter stopped the vehicle.
-    activations: u32,
+    stop_count: u32,
 }
 
 /// Direction in which this vehicle flies or is about to fly.
@@ -122,20 +122,20 @@ impl SafetyFilter {
     /// Time for which the filter has kept the vehicle from continuing although the vehicle goes
     /// first; zero if it has not done so within the last `free`.
     pub(crate) fn blocked_with_priority_for(&self, now: Instant, free: Duration) -> Duration {
-        let blocked = !self.hindered_yields && now - self.hindered_at < free;
+        let blocked = !self.yielded_when_hindered && now - self.last_hindered_at < free;
         if blocked { now - self.hindered_since } else { Duration::default() }
     }
 
     /// Time for which the filter has kept the vehicle from continuing because of a neighbour that
     /// is on the ground, or lost.
     pub(crate) fn blocked_for_good_for(&self, now: Instant) -> Duration {
-        if self.blocker_rests { self.hindered_for(now) } else { Duration::default() }
+        if self.blocker_is_grounded_or_lost { self.hindered_for(now) } else { Duration::default() }
     }
 
     /// Time for which the filter has kept the vehicle from continuing so that another one goes
     /// first.
     pub(crate) fn yielded_for(&self, now: Instant) -> Duration {
-        if self.hindered_yields { self.hindered_for(now) } else { Duration::default() }
+        if self.yielded_when_hindered { self.hindered_for(now) } else { Duration::default() }
     }
 
     /// Whether the filter checked the path backwards in this step.
@@ -145,27 +145,29 @@ impl SafetyFilter {
 
     /// Whether the filter stops the vehicle for a neighbour that goes first.
     pub(super) fn is_yielding(&self) -> bool {
-        self.yields
+        self.yields_to_blocker
     }
 
     /// System id of the neighbour that the filter stops for; 0 for none.
-    pub(crate) fn blocker(&self) -> u8 {
-        if self.is_stopped() { self.blocker } else { 0 }
+    pub(crate) fn blocker_id(&self) -> u8 {
+        if self.is_stopped() { self.blocker_id } else { 0 }
     }
 
     /// System id of the neighbour that the filter stops for, or stopped for last.
-    pub(crate) fn last_blocker(&self) -> u8 {
-        self.blocker
+    pub(crate) fn last_blocker_id(&self) -> u8 {
+        self.blocker_id
     }
 
     /// Number of times that the filter stopped the vehicle.
-    pub(crate) fn activation_count(&self) -> u32 {
-        self.activations
+    pub(crate) fn stop_count(&self) -> u32 {
+        self.stop_count
     }
 
     /// Time for which another vehicle may have been in the landing column.
     pub(crate) fn column_blocked_for(&self, now: Instant) -> Duration {
-        self.column_since.filter(|_| !self.column_clear).map_or(Duration::default(), |at| now - at)
+        self.column_clear_changed_at
+            .filter(|_| !self.column_clear)
+            .map_or(Duration::default(), |at| now - at)
     }
 
     /// Time for which a vehicle that is on the ground, or lost, has been in the landing column.
@@ -175,7 +177,9 @@ impl SafetyFilter {
 
     /// Time for which the landing column has been free.
     pub(crate) fn column_clear_for(&self, now: Instant) -> Duration {
-        self.column_since.filter(|_| self.column_clear).map_or(Duration::default(), |at| now - at)
+        self.column_clear_changed_at
+            .filter(|_| self.column_clear)
+            .map_or(Duration::default(), |at| now - at)
     }
 
     /// Time since a landing first had to wait for a free column; short gaps do not end the wait.
@@ -186,14 +190,14 @@ impl SafetyFilter {
     /// Time for which the filter has kept the vehicle from continuing, stops and short flights
     /// between them together.
     pub(crate) fn hindered_for(&self, now: Instant) -> Duration {
-        let hindered = now - self.hindered_at < HINDERED_WITHIN;
+        let hindered = now - self.last_hindered_at < HINDERED_WITHIN;
         if hindered { now - self.hindered_since } else { Duration::default() }
     }
 
     /// Time since the filter last kept the vehicle from continuing because of a neighbour that
     /// comes down unheard, and so is soon out of this vehicle's path.
-    pub(crate) fn time_since_blocked_by_descent(&self, now: Instant) -> Duration {
-        now - self.blocked_by_descent_at
+    pub(crate) fn time_since_blocked_by_unheard_descent(&self, now: Instant) -> Duration {
+        now - self.blocked_by_unheard_descent_at
     }
 
     /// Whether no other vehicle could be in the landing column in the last step.
@@ -202,7 +206,7 @@ impl SafetyFilter {
     }
 
     pub(super) fn reset(&mut self) {
-        *self = Self { activations: self.activations, ..Self::default() };
+        *self = Self { stop_count: self.stop_count, ..Self::default() };
     }
 
     /// [`Urgency::Urgent`] while the filter stops the vehicle in this step; passing a stranger
@@ -216,43 +220,44 @@ impl SafetyFilter {
 
     /// Share of the nominal speed at which the vehicle may fly: less than 1 past a stranger.
     pub(super) fn speed_scale(&self, now: Instant) -> f32 {
-        if self.passes_stranger(now) { PAST_STRANGER_SHARE } else { 1.0 }
+        if self.passes_stranger(now) { PASS_STRANGER_SPEED_SHARE } else { 1.0 }
     }
 
     fn passes_stranger(&self, now: Instant) -> bool {
-        self.blocker_is_stranger && self.stopped_for(now) >= MAX_STOP_FOR_STRANGER
+        self.blocker_is_stranger && self.stopped_for(now) >= PASS_STRANGER_AFTER
     }
 
     /// Whether the vehicle, stopped in its descent, is to climb back up its column.
     pub(super) fn climbs_back(&self, now: Instant) -> bool {
-        self.yields && self.stopped_for(now) >= ABORT_DESCENT_AFTER
+        self.yields_to_blocker && self.stopped_for(now) >= ABORT_DESCENT_AFTER
     }
 }
 
 impl SafetyFilter {
     /// Notes that a neighbour keeps the vehicle from continuing, to which it yields or not.
     fn note_hindered(&mut self, now: Instant) {
-        if now - self.hindered_at > FREE_AFTER {
+        if now - self.last_hindered_at > UNHINDERED_AFTER {
             self.hindered_since = now;
         }
-        (self.hindered_at, self.hindered_yields) = (now, self.yields);
+        (self.last_hindered_at, self.yielded_when_hindered) = (now, self.yields_to_blocker);
     }
 
-    fn note_column(&mut self, found: Option<&FilterConflict>, now: Instant) {
+    fn update_column(&mut self, found: Option<&FilterConflict>, now: Instant) {
         let clear = found.is_none();
-        let rests = found.is_some_and(|found| found.rests);
+        let rests = found.is_some_and(|found| found.is_grounded_or_lost);
         self.column_blocked_for_good_since =
             self.column_blocked_for_good_since.or(Some(now)).filter(|_| rests);
         if !clear {
             self.landing_held_since.get_or_insert(now);
         }
-        if clear != self.column_clear || self.column_since.is_none() {
-            (self.column_clear, self.column_since) = (clear, Some(now));
+        if clear != self.column_clear || self.column_clear_changed_at.is_none() {
+            (self.column_clear, self.column_clear_changed_at) = (clear, Some(now));
         }
     }
 
     fn reset_stop(&mut self) {
-        (self.stopped_since, self.clear_since) = (None, None);
-        (self.yields, self.blocker_is_stranger, self.blocker_rests) = (false, false, false);
+        (self.stopped_since, self.path_clear_since) = (None, None);
+        (self.yields_to_blocker, self.blocker_is_stranger, self.blocker_is_grounded_or_lost) =
+            (false, false, false);
     }
 }

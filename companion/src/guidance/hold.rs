@@ -5,7 +5,7 @@
 //! points ahead of its setpoint. It does not move again until [`HOLD_REPORT_LIFETIME`] and the
 //! delay of its messages have passed since the last such report, by when the others have heard new
 //! points. The vehicle that yields reports its hold at once, the other one only after standing for
-//! [`GOING_FIRST_STANDSTILL`], so that it goes first.
+//! [`HOLD_AFTER_IF_FIRST`], so that it goes first.
 //!
 //! ENU metres.
 
@@ -14,16 +14,16 @@ use crate::time::{Duration, Instant};
 /// Time for which others rely on a reported hold: longer than three lost reports in a row.
 const HOLD_REPORT_LIFETIME: Duration = Duration::from_millis(1000);
 /// Time of standing after which a vehicle that yields reports that it holds.
-pub(super) const YIELDING_STANDSTILL: Duration = Duration::from_millis(300);
+pub(super) const HOLD_AFTER_IF_YIELDING: Duration = Duration::from_millis(300);
 /// Time of standing after which a vehicle that goes first reports that it holds: time for the
 /// others to stop.
-pub(super) const GOING_FIRST_STANDSTILL: Duration = Duration::from_secs(4);
+pub(super) const HOLD_AFTER_IF_FIRST: Duration = Duration::from_secs(4);
 
 /// Whether the vehicle reports that it holds, and when it last did.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Hold {
-    since: Option<Instant>,
-    on: bool,
+    standing_since: Option<Instant>,
+    active: bool,
     /// When the hold was last sent in an intent, and the delay with which others hear it.
     reported_at: Option<Instant>,
     message_delay: Duration,
@@ -32,22 +32,22 @@ pub(crate) struct Hold {
 impl Hold {
     /// One step in which the vehicle stands and is not to move; after `patience` the hold begins.
     /// `late_s`: delay of messages, seconds. Returns whether it begins.
-    pub(super) fn stand(&mut self, patience: Duration, late_s: f32, now: Instant) -> bool {
+    pub(super) fn note_standing(&mut self, patience: Duration, late_s: f32, now: Instant) -> bool {
         self.message_delay = Duration::from_micros((late_s * 1e6) as u64);
-        let since = *self.since.get_or_insert(now);
-        let on = now - since >= patience || self.on;
-        core::mem::replace(&mut self.on, on) != on
+        let since = *self.standing_since.get_or_insert(now);
+        let on = now - since >= patience || self.active;
+        core::mem::replace(&mut self.active, on) != on
     }
 
     /// Ends the hold: the vehicle moves, or guidance no longer moves it. Returns whether it was on.
     pub(super) fn end(&mut self) -> bool {
-        self.since = None;
-        core::mem::take(&mut self.on)
+        self.standing_since = None;
+        core::mem::take(&mut self.active)
     }
 
     /// Whether the vehicle's intents report the hold.
     pub(crate) fn is_reported(&self) -> bool {
-        self.on
+        self.active
     }
 
     /// Notes that an intent with the hold was sent.

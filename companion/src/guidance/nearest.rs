@@ -4,13 +4,13 @@
 use planner_core::Point;
 use planner_core::flight::Path;
 
-use super::{Guidance, SETTLE_WINDOW_M};
+use super::{Guidance, REFERENCE_RESET_WINDOW_M};
 
 /// Distance along the path by which the point nearest to the setpoint may jump in a step, metres:
 /// from one leg to the next where the setpoint rounds a corner, by 0.25 m at most.
-const CORNER_REACH_M: f32 = 0.5;
+const MAX_CORNER_JUMP_M: f32 = 0.5;
 /// Rounding of an arc length, metres: where the setpoint stands, its place must not creep.
-const ROUNDING_M: f32 = 1e-3;
+const ARC_LENGTH_ROUNDING_M: f32 = 1e-3;
 /// A nearest point this close to the end of the path counts as its end, metres.
 const AT_PATH_END_M: f32 = 0.02;
 
@@ -31,19 +31,19 @@ impl Guidance {
     /// has moved by at most a step of `dt_s` at cruise speed, and it is never beyond the reference.
     /// It may be 1.2 s of flight behind the reference, 18 m at 15 m/s. A window of that length
     /// could find a later leg too early, where that leads back over the one before.
-    pub(super) fn follow_setpoint<const W: usize>(&mut self, path: &Path<W>, dt_s: f32) {
-        let (from_m, along_m) = (self.setpoint_m, self.tracker.along_m);
-        let reach_m = 0.5 * (CORNER_REACH_M + self.track.cruise_mps * dt_s);
+    pub(super) fn update_setpoint_along_m<const W: usize>(&mut self, path: &Path<W>, dt_s: f32) {
+        let (from_m, along_m) = (self.setpoint_along_m, self.tracker.along_m);
+        let reach_m = 0.5 * (MAX_CORNER_JUMP_M + self.track.cruise_mps * dt_s);
         let place = self.smoother.position();
-        let seen_m = path.project(&place, from_m + reach_m, reach_m + ROUNDING_M);
-        self.setpoint_m = seen_m.max(from_m).min(along_m);
+        let seen_m = path.project(&place, from_m + reach_m, reach_m + ARC_LENGTH_ROUNDING_M);
+        self.setpoint_along_m = seen_m.max(from_m).min(along_m);
     }
 
     /// Sets the reference back to the setpoint, which stands.
-    pub(super) fn settle_reference<const W: usize>(&mut self, path: &Path<W>) {
-        let from_m = self.setpoint_m;
+    pub(super) fn reset_reference_to_setpoint<const W: usize>(&mut self, path: &Path<W>) {
+        let from_m = self.setpoint_along_m;
         let stepped_back = self.tracker.along_m <= from_m;
-        let reach_m = if stepped_back { 0.5 * SETTLE_WINDOW_M } else { 0.0 };
+        let reach_m = if stepped_back { 0.5 * REFERENCE_RESET_WINDOW_M } else { 0.0 };
         self.tracker.along_m =
             nearest_arc_length_m(path, &self.smoother.position(), from_m + reach_m, reach_m);
     }

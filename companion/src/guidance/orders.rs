@@ -6,7 +6,9 @@ use super::nearest::nearest_arc_length_m;
 use super::phase::Phase;
 use super::smoother::TICK_S;
 use super::waypoints::Algorithm2Waypoints;
-use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, SETPOINT_AT_REFERENCE_M, STANDING_SETPOINT_MPS};
+use super::{
+    ARRIVED_WITHIN_M, Guidance, REJOIN_WINDOW_M, SETPOINT_AT_REFERENCE_M, STANDING_SETPOINT_MPS,
+};
 use crate::config::limits::Urgency;
 use crate::time::Instant;
 use planner_core::Point;
@@ -18,9 +20,9 @@ impl Guidance {
     /// setpoint, or the position was lost.
     pub fn stop_and_hold(&mut self, point: Point) {
         // After a lost position the setpoint begins where the vehicle is.
-        let lost = core::mem::take(&mut self.position_unknown) && self.unsent_s > 0.0;
+        let lost = core::mem::take(&mut self.position_was_lost) && self.since_sent_s > 0.0;
         if lost || !self.smoother.has_setpoint() {
-            self.smoother.resume_at(point, self.unsent_s);
+            self.smoother.resume_at(point, self.since_sent_s);
             self.forget_leg();
         }
     }
@@ -36,10 +38,11 @@ impl Guidance {
         self.stop_and_hold(point);
         self.forget_leg();
         let Some(path) = plan.map(|plan| &plan.path) else { return };
-        let away = |end: Point| (end - point).xy().norm_squared() > ARRIVED_M * ARRIVED_M;
-        if self.has_reached_end(path) && path.point_at(path.length_m()).is_some_and(away) {
-            self.tracker.along_m = path.length_m() - ARRIVED_M;
-            self.setpoint_m = self.tracker.along_m;
+        let away =
+            |end: Point| (end - point).xy().norm_squared() > ARRIVED_WITHIN_M * ARRIVED_WITHIN_M;
+        if self.is_reference_at_end_of(path) && path.point_at(path.length_m()).is_some_and(away) {
+            self.tracker.along_m = path.length_m() - ARRIVED_WITHIN_M;
+            self.setpoint_along_m = self.tracker.along_m;
         }
     }
 
@@ -47,34 +50,34 @@ impl Guidance {
     /// setpoint.
     pub fn begin_climb(&mut self, position: &Point) {
         self.reset();
-        self.from_pad = true;
+        self.path_begins_above_pad = true;
         self.phase = Phase::Climb;
         if !self.smoother.has_setpoint() {
-            self.smoother.begin_at(*position, self.unsent_s);
+            self.smoother.begin_at(*position, self.since_sent_s);
         }
     }
 
     /// Puts the flight on its path: the reference advances from the arc length that it has.
     pub fn start_following(&mut self, now: Instant) {
-        (self.on_path, self.lands_off_path) = (true, false);
+        (self.has_begun_path, self.lands_off_path) = (true, false);
         self.evade_search.reset();
         self.acknowledged_path.start_following(now);
         self.last_progress_m = self.tracker.along_m;
-        self.progress_at = now;
+        self.last_progress_at = now;
     }
 
     /// Begins another path at its start; the setpoint stands there, or near it.
     pub fn begin_path(&mut self, now: Instant) {
         // A path that begins before the first one is joined begins at the same place.
-        self.from_pad &= self.tracker.along_m <= 0.0;
-        (self.tracker, self.setpoint_m) = (ReferenceState::default(), 0.0);
+        self.path_begins_above_pad &= self.tracker.along_m <= 0.0;
+        (self.tracker, self.setpoint_along_m) = (ReferenceState::default(), 0.0);
         self.phase = Phase::Path;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
         self.ends_away_from_goal = false;
         self.guides_landing = false;
-        self.reported_m = f32::NEG_INFINITY;
-        self.gates_open = 0;
+        self.last_reported_progress_m = f32::NEG_INFINITY;
+        self.open_gate_count = 0;
         self.acknowledged_path = AcknowledgedPath::of_new_path(now);
         // What hindered the vehicle on the other path does not count on this one.
         self.filter.reset();
@@ -108,19 +111,19 @@ impl Guidance {
     /// Begins another path, at the place `along_m` metres along it; the setpoint stands there.
     pub(crate) fn begin_path_at(&mut self, along_m: f32, now: Instant) {
         self.begin_path(now);
-        (self.tracker.along_m, self.setpoint_m) = (along_m, along_m);
+        (self.tracker.along_m, self.setpoint_along_m) = (along_m, along_m);
         self.last_progress_m = along_m;
     }
 
     /// Sets the place along the path where the vehicle is to hold, metres; ∞ for none.
-    pub(crate) fn set_halt_m(&mut self, along_m: f32) {
-        self.halt_m = along_m;
+    pub(crate) fn set_division_hold_m(&mut self, along_m: f32) {
+        self.division_hold_m = along_m;
     }
 
     /// Whether the raw point was set back to where the setpoint stands. Only then may another path
     /// begin, even one that starts a little away from it.
-    pub(crate) fn is_at_rest_on_raw_point(&self) -> bool {
-        self.raw_point_at_rest
+    pub(crate) fn is_raw_point_at_setpoint(&self) -> bool {
+        self.raw_point_at_setpoint
     }
 
     /// Position of the setpoint, ENU metres.
@@ -131,7 +134,7 @@ impl Guidance {
     /// Whether the setpoint has reached the reference, at which a path aside begins: a setpoint
     /// that was stopped short of the reference would first have to fly on.
     pub(crate) fn is_setpoint_at_reference(&self) -> bool {
-        libm::fabsf(self.tracker.along_m - self.setpoint_m) < SETPOINT_AT_REFERENCE_M
+        libm::fabsf(self.tracker.along_m - self.setpoint_along_m) < SETPOINT_AT_REFERENCE_M
     }
 
     /// Whether the setpoint stands, in a descent too.
@@ -140,26 +143,26 @@ impl Guidance {
     }
 
     /// Whether the setpoint stands, outside a descent.
-    pub fn stands_outside_descent(&self) -> bool {
+    pub fn is_setpoint_still_outside_descent(&self) -> bool {
         self.is_setpoint_still() && self.phase != Phase::Descent
     }
 
     /// Whether the setpoint stands because its path leaves the geofence ahead.
     pub fn is_standing_at_fence(&self) -> bool {
-        self.stopped_at_fence && self.stands_outside_descent()
+        self.stopped_at_fence && self.is_setpoint_still_outside_descent()
     }
 
     /// Nearest place along the path at which the vehicle could stop now, metres.
     pub(crate) fn stopping_point_m(&self) -> f32 {
-        let braking_m = self.smoother.stopping_distance_m(Urgency::Smooth);
-        self.tracker.along_m.max(self.setpoint_m + braking_m)
+        let braking_m = self.smoother.stop_distance_m(Urgency::Smooth);
+        self.tracker.along_m.max(self.setpoint_along_m + braking_m)
     }
 
     /// Begins a landing that setpoints lead straight down from where the setpoint stands, to the
     /// height at which the autopilot's landing takes over.
     pub(crate) fn begin_guided_landing(&mut self, now: Instant) {
         self.cancel_evasion();
-        (self.guides_landing, self.progress_at) = (true, now);
+        (self.guides_landing, self.last_progress_at) = (true, now);
     }
 
     /// Holds as [`Self::stop_and_hold`] for a landing that does not begin on the path: no straight
@@ -183,7 +186,7 @@ impl Guidance {
     /// is none.
     pub fn resume_climb(&mut self, position: &Point, now: Instant) {
         self.stop_and_hold(*position);
-        self.followed_at = now;
+        self.followed_or_advanced_at = now;
         self.phase = Phase::Climb;
     }
 
@@ -196,12 +199,13 @@ impl Guidance {
         now: Instant,
     ) {
         self.stop_and_hold(*position);
-        self.followed_at = now;
+        self.followed_or_advanced_at = now;
         let (path, place) = (&plan.path, self.smoother.position());
         let below = path.point_at(path.length_m()).is_some_and(|end| {
-            end.z > place.z && (end - place).xy().norm_squared() < ARRIVED_M * ARRIVED_M
+            end.z > place.z
+                && (end - place).xy().norm_squared() < ARRIVED_WITHIN_M * ARRIVED_WITHIN_M
         });
-        if self.raw_point_at_rest && !(self.phase == Phase::Descent && below) {
+        if self.raw_point_at_setpoint && !(self.phase == Phase::Descent && below) {
             self.phase = Phase::Path;
             let along_m = self.tracker.along_m;
             self.tracker.along_m = nearest_arc_length_m(path, &place, along_m, REJOIN_WINDOW_M);
@@ -209,7 +213,7 @@ impl Guidance {
                 // On its way from its pad, or up its column, to a place that is not the nearest.
                 self.tracker.along_m = along_m;
             }
-            self.setpoint_m = self.tracker.along_m;
+            self.setpoint_along_m = self.tracker.along_m;
         }
         self.start_following(now);
     }
@@ -224,14 +228,14 @@ impl Guidance {
         let from_m = (self.tracker.along_m + braking_m).min(path.length_m());
         let mut back = Path::new();
         let ahead = path.waypoints().iter().find(|w| w.along_m >= from_m);
-        let mut clearance_m = ahead.map_or(0.0, |w| w.clearance_m);
+        let mut clearance_m = ahead.map_or(0.0, |w| w.leg_clearance_m);
         if let Some(turn) = path.point_at(from_m) {
             // `path` had as many points: `turn` takes the place of at least one waypoint ahead.
             let _ = back.push(turn, clearance_m);
         }
         for waypoint in path.waypoints().iter().rev().filter(|w| w.along_m < from_m) {
             let _ = back.push(waypoint.position, clearance_m);
-            clearance_m = waypoint.clearance_m;
+            clearance_m = waypoint.leg_clearance_m;
         }
         let tracker = ReferenceState {
             along_m: from_m - self.tracker.along_m,
@@ -240,18 +244,18 @@ impl Guidance {
         let (phase, leg) = (self.phase, self.leg.take());
         *path = back;
         self.begin_path(now);
-        (self.tracker, self.setpoint_m) = (tracker, tracker.along_m);
+        (self.tracker, self.setpoint_along_m) = (tracker, tracker.along_m);
         self.returning = true;
         match phase {
             Phase::Climb | Phase::Join => (self.phase, self.leg) = (phase, leg),
             Phase::Descent => {
                 // Back up the leg of the descent: what the setpoint still sinks while it brakes is
                 // flown backwards on the new leg.
-                if let (Some(leg), false) = (leg, self.raw_point_at_rest) {
+                if let (Some(leg), false) = (leg, self.raw_point_at_setpoint) {
                     let mut up = Path::new();
                     let ends = (leg.waypoints().last(), leg.waypoints().first());
                     for end in [ends.0, ends.1].into_iter().flatten() {
-                        let _ = up.push(end.position, end.clearance_m);
+                        let _ = up.push(end.position, end.leg_clearance_m);
                     }
                     self.leg_tracker.along_m = leg.length_m() - self.leg_tracker.along_m;
                     self.leg_tracker.speed_mps = -self.leg_tracker.speed_mps;
@@ -265,7 +269,7 @@ impl Guidance {
     /// Forgets the straight leg: the raw point is where the setpoint stands, and the next leg
     /// begins there.
     pub(super) fn forget_leg(&mut self) {
-        self.raw_point_at_rest = true;
+        self.raw_point_at_setpoint = true;
         self.leg = None;
         self.leg_tracker = ReferenceState::default();
         self.tracker.speed_mps = 0.0;

@@ -22,7 +22,7 @@ impl Guidance {
         let smoother = &self.smoother;
         let still = Point::zeros();
         let unknown = scene.telemetry.position_at.is_none() || state == State::PositionLost;
-        if unknown || (!self.leads_to_place && state.needs_new_position()) {
+        if unknown || (!self.setpoint_has_position && state.needs_fresh_position()) {
             return Setpoint::Stop(if smoother.has_setpoint() {
                 smoother.velocity()
             } else {
@@ -40,8 +40,9 @@ impl Guidance {
         let velocity = smoother.velocity() + smoother.acceleration() * lead_s;
         let most = smoother.velocity().length().max(smoother.raw_speed_mps());
         let velocity = velocity * (most / velocity.length().max(most).max(1e-6));
-        let heading =
-            scene.plan.and_then(|plan| task::heading(&plan.task, &plan.path, self.setpoint_m));
+        let heading = scene
+            .plan
+            .and_then(|plan| task::heading(&plan.task, &plan.path, self.setpoint_along_m));
         Setpoint::Move(smoother.position(), velocity, self.sent_acceleration, heading)
     }
 
@@ -49,7 +50,7 @@ impl Guidance {
     pub(super) fn note_place_sent(&mut self) {
         if self.smoother.has_setpoint() {
             self.smoother.mark_sent();
-            self.unsent_s = 0.0;
+            self.since_sent_s = 0.0;
         }
     }
 }

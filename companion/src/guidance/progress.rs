@@ -1,13 +1,13 @@
 //! Progress of the vehicle along its flight: climb, path and descent, and which of them are done.
 
-use planner_core::flight::{PROGRESS_ERROR_M, Path, VehiclePlan};
+use planner_core::flight::{MAX_REPORTED_PROGRESS_LAG_M, Path, VehiclePlan};
 use planner_core::track::deconflict::Method;
 use planner_core::{Length, Point};
 
 use super::motion::clamp_to;
 use super::{
-    ARRIVED_M, AT_REST_MPS, CLIMBED_M, DESCENDED_M, Guidance, GuidanceInputs, LAND_AFTER, Phase,
-    WINDOW_EDGE_M,
+    ARRIVED_WITHIN_M, AT_REST_MPS, CLIMB_DONE_WITHIN_M, DESCENT_DONE_WITHIN_M, Guidance,
+    GuidanceInputs, LAND_MODE_AFTER_REST, Phase, WINDOW_EDGE_M,
 };
 use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
@@ -15,34 +15,35 @@ use crate::time::Instant;
 
 /// Cruise speed up to which the vehicle's place on the path is searched within three times the
 /// greatest lead behind the reference, m/s.
-const LAG_WINDOW_ABOVE_MPS: f32 = 2.0;
-/// Half of the distance searched in addition for each m/s above [`LAG_WINDOW_ABOVE_MPS`], seconds:
-/// the setpoint's curve follows the reference by up to 1.2 s, and the vehicle that curve by 0.4 s.
-const LAG_WINDOW_S: f32 = 1.0;
+const WIDER_LAG_WINDOW_ABOVE_MPS: f32 = 2.0;
+/// Half of the distance searched in addition for each m/s above [`WIDER_LAG_WINDOW_ABOVE_MPS`],
+/// seconds: the setpoint's curve follows the reference by up to 1.2 s, and the vehicle that curve
+/// by 0.4 s.
+const EXTRA_LAG_WINDOW_S: f32 = 1.0;
 
 /// Greatest distance before a gate at which the reference of a vehicle that waits there stands,
 /// metres.
-const STOPS_BEFORE_GATE_M: f32 = 0.05;
-/// A vehicle within [`ARRIVED_M`] of its reference reports its progress at most this far short of
-/// the reference, metres: less than gates allow ([`PROGRESS_ERROR_M`]), since a vehicle stops a
-/// little short of a gate.
-const REPORTED_SHORT_M: f32 = PROGRESS_ERROR_M - STOPS_BEFORE_GATE_M;
+const MAX_STOP_BEFORE_GATE_M: f32 = 0.05;
+/// A vehicle within [`ARRIVED_WITHIN_M`] of its reference reports its progress at most this far
+/// short of the reference, metres: less than gates allow ([`MAX_REPORTED_PROGRESS_LAG_M`]), since a
+/// vehicle stops a little short of a gate.
+const MAX_REPORTED_SHORTFALL_M: f32 = MAX_REPORTED_PROGRESS_LAG_M - MAX_STOP_BEFORE_GATE_M;
 /// Distance below the ground of which a vehicle that has landed reports the progress, metres: every
 /// gate that waits for its flight opens.
 const LANDED_EXTRA_PROGRESS_M: f32 = 1.0;
 /// Distance up to a stop below which a vehicle on its pad does not depart, metres.
-const MIN_DEPARTURE_M: f32 = 0.05;
+const MIN_FREE_PATH_TO_DEPART_M: f32 = 0.05;
 
 impl Guidance {
     /// Whether advice lets the vehicle fly on far enough for its departure to be worth it.
     pub(crate) fn may_depart(&self) -> bool {
-        self.advice.stop_within_m > MIN_DEPARTURE_M
+        self.advice.stop_within_m > MIN_FREE_PATH_TO_DEPART_M
     }
 
     /// Place along the plan's path up to which this vehicle flies while unheard, through gates that
     /// are open or open after a short wait, metres; and the seconds by which those gates delay it
     /// ([`Neighbours::own_unheard_reach`]).
-    pub(crate) fn unheard_reach<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn unheard_end_m_and_delay_s<const V: usize, const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
         neighbours: &Neighbours<V>,
@@ -50,7 +51,7 @@ impl Guidance {
         now: Instant,
     ) -> (f32, u8) {
         let Some(plan) = scene.plan else { return (f32::NEG_INFINITY, 0) };
-        let gates = plan.gates.get(self.gates_open..).unwrap_or_default();
+        let gates = plan.gates.get(self.open_gate_count..).unwrap_or_default();
         let (closed_m, delay_s) = neighbours.own_unheard_reach(gates, progress_m, now);
         (libm::fminf(closed_m, plan.path.length_m()), delay_s)
     }
@@ -69,24 +70,24 @@ impl Guidance {
         let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.is_on_detour()) else {
             return f32::NEG_INFINITY;
         };
-        let gate_m = plan.gates.get(self.gates_open).map_or(f32::INFINITY, |gate| gate.at_m);
+        let gate_m = plan.gates.get(self.open_gate_count).map_or(f32::INFINITY, |gate| gate.at_m);
         gate_m.min(plan.path.length_m())
     }
 
     /// When the reference last advanced along the path by 0.25 m.
     pub fn last_progress_at(&self) -> Instant {
-        self.progress_at
+        self.last_progress_at
     }
 
     /// Arc length reported to neighbours, for their gates, metres: before and in the climb minus
     /// the height still to climb, in the descent beyond the path's length. On one path it never
     /// falls.
-    pub fn progress_m<const W: usize, const G: usize>(
+    pub fn reported_progress_m<const W: usize, const G: usize>(
         &self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> f32 {
-        self.measured_progress_m(state, scene).max(self.reported_m)
+        self.measured_progress_m(state, scene).max(self.last_reported_progress_m)
     }
 
     /// Notes the progress that this vehicle reports. Nobody heard of the way that it flies back in
@@ -96,10 +97,11 @@ impl Guidance {
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
     ) {
-        self.reported_m = match state == State::SwarmLinkLost && self.back_to_m.is_some() {
-            true => self.measured_progress_m(state, scene),
-            false => self.progress_m(state, scene),
-        };
+        self.last_reported_progress_m =
+            match state == State::SwarmLinkLost && self.step_back_to_m.is_some() {
+                true => self.measured_progress_m(state, scene),
+                false => self.reported_progress_m(state, scene),
+            };
     }
 
     pub(crate) fn measured_progress_m<const W: usize, const G: usize>(
@@ -112,33 +114,34 @@ impl Guidance {
         let length_m = path.length_m();
         let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
         let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
-        if state.has_landed() && self.has_reached_end(path) {
+        if state.has_landed() && self.is_reference_at_end_of(path) {
             return length_m + plan.descent_m + LANDED_EXTRA_PROGRESS_M;
         }
         match self.phase {
             Phase::Climb => -clamp_to(start_z - z, 0.0, plan.climb_m),
             Phase::Path | Phase::Descent
-                if self.has_reached_end(path)
+                if self.is_reference_at_end_of(path)
                     && (state == State::Land || self.phase == Phase::Descent) =>
             {
                 length_m + clamp_to(end_z - z, 0.0, plan.descent_m)
             }
-            _ if self.on_path => {
+            _ if self.has_begun_path => {
                 let lead_m = self.track.lead_max_m;
-                let faster_mps = libm::fmaxf(self.track.cruise_mps - LAG_WINDOW_ABOVE_MPS, 0.0);
-                let window_m = 2.0 * lead_m + LAG_WINDOW_S * faster_mps;
+                let faster_mps =
+                    libm::fmaxf(self.track.cruise_mps - WIDER_LAG_WINDOW_ABOVE_MPS, 0.0);
+                let window_m = 2.0 * lead_m + EXTRA_LAG_WINDOW_S * faster_mps;
                 let seen = path.project(
                     &scene.telemetry.position,
                     self.tracker.along_m + lead_m - window_m,
                     window_m,
                 );
-                // Within `ARRIVED_M` of its reference the vehicle reports at least the progress
-                // that gates ask of a vehicle that waits there.
+                // Within `ARRIVED_WITHIN_M` of its reference the vehicle reports at least the
+                // progress that gates ask of a vehicle that waits there.
                 let at = path.point_at(self.tracker.along_m);
-                let arrived =
-                    at.is_some_and(|at| (at - scene.telemetry.position).length() < ARRIVED_M);
+                let arrived = at
+                    .is_some_and(|at| (at - scene.telemetry.position).length() < ARRIVED_WITHIN_M);
                 let least = if arrived {
-                    self.tracker.along_m - REPORTED_SHORT_M
+                    self.tracker.along_m - MAX_REPORTED_SHORTFALL_M
                 } else {
                     f32::NEG_INFINITY
                 };
@@ -150,37 +153,40 @@ impl Guidance {
 
     /// Whether the reference has reached the end of a path that ends at the vehicle's goal: not
     /// aside, not back on the plan's path, not back at the path's start.
-    pub fn is_at_goal<const W: usize, const G: usize>(
+    pub fn is_reference_at_goal<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
         !self.returning
             && !self.ends_away_from_goal
-            && scene.plan.is_some_and(|plan| self.has_reached_end(&plan.path))
+            && scene.plan.is_some_and(|plan| self.is_reference_at_end_of(&plan.path))
     }
 
     /// Whether the reference has reached the end of the path, wherever that leads.
-    pub fn is_at_end<const W: usize, const G: usize>(
+    pub fn is_reference_at_end<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
-        scene.plan.is_some_and(|plan| self.has_reached_end(&plan.path))
+        scene.plan.is_some_and(|plan| self.is_reference_at_end_of(&plan.path))
     }
 
-    pub(super) fn has_reached_end<const W: usize>(&self, path: &Path<W>) -> bool {
-        self.on_path && self.tracker.along_m >= path.length_m()
+    pub(super) fn is_reference_at_end_of<const W: usize>(&self, path: &Path<W>) -> bool {
+        self.has_begun_path && self.tracker.along_m >= path.length_m()
     }
 
     /// Height of the ground below the vehicle as far as the plan says, ENU up, metres: that of the
     /// pad before the path, that of the goal at its end, and between them the lowest that is known.
     // Not inlined: it has many callers, and in each it would take a board's flash.
     #[inline(never)]
-    pub(crate) fn ground_m<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>) -> f32 {
+    pub(crate) fn planned_ground_m<const W: usize, const G: usize>(
+        &self,
+        plan: &VehiclePlan<W, G>,
+    ) -> f32 {
         let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
         let end_m =
             plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);
-        match self.on_path {
-            true if self.has_reached_end(&plan.path) => end_m,
+        match self.has_begun_path {
+            true if self.is_reference_at_end_of(&plan.path) => end_m,
             true => pad_m.min(end_m).min(self.lowest_ground_m),
             false => pad_m,
         }
@@ -197,25 +203,25 @@ impl Guidance {
                 let apart = self.smoother.position() - scene.telemetry.position;
                 // Both setpoint and vehicle have to be at the top: a low climb must not count as
                 // done while the vehicle is on its pad.
-                (self.smoother.position().z - top.position.z).abs() < CLIMBED_M
-                    && self.stands_outside_descent()
-                    && apart.length() < 2.0 * ARRIVED_M
-                    && apart.z.abs() < CLIMBED_M
+                (self.smoother.position().z - top.position.z).abs() < CLIMB_DONE_WITHIN_M
+                    && self.is_setpoint_still_outside_descent()
+                    && apart.length() < 2.0 * ARRIVED_WITHIN_M
+                    && apart.z.abs() < CLIMB_DONE_WITHIN_M
             })
     }
 
     /// Whether the path and the guided descent are flown, so that the autopilot's landing takes
     /// over.
-    pub fn is_path_done<const W: usize, const G: usize>(
+    pub fn is_path_and_descent_done<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
         now: Instant,
     ) -> bool {
         if self.is_algorithm2() {
-            let stands =
-                self.stands_outside_descent() && scene.telemetry.velocity.length() < AT_REST_MPS;
+            let stands = self.is_setpoint_still_outside_descent()
+                && scene.telemetry.velocity.length() < AT_REST_MPS;
             return stands
-                && self.on_path
+                && self.has_begun_path
                 && self.waypoints.is_completed()
                 && !self.ends_away_from_goal;
         }
@@ -225,14 +231,15 @@ impl Guidance {
         // contact only while the setpoint sinks, so a setpoint that stands at the planned ground
         // would wait for it forever.
         let low_m = self.smoother.position().z - low.position.z;
-        let ended =
-            low_m < DESCENDED_M && self.is_setpoint_still() && now - self.progress_at >= LAND_AFTER;
+        let ended = low_m < DESCENT_DONE_WITHIN_M
+            && self.is_setpoint_still()
+            && now - self.last_progress_at >= LAND_MODE_AFTER_REST;
         self.phase == Phase::Descent
             && !self.climbing_back
             && self.is_leg_done()
-            && (scene.telemetry.position.z - low.position.z < DESCENDED_M
+            && (scene.telemetry.position.z - low.position.z < DESCENT_DONE_WITHIN_M
                 || ended
-                || self.guided_descent_m(scene, plan.descent_m) == 0.0)
+                || self.guided_descent_depth_m(scene, plan.descent_m) == 0.0)
     }
 
     /// Whether the vehicle stands at the end of its path, and advice lets it begin its descent from
@@ -242,13 +249,13 @@ impl Guidance {
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
         let Some(plan) = scene.plan else { return false };
-        self.has_reached_end(&plan.path)
+        self.is_reference_at_end_of(&plan.path)
             && !self.is_algorithm2()
             && !self.ends_away_from_goal
-            && self.stands_outside_descent()
+            && self.is_setpoint_still_outside_descent()
             && plan.path.point_at(plan.path.length_m()).is_some_and(|end| {
-                (end - scene.telemetry.position).length() < ARRIVED_M
-                    && (end - self.smoother.position()).length() < ARRIVED_M
+                (end - scene.telemetry.position).length() < ARRIVED_WITHIN_M
+                    && (end - self.smoother.position()).length() < ARRIVED_WITHIN_M
             })
             && scene.telemetry.velocity.length() < AT_REST_MPS
             && (self.advice.stop_within_m > plan.descent_m || self.returning)
@@ -267,8 +274,8 @@ impl Guidance {
         let along_m = plan.path.project(position, self.tracker.along_m, window_m);
         if let (Phase::Descent, Some(last)) = (self.phase, plan.path.waypoints().last()) {
             let away = position - last.position;
-            if (-plan.descent_m - ARRIVED_M..ARRIVED_M).contains(&away.z)
-                && away.xy().length() < ARRIVED_M
+            if (-plan.descent_m - ARRIVED_WITHIN_M..ARRIVED_WITHIN_M).contains(&away.z)
+                && away.xy().length() < ARRIVED_WITHIN_M
             {
                 return true;
             }
@@ -277,19 +284,19 @@ impl Guidance {
             return false;
         }
         plan.path.point_at(along_m).is_some_and(|nearest| {
-            (nearest - position).norm_squared() <= self.free_around_sq(&plan.path, along_m)
+            (nearest - position).norm_squared() <= self.free_radius_sq_m2(&plan.path, along_m)
         })
     }
 
     /// Square of the distance from the path's point at `along_m` up to which the straight way to it
     /// is free of walls, m²: the hull fits where the vehicle is, and within the clearance c around
     /// that point. With d² ≤ c² − r² it then fits everywhere between both.
-    fn free_around_sq<const W: usize>(&self, path: &Path<W>, along_m: f32) -> f32 {
+    fn free_radius_sq_m2<const W: usize>(&self, path: &Path<W>, along_m: f32) -> f32 {
         let mut waypoints = path.waypoints().iter();
         let leg = waypoints.find(|w| w.along_m >= along_m && w.along_m > 0.0);
         // A path back from before its first leg has one point.
         let leg = leg.or(path.waypoints().last());
-        let (clearance_m, radius_m) = (leg.map_or(0.0, |w| w.clearance_m), self.track.radius_m);
+        let (clearance_m, radius_m) = (leg.map_or(0.0, |w| w.leg_clearance_m), self.track.radius_m);
         clearance_m * clearance_m - radius_m * radius_m
     }
 
@@ -302,12 +309,12 @@ impl Guidance {
         let start = scene.plan.and_then(|plan| plan.path.waypoints().first());
         start.is_some_and(|start| {
             let away = scene.telemetry.position - start.position;
-            away.z < ARRIVED_M && self.is_within_start_tolerance(&away)
+            away.z < ARRIVED_WITHIN_M && self.is_within_start_tolerance(&away)
         })
     }
 
     fn is_within_start_tolerance(&self, away: &Point) -> bool {
-        away.xy().length() < self.start_tolerance_m + ARRIVED_M
+        away.xy().length() < self.start_tolerance_m + ARRIVED_WITHIN_M
     }
 
     /// Where the straight leg by which the vehicle joins its path leads from `place`: to its place
@@ -324,15 +331,17 @@ impl Guidance {
         let along_m = self.tracker.along_m;
         let at = path.point_at(along_m)?;
         let away = place - at;
-        let arrived_sq = ARRIVED_M * ARRIVED_M;
-        let free_sq = self.free_around_sq(path, along_m).max(arrived_sq);
+        let arrived_sq = ARRIVED_WITHIN_M * ARRIVED_WITHIN_M;
+        let free_sq = self.free_radius_sq_m2(path, along_m).max(arrived_sq);
         if self.is_algorithm2() || away.norm_squared() <= free_sq {
             return Some(at);
         }
         let beside = away.xy().norm_squared() <= arrived_sq
-            || (self.from_pad && along_m <= 0.0 && self.is_within_start_tolerance(&away));
-        match beside && !self.lands_off_path && away.z < CLIMBED_M {
-            true if away.z < -CLIMBED_M => Some(Point::new(place.x, place.y, at.z)),
+            || (self.path_begins_above_pad
+                && along_m <= 0.0
+                && self.is_within_start_tolerance(&away));
+        match beside && !self.lands_off_path && away.z < CLIMB_DONE_WITHIN_M {
+            true if away.z < -CLIMB_DONE_WITHIN_M => Some(Point::new(place.x, place.y, at.z)),
             true => Some(at),
             false => None,
         }
@@ -343,7 +352,7 @@ impl Guidance {
         &self,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> f32 {
-        let on = scene.plan.and_then(|plan| plan.path.point_at(self.setpoint_m));
+        let on = scene.plan.and_then(|plan| plan.path.point_at(self.setpoint_along_m));
         on.map_or(f32::INFINITY, |on| (on - self.smoother.position()).length())
     }
 
@@ -371,7 +380,7 @@ impl Guidance {
     }
 
     /// Whether the vehicle is in the descent from the end of its path, or of a guided landing.
-    pub(crate) fn is_descending(&self) -> bool {
+    pub(crate) fn is_in_descent(&self) -> bool {
         self.phase == Phase::Descent
     }
 }

@@ -7,11 +7,11 @@ use planner_core::{Length, Point};
 
 use super::smoother::TICK_S;
 use super::{
-    DESCENDED_M, FENCE_HALVINGS, FENCE_MARGIN_M, GUIDED_LANDING_STALL_TIMEOUT, Guidance,
-    GuidanceInputs, LEG_LEAD_M, MIN_LEG_M, Phase, SETTLE_WINDOW_M, TOUCHDOWN_MPS,
+    DESCENT_DONE_WITHIN_M, FENCE_HALVINGS, FENCE_MARGIN_M, GUIDED_LANDING_STALL_TIMEOUT, Guidance,
+    GuidanceInputs, MAX_LEG_LEAD_M, MIN_LEG_M, Phase, REFERENCE_RESET_WINDOW_M, TOUCHDOWN_MPS,
 };
 use crate::autopilot::AutopilotKind;
-use crate::config::limits::MIN_LEG_SPEED_MPS;
+use crate::config::limits::MIN_LEG_SPEED_LIMIT_MPS;
 use crate::guidance::evade::{self, StepBack};
 use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
@@ -33,7 +33,7 @@ impl Guidance {
     ) -> Point {
         let path = &plan.path;
         let raw = self.smoother.raw_point();
-        if core::mem::replace(&mut self.raw_point_at_rest, false) && self.phase == Phase::Path {
+        if core::mem::replace(&mut self.raw_point_at_setpoint, false) && self.phase == Phase::Path {
             (self.phase, self.leg) = (Phase::Join, None);
         }
         if self.phase == Phase::Climb && state != State::Climb && self.is_leg_done() {
@@ -41,7 +41,7 @@ impl Guidance {
         }
         if self.phase == Phase::Path && state == State::Follow && self.may_begin_descent(scene) {
             (self.phase, self.leg) = (Phase::Descent, None);
-            self.progress_at = now;
+            self.last_progress_at = now;
         }
         let target = match self.phase {
             Phase::Hold => return raw,
@@ -53,20 +53,22 @@ impl Guidance {
                 let down_m = if self.climbing_back {
                     0.0
                 } else {
-                    self.guided_descent_m(scene, plan.descent_m)
+                    self.guided_descent_depth_m(scene, plan.descent_m)
                 };
-                let led_m = self.ground_m(plan) + self.guided_descent_end_m(scene);
+                let led_m = self.planned_ground_m(plan) + self.guided_descent_end_height_m(scene);
                 let to_m =
                     if self.guides_landing { libm::fminf(led_m, raw.z) } else { end.z - down_m };
                 Point::new(raw.x, raw.y, to_m)
             }),
             Phase::Path if self.is_algorithm2() => {
                 return self
-                    .next_to_waypoint(path, &scene.telemetry.position, advice)
+                    .next_raw_point_to_waypoint(path, &scene.telemetry.position, advice)
                     .unwrap_or(raw);
             }
             Phase::Path => {
-                return self.next_on_path(path, advice, neighbours, now, step_back).unwrap_or(raw);
+                return self
+                    .next_raw_point_on_path(path, advice, neighbours, now, step_back)
+                    .unwrap_or(raw);
             }
         };
         let Some(target) = target else { return raw };
@@ -78,18 +80,18 @@ impl Guidance {
             (self.leg, self.leg_tracker) = (Some(leg), ReferenceState::default());
         }
         let Some(leg) = &self.leg else { return raw };
-        let advice = Advice { speed_scale: self.descent_scale(plan, leg), ..Advice::FREE };
+        let advice = Advice { speed_scale: self.descent_speed_share(plan, leg), ..Advice::FREE };
         let before_m = self.leg_tracker.along_m;
         let reference =
             track::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
-        self.lead_limit_m = LEG_LEAD_M;
+        self.max_lead_m = MAX_LEG_LEAD_M;
         if self.phase == Phase::Descent && self.leg_tracker.along_m > before_m {
-            self.progress_at = now;
+            self.last_progress_at = now;
         }
         if self.phase == Phase::Join && (leg.length_m() < MIN_LEG_M || self.is_leg_done()) {
             // A leg back up a descent may end beside the path: another leg joins it.
             let beside_m = (target - raw).length();
-            let joined = beside_m < MIN_LEG_M + MIN_LEG_SPEED_MPS * TICK_S;
+            let joined = beside_m < MIN_LEG_M + MIN_LEG_SPEED_LIMIT_MPS * TICK_S;
             (self.phase, self.leg) = (if joined { Phase::Path } else { Phase::Join }, None);
         }
         reference.map_or(raw, |reference| reference.position)
@@ -98,7 +100,7 @@ impl Guidance {
     /// The next raw point of a stop: it brakes along the path or leg, since a stop from high speed
     /// is longer than the raw steps that the smoother's averages still hold.
     pub(super) fn next_braked_raw_point<const W: usize>(&mut self, path: &Path<W>) -> Point {
-        let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
+        let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for_id: 0 };
         let reference = match (self.phase, &self.leg) {
             (Phase::Path, None) => {
                 track::advance(&self.track, path, &mut self.tracker, &stop, TICK_S)
@@ -112,7 +114,7 @@ impl Guidance {
     }
 
     /// The next raw point on the path: forward, or back from below a vehicle that descends.
-    pub(super) fn next_on_path<const V: usize, const W: usize>(
+    pub(super) fn next_raw_point_on_path<const V: usize, const W: usize>(
         &mut self,
         path: &Path<W>,
         advice: &Advice,
@@ -121,7 +123,7 @@ impl Guidance {
         step_back: &mut StepBack,
     ) -> Option<Point> {
         let mut advice = *advice;
-        if let Some(to_m) = self.back_to_m {
+        if let Some(to_m) = self.step_back_to_m {
             let safety_m = self.deconflict.safety_distance_m;
             let near = neighbours.states_with_age(now);
             // The reference steps back only if the filter has checked the path backwards and found
@@ -144,7 +146,7 @@ impl Guidance {
         let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + FENCE_MARGIN_M;
         let allowed = |by_m: f32| {
             let ahead = path.point_at(self.tracker.along_m + by_m);
-            ahead.is_none_or(|ahead| self.smoother.is_place_allowed(&ahead))
+            ahead.is_none_or(|ahead| self.smoother.is_within_fence_slack(&ahead))
         };
         let (mut inside_m, mut outside_m) = (0.0, braking_m + FENCE_MARGIN_M);
         if !allowed(outside_m) {
@@ -155,21 +157,21 @@ impl Guidance {
             advice.stop_within_m = advice.stop_within_m.min(inside_m - FENCE_MARGIN_M);
             self.stopped_at_fence = true;
         }
-        let Reference { position, lead_m, .. } =
+        let Reference { position, lead_limit_m: lead_m, .. } =
             track::advance(&self.track, path, &mut self.tracker, &advice, TICK_S)?;
-        self.lead_limit_m = lead_m;
+        self.max_lead_m = lead_m;
         Some(position)
     }
 
     /// The next raw point by Algorithm 2: straight to the current waypoint, at the advised speed.
-    pub(super) fn next_to_waypoint<const W: usize>(
+    pub(super) fn next_raw_point_to_waypoint<const W: usize>(
         &mut self,
         path: &Path<W>,
         position: &Point,
         advice: &Advice,
     ) -> Option<Point> {
         let (raw, before) = (self.smoother.raw_point(), self.waypoints);
-        let target = self.waypoints.next_waypoint(path, position);
+        let target = self.waypoints.update_current_waypoint(path, position);
         let mut advice = *advice;
         match target {
             None => advice.speed_scale = 0.0,
@@ -195,18 +197,19 @@ impl Guidance {
         let speed = self.leg_tracker.speed_mps.max(0.0);
         let braking_m = speed * speed / (2.0 * self.track.accel_z_mps2.min(self.track.accel_mps2));
         let ahead_m = self.leg_tracker.along_m + braking_m + 2.0 * speed * TICK_S + MIN_LEG_M;
-        if leg.point_at(ahead_m).is_some_and(|ahead| !self.smoother.is_place_allowed(&ahead)) {
+        if leg.point_at(ahead_m).is_some_and(|ahead| !self.smoother.is_within_fence_slack(&ahead)) {
             advice.stop_within_m = braking_m;
             self.stopped_at_fence = true;
         }
         let reference = track::advance(&self.track, leg, &mut self.leg_tracker, &advice, TICK_S)?;
-        self.lead_limit_m = LEG_LEAD_M;
+        self.max_lead_m = MAX_LEG_LEAD_M;
         self.tracker.speed_mps = self.leg_tracker.speed_mps;
         let length_m = path.length_m();
         self.tracker.along_m = if self.waypoints.is_completed() {
             length_m
         } else {
-            let seen_m = path.project(&reference.position, self.tracker.along_m, SETTLE_WINDOW_M);
+            let seen_m =
+                path.project(&reference.position, self.tracker.along_m, REFERENCE_RESET_WINDOW_M);
             seen_m.max(self.tracker.along_m).min((length_m - MIN_LEG_M).max(0.0))
         };
         Some(reference.position)
@@ -219,22 +222,26 @@ impl Guidance {
     }
 
     /// Depth below the end of the path to which setpoints lead the descent, metres: to the ground
-    /// for PX4, else down to `low_height_m` above it. There the autopilot's landing takes over, in
-    /// which the wind may carry the vehicle off.
-    pub(super) fn guided_descent_m<const W: usize, const G: usize>(
+    /// for PX4, else down to `final_descent_height_m` above it. There the autopilot's landing takes
+    /// over, in which the wind may carry the vehicle off.
+    pub(super) fn guided_descent_depth_m<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
         descent_m: f32,
     ) -> f32 {
-        libm::fmaxf(descent_m - self.guided_descent_end_m(scene), 0.0)
+        libm::fmaxf(descent_m - self.guided_descent_end_height_m(scene), 0.0)
     }
 
     /// Height above the ground at which setpoints end their descent, metres: 0 for PX4.
-    fn guided_descent_end_m<const W: usize, const G: usize>(
+    fn guided_descent_end_height_m<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> f32 {
-        if scene.telemetry.kind == Some(AutopilotKind::Px4) { 0.0 } else { self.low_height_m }
+        if scene.telemetry.kind == Some(AutopilotKind::Px4) {
+            0.0
+        } else {
+            self.final_descent_height_m
+        }
     }
 
     /// Whether setpoints lead the landing down in this step: once the setpoint stands, and while no
@@ -249,23 +256,25 @@ impl Guidance {
         if !self.guides_landing || state != State::Land {
             return false;
         }
-        if self.phase != Phase::Descent && self.raw_point_at_rest {
+        if self.phase != Phase::Descent && self.raw_point_at_setpoint {
             (self.phase, self.leg) = (Phase::Descent, None);
         }
         let down = |leg: &Path<2>| {
             let low = leg.waypoints().last();
             self.is_leg_done()
-                && low.is_some_and(|low| scene.telemetry.position.z - low.position.z < DESCENDED_M)
+                && low.is_some_and(|low| {
+                    scene.telemetry.position.z - low.position.z < DESCENT_DONE_WITHIN_M
+                })
         };
         let ended = self.phase == Phase::Descent && self.leg.as_ref().is_some_and(down);
-        self.guides_landing = !ended && now - self.progress_at < GUIDED_LANDING_STALL_TIMEOUT;
+        self.guides_landing = !ended && now - self.last_progress_at < GUIDED_LANDING_STALL_TIMEOUT;
         self.guides_landing && self.phase == Phase::Descent && self.filter.column_clear()
     }
 
     /// Share of the leg's speed for a descent, such that it is no faster than [`TOUCHDOWN_MPS`]
-    /// from `low_height_m` above the ground on: within that margin to walls the real ground may
-    /// already lie.
-    fn descent_scale<const W: usize, const G: usize>(
+    /// from `final_descent_height_m` above the ground on: within that margin to walls the real
+    /// ground may already lie.
+    fn descent_speed_share<const W: usize, const G: usize>(
         &self,
         plan: &VehiclePlan<W, G>,
         leg: &Path<2>,
@@ -275,8 +284,9 @@ impl Guidance {
         else {
             return 1.0;
         };
-        let over_m =
-            top.position.z - self.leg_tracker.along_m - (self.ground_m(plan) + self.low_height_m);
+        let over_m = top.position.z
+            - self.leg_tracker.along_m
+            - (self.planned_ground_m(plan) + self.final_descent_height_m);
         let most_mps = fpu::sqrtf(
             TOUCHDOWN_MPS * TOUCHDOWN_MPS
                 + 2.0 * self.leg_track.accel_z_mps2 * libm::fmaxf(over_m, 0.0),

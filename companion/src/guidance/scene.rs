@@ -17,7 +17,7 @@ pub struct GuidanceInputs<'a, const W: usize, const G: usize> {
     /// MAVLink system id of the vehicle.
     pub id: u8,
     /// Where that path comes from.
-    pub source: PathSource,
+    pub path_source: PathSource,
 }
 
 /// Where the path that a vehicle flies comes from.
@@ -35,16 +35,16 @@ impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
         plan: Option<&'a VehiclePlan<W, G>>,
         telemetry: &'a Telemetry,
         (rank, id): (u16, u8),
-        source: PathSource,
+        path_source: PathSource,
     ) -> Self {
         let plan = plan.filter(|plan| !plan.path.waypoints().is_empty());
-        Self { plan, telemetry, rank, id, source }
+        Self { plan, telemetry, rank, id, path_source }
     }
 
     /// Whether the vehicle's position is known: once known it counts as such, but in states in
     /// which somebody else may fly the vehicle only while it is new.
-    pub(crate) fn is_place_known(&self, state: State, now: Instant) -> bool {
-        match state.needs_new_position() {
+    pub(crate) fn is_position_usable(&self, state: State, now: Instant) -> bool {
+        match state.needs_fresh_position() {
             true => self.telemetry.position_age(now) < MAX_POSITION_AGE,
             false => self.telemetry.position_at.is_some(),
         }
@@ -52,6 +52,6 @@ impl<'a, const W: usize, const G: usize> GuidanceInputs<'a, W, G> {
 
     /// Whether the path is a detour, not that of the shared plan.
     pub(crate) fn is_on_detour(&self) -> bool {
-        self.source == PathSource::Detour
+        self.path_source == PathSource::Detour
     }
 }

@@ -29,7 +29,7 @@ pub enum Setpoint {
 
 /// Horizontal acceleration from the vehicle towards the setpoint, for an autopilot that adds it to
 /// what its own loops command. Vertically its own loops are stiff enough: 0.
-pub(super) fn position_correction(
+pub(super) fn correction_acceleration(
     position: &Point,
     velocity: &Point,
     telemetry: &Telemetry,

@@ -20,7 +20,7 @@
 //!   acceleration and jerk exactly, beside the geofence too ([`super::fence`]).
 //!
 //! ENU metres, seconds. Work: 2·[`MAX_WINDOW_TICKS`] vector sums for each tick, at most
-//! [`MAX_TICKS`] ticks a step.
+//! [`MAX_TICKS_PER_STEP`] ticks a step.
 
 mod clock;
 
@@ -30,23 +30,23 @@ use planner_core::{Length, Point};
 
 use super::fence::Fence;
 use super::motion::{Motion, clamp_length};
-use crate::config::limits::{MAX_SMOOTHING_S, MotionLimits, Urgency};
+use crate::config::limits::{MAX_SMOOTHING_WINDOW_S, MotionLimits, Urgency};
 
 /// Time between two raw points, seconds: the period of the setpoints.
 pub const TICK_S: f32 = 0.05;
 /// Maximum number of raw points taken in one step: a later step moves the setpoint no further.
-pub const MAX_TICKS: u8 = 4;
+pub const MAX_TICKS_PER_STEP: u8 = 4;
 /// Longest window of each moving average, in ticks of [`TICK_S`].
-const MAX_WINDOW_TICKS: usize = (MAX_SMOOTHING_S / TICK_S + 0.5) as usize;
+const MAX_WINDOW_TICKS: usize = (MAX_SMOOTHING_WINDOW_S / TICK_S + 0.5) as usize;
 /// Shortest window of each moving average, in ticks.
 const MIN_WINDOW_TICKS: usize = 8;
 /// Factor by which the averages' jerk stays below the limit: the rest is for corners and the clock.
-const JERK_RESERVE: f32 = 1.12;
+const JERK_RESERVE_FACTOR: f32 = 1.12;
 /// Number of raw steps that enter one value of both averages.
 const HISTORY_LEN: usize = 2 * MAX_WINDOW_TICKS - 1;
 /// Share of the jerk limit with which a stop by the clock is assumed to begin, in steps of 50 ms:
 /// the curve may need the rest.
-const CLOCK_JERK_SHARE: f32 = 0.7;
+const STOP_BEGIN_JERK_SHARE: f32 = 0.7;
 /// Share of the jerk limit with which the end of a change of speed is planned: the curve may need
 /// the rest.
 const END_JERK_SHARE: f32 = 0.4;
@@ -61,12 +61,12 @@ const STOP_MARGIN_M: f32 = 0.02;
 /// moves faster is an estimate that jumps.
 const MAX_FOLLOWED_MPS: f32 = 15.0;
 /// Longest gap between setpoints during which the vehicle still flies by the last one, seconds.
-const MAX_SETPOINT_GAP_S: f32 = 0.3;
+const MAX_CONTINUED_GAP_S: f32 = 0.3;
 /// Weight of the newest step in the velocity of a followed vehicle: its position is reported in
 /// steps.
 const FOLLOWED_VELOCITY_GAIN: f32 = 0.25;
 /// Greatest velocity after following a vehicle, as a multiple of the followed velocity.
-const MAX_SPEED_OVER_FOLLOWED: f32 = 1.5;
+const MAX_SPEED_TO_FOLLOWED_RATIO: f32 = 1.5;
 /// Distance outside the fence up to which a raw point is moved inside without a report, metres.
 const FENCE_SLACK_M: f32 = 0.01;
 /// Distance by which a raw step may exceed the speed limit, metres: rounding at a kilometre from
@@ -89,13 +89,13 @@ pub struct SetpointStats {
     /// Setpoints made.
     pub setpoint_count: u32,
     /// Greatest distance between two setpoints, divided by the time between them, m/s.
-    pub speed_mps: f32,
+    pub max_speed_mps: f32,
     /// Greatest acceleration, m/s².
-    pub accel_mps2: f32,
+    pub max_accel_mps2: f32,
     /// Greatest jerk outside stops by the safety filter, m/s³.
-    pub jerk_mps3: f32,
+    pub max_jerk_mps3: f32,
     /// Greatest jerk in a stop by the safety filter, m/s³.
-    pub urgent_jerk_mps3: f32,
+    pub max_urgent_jerk_mps3: f32,
     /// Steps whose raw points were not finite, outside the geofence or too far from the last: the
     /// smoother held instead of following them.
     pub hold_count: u32,
@@ -108,12 +108,12 @@ pub struct SetpointSmoother {
     fence: Option<Fence>,
     average_ticks: usize,
     /// Newest raw point.
-    raw: Point,
-    /// The last differences between raw points, a ring; `newest_step` is the newest.
-    steps: [Point; HISTORY_LEN],
-    newest_step: usize,
+    newest_raw_point: Point,
+    /// The last differences between raw points, a ring; `newest_step_index` is the newest.
+    raw_steps: [Point; HISTORY_LEN],
+    newest_step_index: usize,
     /// Newest value of the averages, and its last three steps, oldest first.
-    average: Point,
+    averaged_point: Point,
     average_steps: [Point; 3],
     /// Time since the last tick, as a share of a tick.
     tick_fraction: f32,
@@ -123,9 +123,9 @@ pub struct SetpointSmoother {
     /// Whether there is a setpoint, from which the next one continues.
     has_setpoint: bool,
     /// Place of the setpoint that was sent last; `None` before the first.
-    last_sent: Option<Point>,
+    last_sent_position: Option<Point>,
     /// Whether the setpoint continues after a short gap, for which the next step makes up.
-    resumes: bool,
+    resumes_after_gap: bool,
     /// Velocity with which setpoints follow a vehicle that its pilot or autopilot flies.
     followed_velocity: Point,
     /// Of the step under way: its length, whether the safety filter stops, whether all raw points
@@ -147,17 +147,17 @@ impl SetpointSmoother {
             limits,
             fence: fence.map(Fence::new),
             average_ticks: ticks_per_average(&limits),
-            raw: Point::zeros(),
-            steps: [Point::zeros(); HISTORY_LEN],
-            newest_step: 0,
-            average: Point::zeros(),
+            newest_raw_point: Point::zeros(),
+            raw_steps: [Point::zeros(); HISTORY_LEN],
+            newest_step_index: 0,
+            averaged_point: Point::zeros(),
             average_steps: [Point::zeros(); 3],
             tick_fraction: 0.0,
             clock_speed: 1.0,
             clock_acceleration: 0.0,
             has_setpoint: false,
-            last_sent: None,
-            resumes: false,
+            last_sent_position: None,
+            resumes_after_gap: false,
             followed_velocity: Point::zeros(),
             dt_s: 0.0,
             urgency: Urgency::Smooth,
@@ -172,7 +172,7 @@ impl SetpointSmoother {
     pub(crate) fn set_limits(&mut self, limits: MotionLimits, fence: Option<(Point, Point)>) {
         (self.limits, self.fence, self.average_ticks) =
             (limits, fence.map(Fence::new), ticks_per_average(&limits));
-        self.forget_curve();
+        self.restart_curve_at_setpoint();
     }
 
     /// Whether there is a setpoint, from which the next one continues.
@@ -202,16 +202,16 @@ impl SetpointSmoother {
 
     /// The raw point. It is ahead of the setpoint by the steps that the averages still hold.
     pub(crate) fn raw_point(&self) -> Point {
-        self.raw
+        self.newest_raw_point
     }
 
     /// Speed of the newest raw step, m/s: the setpoint has it T later, if the clock runs on.
     pub(crate) fn raw_speed_mps(&self) -> f32 {
-        self.steps[self.newest_step].length() / TICK_S * self.clock_speed
+        self.raw_steps[self.newest_step_index].length() / TICK_S * self.clock_speed
     }
 
     /// Greatest jerk of a setpoint, m/s³.
-    pub(crate) fn jerk_mps3(&self, urgency: Urgency) -> f32 {
+    pub(crate) fn max_jerk_mps3(&self, urgency: Urgency) -> f32 {
         self.limits.jerk(urgency)
     }
 
@@ -233,14 +233,14 @@ impl SetpointSmoother {
 
     /// Length of a stop of the setpoint that begins now, metres: while the braking builds up, and
     /// while the setpoint brakes.
-    pub(crate) fn stopping_distance_m(&self, urgency: Urgency) -> f32 {
+    pub(crate) fn stop_distance_m(&self, urgency: Urgency) -> f32 {
         let velocity = self.velocity();
         let speed = sqrtf(velocity.norm_squared());
         if speed < FULL_STOP_MPS {
             return 0.0;
         }
         let accel = self.limits.accel_along(&(velocity / speed));
-        let jerk = CLOCK_JERK_SHARE * self.limits.jerk(urgency);
+        let jerk = STOP_BEGIN_JERK_SHARE * self.limits.jerk(urgency);
         let ahead = fmaxf(self.acceleration().dot(&velocity) / speed, 0.0);
         let build_up_s = (accel + ahead) / jerk + TICK_S;
         let end_s =
@@ -251,66 +251,67 @@ impl SetpointSmoother {
             + STOP_MARGIN_M
     }
 
-    /// Begins setpoints at a place, `unsent_s` after one was sent last. After a gap shorter than
-    /// [`MAX_SETPOINT_GAP_S`] the last setpoint continues instead, as the autopilot has done.
-    pub(crate) fn resume_at(&mut self, place: Point, unsent_s: f32) {
+    /// Begins setpoints at a place, `since_sent_s` after one was sent last. After a gap shorter
+    /// than [`MAX_CONTINUED_GAP_S`] the last setpoint continues instead, as the autopilot has done.
+    pub(crate) fn resume_at(&mut self, place: Point, since_sent_s: f32) {
         if !self.has_setpoint
-            && self.last_sent == Some(self.position())
-            && unsent_s < MAX_SETPOINT_GAP_S
+            && self.last_sent_position == Some(self.position())
+            && since_sent_s < MAX_CONTINUED_GAP_S
         {
-            (self.has_setpoint, self.resumes) = (true, true);
-            self.forget_curve();
+            (self.has_setpoint, self.resumes_after_gap) = (true, true);
+            self.restart_curve_at_setpoint();
         } else {
-            self.begin_at(place, unsent_s);
+            self.begin_at(place, since_sent_s);
         }
     }
 
     /// Begins at rest at a place, no further from the place sent last than a followed vehicle flies
-    /// in `unsent_s`: an estimate that jumps is no motion.
-    pub(crate) fn begin_at(&mut self, place: Point, unsent_s: f32) {
+    /// in `since_sent_s`: an estimate that jumps is no motion.
+    pub(crate) fn begin_at(&mut self, place: Point, since_sent_s: f32) {
         let place = if place.iter().all(|c| c.is_finite()) {
             self.nearest_inside_fence(place)
         } else {
             self.position()
         };
-        let place = self
-            .last_sent
-            .map_or(place, |sent| sent + clamp_length(place - sent, MAX_FOLLOWED_MPS * unsent_s));
+        let place = self.last_sent_position.map_or(place, |sent| {
+            sent + clamp_length(place - sent, MAX_FOLLOWED_MPS * since_sent_s)
+        });
         self.motion = Motion::at_rest(place);
-        (self.has_setpoint, self.resumes, self.followed_velocity) = (true, false, Point::zeros());
-        self.forget_curve();
+        (self.has_setpoint, self.resumes_after_gap, self.followed_velocity) =
+            (true, false, Point::zeros());
+        self.restart_curve_at_setpoint();
     }
 
-    /// Sets the setpoint to the place of a vehicle that its pilot or autopilot flies, `unsent_s`
-    /// after a setpoint was sent last, and estimates its velocity.
-    pub(crate) fn follow_vehicle(&mut self, place: Point, unsent_s: f32) {
+    /// Sets the setpoint to the place of a vehicle that its pilot or autopilot flies,
+    /// `since_sent_s` after a setpoint was sent last, and estimates its velocity.
+    pub(crate) fn follow_vehicle(&mut self, place: Point, since_sent_s: f32) {
         let (here, was_live, followed) =
             (self.position(), self.has_setpoint, self.followed_velocity);
-        self.begin_at(place, unsent_s);
-        if was_live && unsent_s > 0.0 {
+        self.begin_at(place, since_sent_s);
+        if was_live && since_sent_s > 0.0 {
             self.followed_velocity = followed
-                + ((self.position() - here) / unsent_s - followed) * FOLLOWED_VELOCITY_GAIN;
+                + ((self.position() - here) / since_sent_s - followed) * FOLLOWED_VELOCITY_GAIN;
         }
     }
 
     /// Whether the next step makes up for a gap, and is as long as the time since the last sending.
     pub(crate) fn makes_up_for_gap(&self) -> bool {
-        self.resumes
+        self.resumes_after_gap
     }
 
     /// Notes that the setpoint was sent.
     pub(crate) fn mark_sent(&mut self) {
-        self.last_sent = Some(self.position());
+        self.last_sent_position = Some(self.position());
     }
 
     /// Gives the setpoint the vehicle's velocity: the setpoint brakes from that, and returns to its
     /// place. The velocity is limited to 1.5 times the followed velocity
-    /// ([`MAX_SPEED_OVER_FOLLOWED`]), to the speed limit, and so that the setpoint can stop inside
-    /// the fence.
-    pub(crate) fn hold_with_velocity(&mut self, velocity: &Point) {
+    /// ([`MAX_SPEED_TO_FOLLOWED_RATIO`]), to the speed limit, and so that the setpoint can stop
+    /// inside the fence.
+    pub(crate) fn brake_from_velocity(&mut self, velocity: &Point) {
         let most_mps = fminf(
             self.limits.max_speed_mps(),
-            MAX_SPEED_OVER_FOLLOWED * self.followed_velocity.length(),
+            MAX_SPEED_TO_FOLLOWED_RATIO * self.followed_velocity.length(),
         );
         let velocity = clamp_length(*velocity, most_mps);
         if velocity.iter().all(|c| c.is_finite()) {
@@ -323,10 +324,10 @@ impl SetpointSmoother {
 
     /// Restarts the curve at the setpoint, which has to be slow: the follower brings it to rest
     /// within its own limits.
-    pub(crate) fn forget_curve(&mut self) {
-        self.steps = [Point::zeros(); HISTORY_LEN];
+    pub(crate) fn restart_curve_at_setpoint(&mut self) {
+        self.raw_steps = [Point::zeros(); HISTORY_LEN];
         self.average_steps = [Point::zeros(); 3];
-        (self.raw, self.average) = (self.position(), self.position());
+        (self.newest_raw_point, self.averaged_point) = (self.position(), self.position());
         (self.tick_fraction, self.clock_speed, self.clock_acceleration) = (0.0, 1.0, 0.0);
         self.curve_acceleration = Point::zeros();
     }
@@ -337,7 +338,7 @@ impl SetpointSmoother {
     }
 
     /// Whether a place is inside the fence, or at most 1 cm outside.
-    pub(crate) fn is_place_allowed(&self, place: &Point) -> bool {
+    pub(crate) fn is_within_fence_slack(&self, place: &Point) -> bool {
         (self.nearest_inside_fence(*place) - place).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M
     }
 
@@ -348,9 +349,11 @@ impl SetpointSmoother {
             self.dt_s = 0.0;
             return 0;
         }
-        let resumes = core::mem::take(&mut self.resumes);
-        self.dt_s =
-            fminf(dt_s, if resumes { MAX_SETPOINT_GAP_S } else { f32::from(MAX_TICKS) * TICK_S });
+        let resumes = core::mem::take(&mut self.resumes_after_gap);
+        self.dt_s = fminf(
+            dt_s,
+            if resumes { MAX_CONTINUED_GAP_S } else { f32::from(MAX_TICKS_PER_STEP) * TICK_S },
+        );
         // A stop by the safety filter keeps its higher jerk until it no longer brakes.
         let brakes =
             self.clock_acceleration < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
@@ -362,7 +365,7 @@ impl SetpointSmoother {
         let clock_before = self.clock_speed;
         self.run_clock(pace, self.dt_s);
         self.tick_fraction += 0.5 * (clock_before + self.clock_speed) * self.dt_s / TICK_S;
-        let due = (self.tick_fraction as u8).min(MAX_TICKS);
+        let due = (self.tick_fraction as u8).min(MAX_TICKS_PER_STEP);
         // After a gap the curve is one point.
         self.tick_fraction =
             if resumes { 0.0 } else { fmaxf(self.tick_fraction - f32::from(due), 0.0) };
@@ -373,7 +376,7 @@ impl SetpointSmoother {
     /// or not finite, leaves the raw point where it is. Either makes [`Self::make_setpoint`] return
     /// false.
     pub(crate) fn push_raw_point(&mut self, next: Point) {
-        let step = self.nearest_inside_fence(next) - self.raw;
+        let step = self.nearest_inside_fence(next) - self.newest_raw_point;
         let furthest = self.limits.max_speed_mps() * TICK_S + STEP_SLACK_M;
         // False for NaN.
         let near = step.norm_squared() <= furthest * furthest;
@@ -400,29 +403,30 @@ impl SetpointSmoother {
             self.stats.hold_count = self.stats.hold_count.saturating_add(1);
         }
         if !to.is_finite() {
-            self.forget_curve();
+            self.restart_curve_at_setpoint();
             return false;
         }
         self.curve_acceleration = acceleration;
         let before = self.motion;
         let jerk_mps3 = self.limits.jerk(self.urgency);
         self.motion.follow(&to, &self.limits, self.fence.as_ref(), jerk_mps3, dt_s);
-        self.hold_inside();
+        self.clamp_inside_fence();
         let step_m = (self.motion.position - before.position).length();
         let jerk_mps3 = (self.motion.acceleration - before.acceleration).length() / dt_s;
         let worst = match self.urgency {
-            Urgency::Smooth => &mut self.stats.jerk_mps3,
-            Urgency::Urgent => &mut self.stats.urgent_jerk_mps3,
+            Urgency::Smooth => &mut self.stats.max_jerk_mps3,
+            Urgency::Urgent => &mut self.stats.max_urgent_jerk_mps3,
         };
         *worst = fmaxf(*worst, jerk_mps3);
-        self.stats.speed_mps = fmaxf(self.stats.speed_mps, (step_m - STEP_SLACK_M) / dt_s);
-        self.stats.accel_mps2 = fmaxf(self.stats.accel_mps2, self.motion.acceleration.length());
+        self.stats.max_speed_mps = fmaxf(self.stats.max_speed_mps, (step_m - STEP_SLACK_M) / dt_s);
+        self.stats.max_accel_mps2 =
+            fmaxf(self.stats.max_accel_mps2, self.motion.acceleration.length());
         sound
     }
 
     /// The follower stops before the fence. If rounding of uneven steps still leads outside, the
     /// setpoint is set back inside at once: the fence comes before smoothness.
-    fn hold_inside(&mut self) {
+    fn clamp_inside_fence(&mut self) {
         let place = self.nearest_inside_fence(self.motion.position);
         for axis in 0..3 {
             if place[axis] != self.motion.position[axis] {
@@ -434,35 +438,35 @@ impl SetpointSmoother {
 
     /// Adds a raw step, and computes the new value of the averages.
     fn push_raw_step(&mut self, step: Point) {
-        self.raw += step;
-        self.newest_step =
-            if self.newest_step == 0 { HISTORY_LEN - 1 } else { self.newest_step - 1 };
-        self.steps[self.newest_step] = step;
+        self.newest_raw_point += step;
+        self.newest_step_index =
+            if self.newest_step_index == 0 { HISTORY_LEN - 1 } else { self.newest_step_index - 1 };
+        self.raw_steps[self.newest_step_index] = step;
         // Both averages at once: a triangle of 2n − 1 weights.
         let n = self.average_ticks;
         let scale = 1.0 / (n * n) as f32;
         let (mut slope, mut behind) = (Point::zeros(), Point::zeros());
         let mut tail = 1.0;
         for i in 0..2 * n - 1 {
-            let at = if self.newest_step + i < HISTORY_LEN {
-                self.newest_step + i
+            let at = if self.newest_step_index + i < HISTORY_LEN {
+                self.newest_step_index + i
             } else {
-                self.newest_step + i - HISTORY_LEN
+                self.newest_step_index + i - HISTORY_LEN
             };
             let weight = (if i < n { i + 1 } else { 2 * n - 1 - i }) as f32 * scale;
-            slope += self.steps[at] * weight;
+            slope += self.raw_steps[at] * weight;
             tail -= weight;
-            behind += self.steps[at] * tail;
+            behind += self.raw_steps[at] * tail;
         }
         self.average_steps = [self.average_steps[1], self.average_steps[2], slope];
-        self.average = self.raw - behind;
+        self.averaged_point = self.newest_raw_point - behind;
     }
 
     /// Place, velocity and acceleration of the curve at the clock's place in the tick.
     fn curve_motion(&self) -> (Point, Point, Point) {
         let [e0, e1, e2] = &self.average_steps;
         let (x, y) = (self.tick_fraction, 1.0 - self.tick_fraction);
-        let second = self.average - e2 - e1;
+        let second = self.averaged_point - e2 - e1;
         let place = second
             + (e1 * (1.0 + 3.0 * x + 3.0 * x * x - 2.0 * x * x * x) + e2 * (x * x * x)
                 - e0 * (y * y * y))
@@ -476,7 +480,8 @@ impl SetpointSmoother {
 /// Number of ticks in each average's window: long enough for the limit of jerk.
 fn ticks_per_average(limits: &MotionLimits) -> usize {
     let n = libm::ceilf(
-        2.0 * JERK_RESERVE * limits.accel_mps2 / (limits.jerk(Urgency::Smooth) * TICK_S) - 1e-3,
+        2.0 * JERK_RESERVE_FACTOR * limits.accel_mps2 / (limits.jerk(Urgency::Smooth) * TICK_S)
+            - 1e-3,
     ) as usize;
     n.clamp(MIN_WINDOW_TICKS, MAX_WINDOW_TICKS)
 }

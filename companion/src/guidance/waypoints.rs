@@ -18,28 +18,28 @@ const WP_RADIUS_M: f32 = 0.4;
 /// The paper's `nWaypoint`, the index of the current waypoint, and whether the path is completed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Algorithm2Waypoints {
-    next: usize,
+    current_index: usize,
     completed: bool,
 }
 
 impl Algorithm2Waypoints {
     /// One turn of Algorithm 2's loop for a vehicle at `position`. Returns the waypoint that it
     /// flies to; `None` once the path is completed.
-    pub(super) fn next_waypoint<const W: usize>(
+    pub(super) fn update_current_waypoint<const W: usize>(
         &mut self,
         path: &Path<W>,
         position: &Point,
     ) -> Option<Point> {
         let points = path.waypoints();
-        let goal = points.get(self.next)?.position;
+        let goal = points.get(self.current_index)?.position;
         if (goal - position).length() < WP_RADIUS_M {
-            if self.next + 1 < points.len() {
-                self.next += 1;
+            if self.current_index + 1 < points.len() {
+                self.current_index += 1;
             } else {
                 self.completed = true;
             }
         }
-        (!self.completed).then(|| points[self.next].position)
+        (!self.completed).then(|| points[self.current_index].position)
     }
 
     /// Whether the last waypoint was reached.

@@ -43,7 +43,7 @@ pub(crate) enum AnswerKind {
     /// COMMAND_ACK.
     Ack,
     /// TIMESYNC.
-    Time,
+    Timesync,
     /// PARAM_VALUE and PARAM_ERROR.
     Parameter,
     /// The message that a REQUEST_MESSAGE requests.

@@ -51,7 +51,7 @@ pub struct PhotographedReport {
     pub flies: bool,
     /// Whether the ranges are all the waypoints that the sender's plan leaves out. If false, they
     /// are waypoints that it knows to be photographed, or a part of them.
-    pub is_left_out_by_plan: bool,
+    pub are_ranges_left_out_by_plan: bool,
     /// Photographed waypoints, as ranges of their numbers along all lanes of the area.
     pub ranges: Vec<WaypointRange, MAX_RANGES>,
 }
@@ -83,7 +83,7 @@ impl PhotographedReport {
             VERSION,
             self.system_id,
             self.round,
-            u8::from(self.flies) | u8::from(self.is_left_out_by_plan) << 1,
+            u8::from(self.flies) | u8::from(self.are_ranges_left_out_by_plan) << 1,
             count,
             0,
         ]);
@@ -117,7 +117,7 @@ impl PhotographedReport {
             mission_crc: u32::from_le_bytes([body[6], body[7], body[8], body[9]]),
             round: body[2],
             flies: body[3] & 1 != 0,
-            is_left_out_by_plan: body[3] & 2 != 0,
+            are_ranges_left_out_by_plan: body[3] & 2 != 0,
             ranges: ranges.iter().map(decode_range).collect(),
         })
     }

@@ -9,7 +9,7 @@ use crate::time::{Duration, Instant};
 
 /// Number of sent intents that are stored: those of three seconds at the default rate.
 const MAX_SENT_INTENTS: usize = 16;
-/// Unit of [`IntentEcho::held`], the time between reception of an intent and its echo.
+/// Unit of [`IntentEcho::held_ticks`], the time between reception of an intent and its echo.
 const HELD_TICK: Duration = Duration::from_millis(10);
 /// Greatest delay that an echo can show, seconds: a wrong echo cannot make a vehicle's messages
 /// count as arbitrarily late.
@@ -28,7 +28,7 @@ pub struct IntentEcho {
     /// MAVLink sequence number of the other vehicle's intent.
     pub sequence: u8,
     /// Time from the reception of that intent to its echo, in units of 10 ms, at most 254.
-    pub held: u8,
+    pub held_ticks: u8,
 }
 
 impl IntentEcho {
@@ -39,7 +39,7 @@ impl IntentEcho {
         let held = u8::try_from(held.as_micros() / HELD_TICK.as_micros())
             .ok()
             .filter(|held| *held < u8::MAX)?;
-        Some(Self { rank, sequence, held })
+        Some(Self { rank, sequence, held_ticks: held })
     }
 }
 
@@ -49,7 +49,7 @@ pub(crate) struct ReportedPath {
     /// Where the vehicle is.
     pub(crate) along_m: f32,
     /// Where the intent's points end.
-    pub(crate) ends_m: f32,
+    pub(crate) points_end_m: f32,
 }
 
 /// An intent that this vehicle sent: sequence number, time of sending, and the reported path.
@@ -66,7 +66,7 @@ pub(crate) struct SentIntents {
     ring: [Option<SentIntent>; MAX_SENT_INTENTS],
     count: usize,
     /// When the newest intent was sent that is known to have arrived.
-    arrived: Instant,
+    newest_arrived_sent_at: Instant,
 }
 
 impl SentIntents {
@@ -87,8 +87,8 @@ impl SentIntents {
     /// The sent intent whose arrival this echo shows, now stored as the newest that arrived. `None`
     /// if a newer one has arrived before, or if the intent is no longer stored.
     pub(crate) fn note_arrival(&mut self, echo: &IntentEcho) -> Option<SentIntent> {
-        let sent = self.find(echo).filter(|sent| sent.at > self.arrived)?;
-        self.arrived = sent.at;
+        let sent = self.find(echo).filter(|sent| sent.at > self.newest_arrived_sent_at)?;
+        self.newest_arrived_sent_at = sent.at;
         Some(sent)
     }
 
@@ -96,7 +96,7 @@ impl SentIntents {
     /// intent is no longer stored.
     pub(crate) fn message_delay_s(&self, echo: &IntentEcho, now: Instant) -> Option<f32> {
         let round_s = (now - self.find(echo)?.at).as_secs_f32()
-            - f32::from(echo.held) * HELD_TICK.as_secs_f32();
+            - f32::from(echo.held_ticks) * HELD_TICK.as_secs_f32();
         Some((0.5 * round_s).clamp(0.0, MAX_DELAY_S))
     }
 }
@@ -106,20 +106,20 @@ impl SentIntents {
 pub(crate) struct MessageDelay {
     /// The estimate, seconds.
     pub(crate) delay_s: f32,
-    known: bool,
+    measured: bool,
 }
 
 impl Default for MessageDelay {
     fn default() -> Self {
-        Self { delay_s: ASSUMED_DELAY_S, known: false }
+        Self { delay_s: ASSUMED_DELAY_S, measured: false }
     }
 }
 
 impl MessageDelay {
     pub(crate) fn update(&mut self, delay_s: f32) {
-        let share = if self.known && delay_s < self.delay_s { FALLING_DELAY_GAIN } else { 1.0 };
+        let share = if self.measured && delay_s < self.delay_s { FALLING_DELAY_GAIN } else { 1.0 };
         self.delay_s += (delay_s - self.delay_s) * share;
-        self.known = true;
+        self.measured = true;
     }
 }
 

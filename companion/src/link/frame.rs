@@ -54,9 +54,9 @@ pub struct Counters {
     /// Candidates with a wrong CRC; a false start byte in noise may count here too.
     pub bad_crc: u32,
     /// Candidates with an unknown message id; a false start byte in noise may count here too.
-    pub unknown: u32,
+    pub unknown_id: u32,
     /// Incomplete frames dropped after [`PARTIAL_LIFETIME`].
-    pub expired: u32,
+    pub expired_partial: u32,
     /// Bytes that belong to no frame, of known or unknown id, and to no signature.
     pub noise_bytes: u32,
 }
@@ -79,7 +79,7 @@ pub struct Framer {
     arrivals: Vec<Arrival, MAX_ARRIVALS>,
     /// Number of the next bytes that belong to a frame of unknown id or to a signature, so that
     /// they are not noise.
-    uncounted: usize,
+    not_noise_len: usize,
     counters: Counters,
 }
 
@@ -112,8 +112,14 @@ impl Framer {
             buf: [0; MAX_FRAME_LEN],
             len: 0,
             arrivals: Vec::new(),
-            uncounted: 0,
-            counters: Counters { frames: 0, bad_crc: 0, unknown: 0, expired: 0, noise_bytes: 0 },
+            not_noise_len: 0,
+            counters: Counters {
+                frames: 0,
+                bad_crc: 0,
+                unknown_id: 0,
+                expired_partial: 0,
+                noise_bytes: 0,
+            },
         }
     }
 
@@ -135,28 +141,29 @@ impl Framer {
             let needed = match self.parse_front() {
                 ParseStatus::ValidFrame(total) => return Some(self.take_frame(total)),
                 ParseStatus::NeedsBytes(_) if self.expires_at().is_some_and(|due| now > due) => {
-                    let counted = u32::from(self.uncounted == 0);
-                    self.counters.expired = self.counters.expired.wrapping_add(counted);
-                    self.drop_start();
+                    let counted = u32::from(self.not_noise_len == 0);
+                    self.counters.expired_partial =
+                        self.counters.expired_partial.wrapping_add(counted);
+                    self.drop_false_start();
                     continue;
                 }
                 ParseStatus::NeedsBytes(needed) => needed,
                 ParseStatus::Unknown(total) => {
-                    if self.uncounted == 0 {
-                        self.counters.unknown = self.counters.unknown.wrapping_add(1);
-                        self.uncounted = total;
+                    if self.not_noise_len == 0 {
+                        self.counters.unknown_id = self.counters.unknown_id.wrapping_add(1);
+                        self.not_noise_len = total;
                     }
-                    self.drop_start();
+                    self.drop_false_start();
                     continue;
                 }
                 ParseStatus::BadCrc => {
-                    let counted = u32::from(self.uncounted == 0);
+                    let counted = u32::from(self.not_noise_len == 0);
                     self.counters.bad_crc = self.counters.bad_crc.wrapping_add(counted);
-                    self.drop_start();
+                    self.drop_false_start();
                     continue;
                 }
                 ParseStatus::FalseStart => {
-                    self.drop_start();
+                    self.drop_false_start();
                     continue;
                 }
             };
@@ -225,13 +232,13 @@ impl Framer {
         payload[..usize::from(len)].copy_from_slice(&b[at..at + usize::from(len)]);
         self.counters.frames = self.counters.frames.wrapping_add(1);
         self.remove_front(total);
-        self.uncounted = if signed { SIGNATURE_LEN } else { 0 };
+        self.not_noise_len = if signed { SIGNATURE_LEN } else { 0 };
         self.drop_to_start(0);
         Frame { version, sequence, system, component, message_id, signed, len, payload }
     }
 
     /// Drops the false start byte at the front, and the bytes behind it up to the next start byte.
-    fn drop_start(&mut self) {
+    fn drop_false_start(&mut self) {
         self.drop_to_start(1);
     }
 
@@ -246,8 +253,8 @@ impl Framer {
     /// Counts `count` dropped bytes as noise, without those that belong to a frame of unknown id or
     /// to a signature.
     fn count_noise(&mut self, count: usize) {
-        let noise = count.saturating_sub(self.uncounted);
-        self.uncounted = self.uncounted.saturating_sub(count);
+        let noise = count.saturating_sub(self.not_noise_len);
+        self.not_noise_len = self.not_noise_len.saturating_sub(count);
         self.counters.noise_bytes = self.counters.noise_bytes.wrapping_add(noise as u32);
     }
 

@@ -75,7 +75,7 @@ pub struct Intent {
     pub gates_open_up_to_m: f32,
     /// Greatest delay of the flight to `gates_open_up_to_m`, seconds, by gates and climb, compared
     /// with a flight at 0.4 of the nominal speed; at most 127.
-    pub unheard_delay_s: u8,
+    pub unheard_flight_delay_s: u8,
     /// Vehicles that the sender heard in the last seconds: bit i for rank i in the roster.
     pub heard_bits: u32,
     /// Height of the ground below the sender, as far as it knows, metres up in the mission frame.
@@ -90,7 +90,7 @@ pub struct Intent {
     /// failsafe flies it.
     pub points: Vec<Point, MAX_POINTS>,
     /// How many of the last of these points lie beyond where it will stop for now.
-    pub unheard_point_count: u8,
+    pub unheard_flight_point_count: u8,
 }
 
 impl Intent {
@@ -104,7 +104,7 @@ impl Intent {
             VERSION,
             self.system_id,
             self.flags,
-            self.points.len() as u8 | self.unheard_point_count << 4,
+            self.points.len() as u8 | self.unheard_flight_point_count << 4,
         ]);
         body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
@@ -113,9 +113,9 @@ impl Intent {
         body[20..24].copy_from_slice(&self.heard_bits.to_le_bytes());
         body[24..28].copy_from_slice(&self.ground_m.to_le_bytes());
         let [rank, sequence, held] =
-            self.echo.map_or([0; 3], |e| [e.rank.saturating_add(1), e.sequence, e.held]);
+            self.echo.map_or([0; 3], |e| [e.rank.saturating_add(1), e.sequence, e.held_ticks]);
         body[28..32].copy_from_slice(&[
-            u8::from(self.may_come_down) | self.unheard_delay_s.min(127) << 1,
+            u8::from(self.may_come_down) | self.unheard_flight_delay_s.min(127) << 1,
             rank,
             sequence,
             held,
@@ -162,14 +162,14 @@ impl Intent {
             heard_bits: u32::from_le_bytes(word(20)),
             ground_m: float(24)?,
             may_come_down: body[28] & 1 != 0,
-            unheard_delay_s: body[28] >> 1,
+            unheard_flight_delay_s: body[28] >> 1,
             echo: body[29].checked_sub(1).map(|rank| IntentEcho {
                 rank,
                 sequence: body[30],
-                held: body[31],
+                held_ticks: body[31],
             }),
             points,
-            unheard_point_count: beyond,
+            unheard_flight_point_count: beyond,
         })
     }
 }

@@ -21,17 +21,17 @@ pub const QUEUE_DEPTH: usize = 32;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Outgoing {
     /// SET_MESSAGE_INTERVAL to the autopilot: message id, and interval in microseconds, −1 for off.
-    Interval(u16, f32),
+    SetMessageInterval(u16, f32),
     /// REQUEST_MESSAGE to the autopilot: message id.
-    Request(u16),
+    RequestMessage(u16),
     /// DO_SET_MODE to the autopilot: parameters 2 and 3.
-    Mode(f32, f32),
+    SetMode(f32, f32),
     /// NAV_TAKEOFF to the autopilot: target height above home, metres.
     TakeOff(f32),
     /// PARAM_REQUEST_READ to the autopilot, by name.
     ReadParameter(&'static str),
     /// PARAM_SET to the autopilot of a REAL32: name and value.
-    Parameter(&'static str, f32),
+    SetParameter(&'static str, f32),
     /// TIMESYNC that answers a request.
     Timesync {
         /// This companion's clock, nanoseconds.
@@ -74,7 +74,7 @@ pub enum Outgoing {
         at_once: bool,
     },
     /// DO_DIGICAM_CONTROL to the autopilot: it takes one picture at once.
-    Picture,
+    TakePicture,
     /// COMMAND_ACK that answers a command to the companion.
     Ack {
         /// `MAV_CMD` that is answered.
@@ -151,13 +151,13 @@ impl Outbox {
             ..COMMAND_LONG_DATA::default()
         };
         let long = match message {
-            Outgoing::Interval(id, us) => {
+            Outgoing::SetMessageInterval(id, us) => {
                 command(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, f32::from(id), us, 0.0)
             }
-            Outgoing::Request(id) => {
+            Outgoing::RequestMessage(id) => {
                 command(MavCmd::MAV_CMD_REQUEST_MESSAGE, f32::from(id), 0.0, 0.0)
             }
-            Outgoing::Mode(main, sub) => command(MavCmd::MAV_CMD_DO_SET_MODE, 1.0, main, sub),
+            Outgoing::SetMode(main, sub) => command(MavCmd::MAV_CMD_DO_SET_MODE, 1.0, main, sub),
             Outgoing::TakeOff(height_m) => COMMAND_LONG_DATA {
                 param7: height_m,
                 ..command(MavCmd::MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0)
@@ -168,7 +168,7 @@ impl Outbox {
                 0.0,
                 f32::from(u8::from(at_once)),
             ),
-            Outgoing::Picture => COMMAND_LONG_DATA {
+            Outgoing::TakePicture => COMMAND_LONG_DATA {
                 param5: 1.0,
                 ..command(MavCmd::MAV_CMD_DO_DIGICAM_CONTROL, 0.0, 0.0, 0.0)
             },
@@ -181,7 +181,7 @@ impl Outbox {
                 };
                 return frame::encode(header, &read, out);
             }
-            Outgoing::Parameter(name, param_value) => {
+            Outgoing::SetParameter(name, param_value) => {
                 let set = PARAM_SET_DATA {
                     param_value,
                     target_system: system,

@@ -30,7 +30,7 @@ const TUNNEL_HEADER_LEN: usize = 5;
 const HEADER_LEN: usize = 18;
 const ENTRY_LEN: usize = 5;
 /// Bits of the number of committed divisions.
-const DIVISIONS: u8 = 15;
+const DIVISIONS_MASK: u8 = 15;
 const HEARS_VEHICLE_IN_FLIGHT: u8 = 1 << 6;
 const IN_FLIGHT: u8 = 1 << 7;
 /// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
@@ -101,22 +101,22 @@ pub struct RosterReport {
     pub system_id: u8,
     /// Number of committed divisions, on whose hash all that take part agreed, as the sender knows;
     /// at most 15.
-    pub divisions: u8,
+    pub division_count: u8,
     /// Whether the sender was started and takes part.
     pub in_flight: bool,
     /// Whether the sender hears another vehicle that was started and takes part.
-    pub hears_flight: bool,
+    pub hears_vehicle_in_flight: bool,
     /// Rank of the vehicle of the first entry.
-    pub first: u8,
+    pub first_rank: u8,
     /// 8 bits of the CRC of the plan of the sender's flight, before any division; 0 while it has
     /// none. Places along paths and divisions are of that plan.
-    pub plan: u8,
+    pub plan_crc8: u8,
     /// CRC-32 of the mission file.
     pub mission_crc: u32,
     /// Hash of the last committed division; 0 for none.
     pub committed_hash: u32,
     /// Hash of the division under way, as the sender computed it; 0 for none.
-    pub hash: u32,
+    pub pending_hash: u32,
     /// States of consecutive vehicles of the roster, by rank.
     pub entries: Vec<RosterReportEntry, MAX_ENTRIES_PER_MESSAGE>,
 }
@@ -129,14 +129,14 @@ impl RosterReport {
         (out[2], out[3], out[4]) = (0, 0, len as u8);
         let body = &mut out[TUNNEL_HEADER_LEN..];
         let count = self.entries.len() as u8;
-        let Self { system_id, first, plan, .. } = *self;
-        let divisions = self.divisions & DIVISIONS
-            | if self.hears_flight { HEARS_VEHICLE_IN_FLIGHT } else { 0 }
+        let Self { system_id, first_rank, plan_crc8, .. } = *self;
+        let divisions = self.division_count & DIVISIONS_MASK
+            | if self.hears_vehicle_in_flight { HEARS_VEHICLE_IN_FLIGHT } else { 0 }
             | if self.in_flight { IN_FLIGHT } else { 0 };
-        body[..6].copy_from_slice(&[VERSION, system_id, divisions, first, count, plan]);
+        body[..6].copy_from_slice(&[VERSION, system_id, divisions, first_rank, count, plan_crc8]);
         body[6..10].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[10..14].copy_from_slice(&self.committed_hash.to_le_bytes());
-        body[14..18].copy_from_slice(&self.hash.to_le_bytes());
+        body[14..18].copy_from_slice(&self.pending_hash.to_le_bytes());
         for (to, entry) in body[HEADER_LEN..].chunks_exact_mut(ENTRY_LEN).zip(&self.entries) {
             let bit = |set: bool, at: u8| u8::from(set) << at;
             to[0] = entry.status as u8
@@ -182,14 +182,14 @@ impl RosterReport {
         };
         Some(Self {
             system_id: sender,
-            divisions: body[2] & DIVISIONS,
+            division_count: body[2] & DIVISIONS_MASK,
             in_flight: body[2] & IN_FLIGHT != 0,
-            hears_flight: body[2] & HEARS_VEHICLE_IN_FLIGHT != 0,
-            first: body[3],
-            plan: body[5],
+            hears_vehicle_in_flight: body[2] & HEARS_VEHICLE_IN_FLIGHT != 0,
+            first_rank: body[3],
+            plan_crc8: body[5],
             mission_crc: word(6),
             committed_hash: word(10),
-            hash: word(14),
+            pending_hash: word(14),
             entries: body[HEADER_LEN..].chunks_exact(ENTRY_LEN).map(entry).collect(),
         })
     }

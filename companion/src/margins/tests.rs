@@ -2,7 +2,7 @@ use super::*;
 
 #[test]
 fn a_vehicle_slows_as_its_estimate_gets_worse_and_stops() {
-    let of = |bound_m| speed_share_for_bound(bound_m, 0.8, 0.3);
+    let of = |bound_m| speed_share_for_error_bound(bound_m, 0.8, 0.3);
     assert_eq!(
         (of(0.1), of(0.25), of(0.41), of(f32::INFINITY), of(f32::NAN)),
         (1.0, 1.0, 0.0, 0.0, 0.0)
@@ -20,10 +20,11 @@ proptest::proptest! {
     ) {
         let (good, bad) = (a.min(b), a.max(b));
         let [fast, slow] =
-            [good, bad].map(|bound_m| speed_share_for_bound(bound_m, clearance_m, radius_m));
+            [good, bad].map(|bound_m| speed_share_for_error_bound(bound_m, clearance_m, radius_m));
         proptest::prop_assert!(fast >= slow && (0.0..=1.0).contains(&fast));
         // A moving vehicle keeps its hull inside the clearance.
-        let tracking_m = |pace: f32| if pace == 1.0 { TRACKING_M } else { CRAWL_TRACKING_M };
+        let tracking_m =
+            |pace: f32| if pace == 1.0 { CRUISE_TRACKING_ERROR_M } else { CRAWL_TRACKING_ERROR_M };
         for (pace, bound_m) in [(fast, good), (slow, bad)] {
             proptest::prop_assert!(
                 pace == 0.0 || radius_m + tracking_m(pace) + bound_m <= clearance_m + 1e-3

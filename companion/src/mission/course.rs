@@ -1,7 +1,7 @@
 //! State of one vehicle's mission: the table's state and the states that it interrupted, pending
 //! commands, and the vehicle's plan.
 
-use planner_core::detour::Goal;
+use planner_core::detour::DetourGoal;
 use planner_core::flight::{Path, Task, VehiclePlan, WaypointRange};
 use planner_core::{Length, Point};
 
@@ -11,7 +11,7 @@ use crate::link::Links;
 use crate::link::commands::Command;
 use crate::mission::pending::{self, PendingCommands};
 use crate::mission::photographed::PhotographedWaypoints;
-use crate::mission::task::{PathProgress, Tasks};
+use crate::mission::task::{PathProgress, TaskCommands};
 use crate::mission::waits::{BarredStart, Waits};
 use crate::mission::{GuardInputs, InterruptedStates, State, TargetState, TransitionRow};
 use crate::time::{Duration, Instant};
@@ -32,13 +32,13 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     /// When MISSION_START was accepted: the schedule's times count from there.
     started_at: Instant,
     /// When a pilot last took the vehicle over.
-    pilot_since: Instant,
+    pilot_took_over_at: Instant,
     interrupted: InterruptedStates,
     pending: PendingCommands,
     /// The autopilot's `custom_mode` when the mission was started.
-    mode_before: u32,
+    mode_at_start: u32,
     /// First point of the vehicle's path, above its pad.
-    start: Point,
+    path_start: Point,
     plan: Option<VehiclePlan<W, G>>,
     /// Once the vehicle has left the path of its plan: whether it had taken all pictures of its
     /// share before. `None` while it is on that path.
@@ -49,19 +49,19 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     /// Where the vehicle's plan ends: the place above the pad, the height of the path that leads
     /// there, and the length of the descent there, metres.
     home: (Point, f32, f32),
-    failure: Option<PlanFailure>,
+    plan_failure: Option<PlanFailure>,
     /// Since when the estimate's error bound has exceeded what the margin leaves for it even at
     /// crawl speed; `None` while it fits.
-    imprecise_since: Option<Instant>,
+    imprecise_at_crawl_since: Option<Instant>,
     waits: Waits,
-    tasks: Tasks,
+    task_commands: TaskCommands,
     photographed: PhotographedWaypoints,
     /// Number of the fleet's committed divisions that the plan takes into account.
-    division: usize,
+    division_count: usize,
     /// Whether the plan after the last division has come and is not flown yet.
     division_plan_ready: bool,
     /// Hash of the inputs of the division that the shell was asked for and has not answered.
-    division_requested: Option<u32>,
+    requested_division_hash: Option<u32>,
 }
 
 impl<const W: usize, const G: usize> Mission<W, G> {
@@ -72,23 +72,23 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             state: State::WaitAutopilot,
             entered_at: Instant::ZERO,
             started_at: Instant::ZERO,
-            pilot_since: Instant::ZERO,
+            pilot_took_over_at: Instant::ZERO,
             interrupted: InterruptedStates::default(),
             pending: PendingCommands::default(),
-            mode_before: 0,
-            start,
+            mode_at_start: 0,
+            path_start: start,
             plan: None,
             left_with_all_pictures: None,
             pictures_before_rejoin: 0,
             home: (start, start.z, 0.0),
-            failure: None,
-            imprecise_since: None,
+            plan_failure: None,
+            imprecise_at_crawl_since: None,
             waits: Waits::default(),
-            tasks: Tasks::default(),
+            task_commands: TaskCommands::default(),
             photographed: PhotographedWaypoints::default(),
-            division: 0,
+            division_count: 0,
             division_plan_ready: false,
-            division_requested: None,
+            requested_division_hash: None,
         }
     }
 
@@ -114,7 +114,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Time since a pilot last took the vehicle over.
     pub(crate) fn time_since_pilot_takeover(&self, now: Instant) -> Duration {
-        now - self.pilot_since
+        now - self.pilot_took_over_at
     }
 
     /// The state of the flight without pause and loss: the current state or the one that they
@@ -125,7 +125,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// The state to which the mission returns from the current one.
     pub(crate) fn interrupted_state(&self) -> State {
-        self.interrupted.target(self.state)
+        self.interrupted.state_to_resume(self.state)
     }
 
     /// Commands of the operator that have not been carried out yet.
@@ -135,17 +135,17 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// The autopilot's `custom_mode` when the mission was started.
     pub(crate) fn mode_at_start(&self) -> u32 {
-        self.mode_before
+        self.mode_at_start
     }
 
     /// First point of the vehicle's path, above its pad.
     pub(crate) fn path_start(&self) -> Point {
-        self.start
+        self.path_start
     }
 
     /// Place of the vehicle on its pad: the climb's height below the first point of the path.
     pub(crate) fn pad_position(&self) -> Point {
-        self.start - Point::new(0.0, 0.0, self.climb_m())
+        self.path_start - Point::new(0.0, 0.0, self.climb_m())
     }
 
     /// The vehicle's plan; `None` until the shell has returned one.
@@ -161,7 +161,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// Why the shell did not return the last plan or detour requested; `None` if it has, or not yet
     /// answered.
     pub(crate) fn plan_failure(&self) -> Option<PlanFailure> {
-        self.failure
+        self.plan_failure
     }
 
     /// Whether the plan's departure time has come. Until then the vehicle waits on its pad; later
@@ -173,20 +173,21 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Time for which the estimate's error bound has exceeded what the margin leaves for it even at
     /// crawl speed.
-    pub(crate) fn estimate_imprecise_for(&self, now: Instant) -> Duration {
-        self.imprecise_since.map_or(Duration::default(), |since| now - since)
+    pub(crate) fn imprecise_at_crawl_for(&self, now: Instant) -> Duration {
+        self.imprecise_at_crawl_since.map_or(Duration::default(), |since| now - since)
     }
 
     /// Notes the share of the cruise speed at which the estimate's error bound fits into the
     /// margin; 0 if it does not even at crawl speed.
     pub(crate) fn note_estimate_speed_share(&mut self, share: f32, now: Instant) {
-        self.imprecise_since = if share > 0.0 { None } else { self.imprecise_since.or(Some(now)) };
+        self.imprecise_at_crawl_since =
+            if share > 0.0 { None } else { self.imprecise_at_crawl_since.or(Some(now)) };
     }
 
     /// To be called each step with the vehicle that has not started and that this one waits for, 0
     /// for none. Returns whether the wait is to be reported now.
     pub(crate) fn should_report_wait(&mut self, id: u8, now: Instant, timers: &mut Timers) -> bool {
-        self.waits.report.update(id, now, timers)
+        self.waits.unstarted.should_report(id, now, timers)
     }
 
     /// To be called each step in which a vehicle or an obstacle bars the start.
@@ -201,7 +202,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Time for which the start of this vehicle has been barred.
     pub(crate) fn start_barred_for(&self, now: Instant) -> Duration {
-        self.waits.barred_start.lasts_for(now)
+        self.waits.barred_start.barred_for(now)
     }
 
     /// Stores an operator's command for the mission table. Returns its `MAV_RESULT`; `None` for a
@@ -222,15 +223,15 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         let from = self.state;
         let to = match row.to {
             TargetState::State(to) => to,
-            TargetState::Interrupted => self.interrupted.target(from),
+            TargetState::Interrupted => self.interrupted.state_to_resume(from),
         };
         self.interrupted.record_interruption(from, to, after_search);
         (self.state, self.entered_at) = (to, now);
         if (from, to) == (State::Ready, State::Scheduled) {
-            (self.started_at, self.mode_before) = (now, custom_mode);
+            (self.started_at, self.mode_at_start) = (now, custom_mode);
         }
         if to == State::PilotControl && from != State::PilotReturned {
-            self.pilot_since = now;
+            self.pilot_took_over_at = now;
         }
         self.pending.clear_carried_out(row, to);
         (from, to)
@@ -243,25 +244,25 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Forgets plan and failure, since a plan of the whole mission is requested.
     pub(crate) fn forget_plan(&mut self) {
-        (self.plan, self.failure, self.division, self.left_with_all_pictures) =
+        (self.plan, self.plan_failure, self.division_count, self.left_with_all_pictures) =
             (None, None, 0, None);
-        (self.division_plan_ready, self.division_requested) = (false, None);
+        (self.division_plan_ready, self.requested_division_hash) = (false, None);
         self.waits.barred_start = BarredStart::default();
-        self.tasks.begin_plan();
+        self.task_commands.begin_plan();
     }
 
     /// Forgets the last failure, since a detour is requested; the plan stays until the detour
     /// comes.
-    pub(crate) fn forget_failure(&mut self) {
-        self.failure = None;
+    pub(crate) fn forget_plan_failure(&mut self) {
+        self.plan_failure = None;
     }
 
     /// Stores the plan that the shell returned; one that is invalid or does not begin at the
     /// vehicle's path start is stored as a failure.
     pub(crate) fn set_plan(&mut self, plan: &VehiclePlan<W, G>) {
-        match self.starts_at(plan, &self.start) {
+        match self.is_plan_valid_from(plan, &self.path_start) {
             true => self.begin_plan(plan),
-            false => self.failure = Some(PlanFailure::Invalid),
+            false => self.plan_failure = Some(PlanFailure::Invalid),
         }
     }
 
@@ -277,9 +278,9 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Where the vehicle's plan ends, as a goal that is reached without a roadmap, and the length
     /// of the descent there, metres.
-    pub(crate) fn home_goal(&self) -> (Goal, f32) {
+    pub(crate) fn home_goal(&self) -> (DetourGoal, f32) {
         let (over, layer_m, descent_m) = self.home;
-        (Goal::Home { over, layer_m }, descent_m)
+        (DetourGoal::Home { above_pad: over, layer_z_m: layer_m }, descent_m)
     }
 
     /// Whether the plan after the last division has come and is not flown yet.
@@ -288,7 +289,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Notes that the vehicle flies the plan after the last division from now on.
-    pub(crate) fn note_division_flown(&mut self) {
+    pub(crate) fn note_division_plan_begun(&mut self) {
         self.division_plan_ready = false;
     }
 
@@ -302,37 +303,38 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         again: Duration,
         timers: &mut Timers,
     ) -> bool {
-        let asks = self.division_requested.is_none() || timers.is_due(Timer::DivisionRequest, now);
+        let asks =
+            self.requested_division_hash.is_none() || timers.is_due(Timer::DivisionRequest, now);
         if asks {
-            self.division_requested = Some(hash);
+            self.requested_division_hash = Some(hash);
             timers.set(Timer::DivisionRequest, now + again);
         }
         asks
     }
 
     /// Closes the open request for a division. Returns whether it was for the one with this hash.
-    pub(crate) fn take_division_request(&mut self, fingerprint: u32) -> bool {
-        self.division_requested.take().is_some_and(|of| of == fingerprint)
+    pub(crate) fn close_division_request(&mut self, fingerprint: u32) -> bool {
+        self.requested_division_hash.take().is_some_and(|of| of == fingerprint)
     }
 
     /// Number of the fleet's committed divisions that the plan takes into account.
     pub(crate) fn division_count(&self) -> usize {
-        self.division
+        self.division_count
     }
 
     /// Stores the plan after `division` divisions if it is valid and begins at `place`; returns
     /// whether it does. A vehicle in the air flies it once a row of the table says so.
-    pub(crate) fn accept_division(
+    pub(crate) fn accept_division_plan(
         &mut self,
         plan: &VehiclePlan<W, G>,
         place: &Point,
         division: usize,
     ) -> bool {
-        let begins = self.starts_at(plan, place);
+        let begins = self.is_plan_valid_from(plan, place);
         if begins {
             self.begin_plan(plan);
-            self.tasks.begin_plan();
-            self.division = division;
+            self.task_commands.begin_plan();
+            self.division_count = division;
             self.division_plan_ready = self.state == State::Dividing;
         }
         begins
@@ -341,7 +343,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// Keeps the present plan although `division` divisions count now: the last one could not be
     /// planned.
     pub(crate) fn keep_plan_after_division(&mut self, division: usize) {
-        (self.division, self.division_plan_ready) = (division, false);
+        (self.division_count, self.division_plan_ready) = (division, false);
     }
 
     /// Sends the task's commands to the autopilot that are due at this place of the path. Returns
@@ -354,8 +356,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         links: &mut Links,
     ) -> bool {
         let Some(plan) = &self.plan else { return false };
-        let leaves_path = self.tasks.step(&plan.task, &plan.path, along);
-        self.tasks.send_commands(now, timers, links);
+        let leaves_path = self.task_commands.step(&plan.task, &plan.path, along);
+        self.task_commands.send_commands(now, timers, links);
         leaves_path
     }
 
@@ -390,12 +392,12 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Handles the autopilot's COMMAND_ACK of a command of the task.
     pub(crate) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
-        self.tasks.handle_ack(ack, links);
+        self.task_commands.handle_ack(ack, links);
     }
 
     /// Stores why the shell did not return the requested plan or detour.
-    pub(crate) fn set_failure(&mut self, failure: PlanFailure) {
-        self.failure = Some(failure);
+    pub(crate) fn set_plan_failure(&mut self, failure: PlanFailure) {
+        self.plan_failure = Some(failure);
     }
 
     /// Whether all pictures of the vehicle's share are taken: `along_m` metres along its path, or
@@ -415,7 +417,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Notes pictures, and whether all are taken, as the vehicle leaves the path of its plan
     /// `along_m` metres along it: from now on distances are along another path.
-    fn leave_path(&mut self, along_m: f32) {
+    fn note_path_left(&mut self, along_m: f32) {
         if self.left_with_all_pictures.is_none() {
             self.note_photographed(along_m);
             self.left_with_all_pictures = Some(self.has_all_pictures(along_m));
@@ -431,7 +433,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         along_m: f32,
         ground_m: Option<f32>,
     ) {
-        self.leave_path(along_m);
+        self.note_path_left(along_m);
         if let Some(plan) = &mut self.plan {
             plan.path = way.path.clone();
             plan.descent_m = way.descent_m;
@@ -464,7 +466,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// the start that `turn` makes of it. The new path is not part of the shared plan: neighbours
     /// keep clear of this vehicle as of one outside the plan.
     pub(crate) fn reverse_path(&mut self, along_m: f32, turn: impl FnOnce(&mut Path<W>)) {
-        self.leave_path(along_m);
+        self.note_path_left(along_m);
         if let Some(plan) = &mut self.plan {
             turn(&mut plan.path);
             plan.gates.clear();
@@ -474,10 +476,10 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Whether the plan's numbers are finite and its path begins at `place`; a plan that does not
     /// leave the pad needs no path.
-    pub(crate) fn starts_at(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
+    pub(crate) fn is_plan_valid_from(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
         let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
         let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
-            && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
+            && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.open_from_progress_m.is_nan());
         let first = plan.path.waypoints().first();
         let begins = first.is_some_and(|w| (w.position - place).length() < MAX_PATH_START_ERROR_M);
         finite && (begins || !plan.task.leaves_pad())

@@ -292,132 +292,159 @@ impl Guard {
             Self::PositionKnown => i.position_age < MAX_POSITION_AGE,
             Self::NoPosition => i.position_age > limit,
             Self::StillNoPosition => {
-                i.position_age.min(i.in_state).min(i.heard_for) > limit
+                i.position_age.min(i.time_in_state).min(i.autopilot_heard_for) > limit
                     && i.heartbeat_age < MAX_HEARTBEAT_AGE
             }
-            Self::PositionJumped => i.jumped,
+            Self::PositionJumped => i.position_jumped,
             Self::FoundFlying => i.airborne,
             Self::PlanReady => i.plan_ready,
             Self::PlanFailed => i.plan_failed,
-            Self::RoadmapBad => i.roadmap_bad,
-            Self::StartCommanded => i.start && !i.imprecise && i.has_goal,
-            Self::StartAgain => i.start,
-            Self::MayDetourOverField => i.blocked && i.may_fly_beside && i.blocked_for >= limit,
-            Self::DetourFlown => i.detour_flown,
+            Self::RoadmapBad => i.roadmap_unusable,
+            Self::StartCommanded => i.start_pending && !i.imprecise_at_cruise && i.plan_leaves_pad,
+            Self::StartAgain => i.start_pending,
+            Self::MayDetourOverField => {
+                i.path_blocked && i.may_detour_and_rejoin && i.path_blocked_for >= limit
+            }
+            Self::DetourFlown => i.stands_at_detour_end,
             Self::OwnPlanReady => i.own_plan_ready,
-            Self::OwnPlanLost => i.own_plan_lost,
-            Self::StartOverField => i.start && i.area,
-            Self::StartWithoutGoal => i.start && !i.has_goal && i.plans_as_others && !i.in_reserve,
-            Self::StartInReserve => i.start && i.in_reserve && i.plans_as_others,
-            Self::StartElsewhere => i.start && !i.at_pad,
-            Self::StartArmed => i.start && i.armed,
-            Self::StartBatteryLow => i.start && i.battery_low,
-            Self::StartOutside => i.start && i.outside,
+            Self::OwnPlanLost => i.own_plan_failed,
+            Self::StartOverField => i.start_pending && i.is_coverage,
+            Self::StartWithoutGoal => {
+                i.start_pending && !i.plan_leaves_pad && i.shares_plan_with_others && !i.in_reserve
+            }
+            Self::StartInReserve => i.start_pending && i.in_reserve && i.shares_plan_with_others,
+            Self::StartElsewhere => i.start_pending && !i.at_pad,
+            Self::StartArmed => i.start_pending && i.armed,
+            Self::StartBatteryLow => i.start_pending && i.battery_low,
+            Self::StartOutside => i.start_pending && i.outside_geofence,
             Self::AwayFromPad => i.position_age < MAX_POSITION_AGE && !i.at_pad,
             Self::ChargeLow => i.battery_low,
-            Self::Outside => i.outside,
-            Self::StartImprecise => i.start && i.imprecise && i.in_state >= limit,
-            Self::EstimateImprecise => i.imprecise_for > limit,
+            Self::Outside => i.outside_geofence,
+            Self::StartImprecise => {
+                i.start_pending && i.imprecise_at_cruise && i.time_in_state >= limit
+            }
+            Self::EstimateImprecise => i.imprecise_at_crawl_for > limit,
             Self::OriginMoved => i.origin_moved,
-            Self::GatesOpen => i.gates_open,
-            Self::Elapsed => i.in_state >= limit,
-            Self::Offboard => i.offboard,
-            Self::ModeTaken => i.mode_foreign && !i.critical,
-            Self::FailsafeActs => i.mode_foreign && i.critical,
-            Self::ModeTakenArmed => i.armed && i.mode_foreign && !i.critical,
-            Self::FailsafeActsArmed => i.armed && i.mode_foreign && i.critical,
+            Self::GatesOpen => i.may_take_off,
+            Self::Elapsed => i.time_in_state >= limit,
+            Self::Offboard => i.in_setpoint_mode,
+            Self::ModeTaken => i.mode_foreign && !i.autopilot_critical,
+            Self::FailsafeActs => i.mode_foreign && i.autopilot_critical,
+            Self::ModeTakenArmed => i.armed && i.mode_foreign && !i.autopilot_critical,
+            Self::FailsafeActsArmed => i.armed && i.mode_foreign && i.autopilot_critical,
             Self::Armed => i.armed,
             Self::Disarmed => !i.armed,
-            Self::DisarmedAtGoal => !i.armed && i.at_goal,
-            Self::StaysArmed => i.armed && i.in_state >= limit,
+            Self::DisarmedAtGoal => !i.armed && i.reference_at_goal,
+            Self::StaysArmed => i.armed && i.time_in_state >= limit,
             Self::StaysDisarmed => {
-                !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE
+                !i.armed && i.time_in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE
             }
             Self::StaysDisarmedStarted => {
-                !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE && i.start
+                !i.armed
+                    && i.time_in_state >= limit
+                    && i.heartbeat_age < MAX_HEARTBEAT_AGE
+                    && i.start_pending
             }
-            Self::ArmedUnseen => i.armed_unseen,
+            Self::ArmedUnseen => i.armed_bit_overdue,
             Self::ArmingHeld => {
-                i.arming_unrequested && i.column_blocked_for.min(i.in_state) >= limit
+                i.arming_unrequested && i.column_blocked_for.min(i.time_in_state) >= limit
             }
             Self::ArmingUnanswered => i.arming_unanswered,
             Self::InAir => i.is_in_air(),
             Self::Unattended => {
-                i.is_in_air() && i.offboard && i.own_mode && i.heartbeat_age < MAX_HEARTBEAT_AGE
+                i.is_in_air()
+                    && i.in_setpoint_mode
+                    && i.in_own_mode
+                    && i.heartbeat_age < MAX_HEARTBEAT_AGE
             }
-            Self::LandingModeLeft => !i.landing,
-            Self::LiftedOff => i.lifted_off,
+            Self::LandingModeLeft => !i.in_land_mode,
+            Self::LiftedOff => i.take_off_command_done,
             Self::ClimbDone => i.climb_done,
-            Self::BackAtStart => i.path_done && i.flies_back,
+            Self::BackAtStart => i.path_done && i.returns_to_start,
             Self::PathDone => i.path_done,
             Self::Stalled => i.stalled_for >= limit,
             Self::Unfollowed => i.unfollowed_for >= limit,
-            Self::PathBarred => i.join_barred && i.in_state >= limit,
-            Self::PauseCommanded => i.pause && !i.lifting_off,
-            Self::ResumeCommanded => i.resume,
+            Self::PathBarred => i.join_barred && i.time_in_state >= limit,
+            Self::PauseCommanded => i.pause_pending && !i.climb_just_begun,
+            Self::ResumeCommanded => i.resume_pending,
             Self::BackOnPath => i.position_age < MAX_POSITION_AGE && i.near_path,
             Self::BackOffPath => i.position_age < MAX_POSITION_AGE && !i.near_path,
-            Self::ResumedOnPath => i.offboard && i.resume && i.near_path,
-            Self::ResumedOffPath => i.offboard && i.resume && !i.near_path,
-            Self::PausedOnPad => i.pause && i.in_state >= limit,
-            Self::LandCommanded => i.land,
-            Self::LandUnattended => i.land && i.armed && i.offboard,
-            Self::ReturnCommanded => i.turn_back,
-            Self::ReturnInClimb => i.turn_back && i.in_climb,
-            Self::ReturnOverField => i.turn_back && i.can_fly_home,
-            Self::BlockedOverField => i.blocked && i.blocked_for >= limit && i.may_turn_home(),
-            Self::YieldedOverField => i.yielded_for >= limit && i.may_turn_home() && !i.descends,
-            Self::HinderedOverField => i.hindered_for >= limit && i.may_turn_home() && !i.descends,
-            Self::StalledOverField => i.stalled_for >= limit && i.may_turn_home(),
-            Self::StandsToReturn => i.stands_to_return,
-            Self::WayHomeReady => i.detour_ready && i.homeward,
+            Self::ResumedOnPath => i.in_setpoint_mode && i.resume_pending && i.near_path,
+            Self::ResumedOffPath => i.in_setpoint_mode && i.resume_pending && !i.near_path,
+            Self::PausedOnPad => i.pause_pending && i.time_in_state >= limit,
+            Self::LandCommanded => i.land_pending,
+            Self::LandUnattended => i.land_pending && i.armed && i.in_setpoint_mode,
+            Self::ReturnCommanded => i.return_pending,
+            Self::ReturnInClimb => i.return_pending && i.in_climb,
+            Self::ReturnOverField => i.return_pending && i.may_seek_path_home,
+            Self::BlockedOverField => {
+                i.path_blocked && i.path_blocked_for >= limit && i.may_begin_seeking_home()
+            }
+            Self::YieldedOverField => {
+                i.yielded_for >= limit && i.may_begin_seeking_home() && !i.in_last_descent
+            }
+            Self::HinderedOverField => {
+                i.hindered_for >= limit && i.may_begin_seeking_home() && !i.in_last_descent
+            }
+            Self::StalledOverField => i.stalled_for >= limit && i.may_begin_seeking_home(),
+            Self::StandsToReturn => i.ready_to_request_path_home,
+            Self::WayHomeReady => i.detour_ready && i.seeks_or_flies_path_home,
             Self::NoWayHome => {
                 i.seeking_home_for.is_some_and(|sought| sought >= limit) && i.can_turn_back
             }
             Self::LandingBlocked => i.column_blocked_for > Duration::default() && !i.must_land,
-            Self::NoRoomToLand => i.is_landing_blocked_for(limit) && i.offboard && i.can_turn_back,
+            Self::NoRoomToLand => {
+                i.is_landing_blocked_for(limit) && i.in_setpoint_mode && i.can_turn_back
+            }
             Self::NoRoomHere => {
-                i.is_landing_blocked_for(limit) && i.offboard && i.may_seek_landing_aside
+                i.is_landing_blocked_for(limit) && i.in_setpoint_mode && i.may_seek_landing_aside
             }
             Self::PadTaken => i.is_pad_blocked_for(limit) && i.may_seek_landing_aside,
-            Self::NoPlaceAside => i.seeks_landing && (i.plan_failed || i.in_state >= limit),
+            Self::NoPlaceAside => {
+                i.seeks_landing_aside && (i.plan_failed || i.time_in_state >= limit)
+            }
             Self::LandingPlaceReached => i.landing_place_reached,
             Self::LandingClear => i.column_clear_for >= limit,
-            Self::ColumnBlocked => i.column_blocked_for.min(i.in_state) >= limit,
-            Self::ReserveEnds => i.area && !i.has_goal && !i.in_reserve,
-            Self::StartBarred => i.start_barred_for >= limit && i.others_fly && i.has_goal,
+            Self::ColumnBlocked => i.column_blocked_for.min(i.time_in_state) >= limit,
+            Self::ReserveEnds => i.is_coverage && !i.plan_leaves_pad && !i.in_reserve,
+            Self::StartBarred => {
+                i.start_barred_for >= limit && i.may_leave_part_to_others && i.plan_leaves_pad
+            }
             Self::Yielded => i.yielded_for >= limit && i.seeking_home_for.is_none(),
             Self::Hindered => i.hindered_for >= limit && i.seeking_home_for.is_none(),
             Self::BatteryCritical => i.battery_critical,
-            Self::BatteryLow => i.battery_low && i.room_below && !i.lands_aside,
+            Self::BatteryLow => i.battery_low && i.no_neighbour_below && !i.lands_aside,
             Self::OutsideGeofence => {
-                i.outside && (i.room_below || i.stalled_for > MAX_WAIT_AT_FENCE)
+                i.outside_geofence && (i.no_neighbour_below || i.stalled_for > MAX_WAIT_AT_FENCE)
             }
             Self::NeighboursSilent => i.unlinked_for > limit,
-            Self::LeaseLost => i.area && i.unlinked_for > limit,
-            Self::NotDivided => i.in_state >= limit && i.division_overdue,
-            Self::PausedBeforeLiftOff => i.pause && i.is_before_lift_off(),
+            Self::LeaseLost => i.is_coverage && i.unlinked_for > limit,
+            Self::NotDivided => i.time_in_state >= limit && i.division_overdue,
+            Self::PausedBeforeLiftOff => i.pause_pending && i.is_before_lift_off(),
             Self::BarredBeforeLiftOff => i.hindered_for >= limit && i.is_before_lift_off(),
-            Self::MayFlyUnheard => i.way_free,
-            Self::OutOfRange => i.out_of_range && i.in_state >= limit,
-            Self::NeighbourHeard => i.neighbour_heard,
+            Self::MayFlyUnheard => i.may_fly_on_unheard,
+            Self::OutOfRange => i.others_out_of_range && i.time_in_state >= limit,
+            Self::NeighbourHeard => i.swarm_linked,
             Self::OnGround => {
-                i.on_ground && !i.vertical && i.landing && i.height_m < MAX_HEIGHT_ERROR_ON_GROUND_M
+                i.on_ground
+                    && !i.moves_vertically
+                    && i.in_land_mode
+                    && i.height_if_ground_reported_m < MAX_HEIGHT_ERROR_ON_GROUND_M
             }
-            Self::PathBlocked => i.blocked,
-            Self::PathClear => !i.blocked,
-            Self::OurTurn => i.our_turn,
+            Self::PathBlocked => i.path_blocked,
+            Self::PathClear => !i.path_blocked,
+            Self::OurTurn => i.our_turn_to_detour,
             Self::DetourReady => i.detour_ready,
             Self::DetourFailed => i.plan_failed,
-            Self::NoWayAround => i.no_way_around && i.room_below,
-            Self::NoWayOn => i.no_way_around && i.can_turn_back,
-            Self::BelowLandingVehicle => i.time_below_landing > limit,
+            Self::NoWayAround => i.detours_given_up && i.no_neighbour_below,
+            Self::NoWayOn => i.detours_given_up && i.can_turn_back,
+            Self::BelowLandingVehicle => i.waited_below_landing_for > limit,
             Self::Standing => i.standing,
             Self::Excluded => i.excluded,
             Self::LeftOutSetChanged => i.left_out_set_changed,
-            Self::PlansDiffer => i.plans_differ && i.in_state >= limit,
+            Self::PlansDiffer => i.plans_differ && i.time_in_state >= limit,
             Self::HoldsToDivide => i.holds_to_divide,
-            Self::DivisionReady => i.division_ready,
+            Self::DivisionReady => i.division_plan_ready,
             Self::NothingToDivide => i.division_settled,
         }
     }

@@ -9,15 +9,15 @@ use crate::time::Duration;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GuardInputs {
     /// Time since the mission state was entered.
-    pub in_state: Duration,
+    pub time_in_state: Duration,
     /// Time since the autopilot's last HEARTBEAT.
     pub heartbeat_age: Duration,
     /// Time for which HEARTBEATs have come without a gap of 4.5 s.
-    pub heard_for: Duration,
+    pub autopilot_heard_for: Duration,
     /// Time since the last usable position.
     pub position_age: Duration,
     /// Whether the position jumped, or the EKF origin changed, within the last second.
-    pub jumped: bool,
+    pub position_jumped: bool,
     /// Time since this vehicle last made progress along its path; zero in states other than
     /// `Follow` and `Blocked`.
     pub stalled_for: Duration,
@@ -25,7 +25,7 @@ pub struct GuardInputs {
     pub unfollowed_for: Duration,
     /// Time since this vehicle's path was first found blocked about where it was last found
     /// blocked, even if it was clear meanwhile.
-    pub blocked_for: Duration,
+    pub path_blocked_for: Duration,
     /// Time for which this vehicle has heard no neighbour, or none has reported that it hears this
     /// vehicle, in this state; zero once all have landed or left the plan. In a coverage mission
     /// it counts from 1 s before the lease ends.
@@ -35,12 +35,12 @@ pub struct GuardInputs {
     pub division_overdue: bool,
     /// Whether this vehicle may fly on unheard: all others are out of radio range, and its next
     /// gate is open or none is left.
-    pub way_free: bool,
+    pub may_fly_on_unheard: bool,
     /// Whether all other vehicles that still fly were last heard near the edge of the radio range.
-    pub out_of_range: bool,
+    pub others_out_of_range: bool,
     /// Whether in the last second a neighbour was heard, and one reported that it hears this
     /// vehicle; in a coverage mission, whether a majority reported that.
-    pub neighbour_heard: bool,
+    pub swarm_linked: bool,
     /// Whether other vehicles have divided this vehicle's share of the area, or count this vehicle
     /// as lost.
     pub excluded: bool,
@@ -53,7 +53,7 @@ pub struct GuardInputs {
     /// way.
     pub holds_to_divide: bool,
     /// Whether this vehicle's plan after the last division has come and is not flown yet.
-    pub division_ready: bool,
+    pub division_plan_ready: bool,
     /// Whether no division is under way or outstanding, nor this vehicle's own plan after a detour.
     pub division_settled: bool,
     /// Whether the shell has returned the requested plan.
@@ -61,101 +61,101 @@ pub struct GuardInputs {
     /// Whether the shell answered the request for a plan or detour with a failure.
     pub plan_failed: bool,
     /// Whether the shell has no plan because the roadmap is missing or not the mission's.
-    pub roadmap_bad: bool,
+    pub roadmap_unusable: bool,
     /// Whether the plan makes this vehicle leave its pad.
-    pub has_goal: bool,
+    pub plan_leaves_pad: bool,
     /// In a coverage mission: whether this vehicle has no part, but may get one of a vehicle that
     /// is lost: a majority heard it within the last 5 min, and others take part.
     pub in_reserve: bool,
     /// In a coverage mission: whether all neighbours heard have this vehicle's plan, after time
     /// enough to report another one. True in other missions.
-    pub plans_as_others: bool,
+    pub shares_plan_with_others: bool,
     /// Whether the position is within the start tolerance of the pad, horizontally and in height.
     pub at_pad: bool,
     /// Whether, in `Ready`, the position estimate's error bound exceeds what the margin leaves for
     /// it at cruise speed.
-    pub imprecise: bool,
+    pub imprecise_at_cruise: bool,
     /// Time for which the position estimate's error bound has exceeded what the margin leaves for
     /// it even at crawl speed.
-    pub imprecise_for: Duration,
+    pub imprecise_at_crawl_for: Duration,
     /// Whether the EKF origin moved while the motors were armed.
     pub origin_moved: bool,
     /// Whether MISSION_START is pending.
-    pub start: bool,
+    pub start_pending: bool,
     /// Whether DO_PAUSE_CONTINUE 0 is pending.
-    pub pause: bool,
+    pub pause_pending: bool,
     /// Whether the climb has only begun: the vehicle is less than 1 m, and less than half the
     /// climb, above its pad.
-    pub lifting_off: bool,
+    pub climb_just_begun: bool,
     /// Whether DO_PAUSE_CONTINUE 1 is pending.
-    pub resume: bool,
+    pub resume_pending: bool,
     /// Whether NAV_LAND is pending.
-    pub land: bool,
+    pub land_pending: bool,
     /// Whether NAV_RETURN_TO_LAUNCH is pending and this vehicle does not fly back yet.
-    pub turn_back: bool,
+    pub return_pending: bool,
     /// Whether the mission is a coverage mission.
-    pub area: bool,
+    pub is_coverage: bool,
     /// Whether this vehicle may request a path home from the shell: in a coverage mission, on its
-    /// path, while it has turned home fewer than `MAX_RETURNS` times. Perhaps there is no such
+    /// path, while it has turned home fewer than `MAX_TURNS_HOME` times. Perhaps there is no such
     /// path.
-    pub can_fly_home: bool,
+    pub may_seek_path_home: bool,
     /// Whether this vehicle is on the last descent of its path, above its pad.
-    pub descends: bool,
+    pub in_last_descent: bool,
     /// Whether this vehicle stands and may fly around the obstacle on its path and back to its
     /// path.
-    pub may_fly_beside: bool,
+    pub may_detour_and_rejoin: bool,
     /// Whether this vehicle stands at the end of its detour, back on its path.
-    pub detour_flown: bool,
+    pub stands_at_detour_end: bool,
     /// Whether the rest of its own plan has come to this vehicle, back on its path after a detour.
     pub own_plan_ready: bool,
     /// Whether the rest of its own plan could not be planned for this vehicle, back on its path.
-    pub own_plan_lost: bool,
+    pub own_plan_failed: bool,
     /// Whether this vehicle seeks a path home over the field of heights, or flies one.
-    pub homeward: bool,
+    pub seeks_or_flies_path_home: bool,
     /// Time for which this vehicle has sought its path home; `None` if it seeks none.
     pub seeking_home_for: Option<Duration>,
     /// Whether this vehicle stands, seeks its path home, and may request it from the shell now.
-    pub stands_to_return: bool,
+    pub ready_to_request_path_home: bool,
     /// Whether the flight, apart from interruptions, is still in the take-off or the climb.
     pub in_climb: bool,
     /// Whether the autopilot reports the motors armed.
     pub armed: bool,
     /// Whether the autopilot accepted arming 2.5 s ago or more, so that HEARTBEAT should show it.
-    pub armed_unseen: bool,
+    pub armed_bit_overdue: bool,
     /// Whether arming has not been requested yet.
     pub arming_unrequested: bool,
     /// Whether arming has failed for want of an answer from the autopilot.
     pub arming_unanswered: bool,
     /// Whether the autopilot is still in Offboard or Guided as entered for this mission, or in the
     /// landing mode after it.
-    pub own_mode: bool,
+    pub in_own_mode: bool,
     /// Whether the autopilot's mode is the landing mode.
-    pub landing: bool,
+    pub in_land_mode: bool,
     /// Whether the autopilot's mode is Offboard or Guided.
-    pub offboard: bool,
+    pub in_setpoint_mode: bool,
     /// Whether the autopilot's mode is neither the one before the start nor one that the companion
     /// set, so that a pilot or a failsafe has changed it.
     pub mode_foreign: bool,
     /// Whether HEARTBEAT reports `MAV_STATE_CRITICAL` or worse.
-    pub critical: bool,
+    pub autopilot_critical: bool,
     /// Whether the landing detector reports the vehicle on the ground.
     pub on_ground: bool,
     /// Estimated height above the ground as far as the plan says, metres; NaN while unknown, and
     /// where the landing detector last reported flight.
-    pub height_m: f32,
+    pub height_if_ground_reported_m: f32,
     /// Whether the landing detector has reported flight, or the vehicle has risen, since arming was
     /// requested.
     pub has_flown: bool,
     /// Whether the vehicle moves up or down by more than 0.5 m/s.
-    pub vertical: bool,
+    pub moves_vertically: bool,
     /// Whether the motors are armed and the landing detector reports flight.
     pub airborne: bool,
     /// Whether the landing detector reports flight; always true for an autopilot that takes off
     /// without a command.
-    pub lifted_off: bool,
+    pub take_off_command_done: bool,
     /// Whether the vehicle may take off: its departure is due, gates and safety filter let it go,
     /// the battery's charge is known, and another vehicle hears it.
-    pub gates_open: bool,
+    pub may_take_off: bool,
     /// Whether, in the state `Climb`, setpoint and vehicle are at the start of the path; false in
     /// all other states.
     pub climb_done: bool,
@@ -163,9 +163,9 @@ pub struct GuardInputs {
     /// last descent.
     pub path_done: bool,
     /// Whether the vehicle flies back to its start, along its path or straight home.
-    pub flies_back: bool,
+    pub returns_to_start: bool,
     /// Whether the vehicle is at the goal of its plan.
-    pub at_goal: bool,
+    pub reference_at_goal: bool,
     /// Whether the vehicle is near enough to its path to fly back to it, in the states that wait
     /// for that.
     pub near_path: bool,
@@ -180,7 +180,7 @@ pub struct GuardInputs {
     pub start_barred_for: Duration,
     /// Whether, in a coverage mission, another vehicle that takes part is in flight, none is
     /// missing, and no division is under way.
-    pub others_fly: bool,
+    pub may_leave_part_to_others: bool,
     /// Time for which the column below this vehicle, or before take-off above its pad, has been
     /// free of other vehicles.
     pub column_clear_for: Duration,
@@ -194,13 +194,13 @@ pub struct GuardInputs {
     pub pad_blocked_for: Duration,
     /// Time for which a vehicle that rests for good has barred the way back to its pad; over an
     /// area, where that one may only be silent, zero.
-    pub way_back_blocked_for: Duration,
+    pub way_back_blocked_for_good_for: Duration,
     /// Whether the vehicle is to join its path, but no way there is known to be free of walls.
     pub join_barred: bool,
     /// Whether a place aside to land at may be sought, from the path or over an area.
     pub may_seek_landing_aside: bool,
     /// Whether a place aside to land at is being sought.
-    pub seeks_landing: bool,
+    pub seeks_landing_aside: bool,
     /// Whether a place aside to land at is being sought, flown to, or reached.
     pub lands_aside: bool,
     /// Whether the vehicle stands at the end of its path to a place aside where it is to land.
@@ -217,21 +217,21 @@ pub struct GuardInputs {
     /// Whether the battery's charge is below half of the configured limit.
     pub battery_critical: bool,
     /// Whether no neighbour was last heard below this vehicle, near its vertical.
-    pub room_below: bool,
+    pub no_neighbour_below: bool,
     /// Whether the vehicle is outside its geofence, or stands at it.
-    pub outside: bool,
+    pub outside_geofence: bool,
     /// Whether an obstacle, or a vehicle that left the plan, is on the path ahead, or this vehicle
     /// seeks its path home.
-    pub blocked: bool,
+    pub path_blocked: bool,
     /// Whether all others stand and it is this vehicle's turn to fly a detour.
-    pub our_turn: bool,
+    pub our_turn_to_detour: bool,
     /// Whether the requested detour has come.
     pub detour_ready: bool,
     /// Whether the search for a detour has been given up after several failures.
-    pub no_way_around: bool,
+    pub detours_given_up: bool,
     /// Time for which the vehicle has waited below one that lands, without a place along its path
     /// to evade to.
-    pub time_below_landing: Duration,
+    pub waited_below_landing_for: Duration,
     /// Whether setpoint and vehicle stand: the vehicle is slower than a hovering one that sways.
     pub standing: bool,
 }
@@ -248,8 +248,8 @@ const SURELY_IN_AIR_M: f32 = MAX_HEIGHT_ERROR_ON_GROUND_M + IN_AIR_HYSTERESIS_M;
 
 impl GuardInputs {
     /// Whether the vehicle can request a path home over the field, and does not seek one yet.
-    pub(super) fn may_turn_home(&self) -> bool {
-        self.can_fly_home && self.seeking_home_for.is_none()
+    pub(super) fn may_begin_seeking_home(&self) -> bool {
+        self.may_seek_path_home && self.seeking_home_for.is_none()
     }
 
     /// Whether the vehicle surely has not left the ground: its position is new, the landing
@@ -257,13 +257,16 @@ impl GuardInputs {
     pub(super) fn is_before_lift_off(&self) -> bool {
         self.position_age < MAX_POSITION_AGE_ON_PAD
             && self.on_ground
-            && !self.vertical
+            && !self.moves_vertically
             && !self.has_flown
     }
 
     /// Whether the vehicle is in the air, whatever the landing detector reports.
     pub(super) fn is_in_air(&self) -> bool {
-        self.armed && (self.airborne || self.vertical || self.height_m > SURELY_IN_AIR_M)
+        self.armed
+            && (self.airborne
+                || self.moves_vertically
+                || self.height_if_ground_reported_m > SURELY_IN_AIR_M)
     }
 
     /// Whether the column below has not been free for `limit`, or a vehicle that rests for good has
@@ -276,6 +279,7 @@ impl GuardInputs {
     /// Whether the way to its pad has been barred for `limit`, or for 5 s
     /// (`MAX_WAIT_ABOVE_RESTING`) by a vehicle that rests for good.
     pub(super) fn is_pad_blocked_for(&self, limit: Duration) -> bool {
-        self.pad_blocked_for >= limit || self.way_back_blocked_for >= MAX_WAIT_ABOVE_RESTING
+        self.pad_blocked_for >= limit
+            || self.way_back_blocked_for_good_for >= MAX_WAIT_ABOVE_RESTING
     }
 }

@@ -33,17 +33,17 @@ impl PendingCommands {
         if to.is_over() || matches!(row.action, Action::ForgetStart | Action::CancelStart) {
             *self = Self::default();
         }
-        let lands = to.begins_landing();
+        let lands = to.stops_to_land_or_lands();
         let resumed =
             matches!(guard, Guard::ResumeCommanded | Guard::ResumedOnPath) && to != State::Paused;
         let returns = matches!(guard, Guard::ReturnCommanded | Guard::ReturnOverField);
         if lands || resumed || returns {
             self.pause = false;
         }
-        if lands || to.is_taken_over() {
+        if lands || to.is_flown_by_pilot_or_failsafe() {
             self.land = false;
         }
-        if lands || returns || to.is_taken_over() {
+        if lands || returns || to.is_flown_by_pilot_or_failsafe() {
             self.turn_back = false;
         }
     }
@@ -66,7 +66,7 @@ pub(super) fn apply_command(
         }
         // After its flight in a coverage mission, a vehicle starts again from its pad: it
         // photographs waypoints that other vehicles left.
-        MISSION_START if state == Done && inputs.area => {
+        MISSION_START if state == Done && inputs.is_coverage => {
             pending.start = true;
             return Some(ACCEPTED);
         }
@@ -89,7 +89,7 @@ pub(super) fn apply_command(
             if state == PilotReturned && inputs.position_age >= MAX_POSITION_AGE {
                 return Some(TEMPORARILY_REJECTED);
             }
-            let taken = state.is_flown_by_another();
+            let taken = state.is_left_to_pilot_or_failsafe();
             if pending.pause && !taken && !has_row_for(state, Guard::ResumeCommanded) {
                 pending.pause = false;
                 return Some(ACCEPTED);
@@ -102,12 +102,12 @@ pub(super) fn apply_command(
         LAND if state.has_given_up() => {
             // With motors off a landing needs nothing. With motors on the row acts only in Offboard
             // or Guided; else a pilot or a failsafe flies the vehicle.
-            let acts = inputs.armed && inputs.offboard;
+            let acts = inputs.armed && inputs.in_setpoint_mode;
             pending.land = acts;
             return Some(if acts || !inputs.armed { ACCEPTED } else { TEMPORARILY_REJECTED });
         }
         LAND => {
-            let already = state.begins_landing() || state.has_landed();
+            let already = state.stops_to_land_or_lands() || state.has_landed();
             (&mut pending.land, Guard::LandCommanded, already)
         }
         RETURN_TO_LAUNCH => (&mut pending.turn_back, Guard::ReturnCommanded, state == Done),

@@ -11,7 +11,7 @@
 use planner_core::flight::{Path, PicturePlan, WaypointRange, WaypointSet};
 
 use crate::link::done::{MAX_RANGES, PhotographedReport, RANGE_LEN, decode_range, encode_range};
-use crate::storage::store::{self, MAX_PROGRAM};
+use crate::storage::store::{self, MAX_PROGRAM_LEN};
 use crate::time::{Duration, Instant};
 
 /// Most ranges of waypoints known to be photographed; a waypoint that fits into none is
@@ -24,7 +24,7 @@ const STORE_EVERY_WAYPOINTS: u32 = 10;
 const FLIGHT_REPORT_LIFETIME: Duration = Duration::from_secs(25);
 /// Bytes of a flash record before its ranges: mission CRC and round.
 const HEADER_LEN: usize = 5;
-const _: () = assert!(HEADER_LEN + MAX_PHOTOGRAPHED_RANGES * RANGE_LEN <= MAX_PROGRAM);
+const _: () = assert!(HEADER_LEN + MAX_PHOTOGRAPHED_RANGES * RANGE_LEN <= MAX_PROGRAM_LEN);
 
 /// How far the flight of this vehicle is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,17 +60,17 @@ pub(crate) struct PhotographedWaypoints {
     /// Number of known waypoints in the last flash record.
     stored_count: u32,
     /// Whether `left_out_by_plan` has changed since the plan was requested.
-    outdated: bool,
+    left_out_set_changed: bool,
     /// Round for which the plan was requested.
     planned_round: u8,
     /// Whether the vehicle has left its pad since the plan was requested.
-    has_flown: bool,
+    has_left_pad: bool,
     /// When a vehicle in flight last reported what its plan leaves out.
-    followed_at: Option<Instant>,
+    flight_report_at: Option<Instant>,
     /// Index of the first range of the next report.
     next_range: usize,
     /// Whether the last report was of the waypoints that the plan leaves out.
-    reports_plan: bool,
+    last_report_was_left_out: bool,
 }
 
 impl PhotographedWaypoints {
@@ -116,7 +116,7 @@ impl PhotographedWaypoints {
     /// Prepares the request for a plan of the rest of the area: it leaves out the known waypoints,
     /// or, if the vehicle has not flown since its last request, those agreed on the ground.
     pub(crate) fn prepare_plan_of_rest(&mut self) {
-        if self.has_flown {
+        if self.has_left_pad {
             self.left_out_by_plan = self.known.clone();
         }
         self.note_plan_requested();
@@ -130,7 +130,8 @@ impl PhotographedWaypoints {
     }
 
     fn note_plan_requested(&mut self) {
-        (self.planned_round, self.has_flown, self.outdated) = (self.round, false, false);
+        (self.planned_round, self.has_left_pad, self.left_out_set_changed) =
+            (self.round, false, false);
     }
 
     /// Waypoints that the vehicle's plan leaves out.
@@ -140,8 +141,8 @@ impl PhotographedWaypoints {
 
     /// Whether the waypoints that the plan is to leave out have changed since the plan was
     /// requested.
-    pub(crate) fn is_outdated(&self) -> bool {
-        self.outdated
+    pub(crate) fn has_left_out_set_changed(&self) -> bool {
+        self.left_out_set_changed
     }
 
     /// Number of waypoints known to be photographed.
@@ -153,7 +154,7 @@ impl PhotographedWaypoints {
     /// the plan covers all of it again and a new round begins, unless a vehicle that left before
     /// has reported that round.
     pub(crate) fn note_pad_left(&mut self, photographs: &PicturePlan) {
-        self.has_flown = true;
+        self.has_left_pad = true;
         let whole = photographs.area_waypoint_count() > 0
             && self.left_out_by_plan.count() >= photographs.area_waypoint_count();
         if whole && self.round == self.planned_round {
@@ -188,7 +189,7 @@ impl PhotographedWaypoints {
         planning: PlanningPartners,
         now: Instant,
     ) {
-        if report.is_left_out_by_plan {
+        if report.are_ranges_left_out_by_plan {
             if planning != PlanningPartners::Nobody {
                 self.adopt_left_out_waypoints(report, now);
             }
@@ -198,20 +199,20 @@ impl PhotographedWaypoints {
         if newer > 127 {
             return;
         }
-        let follows = self.followed_at.is_some_and(|at| now - at <= FLIGHT_REPORT_LIFETIME);
+        let follows = self.flight_report_at.is_some_and(|at| now - at <= FLIGHT_REPORT_LIFETIME);
         let plans = planning == PlanningPartners::All && !report.flies && !follows;
         if newer > 0 {
             self.round = report.round;
             self.known.clear();
             if plans {
-                self.outdated |= !self.left_out_by_plan.is_empty();
+                self.left_out_set_changed |= !self.left_out_by_plan.is_empty();
                 self.left_out_by_plan.clear();
             }
         }
         for range in &report.ranges {
             let _ = self.known.insert(*range);
             if plans {
-                self.outdated |= self.left_out_by_plan.insert(*range) == Ok(true);
+                self.left_out_set_changed |= self.left_out_by_plan.insert(*range) == Ok(true);
             }
         }
     }
@@ -219,11 +220,11 @@ impl PhotographedWaypoints {
     /// Leaves out of the next plan the waypoints that are left out by the plan of a vehicle that
     /// has already started.
     fn adopt_left_out_waypoints(&mut self, report: &PhotographedReport, now: Instant) {
-        self.followed_at = Some(now);
+        self.flight_report_at = Some(now);
         if self.left_out_by_plan.ranges() != &report.ranges[..] {
             self.left_out_by_plan.clear();
             report.ranges.iter().for_each(|range| _ = self.left_out_by_plan.insert(*range));
-            self.outdated = true;
+            self.left_out_set_changed = true;
         }
     }
 
@@ -232,15 +233,16 @@ impl PhotographedWaypoints {
     /// report.
     pub(crate) fn next_report(&mut self, stage: FlightStage) -> PhotographedReport {
         let flies = stage == FlightStage::UnderWay;
-        let plan =
-            flies && !self.reports_plan && self.left_out_by_plan.ranges().len() <= MAX_RANGES;
-        self.reports_plan = plan;
+        let plan = flies
+            && !self.last_report_was_left_out
+            && self.left_out_by_plan.ranges().len() <= MAX_RANGES;
+        self.last_report_was_left_out = plan;
         if plan {
             let ranges = self.left_out_by_plan.ranges().iter().copied().collect();
             return PhotographedReport {
                 round: self.round,
                 flies,
-                is_left_out_by_plan: plan,
+                are_ranges_left_out_by_plan: plan,
                 ranges,
                 ..PhotographedReport::default()
             };

@@ -75,7 +75,7 @@ pub struct TransitionRow {
     /// States to which the row applies.
     pub from: &'static [State],
     /// `from` as a bit mask, one bit for each state.
-    pub(crate) states: u32,
+    pub(crate) from_mask: u32,
     /// Condition under which the row is taken.
     pub guard: Guard,
     /// How long the guard's condition must have lasted; zero for at once. Guards without a duration

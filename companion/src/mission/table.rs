@@ -22,7 +22,7 @@ pub(crate) const fn info_row(
 ) -> TransitionRow {
     TransitionRow {
         from,
-        states: state_mask(from),
+        from_mask: state_mask(from),
         guard,
         min_duration: limit,
         to: TargetState::State(to),
@@ -42,7 +42,7 @@ pub(crate) const fn warning_row(
 ) -> TransitionRow {
     TransitionRow {
         from,
-        states: state_mask(from),
+        from_mask: state_mask(from),
         guard,
         min_duration: limit,
         to: TargetState::State(to),
@@ -62,7 +62,7 @@ pub(crate) const fn resume_row(
 ) -> TransitionRow {
     TransitionRow {
         from,
-        states: state_mask(from),
+        from_mask: state_mask(from),
         guard,
         min_duration: limit,
         to: TargetState::Interrupted,
@@ -80,10 +80,10 @@ const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 const MAX_PAD_COLUMN_BLOCKED: Duration = Duration::from_millis(200);
 /// Time for which a vehicle may not reach its setpoint while the setpoint does not move on; then
 /// something holds the vehicle or carries it away, and it lands.
-pub(crate) const UNFOLLOWED_MOST: Duration = secs(20);
+pub(crate) const MAX_UNFOLLOWED: Duration = secs(20);
 /// Time for which the start of a vehicle in a coverage mission may be barred; then it leaves its
 /// share to those that fly. A lost vehicle that may come down above its pad is down sooner.
-const START_BARRED_MOST: Duration = secs(180);
+const MAX_START_BARRED: Duration = secs(180);
 
 use Action as A;
 use Guard as G;
@@ -93,9 +93,9 @@ use State::*;
 pub(crate) const WAITING_ON_GROUND: &[State] =
     &[WaitPosition, Planning, Ready, Scheduled, PadReplanning];
 /// States on the pad after MISSION_START, before arming is requested.
-pub(crate) const STARTED_ON_PAD: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging];
+pub(crate) const STARTED_BEFORE_ARMING: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging];
 /// States on the pad after MISSION_START, before take-off.
-pub(crate) const ON_PAD: &[State] =
+pub(crate) const STARTED_ON_PAD: &[State] =
     &[Scheduled, PadReplanning, Streaming, Engaging, Arming, CancelStart];
 /// States in the air, or about to take off, in which the companion flies the vehicle: by setpoints,
 /// in `TakeOff` by a command.
@@ -163,8 +163,8 @@ pub static TABLE: &[TransitionRow] = &[
     // flight.
     warning_row(&[Arming, CancelStart], G::FailsafeActsArmed, AT_ONCE, Failsafe,  A::None,              "Autopilot failsafe: setpoints stopped"),
     warning_row(&[Arming, CancelStart], G::ModeTakenArmed, AT_ONCE,  PilotControl, A::None,             "Pilot has control: mission stopped"),
-    warning_row(ON_PAD,              G::FailsafeActs,    AT_ONCE,    Aborted,     A::ForgetStart,       "Failsafe before take-off: start cancelled"),
-    warning_row(ON_PAD,              G::ModeTaken,       AT_ONCE,    Aborted,     A::ForgetStart,       "Mode changed by pilot: start cancelled"),
+    warning_row(STARTED_ON_PAD,      G::FailsafeActs,    AT_ONCE,    Aborted,     A::ForgetStart,       "Failsafe before take-off: start cancelled"),
+    warning_row(STARTED_ON_PAD,      G::ModeTaken,       AT_ONCE,    Aborted,     A::ForgetStart,       "Mode changed by pilot: start cancelled"),
     // The companion was restarted in the air: it sends no setpoints, and pilot or autopilot go on
     // flying the vehicle.
     warning_row(WAITING_ON_GROUND,   G::FoundFlying,     AT_ONCE,    Failsafe,    A::ForgetStart,       "Found in flight: no mission"),
@@ -183,10 +183,10 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Arming],           G::NoPosition,      secs(1),    CancelStart, A::CancelStart,       "Position lost: start cancelled"),
     // On the pad: somebody else arms or moves the vehicle, or a condition of the start fails before
     // arming.
-    warning_row(STARTED_ON_PAD,      G::Armed,           AT_ONCE,    Aborted,     A::ForgetStart,       "Armed by someone else: start cancelled"),
-    warning_row(STARTED_ON_PAD,      G::AwayFromPad,     AT_ONCE,    Aborted,     A::ForgetStart,       "Not at its start: start cancelled"),
-    warning_row(STARTED_ON_PAD,      G::ChargeLow,       AT_ONCE,    Aborted,     A::ForgetStart,       "Battery low: start cancelled"),
-    warning_row(STARTED_ON_PAD,      G::Outside,         AT_ONCE,    Aborted,     A::ForgetStart,       "Outside the geofence: start cancelled"),
+    warning_row(STARTED_BEFORE_ARMING, G::Armed,           AT_ONCE,    Aborted,     A::ForgetStart,       "Armed by someone else: start cancelled"),
+    warning_row(STARTED_BEFORE_ARMING, G::AwayFromPad,     AT_ONCE,    Aborted,     A::ForgetStart,       "Not at its start: start cancelled"),
+    warning_row(STARTED_BEFORE_ARMING, G::ChargeLow,       AT_ONCE,    Aborted,     A::ForgetStart,       "Battery low: start cancelled"),
+    warning_row(STARTED_BEFORE_ARMING, G::Outside,         AT_ONCE,    Aborted,     A::ForgetStart,       "Outside the geofence: start cancelled"),
     warning_row(&[Arming],           G::AwayFromPad,     AT_ONCE,    CancelStart, A::CancelStart,       "Not at its start: start cancelled"),
     warning_row(&[Arming],           G::ChargeLow,       AT_ONCE,    CancelStart, A::CancelStart,       "Battery low: start cancelled"),
     warning_row(&[Arming],           G::Outside,         AT_ONCE,    CancelStart, A::CancelStart,       "Outside the geofence: start cancelled"),
@@ -229,7 +229,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Ready],            G::StartImprecise,  secs(3),    Aborted,     A::ForgetStart,       "Estimate worse than margin: start refused"),
     info_row(&[Ready],               G::StartCommanded,  AT_ONCE,    Scheduled,   A::None,              "Started"),
     info_row(&[Ready, Scheduled],    G::LeftOutSetChanged, AT_ONCE,    Planning,    A::RequestPlan,       "More is photographed: planning again"),
-    warning_row(STARTED_ON_PAD,      G::Excluded,        AT_ONCE,    Aborted,     A::ForgetStart,       "Its part was given away: start cancelled"),
+    warning_row(STARTED_BEFORE_ARMING, G::Excluded,        AT_ONCE,    Aborted,     A::ForgetStart,       "Its part was given away: start cancelled"),
     info_row(&[Ready, Scheduled, PadReplanning, Streaming, Engaging], G::LandCommanded, AT_ONCE, Aborted, A::ForgetStart, "Start cancelled as commanded"),
     info_row(&[Ready, Scheduled, PadReplanning, Streaming, Engaging], G::ReturnCommanded, AT_ONCE, Aborted, A::ForgetStart, "Start cancelled as commanded"),
     info_row(&[Arming, CancelStart], G::LandCommanded,   AT_ONCE,    CancelStart, A::CancelStart,       "Start cancelled as commanded"),
@@ -246,7 +246,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Scheduled],        G::PlansDiffer,     secs(10),   Scheduled,   A::None,              "Another plan is heard: start waits"),
     info_row(&[Scheduled],           G::GatesOpen,       AT_ONCE,    Streaming,   A::HoldHere,          ""),
     info_row(&[Scheduled],           G::ReserveEnds,     AT_ONCE,    Done,        A::ForgetStart,       "No goal for this vehicle: staying"),
-    warning_row(&[Scheduled],        G::StartBarred,     START_BARRED_MOST, Aborted, A::ForgetStart,    "Start barred for 3 min: others take its part"),
+    warning_row(&[Scheduled],        G::StartBarred,     MAX_START_BARRED, Aborted,  A::ForgetStart,    "Start barred for 3 min: others take its part"),
     warning_row(&[Streaming, Engaging], G::ColumnBlocked, MAX_PAD_COLUMN_BLOCKED, Scheduled, A::None,      "Vehicle above the pad: start waits"),
     info_row(&[Streaming],           G::Elapsed,         secs(1),    Engaging,    A::RequestOffboard,   ""),
     info_row(&[Engaging],            G::Offboard,        AT_ONCE,    Arming,      A::RequestArming,     "Setpoints followed: arming"),
@@ -289,7 +289,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Follow],           G::PadTaken,        secs(20),   Replanning,  A::RequestLanding,    "No room to land: seeking a place aside"),
     info_row(&[Follow],              G::LandingPlaceReached, AT_ONCE, Land,        A::RequestLandMode,   "Landing aside"),
     warning_row(&[Follow],           G::PathBlocked,     AT_ONCE,    Blocked,     A::BrakeOnPath,       "Path blocked: waiting until all others stand"),
-    warning_row(&[Follow, Blocked],  G::Unfollowed,      UNFOLLOWED_MOST, Land,   A::RequestLandMode,   "Setpoint not followed: landing"),
+    warning_row(&[Follow, Blocked],  G::Unfollowed,      MAX_UNFOLLOWED, Land,    A::RequestLandMode,   "Setpoint not followed: landing"),
     warning_row(&[Follow],           G::StalledOverField, secs(600), Blocked,     A::TurnHome,          "No progress for 10 min: planning the way home"),
     warning_row(&[Follow],           G::Stalled,         secs(600),  Land,        A::RequestLandMode,   "No progress for 10 min: landing"),
     info_row(&[Blocked],             G::PathClear,       AT_ONCE,    Follow,      A::FollowPath,        "Path clear again"),

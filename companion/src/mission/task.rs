@@ -18,11 +18,11 @@ use crate::timers::Timers;
 
 /// State of the commands of the vehicle's task.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Tasks {
+pub(crate) struct TaskCommands {
     camera: CameraControl,
 }
 
-impl Tasks {
+impl TaskCommands {
     /// Ends the commands of the former plan.
     pub(crate) fn begin_plan(&mut self) {
         self.camera.begin_path();

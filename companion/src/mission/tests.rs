@@ -49,27 +49,29 @@ type Shows = fn(&mut GuardInputs);
 
 /// The interruptions: name, and change of the inputs.
 const INTERRUPTIONS: &[(&str, Shows)] = &[
-    ("pause", |i| i.pause = true),
-    ("resume", |i| i.resume = true),
-    ("land", |i| (i.land, i.offboard) = (true, !i.mode_foreign)),
-    ("return", |i| i.turn_back = true),
-    ("start", |i| i.start = true),
-    ("pilot's mode", |i| (i.mode_foreign, i.offboard) = (true, false)),
-    ("failsafe", |i| (i.mode_foreign, i.offboard, i.critical) = (true, false, true)),
+    ("pause", |i| i.pause_pending = true),
+    ("resume", |i| i.resume_pending = true),
+    ("land", |i| (i.land_pending, i.in_setpoint_mode) = (true, !i.mode_foreign)),
+    ("return", |i| i.return_pending = true),
+    ("start", |i| i.start_pending = true),
+    ("pilot's mode", |i| (i.mode_foreign, i.in_setpoint_mode) = (true, false)),
+    ("failsafe", |i| {
+        (i.mode_foreign, i.in_setpoint_mode, i.autopilot_critical) = (true, false, true);
+    }),
     ("position lost", |i| i.position_age = Duration::from_secs(3)),
-    ("position jumps", |i| (i.position_age, i.jumped) = (MAX_POSITION_AGE, true)),
+    ("position jumps", |i| (i.position_age, i.position_jumped) = (MAX_POSITION_AGE, true)),
     ("autopilot silent", |i| i.heartbeat_age = Duration::from_secs(4)),
     ("disarmed", |i| (i.armed, i.airborne) = (false, false)),
-    ("battery low", |i| (i.battery_low, i.room_below) = (true, true)),
+    ("battery low", |i| (i.battery_low, i.no_neighbour_below) = (true, true)),
     ("battery critical", |i| (i.battery_low, i.battery_critical) = (true, true)),
-    ("outside the fence", |i| (i.outside, i.room_below) = (true, true)),
+    ("outside the fence", |i| (i.outside_geofence, i.no_neighbour_below) = (true, true)),
     ("neighbours silent", |i| i.unlinked_for = Duration::from_secs(11)),
 ];
 
 /// Inputs of a state in which nothing happens.
 pub(crate) fn quiet(state: State) -> GuardInputs {
     let on_ground = WAITING_ON_GROUND.contains(&state)
-        || ON_PAD.contains(&state)
+        || STARTED_ON_PAD.contains(&state)
         || matches!(state, Done | Aborted);
     let mut i = GuardInputs {
         armed: !on_ground,
@@ -77,14 +79,14 @@ pub(crate) fn quiet(state: State) -> GuardInputs {
         at_pad: true,
         ..GuardInputs::default()
     };
-    (i.has_goal, i.has_flown, i.own_mode) = (true, !on_ground, !on_ground);
+    (i.plan_leaves_pad, i.has_flown, i.in_own_mode) = (true, !on_ground, !on_ground);
     match state {
         WaitAutopilot => i.heartbeat_age = MAX_HEARTBEAT_AGE,
         WaitPosition => i.position_age = MAX_POSITION_AGE,
-        Blocked => i.blocked = true,
+        Blocked => i.path_blocked = true,
         AutopilotSilent => i.heartbeat_age = Duration::from_secs(5),
         PositionLost => i.position_age = Duration::from_secs(2),
-        Disarm => (i.airborne, i.landing) = (false, true),
+        Disarm => (i.airborne, i.in_land_mode) = (false, true),
         PilotControl | Failsafe => i.mode_foreign = true,
         _ => {}
     }
@@ -182,138 +184,158 @@ fn every_state_is_reached_and_every_wait_ends() {
 /// Inputs under which this guard is met for any limit, and as few others as possible.
 fn inputs_for(guard: Guard) -> GuardInputs {
     let long = Duration::from_secs(3600);
-    let mut i = GuardInputs { armed: true, landing: true, ..GuardInputs::default() };
+    let mut i = GuardInputs { armed: true, in_land_mode: true, ..GuardInputs::default() };
     match guard {
         G::AutopilotHeard | G::PositionKnown => {}
         G::NoHeartbeat => i.heartbeat_age = long,
         G::NoPosition => i.position_age = long,
-        G::StillNoPosition => (i.position_age, i.in_state, i.heard_for) = (long, long, long),
-        G::PositionJumped => (i.position_age, i.jumped) = (long, true),
+        G::StillNoPosition => {
+            (i.position_age, i.time_in_state, i.autopilot_heard_for) = (long, long, long);
+        }
+        G::PositionJumped => (i.position_age, i.position_jumped) = (long, true),
         G::FoundFlying => i.airborne = true,
         G::BackOnPath => i.near_path = true,
         G::BackOffPath => {}
         G::PlanReady => i.plan_ready = true,
         G::PlanFailed => i.plan_failed = true,
-        G::RoadmapBad => (i.plan_failed, i.roadmap_bad) = (true, true),
-        G::StartCommanded => (i.start, i.has_goal, i.at_pad, i.armed) = (true, true, true, false),
+        G::RoadmapBad => (i.plan_failed, i.roadmap_unusable) = (true, true),
+        G::StartCommanded => {
+            (i.start_pending, i.plan_leaves_pad, i.at_pad, i.armed) = (true, true, true, false);
+        }
         G::StartWithoutGoal => {
-            (i.start, i.plans_as_others, i.at_pad, i.armed) = (true, true, true, false);
+            (i.start_pending, i.shares_plan_with_others, i.at_pad, i.armed) =
+                (true, true, true, false);
         }
         G::StartInReserve => {
-            (i.start, i.in_reserve, i.plans_as_others, i.at_pad, i.armed) =
+            (i.start_pending, i.in_reserve, i.shares_plan_with_others, i.at_pad, i.armed) =
                 (true, true, true, true, false);
         }
-        G::ReserveEnds => (i.area, i.armed) = (true, false),
-        G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
-        G::StartArmed => (i.start, i.has_goal, i.at_pad) = (true, true, true),
+        G::ReserveEnds => (i.is_coverage, i.armed) = (true, false),
+        G::StartElsewhere => (i.start_pending, i.plan_leaves_pad, i.armed) = (true, true, false),
+        G::StartArmed => (i.start_pending, i.plan_leaves_pad, i.at_pad) = (true, true, true),
         G::StartImprecise => {
-            (i.start, i.has_goal, i.at_pad, i.armed) = (true, true, true, false);
-            (i.imprecise, i.in_state) = (true, long);
+            (i.start_pending, i.plan_leaves_pad, i.at_pad, i.armed) = (true, true, true, false);
+            (i.imprecise_at_cruise, i.time_in_state) = (true, long);
         }
-        G::EstimateImprecise => i.imprecise_for = long,
+        G::EstimateImprecise => i.imprecise_at_crawl_for = long,
         G::OriginMoved => i.origin_moved = true,
-        G::GatesOpen => i.gates_open = true,
+        G::GatesOpen => i.may_take_off = true,
         G::StartBatteryLow => {
-            (i.start, i.has_goal, i.at_pad, i.armed, i.battery_low) =
+            (i.start_pending, i.plan_leaves_pad, i.at_pad, i.armed, i.battery_low) =
                 (true, true, true, false, true);
         }
         G::StartOutside => {
-            (i.start, i.has_goal, i.at_pad, i.armed, i.outside) = (true, true, true, false, true);
+            (i.start_pending, i.plan_leaves_pad, i.at_pad, i.armed, i.outside_geofence) =
+                (true, true, true, false, true);
         }
         G::AwayFromPad => i.armed = false,
         G::ChargeLow => (i.armed, i.battery_low) = (false, true),
-        G::Outside => (i.armed, i.outside) = (false, true),
-        G::DisarmedAtGoal => (i.armed, i.at_goal) = (false, true),
-        G::StaysArmed => i.in_state = long,
-        G::StaysDisarmed => (i.armed, i.in_state) = (false, long),
-        G::StaysDisarmedStarted => (i.armed, i.in_state, i.start) = (false, long, true),
-        G::ArmedUnseen => i.armed_unseen = true,
+        G::Outside => (i.armed, i.outside_geofence) = (false, true),
+        G::DisarmedAtGoal => (i.armed, i.reference_at_goal) = (false, true),
+        G::StaysArmed => i.time_in_state = long,
+        G::StaysDisarmed => (i.armed, i.time_in_state) = (false, long),
+        G::StaysDisarmedStarted => {
+            (i.armed, i.time_in_state, i.start_pending) = (false, long, true);
+        }
+        G::ArmedUnseen => i.armed_bit_overdue = true,
         G::ArmingHeld => {
-            (i.arming_unrequested, i.column_blocked_for, i.in_state) = (true, long, long);
+            (i.arming_unrequested, i.column_blocked_for, i.time_in_state) = (true, long, long);
         }
         G::ArmingUnanswered => i.arming_unanswered = true,
         G::InAir => i.airborne = true,
-        G::Unattended => (i.airborne, i.offboard, i.own_mode) = (true, true, true),
-        G::LandingModeLeft => i.landing = false,
-        G::PausedOnPad => (i.pause, i.in_state) = (true, long),
-        G::LandUnattended => (i.land, i.airborne, i.offboard) = (true, true, true),
-        G::ReturnInClimb => (i.turn_back, i.in_climb) = (true, true),
-        G::Elapsed => i.in_state = long,
-        G::Offboard => i.offboard = true,
+        G::Unattended => (i.airborne, i.in_setpoint_mode, i.in_own_mode) = (true, true, true),
+        G::LandingModeLeft => i.in_land_mode = false,
+        G::PausedOnPad => (i.pause_pending, i.time_in_state) = (true, long),
+        G::LandUnattended => (i.land_pending, i.airborne, i.in_setpoint_mode) = (true, true, true),
+        G::ReturnInClimb => (i.return_pending, i.in_climb) = (true, true),
+        G::Elapsed => i.time_in_state = long,
+        G::Offboard => i.in_setpoint_mode = true,
         G::ModeTaken => i.mode_foreign = true,
-        G::FailsafeActs => (i.mode_foreign, i.critical) = (true, true),
+        G::FailsafeActs => (i.mode_foreign, i.autopilot_critical) = (true, true),
         G::ModeTakenArmed => i.mode_foreign = true,
-        G::FailsafeActsArmed => (i.mode_foreign, i.critical) = (true, true),
+        G::FailsafeActsArmed => (i.mode_foreign, i.autopilot_critical) = (true, true),
         G::Armed => i.armed = true,
         G::Disarmed => i.armed = false,
-        G::LiftedOff => i.lifted_off = true,
+        G::LiftedOff => i.take_off_command_done = true,
         G::ClimbDone => i.climb_done = true,
-        G::BackAtStart => (i.path_done, i.flies_back) = (true, true),
+        G::BackAtStart => (i.path_done, i.returns_to_start) = (true, true),
         G::PathDone => i.path_done = true,
         G::Unfollowed => i.unfollowed_for = long,
-        G::PathBarred => (i.join_barred, i.in_state) = (true, long),
+        G::PathBarred => (i.join_barred, i.time_in_state) = (true, long),
         G::Stalled => i.stalled_for = long,
-        G::PauseCommanded => i.pause = true,
-        G::ResumeCommanded => i.resume = true,
-        G::ResumedOnPath => (i.offboard, i.resume, i.near_path) = (true, true, true),
-        G::ResumedOffPath => (i.offboard, i.resume) = (true, true),
-        G::LandCommanded => i.land = true,
-        G::ReturnCommanded => i.turn_back = true,
-        G::ReturnOverField => (i.turn_back, i.can_fly_home) = (true, true),
-        G::BlockedOverField => (i.blocked, i.can_fly_home, i.blocked_for) = (true, true, long),
-        G::MayDetourOverField => (i.blocked, i.may_fly_beside, i.blocked_for) = (true, true, long),
-        G::DetourFlown => i.detour_flown = true,
-        G::OwnPlanReady => i.own_plan_ready = true,
-        G::OwnPlanLost => i.own_plan_lost = true,
-        G::YieldedOverField => (i.yielded_for, i.hindered_for, i.can_fly_home) = (long, long, true),
-        G::HinderedOverField => (i.hindered_for, i.can_fly_home) = (long, true),
-        G::StartAgain => i.start = true,
-        G::StartOverField => (i.start, i.area) = (true, true),
-        G::StalledOverField => (i.stalled_for, i.can_fly_home) = (long, true),
-        G::StartBarred => {
-            (i.start_barred_for, i.others_fly, i.has_goal) = (long, true, true);
+        G::PauseCommanded => i.pause_pending = true,
+        G::ResumeCommanded => i.resume_pending = true,
+        G::ResumedOnPath => {
+            (i.in_setpoint_mode, i.resume_pending, i.near_path) = (true, true, true);
         }
-        G::StandsToReturn => i.stands_to_return = true,
-        G::WayHomeReady => (i.detour_ready, i.homeward) = (true, true),
+        G::ResumedOffPath => (i.in_setpoint_mode, i.resume_pending) = (true, true),
+        G::LandCommanded => i.land_pending = true,
+        G::ReturnCommanded => i.return_pending = true,
+        G::ReturnOverField => (i.return_pending, i.may_seek_path_home) = (true, true),
+        G::BlockedOverField => {
+            (i.path_blocked, i.may_seek_path_home, i.path_blocked_for) = (true, true, long);
+        }
+        G::MayDetourOverField => {
+            (i.path_blocked, i.may_detour_and_rejoin, i.path_blocked_for) = (true, true, long);
+        }
+        G::DetourFlown => i.stands_at_detour_end = true,
+        G::OwnPlanReady => i.own_plan_ready = true,
+        G::OwnPlanLost => i.own_plan_failed = true,
+        G::YieldedOverField => {
+            (i.yielded_for, i.hindered_for, i.may_seek_path_home) = (long, long, true);
+        }
+        G::HinderedOverField => (i.hindered_for, i.may_seek_path_home) = (long, true),
+        G::StartAgain => i.start_pending = true,
+        G::StartOverField => (i.start_pending, i.is_coverage) = (true, true),
+        G::StalledOverField => (i.stalled_for, i.may_seek_path_home) = (long, true),
+        G::StartBarred => {
+            (i.start_barred_for, i.may_leave_part_to_others, i.plan_leaves_pad) =
+                (long, true, true);
+        }
+        G::StandsToReturn => i.ready_to_request_path_home = true,
+        G::WayHomeReady => (i.detour_ready, i.seeks_or_flies_path_home) = (true, true),
         G::NoWayHome => (i.seeking_home_for, i.can_turn_back) = (Some(long), true),
         G::LandingBlocked => i.column_blocked_for = long,
         G::LandingClear => i.column_clear_for = long,
-        G::NoRoomToLand => (i.column_blocked_for, i.offboard, i.can_turn_back) = (long, true, true),
+        G::NoRoomToLand => {
+            (i.column_blocked_for, i.in_setpoint_mode, i.can_turn_back) = (long, true, true);
+        }
         G::NoRoomHere => {
-            (i.column_blocked_for, i.offboard, i.may_seek_landing_aside) = (long, true, true);
+            (i.column_blocked_for, i.in_setpoint_mode, i.may_seek_landing_aside) =
+                (long, true, true);
         }
         G::PadTaken => (i.pad_blocked_for, i.may_seek_landing_aside) = (long, true),
-        G::NoPlaceAside => (i.plan_failed, i.seeks_landing) = (true, true),
+        G::NoPlaceAside => (i.plan_failed, i.seeks_landing_aside) = (true, true),
         G::LandingPlaceReached => i.landing_place_reached = true,
-        G::ColumnBlocked => (i.column_blocked_for, i.in_state) = (long, long),
+        G::ColumnBlocked => (i.column_blocked_for, i.time_in_state) = (long, long),
         G::Yielded => (i.yielded_for, i.hindered_for) = (long, long),
-        G::MayFlyUnheard => i.way_free = true,
-        G::OutOfRange => (i.out_of_range, i.in_state) = (true, long),
+        G::MayFlyUnheard => i.may_fly_on_unheard = true,
+        G::OutOfRange => (i.others_out_of_range, i.time_in_state) = (true, long),
         G::Hindered => i.hindered_for = long,
         G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
-        G::BatteryLow => (i.battery_low, i.room_below) = (true, true),
-        G::OutsideGeofence => (i.outside, i.room_below) = (true, true),
+        G::BatteryLow => (i.battery_low, i.no_neighbour_below) = (true, true),
+        G::OutsideGeofence => (i.outside_geofence, i.no_neighbour_below) = (true, true),
         G::NeighboursSilent => i.unlinked_for = long,
-        G::LeaseLost => (i.area, i.unlinked_for) = (true, long),
-        G::NotDivided => (i.in_state, i.division_overdue) = (long, true),
-        G::PausedBeforeLiftOff => (i.pause, i.on_ground) = (true, true),
+        G::LeaseLost => (i.is_coverage, i.unlinked_for) = (true, long),
+        G::NotDivided => (i.time_in_state, i.division_overdue) = (long, true),
+        G::PausedBeforeLiftOff => (i.pause_pending, i.on_ground) = (true, true),
         G::BarredBeforeLiftOff => (i.hindered_for, i.on_ground) = (long, true),
-        G::NeighbourHeard => i.neighbour_heard = true,
+        G::NeighbourHeard => i.swarm_linked = true,
         G::OnGround => i.on_ground = true,
-        G::PathBlocked => i.blocked = true,
+        G::PathBlocked => i.path_blocked = true,
         G::PathClear => {}
-        G::OurTurn => i.our_turn = true,
+        G::OurTurn => i.our_turn_to_detour = true,
         G::DetourReady => i.detour_ready = true,
         G::DetourFailed => i.plan_failed = true,
-        G::NoWayAround => (i.no_way_around, i.room_below) = (true, true),
-        G::NoWayOn => (i.no_way_around, i.can_turn_back) = (true, true),
-        G::BelowLandingVehicle => i.time_below_landing = long,
+        G::NoWayAround => (i.detours_given_up, i.no_neighbour_below) = (true, true),
+        G::NoWayOn => (i.detours_given_up, i.can_turn_back) = (true, true),
+        G::BelowLandingVehicle => i.waited_below_landing_for = long,
         G::Standing => i.standing = true,
         G::Excluded => i.excluded = true,
         G::LeftOutSetChanged => i.left_out_set_changed = true,
-        G::PlansDiffer => (i.plans_differ, i.in_state) = (true, long),
+        G::PlansDiffer => (i.plans_differ, i.time_in_state) = (true, long),
         G::HoldsToDivide => i.holds_to_divide = true,
-        G::DivisionReady => i.division_ready = true,
+        G::DivisionReady => i.division_plan_ready = true,
         G::NothingToDivide => i.division_settled = true,
     }
     i
@@ -338,7 +360,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
                 (Scheduled | PadReplanning | Streaming | Engaging, guard) => {
                     inputs.armed = guard == G::Armed;
                 }
-                (Blocked, guard) => inputs.blocked = guard != G::PathClear,
+                (Blocked, guard) => inputs.path_blocked = guard != G::PathClear,
                 _ => {}
             }
             if row.guard == G::Armed {
@@ -367,17 +389,17 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
 #[test]
 fn the_pilot_outranks_everything_in_the_air() {
     let everything = GuardInputs {
-        in_state: secs(9999),
-        blocked_for: secs(9999),
+        time_in_state: secs(9999),
+        path_blocked_for: secs(9999),
         stalled_for: secs(9999),
         mode_foreign: true,
         armed: true,
-        pause: true,
-        resume: true,
-        land: true,
-        turn_back: true,
+        pause_pending: true,
+        resume_pending: true,
+        land_pending: true,
+        return_pending: true,
         battery_low: true,
-        outside: true,
+        outside_geofence: true,
         path_done: true,
         climb_done: true,
         position_age: secs(9999),
@@ -386,7 +408,7 @@ fn the_pilot_outranks_everything_in_the_air() {
     for state in FLYING.iter().chain(&[Land]) {
         let to = |inputs| first_applicable_row(*state, inputs).map(|row| row.to);
         assert_eq!(to(&everything), Some(TargetState::State(PilotControl)), "{state:?}");
-        let failsafe = GuardInputs { critical: true, ..everything };
+        let failsafe = GuardInputs { autopilot_critical: true, ..everything };
         assert_eq!(to(&failsafe), Some(TargetState::State(Failsafe)), "{state:?}");
     }
 }

@@ -17,7 +17,7 @@ const UNBARRED_AFTER: Duration = Duration::from_secs(5);
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Waits {
     /// The wait for another vehicle that has not started.
-    pub(super) report: WaitReport,
+    pub(super) unstarted: WaitReport,
     /// How long the start of this vehicle has been barred.
     pub(super) barred_start: BarredStart,
 }
@@ -32,7 +32,7 @@ pub(crate) struct WaitReport {
 impl WaitReport {
     /// To be called each step with the vehicle that has not started and that this one waits for, 0
     /// for none. Returns whether the wait is to be reported now, every 30 s (`REPORT_WAIT_AFTER`).
-    pub(crate) fn update(&mut self, id: u8, now: Instant, timers: &mut Timers) -> bool {
+    pub(crate) fn should_report(&mut self, id: u8, now: Instant, timers: &mut Timers) -> bool {
         if id != self.id {
             self.id = id;
             timers.set(Timer::WaitReport, now + REPORT_WAIT_AFTER);
@@ -64,7 +64,7 @@ impl BarredStart {
     }
 
     /// Time for which the start has been barred, short gaps included; zero if it is not.
-    pub(crate) fn lasts_for(&self, now: Instant) -> Duration {
+    pub(crate) fn barred_for(&self, now: Instant) -> Duration {
         self.since.map_or(Duration::default(), |since| now - since)
     }
 }

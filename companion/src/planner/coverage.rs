@@ -7,9 +7,9 @@ use heapless::Vec;
 use planner_core::coverage::area::{Area, AreaError, Ring};
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
 use planner_core::coverage::losses::{self, Loss, VehicleStatus};
-use planner_core::coverage::pack::{self, PackWorkspace, RoutePlan, Vehicle, Work};
+use planner_core::coverage::pack::{self, CoverageProblem, PackWorkspace, RoutePlan, Vehicle};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
-use planner_core::coverage::transit::Transit;
+use planner_core::coverage::transit::TransitGraph;
 use planner_core::coverage::{CoverageError, Flat, around};
 use planner_core::detour::{DetourRequest, KeepOutZone};
 use planner_core::file::CRC32;
@@ -41,23 +41,23 @@ pub struct Workspace<const X: usize, const L: usize, const K: usize> {
     pack: PackWorkspace<K>,
     routes: RoutePlan<K>,
     losses: losses::LossesWorkspace<L, K>,
-    planned: Planned,
+    planned: PlanFingerprint,
 }
 
 /// Identifies the plan that a workspace and the flights planned with it hold: a further division
 /// starts from that plan instead of planning the whole area again.
 #[derive(Clone, Copy, PartialEq, Eq)]
-struct Planned {
+struct PlanFingerprint {
     /// Number of plans up to this one, the one before take-off included; 0 if there is no plan.
-    plans: u32,
+    plan_count: u32,
     /// CRC of the inputs of all these plans.
     inputs_crc: u32,
     /// CRC of its flights.
     plan_crc: u32,
 }
 
-impl Planned {
-    const NOTHING: Self = Self { plans: 0, inputs_crc: 0, plan_crc: 0 };
+impl PlanFingerprint {
+    const NOTHING: Self = Self { plan_count: 0, inputs_crc: 0, plan_crc: 0 };
 }
 
 impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
@@ -71,7 +71,7 @@ impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
             pack: PackWorkspace::new(),
             routes: RoutePlan::new(),
             losses: losses::LossesWorkspace::new(),
-            planned: Planned::NOTHING,
+            planned: PlanFingerprint::NOTHING,
         }
     }
 
@@ -159,17 +159,17 @@ fn packing_vehicle(
     view: &CoverageView<'_>,
     i: usize,
 ) -> Vehicle {
-    let place = vehicle.start.xy();
+    let place = vehicle.path_start.xy();
     let share = view.shares().nth(i);
     Vehicle {
-        place,
+        transit_start: place,
         home: place,
         cruise_mps: libm::fminf(mission.header().cruise_mps, vehicle.speed_max_mps),
         climb_mps: share.map_or(0.0, |s| s.climb_mps),
         descend_mps: share.map_or(0.0, |s| s.descend_mps),
         // With `Anyone` the weights are sizes of parts, not of vehicles: after a loss each vehicle
         // that flies on gets an equal share.
-        weight: match view.header().parts {
+        weight: match view.header().part_eligibility {
             PartEligibility::SameWeight => share.map_or(0.0, |s| s.weight),
             PartEligibility::Anyone => 1.0,
         },
@@ -204,8 +204,8 @@ impl<'m> Request<'_, 'm> {
         let steepest =
             vehicles.iter().map(|v| libm::fminf(v.climb_mps, v.descend_mps) / v.cruise_mps);
         let max_slope = steepest.fold(f32::INFINITY, libm::fminf);
-        let (height_m, tolerance_m) = (ground.height_m, ground.tolerance_m);
-        Ok(Some(TerrainFollowing { field, height_m, tolerance_m, max_slope }))
+        let (height_m, tolerance_m) = (ground.min_height_above_ground_m, ground.height_tolerance_m);
+        Ok(Some(TerrainFollowing { field, min_height_m: height_m, tolerance_m, max_slope }))
     }
 }
 
@@ -248,7 +248,7 @@ pub fn plan_detour<
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), PlanFailure> {
     let area = read_area(view, &mut ws.vertices, &mut ws.rings).map_err(Error::Coverage)?;
-    let mut transit = Transit::<C>::empty();
+    let mut transit = TransitGraph::<C>::empty();
     transit.set_area(area).map_err(Error::Coverage)?;
     let field = field.filter(|_| view.header().ground.is_some());
     around::plan_detour_for_vehicle(&transit, field, request, obstacles, out)
@@ -263,13 +263,20 @@ fn read_fleet<const K: usize>(
 ) -> Result<(Vec<Vehicle, K>, Vec<Pad, K>), CoverageError> {
     let (mut vehicles, mut pads) = (Vec::new(), Vec::new());
     for (i, own) in mission.vehicles().enumerate() {
-        let (id, start, climb_m) = (own.task.id, own.start, own.task.climb_m);
-        let pad = Pad { id, start, climb_m, end_z_m: start.z, descent_m: climb_m, airborne: false };
+        let (id, start, climb_m) = (own.task.id, own.path_start, own.task.climb_m);
+        let pad = Pad {
+            vehicle_id: id,
+            path_start: start,
+            climb_m,
+            path_end_z_m: start.z,
+            descent_m: climb_m,
+            airborne: false,
+        };
         vehicles
             .push(packing_vehicle(mission, &own, view, i))
             .map_err(|_| CoverageError::Vehicles)?;
         pads.push(pad).map_err(|_| CoverageError::Vehicles)?;
-        if area.is_in_no_fly_zone(&own.start.xy()) {
+        if area.is_in_no_fly_zone(&own.path_start.xy()) {
             return Err(CoverageError::InsideNoFly(i as u8));
         }
     }
@@ -325,24 +332,25 @@ pub fn plan_flights<
     let Request { mission, view, max_gates: gates_most, .. } = *request;
     let header = view.header();
     let area = read_area(view, &mut ws.vertices, &mut ws.rings)?;
-    let mut transit = Transit::<C>::empty();
+    let mut transit = TransitGraph::<C>::empty();
     transit.set_area(area)?;
     let (vehicles, pads) = read_fleet::<K>(mission, view, &area)?;
     // After a failure the workspace counts as holding no plan.
-    let planned = core::mem::replace(&mut ws.planned, Planned::NOTHING);
-    let mut wanted = Planned { plans: 1, inputs_crc: start_inputs_crc(request), plan_crc: out.crc };
+    let planned = core::mem::replace(&mut ws.planned, PlanFingerprint::NOTHING);
+    let mut wanted =
+        PlanFingerprint { plan_count: 1, inputs_crc: start_inputs_crc(request), plan_crc: out.crc };
     let mut known = u32::from(planned == wanted);
     for inputs in losses.clone() {
         wanted.inputs_crc = division_inputs_crc(wanted.inputs_crc, inputs);
-        wanted.plans += 1;
-        known = if planned == wanted { wanted.plans } else { known };
+        wanted.plan_count += 1;
+        known = if planned == wanted { wanted.plan_count } else { known };
     }
     if known == 0 {
         let pattern = LanePattern {
             spacing: header.spacing,
-            angle_deg: header.angle_deg,
-            margin_m: header.margin_m,
-            search_steps: header.search_steps,
+            angle_from_east_deg: header.lane_angle_deg,
+            border_overshoot_m: header.lane_overshoot_m,
+            max_search_steps: header.search_steps,
         };
         tracks::build_lanes(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
         if ws.tracks.waypoint_count() > PicturePlan::MAX_AREA_WAYPOINTS {
@@ -351,37 +359,37 @@ pub fn plan_flights<
     }
     let (tracks, transit) = (&ws.tracks, &transit);
     let following = request.terrain_following(&vehicles)?;
-    let whole = Work {
+    let whole = CoverageProblem {
         tracks,
         transit,
         vehicles: &vehicles,
         heights: header.heights,
-        unit: header.unit,
+        unit: header.assignment_unit,
         following,
     };
     let along = tracks.lane_direction();
-    let look = match header.heading {
-        HeadingRule::Sweep => HeadingMode::Fixed(libm::atan2f(along.y, along.x)),
-        HeadingRule::Lane => HeadingMode::Ahead,
+    let look = match header.heading_rule {
+        HeadingRule::SameOnAllLanes => HeadingMode::FixedEnuRad(libm::atan2f(along.y, along.x)),
+        HeadingRule::DirectionOfFlight => HeadingMode::Ahead,
     };
     let flight_inputs = FlightInputs {
         pads: &pads,
         capture: CaptureSettings {
-            waypoint_m: header.spacing.waypoint_m,
+            max_picture_spacing_m: header.spacing.max_waypoint_spacing_m,
             heading_mode: look,
             trigger: header.trigger,
         },
-        clearance_m: OPEN_FIELD_CLEARANCE_M,
+        assumed_clearance_m: OPEN_FIELD_CLEARANCE_M,
         schedule: mission.header().schedule,
         max_gates: gates_most,
         photographed: &[],
-        held_layers: 0,
+        occupied_layers: 0,
         following,
     };
     if known == 0 {
         let (left, done) = ws.losses.reset_with_done(tracks, transit, request.photographed)?;
-        let work = Work { tracks: left, ..whole };
-        match header.parts {
+        let work = CoverageProblem { tracks: left, ..whole };
+        match header.part_eligibility {
             PartEligibility::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
             PartEligibility::Anyone => {
                 let shares: Vec<f32, K> = view.shares().map(|share| share.weight).collect();
@@ -396,14 +404,14 @@ pub fn plan_flights<
     for inputs in losses.skip(known as usize - 1) {
         let mut statuses: Vec<VehicleStatus, K> = Vec::new();
         for pad in &pads {
-            let rank = pads.iter().filter(|other| other.id < pad.id).count();
+            let rank = pads.iter().filter(|other| other.vehicle_id < pad.vehicle_id).count();
             let input = inputs.get(rank).ok_or(CoverageError::Vehicles)?;
-            let fate = VehicleStatus { alive: input.alive, along_m: input.along_m() };
+            let fate = VehicleStatus { continues: input.alive, photographed_to_m: input.along_m() };
             statuses.push(fate).map_err(|_| CoverageError::Vehicles)?;
         }
-        let loss = Loss { work: &whole, flight_inputs: &flight_inputs, statuses: &statuses };
+        let loss = Loss { problem: &whole, flight_inputs: &flight_inputs, statuses: &statuses };
         losses::redivide_work(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
     }
-    ws.planned = Planned { plan_crc: out.crc, ..wanted };
+    ws.planned = PlanFingerprint { plan_crc: out.crc, ..wanted };
     Ok(())
 }

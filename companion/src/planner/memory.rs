@@ -1,5 +1,5 @@
-//! What a shell lends to [`super::answer`]: the files, what the companion knows for the requested
-//! plan, and memory. A board has the memory in statics, the host on its heap.
+//! What a shell lends to [`super::answer_plan_request`]: the files, what the companion knows for
+//! the requested plan, and memory. A board has the memory in statics, the host on its heap.
 
 use heapless::Vec;
 use planner_core::detour::{DetourRequest, KeepOutZone};
@@ -87,7 +87,7 @@ pub struct PlanInputs<const V: usize, const Z: usize> {
     /// Waypoints that were photographed before this flight.
     pub(super) photographed: Vec<WaypointRange, MAX_PHOTOGRAPHED_RANGES>,
     /// The inputs of each division so far; empty unless a division's plan is requested.
-    pub(super) losses: Vec<DivisionInputs<V>, MAX_DIVISIONS>,
+    pub(super) divisions: Vec<DivisionInputs<V>, MAX_DIVISIONS>,
 }
 
 impl<const V: usize, const Z: usize> PlanInputs<V, Z> {
@@ -97,7 +97,7 @@ impl<const V: usize, const Z: usize> PlanInputs<V, Z> {
             zones: Vec::new(),
             too_many_zones: false,
             photographed: Vec::new(),
-            losses: Vec::new(),
+            divisions: Vec::new(),
         }
     }
 
@@ -105,7 +105,7 @@ impl<const V: usize, const Z: usize> PlanInputs<V, Z> {
         self.zones.clear();
         self.too_many_zones = false;
         self.photographed.clear();
-        self.losses.clear();
+        self.divisions.clear();
     }
 
     pub(crate) fn add_photographed(&mut self, ranges: &[WaypointRange]) {
@@ -116,7 +116,7 @@ impl<const V: usize, const Z: usize> PlanInputs<V, Z> {
     pub(crate) fn add_division(&mut self, inputs: &[VehicleDivisionInput]) {
         // Cannot overflow: it has room for the divisions that the companion keeps and for the one
         // in progress.
-        let _ = self.losses.push(inputs.iter().copied().collect());
+        let _ = self.divisions.push(inputs.iter().copied().collect());
     }
 
     pub(crate) fn add_zone(&mut self, zone: KeepOutZone) {

@@ -10,7 +10,7 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Ring, RingKind};
 use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::pack::{Heights, TrackUnit};
-use planner_core::detour::{Goal, KeepOutZone, ZoneKind};
+use planner_core::detour::{DetourGoal, KeepOutZone, ZoneKind};
 use planner_core::flight::{Task, Trigger, WaypointRange};
 use planner_core::geo::frames::Geodetic;
 use planner_core::plan::{GoalMode, Objective, VehicleTask};
@@ -19,7 +19,7 @@ use planner_core::track::deconflict::Method;
 
 use super::*;
 use crate::storage::mission_file::coverage::{
-    CoverageHeader, CoverageParts, Ground, HeadingRule, PartEligibility, VehicleShare,
+    CoverageBlock, CoverageHeader, HeadingRule, PartEligibility, UnevenGround, VehicleShare,
 };
 use crate::storage::mission_file::{
     self, MissionBlock, MissionGoal, MissionHeader, MissionVehicle,
@@ -75,7 +75,7 @@ impl Bench {
         };
         let memory = PlanningMemory::new(&mut self.workspaces, &mut self.swarm, &mut self.own);
         let mut memory = Box::new(memory);
-        answer(&files, system_id, requested, &mut memory)?;
+        answer_plan_request(&files, system_id, requested, &mut memory)?;
         Ok(&self.own.plan)
     }
 
@@ -104,7 +104,7 @@ fn mission(mode: GoalMode, roadmap_crc: u32, block: &MissionBlock<'_>) -> List<u
     };
     let vehicles = [(3, STARTS[0]), (7, STARTS[1])].map(|(id, start)| MissionVehicle {
         task: VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.7, goal: None },
-        start,
+        path_start: start,
         radius_m: 0.3,
         speed_max_mps: 5.0,
     });
@@ -122,8 +122,8 @@ fn with_goals() -> Box<Bench> {
         edge_max_m: 30.0,
         tested_clearance_m: 0.8,
         max_clearance_m: 10.0,
-        starts: 2,
-        goals: 2,
+        start_count: 2,
+        goal_count: 2,
     };
     let nodes = [STARTS[0], STARTS[1], GOALS[0], GOALS[1], BESIDE];
     let edges = [(0, 2), (1, 3), (0, 4), (1, 4), (2, 4), (3, 4)].map(|(a, b)| Edge {
@@ -141,36 +141,36 @@ fn with_goals() -> Box<Bench> {
 }
 
 /// A mission over an area of 100 × 60 m, without a roadmap.
-fn over_area(ground: Option<Ground>) -> Box<Bench> {
+fn over_area(ground: Option<UnevenGround>) -> Box<Bench> {
     let header = CoverageHeader {
-        unit: TrackUnit::Waypoint,
-        parts: PartEligibility::Anyone,
-        heading: HeadingRule::Sweep,
+        assignment_unit: TrackUnit::Waypoint,
+        part_eligibility: PartEligibility::Anyone,
+        heading_rule: HeadingRule::SameOnAllLanes,
         trigger: Trigger::Distance,
         search_steps: 2000,
-        heights: Heights { mission_m: 25.0, layer_m: 5.0 },
+        heights: Heights { max_picture_height_m: 25.0, layer_spacing_m: 5.0 },
         spacing: Spacing {
             footprint: Footprint { along_m: 20.0, across_m: 30.0 },
-            lane_m: 12.0,
-            waypoint_m: 8.0,
+            max_lane_spacing_m: 12.0,
+            max_waypoint_spacing_m: 8.0,
         },
-        angle_deg: None,
-        margin_m: 0.0,
+        lane_angle_deg: None,
+        lane_overshoot_m: 0.0,
         ground,
     };
     let vertices = [(0.0, 10.0), (100.0, 10.0), (100.0, 70.0), (0.0, 70.0)];
     let vertices = vertices.map(|(x, y)| Flat::new(x, y));
     let rings = [Ring { end: 4, kind: RingKind::Outer }];
     let shares = [VehicleShare { weight: 1.0, climb_mps: 3.0, descend_mps: 1.0 }; 2];
-    let parts = CoverageParts { header, shares: &shares, rings: &rings, vertices: &vertices };
+    let parts = CoverageBlock { header, shares: &shares, rings: &rings, vertices: &vertices };
     let mission = mission(GoalMode::Labelled, 0, &MissionBlock::Coverage(parts));
     Box::new(Bench { mission, ..Bench::default() })
 }
 
 /// A detour of vehicle 3 from `here`, 2 m on its leg to `goal`.
-fn detour(goal: Goal) -> RequestedPlan {
+fn detour(goal: DetourGoal) -> RequestedPlan {
     RequestedPlan::Detour(DetourRequest {
-        aside: false,
+        land_aside: false,
         here: Point::new(2.0, 0.0, 2.0),
         leg: [GOALS[0], STARTS[0]],
         leg_clearance_m: 2.0,
@@ -197,8 +197,8 @@ fn pictures(plan: &VehiclePlan<64, G>) -> u32 {
 fn a_vehicle_gets_its_part_of_the_swarms_plan() {
     for mut bench in [with_goals(), over_area(None)] {
         let own = [3, 7].map(|id| bench.answer(id, &RequestedPlan::Flight).unwrap().clone());
-        assert_eq!(own[0].plan_crc, own[1].plan_crc);
-        assert_eq!([own[0].plan_crc, own[1].plan_crc], [bench.swarm.crc; 2]);
+        assert_eq!(own[0].swarm_plan_crc, own[1].swarm_plan_crc);
+        assert_eq!([own[0].swarm_plan_crc, own[1].swarm_plan_crc], [bench.swarm.crc; 2]);
         for (own, flight) in own.iter().zip(&bench.swarm.flights) {
             assert!(own.path == flight.path && own.task == flight.task && own.task.leaves_pad());
         }
@@ -208,13 +208,16 @@ fn a_vehicle_gets_its_part_of_the_swarms_plan() {
 #[test]
 fn a_detour_keeps_out_of_the_zones() {
     let mut bench = with_goals();
-    let direct = bench.answer(3, &detour(Goal::Node(0))).unwrap().path.length_m();
+    let direct = bench.answer(3, &detour(DetourGoal::RoadmapGoal(0))).unwrap().path.length_m();
     assert!((direct - 18.0).abs() < 0.01, "{direct}");
     bench.own.inputs.add_zone(zone(Point::new(10.0, 0.0, 2.0)));
-    let around = bench.answer(3, &detour(Goal::Node(0))).unwrap();
+    let around = bench.answer(3, &detour(DetourGoal::RoadmapGoal(0))).unwrap();
     assert!(around.path.waypoints().iter().any(|w| w.position == BESIDE), "{around:?}");
     bench.own.inputs.add_zone(zone(BESIDE));
-    assert_eq!(bench.failure(3, &detour(Goal::Node(0))), Some(PlanFailure::Unreachable));
+    assert_eq!(
+        bench.failure(3, &detour(DetourGoal::RoadmapGoal(0))),
+        Some(PlanFailure::Unreachable)
+    );
 }
 
 #[test]
@@ -235,8 +238,8 @@ fn an_area_is_planned_without_what_is_photographed_and_after_losses() {
 #[test]
 fn each_failure_has_its_reason() {
     use PlanFailure::*;
-    let home = Goal::Home { over: STARTS[0], layer_m: 30.0 };
-    let requests = [RequestedPlan::Flight, detour(Goal::Node(0)), detour(home)];
+    let home = DetourGoal::Home { above_pad: STARTS[0], layer_z_m: 30.0 };
+    let requests = [RequestedPlan::Flight, detour(DetourGoal::RoadmapGoal(0)), detour(home)];
     for requested in &requests {
         let mut nothing = Box::<Bench>::default();
         assert_eq!(nothing.failure(3, requested), Some(RoadmapUnusable), "no mission");
@@ -248,10 +251,15 @@ fn each_failure_has_its_reason() {
     }
     let mut goals = with_goals();
     assert_eq!(goals.failure(3, &detour(home)), Some(Unreachable), "no such goal");
-    let ground = Ground { height_m: 18.0, tolerance_m: 3.0, low_m: 0.0, high_m: 4.0 };
+    let ground = UnevenGround {
+        min_height_above_ground_m: 18.0,
+        height_tolerance_m: 3.0,
+        low_m: 0.0,
+        high_m: 4.0,
+    };
     let mut no_field = over_area(Some(ground));
     assert_eq!(no_field.failure(3, &RequestedPlan::Flight), Some(RoadmapUnusable));
-    for (mut bench, goal) in [(goals, Goal::Node(0)), (over_area(None), home)] {
+    for (mut bench, goal) in [(goals, DetourGoal::RoadmapGoal(0)), (over_area(None), home)] {
         let far = Point::new(-50.0, -50.0, 2.0);
         (0..Z).for_each(|_| bench.own.inputs.add_zone(zone(far)));
         assert_eq!(bench.failure(3, &detour(goal)), None);

@@ -14,8 +14,8 @@
 //! hears a lower system id claim waits again.
 //!
 //! The place of a vehicle that is out of the plan is compared with the whole path before its gates
-//! open, and from then on twice a second, with [`MAX_STRETCHES_PER_STEP`] stretches of the path a
-//! step, so a scan with many vehicles takes several steps.
+//! open, and from then on twice a second, with [`MAX_SEGMENT_CHECKS_PER_STEP`] stretches of the
+//! path a step, so a scan with many vehicles takes several steps.
 //!
 //! In a coverage mission there is no roadmap and no turn: a stopped vehicle flies around the
 //! obstacle and back to its path ([`beside`]), or home ([`homeward`]). ENU metres.
@@ -47,24 +47,24 @@ use crate::timers::{Timer, Timers};
 const BLOCKED_CHECK_EVERY: Duration = Duration::from_millis(500);
 /// Maximum number of comparisons of a path segment with a keep-out zone in one step, or those of
 /// the whole path with one zone if they are more.
-const MAX_STRETCHES_PER_STEP: usize = 160;
+const MAX_SEGMENT_CHECKS_PER_STEP: usize = 160;
 /// Cost of computing one keep-out zone, as a number of comparisons of it with a path segment.
 const ZONE_COST: usize = 12;
 /// Time for which all other vehicles have to stand before this one claims the turn, seconds: longer
 /// than a vehicle takes to see and obey a gate that opened.
-const ALL_STAND_S: u64 = 3;
+const ALL_STAND_BEFORE_CLAIM_S: u64 = 3;
 /// Time for which a vehicle claims the turn to fly a detour before it takes the turn.
 const TURN_CLAIM: Duration = Duration::from_secs(1);
 /// Time by which each blocked vehicle with a lower system id delays this one's claim, seconds.
-const TURN_DELAY_S: u64 = 2;
+const TURN_DELAY_PER_VEHICLE_S: u64 = 2;
 /// Maximum pause from a search that found no detour to the next, seconds.
-const DETOUR_RETRY_S: u64 = 10;
+const MAX_SEARCH_PAUSE_S: u64 = 10;
 /// Time for which a vehicle waits while all others stand, after which it counts as blocked: the
 /// vehicle that it waits for has found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(15);
 /// Number of failed searches, and detours without progress, after which a vehicle seeks no further
 /// detour; one search fewer is enough if they failed in one place over [`EARLY_GIVE_UP_AFTER_S`].
-const MAX_DETOUR_SEARCHES: u8 = 3;
+const MAX_FAILED_SEARCHES: u8 = 3;
 /// Time since the first failed search in one place after which one search fewer is enough, s.
 const EARLY_GIVE_UP_AFTER_S: u64 = 50;
 /// Time without progress on a detour, or under a stop by the safety filter, that counts as a block.
@@ -79,7 +79,7 @@ const STOP_COUNTS_FOR: Duration = Duration::from_millis(500);
 const STOP_COUNTS_FOR_WHILE_BLOCKED: Duration = Duration::from_secs(3);
 /// Time after which a vehicle on its pad that hears no other one, or that no other one hears,
 /// reports that it waits.
-const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
+const WAITS_UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Sway, metres: a stopped vehicle this near to the end of a path aside counts as at the end.
 const ASIDE_END_TOLERANCE_M: f32 = 0.5;
 
@@ -93,7 +93,7 @@ pub(crate) struct Detours {
     left_plan: bool,
     path_kind: PathKind,
     /// Purpose of the path requested from the shell, and whether the shell has read the request.
-    sought: Option<DetourPurpose>,
+    requested_purpose: Option<DetourPurpose>,
     request_read: bool,
     /// The search for a path straight home in a coverage mission.
     pub(crate) home: HomewardSearch,
@@ -104,22 +104,22 @@ pub(crate) struct Detours {
     /// Whether the requested detour has come and is not flown yet.
     detour_ready: bool,
     /// Number of failed searches for a detour to the goal since another vehicle last moved.
-    failures: u8,
+    failed_searches: u8,
     /// Whether a further search is useless: no other vehicle will move any more, or searches from
     /// this place have failed for [`EARLY_GIVE_UP_AFTER_S`].
     no_retry: bool,
     /// Number of failed searches from about the same place; that place along the path, metres; and
     /// the times of the first of them and of the last failed search anywhere.
-    failures_here: u8,
+    failed_searches_here: u8,
     failed_at_m: f32,
     failed_since: Instant,
     failed_at: Instant,
     /// Number of detours in a row on which the vehicle made no progress.
     detours_without_progress: u8,
     /// When a search for a path aside last failed.
-    no_way_aside_at: Option<Instant>,
+    aside_search_failed_at: Option<Instant>,
     /// Place from before a jump of the position, and the time of the jump; `None` without a jump.
-    before_jump: Option<(Point, Instant)>,
+    place_before_jump: Option<(Point, Instant)>,
     all_standing_since: Option<Instant>,
     /// Since when this vehicle claims the turn to fly a detour.
     claimed_since: Option<Instant>,
@@ -136,7 +136,7 @@ pub(crate) struct Detours {
 /// Result of a finished scan of the path.
 struct ScanResult {
     /// When the scan began, if it found the path clear.
-    clear_at: Option<Instant>,
+    began_if_clear: Option<Instant>,
 }
 
 impl Detours {
@@ -198,7 +198,7 @@ impl Detours {
 
     /// First free place along the path beyond the block in a coverage mission, metres, where a
     /// detour can end; `None` if there is none.
-    pub(crate) fn rejoin_m<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> Option<f32> {
@@ -211,12 +211,12 @@ impl Detours {
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
-        view.config.lost_vehicle_down_s.is_some()
+        view.config.lost_vehicle_down_after_s.is_some()
             && (!self.is_on_detour() || self.is_beside_plan())
             && !self.left_plan
             && !self.is_homeward()
             && !view.guidance.returning
-            && view.guidance.along_m() >= 0.0
+            && view.guidance.reference_along_m() >= 0.0
             && view.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
     }
 
@@ -267,15 +267,15 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
         let now = view.now;
-        let held = view.guidance.advice.waiting_for != 0 || view.guidance.filter.is_stopped();
+        let held = view.guidance.advice.waiting_for_id != 0 || view.guidance.filter.is_stopped();
         let rests = view.telemetry.velocity.length() < MAX_HOVER_MPS;
-        let stands = view.guidance.stands_outside_descent() && rests;
+        let stands = view.guidance.is_setpoint_still_outside_descent() && rests;
         match view.mission.state() {
-            state if state.waits_on_pad() => {
+            state if state.waits_on_pad_after_start() => {
                 self.blocked
                     || !view.guidance.filter.column_clear()
                     || view.neighbours.unlinked_duration(now, view.mission.started_at())
-                        >= UNHEARD_ON_PAD_AFTER
+                        >= WAITS_UNHEARD_ON_PAD_AFTER
                     || (held && !view.guidance.may_depart())
             }
             State::Follow => held && stands,
@@ -304,7 +304,7 @@ impl Detours {
         self.left_plan |= view.config.roster.len() > 1
             && self.is_own_vehicle_out_of_plan(view)
             && view.mission.plan().is_some();
-        let on_ground = view.mission.state().waits_on_pad();
+        let on_ground = view.mission.state().waits_on_pad_after_start();
         let stopped = view.mission.state().is_blocked();
         if !on_ground && !stopped && view.mission.state() != State::Follow {
             (self.blocked, self.obstructed) = (false, false);
@@ -321,7 +321,7 @@ impl Detours {
         if looked.is_some() || due {
             self.update_blocked(view);
         }
-        looked.and_then(|looked| looked.clear_at)
+        looked.and_then(|looked| looked.began_if_clear)
     }
 
     /// Continues the scan under way; `None` while it goes on, or where there is none.
@@ -333,7 +333,7 @@ impl Detours {
         let obstructed = self.continue_path_scan(view)?;
         self.scan_began = None;
         self.obstructed = obstructed;
-        Some(ScanResult { clear_at: (!obstructed).then_some(began) })
+        Some(ScanResult { began_if_clear: (!obstructed).then_some(began) })
     }
 
     /// Decides whether the vehicle is blocked, since when no other one has moved, and whether this
@@ -350,9 +350,9 @@ impl Detours {
         let stands = view.mission.state().is_blocked();
         let near_m = if stands { ASIDE_END_TOLERANCE_M } else { 0.0 };
         let length_m = view.mission.plan().map_or(0.0, |plan| plan.path.length_m());
-        let at_end = view.guidance.along_m() >= length_m - near_m;
+        let at_end = view.guidance.reference_along_m() >= length_m - near_m;
         let off_plan = match self.path_kind {
-            _ if self.seeks_landing() => false,
+            _ if self.seeks_landing_aside() => false,
             PathKind::Plan | PathKind::PlanReady => self.left_plan,
             PathKind::Detour(DetourPurpose::Aside(_)) => at_end,
             PathKind::Detour(_) => false,
@@ -366,7 +366,7 @@ impl Detours {
         let stopped = self.is_stopped_for_long(view, free);
         self.blocked = !view.guidance.returning
             && (stuck || off_plan || dead_end || stopped || self.obstructed);
-        let along_m = view.guidance.along_m();
+        let along_m = view.guidance.reference_along_m();
         if self.blocked
             && self.blocked_here.is_none_or(|(at_m, _)| along_m > at_m + BLOCKED_AGAIN_M)
         {
@@ -374,12 +374,12 @@ impl Detours {
         }
         if !view.neighbours.are_all_standing(now) {
             // Another vehicle moved, which may have freed the path.
-            (self.all_standing_since, self.failures, self.no_retry) = (None, 0, false);
+            (self.all_standing_since, self.failed_searches, self.no_retry) = (None, 0, false);
         } else if self.all_standing_since.is_none() {
             self.all_standing_since = Some(now);
         }
         let claims = self.may_claim_turn(view)
-            && !view.neighbours.is_turn_claimed_before(view.config.system_id, now);
+            && !view.neighbours.is_turn_claimed_by_lower_id(view.config.system_id, now);
         self.claimed_since = self.claimed_since.or(Some(now)).filter(|_| claims);
     }
 
@@ -391,8 +391,8 @@ impl Detours {
         free: Duration,
     ) -> bool {
         let (now, filter) = (view.now, &view.guidance.filter);
-        let for_good = view.config.lost_vehicle_down_s.is_some()
-            && !view.neighbours.follows_plan(filter.last_blocker());
+        let for_good = view.config.lost_vehicle_down_after_s.is_some()
+            && !view.neighbours.follows_plan(filter.last_blocker_id());
         filter.blocked_with_priority_for(now, free) > STUCK_AFTER
             || (for_good && filter.hindered_for(now) > STUCK_AFTER)
     }
@@ -404,23 +404,27 @@ impl Detours {
     ) -> Option<bool> {
         let Some(plan) = view.mission.plan() else { return Some(false) };
         let here = match view.mission.state() {
-            state if state.waits_on_pad() => view.mission.pad_position(),
+            state if state.waits_on_pad_after_start() => view.mission.pad_position(),
             _ => view.telemetry.position,
         };
-        let along_m = view.guidance.along_m();
+        let along_m = view.guidance.reference_along_m();
         let cost = detour::count_segments_ahead(&plan.path, along_m) + ZONE_COST;
         // A hovering vehicle sways. So in a coverage mission an obstacle that has blocked the path
         // does so until it is as far from the path as a detour keeps.
-        let waits = view.config.lost_vehicle_down_s.is_some()
+        let waits = view.config.lost_vehicle_down_after_s.is_some()
             && view.mission.state() == State::Blocked
             && self.obstructed;
-        let [beside_m, beyond_m] = if waits { beside::STAYS_BLOCKED_M } else { beside::BLOCKED_M };
+        let [beside_m, beyond_m] = if waits {
+            beside::STAYS_BLOCKED_BESIDE_AND_BEYOND_STOP_M
+        } else {
+            beside::BLOCKED_BESIDE_AND_BEYOND_STOP_M
+        };
         let apart_m = view.config.safety_distance_m + beside_m;
         let (now, neighbours) = (view.now, view.neighbours);
         let new = self.obstacles.unavoided();
         self.scan.continue_scan(
             new.len() + neighbours.len(),
-            &mut (cost.max(MAX_STRETCHES_PER_STEP) as u16),
+            &mut (cost.max(MAX_SEGMENT_CHECKS_PER_STEP) as u16),
             cost as u16,
             |source, visit| match new.get(source) {
                 Some(obstacle) => visit(*obstacle),
@@ -431,7 +435,7 @@ impl Detours {
             // In a coverage mission only the path up to `beyond_m` past where the vehicle can stop
             // counts: it goes on taking pictures until it is near the obstacle.
             |obstacle| {
-                let until_m = match view.config.lost_vehicle_down_s {
+                let until_m = match view.config.lost_vehicle_down_after_s {
                     Some(_) => view.guidance.stopping_point_m().max(0.0) + beyond_m,
                     None => f32::INFINITY,
                 };
@@ -454,14 +458,15 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
         // In a coverage mission vehicles take no turns.
-        if !self.blocked || view.config.lost_vehicle_down_s.is_some() {
+        if !self.blocked || view.config.lost_vehicle_down_after_s.is_some() {
             return false;
         }
         let Some(at) = self.all_standing_since else { return false };
         let pause_s = Self::search_pause_s(view);
-        let wait_s = ALL_STAND_S
-            + TURN_DELAY_S * view.neighbours.blocked_count_before(view.config.system_id)
-            + pause_s * u64::from(self.failures);
+        let wait_s = ALL_STAND_BEFORE_CLAIM_S
+            + TURN_DELAY_PER_VEHICLE_S
+                * view.neighbours.blocked_count_below_id(view.config.system_id)
+            + pause_s * u64::from(self.failed_searches);
         self.may_search_again(pause_s, view.now)
             && view.neighbours.are_all_standing(view.now)
             && view.now - at >= Duration::from_secs(wait_s)

@@ -15,14 +15,14 @@ pub(crate) const MAX_OBSTACLE_RADIUS_M: f32 = 20.0;
 /// metres.
 const SAME_OBSTACLE_M: f32 = 0.1;
 
-/// Reported obstacles; the first `avoided` of them are avoided by the detour that is flown.
+/// Reported obstacles; the first `avoided_count` of them are avoided by the detour that is flown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Obstacles {
     known: Vec<KeepOutZone, MAX_OBSTACLES>,
-    avoided: usize,
+    avoided_count: usize,
     /// Number of obstacles known when a detour was last requested: the detour does not avoid later
     /// ones.
-    requested: usize,
+    requested_count: usize,
 }
 
 impl Obstacles {
@@ -37,8 +37,8 @@ impl Obstacles {
             self.known.iter().position(|o| (o.from - centre).length() < SAME_OBSTACLE_M)
         {
             self.known.remove(at);
-            self.avoided -= usize::from(at < self.avoided);
-            self.requested -= usize::from(at < self.requested);
+            self.avoided_count -= usize::from(at < self.avoided_count);
+            self.requested_count -= usize::from(at < self.requested_count);
         }
     }
 
@@ -88,22 +88,22 @@ impl Obstacles {
 
     /// Obstacles that the detour flown now does not avoid: these may block the path.
     pub(crate) fn unavoided(&self) -> &[KeepOutZone] {
-        &self.known[self.avoided..]
+        &self.known[self.avoided_count..]
     }
 
     /// Makes all obstacles count as new: the path changes to one that avoids none of them.
     pub(crate) fn forget_avoided(&mut self) {
-        self.avoided = 0;
+        self.avoided_count = 0;
     }
 
     /// Notes that a detour around all obstacles known now is requested from the shell.
     pub(crate) fn mark_requested(&mut self) {
-        self.requested = self.known.len();
+        self.requested_count = self.known.len();
     }
 
     /// Notes that the requested detour is flown: the obstacles known at the request are avoided.
-    pub(crate) fn avoid_requested(&mut self) {
-        self.avoided = self.requested;
+    pub(crate) fn mark_requested_avoided(&mut self) {
+        self.avoided_count = self.requested_count;
     }
 }
 

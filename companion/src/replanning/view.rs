@@ -20,18 +20,18 @@ pub(crate) struct DetourView<'a, const V: usize, const W: usize, const G: usize>
     pub(crate) guidance: &'a Guidance,
     pub(crate) telemetry: &'a Telemetry,
     pub(crate) neighbours: &'a Neighbours<V>,
-    pub(crate) scene: GuidanceInputs<'a, W, G>,
+    pub(crate) guidance_inputs: GuidanceInputs<'a, W, G>,
 }
 
 impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
     /// Estimated height above the ground as far as the plan says, metres; NaN while unknown.
     // Not inlined: in each caller it would take a board's flash.
     #[inline(never)]
-    pub(crate) fn height_m(&self) -> f32 {
+    pub(crate) fn height_above_ground_m(&self) -> f32 {
         let known = self.telemetry.position_age(self.now) < MAX_POSITION_AGE
             && !self.telemetry.origin_moved;
         match self.mission.plan().filter(|_| known) {
-            Some(plan) => self.telemetry.position.z - self.guidance.ground_m(plan),
+            Some(plan) => self.telemetry.position.z - self.guidance.planned_ground_m(plan),
             None => f32::NAN,
         }
     }
@@ -40,11 +40,12 @@ impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
     /// height agrees.
     pub(crate) fn is_on_ground(&self) -> bool {
         self.telemetry.reports_ground(self.now)
-            && (!self.telemetry.armed || self.height_m() < MAX_HEIGHT_ERROR_ON_GROUND_M)
+            && (!self.telemetry.armed
+                || self.height_above_ground_m() < MAX_HEIGHT_ERROR_ON_GROUND_M)
     }
 
     /// Whether a pilot flies the vehicle again after its mission has ended with a landing.
-    pub(crate) fn is_flown_after_mission(&self) -> bool {
+    pub(crate) fn is_piloted_after_mission(&self) -> bool {
         self.mission.state() == State::Done && self.telemetry.armed && !self.is_on_ground()
     }
 }
@@ -54,5 +55,5 @@ pub(crate) struct ReportedPlace {
     pub(crate) position: Point,
     pub(crate) velocity: Point,
     /// When the position was measured, or last known before a jump.
-    pub(crate) at: Instant,
+    pub(crate) measured_at: Instant,
 }

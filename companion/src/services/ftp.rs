@@ -47,7 +47,7 @@ pub(crate) fn changes_files(padded: &[u8; 255]) -> bool {
 /// Most requests in the queue; `mavftp` has five under way.
 const MAX_QUEUED_REQUESTS: usize = 6;
 /// Time without a request after which another client may take over the session.
-const SESSION_IDLE: Duration = Duration::from_secs(10);
+const SESSION_IDLE_AFTER: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug)]
 struct Reply {
@@ -70,18 +70,18 @@ struct Session {
     file: File,
     access: Access,
     /// Whether no byte was written to the file yet.
-    fresh: bool,
+    nothing_written: bool,
     opened_by: FtpRequest,
-    used_at: Instant,
+    last_used_at: Instant,
 }
 
-/// Operation that the server executes; the flag of `Read` and `Sum`: whether the store has accepted
+/// Operation that the server executes; the flag of `Read` and `Crc`: whether the store has accepted
 /// the read.
 #[derive(Clone, Copy, Debug)]
 enum FtpOperation {
     Nothing,
     Read(FtpRequest, bool),
-    Sum(FtpRequest, bool),
+    Crc(FtpRequest, bool),
     Open(FtpRequest),
     Close(FtpRequest),
 }
@@ -119,12 +119,12 @@ impl Ftp {
     /// dropped: the client repeats it.
     pub fn queue_request(&mut self, link: usize, now: Instant, frame: &Frame) {
         self.now = now;
-        let request = FtpRequest::read(link, frame);
+        let request = FtpRequest::from_frame(link, frame);
         let same = |held: &FtpRequest| held.is_same_request(&request);
         let at_work = match &self.operation {
             FtpOperation::Nothing => false,
             FtpOperation::Read(held, _)
-            | FtpOperation::Sum(held, _)
+            | FtpOperation::Crc(held, _)
             | FtpOperation::Open(held)
             | FtpOperation::Close(held) => same(held),
         };
@@ -177,10 +177,10 @@ impl Ftp {
                 }
                 _ => self.ack(&request, bytes),
             },
-            (FtpOperation::Sum(request, true), ReadOutcome::Sum(sum)) => {
+            (FtpOperation::Crc(request, true), ReadOutcome::Crc(sum)) => {
                 self.ack(&request, &sum.to_le_bytes());
             }
-            (FtpOperation::Read(request, true) | FtpOperation::Sum(request, true), _) => {
+            (FtpOperation::Read(request, true) | FtpOperation::Crc(request, true), _) => {
                 let due = request_of_next_packet(&request, self.burst.take().as_ref());
                 self.nak(&due, NakError::Errno(EIO));
             }
@@ -192,7 +192,7 @@ impl Ftp {
     /// upload is open or ended.
     fn continue_operation(&mut self, store: &mut Store) {
         match &mut self.operation {
-            FtpOperation::Nothing | FtpOperation::Read(_, true) | FtpOperation::Sum(_, true) => {}
+            FtpOperation::Nothing | FtpOperation::Read(_, true) | FtpOperation::Crc(_, true) => {}
             FtpOperation::Read(request, asked) => {
                 let due = request_of_next_packet(request, self.burst.as_ref());
                 let file = self.session.map(|session| session.file);
@@ -205,7 +205,7 @@ impl Ftp {
                     self.nak(&due, NakError::EndOfFile);
                 }
             }
-            FtpOperation::Sum(request, asked) => {
+            FtpOperation::Crc(request, asked) => {
                 match request.requested_file().filter(|file| store.file_size(*file).is_some()) {
                     Some(file) => *asked = store.request_crc(file, 0),
                     None => {
@@ -222,9 +222,11 @@ impl Ftp {
                     Some(UploadState::Ended(Err(why))) => self.end_upload(&request, Err(why)),
                     _ => {
                         self.operation = FtpOperation::Nothing;
-                        // The erasure for this session may have taken longer than [`SESSION_IDLE`].
-                        self.session =
-                            self.session.map(|session| Session { used_at: self.now, ..session });
+                        // The erasure for this session may have taken longer than
+                        // [`SESSION_IDLE_AFTER`].
+                        self.session = self
+                            .session
+                            .map(|session| Session { last_used_at: self.now, ..session });
                         self.reply_and_remember(&request, Ok(()));
                     }
                 }
@@ -328,7 +330,7 @@ impl Ftp {
                     None => self.nak(request, NakError::NotFound),
                 }
             }
-            op::CRC32 => self.operation = FtpOperation::Sum(*request, false),
+            op::CRC32 => self.operation = FtpOperation::Crc(*request, false),
             op::TRUNCATE | op::RENAME
                 if request.requested_file().is_none_or(|file| store.file_size(file).is_none()) =>
             {
@@ -337,7 +339,7 @@ impl Ftp {
             op::MAKE_DIRECTORY | op::REMOVE_DIRECTORY | op::TRUNCATE | op::RENAME => {
                 self.nak(request, NakError::Protected);
             }
-            _ => self.nak(request, NakError::Unknown),
+            _ => self.nak(request, NakError::UnknownCommand),
         }
     }
 
@@ -369,10 +371,10 @@ impl Ftp {
         };
         let same = |session: &&mut Session| {
             (session.client, session.id, session.file) == (request.client, request.session, file)
-                && session.fresh
+                && session.nothing_written
         };
         if let Some(session) = self.session.as_mut().filter(same) {
-            (session.opened_by, session.used_at) = (*request, self.now);
+            (session.opened_by, session.last_used_at) = (*request, self.now);
             return self.ack(request, &[]);
         }
         if !self.open_session(request, file, Access::Write, store) {
@@ -402,11 +404,12 @@ impl Ftp {
         }
         match store.take_piece(request.offset, request.bytes()) {
             PieceOutcome::Stored => {
-                self.session = self.session.map(|session| Session { fresh: false, ..session });
+                self.session =
+                    self.session.map(|session| Session { nothing_written: false, ..session });
                 self.ack(request, &[]);
             }
             PieceOutcome::TooLarge => self.nak(request, NakError::Errno(EFBIG)),
-            PieceOutcome::Later => {}
+            PieceOutcome::RetryLater => {}
         }
     }
 
@@ -426,7 +429,7 @@ impl Ftp {
                 if (request.sequence.wrapping_sub(session.opened_by.sequence) as i16) < 0 {
                     return Err(NakError::InvalidSession);
                 }
-                session.used_at = now;
+                session.last_used_at = now;
                 Ok(*session)
             }
             _ => Err(NakError::InvalidSession),
@@ -434,7 +437,7 @@ impl Ftp {
     }
 
     fn is_idle(&self, session: &Session) -> bool {
-        self.now - session.used_at > SESSION_IDLE
+        self.now - session.last_used_at > SESSION_IDLE_AFTER
     }
 
     /// Opens a session in place of the client's own or an idle one. False, with a NAK, if another
@@ -448,14 +451,21 @@ impl Ftp {
     ) -> bool {
         let held = |session: &Session| session.client != request.client && !self.is_idle(session);
         if self.session.as_ref().is_some_and(held) {
-            self.nak(request, NakError::Sessions);
+            self.nak(request, NakError::NoSessionsAvailable);
             return false;
         }
         self.drop_session(store);
         let FtpRequest { client, session: id, .. } = *request;
-        let (opened_by, fresh) = (*request, access == Access::Write);
-        self.session =
-            Some(Session { id, client, file, access, fresh, opened_by, used_at: self.now });
+        let (opened_by, nothing_written) = (*request, access == Access::Write);
+        self.session = Some(Session {
+            id,
+            client,
+            file,
+            access,
+            nothing_written,
+            opened_by,
+            last_used_at: self.now,
+        });
         true
     }
 

@@ -12,7 +12,7 @@ use crate::config::parameters::TABLE;
 use crate::events::Event;
 use crate::link::frame::{self, Framer, Header};
 use crate::state::State;
-use crate::storage::store::MAX_READ;
+use crate::storage::store::MAX_READ_LEN;
 use crate::testing::fake_autopilot::*;
 use crate::testing::fake_flash::{Flash, execute, started};
 
@@ -40,7 +40,7 @@ impl Ground {
         let length = frame::encode(header, message, &mut bytes);
         let now = self.bench.now;
         self.bench.companion.handle_bytes(link, now, &bytes[..length]);
-        let mut read = [0; MAX_READ];
+        let mut read = [0; MAX_READ_LEN];
         let mut heard = Vec::new();
         let mut framer = Framer::new();
         loop {

@@ -30,7 +30,7 @@ impl Default for InterruptedStates {
 
 impl InterruptedStates {
     /// The state to which [`TargetState::Interrupted`] leads from `state`.
-    pub fn target(&self, state: State) -> State {
+    pub fn state_to_resume(&self, state: State) -> State {
         if state == State::Paused { self.by_pause } else { self.by_loss }
     }
 
@@ -59,11 +59,11 @@ impl InterruptedStates {
     pub(crate) fn interruption_text(&self, from: State, to: State) -> Option<&'static str> {
         use State::*;
         let kept = match to {
-            Paused if from.may_resume_off_path() => return Some("Still paused"),
+            Paused if from.may_be_off_path_on_resume() => return Some("Still paused"),
             Paused | PilotControl | AutopilotSilent | PositionLost
                 if !from.is_interrupted_by_loss() =>
             {
-                self.target(to)
+                self.state_to_resume(to)
             }
             _ => return None,
         };

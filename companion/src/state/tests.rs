@@ -1,5 +1,5 @@
 use super::State;
-use crate::mission::table::{ON_PAD, STARTED_ON_PAD};
+use crate::mission::table::{STARTED_BEFORE_ARMING, STARTED_ON_PAD};
 
 fn is_set(predicate: fn(State) -> bool, set: &[State]) -> bool {
     State::ALL.iter().all(|state| predicate(*state) == set.contains(state))
@@ -7,6 +7,6 @@ fn is_set(predicate: fn(State) -> bool, set: &[State]) -> bool {
 
 #[test]
 fn predicates_are_the_tables_sets() {
-    assert!(is_set(State::is_on_pad, ON_PAD));
-    assert!(is_set(State::is_before_arming, STARTED_ON_PAD));
+    assert!(is_set(State::is_started_on_pad, STARTED_ON_PAD));
+    assert!(is_set(State::is_started_before_arming, STARTED_BEFORE_ARMING));
 }

@@ -19,9 +19,9 @@ use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::ScheduleConfig;
 use planner_core::track::deconflict::Method;
 
-use self::coverage::{CoverageParts, CoverageView};
+use self::coverage::{CoverageBlock, CoverageView};
 use self::numbers::{f32_at, point_at, put_numbers, u16_at, u32_at};
-use crate::config::{Config, RosterEntry, USUAL_GROUND_STATIONS, box_contains};
+use crate::config::{Config, DEFAULT_GROUND_STATION_IDS, RosterEntry, box_contains};
 
 pub mod coverage;
 mod error;
@@ -67,7 +67,7 @@ pub enum MissionBlock<'a> {
     /// The vehicles fly to these goals.
     Goals(&'a [MissionGoal]),
     /// The vehicles photograph this area.
-    Coverage(CoverageParts<'a>),
+    Coverage(CoverageBlock<'a>),
 }
 
 impl MissionBlock<'_> {
@@ -110,7 +110,7 @@ pub fn write_mission(
         return Err(FileError::Length.into());
     };
     let needed = block.file_len(vehicles.len());
-    let out = out.get_mut(..needed).ok_or(MissionError::MissionFull { needed })?;
+    let out = out.get_mut(..needed).ok_or(MissionError::BufferTooSmall { needed })?;
     write_header(header, block, [vehicle_count, goal_count], out);
     let (to_vehicles, rest) =
         out[HEADER_LEN..needed - CRC_LEN].split_at_mut(vehicles.len() * VEHICLE_LEN);
@@ -207,7 +207,7 @@ impl<'a> MissionView<'a> {
         }
         let (u16_at, u32_at) = (|at: usize| u16_at(head, at), |at: usize| u32_at(head, at));
         let ground_stations = match u16_at(8) {
-            VERSION_WITHOUT_GROUND_STATIONS => USUAL_GROUND_STATIONS,
+            VERSION_WITHOUT_GROUND_STATIONS => DEFAULT_GROUND_STATION_IDS,
             VERSION_WITHOUT_KIND | VERSION => [head[28], head[29], head[30], head[31]],
             other => return Err(FileError::Version(other).into()),
         };
@@ -287,19 +287,19 @@ impl<'a> MissionView<'a> {
             let id = vehicle.task.id;
             let known = core::mem::replace(&mut seen[usize::from(id)], true);
             if known || !vehicle.is_valid(self.goals.len()) {
-                return Err(MissionError::Vehicle(i as u16));
+                return Err(MissionError::InvalidVehicle(i as u16));
             }
             let same = |other: &[u8; VEHICLE_LEN]| other[2..4] == self.vehicles[i][2..4];
             if labelled && vehicle.task.goal.is_some() && self.vehicles[..i].iter().any(same) {
                 return Err(MissionError::SameGoal(id));
             }
-            if !inside(&vehicle.start) {
+            if !inside(&vehicle.path_start) {
                 return Err(MissionError::StartOutside(id));
             }
         }
         for (goal, i) in self.goals().zip(0..) {
             if !goal.is_valid() {
-                return Err(MissionError::Goal(i));
+                return Err(MissionError::InvalidGoal(i));
             }
             if !inside(&goal.position) {
                 return Err(MissionError::GoalOutside(i));
@@ -358,7 +358,8 @@ impl<'a> MissionView<'a> {
 
     /// Whether the mission was made for this roadmap: CRC and numbers of starts and goals agree.
     fn matches_roadmap(&self, roadmap: &RoadmapView<'_>) -> bool {
-        let terminals = (usize::from(roadmap.header().starts), usize::from(roadmap.header().goals));
+        let terminals =
+            (usize::from(roadmap.header().start_count), usize::from(roadmap.header().goal_count));
         self.header.roadmap_crc == roadmap.crc()
             && terminals == (self.vehicles.len(), self.goals.len())
     }
@@ -367,7 +368,7 @@ impl<'a> MissionView<'a> {
     /// its lists; each vehicle has room for `gates_most` gates.
     ///
     /// # Errors
-    /// [`MissionError::RosterFull`] if the mission has more than `V` vehicles or goals.
+    /// [`MissionError::TooManyVehiclesOrGoals`] if the mission has more than `V` vehicles or goals.
     pub fn plan_request<'b, const V: usize>(
         &self,
         tasks: &'b mut Vec<VehicleTask, V>,
@@ -375,7 +376,7 @@ impl<'a> MissionView<'a> {
         gates_most: usize,
     ) -> Result<PlanRequest<'b>, MissionError> {
         if self.vehicles.len() > V || self.goals.len() > V {
-            return Err(MissionError::RosterFull);
+            return Err(MissionError::TooManyVehiclesOrGoals);
         }
         tasks.clear();
         tasks.extend(self.vehicles().map(|vehicle| vehicle.task));
@@ -383,7 +384,7 @@ impl<'a> MissionView<'a> {
         descents_m.extend(self.goals().map(|goal| goal.descent_m));
         Ok(PlanRequest {
             vehicles: tasks,
-            descents_m,
+            goal_descents_m: descents_m,
             mode: self.header.mode,
             schedule: self.header.schedule,
             max_gates: gates_most,
@@ -402,19 +403,19 @@ impl<'a> MissionView<'a> {
         let index = self.index_of(system_id).ok_or(MissionError::NotInRoster(system_id))?;
         let own = MissionVehicle::from_bytes(&self.vehicles[index]);
         if self.vehicles.len() > V {
-            return Err(MissionError::RosterFull);
+            return Err(MissionError::TooManyVehiclesOrGoals);
         }
         let header = &self.header;
-        let mut config = Config::new(system_id, own.start, header.origin);
+        let mut config = Config::new(system_id, own.path_start, header.origin);
         config.roster.clear();
-        (config.slowest_mps, config.fastest_mps) = (header.cruise_mps, 0.0);
+        (config.slowest_vehicle_mps, config.fastest_vehicle_mps) = (header.cruise_mps, 0.0);
         for vehicle in self.vehicles() {
             let cruise_mps = libm::fminf(header.cruise_mps, vehicle.speed_max_mps);
-            config.slowest_mps = libm::fminf(config.slowest_mps, cruise_mps);
-            config.fastest_mps = libm::fmaxf(config.fastest_mps, cruise_mps);
-            let entry = RosterEntry { system_id: vehicle.task.id, start: vehicle.start };
+            config.slowest_vehicle_mps = libm::fminf(config.slowest_vehicle_mps, cruise_mps);
+            config.fastest_vehicle_mps = libm::fmaxf(config.fastest_vehicle_mps, cruise_mps);
+            let entry = RosterEntry { system_id: vehicle.task.id, path_start: vehicle.path_start };
             let at = config.roster.partition_point(|other| other.system_id < entry.system_id);
-            config.roster.insert(at, entry).map_err(|_| MissionError::RosterFull)?;
+            config.roster.insert(at, entry).map_err(|_| MissionError::TooManyVehiclesOrGoals)?;
         }
         config.mission_crc = self.crc;
         config.cruise_mps = libm::fminf(header.cruise_mps, own.speed_max_mps);
@@ -424,7 +425,7 @@ impl<'a> MissionView<'a> {
             && let Some(share) = view.shares().nth(index)
         {
             (config.climb_mps, config.descend_mps) = (share.climb_mps, share.descend_mps);
-            config.lost_vehicle_down_s = Some(view.unheard_vehicle_down_s());
+            config.lost_vehicle_down_after_s = Some(view.unheard_vehicle_down_after_s());
             config.ground = view.header().ground;
         }
         config.radius_m = own.radius_m;

@@ -31,8 +31,8 @@ use core::ops::Range;
 
 pub(crate) use self::flash::crc32;
 pub use self::flash::{
-    ErasePermission, File, FlashFault, FlashLayout, FlashRequest, MAX_PROGRAM, MAX_READ, ReadFlash,
-    ReadOutcome, WORD,
+    ErasePermission, File, FlashFault, FlashLayout, FlashRequest, MAX_PROGRAM_LEN, MAX_READ_LEN,
+    ReadFlash, ReadOutcome, WORD_LEN,
 };
 use self::flash_area::{AreaCondition, FlashArea, Seal};
 use self::job::FlashJob;
@@ -42,30 +42,30 @@ pub use self::upload_state::{UploadError, UploadState};
 use crate::config::parameters::Parameters;
 
 /// Record of the photographed waypoints of an area, as [`crate::mission::photographed`] writes it.
-pub(crate) type PhotographedRecord = heapless::Vec<u8, MAX_PROGRAM>;
+pub(crate) type PhotographedRecord = heapless::Vec<u8, MAX_PROGRAM_LEN>;
 
 /// State of the flash store.
 #[derive(Clone, Debug)]
 pub struct Store {
     layout: FlashLayout,
     slots: [AreaCondition; 2],
-    in_use: Option<usize>,
+    slot_in_use: Option<usize>,
     journal: Journal,
     parameters: Parameters,
     /// Slots sealed with this sequence number or a lower one hold a removed file.
-    removed_up_to: u32,
-    unsaved: bool,
+    removed_up_to_sequence: u32,
+    parameters_unsaved: bool,
     photographed: PhotographedRecord,
-    unsaved_photographed: bool,
+    photographed_unsaved: bool,
     reassembly: UploadReassembly,
     upload: Option<(File, UploadState)>,
     job: FlashJob,
     /// An erasure interrupted between two sectors, so that a read comes first.
-    paused_job: FlashJob,
+    paused_erasure: FlashJob,
     /// Whether the shell executes a request whose outcome has not come yet.
     request_pending: bool,
-    buffer: [u8; MAX_PROGRAM],
-    program_word: [u8; WORD],
+    buffer: [u8; MAX_PROGRAM_LEN],
+    program_word: [u8; WORD_LEN],
     erasure_failed: bool,
 }
 
@@ -78,49 +78,49 @@ impl Store {
         let mut store = Self {
             layout,
             slots,
-            in_use: None,
+            slot_in_use: None,
             journal: Journal::default(),
             parameters: Parameters::default(),
-            removed_up_to: 0,
-            unsaved: false,
+            removed_up_to_sequence: 0,
+            parameters_unsaved: false,
             photographed: PhotographedRecord::new(),
-            unsaved_photographed: false,
+            photographed_unsaved: false,
             reassembly: UploadReassembly::default(),
             upload: None,
             job: FlashJob::None,
-            paused_job: FlashJob::None,
+            paused_erasure: FlashJob::None,
             request_pending: false,
-            buffer: [0; MAX_PROGRAM],
-            program_word: [0; WORD],
+            buffer: [0; MAX_PROGRAM_LEN],
+            program_word: [0; WORD_LEN],
             erasure_failed: false,
         };
         store.mount_journal(flash);
-        store.in_use = store.newest_slot();
+        store.slot_in_use = store.newest_slot();
         store
     }
 
     /// Range of the roadmap or field in use since this start, in the storage bank; `None` if there
     /// is none. It is not written before the next start.
-    pub fn roadmap(&self) -> Option<Range<u32>> {
-        let slot = self.in_use?;
+    pub fn map_range(&self) -> Option<Range<u32>> {
+        let slot = self.slot_in_use?;
         let at = FlashArea::Slot(slot).data_offset(&self.layout);
         Some(at..at + self.slots[slot].seal()?.len)
     }
 
     /// Rejects the roadmap or field of this start, which is complete but cannot be used.
-    /// [`Self::roadmap`] is then the older one; returns whether there is one. To be called before
-    /// any other use of the store.
+    /// [`Self::map_range`] is then the older one; returns whether there is one. To be
+    /// called before any other use of the store.
     pub fn fall_back_to_older_roadmap(&mut self) -> bool {
-        if let Some(slot) = self.in_use {
+        if let Some(slot) = self.slot_in_use {
             self.slots[slot] = AreaCondition::Dirty;
-            self.in_use = self.newest_slot();
+            self.slot_in_use = self.newest_slot();
         }
-        self.in_use.is_some()
+        self.slot_in_use.is_some()
     }
 
     /// Range of the mission file in the storage bank; the caller must copy the file, since the
     /// journal moves it.
-    pub fn mission(&self) -> Option<Range<u32>> {
+    pub fn mission_range(&self) -> Option<Range<u32>> {
         self.file_range(File::Mission)
     }
 
@@ -139,7 +139,7 @@ impl Store {
         value: f32,
     ) -> Result<(), crate::config::parameters::ParameterError> {
         if self.parameters.set(index, value)? {
-            self.unsaved = true;
+            self.parameters_unsaved = true;
         }
         Ok(())
     }
@@ -147,18 +147,18 @@ impl Store {
     /// Whether the record of the parameters is still to be written: a parameter was set, a roadmap
     /// or field was removed, which the same record states, or the journal failed.
     pub fn has_unsaved_parameters(&self) -> bool {
-        self.unsaved
+        self.parameters_unsaved
     }
 
     /// The record of photographed waypoints, as last set or restored from flash.
-    pub(crate) fn photographed(&self) -> &[u8] {
+    pub(crate) fn photographed_record(&self) -> &[u8] {
         &self.photographed
     }
 
     /// Sets the record of photographed waypoints; it is written to flash by a later request.
     pub(crate) fn set_photographed_record(&mut self, photographed: PhotographedRecord) {
         self.photographed = photographed;
-        self.unsaved_photographed = true;
+        self.photographed_unsaved = true;
     }
 
     /// Length of a file, bytes; `None` if there is no such file.
@@ -171,20 +171,20 @@ impl Store {
     pub fn remove_file(&mut self, file: File) {
         match file {
             File::Roadmap | File::Field => {
-                if let Some((_, Seal { sequence, .. })) = self.newest_of(file) {
-                    self.removed_up_to = sequence;
-                    self.unsaved = true;
+                if let Some((_, Seal { sequence, .. })) = self.newest_slot_of(file) {
+                    self.removed_up_to_sequence = sequence;
+                    self.parameters_unsaved = true;
                 }
             }
             File::Mission => {
-                self.journal.removed |= self.journal.mission.take().is_some();
+                self.journal.mission_removal_unsaved |= self.journal.mission.take().is_some();
             }
         }
     }
 
-    /// Starts reading up to `len` bytes of a file (at most [`MAX_READ`], fewer at the file's end).
-    /// False if the file ends before `offset`, or if the store is at work: in that case it is to be
-    /// called again.
+    /// Starts reading up to `len` bytes of a file (at most [`MAX_READ_LEN`], fewer at the file's
+    /// end). False if the file ends before `offset`, or if the store is at work: in that case it is
+    /// to be called again.
     pub fn request_read(&mut self, file: File, offset: u32, len: usize) -> bool {
         let Some(extent) =
             self.file_range(file).filter(|extent| offset < extent.end - extent.start)
@@ -192,7 +192,7 @@ impl Store {
             return false;
         };
         let at = extent.start + offset;
-        let len = len.min(MAX_READ).min((extent.end - at) as usize);
+        let len = len.min(MAX_READ_LEN).min((extent.end - at) as usize);
         self.start_read(FlashJob::Read { at, len })
     }
 
@@ -200,13 +200,13 @@ impl Store {
     /// such file, or if the store is at work: in that case it is to be called again.
     pub fn request_crc(&mut self, file: File, state: u32) -> bool {
         let Some(extent) = self.file_range(file) else { return false };
-        self.start_read(FlashJob::Sum { at: extent.start, end: extent.end, sum: state })
+        self.start_read(FlashJob::Crc { at: extent.start, end: extent.end, sum: state })
     }
 
     fn start_read(&mut self, job: FlashJob) -> bool {
         match self.job {
             FlashJob::None => {}
-            FlashJob::Erase { .. } if !self.request_pending => self.paused_job = self.job,
+            FlashJob::Erase { .. } if !self.request_pending => self.paused_erasure = self.job,
             _ => return false,
         }
         self.job = job;
@@ -216,21 +216,23 @@ impl Store {
     /// The slot with the newest complete roadmap or field that was not removed.
     fn newest_slot(&self) -> Option<usize> {
         let number = |i: &usize| self.slots[*i].seal().map(|seal| seal.sequence);
-        (0..2).filter(|i| number(i).is_some_and(|n| n > self.removed_up_to)).max_by_key(number)
+        (0..2)
+            .filter(|i| number(i).is_some_and(|n| n > self.removed_up_to_sequence))
+            .max_by_key(number)
     }
 
     /// The newest slot and its seal, if it holds `file`; of roadmap and field only the newer one
     /// counts.
-    fn newest_of(&self, file: File) -> Option<(usize, Seal)> {
+    fn newest_slot_of(&self, file: File) -> Option<(usize, Seal)> {
         let slot = self.newest_slot()?;
         let seal = self.slots[slot].seal()?;
-        (seal.field == (file == File::Field)).then_some((slot, seal))
+        (seal.is_height_field == (file == File::Field)).then_some((slot, seal))
     }
 
     fn file_range(&self, file: File) -> Option<Range<u32>> {
         match file {
             File::Roadmap | File::Field => {
-                let (slot, seal) = self.newest_of(file)?;
+                let (slot, seal) = self.newest_slot_of(file)?;
                 let at = FlashArea::Slot(slot).data_offset(&self.layout);
                 Some(at..at + seal.len)
             }
@@ -241,7 +243,7 @@ impl Store {
     fn condition_mut(&mut self, area: FlashArea) -> &mut AreaCondition {
         match area {
             FlashArea::Slot(i) => &mut self.slots[i],
-            FlashArea::Half(i) => &mut self.journal.halves[i],
+            FlashArea::JournalHalf(i) => &mut self.journal.halves[i],
         }
     }
 
@@ -250,14 +252,14 @@ impl Store {
     fn next_area_to_erase(&self) -> Option<FlashArea> {
         let newest = self.newest_slot();
         let slot = (0..2).find(|&i| {
-            let held = Some(i) == self.in_use || Some(i) == newest;
+            let held = Some(i) == self.slot_in_use || Some(i) == newest;
             !held && !matches!(self.slots[i], AreaCondition::Clean | AreaCondition::Open)
         });
         let half = (0..2).find(|&i| {
-            let held = Some(i) == self.journal.active;
+            let held = Some(i) == self.journal.active_half;
             !held && !matches!(self.journal.halves[i], AreaCondition::Clean | AreaCondition::Open)
         });
-        half.map(FlashArea::Half).or(slot.map(FlashArea::Slot))
+        half.map(FlashArea::JournalHalf).or(slot.map(FlashArea::Slot))
     }
 }
 

@@ -57,16 +57,16 @@ pub struct OwnReport {
     /// Whether this vehicle takes part in the mission, was lost, has left or has finished.
     pub status: ShareStatus,
     /// Whether this vehicle was not started yet: it may take part again as a new vehicle.
-    pub waits: bool,
+    pub waits_for_start: bool,
     /// Whether this vehicle is in the air.
     pub airborne: bool,
     /// Number of divisions from which its path follows: the fields below are along that path.
-    pub division: usize,
+    pub path_division_count: usize,
     /// Progress along its path, decimetres.
     pub progress_dm: u16,
     /// The commitment that this vehicle would report now, decimetres along its path: where it would
     /// hold. `None` if it cannot make one.
-    pub commitment_dm: Option<u16>,
+    pub new_commitment_dm: Option<u16>,
     /// Whether this vehicle holds at its commitment.
     pub holds: bool,
     /// Whether this vehicle's path, the first part of its route, ends soon, so that all are to
@@ -84,7 +84,7 @@ pub struct VehicleReception {
     /// Whether a vehicle heard by this one lately reported that it hears the other one.
     pub heard_by_others: bool,
     /// Ranks of the vehicles that the other one reported to hear, as bits.
-    pub hears: u32,
+    pub heard_bits: u32,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -95,9 +95,9 @@ struct FleetVehicle {
     /// When the member was last heard, by this vehicle or by one that this vehicle hears.
     heard_at: Instant,
     /// Whether this vehicle itself lately heard the member.
-    heard_itself: bool,
+    heard_by_us: bool,
     /// Hash of the division under way that the member has computed; 0 for none.
-    hash: u32,
+    pending_hash: u32,
 }
 
 impl FleetVehicle {
@@ -109,37 +109,35 @@ impl FleetVehicle {
 /// What this vehicle knows of all vehicles of the roster, itself included, and of their divisions.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Fleet<const V: usize> {
-    own: u8,
+    own_rank: u8,
     members: Vec<FleetVehicle, V>,
     /// Inputs of the binding divisions, oldest first.
     divisions: Vec<DivisionInputs<V>, MAX_DIVISIONS>,
     committed_hash: u32,
     /// Inputs of the division under way; empty until all of them are known.
-    division_inputs: DivisionInputs<V>,
-    hash: u32,
+    pending_inputs: DivisionInputs<V>,
+    pending_hash: u32,
     /// Inputs of the division that this vehicle reported last and withdrew since.
-    previous_inputs: DivisionInputs<V>,
-    previous_hash: u32,
-    lease_at: Instant,
+    withdrawn_inputs: DivisionInputs<V>,
+    withdrawn_hash: u32,
+    lease_renewed_at: Instant,
     excluded: bool,
     /// 8 bits of the CRC of the plan that this flight began with; 0 while there is none.
-    plan: u8,
+    plan_crc8: u8,
     /// Whether this vehicle waits for its start, and knows of none that was started: there is no
     /// flight in which one could be lost or leave.
     idle: bool,
-    /// Ranks of the vehicles in flight, by what they report themselves, as bits: those that were
-    /// started, and take part.
-    in_flight: u32,
+    /// Ranks of the vehicles in flight (started, and taking part) by their own reports, as bits.
+    in_flight_bits: u32,
     /// Ranks of the other vehicles that report that they hear one in flight, as bits.
-    hear_flight: u32,
+    hears_flight_bits: u32,
     /// Ranks of the vehicles that have reported their own entry, as bits.
-    introduced: u32,
+    introduced_bits: u32,
     /// Whether this vehicle is in the air.
     airborne: bool,
     /// When the last of the vehicles that may be lost is down; 0 if there is none.
     down_at: Instant,
-    /// Whether a vehicle that takes part has not been heard for [`MISSED_AFTER`], or hears no
-    /// majority.
+    /// Whether one that takes part was not heard for [`MISSED_AFTER`], or hears no majority.
     any_missing: bool,
     limits: FleetTimeouts,
 }
@@ -149,21 +147,21 @@ impl<const V: usize> Fleet<V> {
     pub fn new(own: usize, count: usize, limits: FleetTimeouts) -> Self {
         let member = FleetVehicle { has_part: true, ..FleetVehicle::default() };
         Self {
-            own: own as u8,
+            own_rank: own as u8,
             members: core::iter::repeat_n(member, count.min(V)).collect(),
             divisions: Vec::new(),
             committed_hash: 0,
-            division_inputs: Vec::new(),
-            hash: 0,
-            previous_inputs: Vec::new(),
-            previous_hash: 0,
-            lease_at: Instant::ZERO,
+            pending_inputs: Vec::new(),
+            pending_hash: 0,
+            withdrawn_inputs: Vec::new(),
+            withdrawn_hash: 0,
+            lease_renewed_at: Instant::ZERO,
             excluded: false,
-            plan: 0,
+            plan_crc8: 0,
             idle: false,
-            in_flight: 0,
-            hear_flight: 0,
-            introduced: 0,
+            in_flight_bits: 0,
+            hears_flight_bits: 0,
+            introduced_bits: 0,
             airborne: false,
             down_at: Instant::ZERO,
             any_missing: false,
@@ -175,33 +173,34 @@ impl<const V: usize> Fleet<V> {
     /// is forgotten. A vehicle that was lost, has left or flew a division takes part again under a
     /// new incarnation number.
     pub fn begin_flight(&mut self, now: Instant) {
-        let entry = self.members[usize::from(self.own)].entry;
+        let entry = self.members[usize::from(self.own_rank)].entry;
         if entry.status != ShareStatus::Alive || self.excluded || !self.divisions.is_empty() {
             self.rejoin((entry.incarnation + 1) % INCARNATIONS);
         }
         self.forget_plan();
-        (self.in_flight, self.hear_flight) = (0, 0);
+        (self.in_flight_bits, self.hears_flight_bits) = (0, 0);
         self.members.iter_mut().for_each(|member| member.heard_at = now);
         // A majority has to hear this vehicle before it takes off.
-        self.lease_at = Instant::ZERO;
+        self.lease_renewed_at = Instant::ZERO;
     }
 
     /// Sets the plan of this flight, by its CRC: places along paths and divisions that others
     /// report count only if they are of the same plan.
     pub fn set_plan(&mut self, plan_crc: u32) {
         // 0 stands for no plan.
-        self.plan = plan_crc.to_le_bytes().into_iter().fold(0, |bits, byte| bits ^ byte).max(1);
+        self.plan_crc8 = plan_crc.to_le_bytes().into_iter().fold(0, |crc, byte| crc ^ byte).max(1);
     }
 
     /// Forgets the plan, its divisions, and all places along its paths.
     fn forget_plan(&mut self) {
-        (self.plan, self.committed_hash, self.hash, self.previous_hash) = (0, 0, 0, 0);
+        (self.plan_crc8, self.committed_hash, self.pending_hash, self.withdrawn_hash) =
+            (0, 0, 0, 0);
         self.divisions.clear();
-        self.division_inputs.clear();
-        self.previous_inputs.clear();
+        self.pending_inputs.clear();
+        self.withdrawn_inputs.clear();
         for member in &mut self.members {
             member.entry = member.entry.seen_from_another_division();
-            (member.has_part, member.hash) = (true, 0);
+            (member.has_part, member.pending_hash) = (true, 0);
         }
     }
 
@@ -215,15 +214,15 @@ impl<const V: usize> Fleet<V> {
         }
         *self = Self {
             members: core::mem::take(&mut self.members),
-            lease_at: self.lease_at,
-            in_flight: self.in_flight,
-            hear_flight: self.hear_flight,
+            lease_renewed_at: self.lease_renewed_at,
+            in_flight_bits: self.in_flight_bits,
+            hears_flight_bits: self.hears_flight_bits,
             airborne: self.airborne,
-            plan: self.plan,
+            plan_crc8: self.plan_crc8,
             idle: self.idle,
-            ..Self::new(usize::from(self.own), 0, self.limits)
+            ..Self::new(usize::from(self.own_rank), 0, self.limits)
         };
-        self.members[usize::from(self.own)].entry.incarnation = incarnation;
+        self.members[usize::from(self.own_rank)].entry.incarnation = incarnation;
     }
 
     /// One step: updates this vehicle's entry, the reception of the others, the lease, and the
@@ -236,57 +235,57 @@ impl<const V: usize> Fleet<V> {
     ) {
         (self.airborne, self.down_at, self.any_missing) = (own.airborne, Instant::ZERO, false);
         // This vehicle may not yet have the path of the last division.
-        let caught_up = own.division == self.divisions.len();
-        let entry = &mut self.members[usize::from(self.own)].entry;
+        let caught_up = own.path_division_count == self.divisions.len();
+        let entry = &mut self.members[usize::from(self.own_rank)].entry;
         // The path of a vehicle that has left is no part of its share: its progress does not count.
         if caught_up && entry.status == ShareStatus::Alive {
             entry.progress_dm = entry.progress_dm.max(own.progress_dm);
         }
         let status = if caught_up { own.status } else { own.status.seen_from_another_division() };
         entry.status = entry.status.max(status);
-        let takes_off = !own.waits && entry.status == ShareStatus::Alive;
+        let takes_off = !own.waits_for_start && entry.status == ShareStatus::Alive;
         let bit = self.own_bit();
-        self.in_flight = if takes_off { self.in_flight | bit } else { self.in_flight & !bit };
-        self.hear_flight &= !bit;
+        self.in_flight_bits = self.in_flight_bits & !bit | if takes_off { bit } else { 0 };
+        self.hears_flight_bits &= !bit;
         let mut linked = bit;
         let counted = self.counted_ranks();
         for (rank, member) in self.members.iter_mut().enumerate() {
             let heard = hearing(rank);
-            let lately = heard.heard_at.is_some_and(|at| now - at <= self.limits.heard);
-            if rank == usize::from(self.own) || lately || heard.heard_by_others {
+            let lately = heard.heard_at.is_some_and(|at| now - at <= self.limits.heard_within);
+            if rank == usize::from(self.own_rank) || lately || heard.heard_by_others {
                 member.heard_at = now;
             }
-            member.heard_itself = lately;
+            member.heard_by_us = lately;
             let (silence, bit) = (now - member.heard_at, 1 << rank.min(31));
             if silence >= MISSED_AFTER && member.has_part {
                 let falls = member.entry.status <= ShareStatus::Lost;
-                let down_at = member.heard_at + self.limits.down;
+                let down_at = member.heard_at + self.limits.down_after;
                 self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
             }
             // A vehicle that hears no majority is to land, and leaves its part, as its lease ends.
-            let cut_off = lately && !Self::is_majority_of(heard.hears | bit, counted);
+            let cut_off = lately && !Self::is_majority_of(heard.heard_bits | bit, counted);
             self.any_missing |= (silence >= MISSED_AFTER || cut_off) && member.takes_part();
-            if silence >= self.limits.silent {
-                self.hear_flight &= !bit;
+            if silence >= self.limits.lost_after {
+                self.hears_flight_bits &= !bit;
                 // A majority has counted the vehicle as lost, so it has landed; or its battery is
                 // empty.
                 let lost = member.entry.status == ShareStatus::Lost;
-                if (lost && silence >= self.limits.down) || silence >= LANDED_AFTER_SILENCE {
-                    self.in_flight &= !bit;
+                if (lost && silence >= self.limits.down_after) || silence >= LANDED_AFTER_SILENCE {
+                    self.in_flight_bits &= !bit;
                 }
             }
             linked |= u32::from(lately && heard.hears_us) << rank.min(31);
         }
         if self.is_majority(|rank, _| linked >> rank & 1 != 0) {
-            self.lease_at = now;
+            self.lease_renewed_at = now;
         }
-        self.idle = own.waits && !self.is_another_in_flight();
+        self.idle = own.waits_for_start && !self.is_another_in_flight();
         if self.idle {
             self.forget_earlier_flight(now);
         }
         self.rejoin_if_ready(now, own.status);
         // One that has left may have been deaf meanwhile: whom it does not hear others may hear.
-        if self.has_lease(now) && self.vehicle_takes_part(usize::from(self.own)) {
+        if self.has_lease(now) && self.vehicle_takes_part(usize::from(self.own_rank)) {
             self.count_silent_as_lost(now);
         }
         if caught_up {
@@ -297,18 +296,18 @@ impl<const V: usize> Fleet<V> {
     /// Whether another vehicle is in flight, as far as this one has heard, or as a vehicle that it
     /// hears has heard. A vehicle that fell silent in flight may still fly.
     fn is_another_in_flight(&self) -> bool {
-        self.heard_flights() | self.hear_flight & !self.own_bit() != 0
+        self.other_ranks_in_flight() | self.hears_flight_bits & !self.own_bit() != 0
     }
 
     /// Ranks of the other vehicles that this one knows to be in flight, as bits.
-    fn heard_flights(&self) -> u32 {
+    fn other_ranks_in_flight(&self) -> u32 {
         let counts = |rank: &usize| self.members[*rank].entry.status <= ShareStatus::Lost;
         let known = (0..self.members.len()).filter(counts).fold(0, |bits, rank| bits | 1 << rank);
-        self.in_flight & known & !self.own_bit()
+        self.in_flight_bits & known & !self.own_bit()
     }
 
     fn own_bit(&self) -> u32 {
-        1 << self.own.min(31)
+        1 << self.own_rank.min(31)
     }
 
     /// Before a start vehicles come up one after the other, and report places along their paths of
@@ -316,7 +315,7 @@ impl<const V: usize> Fleet<V> {
     fn forget_earlier_flight(&mut self, now: Instant) {
         for (rank, member) in self.members.iter_mut().enumerate() {
             member.heard_at = now;
-            if rank != usize::from(self.own) {
+            if rank != usize::from(self.own_rank) {
                 member.entry = member.entry.seen_from_another_division();
             }
         }
@@ -334,7 +333,7 @@ impl<const V: usize> Fleet<V> {
             ShareStatus::Finished => false,
         };
         let asked = self.members.iter().any(|m| m.has_part && asks(m));
-        self.vehicle_takes_part(usize::from(self.own))
+        self.vehicle_takes_part(usize::from(self.own_rank))
             && !self.idle
             && !self.divisions.is_full()
             && asked
@@ -350,12 +349,12 @@ impl<const V: usize> Fleet<V> {
     fn prepare_division_inputs(&mut self, now: Instant) {
         let known = |m: &FleetVehicle| match m.entry.status {
             ShareStatus::Alive => m.entry.commitment_dm.is_some(),
-            ShareStatus::Lost => now - m.heard_at >= self.limits.silent,
+            ShareStatus::Lost => now - m.heard_at >= self.limits.lost_after,
             ShareStatus::Left | ShareStatus::Finished => true,
         };
         if !self.has_lease(now) || !self.members.iter().filter(|m| m.has_part).all(known) {
             self.withdraw_inputs();
-            self.division_inputs.clear();
+            self.pending_inputs.clear();
             return;
         }
         // A vehicle that has no part since an earlier division gets none in this one.
@@ -366,57 +365,58 @@ impl<const V: usize> Fleet<V> {
                 VehicleDivisionInput::default()
             }
         };
-        if !self.members.iter().map(input).eq(self.division_inputs.iter().copied()) {
+        if !self.members.iter().map(input).eq(self.pending_inputs.iter().copied()) {
             self.withdraw_inputs();
-            self.division_inputs = self.members.iter().map(input).collect();
+            self.pending_inputs = self.members.iter().map(input).collect();
         }
     }
 
     /// Withdraws the inputs that were reported last, and remembers them.
     fn withdraw_inputs(&mut self) {
-        if self.hash != 0 {
-            (self.previous_inputs, self.previous_hash) = (self.division_inputs.clone(), self.hash);
-            self.hash = 0;
+        if self.pending_hash != 0 {
+            (self.withdrawn_inputs, self.withdrawn_hash) =
+                (self.pending_inputs.clone(), self.pending_hash);
+            self.pending_hash = 0;
         }
     }
 
     /// Whether the shell is to compute the division under way: all its inputs are known.
-    pub fn needs_division(&self) -> bool {
-        self.hash == 0 && !self.division_inputs.is_empty()
+    pub fn is_division_to_be_computed(&self) -> bool {
+        self.pending_hash == 0 && !self.pending_inputs.is_empty()
     }
 
     /// The inputs of every binding division, and of the one under way where its hash is still to be
     /// computed.
     pub fn inputs_of_divisions(&self) -> impl Iterator<Item = &[VehicleDivisionInput]> + Clone {
-        let under_way = self.needs_division().then_some(&self.division_inputs);
+        let under_way = self.is_division_to_be_computed().then_some(&self.pending_inputs);
         self.divisions.iter().chain(under_way).map(|inputs| &inputs[..])
     }
 
     /// Sets the hash of the division under way from the CRC of the computed plan and from the
     /// inputs: the same plan may follow from inputs with another lost vehicle.
     pub fn set_hash_from_plan(&mut self, plan_crc: u32) {
-        if self.needs_division() {
+        if self.is_division_to_be_computed() {
             let mut digest = CRC32.digest();
             digest.update(&plan_crc.to_le_bytes());
-            for input in &self.division_inputs {
+            for input in &self.pending_inputs {
                 let [low, high] = input.along_dm.to_le_bytes();
                 digest.update(&[u8::from(input.alive), low, high]);
             }
             // 0 stands for no hash.
-            self.hash = digest.finalize().max(1);
-            self.members[usize::from(self.own)].hash = self.hash;
+            self.pending_hash = digest.finalize().max(1);
+            self.members[usize::from(self.own_rank)].pending_hash = self.pending_hash;
         }
     }
 
     fn is_division_agreed(&self, now: Instant) -> bool {
         let agrees = |rank: usize| {
             let member = &self.members[rank];
-            member.hash == self.hash && member.entry.holds
+            member.pending_hash == self.pending_hash && member.entry.holds
         };
         let is_down = |m: &FleetVehicle| {
-            m.entry.status != ShareStatus::Lost || now - m.heard_at >= self.limits.down
+            m.entry.status != ShareStatus::Lost || now - m.heard_at >= self.limits.down_after
         };
-        self.hash != 0
+        self.pending_hash != 0
             && self.members.iter().filter(|m| m.has_part).all(is_down)
             && (0..self.members.len()).filter(|rank| self.vehicle_takes_part(*rank)).all(agrees)
             && self.is_majority(|rank, _| self.vehicle_takes_part(rank))
@@ -424,13 +424,13 @@ impl<const V: usize> Fleet<V> {
 
     /// Makes the division under way binding: vehicles without a part in it leave the fleet.
     fn commit_division(&mut self) {
-        let inputs = core::mem::take(&mut self.division_inputs);
-        self.committed_hash = self.hash;
-        (self.hash, self.previous_hash) = (0, 0);
-        self.previous_inputs.clear();
+        let inputs = core::mem::take(&mut self.pending_inputs);
+        self.committed_hash = self.pending_hash;
+        (self.pending_hash, self.withdrawn_hash) = (0, 0);
+        self.withdrawn_inputs.clear();
         for (member, input) in self.members.iter_mut().zip(&inputs) {
             member.has_part &= input.alive;
-            member.hash = 0;
+            member.pending_hash = 0;
             member.entry = match input.alive {
                 true => member.entry.seen_from_another_division(),
                 false => member.entry.without_places(),
@@ -445,17 +445,18 @@ impl<const V: usize> Fleet<V> {
     /// forgotten: that matters only before a start. Fleets that will act alike become equal, so a
     /// search recognises a state that it has visited.
     pub fn normalise_for_search(&mut self, now: Instant, then: Instant) {
-        let FleetTimeouts { lease, silent, down, .. } = self.limits;
+        let FleetTimeouts { lease, lost_after: lost, down_after: down, .. } = self.limits;
         let moved = |at: Instant, most: Duration| {
             let age = (now - at).min(most);
             Instant::from_micros(then.as_micros().saturating_sub(age.as_micros()))
         };
-        (self.in_flight, self.hear_flight) = (self.in_flight & self.own_bit(), 0);
-        (self.introduced, self.down_at, self.any_missing) = (u32::MAX, Instant::ZERO, false);
-        self.lease_at = moved(self.lease_at, Duration::from_micros(2 * lease.as_micros()));
+        (self.in_flight_bits, self.hears_flight_bits) = (self.in_flight_bits & self.own_bit(), 0);
+        (self.introduced_bits, self.down_at, self.any_missing) = (u32::MAX, Instant::ZERO, false);
+        self.lease_renewed_at =
+            moved(self.lease_renewed_at, Duration::from_micros(2 * lease.as_micros()));
         for member in &mut self.members {
             let counts = member.has_part && member.entry.status <= ShareStatus::Lost;
-            member.heard_at = if counts { moved(member.heard_at, silent.max(down)) } else { then };
+            member.heard_at = if counts { moved(member.heard_at, lost.max(down)) } else { then };
         }
     }
 
@@ -466,7 +467,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Hash of the inputs of all binding divisions, and of the one under way if that is to be
     /// computed.
-    pub fn division_hash(&self) -> u32 {
+    pub fn division_inputs_hash(&self) -> u32 {
         let mut digest = CRC32.digest();
         for input in self.inputs_of_divisions().flatten() {
             let [low, high] = input.along_dm.to_le_bytes();
@@ -478,13 +479,12 @@ impl<const V: usize> Fleet<V> {
     /// This vehicle's commitment, the place where it is to hold, decimetres along its path, while a
     /// division is under way; `None` before it was reported.
     pub fn commitment_dm(&self) -> Option<u16> {
-        self.members[usize::from(self.own)].entry.commitment_dm.filter(|_| self.is_dividing())
+        self.members[usize::from(self.own_rank)].entry.commitment_dm.filter(|_| self.is_dividing())
     }
 
-    /// Place where this vehicle held for the last binding division, decimetres along its path
-    /// before it.
+    /// Where this vehicle held for the last binding division, decimetres along its path before it.
     pub fn held_at_dm(&self) -> u16 {
-        let inputs = self.divisions.last().and_then(|inputs| inputs.get(usize::from(self.own)));
+        let inputs = self.divisions.last().and_then(|all| all.get(usize::from(self.own_rank)));
         inputs.map_or(0, |input| input.along_dm)
     }
 

@@ -13,7 +13,7 @@ use planner_core::detour::KeepOutZone;
 pub struct IncrementalScan {
     /// The source whose zones are tested now, and the number of sources.
     source: u16,
-    sources: u16,
+    source_count: u16,
     /// Number of sources of which all zones were tested.
     sources_checked: u16,
     /// Number of zones of the present source that were tested.
@@ -35,8 +35,8 @@ impl IncrementalScan {
         meets_condition: impl Fn(&KeepOutZone) -> bool,
     ) -> Option<bool> {
         let sources = sources as u16;
-        if self.sources != sources {
-            self.sources = sources;
+        if self.source_count != sources {
+            self.source_count = sources;
             self.restart();
         }
         while self.sources_checked < sources {

@@ -32,7 +32,7 @@ use planner_core::{Length, Point};
 pub(crate) use self::bounds::MAX_HOVER_MPS;
 use self::bounds::*;
 use self::entry::NeighbourEntry;
-use crate::config::{Ground, RosterEntry};
+use crate::config::{RosterEntry, UnevenGround};
 use crate::link::intent::{GROUNDED, Intent, LANDED, ON_PLAN, OUT_OF_PLAN};
 use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
@@ -46,63 +46,68 @@ pub struct Neighbours<const V: usize> {
     states: Vec<Neighbour, V>,
     /// Number of roster vehicles in `entries`, sorted by id; behind them are the strangers.
     roster_count: usize,
-    dropped: u16,
+    dropped_positions: u16,
     /// When a vehicle of the roster last reported that it hears this one.
     reported_heard_at: Option<Instant>,
     /// When the last scan began that found no vehicle out of the plan on the path.
-    clear_at: Instant,
+    path_clear_at: Instant,
     /// Greatest speed at which a reported progress is believed to grow, m/s.
-    fastest_mps: f32,
+    max_progress_mps: f32,
     /// Least speed at which an unheard vehicle is assumed to make progress, m/s.
-    assumed_speed_mps: f32,
+    min_unheard_progress_mps: f32,
     /// Distance from which on the radio may not reach, metres; ∞ where it reaches every vehicle.
     range_edge_m: f32,
     /// Speed of the mission's fastest vehicle, m/s.
-    fastest_cruise_mps: f32,
+    fastest_vehicle_mps: f32,
     /// Position of this vehicle, ENU.
-    place: Point,
+    own_position: Point,
     /// Rank of the vehicle with which the next relay message begins.
-    relay_next: u16,
+    next_relayed_rank: u16,
     /// Rank of this vehicle in the roster.
     own_rank: u16,
     /// The fleet, by which vehicles of a coverage mission agree; `None` in other missions.
     fleet: Option<Fleet<V>>,
     /// Heights of the ground of an area that is not level.
-    ground: Option<Ground>,
+    ground: Option<UnevenGround>,
     /// Silence after which a lost vehicle is assumed to be on the ground.
     down_after: Duration,
     /// Distance by which two vehicles in the air in a coverage mission may be nearer than their
     /// estimates say, metres; 0 in other missions.
     pair_position_error_m: f32,
     /// Rank of the vehicle with which the next roster report begins.
-    roster_next: u16,
+    next_reported_rank: u16,
 }
 
 impl<const V: usize> Neighbours<V> {
     /// A table of the vehicles of `roster`, which is sorted by id, without this one; none of them
-    /// was heard yet. Their progress is believed to grow no faster than `fastest_mps` or the speed
-    /// of a landing, and, while unheard, no slower than a share of `slowest_mps`. Both are speeds
-    /// of the whole mission, so that all vehicles judge a report alike.
-    pub fn new(roster: &[RosterEntry], own_id: u8, slowest_mps: f32, fastest_mps: f32) -> Self {
+    /// was heard yet. Their progress is believed to grow no faster than `fastest_vehicle_mps` or
+    /// the speed of a landing, and, while unheard, no slower than a share of `slowest_vehicle_mps`.
+    /// Both are speeds of the whole mission, so that all vehicles judge a report alike.
+    pub fn new(
+        roster: &[RosterEntry],
+        own_id: u8,
+        slowest_vehicle_mps: f32,
+        fastest_vehicle_mps: f32,
+    ) -> Self {
         let mut table = Self {
             entries: Vec::new(),
             states: Vec::new(),
             roster_count: 0,
-            dropped: 0,
+            dropped_positions: 0,
             reported_heard_at: None,
-            clear_at: Instant::ZERO,
-            fastest_mps: libm::fmaxf(fastest_mps, MAX_LANDING_MPS),
-            assumed_speed_mps: slowest_mps * RECKONED_SPEED_SHARE,
+            path_clear_at: Instant::ZERO,
+            max_progress_mps: libm::fmaxf(fastest_vehicle_mps, MAX_LANDING_MPS),
+            min_unheard_progress_mps: slowest_vehicle_mps * MIN_UNHEARD_SPEED_SHARE,
             range_edge_m: f32::INFINITY,
-            fastest_cruise_mps: fastest_mps,
-            place: Point::zeros(),
-            relay_next: 0,
+            fastest_vehicle_mps,
+            own_position: Point::zeros(),
+            next_relayed_rank: 0,
             own_rank: 0,
             fleet: None,
             ground: None,
             down_after: DOWN_AFTER,
             pair_position_error_m: 0.0,
-            roster_next: 0,
+            next_reported_rank: 0,
         };
         for (rank, entry) in roster.iter().enumerate() {
             if entry.system_id == own_id {
@@ -117,16 +122,16 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Number of positions dropped because the table had no room for their sender.
-    pub fn dropped_count(&self) -> u16 {
-        self.dropped
+    pub fn dropped_position_count(&self) -> u16 {
+        self.dropped_positions
     }
 
     fn add_entry(&mut self, id: u8, rank: u16) -> Option<usize> {
         let entry = NeighbourEntry::unheard(
             id,
             rank,
-            self.assumed_speed_mps,
-            [self.stretch_for_range_m(), self.fastest_cruise_mps],
+            self.min_unheard_progress_mps,
+            [self.max_unheard_travel_for_range_m(), self.fastest_vehicle_mps],
         );
         self.entries.push(entry).ok()?;
         Some(self.entries.len() - 1)
@@ -178,14 +183,16 @@ impl<const V: usize> Neighbours<V> {
             lon_deg: f64::from(data.lon) * 1e-7,
             alt_m: f64::from(data.alt) * 1e-3,
         };
-        let (own, edge_m) = (self.place, self.range_edge_m);
+        let (own, edge_m) = (self.own_position, self.range_edge_m);
         let at = self.active_roster_index(id, now).or_else(|| self.stranger_entry(id, now));
         let Some(entry) = at.and_then(|at| self.entries.get_mut(at)) else { return };
-        let behind = entry.boot_ms.wrapping_sub(data.time_boot_ms);
-        if !place.is_valid() || (entry.position_at.is_some() && behind < RESTART_MS) {
+        let behind = entry.position_boot_ms.wrapping_sub(data.time_boot_ms);
+        if !place.is_valid()
+            || (entry.position_at.is_some() && behind < SENDER_RESTARTED_STEP_BACK_MS)
+        {
             return;
         }
-        entry.boot_ms = data.time_boot_ms;
+        entry.position_boot_ms = data.time_boot_ms;
         entry.heard_at = Some(now);
         entry.position_at = Some(now);
         entry.state.position = frames::geodetic_to_enu(origin, &place);
@@ -222,7 +229,7 @@ impl<const V: usize> Neighbours<V> {
         let shared = on_plan && entry.shares_plan;
         let flies_plan = on_plan && intent.flags & (LANDED | OUT_OF_PLAN) == 0;
         let follows = flies_plan && intent.plan_crc != 0;
-        entry.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
+        entry.follows_other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
         (entry.heard_at, entry.intent_at) = (Some(now), Some(now));
         entry.flags = intent.flags;
         if entry.reports_any(GROUNDED)
@@ -232,7 +239,7 @@ impl<const V: usize> Neighbours<V> {
             entry.pad = Some(entry.state.position);
         }
         let out = entry.reports_any(OUT_OF_PLAN) && entry.position_at.is_some();
-        entry.out_since = entry.out_since.or(Some(now)).filter(|_| out);
+        entry.out_of_plan_since = entry.out_of_plan_since.or(Some(now)).filter(|_| out);
         // From rank 32 on there is no bit: this vehicle counts as heard by the neighbour.
         if rank >= 32 || intent.heard_bits & (1 << rank) != 0 {
             entry.hears_us_at = Some(now);
@@ -241,19 +248,19 @@ impl<const V: usize> Neighbours<V> {
         entry.heard_bits = intent.heard_bits;
         entry.points.clone_from(&intent.points);
         let most = intent.points.len().saturating_sub(1) as u8;
-        entry.unheard_point_count = intent.unheard_point_count.min(most);
+        entry.unheard_flight_point_count = intent.unheard_flight_point_count.min(most);
         entry.points_length_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
-        entry.extent_m = fpu::sqrtf(entry.points_for_now().iter().fold(0.0, most));
+        entry.points_extent_m = fpu::sqrtf(entry.points_to_stop().iter().fold(0.0, most));
         entry.update_place_on_points();
         (entry.may_come_down, entry.ground_m) = (intent.may_come_down, intent.ground_m);
         entry.gates_open_up_to_m =
             if shared { intent.gates_open_up_to_m } else { f32::NEG_INFINITY };
-        entry.unheard_delay_s = intent.unheard_delay_s;
+        entry.unheard_flight_delay_s = intent.unheard_flight_delay_s;
         entry.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
-        entry.state.progress_m =
-            shared.then(|| entry.plausible_progress_m(intent.progress_m, self.fastest_mps, now));
+        entry.state.progress_m = shared
+            .then(|| entry.plausible_progress_m(intent.progress_m, self.max_progress_mps, now));
     }
 
     /// Number of vehicles in the table, strangers included.
@@ -269,10 +276,10 @@ impl<const V: usize> Neighbours<V> {
     /// Forgets what holds only for an older plan: the scan's result, avoided places, relayed
     /// progress and open gates.
     pub fn forget_plan(&mut self) {
-        self.clear_at = Instant::ZERO;
+        self.path_clear_at = Instant::ZERO;
         for entry in &mut self.entries {
-            (entry.avoided_at, entry.furthest) = (NO_PLACE, None);
-            (entry.relayed_m, entry.relayed_at) = (None, None);
+            (entry.avoided_place, entry.max_progress) = (NO_PLACE, None);
+            (entry.relayed_progress_m, entry.relayed_report_at) = (None, None);
             entry.gates_open_up_to_m = f32::NEG_INFINITY;
         }
     }

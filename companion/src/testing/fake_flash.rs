@@ -10,7 +10,7 @@ use std::vec::Vec;
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
 use planner_core::plan::{GoalMode, VehicleTask};
-use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapHeader};
+use planner_core::roadmap::{self, Edge, LANDMARK_COUNT, RoadmapHeader};
 use planner_core::schedule::ScheduleConfig;
 use planner_core::track::deconflict::Method;
 use rand_core::Rng;
@@ -18,14 +18,18 @@ use rand_pcg::Pcg32;
 
 use crate::storage::mission_file::{self, MissionBlock, MissionHeader, MissionVehicle};
 use crate::storage::store::{
-    ErasePermission, FlashFault, FlashLayout, FlashRequest, MAX_PROGRAM, MAX_READ, ReadFlash,
-    Store, WORD,
+    ErasePermission, FlashFault, FlashLayout, FlashRequest, MAX_PROGRAM_LEN, MAX_READ_LEN,
+    ReadFlash, Store, WORD_LEN,
 };
 
 /// Layout as the H743's storage bank, but smaller, so that many power losses can be simulated
 /// quickly.
-pub const LAYOUT: FlashLayout =
-    FlashLayout { sector_len: 8 << 10, slot_len: 24 << 10, half_len: 8 << 10, stalls: false };
+pub const LAYOUT: FlashLayout = FlashLayout {
+    sector_len: 8 << 10,
+    slot_len: 24 << 10,
+    journal_half_len: 8 << 10,
+    stalls_processor: false,
+};
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
 
 /// The power was lost during a request.
@@ -47,7 +51,7 @@ impl Flash {
     pub fn new(seed: u64) -> Self {
         let mut rng = Pcg32::new(seed, 7);
         let bytes = (0..LAYOUT.len()).map(|_| rng.next_u32() as u8).collect();
-        let torn = (0..50).map(|_| rng.next_u32() % (LAYOUT.len() / WORD as u32)).collect();
+        let torn = (0..50).map(|_| rng.next_u32() % (LAYOUT.len() / WORD_LEN as u32)).collect();
         Self { bytes, torn, rng, power: None, programmed: 0 }
     }
 
@@ -77,21 +81,21 @@ impl Flash {
             };
         }
         if kind == 3 {
-            self.torn.insert((at / WORD) as u32);
+            self.torn.insert((at / WORD_LEN) as u32);
         }
     }
 
     pub fn erase(&mut self, at: u32) -> Result<(), PowerLoss> {
         assert_eq!(at % LAYOUT.sector_len, 0);
-        let words = LAYOUT.sector_len as usize / WORD;
+        let words = LAYOUT.sector_len as usize / WORD_LEN;
         let goes = self.loses_power();
         for i in 0..words {
-            let at = at as usize + i * WORD;
+            let at = at as usize + i * WORD_LEN;
             if goes && self.rng.next_u32().is_multiple_of(2) {
-                self.tear(at, &[0xFF; WORD]);
+                self.tear(at, &[0xFF; WORD_LEN]);
             } else {
-                self.bytes[at..at + WORD].fill(0xFF);
-                self.torn.remove(&((at / WORD) as u32));
+                self.bytes[at..at + WORD_LEN].fill(0xFF);
+                self.torn.remove(&((at / WORD_LEN) as u32));
             }
         }
         if goes { Err(PowerLoss) } else { Ok(()) }
@@ -99,22 +103,22 @@ impl Flash {
 
     pub fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), PowerLoss> {
         assert!(
-            (at as usize).is_multiple_of(WORD)
-                && bytes.len().is_multiple_of(WORD)
-                && (1..=MAX_PROGRAM).contains(&bytes.len())
+            (at as usize).is_multiple_of(WORD_LEN)
+                && bytes.len().is_multiple_of(WORD_LEN)
+                && (1..=MAX_PROGRAM_LEN).contains(&bytes.len())
         );
-        for (i, word) in bytes.chunks(WORD).enumerate() {
-            let at = at as usize + i * WORD;
-            let blank = self.bytes[at..at + WORD].iter().all(|b| *b == 0xFF);
+        for (i, word) in bytes.chunks(WORD_LEN).enumerate() {
+            let at = at as usize + i * WORD_LEN;
+            let blank = self.bytes[at..at + WORD_LEN].iter().all(|b| *b == 0xFF);
             assert!(
-                blank && !self.torn.contains(&((at / WORD) as u32)),
+                blank && !self.torn.contains(&((at / WORD_LEN) as u32)),
                 "programmed twice at {at:#x}"
             );
             if self.loses_power() {
                 self.tear(at, word);
                 return Err(PowerLoss);
             }
-            self.bytes[at..at + WORD].copy_from_slice(word);
+            self.bytes[at..at + WORD_LEN].copy_from_slice(word);
         }
         Ok(())
     }
@@ -123,7 +127,8 @@ impl Flash {
 impl ReadFlash for Flash {
     fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), FlashFault> {
         let (start, end) = (at as usize, at as usize + out.len());
-        if (start / WORD..end.div_ceil(WORD)).any(|word| self.torn.contains(&(word as u32))) {
+        if (start / WORD_LEN..end.div_ceil(WORD_LEN)).any(|word| self.torn.contains(&(word as u32)))
+        {
             return Err(FlashFault);
         }
         out.copy_from_slice(&self.bytes[start..end]);
@@ -136,7 +141,7 @@ pub fn execute(
     flash: &mut Flash,
     request: FlashRequest<'_>,
     erasing: ErasePermission,
-    read: &mut [u8; MAX_READ],
+    read: &mut [u8; MAX_READ_LEN],
 ) -> Result<Result<usize, FlashFault>, PowerLoss> {
     match request {
         FlashRequest::Erase { at } => {
@@ -149,7 +154,7 @@ pub fn execute(
             Ok(Ok(0))
         }
         FlashRequest::Read { at, len } => {
-            assert!(len <= MAX_READ && len > 0);
+            assert!(len <= MAX_READ_LEN && len > 0);
             Ok(flash.read(at, &mut read[..len]).map(|()| len))
         }
     }
@@ -161,7 +166,7 @@ pub fn run(
     flash: &mut Flash,
     erasing: ErasePermission,
 ) -> Result<(), PowerLoss> {
-    let mut read = [0; MAX_READ];
+    let mut read = [0; MAX_READ_LEN];
     for _ in 0..100_000 {
         let Some(request) = store.poll_request(erasing) else { return Ok(()) };
         let outcome = execute(flash, request, erasing, &mut read)?;
@@ -189,10 +194,10 @@ pub fn roadmap(nodes: usize) -> Vec<u8> {
         edge_max_m: 8.0,
         tested_clearance_m: 0.8,
         max_clearance_m: 6.0,
-        starts: 1,
-        goals: 1,
+        start_count: 1,
+        goal_count: 1,
     };
-    let mut bytes = vec![0; roadmap::encoded_len(nodes, edges.len(), LANDMARKS).unwrap()];
+    let mut bytes = vec![0; roadmap::encoded_len(nodes, edges.len(), LANDMARK_COUNT).unwrap()];
     let mut workspace =
         std::boxed::Box::new(planner_core::roadmap::search::SearchWorkspace::<1024>::new());
     roadmap::write_with_landmarks(&header, &points, &edges, &[], &mut workspace, &mut bytes)
@@ -215,12 +220,17 @@ pub fn mission(vehicles: u8) -> Vec<u8> {
         },
         safety_distance_m: 1.5,
         geofence: None,
-        ground_stations: crate::config::USUAL_GROUND_STATIONS,
+        ground_stations: crate::config::DEFAULT_GROUND_STATION_IDS,
     };
     let task = |id| VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.0, goal: None };
     let start = Point::new(1.0, 2.0, 3.0);
     let roster: Vec<_> = (1..=vehicles)
-        .map(|id| MissionVehicle { task: task(id), start, radius_m: 0.3, speed_max_mps: 5.0 })
+        .map(|id| MissionVehicle {
+            task: task(id),
+            path_start: start,
+            radius_m: 0.3,
+            speed_max_mps: 5.0,
+        })
         .collect();
     let mut bytes = vec![0; mission_file::encoded_len(roster.len(), 0)];
     mission_file::write_mission(&header, &roster, &MissionBlock::Goals(&[]), &mut bytes).unwrap();

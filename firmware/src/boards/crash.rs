@@ -44,7 +44,7 @@ fn update_record<T>(change: impl FnOnce(&mut CrashRecord) -> T) -> T {
 /// if there is nothing to report, as after power-on. To be called once.
 pub fn take_report(cause: ResetCause) -> Option<String<MAX_TEXT_LEN>> {
     critical_section::with(|_| {
-        let (kept, said) = CrashRecord::on_start(read_record(), cause);
+        let (kept, said) = CrashRecord::evaluate_on_start(read_record(), cause);
         write_record(&kept);
         said
     })
@@ -110,7 +110,7 @@ pub fn faulted(pc: u32) -> ! {
     // SAFETY: fault registers, which are only read.
     let scb = unsafe { &*SCB::PTR };
     let (cfsr, mmfar) = (scb.cfsr.read(), scb.mmfar.read());
-    if fault::is_overflow(cfsr, mmfar, &stack::guard()) {
+    if fault::is_stack_overflow(cfsr, mmfar, &stack::guard_range()) {
         // The program counter is not reported: it lies on the stack that overflowed.
         record_and_restart("Restarted: stack overflow")
     }

@@ -15,7 +15,7 @@ const MPU_CTRL_ENABLE: u32 = 1 << 2 | 1;
 
 /// The guard below the stack: an access to it is a fault.
 pub(super) fn stack_guard_region() -> Region {
-    Region::new(stack::guard().start, GUARD_LEN, RegionAccess::None)
+    Region::new(stack::guard_range().start, GUARD_LEN, RegionAccess::None)
 }
 
 /// Sets regions 0, 1, …; where two overlap the higher number applies. Then enables the unit. To be

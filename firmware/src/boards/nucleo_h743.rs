@@ -48,24 +48,26 @@ const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
 /// Bytes of the ring buffer that DMA fills: 22 ms at the autopilot's baud rate. `memory.x` places
 /// the statics named `DMA_…` in SRAM3, which DMA reaches and which is not cached.
-const UART_RING: usize = 2048;
-static DMA_AUTOPILOT_IN: ConstStaticCell<[u8; UART_RING]> = ConstStaticCell::new([0; UART_RING]);
-static DMA_RADIO_IN: ConstStaticCell<[u8; UART_RING]> = ConstStaticCell::new([0; UART_RING]);
+const UART_RING_LEN: usize = 2048;
+static DMA_AUTOPILOT_IN: ConstStaticCell<[u8; UART_RING_LEN]> =
+    ConstStaticCell::new([0; UART_RING_LEN]);
+static DMA_RADIO_IN: ConstStaticCell<[u8; UART_RING_LEN]> =
+    ConstStaticCell::new([0; UART_RING_LEN]);
 static DMA_AUTOPILOT_OUT: ConstStaticCell<transmitter::Buffer> =
-    ConstStaticCell::new(transmitter::EMPTY);
+    ConstStaticCell::new(transmitter::ZEROED);
 static DMA_RADIO_OUT: ConstStaticCell<transmitter::Buffer> =
-    ConstStaticCell::new(transmitter::EMPTY);
+    ConstStaticCell::new(transmitter::ZEROED);
 
 /// Warning: BOR_LEV in the option bytes is below 3, as on a new chip.
-const BROWN_OUT_OFF: &str = "Brown-out reset is off: set BOR_LEV to 3";
+const BROWN_OUT_OFF_WARNING: &str = "Brown-out reset is off: set BOR_LEV to 3";
 /// Warning: the ST-LINK outputs no clock.
-const NO_HSE: &str = "No 8 MHz from the ST-LINK: own oscillator";
+const NO_HSE_WARNING: &str = "No 8 MHz from the ST-LINK: own oscillator";
 
 /// Receives by DMA into a ring buffer.
 pub type Receiver = RingBufferedUartRx<'static>;
 /// Interrupt priority of the executor of links and setpoints: below all devices.
-pub const LINKS_PRIORITY: u8 = LINKS_AT as u8;
-const LINKS_AT: Priority = Priority::P8;
+pub const LINKS_PRIORITY: u8 = LINKS_INTERRUPT_PRIORITY as u8;
+const LINKS_INTERRUPT_PRIORITY: Priority = Priority::P8;
 
 /// Interrupt handler that runs the executor of links and setpoints; no device of this board uses
 /// this interrupt.
@@ -98,12 +100,13 @@ pub fn start() -> Parts {
     configure_mpu_and_caches();
     let mut warnings = Vec::new();
     let level = h743::brown_out_level(pac::FLASH.optsr_cur().read().0);
-    let wrong = [(level < 3, BROWN_OUT_OFF), (source == ClockSource::Internal, NO_HSE)]
-        .into_iter()
-        .filter(|(is, _)| *is);
+    let wrong =
+        [(level < 3, BROWN_OUT_OFF_WARNING), (source == ClockSource::Internal, NO_HSE_WARNING)]
+            .into_iter()
+            .filter(|(is, _)| *is);
     // Cannot overflow: it has room for both warnings.
     wrong.for_each(|(_, text)| _ = warnings.push(text));
-    interrupt::UART7.set_priority(LINKS_AT);
+    interrupt::UART7.set_priority(LINKS_INTERRUPT_PRIORITY);
     interrupt::UART8.set_priority(Priority::P12);
     let serial = |baudrate| {
         let mut config = usart::Config::default();
@@ -139,12 +142,12 @@ pub fn start() -> Parts {
 /// The independent watchdog, and the LED that toggles each time it is fed.
 pub struct Watchdog {
     device: IndependentWatchdog<'static, peripherals::IWDG1>,
-    light: Output<'static>,
+    led: Output<'static>,
 }
 
 impl Watchdog {
-    fn new(device: Peri<'static, peripherals::IWDG1>, light: Output<'static>) -> Self {
-        Self { device: IndependentWatchdog::new(device, WATCHDOG_TIMEOUT_US), light }
+    fn new(device: Peri<'static, peripherals::IWDG1>, led: Output<'static>) -> Self {
+        Self { device: IndependentWatchdog::new(device, WATCHDOG_TIMEOUT_US), led }
     }
 
     fn start(&mut self) {
@@ -154,6 +157,6 @@ impl Watchdog {
     /// Feeds the watchdog and toggles the LED.
     pub fn feed(&mut self) {
         self.device.pet();
-        self.light.toggle();
+        self.led.toggle();
     }
 }

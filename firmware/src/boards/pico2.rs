@@ -9,8 +9,8 @@
 //!
 //! Code runs from the flash that also holds the files, so it stops while that flash erases or
 //! programs: no setpoint is sent, and received bytes may be lost. So the flash is changed only
-//! while disarmed (`FlashLayout::stalls`): uploads are refused in flight, and changed parameters
-//! are stored after landing.
+//! while disarmed (`FlashLayout::stalls_processor`): uploads are refused in flight, and changed
+//! parameters are stored after landing.
 //!
 //! `SYSRESETREQ` resets the processor but not watchdog, UARTs and other peripherals. So this board
 //! restarts by its watchdog, which resets everything but the oscillators.
@@ -42,10 +42,10 @@ bind_interrupts!(struct Irqs {
 const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
 /// Bytes of a UART's ring buffer: 22 ms at the autopilot's baud rate.
-const UART_RING: usize = 2048;
-type Rings = [[u8; UART_RING]; 2];
-static AUTOPILOT_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING]; 2]);
-static RADIO_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING]; 2]);
+const UART_RING_LEN: usize = 2048;
+type Rings = [[u8; UART_RING_LEN]; 2];
+static AUTOPILOT_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING_LEN]; 2]);
+static RADIO_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING_LEN]; 2]);
 
 /// Bytes of the whole flash.
 const FLASH_LEN: usize = 4 << 20;
@@ -62,8 +62,8 @@ pub type Receiver = BufferedUartRx;
 pub type Transmitter = BufferedUartTx;
 
 /// Interrupt priority of the executor of links and setpoints: below all devices.
-pub const LINKS_PRIORITY: u8 = LINKS_AT as u8;
-const LINKS_AT: Priority = Priority::P1;
+pub const LINKS_PRIORITY: u8 = LINKS_INTERRUPT_PRIORITY as u8;
+const LINKS_INTERRUPT_PRIORITY: Priority = Priority::P1;
 
 /// Interrupt handler that runs the executor of links and setpoints; no device uses this interrupt.
 #[interrupt]
@@ -123,7 +123,7 @@ pub fn start() -> Parts {
     let p = embassy_rp::init(embassy_rp::config::Config::default());
     let mut watchdog = Watchdog::new(p.WATCHDOG, Output::new(p.PIN_25, Level::Low));
     watchdog.start();
-    interrupt::SWI_IRQ_0.set_priority(LINKS_AT);
+    interrupt::SWI_IRQ_0.set_priority(LINKS_INTERRUPT_PRIORITY);
     interrupt::SWI_IRQ_1.set_priority(Priority::P2);
     let serial = |baudrate| {
         let mut config = uart::Config::default();
@@ -209,12 +209,12 @@ impl crate::flash::Flash for Flash {
 /// The watchdog, and the LED that toggles each time it is fed.
 pub struct Watchdog {
     device: watchdog::Watchdog,
-    light: Output<'static>,
+    led: Output<'static>,
 }
 
 impl Watchdog {
-    fn new(device: Peri<'static, peripherals::WATCHDOG>, light: Output<'static>) -> Self {
-        Self { device: watchdog::Watchdog::new(device), light }
+    fn new(device: Peri<'static, peripherals::WATCHDOG>, led: Output<'static>) -> Self {
+        Self { device: watchdog::Watchdog::new(device), led }
     }
 
     /// Starts the watchdog. It stops counting while a debugger has a processor halted.
@@ -227,6 +227,6 @@ impl Watchdog {
     /// Feeds the watchdog and toggles the LED.
     pub fn feed(&mut self) {
         self.device.feed(embassy_time::Duration::from_micros(WATCHDOG_TIMEOUT_US.into()));
-        self.light.toggle();
+        self.led.toggle();
     }
 }

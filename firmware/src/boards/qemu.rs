@@ -15,7 +15,7 @@ mod vectors;
 mod watchdog;
 
 pub use flash::{Flash, LAYOUT};
-pub use interrupts::LINKS as LINKS_PRIORITY;
+pub use interrupts::LINKS_PRIORITY;
 pub use sleep::sleep;
 pub use uart::{Receiver, Transmitter};
 pub use watchdog::Watchdog;

@@ -20,7 +20,7 @@ pub fn size_bytes() -> usize {
 }
 
 /// Most bytes of the stack in use at once since the start.
-pub fn used_bytes() -> usize {
+pub fn max_used_bytes() -> usize {
     let end = addr_of!(_stack_end);
     let words = size_bytes() / size_of::<u32>();
     let untouched = (0..words).take_while(|&word| {
@@ -32,7 +32,7 @@ pub fn used_bytes() -> usize {
 }
 
 /// Address range of the guard below the stack, where every access faults.
-pub fn guard() -> Range<u32> {
+pub fn guard_range() -> Range<u32> {
     let end = addr_of!(_stack_end) as u32;
     end - GUARD_LEN..end
 }

@@ -17,7 +17,7 @@ const STKOF: u32 = 1 << 20;
 /// Whether a fault with these CFSR and MMFAR values is a stack overflow: the stack pointer went
 /// below MSPLIM, a push of registers was refused, or a data access hit the address range `guard`
 /// below the stack.
-pub fn is_overflow(cfsr: u32, mmfar: u32, guard: &Range<u32>) -> bool {
+pub fn is_stack_overflow(cfsr: u32, mmfar: u32, guard: &Range<u32>) -> bool {
     let in_guard = cfsr & DACCVIOL != 0 && cfsr & MMARVALID != 0 && guard.contains(&mmfar);
     cfsr & (STKOF | MSTKERR | MLSPERR) != 0 || in_guard
 }

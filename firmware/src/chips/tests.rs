@@ -94,12 +94,12 @@ fn the_rp2350_distinguishes_its_resets_and_resets_its_processors() {
 fn an_overflow_of_the_stack_is_distinguished_from_other_faults() {
     let guard = 0x2000_9000..0x2000_A000;
     let (daccviol, mstkerr, valid, stkof) = (1 << 1, 1 << 4, 1 << 7, 1 << 20);
-    assert!(fault::is_overflow(mstkerr, 0, &guard));
-    assert!(fault::is_overflow(stkof, 0, &guard));
-    assert!(fault::is_overflow(daccviol | valid, 0x2000_9FFC, &guard));
+    assert!(fault::is_stack_overflow(mstkerr, 0, &guard));
+    assert!(fault::is_stack_overflow(stkof, 0, &guard));
+    assert!(fault::is_stack_overflow(daccviol | valid, 0x2000_9FFC, &guard));
     for (cfsr, mmfar) in
         [(daccviol | valid, 0), (daccviol, 0x2000_9FFC), (1 << 15 | 1 << 9, 0x2000_9FFC), (1, 0)]
     {
-        assert!(!fault::is_overflow(cfsr, mmfar, &guard), "{cfsr:#x} {mmfar:#x}");
+        assert!(!fault::is_stack_overflow(cfsr, mmfar, &guard), "{cfsr:#x} {mmfar:#x}");
     }
 }

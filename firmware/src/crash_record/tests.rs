@@ -5,12 +5,12 @@ fn start(kept: &CrashRecord, cause: ResetCause) -> (CrashRecord, Option<String<M
     let words = kept.to_words();
     let read = CrashRecord::from_words(&words);
     assert_eq!(read.as_ref(), Some(kept), "as it was written");
-    CrashRecord::on_start(read, cause)
+    CrashRecord::evaluate_on_start(read, cause)
 }
 
 #[test]
 fn any_flipped_bit_is_noticed_and_so_is_memory_of_one_kind() {
-    let (mut kept, _) = CrashRecord::on_start(None, ResetCause::Unknown);
+    let (mut kept, _) = CrashRecord::evaluate_on_start(None, ResetCause::Unknown);
     kept.begin_work(FileWork::Plan, 7);
     kept.note_crash("Restarted: panic at machine.rs:123");
     let words = kept.to_words();
@@ -26,7 +26,7 @@ fn any_flipped_bit_is_noticed_and_so_is_memory_of_one_kind() {
 
 #[test]
 fn each_end_is_said_as_it_was() {
-    let (fresh, said) = CrashRecord::on_start(None, ResetCause::Unknown);
+    let (fresh, said) = CrashRecord::evaluate_on_start(None, ResetCause::Unknown);
     assert_eq!(said, None, "nothing was before");
     let says = |kept: &CrashRecord, cause| start(kept, cause).1;
     let rows = [
@@ -77,7 +77,7 @@ fn files_that_bring_three_starts_in_a_row_down_are_set_aside() {
         (ResetCause::Unknown, End::Panic),
         (ResetCause::Watchdog, End::Reset),
     ] {
-        let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
+        let mut kept = CrashRecord::evaluate_on_start(None, ResetCause::Power).0;
         assert!((0..3).all(|_| fails(&mut kept, 7, cause, end)));
         assert!(!kept.begin_work(FileWork::Plan, 7), "three times");
         let again = start(&kept, ResetCause::Key).0;
@@ -93,7 +93,7 @@ fn files_that_bring_three_starts_in_a_row_down_are_set_aside() {
 
 #[test]
 fn a_roadmap_that_was_set_aside_stays_so_while_a_mission_fails() {
-    let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
+    let mut kept = CrashRecord::evaluate_on_start(None, ResetCause::Power).0;
     for _ in 0..3 {
         assert!(kept.begin_work(FileWork::CheckRoadmap, 1));
         kept.note_crash("Restarted: fault");
@@ -111,7 +111,7 @@ fn a_roadmap_that_was_set_aside_stays_so_while_a_mission_fails() {
 #[test]
 fn only_starts_in_a_row_count_and_only_those_that_the_planner_brought_down() {
     let fail = |kept: &mut CrashRecord| assert!(fails(kept, 7, ResetCause::Request, End::Panic));
-    let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
+    let mut kept = CrashRecord::evaluate_on_start(None, ResetCause::Power).0;
     (0..2).for_each(|_| fail(&mut kept));
     // A start without a plan leaves the count, and so does one ended by key, brown-out or
     // debugger.
@@ -125,7 +125,7 @@ fn only_starts_in_a_row_count_and_only_those_that_the_planner_brought_down() {
     fail(&mut kept);
     assert!(!kept.clone().begin_work(FileWork::Plan, 7));
     // A start whose plans all complete resets the count.
-    let mut kept = CrashRecord::on_start(None, ResetCause::Power).0;
+    let mut kept = CrashRecord::evaluate_on_start(None, ResetCause::Power).0;
     (0..2).for_each(|_| fail(&mut kept));
     assert!(kept.begin_work(FileWork::Plan, 7));
     kept.finish_work();

@@ -22,7 +22,7 @@ fn a_setpoint_is_missed_only_while_more_are_to_come() {
 fn the_watchdog_is_fed_only_while_tasks_come_by_and_setpoints_flow() {
     let shell = Shell::new();
     assert!(shell.may_feed_watchdog_at(19_999) && !shell.may_feed_watchdog_at(20_000), "it starts");
-    shell.started.store(true, Ordering::Relaxed);
+    shell.has_companion.store(true, Ordering::Relaxed);
     let come_by =
         |ms| shell.checked_in_ms.iter().for_each(|seen| seen.store(ms, Ordering::Relaxed));
     come_by(1000);
@@ -34,6 +34,6 @@ fn the_watchdog_is_fed_only_while_tasks_come_by_and_setpoints_flow() {
     assert!(!shell.may_feed_watchdog_at(5400), "the first setpoint is late");
     shell.setpoints.note_setpoint(5400);
     assert!(shell.may_feed_watchdog_at(5400));
-    shell.checked_in_ms[TIME_TASK].store(4000, Ordering::Relaxed);
+    shell.checked_in_ms[TIMER_TASK].store(4000, Ordering::Relaxed);
     assert!(!shell.may_feed_watchdog_at(5400), "one task hangs");
 }

@@ -10,43 +10,44 @@ use planner_core::coverage::Flat;
 
 /// A point within this distance of a border is on the border, metres: neighbouring fields share
 /// borders, and coordinates are rounded.
-const ON_BORDER_M: f64 = 0.01;
+const BORDER_TOLERANCE_M: f64 = 0.01;
 
 /// Pair of rings, or one ring, that makes an area invalid; fields are indices among outer rings or
 /// among holes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Overlap {
+pub enum RingFault {
     /// Two outer rings that overlap.
-    Outers(usize, usize),
+    OutersOverlap(usize, usize),
     /// Two holes that overlap.
-    Holes(usize, usize),
+    HolesOverlap(usize, usize),
     /// A hole that does not lie wholly inside one outer ring.
-    HoleOut(usize),
+    HoleNotInsideOuter(usize),
     /// An outer ring whose holes leave nothing of it to photograph.
-    NothingLeft(usize),
+    OuterFilledByHoles(usize),
 }
 
 /// The first overlap of an area's rings, or hole that is not inside an outer ring, or outer ring
 /// that its holes fill; `None` if the rings are a valid area. Edges must not cross:
 /// [`planner_core::coverage::area::Area::new`] checks that.
-pub fn find_overlap(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
+pub fn find_ring_fault(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<RingFault> {
     let (outers, holes) = (rings_to_f64(outers), rings_to_f64(holes));
     if let Some((i, j)) = first_overlapping_pair(&outers) {
-        return Some(Overlap::Outers(i, j));
+        return Some(RingFault::OutersOverlap(i, j));
     }
     if let Some((i, j)) = first_overlapping_pair(&holes) {
-        return Some(Overlap::Holes(i, j));
+        return Some(RingFault::HolesOverlap(i, j));
     }
     let mut left_m2: Vec<f64> = outers.iter().map(RingF64::area_m2).collect();
     for (index, hole) in holes.iter().enumerate() {
-        let around = |outer: &RingF64| !hole.relation_to(outer).outside;
+        let around = |outer: &RingF64| !hole.relation_to(outer).has_part_outside;
         let Some(own) = outers.iter().position(around) else {
-            return Some(Overlap::HoleOut(index));
+            return Some(RingFault::HoleNotInsideOuter(index));
         };
         left_m2[own] -= hole.area_m2();
     }
-    let nothing = |(ring, left_m2): (&RingF64, &f64)| *left_m2 < ON_BORDER_M * ring.perimeter_m();
-    outers.iter().zip(&left_m2).position(nothing).map(Overlap::NothingLeft)
+    let nothing =
+        |(ring, left_m2): (&RingF64, &f64)| *left_m2 < BORDER_TOLERANCE_M * ring.perimeter_m();
+    outers.iter().zip(&left_m2).position(nothing).map(RingFault::OuterFilledByHoles)
 }
 
 /// Indices of the first two rings that overlap; rings that only share a border do not.
@@ -58,8 +59,8 @@ fn first_overlapping_pair(rings: &[RingF64]) -> Option<(usize, usize)> {
             return false;
         }
         let (a_of_b, b_of_a) = (a.relation_to(b), b.relation_to(a));
-        let same = !a_of_b.outside && !b_of_a.outside;
-        a_of_b.inside || b_of_a.inside || same
+        let same = !a_of_b.has_part_outside && !b_of_a.has_part_outside;
+        a_of_b.has_part_inside || b_of_a.has_part_inside || same
     })
 }
 
@@ -74,8 +75,8 @@ struct RingF64 {
 /// strictly outside that ring.
 #[derive(Default)]
 struct RingRelation {
-    inside: bool,
-    outside: bool,
+    has_part_inside: bool,
+    has_part_outside: bool,
 }
 
 fn rings_to_f64(rings: &[&[Flat]]) -> Vec<RingF64> {
@@ -117,17 +118,17 @@ impl RingF64 {
     fn relation_to(&self, other: &Self) -> RingRelation {
         let mut sides = RingRelation::default();
         for (a, b) in self.edges() {
-            let cuts = other.intersection_shares(a, b);
+            let cuts = other.split_fractions(a, b);
             for pair in cuts.windows(2) {
                 let share = f64::midpoint(pair[0], pair[1]);
                 let middle = [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
                 if !other.has_on_border(middle) {
                     let inside = other.contains(middle);
-                    sides.inside |= inside;
-                    sides.outside |= !inside;
+                    sides.has_part_inside |= inside;
+                    sides.has_part_outside |= !inside;
                 }
             }
-            if sides.inside && sides.outside {
+            if sides.has_part_inside && sides.has_part_outside {
                 break;
             }
         }
@@ -136,14 +137,14 @@ impl RingF64 {
 
     /// Points at which this ring meets the segment from `a` to `b`, as sorted fractions 0 to 1 of
     /// the segment, with 0 and 1 among them.
-    fn intersection_shares(&self, a: [f64; 2], b: [f64; 2]) -> Vec<f64> {
+    fn split_fractions(&self, a: [f64; 2], b: [f64; 2]) -> Vec<f64> {
         let along = [b[0] - a[0], b[1] - a[1]];
         let length2 = along[0] * along[0] + along[1] * along[1];
         let mut shares = vec![0.0, 1.0];
         for (c, d) in self.edges() {
             let far = |axis: usize| {
-                c[axis].max(d[axis]) < a[axis].min(b[axis]) - ON_BORDER_M
-                    || c[axis].min(d[axis]) > a[axis].max(b[axis]) + ON_BORDER_M
+                c[axis].max(d[axis]) < a[axis].min(b[axis]) - BORDER_TOLERANCE_M
+                    || c[axis].min(d[axis]) > a[axis].max(b[axis]) + BORDER_TOLERANCE_M
             };
             if far(0) || far(1) {
                 continue;
@@ -165,7 +166,7 @@ impl RingF64 {
             let (along, to) = ([b[0] - a[0], b[1] - a[1]], [place[0] - a[0], place[1] - a[1]]);
             let length2 = along[0] * along[0] + along[1] * along[1];
             let share = ((to[0] * along[0] + to[1] * along[1]) / length2).clamp(0.0, 1.0);
-            (to[0] - along[0] * share).hypot(to[1] - along[1] * share) <= ON_BORDER_M
+            (to[0] - along[0] * share).hypot(to[1] - along[1] * share) <= BORDER_TOLERANCE_M
         })
     }
 

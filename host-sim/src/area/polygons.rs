@@ -29,7 +29,7 @@ pub enum AreaFileError {
     Read(#[from] std::io::Error),
     /// The ending of the file's name is none of the known formats.
     #[error("is in no known format: its name ends in none of .geojson, .json, .wkt, .kml, .plan")]
-    Format,
+    UnknownFormat,
     /// The file is not in the format of its ending.
     #[error("is not {format}: {why}")]
     Malformed {

@@ -3,7 +3,7 @@
 use anyhow::ensure;
 use companion::services::ftp::MAX_DATA;
 use companion::storage::store::reassembly::PieceOutcome;
-use companion::storage::store::{ErasePermission, File, MAX_READ, Store, UploadState};
+use companion::storage::store::{ErasePermission, File, MAX_READ_LEN, Store, UploadState};
 
 use planner_core::map::field;
 
@@ -30,7 +30,7 @@ pub fn flash_bank_image(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8
     let mut flash = HostFlash::open(None)?;
     let mut store = Store::mount(HOST_FLASH_LAYOUT, &mut flash);
     let mut settle = |store: &mut Store| {
-        let mut read = [0; MAX_READ];
+        let mut read = [0; MAX_READ_LEN];
         while let Some(request) = store.poll_request(ErasePermission::Allowed) {
             let outcome = flash.execute_request(request, &mut read);
             store.handle_flash_outcome(outcome);

@@ -11,7 +11,7 @@ use super::flash_image::{
 };
 use super::{EmulatedBoard, GrantResult, STACK_LEN};
 use crate::flash::HOST_FLASH_LAYOUT;
-use companion::storage::store::WORD;
+use companion::storage::store::WORD_LEN;
 
 /// Most bytes of memory in one message.
 const MEMORY_CHUNK: usize = 32 << 10;
@@ -31,7 +31,7 @@ impl EmulatedBoard {
         while memory.len() < length {
             let len = (length - memory.len()).min(MEMORY_CHUNK) as u16;
             self.send(&ToBoard::Peek { address: address + memory.len() as u32, len }.to_bytes())?;
-            memory.extend(self.wait_for_grant()?.memory);
+            memory.extend(self.wait_for_grant_end()?.memory);
         }
         Ok(memory)
     }
@@ -47,7 +47,7 @@ impl EmulatedBoard {
                 len: bytes.len() as u16,
             };
             self.send(&[&head.to_bytes(), bytes].concat())?;
-            self.wait_for_grant()?;
+            self.wait_for_grant_end()?;
         }
         Ok(())
     }
@@ -65,7 +65,7 @@ impl EmulatedBoard {
         timeout: Duration,
     ) -> anyhow::Result<GrantResult> {
         self.send(&ToBoard::Call { address, argument }.to_bytes())?;
-        self.wait_for_grant_within(timeout)
+        self.wait_for_grant_end_within(timeout)
     }
 
     /// Writes the image `bank` into the board's flash bank, with the mark of each word: erased or
@@ -81,7 +81,7 @@ impl EmulatedBoard {
         );
         let mark =
             |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { PROGRAMMED };
-        let marks: Vec<u8> = bank.chunks(WORD).map(mark).collect();
+        let marks: Vec<u8> = bank.chunks(WORD_LEN).map(mark).collect();
         self.write_memory(FLASH_BANK2_ADDRESS, bank)?;
         self.write_memory(WORD_MARKS_ADDRESS, &marks)?;
         self.write_memory(BANK_IMAGE_MARK.0, &BANK_IMAGE_MARK.1.to_le_bytes())
@@ -93,7 +93,7 @@ impl EmulatedBoard {
     /// The QEMU process has ended.
     pub fn torn_flash_words(&mut self) -> anyhow::Result<Vec<usize>> {
         let marks =
-            self.read_memory(WORD_MARKS_ADDRESS, HOST_FLASH_LAYOUT.len() as usize / WORD)?;
+            self.read_memory(WORD_MARKS_ADDRESS, HOST_FLASH_LAYOUT.len() as usize / WORD_LEN)?;
         Ok((0..marks.len()).filter(|word| marks[*word] == TORN).collect())
     }
 

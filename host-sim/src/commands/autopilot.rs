@@ -109,7 +109,7 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
             .duration_since(UNIX_EPOCH)
             .map_or(0, |t| t.as_micros() as u64),
         ports: args.listen.len(),
-        forwards: true,
+        forwards_between_ports: true,
         ..AutopilotConfig::default()
     };
     let mut autopilot =

@@ -7,11 +7,11 @@ use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
 use companion::link::frame::MAX_FRAME_LEN;
-use companion::storage::store::{MAX_READ, Store};
+use companion::storage::store::{MAX_READ_LEN, Store};
 use companion::{Config, Event, Instant, Link, State};
 use heapless::Vec as FixedVec;
 
-use super::load;
+use super::load_supported;
 use crate::capacity::{HostCompanion, VEHICLES, new_companion};
 use crate::flash::{self, HostFlash};
 use crate::link::{self, LinkUrl};
@@ -20,7 +20,7 @@ use crate::mission::planner::HostPlanner;
 use crate::progress::Progress;
 use crate::say;
 use crate::shortage;
-use crate::swarm::ground_station::mission_start;
+use crate::swarm::ground_station::encode_mission_start;
 use crate::swarm::simulated_vehicle::is_finished;
 use crate::swarm::vehicles::companion_config;
 
@@ -61,7 +61,7 @@ const MAX_AUTOPILOT_SILENCE: companion::Duration = companion::Duration::from_sec
 /// # Errors
 /// Bad input, or a link that fails permanently; the error names it.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let scenario = load(&args.scenario, None)?;
+    let scenario = load_supported(&args.scenario, None)?;
     // Opens the flash first, so that a bad file fails before the planning, which takes long.
     let mut flash = HostFlash::open(args.flash.as_deref())?;
     let mut mission = PreparedMission::prepare(scenario, &Progress::on_terminal())?;
@@ -93,7 +93,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Clock::now();
     let now = || Instant::from_micros(began.elapsed().as_micros() as u64);
     let mut buffer = [0; 2048];
-    let mut read = [0; MAX_READ];
+    let mut read = [0; MAX_READ_LEN];
     let mut finished_at = None;
     loop {
         for (link, io) in &mut links {
@@ -116,13 +116,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         while let Some(event) = companion.poll_event() {
             match event {
                 Event::RestartRequested => restarts = true,
-                Event::WaitsForStart { id } => {
+                Event::WaitsForUnstartedVehicle { id } => {
                     say!(
                         "{:9.3} s  waiting for vehicle {id}: not started",
                         began.elapsed().as_secs_f32()
                     );
                 }
-                Event::FlownAround { left } => {
+                Event::DetourSkippedWaypoints { count: left } => {
                     say!(
                         "{:9.3} s  flown around: {left} waypoints are left",
                         began.elapsed().as_secs_f32()
@@ -140,7 +140,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                     say!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());
                     if args.start && to == State::Ready {
                         let mut frame = [0; MAX_FRAME_LEN];
-                        let length = mission_start(config.ground_stations[0], args.id, &mut frame);
+                        let length =
+                            encode_mission_start(config.ground_stations[0], args.id, &mut frame);
                         companion.handle_bytes(Link::Swarm, now(), &frame[..length]);
                     }
                 }
@@ -163,7 +164,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         // In the air the mission may continue: a pilot may hand the vehicle back.
         let t = companion.telemetry();
         let heard = t.heartbeat_age(now()) < MAX_AUTOPILOT_SILENCE;
-        let flies = t.armed && t.reports_flight() && heard;
+        let flies = t.armed && t.last_reported_flight() && heard;
         if !is_finished(state) || flies {
             finished_at = None;
         } else if finished_at.get_or_insert_with(Clock::now).elapsed() > REPORT_END_FOR {

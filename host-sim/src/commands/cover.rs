@@ -44,7 +44,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let scenario = scenario::load(&args.scenario)?;
     scenario.check_supported()?;
-    output::print_speed_limits(&scenario);
+    output::print_slow_vehicles(&scenario);
     let files = extra_file_names(&scenario);
     let names: Vec<&str> =
         output::RESULT_FILES.into_iter().chain(files.iter().map(String::as_str)).collect();
@@ -54,7 +54,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let flights = planned.flights();
     let findings = check::check_flights(&planned, &check::flights_to_check(&planned, &flights));
     let result = cover_result(&planned, &findings);
-    let written = add_flights(&planned, &flights, &mut results)?;
+    let written = add_flight_files(&planned, &flights, &mut results)?;
     results.add(output::RESULT_FILES[0], result::json(&result)?.as_bytes())?;
     let timing = Timing {
         search_s: planned.computing_s[0] + planned.computing_s[1],
@@ -68,7 +68,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     page.timing = Some(serde_json::to_value(&timing)?);
     results.add(output::RESULT_FILES[2], report::page(&page)?.as_bytes())?;
     results.commit()?;
-    remove_stale(&args.out, &written)?;
+    remove_stale_plan_files(&args.out, &written)?;
     print(&result, &findings, &args.out);
     print_origin(&planned);
     print_unchecked_batteries(&planned);
@@ -84,7 +84,7 @@ fn extra_file_names(scenario: &Scenario) -> Vec<String> {
 
 /// Adds each flight's plan files (`.plan` and `.waypoints`), `waypoints.csv` and `area.geojson` to
 /// the results. Returns the names of the plan files.
-fn add_flights(
+fn add_flight_files(
     planned: &CoveragePlan<'_>,
     flights: &[SortieFlight],
     results: &mut ResultFiles,
@@ -92,8 +92,8 @@ fn add_flights(
     let mut written = Vec::new();
     for (sortie, points, _) in flights {
         let route = &sortie.route;
-        let id = planned.scenario.vehicles[usize::from(route.vehicle)].id;
-        let name = match sortie.of {
+        let id = planned.scenario.vehicles[usize::from(route.vehicle_index)].id;
+        let name = match sortie.sorties_of_vehicle {
             1 => format!("vehicle-{id}"),
             _ => format!("vehicle-{id}-sortie-{}", sortie.number),
         };
@@ -113,7 +113,7 @@ fn add_flights(
 
 /// Removes plan files in the directory that an earlier run wrote and this one did not, so that none
 /// of them is uploaded together with the new ones.
-fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
+fn remove_stale_plan_files(dir: &Path, written: &[String]) -> anyhow::Result<()> {
     let number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let is_plan = |name: &str| {
         let stem = name.strip_suffix(".plan").or_else(|| name.strip_suffix(".waypoints"));
@@ -141,16 +141,16 @@ fn area_line(coverage: &CoverageResult, findings: &CoverageFindings) -> String {
         "area       {:.2} % {} ({} of {:.2} m), {} on {} at {:.1}°",
         100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
         if coverage.trigger == "none" { "flown over" } else { "photographed" },
-        counted(findings.cells as usize, "cell"),
+        count_with_noun(findings.cells_to_cover as usize, "cell"),
         findings.cell_m,
-        counted(coverage.waypoints as usize, "waypoint"),
-        counted(coverage.lanes, "lane"),
-        coverage.angle_deg
+        count_with_noun(coverage.waypoint_count as usize, "waypoint"),
+        count_with_noun(coverage.lane_count, "lane"),
+        coverage.lane_angle_deg
     )
 }
 
 /// A number with its noun, in the plural unless it is 1.
-fn counted(count: usize, noun: &str) -> String {
+fn count_with_noun(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
@@ -158,28 +158,31 @@ fn print(result: &CoverResult, findings: &CoverageFindings, dir: &std::path::Pat
     let coverage = &result.coverage;
     say!("vehicle  waypoints         layer m  leaves s   cost s   cost m");
     for route in &coverage.routes {
-        let (first, last) =
-            if route.backward { (route.last, route.first) } else { (route.first, route.last) };
+        let (first, last) = if route.backward {
+            (route.highest_waypoint, route.lowest_waypoint)
+        } else {
+            (route.lowest_waypoint, route.highest_waypoint)
+        };
         say!(
             "{:>7}  {:<16}  {:>7.1}  {:>8.1}  {:>7.1}  {:>7.1}",
             route.vehicle,
             format!("{first} to {last}"),
-            route.layer_m,
+            route.layer_height_m,
             route.depart_s,
             route.cost_s,
             route.cost_m
         );
         for (number, sortie) in (1..).zip(&route.sorties).filter(|_| route.sorties.len() > 1) {
             let (first, last) = if route.backward {
-                (sortie.last, sortie.first)
+                (sortie.highest_waypoint, sortie.lowest_waypoint)
             } else {
-                (sortie.first, sortie.last)
+                (sortie.lowest_waypoint, sortie.highest_waypoint)
             };
             say!(
                 "  sortie {number:<4}  {:<10}  {:>7}  {:>8.1}  {:>7.1}  {:>7.1}",
                 format!("{first} to {last}"),
                 "",
-                sortie.begin_s + sortie.depart_s,
+                sortie.round_begin_s + sortie.departure_delay_s,
                 sortie.cost_s,
                 sortie.cost_m
             );
@@ -191,7 +194,7 @@ fn print(result: &CoverResult, findings: &CoverageFindings, dir: &std::path::Pat
     say!();
     say!("{}", if result.complete { "complete" } else { "NOT COMPLETE" });
     say!("{}", area_line(coverage, findings));
-    if let Some([x, y]) = findings.first_missing_cell {
+    if let Some([x, y]) = findings.first_missing_cell_centre {
         say!("left out   the first cell is at [{x:.1}, {y:.1}]");
     }
     print_terrain(coverage);
@@ -201,7 +204,7 @@ fn print(result: &CoverResult, findings: &CoverageFindings, dir: &std::path::Pat
     say!(
         "cost       {:.1} s, {:.1} % above the bound of {:.1} s ({})",
         coverage.max_cost_s,
-        100.0 * coverage.gap,
+        100.0 * coverage.gap_to_lower_bound,
         coverage.lower_bound_s,
         result.method
     );
@@ -223,10 +226,12 @@ fn print_origin(planned: &CoveragePlan<'_>) {
 /// whether a battery lasts.
 fn print_unchecked_batteries(planned: &CoveragePlan<'_>) {
     let unknown = planned.sorties.iter().filter(|sortie| {
-        planned.scenario.vehicles[usize::from(sortie.route.vehicle)].endurance_s.is_none()
+        planned.scenario.vehicles[usize::from(sortie.route.vehicle_index)]
+            .hover_endurance_s
+            .is_none()
     });
-    let longest_s = unknown.map(|sortie| sortie.flown_s).fold(0.0, f32::max);
-    if longest_s > 0.0 && !planned.area_settings.batteries {
+    let longest_s = unknown.map(|sortie| sortie.flight_duration_s).fold(0.0, f32::max);
+    if longest_s > 0.0 && !planned.area_settings.allows_battery_swaps {
         say!("batteries  not checked: vehicles without endurance_s fly up to {longest_s:.0} s");
     }
 }
@@ -235,12 +240,16 @@ fn print_terrain(coverage: &CoverageResult) {
     if let Some(terrain) = &coverage.terrain {
         say!(
             "terrain    lanes {:.1} to {:.1} m above the ground, at most {:.0} % steep",
-            terrain.ground_least_m,
-            terrain.ground_most_m,
-            100.0 * terrain.steepest
+            terrain.min_above_ground_m,
+            terrain.max_above_ground_m,
+            100.0 * terrain.steepest_slope
         );
-        if terrain.too_low + terrain.too_steep > 0 {
-            say!("terrain    {} legs too low, {} too steep", terrain.too_low, terrain.too_steep);
+        if terrain.legs_too_low + terrain.legs_too_steep > 0 {
+            say!(
+                "terrain    {} legs too low, {} too steep",
+                terrain.legs_too_low,
+                terrain.legs_too_steep
+            );
         }
     }
 }

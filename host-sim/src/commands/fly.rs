@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use anyhow::{Context, bail, ensure};
 
-use super::load;
+use super::load_supported;
 use crate::capacity::BoardCapacity;
 use crate::coverage::CoveragePlan;
 use crate::files::ResultFiles;
@@ -95,17 +95,17 @@ pub struct DemoArgs {
 /// # Errors
 /// The input is bad; the error names its place.
 pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
-    let mut scenario = load(&args.scenario, args.seed)?;
+    let mut scenario = load_supported(&args.scenario, args.seed)?;
     set_board_links(&mut scenario, &args.companion, &args.radio)?;
     if let Some(program) = &args.emulate {
         set_emulated_boards(&mut scenario, program, args.boards, &args.out)?;
     }
     if let Some(dir) = &args.flash {
-        keep_flashes(&mut scenario, dir)?;
+        set_flash_files(&mut scenario, dir)?;
     }
     let pace = if args.realtime { Pace::RealTime } else { Pace::Fastest };
     let shown = FlightDisplay { pace, qgc: args.qgc.as_ref() };
-    plan_and_fly(scenario, "fly", &args.out, &shown, args.flash.as_deref())
+    plan_fly_and_report(scenario, "fly", &args.out, &shown, args.flash.as_deref())
 }
 
 /// Makes the scenario's first vehicles use companions elsewhere: the n-th vehicle uses the n-th
@@ -134,7 +134,7 @@ fn set_board_links(
 }
 
 /// Gives each companion a file in this directory for its flash.
-fn keep_flashes(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
+fn set_flash_files(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(dir)
         .with_context(|| format!("cannot keep flashes: {}", printable_path(dir)))?;
     for vehicle in &mut scenario.vehicles {
@@ -178,11 +178,11 @@ fn set_emulated_boards(
 pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let scenario =
         scenario::parse(DEMO_SCENARIO, "demo.toml").context("the demo's own scenario")?;
-    plan_and_fly(scenario, "demo", &args.out, &FlightDisplay::default(), None)
+    plan_fly_and_report(scenario, "demo", &args.out, &FlightDisplay::default(), None)
 }
 
 /// Refuses a mission that is larger than the emulated board holds.
-fn check_emulated_boards(mission: &PreparedMission, plan: &HostPlan) -> anyhow::Result<()> {
+fn check_fits_emulated_boards(mission: &PreparedMission, plan: &HostPlan) -> anyhow::Result<()> {
     let mut vehicles = mission.scenario.vehicles.iter();
     if vehicles.any(|vehicle| matches!(vehicle.companion, CompanionHost::Emulated { .. })) {
         let board = BoardCapacity::by_name(EMULATED_BOARD).map_err(anyhow::Error::msg)?;
@@ -207,27 +207,27 @@ fn print_errors_and_speed(flight: &SwarmFlight, limit_s: f32) {
     say!(
         "           {:.0} s simulated in {:.1} s, {:.0} × real time",
         flight.simulated_s,
-        flight.took_s,
-        flight.simulated_s / flight.took_s
+        flight.wall_time_s,
+        flight.simulated_s / flight.wall_time_s
     );
 }
 
 /// Adds the pictures of earlier flights if this flight continued them. It continued them unless the
 /// companions knew no waypoint, or every waypoint, as photographed: then they began the area again.
-fn add_earlier_pictures(
+fn add_earlier_pictures_if_continued(
     kept: &PictureStore,
     mission: &PreparedMission,
     flight: &mut SwarmFlight,
 ) -> anyhow::Result<()> {
-    let done: u32 = flight.done.iter().map(|range| range.end - range.first).sum();
+    let done: u32 = flight.photographed_before.iter().map(|range| range.end - range.first).sum();
     let planned = CoveragePlan::plan_as_companions(&mission.scenario)?;
     if done > 0 && done < planned.tracks.waypoint_count() {
-        kept.prepend_to(&mut flight.pictures);
+        kept.prepend_earlier_to(&mut flight.pictures);
     }
     Ok(())
 }
 
-fn plan_and_fly(
+fn plan_fly_and_report(
     scenario: Scenario,
     command: &'static str,
     out: &Path,
@@ -240,10 +240,10 @@ fn plan_and_fly(
     let mut results = ResultFiles::open(out, &output::RESULT_FILES)?;
     let began = Instant::now();
     let progress = Progress::on_terminal();
-    output::print_speed_limits(&scenario);
+    output::print_slow_vehicles(&scenario);
     let mut mission = PreparedMission::prepare(scenario, &progress)?;
     let plan = mission.plan()?;
-    check_emulated_boards(&mission, &plan)?;
+    check_fits_emulated_boards(&mission, &plan)?;
     let mut flight = match gateway {
         Some(gateway) => {
             swarm::fly_with_ground_station(&mission, &plan, command, gateway, &progress)?
@@ -254,7 +254,7 @@ fn plan_and_fly(
         flight.pictures = places;
     }
     if let Some(kept) = &kept {
-        add_earlier_pictures(kept, &mission, &mut flight)?;
+        add_earlier_pictures_if_continued(kept, &mission, &mut flight)?;
     }
     let pictures = std::mem::take(&mut flight.pictures);
     let judged = match &mission.scenario.area {

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use crate::files::ResultFiles;
-use crate::map::{MapError, OccupancyMap, Octree, RESOLUTION_RANGE_M, Source, bt, building};
+use crate::map::{MapError, MapSource, OccupancyMap, Octree, RESOLUTION_RANGE_M, bt, building};
 use crate::say;
 
 /// Resolution of a built-in map where none is given, metres.
@@ -126,7 +126,7 @@ pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
             say!("{}", if *json { serde_json::to_string_pretty(&info)? } else { info.text() });
         }
         MapAction::Convert { file, out, resolution } => {
-            if !matches!(Source::parse(&out.to_string_lossy()), Ok(Source::Bt(_))) {
+            if !matches!(MapSource::parse(&out.to_string_lossy()), Ok(MapSource::Bt(_))) {
                 let expected = "a file to write that ends in `.bt`";
                 return Err(
                     MapError::UnknownKind { file: out.display().to_string(), expected }.into()
@@ -153,13 +153,13 @@ enum Map {
 /// Loads a map: the octree of a `.bt` file, or, with a resolution given or for a built-in map, the
 /// grid that missions are planned on.
 fn read(file: &str, resolution_m: Option<f32>) -> Result<(&'static str, Map), MapError> {
-    match (Source::parse(file)?, resolution_m) {
-        (Source::Building(seed), _) => {
+    match (MapSource::parse(file)?, resolution_m) {
+        (MapSource::Building(seed), _) => {
             let map = building::building_map(seed, resolution_m.unwrap_or(DEFAULT_RESOLUTION_M))?;
             Ok(("builtin", Map::Grid(map)))
         }
-        (Source::Bt(path), None) => Ok(("octomap", Map::Tree(bt::read(path)?))),
-        (Source::Bt(path), Some(resolution_m)) => Ok((
+        (MapSource::Bt(path), None) => Ok(("octomap", Map::Tree(bt::read(path)?))),
+        (MapSource::Bt(path), Some(resolution_m)) => Ok((
             "octomap",
             Map::Grid(OccupancyMap::from_octree(&bt::read(path)?, resolution_m, file)?),
         )),
@@ -172,7 +172,8 @@ fn map_info(file: &str, resolution_m: Option<f32>) -> Result<MapInfo, MapError> 
         Map::Tree(tree) => (Some(tree), [0.0; 3]),
         Map::Grid(grid) => grid.to_shifted_octree(),
     };
-    let refuse = || MapError::Grid { file: file.into(), why: "all its cells are alike".into() };
+    let refuse =
+        || MapError::DoesNotFitGrid { file: file.into(), why: "all its cells are alike".into() };
     Ok(MapInfo::from_octree(kind, &tree.ok_or_else(refuse)?, shift))
 }
 

@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use anyhow::bail;
 
-use super::load;
+use super::load_supported;
 use crate::capacity::{BOARDS, BoardCapacity, WAYPOINTS};
 use crate::files::ResultFiles;
 use crate::mission::{HostPlan, PreparedMission};
@@ -41,10 +41,10 @@ pub struct Args {
 /// The input is bad, there is no plan, or it does not fit the board; the error names the place.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    let scenario = load(&args.scenario, None)?;
+    let scenario = load_supported(&args.scenario, None)?;
     let names = ["starts.txt", "goals.txt", "roadmap.bin", "field.bin", "mission.bin"];
     let mut results = ResultFiles::open(&args.out, &[&output::RESULT_FILES[..], &names].concat())?;
-    output::print_speed_limits(&scenario);
+    output::print_slow_vehicles(&scenario);
     let mut mission = PreparedMission::prepare_for(scenario, args.board, &Progress::on_terminal())?;
     let plan = mission.plan()?;
     if let Some((board, why)) =
@@ -76,19 +76,19 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             Some(why) => say!("board      {} does not hold the files: {why}", board.name),
         }
     }
-    let BuildTimes { boxes_s, nodes_s, edges_s, passages_s, cap_s, file_s } =
+    let BuildTimes { box_tree_s, nodes_s, edges_s, passages_s, edge_cap_s, encoding_s } =
         mission.timing.roadmap_parts;
     say!(
         "times      map {:.1} ms, roadmap {:.1} ms: boxes {:.1}, nodes {:.1}, edges {:.1}, passages {:.1}, capping {:.1}, \
          file {:.1}",
         mission.timing.map_s * 1e3,
         mission.timing.roadmap_s * 1e3,
-        boxes_s * 1e3,
+        box_tree_s * 1e3,
         nodes_s * 1e3,
         edges_s * 1e3,
         passages_s * 1e3,
-        cap_s * 1e3,
-        file_s * 1e3
+        edge_cap_s * 1e3,
+        encoding_s * 1e3
     );
     say!("pads       where each stands, as `--home` of `host-sim autopilot`");
     for (i, task) in mission.tasks.iter().enumerate() {
@@ -104,13 +104,13 @@ fn planned_result(mission: &PreparedMission, plan: &HostPlan) -> MissionResult {
         (f.climb_m + f.descent_m) / schedule.vertical_mps + f.path.length_m() / schedule.cruise_mps
     };
     let flying = || plan.flights.iter().filter(|f| f.task.leaves_pad());
-    let clearances = flying().flat_map(|f| f.path.waypoints()).map(|w| w.clearance_m);
+    let clearances = flying().flat_map(|f| f.path.waypoints()).map(|w| w.leg_clearance_m);
     let min_clearance_m = clearances.fold(f32::INFINITY, f32::min);
     let vehicles: Vec<_> = plan
         .flights
         .iter()
         .map(|flight| VehicleResult {
-            id: flight.id,
+            id: flight.vehicle_id,
             goal: flight.task.goal(),
             reached: false,
             landed: false,
@@ -130,7 +130,10 @@ fn planned_result(mission: &PreparedMission, plan: &HostPlan) -> MissionResult {
         complete: mission.scenario.covers_area()
             || flying().count() == mission.goals.len().min(vehicles.len()),
         vehicles,
-        totals: Totals { path_m: rounded(plan.total_m() as f32), makespan_s: rounded(makespan_s) },
+        totals: Totals {
+            path_m: rounded(plan.total_path_m() as f32),
+            makespan_s: rounded(makespan_s),
+        },
         safety: Safety {
             wall_contacts: 0,
             min_clearance_m: min_clearance_m.is_finite().then(|| rounded(min_clearance_m)),
@@ -139,8 +142,8 @@ fn planned_result(mission: &PreparedMission, plan: &HostPlan) -> MissionResult {
             violations: 0,
             deadlocks: 0,
         },
-        roadmap: mission.roadmap_size(),
-        left: Unserved {
+        roadmap: mission.roadmap_counts(),
+        unserved: Unserved {
             reasons: shortage::shortage_lines(mission, plan),
             ..mission.unserved(plan)
         },

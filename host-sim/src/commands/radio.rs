@@ -54,7 +54,8 @@ fn parse_seconds(text: &str) -> Result<f64, String> {
 /// # Errors
 /// A link cannot be opened or is permanently lost.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let config = RadioConfig { range_m: f32::INFINITY, loss: args.loss, delay_s: args.delay };
+    let config =
+        RadioConfig { range_m: f32::INFINITY, loss_probability: args.loss, delay_s: args.delay };
     let mut radio = Radio::new(config, args.listen.len(), args.seed);
     let places = vec![Point::zeros(); args.listen.len()];
     let mut links: Vec<(&LinkUrl, Box<dyn ByteLink>, Framer)> = Vec::new();

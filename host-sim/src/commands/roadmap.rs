@@ -5,9 +5,9 @@ use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, ensure};
 use clap::Subcommand;
-use planner_core::roadmap::{LANDMARKS, RoadmapError, RoadmapView};
+use planner_core::roadmap::{LANDMARK_COUNT, RoadmapError, RoadmapView};
 
-use super::load;
+use super::load_supported;
 use crate::capacity::BoardCapacity;
 use crate::files::{self, ResultFiles};
 use crate::mission::PreparedMission;
@@ -49,7 +49,7 @@ enum RoadmapAction {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         RoadmapAction::Build { scenario, out, board } => {
-            let scenario = load(scenario, None)?;
+            let scenario = load_supported(scenario, None)?;
             let mut results = ResultFiles::single_file(out)?;
             let mission = PreparedMission::prepare_for(scenario, *board, &Progress::on_terminal())?;
             results.add_file(out, &mission.roadmap_or_field_file)?;
@@ -71,7 +71,12 @@ fn print(view: &RoadmapView<'_>) {
     let header = view.header();
     let edges = || (0..view.node_count() as u16).flat_map(|n| view.half_edges(n));
     let narrowest = edges().map(|e| e.clearance_m).fold(f32::INFINITY, f32::min);
-    say!("nodes          {} ({} starts, {} goals)", view.node_count(), header.starts, header.goals);
+    say!(
+        "nodes          {} ({} starts, {} goals)",
+        view.node_count(),
+        header.start_count,
+        header.goal_count
+    );
     say!("edges          {}", view.half_edge_count() / 2);
     say!("edge length    {} to {} m", header.edge_min_m, header.edge_max_m);
     say!(
@@ -84,9 +89,9 @@ fn print(view: &RoadmapView<'_>) {
         header.origin.lon_deg,
         header.origin.alt_m
     );
-    say!("landmarks      {}", if view.has_landmarks() { LANDMARKS } else { 0 });
+    say!("landmarks      {}", if view.has_landmarks() { LANDMARK_COUNT } else { 0 });
     let grounded =
-        (0..view.node_count() as u16).filter(|node| view.ground_m(*node).is_some()).count();
+        (0..view.node_count() as u16).filter(|node| view.ground_z_m(*node).is_some()).count();
     say!("ground         known below {grounded} nodes");
     say!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
 }

@@ -51,7 +51,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let bytes = files::read(&args.file, files::MAX_BINARY_BYTES)
         .with_context(|| format!("cannot read: {path}"))?;
     let board = args.board.unwrap_or(&BOARDS[0]);
-    let file = file_kind(&bytes, board).with_context(|| format!("not for upload: {path}"))?;
+    let file =
+        checked_file_kind(&bytes, board).with_context(|| format!("not for upload: {path}"))?;
     let mut client =
         FtpClient::new(args.link.open()?, args.id).with_own_system(args.ground_station);
     let system = client.wait_for_companion()?;
@@ -69,7 +70,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Kind of a file by its magic number; an error if it is malformed or exceeds the board's capacity.
-fn file_kind(bytes: &[u8], board: &BoardCapacity) -> anyhow::Result<File> {
+fn checked_file_kind(bytes: &[u8], board: &BoardCapacity) -> anyhow::Result<File> {
     let (file, excess) = if bytes.starts_with(&roadmap::MAGIC) {
         let view = super::roadmap::parse(bytes).context("no sound roadmap")?;
         (File::Roadmap, board.roadmap_excess(&view))

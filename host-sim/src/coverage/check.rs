@@ -26,9 +26,9 @@ pub struct CoverageFindings {
     /// Photographed cells divided by all cells that count, 0 to 1; 0 if none counts.
     pub covered_share: f64,
     /// Number of cells that count.
-    pub cells: u64,
+    pub cells_to_cover: u64,
     /// Centre of the first cell that is not photographed, metres east and north; `None` if all are.
-    pub first_missing_cell: Option<[f64; 2]>,
+    pub first_missing_cell_centre: Option<[f64; 2]>,
     /// Side of a cell, metres.
     pub cell_m: f64,
     /// Number of pictures.
@@ -52,7 +52,7 @@ impl CoverageFindings {
     /// Whether the area is covered, each waypoint flown once, and no other fault was found. An area
     /// of which no cell counts is not judged, so it is not clean.
     pub fn is_clean(&self) -> bool {
-        self.cells > 0
+        self.cells_to_cover > 0
             && self.covered_share >= 1.0
             && self.missed_waypoints
                 + self.repeated_waypoints
@@ -75,7 +75,7 @@ pub fn flights_to_check<'f>(
     flights: &'f [SortieFlight],
 ) -> Vec<TimedFlight<'f>> {
     let flown = |(sortie, points, times_s): &'f SortieFlight| {
-        let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
+        let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle_index)].id;
         TimedFlight { vehicle, points, times_s }
     };
     flights.iter().map(flown).collect()
@@ -84,7 +84,7 @@ pub fn flights_to_check<'f>(
 /// Checks the waypoints, no-fly zones, heights and pictures of flights.
 pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) -> CoverageFindings {
     let mut findings = CoverageFindings::default();
-    count_waypoints(planned, flights, &mut findings);
+    count_waypoint_faults(planned, flights, &mut findings);
     for flight in flights {
         let enters = |pair: &&[FlightPoint]| {
             does_leg_enter_zone(planned, &pair[0].position.xy(), &pair[1].position.xy())
@@ -92,7 +92,7 @@ pub fn check_flights(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>]) ->
         findings.legs_in_no_fly_zones += flight.points.windows(2).filter(enters).count() as u64;
     }
     findings.heights = heights::check_heights(planned, flights);
-    CoverageCells::fine_enough(planned).count_photographed_cells(
+    CoverageCells::refined_until_a_cell_counts(planned).count_photographed_cells(
         planned,
         planned_pictures(planned, flights),
         &mut findings,
@@ -108,8 +108,12 @@ pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>])
         let vehicle = Some(flight.vehicle);
         let points = flight.points.iter().zip(flight.times_s);
         let photos = points.filter(|(point, _)| matches!(point.action, WaypointAction::Photo(_)));
-        let taken =
-            photos.map(|(point, &t_s)| Picture { vehicle, t_s, position: point.position, heading });
+        let taken = photos.map(|(point, &t_s)| Picture {
+            vehicle,
+            t_s,
+            position: point.position,
+            yaw_enu_rad: heading,
+        });
         taken.collect::<Vec<_>>()
     };
     flights.iter().flat_map(taken).collect()
@@ -125,7 +129,11 @@ pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> Cov
         repeated_waypoints: twice,
         ..CoverageFindings::default()
     };
-    CoverageCells::fine_enough(planned).count_photographed_cells(planned, pictures, &mut findings);
+    CoverageCells::refined_until_a_cell_counts(planned).count_photographed_cells(
+        planned,
+        pictures,
+        &mut findings,
+    );
     findings
 }
 
@@ -137,7 +145,7 @@ pub fn footprints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> Vec<[[f32
     pictures.iter().map(|picture| cells.footprint_corners(planned, picture)).collect()
 }
 
-fn count_waypoints(
+fn count_waypoint_faults(
     planned: &CoveragePlan<'_>,
     flights: &[TimedFlight<'_>],
     findings: &mut CoverageFindings,
@@ -195,50 +203,61 @@ fn ring_contains(ring: &[[f64; 2]], place: [f64; 2]) -> bool {
 
 /// A grid of square cells over the area, with axes along and across the lanes.
 struct CoverageCells {
-    along: [f64; 2],
-    low: [f64; 2],
-    side: f64,
-    size: [usize; 2],
+    lane_direction: [f64; 2],
+    low_corner: [f64; 2],
+    side_m: f64,
+    column_row_counts: [usize; 2],
 }
 
 impl CoverageCells {
     fn new(planned: &CoveragePlan<'_>) -> Self {
         let along = planned.tracks.lane_direction();
         let along = [f64::from(along.x), f64::from(along.y)];
-        let mut cells = Self { along, low: [f64::INFINITY; 2], side: 0.0, size: [0; 2] };
+        let mut cells = Self {
+            lane_direction: along,
+            low_corner: [f64::INFINITY; 2],
+            side_m: 0.0,
+            column_row_counts: [0; 2],
+        };
         let mut high = [f64::NEG_INFINITY; 2];
         for vertex in planned.area_settings.rings_of(RingKind::Outer).flatten() {
             let place = cells.to_lane_frame(vertex);
             for axis in 0..2 {
-                cells.low[axis] = cells.low[axis].min(place[axis]);
+                cells.low_corner[axis] = cells.low_corner[axis].min(place[axis]);
                 high[axis] = high[axis].max(place[axis]);
             }
         }
-        let [wide, tall] = [high[0] - cells.low[0], high[1] - cells.low[1]];
-        let lane_m = f64::from(planned.area_settings.spacing.lane_m);
-        cells.side = (lane_m / 10.0).max((wide * tall / MAX_CHECKED_CELLS).sqrt());
-        cells.size = [wide, tall].map(|side| (side / cells.side).ceil().max(1.0) as usize);
+        let [wide, tall] = [high[0] - cells.low_corner[0], high[1] - cells.low_corner[1]];
+        let lane_m = f64::from(planned.area_settings.spacing.max_lane_spacing_m);
+        cells.side_m = (lane_m / 10.0).max((wide * tall / MAX_CHECKED_CELLS).sqrt());
+        cells.column_row_counts =
+            [wide, tall].map(|side| (side / cells.side_m).ceil().max(1.0) as usize);
         cells
     }
 
     /// A grid whose cells are halved until at least one of them counts, so that an area narrower
     /// than a cell is checked too; stops at [`MAX_CHECKED_CELLS`].
-    fn fine_enough(planned: &CoveragePlan<'_>) -> Self {
+    fn refined_until_a_cell_counts(planned: &CoveragePlan<'_>) -> Self {
         Self::new(planned).halved_until_one_counts(planned, MAX_CHECKED_CELLS)
     }
 
     fn halved_until_one_counts(mut self, planned: &CoveragePlan<'_>, most: f64) -> Self {
         let fits = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= most;
-        while !self.points_inside_area(planned, self.size, 0.5).contains(&true) && fits(self.size) {
-            self.side /= 2.0;
-            self.size = self.size.map(|count| 2 * count);
+        while !self.points_inside_area(planned, self.column_row_counts, 0.5).contains(&true)
+            && fits(self.column_row_counts)
+        {
+            self.side_m /= 2.0;
+            self.column_row_counts = self.column_row_counts.map(|count| 2 * count);
         }
         self
     }
 
     fn to_lane_frame(&self, place: &Flat) -> [f64; 2] {
         let (x, y) = (f64::from(place.x), f64::from(place.y));
-        [x * self.along[0] + y * self.along[1], y * self.along[0] - x * self.along[1]]
+        [
+            x * self.lane_direction[0] + y * self.lane_direction[1],
+            y * self.lane_direction[0] - x * self.lane_direction[1],
+        ]
     }
 
     /// For each point of a grid, row by row: whether it lies in the area and outside no-fly zones.
@@ -261,11 +280,13 @@ impl CoverageCells {
         let zones = rings(RingKind::NoFly);
         let mut held = vec![false; columns * rows];
         for (row, line) in held.chunks_mut(columns).enumerate() {
-            let at =
-                [self.low[0] + offset * self.side, self.low[1] + (row as f64 + offset) * self.side];
-            self.for_row_inside_rings(line, &wanted, at, |place| *place = true);
+            let at = [
+                self.low_corner[0] + offset * self.side_m,
+                self.low_corner[1] + (row as f64 + offset) * self.side_m,
+            ];
+            self.for_each_row_point_in_rings(line, &wanted, at, |place| *place = true);
             for zone in &zones {
-                self.for_row_inside_rings(line, std::slice::from_ref(zone), at, |place| {
+                self.for_each_row_point_in_rings(line, std::slice::from_ref(zone), at, |place| {
                     *place = false;
                 });
             }
@@ -275,7 +296,7 @@ impl CoverageCells {
 
     /// Applies `to` to each point of a grid row that lies inside the rings by the even-odd rule;
     /// the row's first point is `at`.
-    fn for_row_inside_rings(
+    fn for_each_row_point_in_rings(
         &self,
         row: &mut [bool],
         rings: &[Vec<[f64; 2]>],
@@ -293,7 +314,7 @@ impl CoverageCells {
         }
         crossings.sort_by(f64::total_cmp);
         for pair in crossings.chunks_exact(2) {
-            let index = |u: f64| ((u - at[0]) / self.side).ceil().max(0.0) as usize;
+            let index = |u: f64| ((u - at[0]) / self.side_m).ceil().max(0.0) as usize;
             let (from, end) = (index(pair[0]), index(pair[1]).min(row.len()));
             row.get_mut(from..end).into_iter().flatten().for_each(&mut to);
         }
@@ -305,10 +326,12 @@ impl CoverageCells {
     /// footprint.
     fn half_footprint(&self, planned: &CoveragePlan<'_>, picture: &Picture) -> [f64; 2] {
         let (footprint, height_m) =
-            (planned.area_settings.spacing.footprint, planned.area_settings.height_m);
-        let above_m = picture.position.z - planned.area_settings.ground_m(&picture.position.xy());
+            (planned.area_settings.spacing.footprint, planned.area_settings.picture_height_m);
+        let above_m =
+            picture.position.z - planned.area_settings.ground_height_m(&picture.position.xy());
         let half = [f64::from(footprint.along_m) / 2.0, f64::from(footprint.across_m) / 2.0];
-        let askew = f64::from(picture.heading) - self.along[1].atan2(self.along[0]);
+        let askew =
+            f64::from(picture.yaw_enu_rad) - self.lane_direction[1].atan2(self.lane_direction[0]);
         let (cos, sin) = (askew.cos().abs(), askew.sin().abs());
         let fits = |own: f64, other: f64| own / (own * cos + other * sin);
         let share = fits(half[0], half[1]).min(fits(half[1], half[0])).min(1.0);
@@ -322,7 +345,7 @@ impl CoverageCells {
             (self.to_lane_frame(&picture.position.xy()), self.half_footprint(planned, picture));
         [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[i, j]| {
             let (u, v) = (u + i * along, v + j * across);
-            let [x, y] = self.along;
+            let [x, y] = self.lane_direction;
             [u * x - v * y, u * y + v * x].map(|metres| metres as f32)
         })
     }
@@ -334,14 +357,14 @@ impl CoverageCells {
         findings: &mut CoverageFindings,
     ) {
         let spacing = planned.area_settings.spacing;
-        let counted = self.points_inside_area(planned, self.size, 0.5);
+        let counted = self.points_inside_area(planned, self.column_row_counts, 0.5);
         // Neighbouring pictures overlap by a cell or more, so one picture must show all corners of
         // a cell.
-        let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)
-            .min(f64::from(spacing.footprint.along_m - spacing.waypoint_m))
-            >= self.side;
+        let whole = f64::from(spacing.footprint.across_m - spacing.max_lane_spacing_m)
+            .min(f64::from(spacing.footprint.along_m - spacing.max_waypoint_spacing_m))
+            >= self.side_m;
         pictures.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
-        let [columns, rows] = self.size;
+        let [columns, rows] = self.column_row_counts;
         // Otherwise corners outside the area are marked as shown; all other corners, and the cell's
         // centre, must be in some picture.
         let mut corners: Vec<bool> = match whole {
@@ -359,8 +382,8 @@ impl CoverageCells {
             let half = self.half_footprint(planned, &picture);
             // Range of cell corners in the picture; 1e-3 cell of tolerance absorbs rounding.
             let range = |axis: usize, most: usize| {
-                let from = (place[axis] - half[axis] - self.low[axis]) / self.side;
-                let to = (place[axis] + half[axis] - self.low[axis]) / self.side;
+                let from = (place[axis] - half[axis] - self.low_corner[axis]) / self.side_m;
+                let to = (place[axis] + half[axis] - self.low_corner[axis]) / self.side_m;
                 let to = (to + 1e-3).floor().clamp(-1.0, most as f64);
                 ((from - 1e-3).ceil().max(0.0) as i64, to as i64)
             };
@@ -371,7 +394,7 @@ impl CoverageCells {
                 }
             }
             let middle_shown = |axis: usize, index: i64| {
-                let middle = self.low[axis] + (index as f64 + 0.5) * self.side;
+                let middle = self.low_corner[axis] + (index as f64 + 0.5) * self.side_m;
                 (middle - place[axis]).abs() <= half[axis]
             };
             // Cells that the picture shows whole; without `whole`, also those it shows in part.
@@ -394,18 +417,26 @@ impl CoverageCells {
             }
             findings.new_cells_over_time.push((time, new));
         }
-        findings.cell_m = self.side;
-        findings.cells = counted.iter().filter(|counted| **counted).count() as u64;
+        findings.cell_m = self.side_m;
+        findings.cells_to_cover = counted.iter().filter(|counted| **counted).count() as u64;
         let missing = counted.iter().zip(&shown).position(|(counted, shown)| *counted && !shown);
-        findings.first_missing_cell = missing.map(|cell| {
-            let at = |axis: usize, index: usize| self.low[axis] + (index as f64 + 0.5) * self.side;
+        findings.first_missing_cell_centre = missing.map(|cell| {
+            let at = |axis: usize, index: usize| {
+                self.low_corner[axis] + (index as f64 + 0.5) * self.side_m
+            };
             let (u, v) = (at(0, cell % columns), at(1, cell / columns));
-            [u * self.along[0] - v * self.along[1], u * self.along[1] + v * self.along[0]]
+            [
+                u * self.lane_direction[0] - v * self.lane_direction[1],
+                u * self.lane_direction[1] + v * self.lane_direction[0],
+            ]
         });
         let good =
             counted.iter().zip(&shown).filter(|(counted, shown)| **counted && **shown).count();
-        findings.covered_share =
-            if findings.cells == 0 { 0.0 } else { good as f64 / findings.cells as f64 };
+        findings.covered_share = if findings.cells_to_cover == 0 {
+            0.0
+        } else {
+            good as f64 / findings.cells_to_cover as f64
+        };
     }
 }
 

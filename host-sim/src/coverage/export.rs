@@ -40,21 +40,26 @@ pub struct ExportedItem {
     pub frame: u8,
     /// Parameters 1 to 4. `None` becomes null (NaN: the current value) in `.plan`, and 0 in
     /// `.waypoints`.
-    pub params: [Option<f64>; 4],
+    pub params_1_to_4: [Option<f64>; 4],
     /// Latitude and longitude, degrees, and metres above home. Zeros if the item has no position,
     /// except that the first may hold parameter 5 of the command.
-    pub place: [f64; 3],
+    pub params_5_to_7: [f64; 3],
 }
 
 impl ExportedItem {
     fn from_command(command: u16, params: [f64; 4]) -> Self {
-        Self { command, frame: FRAME_MISSION, params: params.map(Some), place: [0.0; 3] }
+        Self {
+            command,
+            frame: FRAME_MISSION,
+            params_1_to_4: params.map(Some),
+            params_5_to_7: [0.0; 3],
+        }
     }
 }
 
 /// Home position of a route's vehicle, WGS84: its pad in the scenario, with the pad's altitude.
 fn home_position(planned: &CoveragePlan<'_>, route: &Route) -> Geodetic {
-    let start = planned.scenario.vehicles[usize::from(route.vehicle)].start;
+    let start = planned.scenario.vehicles[usize::from(route.vehicle_index)].start;
     Geodetic {
         alt_m: planned.area_settings.origin.alt_m + f64::from(start.z),
         ..planned.geodetic_at_origin_altitude(&start)
@@ -62,7 +67,8 @@ fn home_position(planned: &CoveragePlan<'_>, route: &Route) -> Geodetic {
 }
 
 /// Yaw commanded at point `index`, degrees clockwise from north, rounded to 0.01: the lanes' common
-/// direction, or, with [`HeadingRule::Lane`], the direction of flight along the point's lane.
+/// direction, or, with [`HeadingRule::DirectionOfFlight`], the direction of flight along the
+/// point's lane.
 fn yaw_deg(planned: &CoveragePlan<'_>, points: &[FlightPoint], index: usize) -> f64 {
     let along = planned.tracks.lane_direction();
     let sweep = course_deg(&Point::zeros(), &Point::new(along.x, along.y, 0.0));
@@ -75,8 +81,8 @@ fn yaw_deg(planned: &CoveragePlan<'_>, points: &[FlightPoint], index: usize) -> 
             .then(|| course_deg(&from.position, &to.position))
     });
     let yaw = match planned.area_settings.heading {
-        HeadingRule::Sweep => sweep,
-        HeadingRule::Lane => step.unwrap_or(sweep),
+        HeadingRule::SameOnAllLanes => sweep,
+        HeadingRule::DirectionOfFlight => step.unwrap_or(sweep),
     };
     f64::from((yaw * 100.0).round() / 100.0)
 }
@@ -89,45 +95,49 @@ pub fn flight_items(
 ) -> Vec<ExportedItem> {
     let (scenario, route) = (planned.scenario, &sortie.route);
     let home = home_position(planned, route);
-    let start = scenario.vehicles[usize::from(route.vehicle)].start;
+    let start = scenario.vehicles[usize::from(route.vehicle_index)].start;
     let place = |position: &Point| {
         let place = planned.geodetic_at_origin_altitude(position);
         [
-            round_to(place.lat_deg, 1e9),
-            round_to(place.lon_deg, 1e9),
-            round_to(f64::from(position.z - start.z), 1e3),
+            round_to_parts(place.lat_deg, 1e9),
+            round_to_parts(place.lon_deg, 1e9),
+            round_to_parts(f64::from(position.z - start.z), 1e3),
         ]
     };
     let waypoint = |index: usize| ExportedItem {
         command: NAV_WAYPOINT,
         frame: FRAME_RELATIVE,
-        params: [Some(0.0), Some(0.0), Some(0.0), Some(yaw_deg(planned, points, index))],
-        place: place(&points[index].position),
+        params_1_to_4: [Some(0.0), Some(0.0), Some(0.0), Some(yaw_deg(planned, points, index))],
+        params_5_to_7: place(&points[index].position),
     };
-    let speed = f64::from(planned.vehicles[usize::from(route.vehicle)].cruise_mps);
+    let speed = f64::from(planned.vehicles[usize::from(route.vehicle_index)].cruise_mps);
     let top = points.get(1).map_or(0.0, |point| f64::from(point.position.z - start.z));
     let mut items = Vec::new();
-    if sortie.depart_s > 0.0 {
+    if sortie.departure_delay_s > 0.0 {
         items.push(ExportedItem::from_command(
             NAV_DELAY,
-            [f64::from(sortie.depart_s), -1.0, -1.0, -1.0],
+            [f64::from(sortie.departure_delay_s), -1.0, -1.0, -1.0],
         ));
     }
     items.extend([
         ExportedItem {
             command: NAV_TAKEOFF,
             frame: FRAME_RELATIVE,
-            params: [Some(0.0), Some(0.0), Some(0.0), None],
-            place: [round_to(home.lat_deg, 1e9), round_to(home.lon_deg, 1e9), round_to(top, 1e3)],
+            params_1_to_4: [Some(0.0), Some(0.0), Some(0.0), None],
+            params_5_to_7: [
+                round_to_parts(home.lat_deg, 1e9),
+                round_to_parts(home.lon_deg, 1e9),
+                round_to_parts(top, 1e3),
+            ],
         },
-        ExportedItem::from_command(DO_CHANGE_SPEED, [1.0, round_to(speed, 1e3), -1.0, 0.0]),
+        ExportedItem::from_command(DO_CHANGE_SPEED, [1.0, round_to_parts(speed, 1e3), -1.0, 0.0]),
     ]);
     for (index, point) in points.iter().enumerate().skip(2) {
         let lane_at = |i: Option<usize>| i.and_then(|i| points.get(i)).and_then(|point| point.lane);
         let begins = point.lane.is_some() && lane_at(index.checked_sub(1)) != point.lane;
         let ends = point.lane.is_some() && lane_at(Some(index + 1)) != point.lane;
         match (point.action, planned.area_settings.trigger) {
-            (WaypointAction::Pad, _) => {
+            (WaypointAction::OnPad, _) => {
                 items.push(ExportedItem::from_command(NAV_RETURN_TO_LAUNCH, [0.0; 4]));
             }
             (WaypointAction::Photo(_), Trigger::Waypoint) => {
@@ -135,7 +145,7 @@ pub fn flight_items(
                 items.push(ExportedItem::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
                 // Parameter 5 of DO_DIGICAM_CONTROL, 1, takes a picture; its slot is `place[0]`.
                 if let Some(last) = items.last_mut() {
-                    last.place[0] = 1.0;
+                    last.params_5_to_7[0] = 1.0;
                 }
             }
             (WaypointAction::Photo(_), trigger) => {
@@ -146,11 +156,12 @@ pub fn flight_items(
                     let mut later =
                         points[index + 1..].iter().take_while(|next| next.lane == point.lane);
                     let next = later.find(|next| matches!(next.action, WaypointAction::Photo(_)));
-                    let step = next.map_or(planned.area_settings.spacing.waypoint_m, |next| {
-                        (next.position - point.position).xy().norm()
-                    });
+                    let step = next
+                        .map_or(planned.area_settings.spacing.max_waypoint_spacing_m, |next| {
+                            (next.position - point.position).xy().norm()
+                        });
                     // Takes a picture at once, then one each `step` metres.
-                    let trigger = [round_to(f64::from(step), 1e3), 0.0, 1.0, 0.0];
+                    let trigger = [round_to_parts(f64::from(step), 1e3), 0.0, 1.0, 0.0];
                     items.push(ExportedItem::from_command(DO_SET_CAM_TRIGG_DIST, trigger));
                 }
                 if trigger == Trigger::Distance && ends {
@@ -163,24 +174,26 @@ pub fn flight_items(
                     ));
                 }
             }
-            (WaypointAction::Transit | WaypointAction::Lane, _) => items.push(waypoint(index)),
+            (WaypointAction::Transit | WaypointAction::AtLaneHeight, _) => {
+                items.push(waypoint(index));
+            }
         }
     }
     items
 }
 
-fn round_to(value: f64, by: f64) -> f64 {
+fn round_to_parts(value: f64, by: f64) -> f64 {
     (value * by).round() / by
 }
 
 /// The mission of one flight as a QGroundControl `.plan` document (JSON).
 pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[ExportedItem]) -> Value {
     let home = home_position(planned, route);
-    let vehicle = &planned.scenario.vehicles[usize::from(route.vehicle)];
+    let vehicle = &planned.scenario.vehicles[usize::from(route.vehicle_index)];
     let item = |(index, item): (usize, &ExportedItem)| {
         let mut params: Vec<Value> =
-            item.params.iter().map(|p| p.map_or(Value::Null, Value::from)).collect();
-        params.extend(item.place.map(Value::from));
+            item.params_1_to_4.iter().map(|p| p.map_or(Value::Null, Value::from)).collect();
+        params.extend(item.params_5_to_7.map(Value::from));
         let mut value = json!({
             "autoContinue": true,
             "command": item.command,
@@ -191,7 +204,7 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[ExportedItem
         });
         if item.frame == FRAME_RELATIVE {
             value["AMSLAltAboveTerrain"] = Value::Null;
-            value["Altitude"] = json!(item.place[2]);
+            value["Altitude"] = json!(item.params_5_to_7[2]);
             value["AltitudeMode"] = json!(1);
         }
         value
@@ -200,7 +213,7 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[ExportedItem
         AutopilotKind::Px4 => 12,
         AutopilotKind::ArduPilot => 3,
     };
-    let speed = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
+    let speed = planned.vehicles[usize::from(route.vehicle_index)].cruise_mps;
     json!({
         "fileType": "Plan",
         "geoFence": { "circles": [], "polygons": [], "version": 2 },
@@ -212,9 +225,9 @@ pub fn qgc_plan(planned: &CoveragePlan<'_>, route: &Route, items: &[ExportedItem
             "hoverSpeed": speed,
             "items": items.iter().enumerate().map(item).collect::<Vec<_>>(),
             "plannedHomePosition": [
-                round_to(home.lat_deg, 1e9),
-                round_to(home.lon_deg, 1e9),
-                round_to(home.alt_m, 1e3),
+                round_to_parts(home.lat_deg, 1e9),
+                round_to_parts(home.lon_deg, 1e9),
+                round_to_parts(home.alt_m, 1e3),
             ],
             "vehicleType": 2,
             "version": 2,
@@ -244,8 +257,8 @@ pub fn waypoints_file(planned: &CoveragePlan<'_>, route: &Route, items: &[Export
             0,
             item.frame,
             item.command,
-            item.params.map(|p| p.unwrap_or(0.0)),
-            item.place,
+            item.params_1_to_4.map(|p| p.unwrap_or(0.0)),
+            item.params_5_to_7,
         );
     }
     text
@@ -258,12 +271,12 @@ pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Stri
         "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie,ground_m\n"
             .to_owned();
     for (sortie, points, times) in flights {
-        let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
+        let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle_index)].id;
         for (order, (point, time)) in points.iter().zip(times).enumerate() {
             let (act, number) = match point.action {
-                WaypointAction::Pad => ("pad", String::new()),
+                WaypointAction::OnPad => ("pad", String::new()),
                 WaypointAction::Transit => ("transit", String::new()),
-                WaypointAction::Lane => ("lane", String::new()),
+                WaypointAction::AtLaneHeight => ("lane", String::new()),
                 WaypointAction::Photo(number) => ("photo", number.to_string()),
             };
             let p = point.position;
@@ -276,7 +289,7 @@ pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Stri
                 p.y,
                 p.z,
                 sortie.number,
-                planned.area_settings.ground_m(&p.xy())
+                planned.area_settings.ground_height_m(&p.xy())
             );
         }
     }
@@ -288,7 +301,7 @@ pub fn flights_csv(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Stri
 pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Value {
     let place = |x: f32, y: f32| {
         let place = planned.geodetic_at_origin_altitude(&Point::new(x, y, 0.0));
-        json!([round_to(place.lon_deg, 1e9), round_to(place.lat_deg, 1e9)])
+        json!([round_to_parts(place.lon_deg, 1e9), round_to_parts(place.lat_deg, 1e9)])
     };
     let kinds = [(RingKind::Outer, "area"), (RingKind::Hole, "hole"), (RingKind::NoFly, "no-fly")];
     let mut features = Vec::new();
@@ -305,7 +318,7 @@ pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Val
     }
     for (sortie, points, _) in flights {
         let photos = points.iter().filter(|point| {
-            matches!(point.action, WaypointAction::Photo(_) | WaypointAction::Lane)
+            matches!(point.action, WaypointAction::Photo(_) | WaypointAction::AtLaneHeight)
         });
         let places: Vec<Value> =
             photos.map(|point| place(point.position.x, point.position.y)).collect();
@@ -317,7 +330,7 @@ pub fn area_geojson(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Val
             "type": "Feature",
             "properties": {
                 "kind": "route",
-                "vehicle": planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id,
+                "vehicle": planned.scenario.vehicles[usize::from(sortie.route.vehicle_index)].id,
                 "sortie": sortie.number,
             },
             "geometry": geometry,

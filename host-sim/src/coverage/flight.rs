@@ -23,11 +23,11 @@ const SAME_PLACE_M: f32 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WaypointAction {
     /// The vehicle stands on its pad.
-    Pad,
+    OnPad,
     /// The vehicle passes at the height of its layer.
     Transit,
     /// The vehicle passes at the height of the lanes, on a lane or between two, without a picture.
-    Lane,
+    AtLaneHeight,
     /// The vehicle takes the picture of the waypoint of this number.
     Photo(u32),
 }
@@ -56,22 +56,23 @@ pub struct TimedFlight<'a> {
 /// All points of a route's flight, from pad to pad.
 pub fn flight_points(planned: &CoveragePlan<'_>, route: &Route) -> Vec<FlightPoint> {
     let (vehicle, pad) = {
-        let index = usize::from(route.vehicle);
+        let index = usize::from(route.vehicle_index);
         (&planned.vehicles[index], planned.scenario.vehicles[index].start)
     };
     let heights = planned.area_settings.heights;
-    let layer_m = heights.mission_m + f32::from(route.layer) * heights.layer_m;
+    let layer_m = heights.max_picture_height_m + f32::from(route.layer) * heights.layer_spacing_m;
     let at = |place: &Flat, height_m: f32| Point::new(place.x, place.y, height_m);
     let point =
         |position: Point, act: WaypointAction| FlightPoint { position, action: act, lane: None };
-    let (first, last) = route.end_waypoints();
-    let ends = [first, last].map(|number| planned.tracks.waypoint(number).unwrap_or(vehicle.place));
+    let (first, last) = route.first_and_last();
+    let ends = [first, last]
+        .map(|number| planned.tracks.waypoint(number).unwrap_or(vehicle.transit_start));
     let mut points = vec![
-        point(pad, WaypointAction::Pad),
-        point(at(&vehicle.place, layer_m), WaypointAction::Transit),
+        point(pad, WaypointAction::OnPad),
+        point(at(&vehicle.transit_start, layer_m), WaypointAction::Transit),
     ];
     points.extend(
-        corners_between(planned, &vehicle.place, &ends[0])
+        corners_around_no_fly_zones(planned, &vehicle.transit_start, &ends[0])
             .iter()
             .map(|c| point(at(c, layer_m), WaypointAction::Transit)),
     );
@@ -79,12 +80,12 @@ pub fn flight_points(planned: &CoveragePlan<'_>, route: &Route) -> Vec<FlightPoi
     add_lane_points(planned, route, &mut points);
     points.push(point(at(&ends[1], layer_m), WaypointAction::Transit));
     points.extend(
-        corners_between(planned, &ends[1], &vehicle.home)
+        corners_around_no_fly_zones(planned, &ends[1], &vehicle.home)
             .iter()
             .map(|c| point(at(c, layer_m), WaypointAction::Transit)),
     );
     points.push(point(at(&vehicle.home, layer_m), WaypointAction::Transit));
-    points.push(point(Point::new(vehicle.home.x, vehicle.home.y, pad.z), WaypointAction::Pad));
+    points.push(point(Point::new(vehicle.home.x, vehicle.home.y, pad.z), WaypointAction::OnPad));
     points
 }
 
@@ -103,14 +104,16 @@ fn add_lane_points(planned: &CoveragePlan<'_>, route: &Route, points: &mut Vec<F
             None => first_lane_start(planned, begin, end),
             Some(mut from) => {
                 let mut between = Vec::new();
-                for corner in corners_between(planned, &from.xy(), begin).iter().chain([begin]) {
+                for corner in
+                    corners_around_no_fly_zones(planned, &from.xy(), begin).iter().chain([begin])
+                {
                     between.extend(leg_corners(planned, &from, corner));
                     from = between.last().copied().unwrap_or(from);
                 }
                 between.pop();
                 let point = |position: Point| FlightPoint {
                     position,
-                    action: WaypointAction::Lane,
+                    action: WaypointAction::AtLaneHeight,
                     lane: None,
                 };
                 points.extend(between.into_iter().map(point));
@@ -129,7 +132,7 @@ fn add_lane_points(planned: &CoveragePlan<'_>, route: &Route, points: &mut Vec<F
 fn first_lane_start(planned: &CoveragePlan<'_>, begin: &Flat, end: &Flat) -> Point {
     match &planned.terrain_following {
         Some(following) => following.start_point(begin, end),
-        None => Point::new(begin.x, begin.y, planned.area_settings.heights.mission_m),
+        None => Point::new(begin.x, begin.y, planned.area_settings.heights.max_picture_height_m),
     }
 }
 
@@ -169,7 +172,11 @@ fn add_picture_points(
             let corner = path[leg];
             // With trigger by waypoint the point of the picture already stands for this corner.
             if !by_waypoint || (along_m(&corner.xy()) - at_m).abs() > SAME_PLACE_M {
-                points.push(FlightPoint { position: corner, action: WaypointAction::Lane, lane });
+                points.push(FlightPoint {
+                    position: corner,
+                    action: WaypointAction::AtLaneHeight,
+                    lane,
+                });
             }
         }
         let end = path[(leg + 1).min(path.len() - 1)];
@@ -186,7 +193,7 @@ fn add_picture_points(
 }
 
 /// Corners of the shortest way around no-fly zones between two points; empty for a straight way.
-fn corners_between(
+fn corners_around_no_fly_zones(
     planned: &CoveragePlan<'_>,
     from: &Flat,
     to: &Flat,
@@ -212,7 +219,7 @@ pub fn passing_times_s(
     route: &Route,
     points: &[FlightPoint],
 ) -> Vec<f32> {
-    let vehicle = &planned.vehicles[usize::from(route.vehicle)];
+    let vehicle = &planned.vehicles[usize::from(route.vehicle_index)];
     let mut time_s = 0.0;
     let mut times = vec![time_s];
     for pair in points.windows(2) {

@@ -16,23 +16,23 @@ const HEIGHT_ROUNDING_M: f32 = 0.02;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightFindings {
     /// Least height of lanes and of the ways between them above the ground, metres.
-    pub least_m: f32,
+    pub min_above_ground_m: f32,
     /// Greatest height of lanes and of the ways between them above the ground, metres.
-    pub most_m: f32,
+    pub max_above_ground_m: f32,
     /// Steepest lane or way between lanes, metres of height per metre over ground.
-    pub steepest: f32,
+    pub steepest_slope: f32,
     /// Number of legs, transits in layers included, that are lower above the ground than the height
     /// of the pictures; vertical legs above pads are left out.
-    pub too_low: u64,
+    pub legs_too_low: u64,
     /// Number of lanes and ways between them that are steeper than their vehicle climbs or descends
     /// at cruise speed.
-    pub too_steep: u64,
+    pub legs_too_steep: u64,
 }
 
 impl HeightFindings {
     /// Whether no leg is too low and no lane or way between lanes is too steep.
     pub fn is_clean(&self) -> bool {
-        self.too_low + self.too_steep == 0
+        self.legs_too_low + self.legs_too_steep == 0
     }
 }
 
@@ -44,35 +44,35 @@ pub fn check_heights(
     let terrain = planned.area_settings.terrain.as_ref()?;
     let sample_m = (terrain.grid.cell_m() / 4.0).min(MAX_SAMPLE_SPACING_M);
     let mut findings = HeightFindings {
-        least_m: f32::INFINITY,
-        most_m: 0.0,
-        steepest: 0.0,
-        too_low: 0,
-        too_steep: 0,
+        min_above_ground_m: f32::INFINITY,
+        max_above_ground_m: 0.0,
+        steepest_slope: 0.0,
+        legs_too_low: 0,
+        legs_too_steep: 0,
     };
     for flight in flights {
         let index =
             planned.scenario.vehicles.iter().position(|vehicle| vehicle.id == flight.vehicle)?;
         let vehicle = &planned.vehicles[index];
         for leg in flight.points.windows(2) {
-            if leg.iter().any(|point| point.action == WaypointAction::Pad) {
+            if leg.iter().any(|point| point.action == WaypointAction::OnPad) {
                 continue;
             }
             let (from, to) = (leg[0].position, leg[1].position);
             let [least_m, most_m] = height_range_above_ground(planned, &from, &to, sample_m);
-            findings.too_low +=
-                u64::from(least_m < planned.area_settings.height_m - HEIGHT_ROUNDING_M);
+            findings.legs_too_low +=
+                u64::from(least_m < planned.area_settings.picture_height_m - HEIGHT_ROUNDING_M);
             if leg.iter().any(|point| point.action == WaypointAction::Transit) {
                 continue;
             }
-            findings.least_m = findings.least_m.min(least_m);
-            findings.most_m = findings.most_m.max(most_m);
+            findings.min_above_ground_m = findings.min_above_ground_m.min(least_m);
+            findings.max_above_ground_m = findings.max_above_ground_m.max(most_m);
             let (way_m, up_m) = ((to - from).xy().norm(), to.z - from.z);
             let most_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
             let allowed_m = most_mps / vehicle.cruise_mps * way_m;
-            findings.too_steep += u64::from(up_m.abs() > allowed_m * 1.01 + HEIGHT_ROUNDING_M);
+            findings.legs_too_steep += u64::from(up_m.abs() > allowed_m * 1.01 + HEIGHT_ROUNDING_M);
             if way_m > MAX_SAMPLE_SPACING_M {
-                findings.steepest = findings.steepest.max(up_m.abs() / way_m);
+                findings.steepest_slope = findings.steepest_slope.max(up_m.abs() / way_m);
             }
         }
     }
@@ -90,7 +90,7 @@ fn height_range_above_ground(
     let parts = (step.xy().norm() / sample_m).ceil().max(1.0) as usize;
     let heights = (0..=parts).map(|part| {
         let at = from + step * (part as f32 / parts as f32);
-        at.z - planned.area_settings.ground_m(&at.xy())
+        at.z - planned.area_settings.ground_height_m(&at.xy())
     });
     heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], h| [least.min(h), most.max(h)])
 }
@@ -98,5 +98,5 @@ fn height_range_above_ground(
 /// Whether a point is at the height of the lanes: on a lane or on the way from one lane to the
 /// next, not on a transit in a layer.
 pub fn is_at_lane_height(point: &FlightPoint) -> bool {
-    matches!(point.action, WaypointAction::Photo(_) | WaypointAction::Lane)
+    matches!(point.action, WaypointAction::Photo(_) | WaypointAction::AtLaneHeight)
 }

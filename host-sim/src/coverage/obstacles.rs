@@ -18,33 +18,35 @@ use self::polygon::{
     Polygon, bounding_box, contains, convex_hull, offset_outward, simplified_outward,
 };
 use crate::capacity::BOARD_NO_FLY_CORNERS;
-use crate::map::{ClearanceField, OccupancyMap, Unknown, VoxelMap};
+use crate::map::{ClearanceField, OccupancyMap, UnknownSpace, VoxelMap};
 
 /// Height above the ground up to which the map's cells count as ground, metres.
-const ROUGH_GROUND_M: f32 = 0.5;
+const MAX_GROUND_CELL_TOP_M: f32 = 0.5;
 /// Added to the clearance of zones against rounding, metres.
 const ZONE_ROUNDING_M: f64 = 0.01;
 /// Most corners of a zone that is not a box.
 const MAX_ZONE_CORNERS: usize = 8;
 /// Distance from the box around all lanes and pads within which zones are kept, metres: transits
 /// may lead there.
-const NEAR_M: f32 = 30.0;
+const KEEP_ZONES_WITHIN_M: f32 = 30.0;
 /// Distance by which a kept zone widens the box in which other zones are kept, metres.
-const NEAR_ZONE_M: f32 = 5.0;
+const KEEP_ZONES_BESIDE_KEPT_M: f32 = 5.0;
 
 /// Ways to draw zones, the preferred one first: the first gives zones of the least area, the last
 /// zones with the fewest corners.
-const OUTLINES: [Outline; 2] =
-    [Outline { boxes: false, free_share: 0.3 }, Outline { boxes: true, free_share: 0.5 }];
+const ZONE_STYLES: [ZoneStyle; 2] = [
+    ZoneStyle { as_boxes: false, max_free_share: 0.3 },
+    ZoneStyle { as_boxes: true, max_free_share: 0.5 },
+];
 
 /// A way to draw zones around blocked columns.
 #[derive(Clone, Copy)]
-struct Outline {
+struct ZoneStyle {
     /// Whether zones are axis-aligned boxes instead of convex hulls.
-    boxes: bool,
+    as_boxes: bool,
     /// Greatest allowed share of a zone's columns that could be flown over; above it the zone is
     /// split.
-    free_share: f64,
+    max_free_share: f64,
 }
 
 /// Error: the zones have this many corners, more than can be planned around.
@@ -57,30 +59,30 @@ pub struct MapObstacles {
     /// The map, without the cells that count as ground; beyond its faces all is free.
     pub map: VoxelMap,
     /// Horizontal distance that paths keep from obstacles at their height, metres.
-    pub clearance_m: f32,
+    pub required_clearance_m: f32,
     field: OnceLock<ClearanceField>,
 }
 
 impl MapObstacles {
     /// The obstacles of a map: its occupied cells without those that count as ground.
-    pub fn new(map: &OccupancyMap, unknown: Unknown, clearance_m: f32) -> Self {
+    pub fn new(map: &OccupancyMap, unknown: UnknownSpace, clearance_m: f32) -> Self {
         let mut map = VoxelMap {
             occupied_words: None,
             no_node_words: None,
-            outside: Outside::Free,
+            beyond_map: Outside::Free,
             ..map.to_voxel_map(unknown)
         };
         let shape = map.shape;
         let is_ground = |cell: &[u32; 3]| {
             let centre = shape.center(*cell);
-            centre.z + shape.resolution_m / 2.0 <= ROUGH_GROUND_M
+            centre.z + shape.resolution_m / 2.0 <= MAX_GROUND_CELL_TOP_M
         };
         let ground: Vec<_> = occupied_cells(&map).filter(is_ground).collect();
         for cell in ground {
             let (word, mask) = shape.word_and_mask(cell);
             map.obstacle_words[word] &= !mask;
         }
-        Self { map, clearance_m, field: OnceLock::new() }
+        Self { map, required_clearance_m: clearance_m, field: OnceLock::new() }
     }
 
     /// Lower bounds of the distance to the nearest obstacle; computed at the first call.
@@ -90,7 +92,7 @@ impl MapObstacles {
 
     /// Horizontal distance from a vehicle that climbs from `place` to the nearest obstacle beside
     /// or above it, metres; `None` if no obstacle is nearer than the clearance.
-    pub fn obstacle_beside_climb_m(&self, place: &Point) -> Option<f32> {
+    pub fn too_near_climb_obstacle_m(&self, place: &Point) -> Option<f32> {
         let shape = &self.map.shape;
         let half = Flat::repeat(shape.resolution_m / 2.0);
         let distance_m = |cell: [u32; 3]| {
@@ -100,7 +102,7 @@ impl MapObstacles {
         };
         let nearest_m =
             occupied_cells(&self.map).filter_map(distance_m).fold(f32::INFINITY, f32::min);
-        (nearest_m < self.clearance_m).then_some(nearest_m)
+        (nearest_m < self.required_clearance_m).then_some(nearest_m)
     }
 
     /// Zones around the obstacles that reach above `floor_m` and are near `places` (the area's
@@ -110,32 +112,36 @@ impl MapObstacles {
     ///
     /// # Errors
     /// All zones together have more than `most` corners.
-    pub fn zones(
+    pub fn no_fly_zones(
         &self,
         floor_m: f32,
         (places, beyond_m): (&[Flat], f32),
         own: usize,
         most: usize,
     ) -> Result<Vec<Vec<Flat>>, TooManyCorners> {
-        let columns = Columns::new(&self.map, f64::from(self.clearance_m), floor_m);
-        let parts = columns.parts();
-        let drawn = OUTLINES.map(|outline| {
-            let zones = parts.iter().flat_map(|part| columns.zones_around(part, &outline));
-            near_zones(zones.map(|zone| to_flat(&zone)).collect(), places, beyond_m + NEAR_M)
+        let columns = Columns::new(&self.map, f64::from(self.required_clearance_m), floor_m);
+        let parts = columns.blocked_parts();
+        let drawn = ZONE_STYLES.map(|style| {
+            let zones = parts.iter().flat_map(|part| columns.zones_around(part, &style));
+            near_zones(
+                zones.map(|zone| to_flat(&zone)).collect(),
+                places,
+                beyond_m + KEEP_ZONES_WITHIN_M,
+            )
         });
         let corners = |zones: &[Vec<Flat>]| own + zones.iter().map(Vec::len).sum::<usize>();
         let counts = drawn.each_ref().map(|zones| corners(zones));
         let fits = |limit: usize| counts.iter().position(|count| *count <= limit);
         match fits(BOARD_NO_FLY_CORNERS).or_else(|| fits(most)) {
             Some(index) => Ok(drawn.into_iter().nth(index).unwrap_or_default()),
-            None => Err(TooManyCorners(counts[OUTLINES.len() - 1])),
+            None => Err(TooManyCorners(counts[ZONE_STYLES.len() - 1])),
         }
     }
 }
 
 /// The occupied cells of a map.
 fn occupied_cells(map: &VoxelMap) -> impl Iterator<Item = [u32; 3]> + '_ {
-    let [bx, by, _] = map.shape.bricks();
+    let [bx, by, _] = map.shape.brick_dims();
     let bricks = map.obstacle_words.iter().zip(0u32..).filter(|(word, _)| **word != 0);
     bricks.flat_map(move |(&word, at)| {
         let [i, j, k] = [at % bx, at / bx % by, at / (bx * by)].map(|brick| brick * 4);
@@ -149,8 +155,9 @@ fn to_flat(polygon: &Polygon) -> Vec<Flat> {
 }
 
 /// The zones that may matter to flights between `places`: those that meet the box around all
-/// places, wider by `near_m`. The box grows by each kept zone, wider by [`NEAR_ZONE_M`], until it
-/// meets no further zone. Each zone is represented by its bounding box.
+/// places, wider by `near_m`. The box grows by each kept zone, wider by
+/// [`KEEP_ZONES_BESIDE_KEPT_M`], until it meets no further zone. Each zone is represented by its
+/// bounding box.
 fn near_zones(mut zones: Vec<Vec<Flat>>, places: &[Flat], near_m: f32) -> Vec<Vec<Flat>> {
     let extent = |points: &[Flat], around_m: f32| {
         let start = [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)];
@@ -169,7 +176,7 @@ fn near_zones(mut zones: Vec<Vec<Flat>>, places: &[Flat], near_m: f32) -> Vec<Ve
             return kept;
         }
         for zone in &near {
-            let [low, high] = extent(zone, NEAR_ZONE_M);
+            let [low, high] = extent(zone, KEEP_ZONES_BESIDE_KEPT_M);
             reach = [reach[0].inf(&low), reach[1].sup(&high)];
         }
         kept.extend(near);
@@ -250,7 +257,7 @@ impl Columns {
     }
 
     /// The blocked columns, in parts whose inflated columns touch.
-    fn parts(&self) -> Vec<Vec<Column>> {
+    fn blocked_parts(&self) -> Vec<Vec<Column>> {
         let mut left = self.inflated.clone();
         let mut parts = Vec::new();
         for first in self.all() {
@@ -274,7 +281,7 @@ impl Columns {
     }
 
     /// Zones that together hold these columns and the clearance around them.
-    fn zones_around(&self, part: &[Column], outline: &Outline) -> Vec<Polygon> {
+    fn zones_around(&self, part: &[Column], style: &ZoneStyle) -> Vec<Polygon> {
         let place = |[i, j]: [usize; 2]| {
             [self.low[0] + i as f64 * self.cell_m, self.low[1] + j as f64 * self.cell_m]
         };
@@ -282,12 +289,12 @@ impl Columns {
             .iter()
             .flat_map(|&[i, j]| [[i, j], [i + 1, j], [i + 1, j + 1], [i, j + 1]].map(place));
         let hull = convex_hull(corners.collect());
-        let inner = match outline.boxes {
+        let inner = match style.as_boxes {
             true => bounding_box(&hull),
             false => simplified_outward(hull, MAX_ZONE_CORNERS),
         };
         let zone = offset_outward(&inner, self.clearance_m + ZONE_ROUNDING_M);
-        if self.free_share(&zone) <= outline.free_share {
+        if self.free_share(&zone) <= style.max_free_share {
             return vec![zone];
         }
         let range = |axis: usize| {
@@ -303,7 +310,7 @@ impl Columns {
         let middle = (first + last).div_ceil(2);
         let (before, after): (Vec<_>, Vec<_>) =
             part.iter().partition(|column| column[axis] < middle);
-        [before, after].iter().flat_map(|half| self.zones_around(half, outline)).collect()
+        [before, after].iter().flat_map(|half| self.zones_around(half, style)).collect()
     }
 
     /// Share of a zone that could be flown over: its columns that are not inflated.

@@ -22,8 +22,9 @@ pub fn report_data(
 ) -> ReportData {
     let scenario = planned.scenario;
     let vehicles = scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
-        let own =
-            flights.iter().filter(|(sortie, _, _)| usize::from(sortie.route.vehicle) == index);
+        let own = flights
+            .iter()
+            .filter(|(sortie, _, _)| usize::from(sortie.route.vehicle_index) == index);
         let passed = own.flat_map(|(_, points, times)| points.iter().zip(times));
         let at = |(point, time): (&FlightPoint, &f32)| TrackPoint {
             t_s: *time,
@@ -37,9 +38,9 @@ pub fn report_data(
             goal_index: None,
             start: vehicle.start,
             goal: None,
-            planned: track.iter().map(|point| point.position).collect(),
+            planned_path: track.iter().map(|point| point.position).collect(),
             track,
-            lost_s: None,
+            power_lost_at_s: None,
         }
     });
     ReportData {
@@ -74,7 +75,7 @@ fn coverage_plots(
 fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> Plot {
     let mut curves = Vec::new();
     for (sortie, points, times_s) in flights {
-        let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
+        let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle_index)].id;
         let mut path =
             Curve { name: format!("vehicle {id}"), vehicle: Some(id), ..Curve::default() };
         let mut ground = Curve { name: format!("ground below {id}"), ..Curve::default() };
@@ -84,9 +85,10 @@ fn height_profile_plot(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> 
             for share in (0..=parts).map(|part| part as f32 / parts as f32) {
                 let (at, t_s) =
                     (leg[0].position + step * share, times[0] + (times[1] - times[0]) * share);
-                for (curve, height_m) in
-                    [(&mut path, at.z), (&mut ground, planned.area_settings.ground_m(&at.xy()))]
-                {
+                for (curve, height_m) in [
+                    (&mut path, at.z),
+                    (&mut ground, planned.area_settings.ground_height_m(&at.xy())),
+                ] {
                     curve.t_s.push(t_s);
                     curve.values.push(height_m);
                 }
@@ -108,7 +110,7 @@ pub(crate) fn area_outlines(planned: &CoveragePlan<'_>) -> Vec<AreaOutline> {
         kind,
         points: ring
             .iter()
-            .map(|v| Point::new(v.x, v.y, planned.area_settings.ground_m(v)))
+            .map(|v| Point::new(v.x, v.y, planned.area_settings.ground_height_m(v)))
             .collect(),
     };
     let shown =
@@ -123,7 +125,7 @@ pub(crate) fn photographed_share_plot(findings: &CoverageFindings) -> Plot {
     for (time, new) in &findings.new_cells_over_time {
         cells += new;
         curve.t_s.push(*time);
-        curve.values.push(100.0 * cells as f32 / findings.cells.max(1) as f32);
+        curve.values.push(100.0 * cells as f32 / findings.cells_to_cover.max(1) as f32);
     }
     Plot {
         title: "Area photographed".to_owned(),

@@ -14,15 +14,15 @@ pub fn planned_layers(planned: &CoveragePlan<'_>, flights: &[SortieFlight]) -> C
         let photos: Vec<&FlightPoint> = points.iter().filter(photos).collect();
         let lanes = photos.chunk_by(|a, b| a.lane == b.lane);
         let lanes = lanes.flat_map(|lane| [lane[0].position, lane[lane.len() - 1].position]);
-        let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
+        let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle_index)].id;
         let index = parts.iter().position(|part| part.vehicle == vehicle).unwrap_or_else(|| {
             parts.push(ReportPart { vehicle, ..ReportPart::default() });
             parts.len() - 1
         });
         let part = &mut parts[index];
-        part.waypoints += photos.len() as u32;
+        part.waypoint_count += photos.len() as u32;
         part.path.extend(points.iter().map(|point| point.position));
-        part.lanes.extend(lanes);
+        part.lane_ends.extend(lanes);
     }
     parts.sort_by_key(|part| part.vehicle);
     let divisions = vec![ReportDivision { parts, ..ReportDivision::default() }];
@@ -45,5 +45,9 @@ pub(crate) fn coverage_layers(
         corners,
     };
     let footprints = pictures.iter().zip(corners).map(footprint).collect();
-    CoverageLayers { lane_m: planned.area_settings.spacing.lane_m, divisions, footprints }
+    CoverageLayers {
+        lane_spacing_m: planned.area_settings.spacing.max_lane_spacing_m,
+        divisions,
+        footprints,
+    }
 }

@@ -3,7 +3,7 @@
 use planner_core::coverage::area::Area;
 use planner_core::coverage::pack::{Route, RoutePlan, Vehicle};
 use planner_core::coverage::tracks::Tracks;
-use planner_core::coverage::transit::Transit;
+use planner_core::coverage::transit::TransitGraph;
 use planner_core::map::field::follow::TerrainFollowing;
 
 use crate::scenario::Scenario;
@@ -24,19 +24,19 @@ pub struct Sortie {
     /// Number of this sortie among its vehicle's, from 1; also the number of its round.
     pub number: u16,
     /// Total number of sorties of the vehicle.
-    pub of: u16,
+    pub sorties_of_vehicle: u16,
     /// Time at which the round of this sortie begins, seconds after the mission's start.
-    pub begin_s: f32,
+    pub round_begin_s: f32,
     /// Time at which the vehicle leaves its pad, seconds after the round begins.
-    pub depart_s: f32,
+    pub departure_delay_s: f32,
     /// Time from leaving the pad to landing on it, seconds.
-    pub flown_s: f32,
+    pub flight_duration_s: f32,
 }
 
 impl Sortie {
     /// Time at which the vehicle has landed, seconds after the mission's start.
-    pub fn end_s(&self) -> f32 {
-        self.begin_s + self.depart_s + self.flown_s
+    pub fn landing_s(&self) -> f32 {
+        self.round_begin_s + self.departure_delay_s + self.flight_duration_s
     }
 }
 
@@ -57,12 +57,12 @@ pub struct CoveragePlan<'a> {
     /// All lanes, in the order of the path.
     pub tracks: Box<Tracks<MAX_LANES>>,
     /// Shortest ways around no-fly zones.
-    pub transit: Box<Transit<'a, MAX_NO_FLY_CORNERS>>,
+    pub transit: Box<TransitGraph<'a, MAX_NO_FLY_CORNERS>>,
     /// Routes of the vehicles that fly, in the order of the path.
     pub plan: RoutePlan<MAX_VEHICLES>,
     /// The shares (W in paper CPP) by which companions divide the path into these routes, one for
     /// each vehicle; `None` if no shares give this plan.
-    pub shares: Option<Vec<f32>>,
+    pub binpat_shares: Option<Vec<f32>>,
     /// Lower bound on the largest cost of any division of this path, seconds.
     pub lower_bound_s: f32,
     /// All sorties, by round: one for each battery; without `batteries` one for each route.

@@ -8,7 +8,7 @@ use super::CoveragePlan;
 use super::check::CoverageFindings;
 use super::sorties::Sortie;
 use crate::result::{
-    CoverageResult, RoadmapSize, RouteResult, Safety, SortieResult, TerrainResult, Totals,
+    CoverageResult, RoadmapCounts, RouteResult, Safety, SortieResult, TerrainResult, Totals,
     VehicleResult, rounded,
 };
 
@@ -32,7 +32,7 @@ pub struct CoverResult {
     /// Separation of the planned flights.
     pub safety: Safety,
     /// Always empty: a coverage mission has no roadmap.
-    pub roadmap: RoadmapSize,
+    pub roadmap: RoadmapCounts,
     /// The coverage section.
     pub coverage: CoverageResult,
 }
@@ -41,7 +41,7 @@ pub struct CoverResult {
 pub fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> CoverResult {
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;
-    let makespan_s = planned.sorties.iter().map(Sortie::end_s).fold(0.0, f32::max);
+    let makespan_s = planned.sorties.iter().map(Sortie::landing_s).fold(0.0, f32::max);
     let least_m = planned.closest_approach_m;
     CoverResult {
         command: "cover",
@@ -61,7 +61,7 @@ pub fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> 
             violations: u32::from(least_m < scenario.deconfliction.safety_distance_m * 0.999),
             deadlocks: 0,
         },
-        roadmap: RoadmapSize { nodes: 0, edges: 0, bytes: 0 },
+        roadmap: RoadmapCounts { nodes: 0, edges: 0, file_bytes: 0 },
         coverage: coverage_result(planned, findings),
         vehicles: vehicle_results(planned),
     }
@@ -69,7 +69,8 @@ pub fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> 
 
 fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
     let vehicles = planned.scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
-        let route = planned.plan.routes.iter().find(|route| usize::from(route.vehicle) == index);
+        let route =
+            planned.plan.routes.iter().find(|route| usize::from(route.vehicle_index) == index);
         VehicleResult {
             id: vehicle.id,
             goal: None,
@@ -89,19 +90,19 @@ fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
 /// Makes the coverage section from a plan and from the check of its pictures.
 pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> CoverageResult {
     let routes = &planned.plan.routes;
-    let max_cost_s = planned.max_sorties_cost_s();
+    let max_cost_s = planned.max_sorties_and_swaps_cost_s();
     let costs: Vec<f64> =
-        routes.iter().map(|route| f64::from(planned.sorties_cost_s(route))).collect();
+        routes.iter().map(|route| f64::from(planned.sorties_and_swaps_cost_s(route))).collect();
     let (mean, sd) = mean_and_sd(&costs);
     let along = planned.tracks.lane_direction();
     let trigger = planned.area_settings.trigger;
     CoverageResult {
         covered_share: findings.covered_share,
-        waypoints: planned.tracks.waypoint_count(),
-        lanes: planned.tracks.lanes().len(),
-        lane_m: rounded(planned.area_settings.spacing.lane_m),
-        waypoint_m: rounded(planned.area_settings.spacing.waypoint_m),
-        angle_deg: rounded(along.y.atan2(along.x).to_degrees()),
+        waypoint_count: planned.tracks.waypoint_count(),
+        lane_count: planned.tracks.lanes().len(),
+        lane_spacing_m: rounded(planned.area_settings.spacing.max_lane_spacing_m),
+        waypoint_spacing_m: rounded(planned.area_settings.spacing.max_waypoint_spacing_m),
+        lane_angle_deg: rounded(along.y.atan2(along.x).to_degrees()),
         max_cost_s: rounded(max_cost_s),
         mean_cost_s: rounded(mean as f32),
         sd_cost_s: rounded(sd as f32),
@@ -109,21 +110,21 @@ pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) 
             routes.iter().map(|route| planned.sorties_cost_m(route)).fold(0.0, f32::max),
         ),
         lower_bound_s: rounded(planned.lower_bound_s),
-        gap: rounded(max_cost_s / planned.lower_bound_s - 1.0),
+        gap_to_lower_bound: rounded(max_cost_s / planned.lower_bound_s - 1.0),
         trigger: match trigger {
             Trigger::Distance => "distance",
             Trigger::Waypoint => "waypoint",
             Trigger::None => "none",
         },
         photos: if trigger == Trigger::None { 0 } else { findings.photos },
-        twice: findings.repeated_waypoints,
-        left: findings.missed_waypoints,
+        repeated_waypoints: findings.repeated_waypoints,
+        missed_waypoints: findings.missed_waypoints,
         terrain: findings.heights.as_ref().map(|heights| TerrainResult {
-            ground_least_m: rounded(heights.least_m),
-            ground_most_m: rounded(heights.most_m),
-            steepest: rounded(heights.steepest),
-            too_low: heights.too_low,
-            too_steep: heights.too_steep,
+            min_above_ground_m: rounded(heights.min_above_ground_m),
+            max_above_ground_m: rounded(heights.max_above_ground_m),
+            steepest_slope: rounded(heights.steepest_slope),
+            legs_too_low: heights.legs_too_low,
+            legs_too_steep: heights.legs_too_steep,
         }),
         routes: route_results(planned),
     }
@@ -132,22 +133,27 @@ pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) 
 fn route_results(planned: &CoveragePlan<'_>) -> Vec<RouteResult> {
     let heights = planned.area_settings.heights;
     let sortie = |sortie: &Sortie| SortieResult {
-        first: sortie.route.first,
-        last: sortie.route.end - 1,
-        begin_s: rounded(sortie.begin_s),
-        depart_s: rounded(sortie.depart_s),
+        lowest_waypoint: sortie.route.lowest_waypoint,
+        highest_waypoint: sortie.route.waypoint_end - 1,
+        round_begin_s: rounded(sortie.round_begin_s),
+        departure_delay_s: rounded(sortie.departure_delay_s),
         cost_s: rounded(sortie.route.cost_s),
         cost_m: rounded(sortie.route.cost_m),
-        flown_s: rounded(sortie.flown_s),
+        flight_duration_s: rounded(sortie.flight_duration_s),
     };
     let route = |route: &Route| RouteResult {
-        depart_s: planned.sorties_of(route).next().map_or(0.0, |sortie| rounded(sortie.depart_s)),
-        vehicle: planned.scenario.vehicles[usize::from(route.vehicle)].id,
-        first: route.first,
-        last: route.end - 1,
-        backward: route.end_waypoints().0 != route.first,
-        layer_m: rounded(heights.mission_m + f32::from(route.layer) * heights.layer_m),
-        cost_s: rounded(planned.sorties_cost_s(route)),
+        depart_s: planned
+            .sorties_of(route)
+            .next()
+            .map_or(0.0, |sortie| rounded(sortie.departure_delay_s)),
+        vehicle: planned.scenario.vehicles[usize::from(route.vehicle_index)].id,
+        lowest_waypoint: route.lowest_waypoint,
+        highest_waypoint: route.waypoint_end - 1,
+        backward: route.first_and_last().0 != route.lowest_waypoint,
+        layer_height_m: rounded(
+            heights.max_picture_height_m + f32::from(route.layer) * heights.layer_spacing_m,
+        ),
+        cost_s: rounded(planned.sorties_and_swaps_cost_s(route)),
         cost_m: rounded(planned.sorties_cost_m(route)),
         sorties: planned.sorties_of(route).map(sortie).collect(),
     };

@@ -47,8 +47,11 @@ pub fn plan_departures(
                 order.iter().filter_map(|other| delays[*other].map(|d| (&tracks[*other][..], d)));
             let mut least_m = f32::INFINITY;
             for other in others {
-                least_m =
-                    least_m.min(min_distance_m((&tracks[own][..], delay), other, separation_m)?);
+                least_m = least_m.min(min_distance_if_separated_m(
+                    (&tracks[own][..], delay),
+                    other,
+                    separation_m,
+                )?);
             }
             Some(least_m)
         };
@@ -85,7 +88,11 @@ fn sample_positions(flight: &DepartureFlight<'_>) -> Vec<Point> {
 /// less than the separation. Pads may be nearer to each other than the separation: while both
 /// vehicles are over their pads, or one stands on its pad, only the distance of the pads is
 /// required.
-fn min_distance_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32) -> Option<f32> {
+fn min_distance_if_separated_m(
+    a: (&[Point], usize),
+    b: (&[Point], usize),
+    separation_m: f32,
+) -> Option<f32> {
     let at = |(track, delay): (&[Point], usize), step: usize| {
         track[step.saturating_sub(delay).min(track.len() - 1)]
     };

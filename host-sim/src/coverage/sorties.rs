@@ -31,10 +31,10 @@ pub(super) fn whole_route_sortie(planned: &CoveragePlan<'_>, route: Route) -> So
     Sortie {
         route,
         number: 1,
-        of: 1,
-        begin_s: 0.0,
-        depart_s: 0.0,
-        flown_s: route_duration_s(planned, &route),
+        sorties_of_vehicle: 1,
+        round_begin_s: 0.0,
+        departure_delay_s: 0.0,
+        flight_duration_s: route_duration_s(planned, &route),
     }
 }
 
@@ -46,40 +46,42 @@ pub fn power_ratio_at_speed(speed_mps: f32) -> f32 {
 /// Time of a route from pad to pad, seconds: at cruise speed, from rest to rest on each horizontal
 /// leg.
 pub fn route_duration_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
-    let index = usize::from(route.vehicle);
+    let index = usize::from(route.vehicle_index);
     let (vehicle, heights) = (&planned.vehicles[index], planned.area_settings.heights);
-    let over_lanes_m = f32::from(route.layer) * heights.layer_m;
-    let top_m = heights.mission_m + over_lanes_m;
+    let over_lanes_m = f32::from(route.layer) * heights.layer_spacing_m;
+    let top_m = heights.max_picture_height_m + over_lanes_m;
     let up_m = (top_m - planned.scenario.vehicles[index].start.z).abs() + over_lanes_m;
-    let level_s = route.ground_m / vehicle.cruise_mps + turns_extra_s(planned, route);
+    let level_s = route.ground_length_m / vehicle.cruise_mps + stops_extra_s(planned, route);
     if planned.terrain_following.is_some() {
-        return level_s + terrain_extra_s(planned, route);
+        return level_s + vertical_and_corner_time_s(planned, route);
     }
     level_s + up_m / vehicle.climb_mps + up_m / vehicle.descend_mps
 }
 
 /// Time of all climbs and descents of a flight over terrain, each as if flown alone, and of stops
 /// at the corners at which its path rises or falls, seconds.
-fn terrain_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
-    let vehicle = &planned.vehicles[usize::from(route.vehicle)];
+fn vertical_and_corner_time_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
+    let vehicle = &planned.vehicles[usize::from(route.vehicle_index)];
     let points = super::flight::flight_points(planned, route);
     let ups = points.windows(2).map(|pair| match pair[1].position.z - pair[0].position.z {
         up_m if up_m > 0.0 => up_m / vehicle.climb_mps,
         down_m => -down_m / vehicle.descend_mps,
     });
-    let corners = points.iter().filter(|point| point.action == WaypointAction::Lane).count() as f32;
+    let corners =
+        points.iter().filter(|point| point.action == WaypointAction::AtLaneHeight).count() as f32;
     ups.sum::<f32>() + corners * vehicle.cruise_mps / PLANNED_ACCEL_MPS2
 }
 
 /// Extra time of stops at both ends of each lane and above the pad, seconds. Lanes and transits
 /// from and to the pad are assumed long enough to reach cruise speed.
-fn turns_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
-    let cruise_mps = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
-    let [from, to] = [route.first, route.end - 1].map(|number| planned.tracks.lane_of(number));
+fn stops_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
+    let cruise_mps = planned.vehicles[usize::from(route.vehicle_index)].cruise_mps;
+    let [from, to] = [route.lowest_waypoint, route.waypoint_end - 1]
+        .map(|number| planned.tracks.lane_of(number));
     let lanes = (to - from + 1) as f32;
     let stop_s = cruise_mps / PLANNED_ACCEL_MPS2;
     // The way from one lane to the next may be too short to reach cruise speed.
-    let step_m = planned.area_settings.spacing.lane_m.min(cruise_mps * stop_s);
+    let step_m = planned.area_settings.spacing.max_lane_spacing_m.min(cruise_mps * stop_s);
     let step_s = 2.0 * (step_m / PLANNED_ACCEL_MPS2).sqrt() - step_m / cruise_mps;
     (lanes + 2.0) * stop_s + (lanes - 1.0) * step_s
 }
@@ -120,7 +122,7 @@ pub fn cut_route(
             .map(|(first, own_s)| (best[first].0 + 1, best[first].1 + f64::from(own_s), first));
         let found = all.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
         best.push(found.ok_or_else(|| LaneTooLong {
-            lane: planned.tracks.lane_of(lanes.lane_starts[end - 1]),
+            lane: planned.tracks.lane_of(lanes.waypoint_bounds[end - 1]),
             takes_s: route_duration_s(planned, &lanes.sub_route(end - 1, end)),
         })?);
     }
@@ -132,7 +134,7 @@ pub fn cut_route(
     }
     // The parts are now in reverse order along the path, which is the order of flight of a backward
     // route.
-    if route.end_waypoints().0 == route.first {
+    if route.first_and_last().0 == route.lowest_waypoint {
         parts.reverse();
     }
     Ok(parts)
@@ -143,7 +145,7 @@ struct RouteLanes<'a> {
     planned: &'a CoveragePlan<'a>,
     route: &'a Route,
     /// First waypoint of each lane within the route, and the end of the route (exclusive).
-    lane_starts: Vec<u32>,
+    waypoint_bounds: Vec<u32>,
     /// For each lane: distance from the pad to its first waypoint and to its last, metres.
     pad_distances_m: Vec<[f32; 2]>,
 }
@@ -151,32 +153,36 @@ struct RouteLanes<'a> {
 impl<'a> RouteLanes<'a> {
     fn new(planned: &'a CoveragePlan<'a>, route: &'a Route) -> Self {
         let tracks = &planned.tracks;
-        let [from, to] = [route.first, route.end - 1].map(|number| tracks.lane_of(number));
-        let inner = tracks.lanes()[from + 1..=to].iter().map(|lane| lane.first);
-        let bounds: Vec<u32> =
-            std::iter::once(route.first).chain(inner).chain([route.end]).collect();
-        let pad = planned.vehicles[usize::from(route.vehicle)].place;
+        let [from, to] =
+            [route.lowest_waypoint, route.waypoint_end - 1].map(|number| tracks.lane_of(number));
+        let inner = tracks.lanes()[from + 1..=to].iter().map(|lane| lane.first_waypoint);
+        let bounds: Vec<u32> = std::iter::once(route.lowest_waypoint)
+            .chain(inner)
+            .chain([route.waypoint_end])
+            .collect();
+        let pad = planned.vehicles[usize::from(route.vehicle_index)].transit_start;
         let way_m = |number: u32| {
             tracks.waypoint(number).map_or(0.0, |place| planned.transit.distance_m(&pad, &place))
         };
         let ways_m = bounds.windows(2).map(|pair| [way_m(pair[0]), way_m(pair[1] - 1)]).collect();
-        Self { planned, route, lane_starts: bounds, pad_distances_m: ways_m }
+        Self { planned, route, waypoint_bounds: bounds, pad_distances_m: ways_m }
     }
 
     /// The lanes `first..end` of the route as a route of their own.
     fn sub_route(&self, first: usize, end: usize) -> Route {
         let (planned, heights) = (self.planned, self.planned.area_settings.heights);
-        let vehicle = &planned.vehicles[usize::from(self.route.vehicle)];
-        let (from, to) = (self.lane_starts[first], self.lane_starts[end]);
+        let vehicle = &planned.vehicles[usize::from(self.route.vehicle_index)];
+        let (from, to) = (self.waypoint_bounds[first], self.waypoint_bounds[end]);
         let inside_m = planned.tracks.distance_to_waypoint_m(to - 1)
             - planned.tracks.distance_to_waypoint_m(from);
         let ground_m = self.pad_distances_m[first][0] + inside_m + self.pad_distances_m[end - 1][1];
-        let top_m = heights.mission_m + f32::from(self.route.layer) * heights.layer_m;
+        let top_m =
+            heights.max_picture_height_m + f32::from(self.route.layer) * heights.layer_spacing_m;
         let delay_s = top_m / vehicle.climb_mps + top_m / vehicle.descend_mps;
         Route {
-            first: from,
-            end: to,
-            ground_m,
+            lowest_waypoint: from,
+            waypoint_end: to,
+            ground_length_m: ground_m,
             cost_m: ground_m + 2.0 * top_m,
             cost_s: ground_m / vehicle.cruise_mps + delay_s,
             ..*self.route

@@ -7,12 +7,12 @@
 //! pictures. A waypoint has its picture
 //!
 //! - if a picture was taken within half a spacing of it along its lane, or within
-//!   [`Tolerance::max_along_m`] where that is more;
+//!   [`PictureTolerance::max_along_m`] where that is more;
 //! - or if the last picture before it and the first one after it on its lane are no further apart
 //!   than the spacing plus `max_along_m`: one of them is then as far off as a picture may be.
 //!
 //! A picture belongs to a lane if it is within half a lane spacing of it, or within
-//! [`Tolerance::cross_track_m`] where that is more. A missing picture leaves a gap of two
+//! [`PictureTolerance::cross_track_m`] where that is more. A missing picture leaves a gap of two
 //! spacings, so it is found while a spacing is more than `max_along_m`. On a short lane whose
 //! waypoints are nearer than the spacing it may not be found; the check of cells then decides
 //! whether the area is photographed.
@@ -39,28 +39,28 @@ pub struct Picture {
     /// Position of the camera, metres ENU; it looks straight down.
     pub position: Point,
     /// Direction of the picture's upper edge, radians counterclockwise from east.
-    pub heading: f32,
+    pub yaw_enu_rad: f32,
 }
 
 /// Greatest distances of pictures from their waypoints in a flight with errors no greater than
 /// planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tolerance {
+pub struct PictureTolerance {
     /// Distance beside the path from tracking, estimate and gusts, metres.
     pub cross_track_m: f32,
     /// Distance flown at cruise speed between the due place of a picture and its true place,
     /// metres.
-    pub late_m: f32,
+    pub trigger_delay_m: f32,
 }
 
-impl Tolerance {
+impl PictureTolerance {
     /// The tolerance from the margins of the plan's scenario.
     pub fn of_plan(planned: &CoveragePlan<'_>) -> Self {
         let scenario = planned.scenario;
         let distances = margins::required_distances(&scenario.simulation, 0.0, &scenario.vehicles);
         Self {
-            cross_track_m: distances.margin_m,
-            late_m: margins::TRIGGER_DELAY_S * scenario.mission.cruise_mps,
+            cross_track_m: distances.wall_margin_m,
+            trigger_delay_m: margins::TRIGGER_DELAY_S * scenario.mission.cruise_mps,
         }
     }
 
@@ -68,13 +68,13 @@ impl Tolerance {
     /// [`margins::with_usable_footprint`] plans with as much, or with less if all vehicles are
     /// slower than the mission's cruise speed.
     pub fn max_along_m(&self) -> f32 {
-        self.cross_track_m + self.late_m
+        self.cross_track_m + self.trigger_delay_m
     }
 }
 
 /// Number of waypoints without a picture, and number of waypoints flown more than once.
 pub fn count_missed_and_repeated(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> (u64, u64) {
-    let tolerance = Tolerance::of_plan(planned);
+    let tolerance = PictureTolerance::of_plan(planned);
     let lanes = planned.tracks.lanes();
     let left: u64 =
         lanes.iter().map(|lane| count_missed_on_lane(planned, lane, pictures, &tolerance)).sum();
@@ -96,12 +96,12 @@ fn count_missed_on_lane(
     planned: &CoveragePlan<'_>,
     lane: &Lane,
     pictures: &[Picture],
-    tolerance: &Tolerance,
+    tolerance: &PictureTolerance,
 ) -> u64 {
     let spacing = planned.area_settings.spacing;
-    let cross_track_m = tolerance.cross_track_m.max(spacing.lane_m / 2.0);
-    let near_m = tolerance.max_along_m().max(spacing.waypoint_m / 2.0);
-    let widest_m = spacing.waypoint_m + tolerance.max_along_m();
+    let cross_track_m = tolerance.cross_track_m.max(spacing.max_lane_spacing_m / 2.0);
+    let near_m = tolerance.max_along_m().max(spacing.max_waypoint_spacing_m / 2.0);
+    let widest_m = spacing.max_waypoint_spacing_m + tolerance.max_along_m();
     let places = pictures.iter().map(|picture| along_and_cross_track(lane, &picture.position.xy()));
     let mut taken: Vec<f32> =
         places.filter(|(_, off_m)| *off_m <= cross_track_m).map(|(along_m, _)| along_m).collect();
@@ -115,16 +115,16 @@ fn count_missed_on_lane(
             || behind.is_some_and(|m| m <= near_m)
             || before.zip(behind).is_some_and(|(before, behind)| before + behind <= widest_m)
     };
-    (0..lane.count).filter(|k| !has_picture(k)).count() as u64
+    (0..lane.waypoint_count).filter(|k| !has_picture(k)).count() as u64
 }
 
 /// Number of the waypoint nearest to a picture taken at `place`; `None` if there are no lanes.
 fn nearest_waypoint(lanes: &[Lane], place: &Flat) -> Option<u32> {
     let nearest = |lane: &Lane| {
         let share = along_and_cross_track(lane, place).0 / lane.length_m().max(f32::MIN_POSITIVE);
-        let last = lane.count.saturating_sub(1);
+        let last = lane.waypoint_count.saturating_sub(1);
         let k = (share * last as f32).round().clamp(0.0, last as f32) as u32;
-        (lane.first + k, (lane.waypoint(k) - place).norm())
+        (lane.first_waypoint + k, (lane.waypoint(k) - place).norm())
     };
     lanes.iter().map(nearest).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(number, _)| number)
 }

@@ -20,16 +20,18 @@ const SPACING: &str = "height_m = 20.0\ncamera = { fov_deg = 73.7, aspect = 1.5 
 fn division(method: &str) -> (Vec<u32>, f32) {
     let scenario = field(&format!("{SPACING}method = \"{method}\""));
     let planned = CoveragePlan::plan_as_companions(&scenario).unwrap();
-    let mut firsts: Vec<u32> = planned.plan.routes.iter().map(|route| route.first).collect();
+    let mut firsts: Vec<u32> =
+        planned.plan.routes.iter().map(|route| route.lowest_waypoint).collect();
     firsts.sort_unstable();
-    (firsts, planned.max_sorties_cost_s())
+    (firsts, planned.max_sorties_and_swaps_cost_s())
 }
 
 #[test]
 fn each_name_of_a_method_divides_by_its_algorithm() {
     let scenario = field(SPACING);
     let planned = CoveragePlan::plan_as_companions(&scenario).unwrap();
-    let lane_begins: Vec<u32> = planned.tracks.lanes().iter().map(|lane| lane.first).collect();
+    let lane_begins: Vec<u32> =
+        planned.tracks.lanes().iter().map(|lane| lane.first_waypoint).collect();
     let [simple, binpat, powell, exact] =
         ["simple-binpat", "binpat", "powell-binpat", "exact"].map(division);
     let whole_lanes =
@@ -45,7 +47,8 @@ fn each_name_of_a_method_divides_by_its_algorithm() {
     assert!(costs[2] < costs[1] && costs[3] < costs[2], "{costs:?}");
     assert_eq!(division("powell"), powell);
     assert_eq!(division("simple"), simple);
-    let usual = (CoveragePlan::plan_as_companions(&scenario).unwrap()).max_sorties_cost_s();
+    let usual =
+        (CoveragePlan::plan_as_companions(&scenario).unwrap()).max_sorties_and_swaps_cost_s();
     assert_eq!(usual, powell.1, "the default");
 }
 
@@ -72,13 +75,13 @@ fn a_sensor_and_a_ground_sampling_distance_give_height_and_spacing() {
     // From this height a pixel of 23.5 mm / 6000, 16 mm behind the lens, shows 20 mm.
     let height_m = 0.02 * 16.0 / (23.5 / 6000.0);
     let near = |got: f32, want: f32| assert!((got - want).abs() < 1e-3 * want, "{got} {want}");
-    near(area.height_m, height_m);
-    near(area.heights.mission_m, height_m);
+    near(area.picture_height_m, height_m);
+    near(area.heights.max_picture_height_m, height_m);
     near(area.spacing.footprint.across_m, 6000.0 * 0.02);
     near(area.spacing.footprint.along_m, 15.6 / 16.0 * height_m);
     // The usual overlaps are 0.6 to the side and 0.7 ahead.
-    near(area.spacing.lane_m, 0.4 * 120.0);
-    near(area.spacing.waypoint_m, 0.3 * 15.6 / 16.0 * height_m);
+    near(area.spacing.max_lane_spacing_m, 0.4 * 120.0);
+    near(area.spacing.max_waypoint_spacing_m, 0.3 * 15.6 / 16.0 * height_m);
 }
 
 #[test]
@@ -114,7 +117,7 @@ fn a_start_inside_a_no_fly_zone_is_refused_by_the_name_of_the_zone() {
         let scenario = field(&format!("{SPACING}no_fly = [{}]", zones.join(", ")));
         let refused =
             CoveragePlan::new(&scenario, CoverageMethod::Binpat).err().map(|e| e.to_string());
-        let place = &scenario.vehicle_places[1];
+        let place = &scenario.vehicle_file_lines[1];
         let why = format!("bad vehicle: {place}: vehicle 2 starts inside no-fly zone {named}");
         assert_eq!(refused, Some(why));
     }

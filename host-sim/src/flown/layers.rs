@@ -30,7 +30,7 @@ pub fn flown_layers(
     flight: &SwarmFlight,
     pictures: Vec<Picture>,
 ) -> anyhow::Result<CoverageLayers> {
-    let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.id).collect();
+    let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.vehicle_id).collect();
     ids.sort_unstable();
     let mut shown: Vec<ReportDivision> = Vec::new();
     let (mut before, mut gone, mut losses) =
@@ -45,9 +45,11 @@ pub fn flown_layers(
             continue;
         }
         losses.extend((division.number > 0).then_some(&division.inputs[..]));
-        let rest = match losses.is_empty() && flight.done.is_empty() {
+        let rest = match losses.is_empty() && flight.photographed_before.is_empty() {
             true => None,
-            false => Some(mission.plan_remaining(&flight.done, losses.iter().copied())?),
+            false => {
+                Some(mission.plan_remaining(&flight.photographed_before, losses.iter().copied())?)
+            }
         };
         let flights = rest.as_ref().map_or(&plan.flights, |rest| &rest.flights);
         let own = waypoint_owners(flights);
@@ -63,7 +65,7 @@ pub fn flown_layers(
                 .filter(|flight| flight.task.leaves_pad())
                 .map(report_part)
                 .collect(),
-            taken: waypoint_transfers(&before, &own),
+            transfers: waypoint_transfers(&before, &own),
         });
         before = own;
     }
@@ -80,7 +82,12 @@ fn report_part(flight: &Flight<WAYPOINTS>) -> ReportPart {
         }
     }
     let places = path.waypoints().iter().map(|waypoint| waypoint.position);
-    ReportPart { vehicle: flight.id, waypoints, path: places.collect(), lanes }
+    ReportPart {
+        vehicle: flight.vehicle_id,
+        waypoint_count: waypoints,
+        path: places.collect(),
+        lane_ends: lanes,
+    }
 }
 
 fn waypoint_owners(flights: &[Flight<WAYPOINTS>]) -> WaypointOwners {
@@ -90,7 +97,7 @@ fn waypoint_owners(flights: &[Flight<WAYPOINTS>]) -> WaypointOwners {
         for range in photographs
             .waypoints_of_pictures(&flight.path, WaypointRange { first: 0, end: u32::MAX })
         {
-            owners.extend((range.first..range.end).map(|number| (number, flight.id)));
+            owners.extend((range.first..range.end).map(|number| (number, flight.vehicle_id)));
         }
     }
     owners
@@ -106,6 +113,6 @@ fn waypoint_transfers(before: &WaypointOwners, now: &WaypointOwners) -> Vec<Wayp
     }
     counts
         .into_iter()
-        .map(|((from, to), waypoints)| WaypointTransfer { from, to, waypoints })
+        .map(|((from, to), waypoints)| WaypointTransfer { from, to, waypoint_count: waypoints })
         .collect()
 }

@@ -14,10 +14,10 @@ pub fn flown_page(
     flight: &SwarmFlight,
 ) -> anyhow::Result<ReportData> {
     let mut page = planned_page(mission, plan, &flight.result)?;
-    let flown = flight.tracks.iter().zip(&flight.lost_s);
+    let flown = flight.tracks.iter().zip(&flight.power_lost_at_s);
     for (vehicle, (track, lost_s)) in page.vehicles.iter_mut().zip(flown) {
         vehicle.track = track.iter().map(|&(t_s, position)| TrackPoint { t_s, position }).collect();
-        vehicle.lost_s = *lost_s;
+        vehicle.power_lost_at_s = *lost_s;
     }
     page.events = flight.log.clone();
     let t_s: Vec<f32> = flight.samples.iter().map(|s| s.t_s).collect();
@@ -38,10 +38,10 @@ pub fn flown_page(
     };
     let largest_m = mission.scenario.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max);
     let body = PlotLimit { value: largest_m, label: "vehicle radius".to_owned() };
-    page.plots = vec![plot("Smallest separation", safety, |s| s.separation_m)];
+    page.plots = vec![plot("Smallest separation", safety, |s| s.min_separation_m)];
     // A coverage mission has no walls, so no clearance to them is plotted.
     if !mission.scenario.covers_area() {
-        page.plots.push(plot("Smallest wall clearance", body, |s| s.clearance_m));
+        page.plots.push(plot("Smallest wall clearance", body, |s| s.min_clearance_m));
     }
     Ok(page)
 }

@@ -19,7 +19,7 @@ type PictureRow = [f32; 5];
 /// The file of pictures, and the pictures that earlier flights left in it.
 pub struct PictureStore {
     path: PathBuf,
-    before: Vec<Picture>,
+    earlier_pictures: Vec<Picture>,
 }
 
 impl PictureStore {
@@ -29,7 +29,7 @@ impl PictureStore {
     /// The file cannot be read, or holds no list of pictures.
     pub fn open(dir: &Path) -> anyhow::Result<Self> {
         let path = dir.join(FILE_NAME);
-        let mut before = Vec::new();
+        let mut earlier_pictures = Vec::new();
         if path.exists() {
             let bad = || format!("no pictures of earlier flights: {}", printable_path(&path));
             let text = files::read(&path, files::MAX_BINARY_BYTES).with_context(bad)?;
@@ -39,18 +39,18 @@ impl PictureStore {
                 vehicle: None,
                 t_s: 0.0,
                 position: Point::new(x, y, z),
-                heading,
+                yaw_enu_rad: heading,
             };
-            before = rows.into_iter().map(picture).collect();
+            earlier_pictures = rows.into_iter().map(picture).collect();
         }
-        Ok(Self { path, before })
+        Ok(Self { path, earlier_pictures })
     }
 
     /// Inserts the pictures of earlier flights before those of this flight, which continued them. A
     /// flight may continue even if the earlier pictures already show the whole area: a companion's
     /// journal may be some waypoints behind.
-    pub fn prepend_to(&self, pictures: &mut Vec<Picture>) {
-        pictures.splice(..0, self.before.iter().copied());
+    pub fn prepend_earlier_to(&self, pictures: &mut Vec<Picture>) {
+        pictures.splice(..0, self.earlier_pictures.iter().copied());
     }
 
     /// Writes all pictures to the file for the next flight.
@@ -59,7 +59,7 @@ impl PictureStore {
     /// The file cannot be written.
     pub fn store_pictures(&self, pictures: &[Picture]) -> anyhow::Result<()> {
         let row = |p: &Picture| -> PictureRow {
-            [p.t_s, p.position.x, p.position.y, p.position.z, p.heading]
+            [p.t_s, p.position.x, p.position.y, p.position.z, p.yaw_enu_rad]
         };
         let rows: Vec<PictureRow> = pictures.iter().map(row).collect();
         let mut results = ResultFiles::single_file(&self.path)?;

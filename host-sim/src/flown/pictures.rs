@@ -37,17 +37,18 @@ pub fn track_points_as_pictures(
     let Some(area) = area else { return Ok(None) };
     let along = CoveragePlan::plan_as_companions(scenario)?.tracks.lane_direction();
     let heading = along.y.atan2(along.x);
-    let below_m = area.heights.layer_m / 2.0;
+    let below_m = area.heights.layer_spacing_m / 2.0;
     let above_m = below_m + area.terrain.as_ref().map_or(0.0, |terrain| terrain.tolerance_m);
-    let heights_m = area.height_m - below_m..=area.height_m + above_m;
-    let is_on_lanes = |place: &Point| heights_m.contains(&(place.z - area.ground_m(&place.xy())));
+    let heights_m = area.picture_height_m - below_m..=area.picture_height_m + above_m;
+    let is_on_lanes =
+        |place: &Point| heights_m.contains(&(place.z - area.ground_height_m(&place.xy())));
     let places = scenario.vehicles.iter().zip(tracks).flat_map(|(vehicle, track)| {
         let on_lanes = track.iter().filter(|(_, place)| is_on_lanes(place));
         on_lanes.map(|&(t_s, position)| Picture {
             vehicle: Some(vehicle.id),
             t_s,
             position,
-            heading,
+            yaw_enu_rad: heading,
         })
     });
     Ok(Some(places.collect()))
@@ -65,7 +66,7 @@ pub fn judge_pictures<const V: usize, const W: usize>(
 ) -> anyhow::Result<FlightFindings> {
     let mut planned = CoveragePlan::plan_as_companions(scenario)?;
     for sortie in &mut planned.sorties {
-        sortie.depart_s = plan.flights[usize::from(sortie.route.vehicle)].depart_s;
+        sortie.departure_delay_s = plan.flights[usize::from(sortie.route.vehicle_index)].depart_s;
     }
     let findings: CoverageFindings = check::check_pictures(&planned, pictures);
     Ok(FlightFindings {

@@ -29,7 +29,7 @@ impl OpenSerialPort {
 }
 
 /// Whether an error only means that no byte can be read or written now.
-fn is_idle(error: &io::Error) -> bool {
+fn is_timeout_or_transient(error: &io::Error) -> bool {
     error.kind() == io::ErrorKind::TimedOut || is_transient(error)
 }
 
@@ -37,7 +37,7 @@ impl ByteLink for OpenSerialPort {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.device.read(buffer) {
             Ok(0) => Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the device is gone")),
-            Err(error) if is_idle(&error) => Ok(0),
+            Err(error) if is_timeout_or_transient(&error) => Ok(0),
             result => result,
         }
     }
@@ -51,7 +51,7 @@ impl ByteLink for OpenSerialPort {
             let end = self.queue.len().min(sent + WRITE_CHUNK);
             match self.device.write(&self.queue[sent..end]) {
                 Ok(count) => sent += count,
-                Err(error) if is_idle(&error) => break,
+                Err(error) if is_timeout_or_transient(&error) => break,
                 Err(error) => return Err(error),
             }
         }

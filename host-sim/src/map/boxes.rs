@@ -103,7 +103,7 @@ fn join_along(axis: usize, boxes: &mut Vec<CellBox>) {
 
 /// Disjoint boxes that together hold exactly the occupied cells of a map.
 fn boxes_of_map(grid: &VoxelGrid<'_>) -> Vec<CellBox> {
-    let [bx, by, _] = grid.shape().bricks().map(|n| n as usize);
+    let [bx, by, _] = grid.shape().brick_dims().map(|n| n as usize);
     let layers: Vec<Vec<CellBox>> = grid
         .words()
         .par_chunks(bx * by)
@@ -127,7 +127,7 @@ fn boxes_of_map(grid: &VoxelGrid<'_>) -> Vec<CellBox> {
 #[derive(Debug)]
 pub struct BoxTree {
     shape: GridShape,
-    outside: Outside,
+    beyond_map: Outside,
     /// The root is the first node.
     nodes: Vec<Node>,
     /// Vector instructions that this machine supports.
@@ -139,7 +139,7 @@ impl BoxTree {
     pub fn new(grid: &VoxelGrid<'_>) -> Self {
         let nodes =
             build_nodes(&mut boxes_of_map(grid), ASSUMED_CLEARANCE_M / grid.shape().resolution_m);
-        Self { shape: *grid.shape(), outside: grid.outside(), nodes, arch: Arch::new() }
+        Self { shape: *grid.shape(), beyond_map: grid.beyond_map(), nodes, arch: Arch::new() }
     }
 
     /// Distance from the segment `a`–`b` to the nearest obstacle, metres, at most `max_m`. The
@@ -155,15 +155,15 @@ impl BoxTree {
             return 0.0;
         }
         let mut limit = max_m / resolution_m;
-        if self.outside == Outside::Blocked {
+        if self.beyond_map == Outside::Blocked {
             limit = limit.min(segment.distance_to_faces(self.shape.dims)).max(0.0);
         }
         let enough = (enough_m / resolution_m).max(0.0);
         let search = BoxSearch {
             nodes: &self.nodes,
             segment: &segment,
-            bound: limit * limit,
-            enough: enough * enough,
+            bound_sq: limit * limit,
+            enough_sq: enough * enough,
         };
         let nearest = self.arch.dispatch(search);
         let nearest = if nearest < limit * limit { nearest.sqrt() } else { limit };
@@ -207,7 +207,7 @@ fn build_nodes(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
         parts.into_iter().map(|part| build_nodes(part, near)).collect()
     };
     let mut next = 1;
-    for (child, nodes) in node.child.iter_mut().zip(&below) {
+    for (child, nodes) in node.child_offsets.iter_mut().zip(&below) {
         *child = next;
         next += nodes.len() as u32;
     }
@@ -220,7 +220,7 @@ fn build_nodes(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
 fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) {
     let mut best = (f32::INFINITY, 0, 0);
     for axis in 0..3 {
-        let Some(bin) = bin_of_box(boxes, axis) else { continue };
+        let Some(bin) = binning_function(boxes, axis) else { continue };
         let mut all: [Option<(CellBox, usize)>; SPLIT_BINS] = [None; SPLIT_BINS];
         for b in boxes.iter() {
             let one = &mut all[bin(b)];
@@ -249,7 +249,7 @@ fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellB
     }
     let (cost, axis, first_above) = best;
     let mut middle = 0;
-    if let Some(bin) = bin_of_box(boxes, axis).filter(|_| cost.is_finite()) {
+    if let Some(bin) = binning_function(boxes, axis).filter(|_| cost.is_finite()) {
         for i in 0..boxes.len() {
             if bin(&boxes[i]) < first_above {
                 boxes.swap(i, middle);
@@ -276,7 +276,7 @@ fn twice_center_range(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
 
 /// Function from a box to its bin, 0 to [`SPLIT_BINS`] − 1, along an axis; `None` if all centres
 /// coincide along it.
-fn bin_of_box(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
+fn binning_function(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
     let (low, high) = twice_center_range(boxes, axis)?;
     (low < high).then_some(move |b: &CellBox| {
         (b.twice_center(axis) - low) as usize * (SPLIT_BINS - 1) / (high - low) as usize

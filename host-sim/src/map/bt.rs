@@ -12,17 +12,17 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::error::MapError;
-use super::octree::{INNER, Inner, Octree, TREE_DEPTH};
+use super::octree::{INNER, InnerNode, Octree, TREE_DEPTH};
 use crate::files;
 
 /// Accepted values of the header's `id`; the colours of a ColorOcTree are ignored.
-const IDS: [&str; 2] = ["OcTree", "ColorOcTree"];
+const ACCEPTED_IDS: [&str; 2] = ["OcTree", "ColorOcTree"];
 const MAGIC: &str = "# Octomap OcTree binary file";
 /// Longest file that is read, bytes: in memory it takes four times as much. The largest public
 /// scans are a tenth of it.
 const MAX_BYTES: u64 = 1 << 26;
 /// Longest header line, bytes; OctoMap's own comment line has 75.
-const MAX_LINE: usize = 1024;
+const MAX_HEADER_LINE: usize = 1024;
 
 /// Reads a `.bt` file.
 pub fn read(path: &Path) -> Result<Octree, MapError> {
@@ -33,16 +33,16 @@ pub fn read(path: &Path) -> Result<Octree, MapError> {
 
 /// Parses the bytes of a `.bt` file; `path` only names it in errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Octree, MapError> {
-    let mut reader = Reader { bytes, at: 0, path, inner: Vec::new(), nodes: 0 };
+    let mut reader = Reader { bytes, at: 0, path, inner: Vec::new(), nodes_read: 0 };
     let header = reader.header()?;
     if header.nodes > 0 {
-        reader.nodes = 1;
+        reader.nodes_read = 1;
         let root = reader.node(0)?;
         reader.inner.push(root);
     }
-    if reader.nodes != header.nodes {
-        let expected = format!("as many nodes as the data holds, {}", reader.nodes);
-        return Err(reader.error_at(header.nodes_at, expected, header.nodes.to_string()));
+    if reader.nodes_read != header.nodes {
+        let expected = format!("as many nodes as the data holds, {}", reader.nodes_read);
+        return Err(reader.error_at(header.nodes_offset, expected, header.nodes.to_string()));
     }
     if reader.at < bytes.len() {
         let found = format!("{} more bytes", bytes.len() - reader.at);
@@ -53,7 +53,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Octree, MapError> {
 
 struct BtHeader {
     nodes: u64,
-    nodes_at: usize,
+    nodes_offset: usize,
     resolution_m: f64,
 }
 
@@ -61,8 +61,8 @@ struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
     path: &'a Path,
-    inner: Vec<Inner>,
-    nodes: u64,
+    inner: Vec<InnerNode>,
+    nodes_read: u64,
 }
 
 impl<'a> Reader<'a> {
@@ -84,7 +84,7 @@ impl<'a> Reader<'a> {
     /// begins.
     fn header_line(&mut self, expected: &str) -> Result<(&'a str, usize), MapError> {
         let begin = self.at;
-        let rest = &self.bytes[begin..self.bytes.len().min(begin + MAX_LINE)];
+        let rest = &self.bytes[begin..self.bytes.len().min(begin + MAX_HEADER_LINE)];
         let Some(length) = rest.iter().position(|&b| b == b'\n') else {
             let found =
                 if begin == self.bytes.len() { "the end of the file" } else { "no end of line" };
@@ -121,7 +121,7 @@ impl<'a> Reader<'a> {
             match word {
                 "" => {}
                 _ if line.starts_with('#') => {}
-                "id" if IDS.contains(&value) => id = true,
+                "id" if ACCEPTED_IDS.contains(&value) => id = true,
                 "id" => {
                     return Err(self.error_at(
                         value_at,
@@ -150,8 +150,8 @@ impl<'a> Reader<'a> {
             }
         }
         match (id, nodes, resolution_m) {
-            (true, Some((nodes, nodes_at)), Some(resolution_m)) => {
-                Ok(BtHeader { nodes, nodes_at, resolution_m })
+            (true, Some((nodes, nodes_offset)), Some(resolution_m)) => {
+                Ok(BtHeader { nodes, nodes_offset, resolution_m })
             }
             (false, ..) => Err(self.error_at(after_header, "`id OcTree`", "`data`")),
             (_, None, _) => Err(self.error_at(after_header, "`size N`", "`data`")),
@@ -161,7 +161,7 @@ impl<'a> Reader<'a> {
 
     /// Reads the inner node at `depth`, whose word comes next, and its children. Recursion ends at
     /// [`TREE_DEPTH`].
-    fn node(&mut self, depth: u32) -> Result<Inner, MapError> {
+    fn node(&mut self, depth: u32) -> Result<InnerNode, MapError> {
         let begin = self.at;
         let Some(&[low, high]) = self.bytes.get(begin..begin + 2) else {
             let found = format!("the end of the file ({} bytes)", self.bytes.len());
@@ -172,14 +172,15 @@ impl<'a> Reader<'a> {
             ));
         };
         self.at += 2;
-        let mut node = Inner { children: u16::from_le_bytes([low, high]), first: 0 };
-        if node.children == 0 {
+        let mut node =
+            InnerNode { child_codes: u16::from_le_bytes([low, high]), first_inner_child: 0 };
+        if node.child_codes == 0 {
             return Err(self.error_at(begin, "an inner node with children", "one without"));
         }
-        let mut inner = heapless::Vec::<Inner, 8>::new();
+        let mut inner = heapless::Vec::<InnerNode, 8>::new();
         for index in 0..8 {
-            let child = node.child(index);
-            self.nodes += u64::from(child != 0);
+            let child = node.child_code(index);
+            self.nodes_read += u64::from(child != 0);
             if child != INNER {
                 continue;
             }
@@ -192,7 +193,7 @@ impl<'a> Reader<'a> {
             }
             inner.push(self.node(depth + 1)?).expect("a node has eight children");
         }
-        node.first = self.inner.len() as u32;
+        node.first_inner_child = self.inner.len() as u32;
         self.inner.extend_from_slice(&inner);
         Ok(node)
     }
@@ -216,9 +217,9 @@ pub fn to_bytes(tree: &Octree) -> Vec<u8> {
     bytes
 }
 
-fn push_node(tree: &Octree, node: Inner, bytes: &mut Vec<u8>) {
-    bytes.extend_from_slice(&node.children.to_le_bytes());
-    for index in (0..8).filter(|&i| node.child(i) == INNER) {
+fn push_node(tree: &Octree, node: InnerNode, bytes: &mut Vec<u8>) {
+    bytes.extend_from_slice(&node.child_codes.to_le_bytes());
+    for index in (0..8).filter(|&i| node.child_code(i) == INNER) {
         push_node(tree, tree.inner[node.inner_index(index)], bytes);
     }
 }

@@ -13,11 +13,11 @@ use planner_core::map::voxel::Outside;
 
 use super::VoxelMap;
 
-/// Greatest distance at which [`nearest_column`] searches, metres.
+/// Greatest distance at which [`nearest_clear_column`] searches, metres.
 const NEAREST_COLUMN_WITHIN_M: f32 = 5.0;
-/// Most cells that [`nearest_column`] reads in all, which takes a second or two.
-const NEAREST_COLUMN_CELLS: f32 = 3e8;
-/// Spacing of the points that [`nearest_column`] tries, metres.
+/// Most cells that [`nearest_clear_column`] reads in all, which takes a second or two.
+const MAX_NEAREST_COLUMN_CELLS: f32 = 3e8;
+/// Spacing of the points that [`nearest_clear_column`] tries, metres.
 const NEAREST_COLUMN_STEP_M: f32 = 0.1;
 
 /// Reason why a vehicle may not fly vertically between the ground and a point.
@@ -41,7 +41,7 @@ pub enum ColumnError {
     /// clearance.
     TooNear {
         /// The point of the obstacle that is nearest to the vertical flight, metres ENU.
-        place: Point,
+        obstacle_point: Point,
         /// Distance from that point to the vehicle's centre where it passes nearest, metres.
         distance_m: f32,
         /// Whether the obstacle is unknown space or a face of the map, rather than an occupied
@@ -55,7 +55,7 @@ pub enum ColumnError {
 ///
 /// # Errors
 /// The first requirement that is not met; [`ColumnError::TooNear`] names the nearest obstacle.
-pub fn ground_below_column(
+pub fn ground_below_clear_column(
     map: &VoxelMap,
     point: &Point,
     radius_m: f32,
@@ -70,24 +70,24 @@ pub fn ground_below_column(
     let below =
         (0..=top).rev().find(|&k| grid.is_occupied([i, j, k])).ok_or(ColumnError::NoGround)?;
     let ground_m = shape.min.z + (below + 1) as f32 * shape.resolution_m;
-    if map.is_unknown([i, j, below]) {
+    if map.is_unknown_obstacle([i, j, below]) {
         return Err(ColumnError::UnknownBelow { top_m: ground_m });
     }
     if point.z - ground_m < radius_m {
         return Err(ColumnError::TooLow { ground_m });
     }
     let (place, distance_m, unknown) =
-        nearest_to_column(map, point, below, ground_m + radius_m, required_m);
+        obstacle_nearest_to_column(map, point, below, ground_m + radius_m, required_m);
     if f64::from(required_m) < distance_m {
         return Ok(ground_m);
     }
-    Err(ColumnError::TooNear { place, distance_m: distance_m as f32, unknown })
+    Err(ColumnError::TooNear { obstacle_point: place, distance_m: distance_m as f32, unknown })
 }
 
 /// Obstacle nearest to the vertical segment from `low_m` up to `point`: its nearest point, its
 /// distance, and whether it is unknown. Obstacles are the blocked cells above layer `ground` within
 /// `reach_m`, and, where the outside is blocked, the faces of the map but the lowest.
-fn nearest_to_column(
+fn obstacle_nearest_to_column(
     map: &VoxelMap,
     point: &Point,
     ground: u32,
@@ -107,7 +107,7 @@ fn nearest_to_column(
         }
     };
     let mut reach_m = reach_m;
-    if map.outside == Outside::Blocked {
+    if map.beyond_map == Outside::Blocked {
         for (axis, end) in [(0, min.x), (0, max.x), (1, min.y), (1, max.y), (2, max.z)] {
             // A cell beyond the nearest face is outside the map, so cells farther than the face
             // need no check.
@@ -139,7 +139,7 @@ fn nearest_to_column(
                 let (x, y, z) = (span(0, i), span(1, j), span(2, k));
                 let height = if z.0 > at.z { z.0 } else { z.1.min(at.z).max(z.0) };
                 let place = [at.x.clamp(x.0, x.1), at.y.clamp(y.0, y.1), height];
-                consider(place, map.is_unknown([i, j, k]));
+                consider(place, map.is_unknown_obstacle([i, j, k]));
             }
         }
     }
@@ -148,7 +148,7 @@ fn nearest_to_column(
 
 /// The nearest point at the same height whose vertical flight has the required clearance: within 5
 /// m, or within less where the required clearance makes each check costly. `None` if there is none.
-pub fn nearest_column(
+pub fn nearest_clear_column(
     map: &VoxelMap,
     point: &Point,
     radius_m: f32,
@@ -164,14 +164,14 @@ pub fn nearest_column(
     let across = 2.0 * required_m / map.shape.resolution_m + 3.0;
     let layers = (map.shape.dims[2] as f32)
         .min(across + (point.z - map.shape.min.z) / map.shape.resolution_m);
-    let most = (NEAREST_COLUMN_CELLS / (across * across * layers)) as usize;
+    let most = (MAX_NEAREST_COLUMN_CELLS / (across * across * layers)) as usize;
     offsets.into_iter().take(most).find_map(|(i, j)| {
         let (x, y) = (
             point.x + i as f32 * NEAREST_COLUMN_STEP_M,
             point.y + j as f32 * NEAREST_COLUMN_STEP_M,
         );
         let place = Point::new(round(x), round(y), point.z);
-        ground_below_column(map, &place, radius_m, required_m).is_ok().then_some(place)
+        ground_below_clear_column(map, &place, radius_m, required_m).is_ok().then_some(place)
     })
 }
 

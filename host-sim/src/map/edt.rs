@@ -17,9 +17,9 @@ use rayon::prelude::*;
 #[derive(Clone, Debug)]
 pub struct ClearanceField {
     shape: GridShape,
-    outside: Outside,
+    beyond_map: Outside,
     /// Squared distances, cells²; in memory z varies fastest, then x, then y.
-    squared: Vec<u16>,
+    squared_distances: Vec<u16>,
 }
 
 impl ClearanceField {
@@ -52,8 +52,8 @@ impl ClearanceField {
             }
         });
         // Transform along z; the memory order changes so that each column is contiguous.
-        let mut squared = vec![0; nx * ny * nz];
-        squared.par_chunks_mut(nx * nz).enumerate().for_each(|(j, sheet)| {
+        let mut squared_distances = vec![0; nx * ny * nz];
+        squared_distances.par_chunks_mut(nx * nz).enumerate().for_each(|(j, sheet)| {
             let mut scratch = LineTransform::new(nz);
             for (i, column) in sheet.chunks_mut(nz).enumerate() {
                 scratch.line.copy_from(layers.iter().skip(j * nx + i).step_by(nx * ny).copied());
@@ -61,7 +61,7 @@ impl ClearanceField {
                 column.copy_from_slice(&scratch.out);
             }
         });
-        Self { shape, outside: grid.outside(), squared }
+        Self { shape, beyond_map: grid.beyond_map(), squared_distances }
     }
 
     /// Lower bound of the distance from `point` to the nearest obstacle, metres; 0 for NaN.
@@ -69,12 +69,12 @@ impl ClearanceField {
         let (min, max) = (self.shape.min, self.shape.max());
         let Some([i, j, k]) = self.shape.cell_of(point) else {
             let away = (min - point).sup(&(point - max)).sup(&Point::zeros());
-            return if self.outside == Outside::Free { away.norm() } else { 0.0 };
+            return if self.beyond_map == Outside::Free { away.norm() } else { 0.0 };
         };
         let [nx, _, nz] = self.shape.dims;
         let at = (j as usize * nx as usize + i as usize) * nz as usize + k as usize;
-        let inner = f32::from(self.squared[at]).sqrt() * self.shape.resolution_m;
-        match self.outside {
+        let inner = f32::from(self.squared_distances[at]).sqrt() * self.shape.resolution_m;
+        match self.beyond_map {
             Outside::Free => inner,
             Outside::Blocked => inner.min((point - min).inf(&(max - point)).min()).max(0.0),
         }
@@ -97,7 +97,7 @@ struct Parabola {
     /// Value of the parabola at x = 0.
     at_zero: i32,
     /// First x at which this parabola is the lowest of the envelope.
-    from: i32,
+    lowest_from: i32,
 }
 
 trait CopyFrom {
@@ -137,21 +137,21 @@ impl LineTransform {
                 // envelope.
                 let width = 2 * (site - last.site);
                 let cross = (at_zero - last.at_zero + width - 1).div_euclid(width);
-                if cross > last.from {
+                if cross > last.lowest_from {
                     from = cross;
                     break;
                 }
                 self.envelope.pop();
             }
             if from < n as i32 {
-                self.envelope.push(Parabola { site, at_zero, from });
+                self.envelope.push(Parabola { site, at_zero, lowest_from: from });
             }
         }
         self.out.clear();
         self.out.resize(n, u16::MAX);
         for (i, parabola) in self.envelope.iter().enumerate() {
-            let to = self.envelope.get(i + 1).map_or(n as i32, |next| next.from);
-            for x in parabola.from..to {
+            let to = self.envelope.get(i + 1).map_or(n as i32, |next| next.lowest_from);
+            for x in parabola.lowest_from..to {
                 let value = parabola.at_zero + x * (x - 2 * parabola.site);
                 self.out[x as usize] = value.min(i32::from(u16::MAX)) as u16;
             }

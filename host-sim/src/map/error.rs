@@ -42,7 +42,7 @@ pub enum MapError {
     },
     /// The map cannot be represented on the requested grid.
     #[error("map does not fit: {}: {why}", printable(file))]
-    Grid {
+    DoesNotFitGrid {
         /// The map's name as given.
         file: String,
         /// Reason, with the numbers that matter.

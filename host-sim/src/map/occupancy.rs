@@ -2,7 +2,7 @@
 //!
 //! The leaves of an octree are resampled conservatively: a planning cell is occupied if any
 //! occupied leaf reaches into it, else unknown if any part of it is unknown, else free. Occupied
-//! leaves that reach in by less than [`NEGLIGIBLE_CELL_SHARE`] of a cell (rounding of the
+//! leaves that reach in by less than [`NEGLIGIBLE_EDGE_SHARE`] of a cell (rounding of the
 //! resolution) do not count. With the octree's own resolution, or a multiple of it, planning cells
 //! begin at cell boundaries of the octree; with its own resolution every cell keeps its state.
 
@@ -15,14 +15,14 @@ use super::voxel_map::{VoxelMap, brick_masks};
 
 /// Share of a planning cell's edge that is neglected: more than the rounding error of f32 over
 /// [`MAX_DIM`] cells.
-pub const NEGLIGIBLE_CELL_SHARE: f64 = 2e-3;
+pub const NEGLIGIBLE_EDGE_SHARE: f64 = 2e-3;
 /// Most cells of a planning grid; each takes 4 bytes more while an octree is resampled.
 pub const MAX_CELLS: u64 = 1 << 27;
 
 /// Whether paths may pass through unknown space.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Unknown {
+pub enum UnknownSpace {
     /// Unknown space is an obstacle, and so is everything beyond the map.
     #[default]
     Blocked,
@@ -62,7 +62,7 @@ impl OccupancyMap {
                 "{x} × {y} × {z} cells of {resolution} m, at most {MAX_CELLS} in all and {MAX_DIM} a side: \
                  choose another resolution_m"
             );
-            return Err(MapError::Grid { file: name.into(), why });
+            return Err(MapError::DoesNotFitGrid { file: name.into(), why });
         }
         let words = vec![0; shape.word_count()];
         Ok(Self { shape, occupied: words.clone(), free: words })
@@ -71,7 +71,7 @@ impl OccupancyMap {
     /// Resamples an octree onto a grid with cells of `resolution_m`, conservatively. Cost: all
     /// leaves, and all cells that they cover.
     pub fn from_octree(tree: &Octree, resolution_m: f32, name: &str) -> Result<Self, MapError> {
-        let refuse = |why: &str| MapError::Grid { file: name.into(), why: why.into() };
+        let refuse = |why: &str| MapError::DoesNotFitGrid { file: name.into(), why: why.into() };
         if !(resolution_m.is_finite() && resolution_m > 0.0) {
             return Err(refuse("resolution_m must be positive"));
         }
@@ -89,7 +89,7 @@ impl OccupancyMap {
             exact
         };
         let span = [0, 1, 2]
-            .map(|a| (f64::from(hi[a] - lo[a]) * scale - NEGLIGIBLE_CELL_SHARE).ceil().max(1.0));
+            .map(|a| (f64::from(hi[a] - lo[a]) * scale - NEGLIGIBLE_EDGE_SHARE).ceil().max(1.0));
         let dims = span.map(|s| s.min(f64::from(u32::MAX)) as u32);
         let corner =
             lo.map(|k| ((f64::from(k) - f64::from(KEY_ORIGIN)) * tree.resolution_m()) as f32);
@@ -98,11 +98,11 @@ impl OccupancyMap {
         // Share of each cell's volume that free leaves fill.
         let mut free_share = vec![0f32; dims.iter().map(|&d| d as usize).product()];
         tree.for_each_leaf(|leaf| {
-            let from = [0, 1, 2].map(|a| f64::from(leaf.min[a] - lo[a]) * scale);
-            let to = from.map(|f| f + f64::from(leaf.size) * scale);
+            let from = [0, 1, 2].map(|a| f64::from(leaf.min_key[a] - lo[a]) * scale);
+            let to = from.map(|f| f + f64::from(leaf.edge_cells) * scale);
             // An occupied leaf that reaches into a cell by less than a hair is rounding; free
             // volume is summed exactly.
-            let hair = if leaf.occupied { NEGLIGIBLE_CELL_SHARE } else { 0.0 };
+            let hair = if leaf.occupied { NEGLIGIBLE_EDGE_SHARE } else { 0.0 };
             let first = from.map(|f| (f + hair).floor() as u32);
             let last =
                 [0, 1, 2].map(|a| ((to[a] - hair).ceil() as u32).max(first[a] + 1).min(dims[a]));
@@ -152,12 +152,12 @@ impl OccupancyMap {
     /// The cells as a pruned octree. Fails if the grid's corner does not lie on a multiple of the
     /// resolution, as the keys of an octree do, or if the grid reaches beyond ±32768 cells.
     pub fn to_octree(&self, name: &str) -> Result<Octree, MapError> {
-        let refuse = |why: String| MapError::Grid { file: name.into(), why };
+        let refuse = |why: String| MapError::DoesNotFitGrid { file: name.into(), why };
         let corner = self.shape.min;
         let (tree, shift) = self.to_shifted_octree();
         if shift
             .iter()
-            .any(|s| s.abs() > NEGLIGIBLE_CELL_SHARE * f64::from(self.shape.resolution_m))
+            .any(|s| s.abs() > NEGLIGIBLE_EDGE_SHARE * f64::from(self.shape.resolution_m))
         {
             let why = format!(
                 "its corner [{}, {}, {}] does not lie on a multiple of {} m, as OctoMap's cells do",
@@ -221,7 +221,7 @@ impl OccupancyMap {
 
     /// Sets the state of all cells in `from..to` along each axis. Panics beyond the grid.
     pub fn fill(&mut self, from: [u32; 3], to: [u32; 3], state: Occupancy) {
-        let [bx, by, _] = self.shape.bricks();
+        let [bx, by, _] = self.shape.brick_dims();
         let [xs, ys, zs] = [0, 1, 2].map(|axis| brick_masks(axis, from[axis], to[axis]));
         for &(k, z) in &zs {
             for &(j, y) in &ys {
@@ -241,21 +241,21 @@ impl OccupancyMap {
     }
 
     /// The bit grids that planner-core plans on; `unknown` says how unknown cells count.
-    pub fn to_voxel_map(&self, unknown: Unknown) -> VoxelMap {
+    pub fn to_voxel_map(&self, unknown: UnknownSpace) -> VoxelMap {
         let inside = self.inside_mask();
         let not_free: Vec<u64> =
             self.free.iter().zip(&inside).map(|(free, inside)| !free & inside).collect();
         let occupied = self.occupied.clone();
-        let (words, seen, never_sample, outside) = match unknown {
-            Unknown::Blocked => (not_free, Some(occupied), None, Outside::Blocked),
-            Unknown::Free => (occupied, None, Some(not_free), Outside::Free),
+        let (words, seen, never_sample, beyond_map) = match unknown {
+            UnknownSpace::Blocked => (not_free, Some(occupied), None, Outside::Blocked),
+            UnknownSpace::Free => (occupied, None, Some(not_free), Outside::Free),
         };
         VoxelMap {
             shape: self.shape,
             obstacle_words: words,
             occupied_words: seen,
             no_node_words: never_sample,
-            outside,
+            beyond_map,
         }
     }
 

@@ -33,38 +33,39 @@ pub(super) const INNER: u16 = 3;
 /// An inner node: two bits for each child, and the index of its first inner child; the others
 /// follow it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Inner {
-    pub(super) children: u16,
-    pub(super) first: u32,
+pub(super) struct InnerNode {
+    pub(super) child_codes: u16,
+    pub(super) first_inner_child: u32,
 }
 
-impl Inner {
-    pub(super) fn child(self, index: u32) -> u16 {
-        self.children >> (2 * index) & 3
+impl InnerNode {
+    pub(super) fn child_code(self, index: u32) -> u16 {
+        self.child_codes >> (2 * index) & 3
     }
 
     /// Index in the node list of the inner child in octant `index`.
     pub(super) fn inner_index(self, index: u32) -> usize {
-        let before = self.children & ((1 << (2 * index)) - 1);
+        let before = self.child_codes & ((1 << (2 * index)) - 1);
         let inner = before & before >> 1 & 0x5555;
-        self.first as usize + inner.count_ones() as usize
+        self.first_inner_child as usize + inner.count_ones() as usize
     }
 }
 
-/// A leaf: a cube of `size` smallest cells along each edge, whose lowest cell has the key `min`.
+/// A leaf: a cube of `edge_cells` smallest cells along each edge; its lowest cell has the key
+/// `min_key`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Leaf {
     /// Keys of the cube's lowest cell along x, y, z.
-    pub min: [u32; 3],
+    pub min_key: [u32; 3],
     /// Edge of the cube in smallest cells, a power of two.
-    pub size: u32,
+    pub edge_cells: u32,
     /// Whether the cube is an obstacle; otherwise it is free.
     pub occupied: bool,
 }
 
 /// Numbers of nodes and leaves of an octree, and their volumes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Counts {
+pub struct OctreeCounts {
     /// Number of all nodes, root and leaves included (OctoMap's `size()`).
     pub nodes: usize,
     /// Number of occupied leaves of any size.
@@ -81,12 +82,12 @@ pub struct Counts {
 #[derive(Clone, Debug)]
 pub struct Octree {
     resolution_m: f64,
-    /// Inner nodes; the root is the last. An empty octree has none.
-    pub(super) inner: Vec<Inner>,
+    /// InnerNode nodes; the root is the last. An empty octree has none.
+    pub(super) inner: Vec<InnerNode>,
 }
 
 impl Octree {
-    pub(super) fn from_parts(resolution_m: f64, inner: Vec<Inner>) -> Self {
+    pub(super) fn from_parts(resolution_m: f64, inner: Vec<InnerNode>) -> Self {
         Self { resolution_m, inner }
     }
 
@@ -120,7 +121,7 @@ impl Octree {
         self.resolution_m
     }
 
-    pub(super) fn root(&self) -> Option<Inner> {
+    pub(super) fn root(&self) -> Option<InnerNode> {
         self.inner.last().copied()
     }
 
@@ -131,26 +132,32 @@ impl Octree {
         }
     }
 
-    fn walk(&self, node: Inner, min: [u32; 3], size: u32, visit: &mut impl FnMut(Leaf)) {
+    fn walk(&self, node: InnerNode, min: [u32; 3], size: u32, visit: &mut impl FnMut(Leaf)) {
         for index in 0..8 {
             let child_min = octant_corner(min, size, index);
-            match node.child(index) {
+            match node.child_code(index) {
                 UNKNOWN => {}
                 INNER => self.walk(self.inner[node.inner_index(index)], child_min, size / 2, visit),
-                kind => visit(Leaf { min: child_min, size, occupied: kind == OCCUPIED }),
+                kind => {
+                    visit(Leaf {
+                        min_key: child_min,
+                        edge_cells: size,
+                        occupied: kind == OCCUPIED,
+                    });
+                }
             }
         }
     }
 
     /// State of the smallest cell with these keys; unknown beyond the key space.
-    pub fn at_key(&self, key: [u32; 3]) -> Occupancy {
+    pub fn occupancy_at_key(&self, key: [u32; 3]) -> Occupancy {
         let Some(mut node) = self.root() else { return Occupancy::Unknown };
         if key.iter().any(|&k| k >= KEYS_PER_AXIS) {
             return Occupancy::Unknown;
         }
         for bit in (0..TREE_DEPTH).rev() {
             let index = (key[0] >> bit & 1) | (key[1] >> bit & 1) << 1 | (key[2] >> bit & 1) << 2;
-            match node.child(index) {
+            match node.child_code(index) {
                 FREE => return Occupancy::Free,
                 OCCUPIED => return Occupancy::Occupied,
                 INNER => node = self.inner[node.inner_index(index)],
@@ -164,20 +171,21 @@ impl Octree {
     pub fn occupancy_at(&self, point: [f64; 3]) -> Occupancy {
         let key = point.map(|c| (c / self.resolution_m).floor() + f64::from(KEY_ORIGIN));
         if key.iter().all(|k| (0.0..f64::from(KEYS_PER_AXIS)).contains(k)) {
-            self.at_key(key.map(|k| k as u32))
+            self.occupancy_at_key(key.map(|k| k as u32))
         } else {
             Occupancy::Unknown
         }
     }
 
-    /// Counts nodes and leaves, and sums up volumes.
-    pub fn counts(&self) -> Counts {
-        let mut counts = Counts { nodes: usize::from(!self.inner.is_empty()), ..Counts::default() };
+    /// OctreeCounts nodes and leaves, and sums up volumes.
+    pub fn counts(&self) -> OctreeCounts {
+        let mut counts =
+            OctreeCounts { nodes: usize::from(!self.inner.is_empty()), ..OctreeCounts::default() };
         for node in &self.inner {
-            counts.nodes += (0..8).filter(|&i| node.child(i) != UNKNOWN).count();
+            counts.nodes += (0..8).filter(|&i| node.child_code(i) != UNKNOWN).count();
         }
         self.for_each_leaf(|leaf| {
-            let volume = (f64::from(leaf.size) * self.resolution_m).powi(3);
+            let volume = (f64::from(leaf.edge_cells) * self.resolution_m).powi(3);
             if leaf.occupied {
                 counts.occupied_leaves += 1;
                 counts.occupied_m3 += volume;
@@ -195,8 +203,8 @@ impl Octree {
         let (mut lo, mut hi) = ([KEYS_PER_AXIS; 3], [0; 3]);
         self.for_each_leaf(|leaf| {
             for axis in 0..3 {
-                lo[axis] = lo[axis].min(leaf.min[axis]);
-                hi[axis] = hi[axis].max(leaf.min[axis] + leaf.size);
+                lo[axis] = lo[axis].min(leaf.min_key[axis]);
+                hi[axis] = hi[axis].max(leaf.min_key[axis] + leaf.edge_cells);
             }
         });
         (hi[0] > 0).then_some((lo, hi))
@@ -218,11 +226,11 @@ fn octant_corner(min: [u32; 3], size: u32, index: u32) -> [u32; 3] {
 
 enum Child {
     Leaf(u16),
-    Inner(Inner),
+    Inner(InnerNode),
 }
 
 struct Builder<'a, F> {
-    inner: Vec<Inner>,
+    inner: Vec<InnerNode>,
     min: [u32; 3],
     end: [u32; 3],
     cell: &'a mut F,
@@ -243,7 +251,7 @@ impl<F: FnMut([u32; 3]) -> Occupancy> Builder<'_, F> {
             });
         }
         let mut children = 0;
-        let mut inner = heapless::Vec::<Inner, 8>::new();
+        let mut inner = heapless::Vec::<InnerNode, 8>::new();
         for index in 0..8 {
             let code = match self.build(octant_corner(corner, size / 2, index), size / 2) {
                 Child::Leaf(kind) => kind,
@@ -263,7 +271,7 @@ impl<F: FnMut([u32; 3]) -> Occupancy> Builder<'_, F> {
             _ => {
                 let first = self.inner.len() as u32;
                 self.inner.extend_from_slice(&inner);
-                Child::Inner(Inner { children, first })
+                Child::Inner(InnerNode { child_codes: children, first_inner_child: first })
             }
         }
     }

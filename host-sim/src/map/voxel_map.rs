@@ -16,13 +16,13 @@ pub struct VoxelMap {
     /// Bits of the cells in which no roadmap node may lie, if these are more than the obstacles.
     pub no_node_words: Option<Vec<u64>>,
     /// Whether the space beyond the map's faces is an obstacle.
-    pub outside: Outside,
+    pub beyond_map: Outside,
 }
 
 impl VoxelMap {
     /// The bit grid of obstacles that planner-core queries.
     pub fn grid(&self) -> VoxelGrid<'_> {
-        VoxelGrid::new(self.shape, self.outside, &self.obstacle_words)
+        VoxelGrid::new(self.shape, self.beyond_map, &self.obstacle_words)
             .expect("the words were made for the shape")
     }
 
@@ -66,7 +66,7 @@ impl VoxelMap {
 
     /// Whether a cell is an obstacle only because it is unknown. Panics for a cell outside the
     /// grid.
-    pub fn is_unknown(&self, cell: [u32; 3]) -> bool {
+    pub fn is_unknown_obstacle(&self, cell: [u32; 3]) -> bool {
         let (word, mask) = self.shape.word_and_mask(cell);
         self.occupied_words
             .as_ref()
@@ -77,7 +77,7 @@ impl VoxelMap {
     /// of the first obstacle below it, or `point` itself inside an obstacle. Without an obstacle it
     /// is the map's bottom if the outside is blocked, else `None`. Also `None` for a point beside
     /// or below the map.
-    pub fn ground_below(&self, point: &Point) -> Option<f32> {
+    pub fn ground_z_below_m(&self, point: &Point) -> Option<f32> {
         let mut inside = *point;
         inside.z =
             inside.z.clamp(self.shape.min.z, self.shape.max().z - self.shape.resolution_m / 2.0);
@@ -90,7 +90,7 @@ impl VoxelMap {
         let height = |k: u32| self.shape.min.z + k as f32 * self.shape.resolution_m;
         match cell {
             Some(k) => Some(height(k + 1).min(point.z)),
-            None => (self.outside == Outside::Blocked).then_some(self.shape.min.z),
+            None => (self.beyond_map == Outside::Blocked).then_some(self.shape.min.z),
         }
     }
 }

@@ -4,10 +4,10 @@
 use std::iter;
 
 use anyhow::{Context, anyhow, bail};
-use companion::margins::TRACKING_M;
+use companion::margins::CRUISE_TRACKING_ERROR_M;
 use companion::planner::coverage::{self, Error, Request};
 use companion::storage::mission_file::coverage::{
-    CoverageHeader, CoverageParts, CoverageView, Ground, PartEligibility, VehicleShare,
+    CoverageBlock, CoverageHeader, CoverageView, PartEligibility, UnevenGround, VehicleShare,
 };
 use companion::storage::mission_file::{MissionBlock, MissionKind};
 use companion::swarm::fleet::VehicleDivisionInput;
@@ -15,7 +15,7 @@ use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::flights::MAX_PATH_LENGTH_M;
 use planner_core::coverage::pack::TrackUnit;
-use planner_core::coverage::transit::Transit;
+use planner_core::coverage::transit::TransitGraph;
 use planner_core::flight::{PathError, WaypointRange};
 use planner_core::map::field::FieldView;
 use planner_core::plan::{PlanError, VehicleTask};
@@ -45,7 +45,7 @@ pub(super) fn prepare(
     board: Option<&'static BoardCapacity>,
 ) -> anyhow::Result<PreparedMission> {
     let planned = CoveragePlan::plan_as_companions(&scenario)?;
-    let Some(shares) = planned.shares.clone() else {
+    let Some(shares) = planned.binpat_shares.clone() else {
         bail!(
             "cannot be flown: {}: companions give parts to vehicles by the least sum of their ways, and those of method \"exact\" would then \
              take longer\nhint: `cover` writes its plans, which autopilots fly without a companion; \"powell-binpat\" can be flown",
@@ -66,7 +66,7 @@ pub(super) fn prepare(
         .collect();
     check_batteries(&planned)?;
     check_ground_clearance(&planned)?;
-    let top_m = TAKEOFF_HEIGHT_M.min(pictures_above_ground_m(planned.area_settings));
+    let top_m = TAKEOFF_HEIGHT_M.min(min_picture_above_ground_m(planned.area_settings));
     drop(planned);
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
@@ -87,12 +87,12 @@ pub(super) fn prepare(
     let mut schedule = schedule_config(&scenario);
     schedule.vertical_mps =
         climbs.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
-    let voxels = map.to_voxel_map(map::Unknown::Free);
+    let voxels = map.to_voxel_map(map::UnknownSpace::Free);
     let mut mission = PreparedMission::new(scenario, voxels, tasks, schedule, board);
     if let Some(terrain) = mission.scenario.area.as_ref().and_then(|area| area.terrain.as_ref()) {
-        mission.roadmap_or_field_file = terrain.field.to_vec();
+        mission.roadmap_or_field_file = terrain.field_file.to_vec();
     }
-    mission.encode_area(&climbs)?;
+    mission.encode_area_mission(&climbs)?;
     let mut ws = on_heap(HostAreaWorkspace::new);
     let plan = mission.plan_area(&[], iter::empty(), &mut ws)?;
     if ws.area.routes() != &routes {
@@ -101,7 +101,7 @@ pub(super) fn prepare(
             mission.scenario.path
         );
     }
-    mission.check_stretches(&plan)?;
+    mission.check_division_count(&plan)?;
     Ok(mission)
 }
 
@@ -109,15 +109,15 @@ pub(super) fn prepare(
 /// companions fly a route without a battery swap.
 fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
     for route in &planned.plan.routes {
-        let index = usize::from(route.vehicle);
+        let index = usize::from(route.vehicle_index);
         let vehicle = &planned.scenario.vehicles[index];
         let cruise_mps = planned.vehicles[index].cruise_mps;
         let beyond_hover = sorties::power_ratio_at_speed(cruise_mps) - 1.0;
-        let takes_s =
-            sorties::route_duration_s(planned, route) + beyond_hover * route.ground_m / cruise_mps;
+        let takes_s = sorties::route_duration_s(planned, route)
+            + beyond_hover * route.ground_length_m / cruise_mps;
         let lasts_s = vehicle.battery_hover_s();
         if takes_s > USABLE_CHARGE * lasts_s {
-            let hint = match planned.area_settings.batteries {
+            let hint = match planned.area_settings.allows_battery_swaps {
                 true => {
                     "`cover` writes a plan for each sortie, which autopilots fly without a companion"
                 }
@@ -128,7 +128,7 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
             bail!(
                 "area too large: {}: vehicle {} would need the charge of {:.0} s in a hover; its battery lasts {lasts_s:.0} s, \
                  and {:.0} % of that are for the landing\nhint: more vehicles, wider lanes, a higher cruise_mps and speed_max_mps take less time; {hint}",
-                planned.scenario.vehicle_places[index],
+                planned.scenario.vehicle_file_lines[index],
                 vehicle.id,
                 takes_s,
                 100.0 * (1.0 - USABLE_CHARGE)
@@ -141,16 +141,17 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
 /// Refuses pictures so low that a vehicle whose estimate is too high by the greatest error could
 /// touch the ground.
 fn check_ground_clearance(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
-    let height_m = pictures_above_ground_m(planned.area_settings);
+    let height_m = min_picture_above_ground_m(planned.area_settings);
     for vehicle in &planned.scenario.vehicles {
         let lower_m =
             margins::max_height_error_m(planned.scenario.simulation.estimator, vehicle.autopilot);
-        let least_m = lower_m + vehicle.radius_m + TRACKING_M;
+        let least_m = lower_m + vehicle.radius_m + CRUISE_TRACKING_ERROR_M;
         if height_m < least_m {
             bail!(
                 "pictures too low: {}: at {height_m:.2} m vehicle {} may touch the ground, {least_m:.2} m are needed\nhint: \
-                 its estimate may be {lower_m:.2} m too high, and it strays by {TRACKING_M} m",
-                planned.area_settings.place,
+                 its estimate may be {lower_m:.2} m too high, and it strays by \
+                 {CRUISE_TRACKING_ERROR_M} m",
+                planned.area_settings.file_line,
                 vehicle.id
             );
         }
@@ -168,36 +169,46 @@ pub fn division_method(scenario: &Scenario) -> CoverageMethod {
 fn ground_settings(
     area: &scenario::coverage::AreaSection,
     terrain: &Terrain,
-) -> anyhow::Result<Ground> {
+) -> anyhow::Result<UnevenGround> {
     let [low_m, high_m] = ground_height_range_m(terrain)?;
-    Ok(Ground { height_m: area.height_m, tolerance_m: terrain.tolerance_m, low_m, high_m })
+    Ok(UnevenGround {
+        min_height_above_ground_m: area.picture_height_m,
+        height_tolerance_m: terrain.tolerance_m,
+        low_m,
+        high_m,
+    })
 }
 
 /// Least height of the pictures above the ground, metres.
-fn pictures_above_ground_m(area: &scenario::coverage::AreaSection) -> f32 {
-    if area.terrain.is_some() { area.height_m } else { area.heights.mission_m }
+fn min_picture_above_ground_m(area: &scenario::coverage::AreaSection) -> f32 {
+    if area.terrain.is_some() { area.picture_height_m } else { area.heights.max_picture_height_m }
 }
 
 /// The lowest and the highest ground of a terrain, metres above the origin. The highest is limited
 /// to that of the field which paths follow.
 fn ground_height_range_m(terrain: &Terrain) -> anyhow::Result<[f32; 2]> {
-    let field = FieldView::parse(&terrain.field).map_err(|error| anyhow!("no field: {error}"))?;
-    let [low_m, high_m] = terrain.grid.range_m().context("no ground")?;
+    let field =
+        FieldView::parse(&terrain.field_file).map_err(|error| anyhow!("no field: {error}"))?;
+    let [low_m, high_m] = terrain.grid.height_range_m().context("no ground")?;
     Ok([low_m, high_m.min(field.highest_m())])
 }
 
 /// A map of level ground below area and pads. Over terrain its ground is at the terrain's lowest
 /// height; the real heights are then in the terrain's grid.
 fn ground_map(planned: &CoveragePlan<'_>) -> anyhow::Result<map::OccupancyMap> {
-    let places =
-        planned.area_settings.vertices.iter().chain(planned.vehicles.iter().map(|v| &v.place));
+    let places = planned
+        .area_settings
+        .vertices
+        .iter()
+        .chain(planned.vehicles.iter().map(|v| &v.transit_start));
     let (mut low, mut high) = (Point::repeat(f32::INFINITY), Point::repeat(f32::NEG_INFINITY));
     for place in places {
         let place = Point::new(place.x, place.y, 0.0);
         (low, high) = (low.inf(&place), high.sup(&place));
     }
     let heights = planned.area_settings.heights;
-    high.z = heights.mission_m + heights.layer_m * (planned.vehicles.len() + 1) as f32;
+    high.z = heights.max_picture_height_m
+        + heights.layer_spacing_m * (planned.vehicles.len() + 1) as f32;
     let around = Point::new(MAP_MARGIN_M, MAP_MARGIN_M, 0.0);
     high.z += MAP_MARGIN_M;
     if let Some(terrain) = &planned.area_settings.terrain {
@@ -210,7 +221,7 @@ fn ground_map(planned: &CoveragePlan<'_>) -> anyhow::Result<map::OccupancyMap> {
 impl PreparedMission {
     /// Encodes the mission file of an area, with each vehicle's weight in the division and its
     /// climb and descent speeds. Lanes are not in it: the companions plan them.
-    fn encode_area(&mut self, shares: &[VehicleShare]) -> anyhow::Result<()> {
+    fn encode_area_mission(&mut self, shares: &[VehicleShare]) -> anyhow::Result<()> {
         let Some(area) = &self.scenario.area else { return Ok(()) };
         let parts = match division_method(&self.scenario) {
             CoverageMethod::PowellBinpat | CoverageMethod::Exact => PartEligibility::Anyone,
@@ -220,18 +231,18 @@ impl PreparedMission {
             }
         };
         let header = CoverageHeader {
-            unit: match area.method {
+            assignment_unit: match area.method {
                 CoverageMethod::SimpleBinpat => TrackUnit::Lane,
                 _ => TrackUnit::Waypoint,
             },
-            parts,
-            heading: area.heading,
+            part_eligibility: parts,
+            heading_rule: area.heading,
             trigger: area.trigger,
             search_steps: coverage::BOARD_SEARCH_STEPS,
             heights: area.heights,
-            spacing: area.usable,
-            angle_deg: area.angle_deg,
-            margin_m: area.margin_m,
+            spacing: area.usable_spacing,
+            lane_angle_deg: area.lane_angle_deg,
+            lane_overshoot_m: area.lane_overrun_m,
             ground: area
                 .terrain
                 .as_ref()
@@ -239,7 +250,7 @@ impl PreparedMission {
                 .transpose()?,
         };
         let (rings, vertices) = (&area.rings[..], &area.vertices[..]);
-        let block = MissionBlock::Coverage(CoverageParts { header, shares, rings, vertices });
+        let block = MissionBlock::Coverage(CoverageBlock { header, shares, rings, vertices });
         self.mission_file = self.encode(&block)?;
         Ok(())
     }
@@ -315,7 +326,7 @@ impl PreparedMission {
         let (vertices, rings): (Vec<_>, Vec<_>) =
             (view.vertices().collect(), view.rings().collect());
         let zones = Area::new(&vertices, &rings)
-            .map(|area| Transit::<BOARD_NO_FLY_CORNERS>::empty().set_area(area));
+            .map(|area| TransitGraph::<BOARD_NO_FLY_CORNERS>::empty().set_area(area));
         if matches!(zones, Ok(Err(_))) {
             return Some(format!(
                 "more convex corners of no-fly zones, {} holds {BOARD_NO_FLY_CORNERS}",

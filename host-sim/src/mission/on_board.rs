@@ -74,7 +74,7 @@ impl PreparedMission {
     ) -> Result<u32, PlanError> {
         let mut workspace = on_heap(PlanWorkspace::<N, V, P>::new);
         let mut plan = on_heap(plan::SwarmPlan::<V, WAYPOINTS>::new);
-        planner::plan_goals(
+        planner::plan_goal_mission(
             &self.mission_view(),
             &self.roadmap_view(),
             board.gates,

@@ -11,10 +11,10 @@ use planner_core::roadmap::{MAX_EDGE_M, RoadmapHeader};
 use planner_core::schedule::ScheduleConfig;
 
 use crate::map::VoxelMap;
-use crate::map::column::{ColumnError, ground_below_column, nearest_column};
+use crate::map::column::{ColumnError, ground_below_clear_column, nearest_clear_column};
 use crate::roadmap::passages::WantedConnection;
 use crate::roadmap::{self, BuildTimes, BuiltRoadmap};
-use crate::scenario::{self, Scenario, Terminals};
+use crate::scenario::{self, Scenario, TerminalEdges};
 
 /// Spacing of the grid on which slots around a single goal are searched, metres.
 const SLOT_GRID_M: f32 = 0.25;
@@ -31,7 +31,7 @@ pub(super) fn climb_height_m(
     radius_m: f32,
 ) -> anyhow::Result<f32> {
     let required_m = radius_m + scenario.roadmap.safety_margin_m;
-    let error = match ground_below_column(map, point, radius_m, required_m) {
+    let error = match ground_below_clear_column(map, point, radius_m, required_m) {
         Ok(ground_m) => return Ok(point.z - ground_m - radius_m),
         Err(error) => error,
     };
@@ -55,7 +55,7 @@ pub(super) fn climb_height_m(
             point.z - ground_m,
             ground_m + radius_m
         ),
-        ColumnError::TooNear { place, distance_m, unknown } => {
+        ColumnError::TooNear { obstacle_point: place, distance_m, unknown } => {
             let obstacle = if unknown { "unknown space" } else { "an obstacle" };
             format!(
                 "{what} has too little room between it and the ground: {at} needs {required_m:.2} m around its column, \
@@ -64,7 +64,7 @@ pub(super) fn climb_height_m(
             )
         }
     };
-    match nearest_column(map, point, radius_m, required_m) {
+    match nearest_clear_column(map, point, radius_m, required_m) {
         Some(place) => {
             bail!(
                 "{why}\nhint: the nearest place that would do is [{}, {}, {}]",
@@ -86,13 +86,13 @@ pub(super) fn vehicle_tasks(
     map: &VoxelMap,
 ) -> anyhow::Result<Vec<VehicleTask>> {
     let task = |(i, vehicle): (usize, &scenario::VehicleSection)| {
-        let place = scenario.vehicle_places.get(i);
+        let place = scenario.vehicle_file_lines.get(i);
         let what = format!("start of vehicle {}", vehicle.id);
         Ok(VehicleTask {
             id: vehicle.id,
             required_clearance_m: vehicle.radius_m + scenario.roadmap.safety_margin_m,
             climb_m: climb_height_m(scenario, map, &what, place, &vehicle.start, vehicle.radius_m)?,
-            goal: vehicle.goal.map(|goal| goal as u16),
+            goal: vehicle.goal_index.map(|goal| goal as u16),
         })
     };
     scenario.vehicles.iter().enumerate().map(task).collect()
@@ -110,7 +110,8 @@ pub(super) fn goal_points(
         return Ok(given.clone());
     }
     let (goal, wanted) = (given[0], scenario.vehicles.len());
-    let (largest_m, required_m) = (scenario.largest_radius_m(), scenario.required_clearance_m());
+    let (largest_m, required_m) =
+        (scenario.largest_radius_m(), scenario.max_required_clearance_m());
     // A vehicle that has landed in one slot must not keep another from landing in the next.
     let apart_m = schedule.separation_m.max(schedule.parked_separation_m);
     // Half the side of the square that is searched, metres: it fits that many slots, with room to
@@ -127,7 +128,7 @@ pub(super) fn goal_points(
         if apart
             && scenario.mission.geofence.as_ref().is_none_or(|fence| fence.contains(&slot))
             && segment_is_clear(&map.grid(), &goal, &slot, required_m)
-            && ground_below_column(map, &slot, largest_m, required_m).is_ok()
+            && ground_below_clear_column(map, &slot, largest_m, required_m).is_ok()
         {
             slots.push(slot);
             if slots.len() == wanted {
@@ -139,14 +140,14 @@ pub(super) fn goal_points(
         "no room at the single goal: {}: only {} of {wanted} vehicles find a place {apart_m} m apart in sight of it\n\
          hint: a goal with {reach_m:.0} m of free floor around it has room for all; fewer vehicles or a smaller \
          deconfliction.safety_distance_m need less",
-        scenario.mission.goal_places.first().unwrap_or(&scenario.path),
+        scenario.mission.goal_file_lines.first().unwrap_or(&scenario.path),
         slots.len()
     )
 }
 
 /// Shortest and longest edge of the roadmap, metres; lengths given as shares are of the map's
 /// longest side.
-fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32)> {
+fn edge_length_limits_m(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32)> {
     let settings = &scenario.roadmap;
     let size_m = (map.shape.max() - map.shape.min).max();
     let metres = |share: Option<f32>, metres: f32| share.map_or(metres, |share| share * size_m);
@@ -168,11 +169,11 @@ fn wanted_connections(scenario: &Scenario, goals: usize) -> Vec<WantedConnection
     let vehicles = scenario.vehicles.len();
     let pairs = scenario.vehicles.iter().enumerate().flat_map(|(start, vehicle)| {
         let required_m = vehicle.radius_m + scenario.roadmap.safety_margin_m;
-        let own = move |goal: &usize| vehicle.goal.is_none_or(|own| own == *goal);
+        let own = move |goal: &usize| vehicle.goal_index.is_none_or(|own| own == *goal);
         (0..goals).filter(own).map(move |goal| WantedConnection {
-            start,
-            goal: vehicles + goal,
-            required_m,
+            start_node: start,
+            goal_node: vehicles + goal,
+            required_clearance_m: required_m,
         })
     });
     pairs.collect()
@@ -189,7 +190,7 @@ pub(super) fn build_roadmap(
     // Edges are tested with the clearance of the smallest vehicle; the search of a larger one skips
     // edges whose stored clearance is too small for it.
     let smallest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(f32::INFINITY, f32::min);
-    let (edge_min_m, edge_max_m) = edge_lengths(scenario, map)?;
+    let (edge_min_m, edge_max_m) = edge_length_limits_m(scenario, map)?;
     // Nodes keep `safety_margin_m` from the geofence: a vehicle beyond it lands. The fence is a
     // box, so an edge between two nodes inside lies inside.
     let room = Point::repeat(settings.safety_margin_m);
@@ -197,7 +198,7 @@ pub(super) fn build_roadmap(
     let fenced = fence.map(|f| map.with_nodes_inside(&(f.min + room), &(f.max - room)));
     let map = fenced.as_ref().unwrap_or(map);
     let config = PrmConfig {
-        nodes: settings.nodes as usize,
+        random_nodes: settings.random_nodes as usize,
         edge_min_m,
         edge_max_m,
         clearance_m: smallest_m + settings.safety_margin_m,
@@ -206,13 +207,13 @@ pub(super) fn build_roadmap(
     };
     let (mut roadmap, mut parts) = roadmap::build(map, &terminals, &config)?;
     let keep_apart = |roadmap: &mut BuiltRoadmap| {
-        if settings.terminals == Terminals::Apart {
+        if settings.terminal_edges == TerminalEdges::Forbidden {
             let is_terminal = |node: u16| usize::from(node) < terminals.len();
             roadmap.edges.retain(|edge| !(is_terminal(edge.a) && is_terminal(edge.b)));
         }
     };
     keep_apart(&mut roadmap);
-    if settings.passages {
+    if settings.adds_passages {
         let searching = Instant::now();
         roadmap::add_passages(
             map,

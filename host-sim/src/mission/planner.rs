@@ -54,10 +54,10 @@ impl
 pub struct HostPlanner<'a> {
     mission: &'a PreparedMission,
     /// Plan of the whole mission, which is the same for all companions.
-    plan: &'a HostPlan,
+    initial_plan: &'a HostPlan,
     files: PlanFiles<'a>,
     workspaces: HostWorkspaces,
-    swarm: Box<HostPlan>,
+    swarm_plan: Box<HostPlan>,
     own: Box<OwnPlanMemory<VEHICLES, WAYPOINTS, GATES, ZONES>>,
 }
 
@@ -71,8 +71,15 @@ impl<'a> HostPlanner<'a> {
             roadmap: RoadmapView::parse(file).ok(),
             field: FieldView::parse(file).ok(),
         };
-        let (swarm, own) = (on_heap(HostPlan::new), on_heap(OwnPlanMemory::new));
-        Self { mission, plan, files, workspaces: HostWorkspaces::default(), swarm, own }
+        let (swarm_plan, own) = (on_heap(HostPlan::new), on_heap(OwnPlanMemory::new));
+        Self {
+            mission,
+            initial_plan: plan,
+            files,
+            workspaces: HostWorkspaces::default(),
+            swarm_plan,
+            own,
+        }
     }
 
     /// Makes the plan of kind `wanted` that the companion of vehicle `index` requests.
@@ -89,13 +96,13 @@ impl<'a> HostPlanner<'a> {
         let requested = requested.ok_or(PlanFailure::Unreachable)?;
         if wanted == PlanKind::Mission && companion.excluded_waypoints().is_empty() {
             // A board computes this plan; here it is computed once for all vehicles.
-            self.own.plan = *self.mission.own_plan(self.plan, index)?;
+            self.own.plan = *self.mission.own_plan(self.initial_plan, index)?;
             return Ok(&self.own.plan);
         }
-        let memory = PlanningMemory::new(&mut self.workspaces, &mut self.swarm, &mut self.own);
+        let memory = PlanningMemory::new(&mut self.workspaces, &mut self.swarm_plan, &mut self.own);
         let mut memory = PlanningMemory { max_gates: self.mission.max_gates(), ..memory };
         let system_id = self.mission.tasks[index].id;
-        planner::answer(&self.files, system_id, &requested, &mut memory)?;
+        planner::answer_plan_request(&self.files, system_id, &requested, &mut memory)?;
         Ok(&self.own.plan)
     }
 }

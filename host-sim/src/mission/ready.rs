@@ -19,7 +19,7 @@ use planner_core::schedule::ScheduleConfig;
 use crate::capacity::{BoardCapacity, GATES, VEHICLES, WAYPOINTS};
 use crate::map::{ClearanceField, VoxelMap};
 use crate::margins;
-use crate::result::{RoadmapSize, Timing};
+use crate::result::{RoadmapCounts, Timing};
 use crate::roadmap::BuiltRoadmap;
 use crate::scenario::{self, Scenario};
 
@@ -89,7 +89,11 @@ impl PreparedMission {
             scenario,
             map,
             goals: Vec::new(),
-            roadmap: BuiltRoadmap { nodes: Vec::new(), edges: Vec::new(), heights_m: Vec::new() },
+            roadmap: BuiltRoadmap {
+                nodes: Vec::new(),
+                edges: Vec::new(),
+                heights_above_ground_m: Vec::new(),
+            },
             roadmap_or_field_file: Vec::new(),
             mission_file: Vec::new(),
             tasks,
@@ -132,20 +136,20 @@ impl PreparedMission {
     /// Height of the ground on which a vehicle that sinks vertically from `place` would come to
     /// stand, metres ENU; `None` where the map has no ground below. In a coverage mission it is the
     /// height of the terrain, or the top of an obstacle of the area's map where that is higher.
-    pub fn ground_below(&self, place: &Point) -> Option<f32> {
-        let below_m = self.map.ground_below(place)?;
+    pub fn ground_z_below_m(&self, place: &Point) -> Option<f32> {
+        let below_m = self.map.ground_z_below_m(place)?;
         let Some(area) = &self.scenario.area else { return Some(below_m) };
         let terrain_m = area.terrain.as_ref().and_then(|t| t.grid.height_at(&place.xy()));
-        let top_m = area.obstacles.as_ref().and_then(|o| o.map.ground_below(place));
+        let top_m = area.obstacles.as_ref().and_then(|o| o.map.ground_z_below_m(place));
         Some(terrain_m.unwrap_or(below_m).max(top_m.unwrap_or(f32::NEG_INFINITY)))
     }
 
     /// Numbers of nodes and edges of the roadmap, and length of the roadmap or field file, bytes.
-    pub fn roadmap_size(&self) -> RoadmapSize {
-        RoadmapSize {
+    pub fn roadmap_counts(&self) -> RoadmapCounts {
+        RoadmapCounts {
             nodes: self.roadmap.nodes.len(),
             edges: self.roadmap.edges.len(),
-            bytes: self.roadmap_or_field_file.len(),
+            file_bytes: self.roadmap_or_field_file.len(),
         }
     }
 
@@ -196,7 +200,7 @@ impl PreparedMission {
             .zip(&self.tasks)
             .map(|(vehicle, &task)| MissionVehicle {
                 task,
-                start: vehicle.start,
+                path_start: vehicle.start,
                 radius_m: vehicle.radius_m,
                 speed_max_mps: vehicle.speed_max_mps,
             })
@@ -215,7 +219,9 @@ fn parse_roadmap(roadmap_file: &[u8]) -> RoadmapView<'_> {
 fn planner_mode(mission: &scenario::MissionSection) -> GoalMode {
     match (mission.mode, mission.objective) {
         (scenario::MissionMode::Labelled, _) => GoalMode::Labelled,
-        (_, scenario::AssignmentObjective::Total) => GoalMode::Unlabelled(Objective::TotalDistance),
+        (_, scenario::AssignmentObjective::TotalDistance) => {
+            GoalMode::Unlabelled(Objective::TotalDistance)
+        }
         (_, scenario::AssignmentObjective::Makespan) => GoalMode::Unlabelled(Objective::Makespan),
     }
 }

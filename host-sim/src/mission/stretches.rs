@@ -13,7 +13,7 @@ const DIVISIONS_RESERVED_FOR_LOSSES: usize = 3;
 
 /// Time at which a flight, by its plan, will request a division, seconds after the start; `None` if
 /// the whole route fits into its path.
-fn division_due_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
+fn division_request_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     let Task::Photograph(photographs) = &flight.task else { return None };
     let end_m = photographs.last_picture_m(&flight.path).filter(|_| photographs.is_first_part)?;
     let end = flight.path.waypoints().iter().find(|waypoint| waypoint.along_m >= end_m)?;
@@ -48,16 +48,16 @@ fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> VehicleDivisionInp
 /// stretch requests; `None` if every route fits into its path.
 pub fn next_division_inputs(plan: &HostPlan) -> Option<Vec<VehicleDivisionInput>> {
     let hold_s =
-        plan.flights.iter().filter_map(division_due_s).min_by(f32::total_cmp)? + COMMITMENT_S;
+        plan.flights.iter().filter_map(division_request_s).min_by(f32::total_cmp)? + COMMITMENT_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();
-    flights.sort_by_key(|flight| flight.id);
+    flights.sort_by_key(|flight| flight.vehicle_id);
     Some(flights.into_iter().map(|flight| division_input_at(flight, hold_s)).collect())
 }
 
 impl PreparedMission {
     /// Refuses a mission whose routes take more divisions without a loss than `MAX_DIVISIONS` less
     /// the reserve.
-    pub(super) fn check_stretches(&self, plan: &HostPlan) -> anyhow::Result<()> {
+    pub(super) fn check_division_count(&self, plan: &HostPlan) -> anyhow::Result<()> {
         let mut losses: Vec<Vec<VehicleDivisionInput>> = Vec::new();
         let mut next = next_division_inputs(plan);
         while let Some(inputs) = next {

@@ -2,18 +2,18 @@
 //! beside the paper's values, and draws the paper's Figs. 8 to 10, 12 and 13 in the report.
 //!
 //! The paper states neither areas nor places of the vehicles, camera, V_a (climb speed), V_d
-//! (descent speed) or Δh (layer spacing). Ours are in `SHORT_TRACK`, `LONG_TRACK`, `CONVEX`,
-//! `COMPARED_AREAS` and `TABLE_4_AREA`; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as
-//! lanes. The paper's times in Tables A1 to A12 were flown in Gazebo; ours are the planned costs
-//! C_k, without turns. CV is 100 · SD / Av in both, with SD the sample standard deviation.
+//! (descent speed) or Δh (layer spacing). Ours are in `SHORT_TRACK_POLYGON`, `LONG_TRACK_POLYGON`,
+//! `TABLE_2_AREA`, `FIG_9_AREAS` and `TABLE_4_AREA`; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far
+//! apart as lanes. The paper's times in Tables A1 to A12 were flown in Gazebo; ours are the planned
+//! costs C_k, without turns. CV is 100 · SD / Av in both, with SD the sample standard deviation.
 
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
 use super::cpp_data::{
-    FLIGHT_TIMES_TABLES, LONG_TRACK_COLUMNS, MEAN_LARGEST_TIME_S, PLANNING_S, REAL_FLIGHT_TIMES_S,
-    SHORT_TRACK_COLUMNS, TABLE_2_COSTS_M, TABLE_4_COSTS_M,
+    FLIGHT_TIMES_TABLES, LONG_TRACK_COLUMNS, MEAN_LARGEST_TIME_S, PAPER_PLANNING_TIMES_S,
+    REAL_FLIGHT_TIMES_S, SHORT_TRACK_COLUMNS, TABLE_2_COSTS_M, TABLE_4_COSTS_M,
 };
 use super::cpp_figures;
 use super::cpp_rows::{TableRow, ValueSummary};
@@ -29,13 +29,13 @@ use crate::scenario::{self, Scenario};
 use crate::{output, report};
 
 /// Polygon of the short track, east and north in metres: lanes of up to 150 m.
-const SHORT_TRACK: &str = "[[0, 0], [150, 0], [150, 180], [0, 180]]";
+const SHORT_TRACK_POLYGON: &str = "[[0, 0], [150, 0], [150, 180], [0, 180]]";
 /// Polygon of the long track, east and north in metres: lanes of up to 320 m.
-const LONG_TRACK: &str = "[[0, 0], [320, 0], [320, 420], [0, 420]]";
+const LONG_TRACK_POLYGON: &str = "[[0, 0], [320, 0], [320, 420], [0, 420]]";
 /// Polygon of Table 2, east and north in metres: convex, five vertices.
-const CONVEX: &str = "[[0, 0], [140, -20], [170, 70], [100, 130], [10, 110]]";
+const TABLE_2_AREA: &str = "[[0, 0], [140, -20], [170, 70], [100, 130], [10, 110]]";
 /// Polygons of the two further areas of Fig. 9, east and north in metres: both convex.
-const COMPARED_AREAS: [&str; 2] = [
+const FIG_9_AREAS: [&str; 2] = [
     "[[0, 0], [300, 0], [340, 110], [160, 190], [0, 150]]",
     "[[0, 0], [200, -15], [260, 120], [90, 200]]",
 ];
@@ -71,14 +71,14 @@ fn paper_scenario(
     Ok(scenario::parse(&text, "paper cpp")?)
 }
 
-fn in_a_row(count: usize) -> Vec<[f64; 2]> {
+fn starts_in_a_row(count: usize) -> Vec<[f64; 2]> {
     (0..count).map(|i| [5.0 * i as f64, -20.0]).collect()
 }
 
 /// Rows of all tables, and whether every plan so far passed its check.
 struct Tables {
     rows: Vec<TableRow>,
-    complete: bool,
+    all_checks_passed: bool,
     /// Cost in seconds and `result.json` of the plan with the greatest cost so far; a plan in which
     /// the check found a fault ranks above all others.
     worst: Option<(f64, serde_json::Value)>,
@@ -96,7 +96,7 @@ impl Tables {
         let planned = CoveragePlan::new(scenario, method)?;
         let findings = check_plan(&planned);
         let result = cover_result(&planned, &findings);
-        self.complete &= findings.is_clean();
+        self.all_checks_passed &= findings.is_clean();
         let rank =
             f64::from(planned.plan.max_cost_s()) + if findings.is_clean() { 0.0 } else { 1e9 };
         if self.worst.as_ref().is_none_or(|(worst, _)| rank > *worst) {
@@ -105,12 +105,12 @@ impl Tables {
         let mut costs = vec![0.0; scenario.vehicles.len()];
         for route in &planned.plan.routes {
             let cost = if unit == "m" { route.cost_m } else { route.cost_s };
-            costs[usize::from(route.vehicle)] = rounded(cost);
+            costs[usize::from(route.vehicle_index)] = rounded(cost);
         }
         Ok(costs)
     }
 
-    fn add(
+    fn add_row(
         &mut self,
         table: &str,
         method: CoverageMethod,
@@ -145,7 +145,7 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let mut results =
         ResultFiles::open(out, &[&output::RESULT_FILES[..], &["tables.json"]].concat())?;
-    let mut tables = Tables { rows: Vec::new(), complete: true, worst: None };
+    let mut tables = Tables { rows: Vec::new(), all_checks_passed: true, worst: None };
     table_2(&mut tables)?;
     let planning = table_3(&mut tables)?;
     table_4(&mut tables)?;
@@ -156,13 +156,13 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     results.add("tables.json", result::json(&tables.rows)?.as_bytes())?;
     let (_, mut worst) = tables.worst.clone().unwrap_or_default();
     worst["command"] = "paper cpp".into();
-    worst["complete"] = tables.complete.into();
+    worst["complete"] = tables.all_checks_passed.into();
     results.add(output::RESULT_FILES[0], result::json(&worst)?.as_bytes())?;
     let plan_s = planning.iter().flatten().sum();
     let timing = Timing { plan_s, wall_s: began.elapsed().as_secs_f64(), ..Timing::default() };
     results.add(output::RESULT_FILES[1], result::json(&timing)?.as_bytes())?;
     // The page's 3D scene shows Fig. 8 d: the plan of Table 2 by POWELL-BINPAT.
-    let scenario = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
+    let scenario = paper_scenario(TABLE_2_AREA, &starts_in_a_row(3), 10.0, 35.0)?;
     let planned = CoveragePlan::new(&scenario, CoverageMethod::PowellBinpat)?;
     let findings = check_plan(&planned);
     let result = serde_json::to_value(cover_result(&planned, &findings))?;
@@ -173,17 +173,21 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     say!();
     say!(
         "{}",
-        if tables.complete { "complete" } else { "NOT COMPLETE: a plan leaves something out" }
+        if tables.all_checks_passed {
+            "complete"
+        } else {
+            "NOT COMPLETE: a plan leaves something out"
+        }
     );
-    Ok(if tables.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+    Ok(if tables.all_checks_passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 /// The paper's Figs. 8 to 10, 12 and 13, drawn with our plans and costs.
 fn paper_figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
-    let convex = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
+    let convex = paper_scenario(TABLE_2_AREA, &starts_in_a_row(3), 10.0, 35.0)?;
     let compared = [
-        paper_scenario(COMPARED_AREAS[0], &in_a_row(3), 10.0, 35.0)?,
-        paper_scenario(COMPARED_AREAS[1], &in_a_row(3), 10.0, 35.0)?,
+        paper_scenario(FIG_9_AREAS[0], &starts_in_a_row(3), 10.0, 35.0)?,
+        paper_scenario(FIG_9_AREAS[1], &starts_in_a_row(3), 10.0, 35.0)?,
     ];
     let small = paper_scenario(TABLE_4_AREA, &TABLE_4_STARTS, 10.0, 35.0)?;
     let [fig_8, fig_9, fig_10] = cpp_figures::route_figures(&convex, &compared, &small)?;
@@ -192,10 +196,10 @@ fn paper_figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
 }
 
 fn table_2(tables: &mut Tables) -> anyhow::Result<()> {
-    let scenario = paper_scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
+    let scenario = paper_scenario(TABLE_2_AREA, &starts_in_a_row(3), 10.0, 35.0)?;
     for (method, theirs) in METHODS.into_iter().zip(TABLE_2_COSTS_M) {
         let ours = tables.plan_costs(&scenario, method, "m")?;
-        tables.add("2", method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
+        tables.add_row("2", method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
     }
     Ok(())
 }
@@ -207,7 +211,7 @@ fn table_3(tables: &mut Tables) -> anyhow::Result<[[f64; 6]; 3]> {
     let mut all = [[0.0; 6]; 3];
     for (row, method) in all.iter_mut().zip(METHODS) {
         for (slot, count) in row.iter_mut().zip(2..) {
-            let scenario = paper_scenario(CONVEX, &in_a_row(count), 10.0, 35.0)?;
+            let scenario = paper_scenario(TABLE_2_AREA, &starts_in_a_row(count), 10.0, 35.0)?;
             let mut times = Vec::with_capacity(TIMED_RUNS);
             for _ in 0..TIMED_RUNS {
                 times.push(CoveragePlan::new(&scenario, method)?.computing_s.iter().sum::<f64>());
@@ -216,9 +220,9 @@ fn table_3(tables: &mut Tables) -> anyhow::Result<[[f64; 6]; 3]> {
             *slot = times[TIMED_RUNS / 2];
         }
     }
-    for ((method, ours), theirs) in METHODS.into_iter().zip(all).zip(PLANNING_S) {
+    for ((method, ours), theirs) in METHODS.into_iter().zip(all).zip(PAPER_PLANNING_TIMES_S) {
         let ms = |times: [f64; 6]| times.map(|s| rounded((s * 1e3) as f32)).to_vec();
-        tables.add("3", method, (10.0, 35.0), PLANNING_UNIT, [ms(ours), ms(theirs)]);
+        tables.add_row("3", method, (10.0, 35.0), PLANNING_UNIT, [ms(ours), ms(theirs)]);
     }
     Ok(all)
 }
@@ -229,7 +233,7 @@ fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
     let scenario = paper_scenario(TABLE_4_AREA, &TABLE_4_STARTS, 10.0, 35.0)?;
     for (method, theirs) in METHODS[1..].iter().zip(TABLE_4_COSTS_M) {
         let ours = tables.plan_costs(&scenario, *method, "m")?;
-        tables.add("4", *method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
+        tables.add_row("4", *method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
     }
     Ok(())
 }
@@ -238,20 +242,21 @@ fn flight_times_tables(tables: &mut Tables) -> anyhow::Result<()> {
     let mut mean_max = [[0.0; 3]; 2];
     for table in &FLIGHT_TIMES_TABLES {
         let method = CoverageMethod::named(table.method).map_err(anyhow::Error::msg)?;
-        let (polygon, columns) = if table.long {
-            (LONG_TRACK, LONG_TRACK_COLUMNS)
+        let (polygon, columns) = if table.is_long_track {
+            (LONG_TRACK_POLYGON, LONG_TRACK_COLUMNS)
         } else {
-            (SHORT_TRACK, SHORT_TRACK_COLUMNS)
+            (SHORT_TRACK_POLYGON, SHORT_TRACK_COLUMNS)
         };
         for (spacing, theirs) in columns.into_iter().zip(table.times_s) {
-            let scenario = paper_scenario(polygon, &in_a_row(theirs.len()), spacing.0, spacing.1)?;
+            let scenario =
+                paper_scenario(polygon, &starts_in_a_row(theirs.len()), spacing.0, spacing.1)?;
             let ours = tables.plan_costs(&scenario, method, "s")?;
             let index = METHODS.iter().position(|m| *m == method).unwrap_or(0);
-            mean_max[usize::from(table.long)][index] +=
+            mean_max[usize::from(table.is_long_track)][index] +=
                 ours.iter().copied().fold(0.0, f64::max) / 12.0;
-            tables.add(table.name, method, spacing, "s", [ours, theirs.to_vec()]);
+            tables.add_row(table.name, method, spacing, "s", [ours, theirs.to_vec()]);
             if let Some(row) = tables.rows.last_mut() {
-                row.track = Some(if table.long { "long" } else { "short" });
+                row.track = Some(if table.is_long_track { "long" } else { "short" });
             }
         }
     }
@@ -260,17 +265,17 @@ fn flight_times_tables(tables: &mut Tables) -> anyhow::Result<()> {
     {
         for (i, method) in METHODS.into_iter().enumerate() {
             let both = [vec![rounded(ours[i] as f32)], vec![theirs[i]]];
-            tables.add(track, method, (0.0, 0.0), "s", both);
+            tables.add_row(track, method, (0.0, 0.0), "s", both);
         }
     }
     Ok(())
 }
 
 fn table_6(tables: &mut Tables) -> anyhow::Result<()> {
-    let scenario = paper_scenario(SHORT_TRACK, &in_a_row(3), 10.0, 20.0)?;
+    let scenario = paper_scenario(SHORT_TRACK_POLYGON, &starts_in_a_row(3), 10.0, 20.0)?;
     for (method, theirs) in METHODS.into_iter().zip(REAL_FLIGHT_TIMES_S) {
         let ours = tables.plan_costs(&scenario, method, "s")?;
-        tables.add("6", method, (10.0, 20.0), "s", [ours, theirs.to_vec()]);
+        tables.add_row("6", method, (10.0, 20.0), "s", [ours, theirs.to_vec()]);
     }
     Ok(())
 }
@@ -307,7 +312,7 @@ fn print_planning(ours: &[[f64; 6]; 3]) {
         "Table 3, planning time in ms for 2 to 7 UAVs: ours (this machine), theirs (Ryzen 7 3750H, Python)"
     );
     let line = |times: &[f64; 6]| times.map(|s| format!("{:>9.3}", s * 1e3)).join(" ");
-    for ((method, ours), theirs) in METHODS.into_iter().zip(ours).zip(PLANNING_S) {
+    for ((method, ours), theirs) in METHODS.into_iter().zip(ours).zip(PAPER_PLANNING_TIMES_S) {
         say!("{:<13}  ours   {}", method.name(), line(ours));
         say!("{:<13}  theirs {}", "", line(&theirs));
     }

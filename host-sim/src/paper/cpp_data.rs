@@ -6,7 +6,7 @@ pub(super) struct FlightTimesTable {
     /// Number of the table.
     pub(super) name: &'static str,
     /// Whether the track is the long one, with lanes of 320 m; the short one has lanes of 150 m.
-    pub(super) long: bool,
+    pub(super) is_long_track: bool,
     /// The method.
     pub(super) method: &'static str,
     /// Flight times, seconds: for each of the table's six columns one value a vehicle.
@@ -24,7 +24,7 @@ pub(super) const LONG_TRACK_COLUMNS: [(f64, f64); 6] =
 pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     FlightTimesTable {
         name: "A1",
-        long: false,
+        is_long_track: false,
         method: "simple-binpat",
         times_s: [
             &[318.0, 331.0, 312.0],
@@ -37,7 +37,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A2",
-        long: false,
+        is_long_track: false,
         method: "binpat",
         times_s: [
             &[214.0, 232.0, 244.0],
@@ -50,7 +50,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A3",
-        long: false,
+        is_long_track: false,
         method: "powell-binpat",
         times_s: [
             &[243.0, 258.0, 245.0],
@@ -63,7 +63,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A4",
-        long: false,
+        is_long_track: false,
         method: "simple-binpat",
         times_s: [
             &[225.0, 232.0, 249.0, 222.0, 222.0],
@@ -76,7 +76,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A5",
-        long: false,
+        is_long_track: false,
         method: "binpat",
         times_s: [
             &[237.0, 204.0, 210.0, 229.0, 244.0],
@@ -89,7 +89,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A6",
-        long: false,
+        is_long_track: false,
         method: "powell-binpat",
         times_s: [
             &[228.0, 213.0, 237.0, 240.0, 246.0],
@@ -102,7 +102,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A7",
-        long: true,
+        is_long_track: true,
         method: "simple-binpat",
         times_s: [
             &[817.0, 834.0, 749.0],
@@ -115,7 +115,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A8",
-        long: true,
+        is_long_track: true,
         method: "binpat",
         times_s: [
             &[859.0, 891.0, 915.0],
@@ -128,7 +128,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A9",
-        long: true,
+        is_long_track: true,
         method: "powell-binpat",
         times_s: [
             &[855.0, 894.0, 898.0],
@@ -141,7 +141,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A10",
-        long: true,
+        is_long_track: true,
         method: "simple-binpat",
         times_s: [
             &[579.0, 619.0, 583.0, 544.0, 685.0],
@@ -154,7 +154,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A11",
-        long: true,
+        is_long_track: true,
         method: "binpat",
         times_s: [
             &[614.0, 633.0, 577.0, 608.0, 672.0],
@@ -167,7 +167,7 @@ pub(super) const FLIGHT_TIMES_TABLES: [FlightTimesTable; 12] = [
     },
     FlightTimesTable {
         name: "A12",
-        long: true,
+        is_long_track: true,
         method: "powell-binpat",
         times_s: [
             &[560.0, 602.0, 614.0, 557.0, 645.0],
@@ -185,7 +185,7 @@ pub(super) const TABLE_2_COSTS_M: [[f64; 3]; 3] =
     [[963.81, 944.65, 644.58], [928.75, 900.34, 789.27], [908.75, 911.77, 904.72]];
 
 /// Table 3: planning times, seconds, by method, for 2 to 7 vehicles.
-pub(super) const PLANNING_S: [[f64; 6]; 3] = [
+pub(super) const PAPER_PLANNING_TIMES_S: [[f64; 6]; 3] = [
     [0.000748, 0.001474, 0.001522, 0.001961, 0.003479, 0.004275],
     [0.0021, 0.002244, 0.002756, 0.003125, 0.003365, 0.003924],
     [0.296894, 0.301134, 0.512768, 1.419654, 1.853162, 1.96757],

@@ -103,7 +103,8 @@ fn route_map(title: String, planned: &CoveragePlan<'_>, content: MapContent) -> 
     let (mut costs, mut most_s) = (Vec::new(), 0.0f32);
     let vehicles = planned.scenario.vehicles.iter().enumerate();
     let route = |(index, vehicle): (usize, &crate::scenario::VehicleSection)| {
-        let own = flights.iter().find(|(sortie, _, _)| usize::from(sortie.route.vehicle) == index);
+        let own =
+            flights.iter().find(|(sortie, _, _)| usize::from(sortie.route.vehicle_index) == index);
         let own = own.filter(|_| content == MapContent::Routes);
         let (cost_m, cost_s) =
             own.map_or((0.0, 0.0), |(sortie, _, _)| (sortie.route.cost_m, sortie.route.cost_s));
@@ -141,7 +142,7 @@ impl ValueSource {
     const BOTH: [(Self, &'static str); 2] =
         [(Self::Ours, "ours, planned"), (Self::Theirs, "theirs, flown in Gazebo")];
 
-    fn of(self, row: &TableRow) -> Option<ValueSummary> {
+    fn summary_of(self, row: &TableRow) -> Option<ValueSummary> {
         match self {
             Self::Ours => row.ours_summary,
             Self::Theirs => row.theirs_summary,
@@ -158,7 +159,7 @@ pub(super) fn spread_figures(rows: &[TableRow]) -> [Figure; 2] {
         for (whose, name) in ValueSource::BOTH {
             let title = format!("({letter}) {fleet} UAVs: {name}");
             let own = |row: &&&TableRow| row.ours.len() == fleet;
-            let value = |row: &TableRow| whose.of(row).map(|summary| summary.mean);
+            let value = |row: &TableRow| whose.summary_of(row).map(|summary| summary.mean);
             let own: Vec<&TableRow> = rows.iter().filter(own).copied().collect();
             times.push(Panel::Bars(chart(title, ("Av, s", "average"), &own, value)));
         }
@@ -168,7 +169,7 @@ pub(super) fn spread_figures(rows: &[TableRow]) -> [Figure; 2] {
             let title = format!("({letter}) {track} track: {name}");
             let own: Vec<&TableRow> =
                 rows.iter().filter(|row| row.track == Some(track)).copied().collect();
-            let value = |row: &TableRow| whose.of(row).map(|summary| summary.cv_percent);
+            let value = |row: &TableRow| whose.summary_of(row).map(|summary| summary.cv_percent);
             spreads.push(Panel::Lines(chart(title, ("CV, %", "spread"), &own, value)));
         }
     }
@@ -219,5 +220,5 @@ fn chart(
             own.values.push(rounded(value as f32));
         }
     }
-    Chart { title, unit: unit.to_owned(), cases, series, scale }
+    Chart { title, unit: unit.to_owned(), cases, series, scale_group: scale }
 }

@@ -11,7 +11,8 @@ use super::track::PictureFootprint;
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CoverageLayers {
     /// Distance from one lane to the next, metres.
-    pub lane_m: f32,
+    #[serde(rename = "lane_m")]
+    pub lane_spacing_m: f32,
     /// Divisions by rising time, at least one: the plan, then each division made in flight.
     pub divisions: Vec<ReportDivision>,
     /// Footprints of the pictures, by rising time.
@@ -29,7 +30,8 @@ pub struct ReportDivision {
     /// Waypoints and path of each vehicle that still flies.
     pub parts: Vec<ReportPart>,
     /// Waypoints that this division moves from one vehicle to another.
-    pub taken: Vec<WaypointTransfer>,
+    #[serde(rename = "taken")]
+    pub transfers: Vec<WaypointTransfer>,
 }
 
 /// What one vehicle photographs in a division.
@@ -38,13 +40,15 @@ pub struct ReportPart {
     /// MAVLink system id.
     pub vehicle: u8,
     /// Number of waypoints.
-    pub waypoints: u32,
+    #[serde(rename = "waypoints")]
+    pub waypoint_count: u32,
     /// Path of the vehicle, metres.
     #[serde(serialize_with = "pack::points")]
     pub path: Vec<Point>,
     /// Both ends of each stretch of a lane that the vehicle photographs, metres.
     #[serde(serialize_with = "pack::points")]
-    pub lanes: Vec<Point>,
+    #[serde(rename = "lanes")]
+    pub lane_ends: Vec<Point>,
 }
 
 /// Waypoints that a division moves from one vehicle to another.
@@ -55,5 +59,6 @@ pub struct WaypointTransfer {
     /// Vehicle that is to photograph the waypoints now.
     pub to: u8,
     /// Number of waypoints.
-    pub waypoints: u32,
+    #[serde(rename = "waypoints")]
+    pub waypoint_count: u32,
 }

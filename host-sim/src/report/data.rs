@@ -96,12 +96,14 @@ pub struct ReportVehicle {
     pub goal: Option<Point>,
     /// Planned path, metres.
     #[serde(serialize_with = "pack::points")]
-    pub planned: Vec<Point>,
+    #[serde(rename = "planned")]
+    pub planned_path: Vec<Point>,
     /// Flown track by rising time, 5–10 points a second; empty if nothing was flown.
     #[serde(serialize_with = "pack::track")]
     pub track: Vec<TrackPoint>,
     /// When the vehicle lost its power, or its motors in the air, seconds; `None` if it did not.
-    pub lost_s: Option<f32>,
+    #[serde(rename = "lost_s")]
+    pub power_lost_at_s: Option<f32>,
 }
 
 /// A spherical obstacle that appears during the flight.

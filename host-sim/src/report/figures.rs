@@ -67,7 +67,8 @@ pub struct Chart {
     /// The series.
     pub series: Vec<Series>,
     /// Name of the value axis: charts of the page with the same name have the same largest value.
-    pub scale: &'static str,
+    #[serde(rename = "scale")]
+    pub scale_group: &'static str,
 }
 
 /// One series of a chart: a value for each case.

@@ -43,7 +43,7 @@ pub(super) fn html(data: &ReportData) -> anyhow::Result<String> {
     let palette = (0..data.vehicles.len()).map(vehicle_color).collect();
     let json = script_safe(&serde_json::to_string(&PageData { data, palette })?);
     Ok(fill_template(TEMPLATE, |name| match name {
-        "title" => escape(&data.title),
+        "title" => html_escape(&data.title),
         "style" => STYLE.to_owned(),
         "libraries" => LIBRARIES.to_owned(),
         "script" => SCRIPT.to_owned(),
@@ -67,7 +67,7 @@ fn fill_template(template: &str, part: impl Fn(&str) -> String) -> String {
 }
 
 /// Escapes text for HTML content.
-fn escape(text: &str) -> String {
+fn html_escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

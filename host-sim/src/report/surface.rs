@@ -15,7 +15,7 @@ use super::pack;
 /// Most rectangles, and most crease lines, of a page: 12 bytes a rectangle, so 2.4 MB of base64. A
 /// map with more rectangles is drawn from cells twice as large, again and again, until it fits; the
 /// page says so.
-pub const FACE_LIMIT: usize = 150_000;
+pub const MAX_FACES_OR_CREASES: usize = 150_000;
 /// Most drawn cells, which bounds time and memory; a larger map is drawn from larger cells.
 const CELL_LIMIT: usize = 1 << 25;
 
@@ -31,21 +31,22 @@ pub struct MapSurface {
     /// Edge of a cell of the map, metres.
     pub resolution_m: f32,
     /// Edge of a cell as drawn, metres: the resolution times a power of two.
-    pub drawn_m: f32,
+    #[serde(rename = "drawn_m")]
+    pub drawn_cell_m: f32,
     /// Rectangles, six numbers each: `2 · axis + (1 if it faces up the axis)`, layer, least `u` and
     /// `v`, extent along `u` and `v`; in drawn cells, with `u` and `v` the two axes after `axis` in
     /// the cycle east, north, up.
     #[serde(serialize_with = "pack::words")]
     pub faces: Vec<u16>,
     /// Crease lines, five numbers each, in drawn cells: axis the line runs along, `u`, `v`, start,
-    /// length. Empty if there are more than [`FACE_LIMIT`].
+    /// length. Empty if there are more than [`MAX_FACES_OR_CREASES`].
     #[serde(serialize_with = "pack::words")]
     pub creases: Vec<u16>,
 }
 
 impl MapSurface {
     /// The surface of the occupied cells of `grid`. Nothing is drawn outside the grid, whatever
-    /// [`VoxelGrid::outside`] says, so that an open map looks open.
+    /// [`VoxelGrid::beyond_map`] says, so that an open map looks open.
     pub fn of(grid: &VoxelGrid<'_>) -> Self {
         let shape = grid.shape();
         let mut scale = 1;
@@ -54,11 +55,11 @@ impl MapSurface {
             let fits = dims.iter().map(|&d| d as usize + 2).product::<usize>() <= CELL_LIMIT;
             let smallest = dims.iter().all(|&d| d == 1);
             if fits || smallest {
-                let cells = Cells::of(grid, scale);
+                let cells = DrawnCells::of(grid, scale);
                 let faces = cells.faces();
-                if faces.len() / 6 <= FACE_LIMIT || smallest {
+                if faces.len() / 6 <= MAX_FACES_OR_CREASES || smallest {
                     let mut creases = cells.creases();
-                    if creases.len() / 5 > FACE_LIMIT {
+                    if creases.len() / 5 > MAX_FACES_OR_CREASES {
                         creases = Vec::new();
                     }
                     let drawn_m = shape.resolution_m * scale as f32;
@@ -67,7 +68,7 @@ impl MapSurface {
                         min: shape.min,
                         max: shape.max(),
                         resolution_m,
-                        drawn_m,
+                        drawn_cell_m: drawn_m,
                         faces,
                         creases,
                     };
@@ -80,13 +81,13 @@ impl MapSurface {
 
 /// Occupancy of the drawn cells, one byte each, with one empty layer around the map, so that a
 /// cell's neighbours need no range check.
-struct Cells {
+struct DrawnCells {
     dims: [usize; 3],
     stride: [usize; 3],
     filled: Vec<bool>,
 }
 
-impl Cells {
+impl DrawnCells {
     /// Drawn cells of `scale`³ cells of the grid each, filled if any of these is occupied.
     fn of(grid: &VoxelGrid<'_>, scale: u32) -> Self {
         let dims = grid.shape().dims.map(|d| d.div_ceil(scale) as usize);
@@ -123,7 +124,7 @@ impl Cells {
                         mask[b * nu + a] = if low == high { 0 } else { 1 + u8::from(low) };
                     }
                 }
-                merge(&mut mask, nu, |kind, a, b, w, h| {
+                merge_into_rectangles(&mut mask, nu, |kind, a, b, w, h| {
                     let code = 2 * axis + usize::from(kind == 2);
                     out.extend([code, layer, a, b, w, h].map(|n| n as u16));
                 });
@@ -168,7 +169,11 @@ impl Cells {
 
 /// Covers the non-zero cells of `mask` (rows of `nu` cells) with rectangles of one value each,
 /// calls `rectangle(value, a, b, width, height)` for each, and sets the cells to 0.
-fn merge(mask: &mut [u8], nu: usize, mut rectangle: impl FnMut(u8, usize, usize, usize, usize)) {
+fn merge_into_rectangles(
+    mask: &mut [u8],
+    nu: usize,
+    mut rectangle: impl FnMut(u8, usize, usize, usize, usize),
+) {
     let nv = mask.len() / nu;
     for b in 0..nv {
         let mut a = 0;

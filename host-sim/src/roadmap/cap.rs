@@ -72,7 +72,7 @@ pub fn limit_edges(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<E
 struct OutgoingEdge {
     to: u16,
     /// How many of [`CLEARANCE_CLASSES_M`] the edge's clearance exceeds.
-    class: u8,
+    clearance_class: u8,
     length_m: f32,
     edge: u32,
 }
@@ -85,7 +85,12 @@ fn adjacency_lists(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out
             CLEARANCE_CLASSES_M.iter().filter(|&&required_m| edge.clearance_m > required_m).count()
                 as u8;
         for (from, to) in [(edge.a, edge.b), (edge.b, edge.a)] {
-            rows[usize::from(from)].push(OutgoingEdge { to, class, length_m, edge: i as u32 });
+            rows[usize::from(from)].push(OutgoingEdge {
+                to,
+                clearance_class: class,
+                length_m,
+                edge: i as u32,
+            });
         }
     }
     rows.par_iter_mut().for_each(|row| {
@@ -101,7 +106,7 @@ fn edge_ranks(rows: &[Vec<OutgoingEdge>], edges: usize) -> Vec<u32> {
     for row in rows {
         let mut shorter = [0; CLEARANCE_CLASSES_M.len() + 1];
         for out in row {
-            for count in &mut shorter[..=usize::from(out.class)] {
+            for count in &mut shorter[..=usize::from(out.clearance_class)] {
                 let rank = &mut ranks[out.edge as usize];
                 *rank = (*rank).min(*count);
                 *count += 1;
@@ -156,7 +161,7 @@ fn keep_first<O: Ord>(
     }
 }
 
-/// The classes of required clearances, numbered as in [`OutgoingEdge::class`].
+/// The classes of required clearances, numbered as in [`OutgoingEdge::clearance_class`].
 fn clearance_classes() -> impl Iterator<Item = u8> {
     1..=CLEARANCE_CLASSES_M.len() as u8
 }
@@ -219,7 +224,7 @@ fn shortest_distances_within(
         if here_m > way_m[node] {
             continue;
         }
-        for out in rows[node].iter().filter(|out| out.class >= class) {
+        for out in rows[node].iter().filter(|out| out.clearance_class >= class) {
             let (to, there_m) = (usize::from(out.to), here_m + out.length_m);
             if there_m < way_m[to] && there_m <= most_m {
                 way_m[to] = there_m;
@@ -263,7 +268,7 @@ fn shortest_path_edge_counts(
             continue;
         }
         order.push(node);
-        for out in rows[node].iter().filter(|out| out.class >= class) {
+        for out in rows[node].iter().filter(|out| out.clearance_class >= class) {
             let (to, there_m) = (usize::from(out.to), way_m[node] + out.length_m);
             if there_m < way_m[to] {
                 (way_m[to], last_edge[to]) = (there_m, Some((node, out.edge)));

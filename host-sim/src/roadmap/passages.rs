@@ -31,11 +31,11 @@ const MAX_SEARCHED_CELLS: usize = 1 << 25;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WantedConnection {
     /// The start's node.
-    pub start: usize,
+    pub start_node: usize,
     /// The goal's node.
-    pub goal: usize,
+    pub goal_node: usize,
     /// Required clearance, metres: the vehicle's radius and safety margin.
-    pub required_m: f32,
+    pub required_clearance_m: f32,
 }
 
 /// Nodes that connect each wanted pair that `edges` do not connect. A pair for which the map has no
@@ -50,27 +50,28 @@ pub fn missing_passage_nodes(
 ) -> Vec<Point> {
     let mut wanted = wanted.to_vec();
     // Widest first: a passage found for a large vehicle also serves smaller ones.
-    wanted.sort_by(|a, b| b.required_m.total_cmp(&a.required_m));
+    wanted.sort_by(|a, b| b.required_clearance_m.total_cmp(&a.required_clearance_m));
     let mut found = Vec::new();
     let mut ways: Vec<WantedConnection> = Vec::new();
-    for class in wanted.chunk_by(|a, b| a.required_m == b.required_m) {
-        let required_m = class[0].required_m;
+    for class in wanted.chunk_by(|a, b| a.required_clearance_m == b.required_clearance_m) {
+        let required_m = class[0].required_clearance_m;
         let mut parts = ConnectedComponents::new(nodes.len(), edges, required_m);
-        ways.iter().for_each(|way| parts.union(way.start, way.goal));
+        ways.iter().for_each(|way| parts.union(way.start_node, way.goal_node));
         let mut walled_off = BTreeSet::new();
         for pair in class {
-            let (from, to) = (parts.component_of(pair.start), parts.component_of(pair.goal));
+            let (from, to) =
+                (parts.component_of(pair.start_node), parts.component_of(pair.goal_node));
             if from == to || walled_off.contains(&(from, to)) {
                 continue;
             }
-            let ends = (nodes[pair.start], nodes[pair.goal]);
+            let ends = (nodes[pair.start_node], nodes[pair.goal_node]);
             let cells = CellSearch::new(map, tree, required_m)
                 .and_then(|search| search.shortest_cell_path(&ends.0, &ends.1));
             match cells.and_then(|way| fewest_corners(tree, &way, config, required_m)) {
                 Some(corners) => {
                     found.extend(corners);
                     ways.push(*pair);
-                    parts.union(pair.start, pair.goal);
+                    parts.union(pair.start_node, pair.goal_node);
                 }
                 None => drop(walled_off.insert((from, to))),
             }
@@ -107,7 +108,7 @@ impl ConnectedComponents {
 }
 
 /// Whether a straight segment keeps the required clearance and [`CLEARANCE_SLACK_M`] more.
-fn is_clear(tree: &BoxTree, a: &Point, b: &Point, required_m: f32) -> bool {
+fn is_clear_with_slack(tree: &BoxTree, a: &Point, b: &Point, required_m: f32) -> bool {
     let enough_m = required_m + CLEARANCE_SLACK_M;
     tree.clearance_m(a, b, 2.0 * enough_m, enough_m) > enough_m
 }
@@ -161,8 +162,9 @@ impl<'a> CellSearch<'a> {
     /// segment leads from `place`.
     fn adjacent_cells_in_sight(&self, place: &Point) -> Vec<usize> {
         let Some(cell) = self.shape.cell_of(place) else { return Vec::new() };
-        let sees =
-            |next: &[u32; 3]| is_clear(self.tree, place, &self.centre(*next), self.required_m);
+        let sees = |next: &[u32; 3]| {
+            is_clear_with_slack(self.tree, place, &self.centre(*next), self.required_m)
+        };
         self.cell_and_neighbours(cell).filter(sees).map(|next| self.index(next)).collect()
     }
 
@@ -203,7 +205,7 @@ impl<'a> CellSearch<'a> {
                 if cost_m < cost[i]
                     && !grid.is_occupied(next)
                     && !never_sample.is_blocked_at(&place)
-                    && is_clear(self.tree, &centre, &place, self.required_m)
+                    && is_clear_with_slack(self.tree, &centre, &place, self.required_m)
                 {
                     (cost[i], came[i]) = (cost_m, index as u32);
                     open.push((rank(cost_m, &place), i));
@@ -231,7 +233,10 @@ fn fewest_corners(
             let length_m = (way[i] - way[j]).norm();
             let fits = (config.edge_min_m..=config.edge_max_m).contains(&length_m);
             let hops_here = hops[j].saturating_add(1);
-            if fits && hops_here < hops[i] && is_clear(tree, &way[j], &way[i], required_m) {
+            if fits
+                && hops_here < hops[i]
+                && is_clear_with_slack(tree, &way[j], &way[i], required_m)
+            {
                 (hops[i], came[i]) = (hops_here, j);
             }
         }

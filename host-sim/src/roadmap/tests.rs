@@ -1,13 +1,13 @@
 use super::*;
-use crate::map::Unknown;
+use crate::map::UnknownSpace;
 use crate::map::building::building_map;
 use planner_core::roadmap::prm::Sampling;
 
 #[test]
 fn any_number_of_threads_gives_the_same_edges() {
-    let map = building_map(1, 0.5).unwrap().to_voxel_map(Unknown::Blocked);
+    let map = building_map(1, 0.5).unwrap().to_voxel_map(UnknownSpace::Blocked);
     let config = PrmConfig {
-        nodes: 500,
+        random_nodes: 500,
         edge_min_m: 0.5,
         edge_max_m: 8.0,
         clearance_m: 0.0,

@@ -23,14 +23,14 @@ pub const ORIGIN_HINT: &str = "area.origin = { lat_deg = …, lon_deg = …, alt
 #[derive(Clone, Debug)]
 pub struct AreaSection {
     /// Where the area stands in the scenario, for error messages, as `FILE:LINE`.
-    pub place: String,
+    pub file_line: String,
     /// Vertices of all rings, one ring after the other, metres east and north of the origin.
     pub vertices: Vec<Flat>,
     /// Kind of each ring, and where its vertices end.
     pub rings: Vec<Ring>,
     /// Number of no-fly zones that the scenario and its area file give. In `rings` the zones around
     /// the map's obstacles come after these.
-    pub given_zones: usize,
+    pub given_no_fly_zones: usize,
     /// Origin of the mission frame.
     pub origin: Geodetic,
     /// The camera; `None` if `lane_m` and `waypoint_m` are given instead.
@@ -39,9 +39,9 @@ pub struct AreaSection {
     pub spacing: Spacing,
     /// `spacing` with its footprint reduced to the part that the plan counts on despite flight
     /// errors.
-    pub usable: Spacing,
+    pub usable_spacing: Spacing,
     /// Height of the pictures, metres: above the ground with terrain, else above the origin.
-    pub height_m: f32,
+    pub picture_height_m: f32,
     /// Greatest height of the pictures above the origin, and distance between transit layers,
     /// metres.
     pub heights: Heights,
@@ -50,11 +50,11 @@ pub struct AreaSection {
     /// Obstacles of `[map]`, around which `rings` has no-fly zones; `None` without a map.
     pub obstacles: Option<Arc<MapObstacles>>,
     /// Direction of the lanes, degrees counter-clockwise from east; `None`: the plan chooses it.
-    pub angle_deg: Option<f32>,
+    pub lane_angle_deg: Option<f32>,
     /// How far beyond the area's edge lanes begin and end, metres.
-    pub margin_m: f32,
+    pub lane_overrun_m: f32,
     /// Whether a route may take more than one battery.
-    pub batteries: bool,
+    pub allows_battery_swaps: bool,
     /// How the work is divided among the vehicles.
     pub method: CoverageMethod,
     /// Heading of the vehicles on the lanes.
@@ -69,8 +69,9 @@ pub struct Terrain {
     /// Heights of the ground, metres above the mission's origin.
     pub grid: Arc<HeightGrid>,
     /// Bytes of the height field that vehicles follow (`field.bin`).
-    pub field: Arc<[u8]>,
-    /// How far vehicles may fly higher above the field than [`AreaSection::height_m`], metres.
+    pub field_file: Arc<[u8]>,
+    /// How far vehicles may fly higher above the field than [`AreaSection::picture_height_m`],
+    /// metres.
     pub tolerance_m: f32,
     /// Steepest slope that vehicles fly, metres of height for each metre over ground.
     pub max_slope: f32,
@@ -82,10 +83,10 @@ impl Terrain {
     /// # Errors
     /// The field's bytes are malformed.
     pub fn following(&self, height_m: f32) -> Result<TerrainFollowing<'_>, FileError> {
-        let field = FieldView::parse(&self.field)?;
+        let field = FieldView::parse(&self.field_file)?;
         Ok(TerrainFollowing {
             field,
-            height_m,
+            min_height_m: height_m,
             tolerance_m: self.tolerance_m,
             max_slope: self.max_slope,
         })
@@ -95,7 +96,7 @@ impl Terrain {
 impl AreaSection {
     /// Height of the ground at a place, metres above the origin; 0 without terrain and outside its
     /// map.
-    pub fn ground_m(&self, place: &Flat) -> f32 {
+    pub fn ground_height_m(&self, place: &Flat) -> f32 {
         self.terrain.as_ref().and_then(|terrain| terrain.grid.height_at(place)).unwrap_or(0.0)
     }
 

@@ -32,7 +32,7 @@ pub struct SourcePlace {
     /// The whole line.
     pub text: String,
     /// Number of characters to mark from the column on, at least 1.
-    pub marked: usize,
+    pub marked_chars: usize,
 }
 
 impl SourcePlace {
@@ -48,7 +48,7 @@ impl SourcePlace {
             line: text[..begin].matches('\n').count() + 1,
             column: text[begin..start].chars().count() + 1,
             text: line.into(),
-            marked: end.map_or(1, |end| text[start..end].chars().count().max(1)),
+            marked_chars: end.map_or(1, |end| text[start..end].chars().count().max(1)),
         }
     }
 }
@@ -58,7 +58,7 @@ impl fmt::Display for ScenarioError {
         let Self { file, place, why, hint } = self;
         match place {
             None => write!(f, "bad scenario: {file}: {why}")?,
-            Some(SourcePlace { line, column, text, marked }) => {
+            Some(SourcePlace { line, column, text, marked_chars: marked }) => {
                 let margin = " ".repeat(line.to_string().len());
                 writeln!(f, "bad scenario: {file}:{line}:{column}: {why}")?;
                 writeln!(f, "{margin} |")?;

@@ -176,7 +176,7 @@ pub(super) struct Table<'a> {
     pub(super) span: TomlSpan,
     name: String,
     table: &'a DeTable<'a>,
-    known: RefCell<Vec<&'static str>>,
+    requested_keys: RefCell<Vec<&'static str>>,
 }
 
 impl<'a> Table<'a> {
@@ -186,7 +186,7 @@ impl<'a> Table<'a> {
         span: TomlSpan,
         table: &'a DeTable<'a>,
     ) -> Self {
-        Self { text, span, name: name.into(), table, known: RefCell::default() }
+        Self { text, span, name: name.into(), table, requested_keys: RefCell::default() }
     }
 
     fn path(&self, key: &str) -> String {
@@ -194,7 +194,7 @@ impl<'a> Table<'a> {
     }
 
     pub(super) fn get(&self, key: &'static str) -> Option<TomlValue<'a>> {
-        self.known.borrow_mut().push(key);
+        self.requested_keys.borrow_mut().push(key);
         self.table.get(key).map(|value| TomlValue::new(self.text, self.path(key), value))
     }
 
@@ -233,7 +233,7 @@ impl<'a> Table<'a> {
 
     /// Marks keys as known that are read later, or not at all.
     pub(super) fn declare_keys(&self, keys: &[&'static str]) {
-        self.known.borrow_mut().extend(keys);
+        self.requested_keys.borrow_mut().extend(keys);
     }
 
     pub(super) fn f32(
@@ -277,7 +277,7 @@ impl<'a> Table<'a> {
 
     /// Refuses the first key in the file that was neither read nor declared.
     pub(super) fn refuse_unknown_keys(&self) -> Result<()> {
-        let known = self.known.borrow();
+        let known = self.requested_keys.borrow();
         let unknown = self.table.iter().filter(|(key, _)| !known.contains(&key.get_ref().as_ref()));
         let Some((key, _)) = unknown.min_by_key(|(key, _)| key.span().start) else { return Ok(()) };
         Err(self.unknown_key_error(key, nearest_word_hint(key.get_ref(), known.iter().copied())))

@@ -11,7 +11,7 @@ mod values;
 use std::path::Path;
 
 use companion::autopilot::AutopilotKind;
-use companion::config::{GROUND_STATIONS, USUAL_GROUND_STATIONS};
+use companion::config::{DEFAULT_GROUND_STATION_IDS, MAX_GROUND_STATIONS};
 use planner_core::Point;
 use planner_core::geo::frames::{Geodetic, geodetic_to_enu};
 use planner_core::roadmap::prm::Sampling;
@@ -25,10 +25,10 @@ use super::error::ScenarioError;
 use super::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
 use super::types::{
     CompanionHost, Deconfliction, Fault, Geofence, MapSection, RoadmapSection, Simulation,
-    Terminals, UnsupportedTable, VehicleSection,
+    TerminalEdges, UnsupportedTable, VehicleSection,
 };
 use crate::link::LinkUrl;
-use crate::map::{RESOLUTION_RANGE_M, Source, Unknown};
+use crate::map::{MapSource, RESOLUTION_RANGE_M, UnknownSpace};
 use crate::quote::printable;
 
 /// Time limit of a simulated flight if the scenario gives none, seconds.
@@ -69,7 +69,7 @@ pub(super) fn read_root<T>(
 }
 
 /// Settings that scenarios of every kind of mission have.
-struct Common {
+struct CommonSettings {
     seed: u64,
     deconfliction: Deconfliction,
     simulation: Simulation,
@@ -83,7 +83,7 @@ fn read_common(
     text: TomlText<'_>,
     root: &Table<'_>,
     (pair_error_m, limit_s): (f32, f32),
-) -> Result<Common> {
+) -> Result<CommonSettings> {
     let seed = root.integer_in_range("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
     let deconfliction = deconfliction.unwrap_or_else(|| empty_table(text, "deconfliction"));
@@ -92,7 +92,7 @@ fn read_common(
     let estimator_span = simulation.as_ref().and_then(|t| t.get("estimator")).map(|v| v.span);
     let simulation =
         read_simulation(&simulation.unwrap_or_else(|| empty_table(text, "simulation")), limit_s)?;
-    Ok(Common { seed, deconfliction, simulation, estimator_span })
+    Ok(CommonSettings { seed, deconfliction, simulation, estimator_span })
 }
 
 /// Reads `[[faults]]`; a fault's vehicle must be one of `vehicles`.
@@ -161,7 +161,7 @@ fn read_map(table: &Table<'_>, folder: &Path) -> Result<(MapSection, bool)> {
     let file_value =
         table.required("file", "a path to an OctoMap `.bt` file, or \"builtin:building\"")?;
     let name = file_value.str()?;
-    if let Err(error) = Source::parse(name) {
+    if let Err(error) = MapSource::parse(name) {
         return Err(file_value.error(&format!("is not a map that can be read: {error}")));
     }
     let file = if name.starts_with("builtin:") {
@@ -175,8 +175,8 @@ fn read_map(table: &Table<'_>, folder: &Path) -> Result<(MapSection, bool)> {
         resolution_m: table.f32("resolution_m", 0.25, RESOLUTION_RANGE_M)?,
         unknown: table.one_of(
             "unknown",
-            Unknown::Blocked,
-            &[("blocked", Unknown::Blocked), ("free", Unknown::Free)],
+            UnknownSpace::Blocked,
+            &[("blocked", UnknownSpace::Blocked), ("free", UnknownSpace::Free)],
         )?,
         origin: origin.unwrap_or(DEFAULT_ORIGIN),
     };
@@ -195,15 +195,15 @@ fn read_roadmap(table: &Table<'_>) -> Result<RoadmapSection> {
         }
     }
     let roadmap = RoadmapSection {
-        nodes: table.integer_in_range("nodes", 2300, 0..=1_000_000)? as u32,
+        random_nodes: table.integer_in_range("nodes", 2300, 0..=1_000_000)? as u32,
         edge_min_m: table.f32("edge_min_m", 0.5, 0.0..=MAX_EDGE_M.into())?,
         edge_max_m: table.f32("edge_max_m", 8.0, 0.001..=MAX_EDGE_M.into())?,
         edge_min_share: table.optional_f32("edge_min_share", 0.0..=1.0)?,
         edge_max_share: table.optional_f32("edge_max_share", 0.0001..=1.0)?,
-        terminals: table.one_of(
+        terminal_edges: table.one_of(
             "terminals",
-            Terminals::Joined,
-            &[("joined", Terminals::Joined), ("apart", Terminals::Apart)],
+            TerminalEdges::Allowed,
+            &[("joined", TerminalEdges::Allowed), ("apart", TerminalEdges::Forbidden)],
         )?,
         safety_margin_m: table.f32("safety_margin_m", 0.5, 0.0..=100.0)?,
         sampling: table.one_of(
@@ -215,7 +215,7 @@ fn read_roadmap(table: &Table<'_>) -> Result<RoadmapSection> {
                 ("bridge", Sampling::Bridge),
             ],
         )?,
-        passages: table.boolean("passages")?,
+        adds_passages: table.boolean("passages")?,
     };
     table.refuse_unknown_keys()?;
     let in_metres = roadmap.edge_min_share.is_none() && roadmap.edge_max_share.is_none();
@@ -230,14 +230,14 @@ fn read_roadmap(table: &Table<'_>) -> Result<RoadmapSection> {
 }
 
 /// Reads the geofence, and the MAVLink system ids of ground stations whose commands count.
-fn fence_and_ground_stations(
+fn read_fence_and_ground_stations(
     table: &Table<'_>,
     vehicles: &[(VehicleSection, VehicleSpans)],
-) -> Result<(Option<Geofence>, [u8; GROUND_STATIONS])> {
+) -> Result<(Option<Geofence>, [u8; MAX_GROUND_STATIONS])> {
     let geofence = table.get("geofence").map(|v| read_geofence(&v)).transpose()?;
     let ground_stations =
         table.get("ground_stations").map(|v| read_stations(&v, vehicles)).transpose()?;
-    let ground_stations = ground_stations.unwrap_or(USUAL_GROUND_STATIONS);
+    let ground_stations = ground_stations.unwrap_or(DEFAULT_GROUND_STATION_IDS);
     Ok((geofence, ground_stations))
 }
 
@@ -253,12 +253,12 @@ fn check_list_len(value: &TomlValue<'_>, count: usize, most: usize, what: &str) 
 fn read_stations(
     value: &TomlValue<'_>,
     vehicles: &[(VehicleSection, VehicleSpans)],
-) -> Result<[u8; GROUND_STATIONS]> {
+) -> Result<[u8; MAX_GROUND_STATIONS]> {
     let given = value.items()?;
-    if !(1..=GROUND_STATIONS).contains(&given.len()) {
-        return Err(value.error(&format!("takes 1 to {GROUND_STATIONS} MAVLink system ids")));
+    if !(1..=MAX_GROUND_STATIONS).contains(&given.len()) {
+        return Err(value.error(&format!("takes 1 to {MAX_GROUND_STATIONS} MAVLink system ids")));
     }
-    let mut ids = [0; GROUND_STATIONS];
+    let mut ids = [0; MAX_GROUND_STATIONS];
     for (id, given) in ids.iter_mut().zip(given) {
         *id = given.integer_in_range(1..=255)? as u8;
         if vehicles.iter().any(|(vehicle, _)| vehicle.id == *id) {
@@ -364,14 +364,14 @@ fn read_vehicle(
     let vehicle = VehicleSection {
         id,
         start: read_place(&start, origin)?,
-        goal: goal
+        goal_index: goal
             .as_ref()
             .map(|v| v.integer_in_range(0..=1_000_000).map(|g| g as usize))
             .transpose()?,
         radius_m: table.f32("radius_m", 0.3, 0.001..=100.0)?,
         altitude_m: table.optional_f32("altitude_m", -1000.0..=20_000.0)?,
         speed_max_mps: table.f32("speed_max_mps", 5.0, 0.01..=100.0)?,
-        endurance_s: table.optional_f32("endurance_s", 1.0..=1e6)?,
+        hover_endurance_s: table.optional_f32("endurance_s", 1.0..=1e6)?,
         payload_kg: table.optional_f32("payload_kg", 0.0..=1e4)?,
         autopilot,
         home: table.get("home").map(|v| read_geodetic(&v)).transpose()?,

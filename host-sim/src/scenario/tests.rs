@@ -1,7 +1,7 @@
 use planner_core::Point;
 
 use super::*;
-use crate::map::Unknown;
+use crate::map::UnknownSpace;
 
 const GOOD: &str = r#"
 [map]
@@ -22,10 +22,10 @@ fn a_short_scenario_has_the_defaults() {
     scenario.check_supported().unwrap();
     assert_eq!(
         (scenario.seed, scenario.map.resolution_m, scenario.map.unknown),
-        (1, 0.25, Unknown::Blocked)
+        (1, 0.25, UnknownSpace::Blocked)
     );
     let roadmap = &scenario.roadmap;
-    assert_eq!((roadmap.nodes, roadmap.edge_min_m, roadmap.edge_max_m), (2300, 0.5, 8.0));
+    assert_eq!((roadmap.random_nodes, roadmap.edge_min_m, roadmap.edge_max_m), (2300, 0.5, 8.0));
     let mission = &scenario.mission;
     assert_eq!((mission.mode, mission.cruise_mps), (MissionMode::Unlabelled, 2.0));
     assert_eq!(mission.ground_stations, [255, 0, 0, 0]);
@@ -40,7 +40,7 @@ fn a_short_scenario_has_the_defaults() {
         (scenario.simulation.serial_baud, scenario.simulation.time_limit_s),
         (921_600, 600.0)
     );
-    assert!((scenario.required_clearance_m() - 0.8).abs() < 1e-6);
+    assert!((scenario.max_required_clearance_m() - 0.8).abs() < 1e-6);
 }
 
 /// `GOOD` with one text replaced by another.
@@ -406,7 +406,7 @@ fn check_places(scenario: &Scenario) {
     let voxels = map.to_voxel_map(scenario.map.unknown);
     let grid = voxels.grid();
     let shape = *grid.shape();
-    let clearance = scenario.required_clearance_m();
+    let clearance = scenario.max_required_clearance_m();
     for point in scenario.vehicles.iter().map(|v| &v.start).chain(&scenario.mission.goals) {
         let reach = (clearance / shape.resolution_m).ceil() as i64 + 1;
         let center = shape.cell_of(point).unwrap_or_else(|| panic!("{point} is beyond the map"));
@@ -428,7 +428,7 @@ fn check_places(scenario: &Scenario) {
                 }
             }
         }
-        assert!(voxels.ground_below(point).is_some(), "{point} is over nothing");
+        assert!(voxels.ground_z_below_m(point).is_some(), "{point} is over nothing");
     }
 }
 
@@ -460,7 +460,8 @@ fn edges_are_given_in_metres_or_as_shares() {
     let text =
         changed("[mission]", "[roadmap]\nedge_max_share = 0.2\nterminals = \"apart\"\n[mission]");
     let roadmap = parse(&text, "p2d.toml").unwrap().roadmap;
-    assert_eq!((roadmap.edge_max_share, roadmap.terminals), (Some(0.2), Terminals::Apart));
+    let edges = (roadmap.edge_max_share, roadmap.terminal_edges);
+    assert_eq!(edges, (Some(0.2), TerminalEdges::Forbidden));
     let text = changed("[mission]", "[roadmap]\nedge_max_share = 0.2\nedge_max_m = 8\n[mission]");
     let error = parse(&text, "p2d.toml").unwrap_err();
     assert!(error.why.contains("cannot stand beside roadmap.edge_max_m"), "{error}");
@@ -470,8 +471,8 @@ fn edges_are_given_in_metres_or_as_shares() {
 fn goals_know_their_lines_and_how_far_apart_they_have_to_be() {
     let text = changed("[3.0, 4.0, 12.5]]", "\n [3.0, 4.0, 12.5]]");
     let scenario = parse(&text, "lines.toml").unwrap();
-    assert_eq!(scenario.mission.goal_places, ["lines.toml:5", "lines.toml:6"]);
-    assert_eq!(scenario.vehicle_places, ["lines.toml:9", "lines.toml:12"]);
+    assert_eq!(scenario.mission.goal_file_lines, ["lines.toml:5", "lines.toml:6"]);
+    assert_eq!(scenario.vehicle_file_lines, ["lines.toml:9", "lines.toml:12"]);
     let error =
         parse(&text.replace("3.0, 4.0, 12.5", "38.5, 19.0, 8.3"), "lines.toml").unwrap_err();
     assert_eq!(error.place.as_ref().map(|place| place.line), Some(6), "{error}");

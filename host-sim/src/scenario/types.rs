@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use companion::autopilot::AutopilotKind;
-use companion::config::GROUND_STATIONS;
+use companion::config::MAX_GROUND_STATIONS;
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
 use planner_core::roadmap::prm::Sampling;
@@ -12,7 +12,7 @@ use planner_core::track::deconflict::Method;
 use super::coverage::AreaSection;
 use super::error::ScenarioError;
 use crate::link::LinkUrl;
-use crate::map::Unknown;
+use crate::map::UnknownSpace;
 
 /// Radio range, metres, from which on companions take it that the radio reaches every vehicle. The
 /// simulated radio keeps the scenario's range.
@@ -36,7 +36,7 @@ pub struct Scenario {
     /// `[[vehicles]]`, in the order of the file.
     pub vehicles: Vec<VehicleSection>,
     /// Where each vehicle's start stands in the file, as `FILE:LINE`.
-    pub vehicle_places: Vec<String>,
+    pub vehicle_file_lines: Vec<String>,
     /// `[deconfliction]`
     pub deconfliction: Deconfliction,
     /// `[simulation]`
@@ -68,7 +68,7 @@ pub struct MapSection {
     /// Edge of a cell of the planning grid, metres.
     pub resolution_m: f32,
     /// Whether unknown space may be flown through.
-    pub unknown: Unknown,
+    pub unknown: UnknownSpace,
     /// Origin of the mission frame.
     pub origin: Geodetic,
 }
@@ -77,7 +77,7 @@ pub struct MapSection {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RoadmapSection {
     /// Number of random nodes besides starts and goals.
-    pub nodes: u32,
+    pub random_nodes: u32,
     /// Shortest length of an edge, metres.
     pub edge_min_m: f32,
     /// Longest length of an edge, metres.
@@ -87,22 +87,22 @@ pub struct RoadmapSection {
     /// Longest edge as a share of the map's longest side (paper P2D); `None`: `edge_max_m` counts.
     pub edge_max_share: Option<f32>,
     /// Whether edges may join two terminals, that is starts or goals.
-    pub terminals: Terminals,
+    pub terminal_edges: TerminalEdges,
     /// Clearance of edges beyond a vehicle's radius, metres.
     pub safety_margin_m: f32,
     /// How random nodes are sampled.
     pub sampling: Sampling,
     /// Whether narrow passages that random nodes miss get nodes of their own.
-    pub passages: bool,
+    pub adds_passages: bool,
 }
 
 /// Whether edges may join two terminals, that is starts or goals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Terminals {
+pub enum TerminalEdges {
     /// Two terminals are joined as any other nodes (paper P3D).
-    Joined,
+    Allowed,
     /// No edge joins two terminals (paper P2D).
-    Apart,
+    Forbidden,
 }
 
 /// `[mission]`
@@ -117,11 +117,11 @@ pub struct MissionSection {
     /// Goals of the vehicles, ENU metres.
     pub goals: Vec<Point>,
     /// Where each goal stands in the file, as `FILE:LINE`.
-    pub goal_places: Vec<String>,
+    pub goal_file_lines: Vec<String>,
     /// Box that vehicles must not leave; `None`: there is no fence.
     pub geofence: Option<Geofence>,
     /// MAVLink system ids of the ground stations whose commands count; 0 fills unused places.
-    pub ground_stations: [u8; GROUND_STATIONS],
+    pub ground_stations: [u8; MAX_GROUND_STATIONS],
 }
 
 /// How goals are assigned to vehicles, or which other kind of mission it is.
@@ -143,7 +143,7 @@ pub enum MissionMode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignmentObjective {
     /// The sum of all path lengths.
-    Total,
+    TotalDistance,
     /// The length of the longest path.
     Makespan,
 }
@@ -172,7 +172,7 @@ pub struct VehicleSection {
     /// Where the vehicle's path begins, ENU metres.
     pub start: Point,
     /// Index (from 0) into [`MissionSection::goals`], for labelled missions.
-    pub goal: Option<usize>,
+    pub goal_index: Option<usize>,
     /// Radius of the vehicle's hull, metres.
     pub radius_m: f32,
     /// Height at which the vehicle flies on 2D maps, metres (not supported yet).
@@ -180,7 +180,7 @@ pub struct VehicleSection {
     /// Highest speed of the vehicle, m/s.
     pub speed_max_mps: f32,
     /// Time in a hover on one battery, seconds; `None`: 1200 s.
-    pub endurance_s: Option<f32>,
+    pub hover_endurance_s: Option<f32>,
     /// Payload of the vehicle, kg (not supported yet).
     pub payload_kg: Option<f32>,
     /// Autopilot of the vehicle: PX4 or ArduPilot.
@@ -217,7 +217,7 @@ impl VehicleSection {
 
     /// Time that the vehicle hovers on a full battery, seconds.
     pub fn battery_hover_s(&self) -> f32 {
-        self.endurance_s.unwrap_or(DEFAULT_ENDURANCE_S)
+        self.hover_endurance_s.unwrap_or(DEFAULT_ENDURANCE_S)
     }
 }
 
@@ -261,17 +261,17 @@ pub struct Deconfliction {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Simulation {
     /// Mean wind, m/s.
-    pub wind_mps: f32,
+    pub mean_wind_mps: f32,
     /// Peak of the gusts on top of the mean wind, m/s.
-    pub gust_mps: f32,
+    pub gust_peak_mps: f32,
     /// Standard deviation of a random error of the position estimate, metres.
-    pub position_noise_m: f32,
+    pub position_noise_sd_m: f32,
     /// Error model of the autopilots' position estimates.
     pub estimator: PositionErrors,
     /// Baud rate of the serial links between companions and autopilots.
     pub serial_baud: u32,
     /// Probability that a byte on a serial link is corrupted.
-    pub serial_corruption: f32,
+    pub serial_corruption_per_byte: f32,
     /// Probability that a receiver misses a radio packet.
     pub radio_loss: f32,
     /// Delay of a radio packet, seconds.
@@ -302,16 +302,16 @@ pub struct Fault {
     pub duration_s: Option<f32>,
     /// MAVLink id of the vehicle that the fault strikes; `None`: it strikes all.
     pub vehicle: Option<u8>,
-    /// Kind of the fault: one of [`FAULT_KINDS`], or [`FAULT_OBSTACLE`].
+    /// Kind of the fault: one of [`VEHICLE_FAULT_KINDS`], or [`FAULT_OBSTACLE`].
     pub kind: &'static str,
     /// `radio-cut`: which direction fails, `tx`, `rx` or `both`; `None`: both.
-    pub direction: Option<String>,
+    pub radio_cut_direction: Option<String>,
     /// `position-jump`, `origin-change`: offset, ENU metres; `None`: the default of the kind.
     pub offset_m: Option<Point>,
     /// `obstacle`: centre of the sphere, ENU metres.
-    pub position: Option<Point>,
+    pub obstacle_position: Option<Point>,
     /// `obstacle`: radius of the sphere, metres.
-    pub radius_m: Option<f32>,
+    pub obstacle_radius_m: Option<f32>,
 }
 
 impl Fault {
@@ -323,7 +323,7 @@ impl Fault {
 }
 
 /// Every kind of fault that strikes vehicles.
-pub const FAULT_KINDS: [&str; 17] = [
+pub const VEHICLE_FAULT_KINDS: [&str; 17] = [
     "kill",
     "radio-cut",
     "serial-stall",
@@ -363,7 +363,7 @@ impl Scenario {
     }
 
     /// The greatest clearance that any vehicle requires, metres: largest radius and safety margin.
-    pub fn required_clearance_m(&self) -> f32 {
+    pub fn max_required_clearance_m(&self) -> f32 {
         self.largest_radius_m() + self.roadmap.safety_margin_m
     }
 

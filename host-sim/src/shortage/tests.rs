@@ -1,6 +1,6 @@
 use super::*;
 use crate::map::Occupancy;
-use crate::map::occupancy::{OccupancyMap, Unknown};
+use crate::map::occupancy::{OccupancyMap, UnknownSpace};
 use planner_core::map::voxel::GridShape;
 
 /// Two rooms on either side of a wall with a door that is `door` cells of 0.1 m wide.
@@ -14,7 +14,7 @@ fn rooms(door: u32) -> VoxelMap {
         let wall = (i == 30 && !in_door) || k == 0;
         map.set([i, j, k], if wall { Occupancy::Occupied } else { Occupancy::Free });
     }
-    map.to_voxel_map(Unknown::Free)
+    map.to_voxel_map(UnknownSpace::Free)
 }
 
 /// The clearance of a start or goal is that of the point itself, not that of its cell's centre.

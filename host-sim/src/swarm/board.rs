@@ -27,7 +27,7 @@ use crate::link::{ByteLink, LinkUrl};
 
 /// One companion on a board or in another process.
 pub struct RemoteCompanion {
-    ends: BoardConnection,
+    connection: BoardConnection,
     framer: Framer,
     state: State,
     progress_m: Option<f32>,
@@ -44,7 +44,7 @@ pub struct BoardLinks<'a> {
     /// Index of the board's vehicle among the radio's stations.
     pub station: usize,
     /// True positions of all stations, ENU metres.
-    pub places: &'a [Point],
+    pub true_positions: &'a [Point],
     /// Called with each STATUSTEXT of the board.
     pub on_text: &'a mut dyn FnMut(&str),
 }
@@ -64,7 +64,7 @@ struct LockStep {
     /// Simulation time at which the board last started, microseconds.
     started_us: u64,
     /// Whether the board was granted a step that it has not finished yet.
-    runs: bool,
+    grant_running: bool,
 }
 
 impl RemoteCompanion {
@@ -80,11 +80,15 @@ impl RemoteCompanion {
     ) -> anyhow::Result<Self> {
         let mut board = EmulatedBoard::start(program, log)?;
         board.load_flash(&boards::flash_bank_image(roadmap, mission)?)?;
-        Ok(Self::new(BoardConnection::LockStep(LockStep { board, started_us: 0, runs: false })))
+        Ok(Self::new(BoardConnection::LockStep(LockStep {
+            board,
+            started_us: 0,
+            grant_running: false,
+        })))
     }
 
-    fn new(ends: BoardConnection) -> Self {
-        Self { ends, framer: Framer::new(), state: State::default(), progress_m: None }
+    fn new(connection: BoardConnection) -> Self {
+        Self { connection, framer: Framer::new(), state: State::default(), progress_m: None }
     }
 
     /// Opens the link to the board's port for the autopilot and, if `radio` is given, to the port
@@ -110,7 +114,7 @@ impl RemoteCompanion {
 
     /// Whether the board's radio traffic passes through the simulated radio.
     pub fn has_radio(&self) -> bool {
-        !matches!(self.ends, BoardConnection::Links { radio: None, .. })
+        !matches!(self.connection, BoardConnection::Links { radio: None, .. })
     }
 
     /// Greatest stack use of the board since its start, bytes; `None` for a board that is not in
@@ -119,11 +123,13 @@ impl RemoteCompanion {
     /// # Errors
     /// The board is gone.
     pub fn max_stack_used(&mut self) -> anyhow::Result<Option<usize>> {
-        let BoardConnection::LockStep(LockStep { board, runs, .. }) = &mut self.ends else {
+        let BoardConnection::LockStep(LockStep { board, grant_running: runs, .. }) =
+            &mut self.connection
+        else {
             return Ok(None);
         };
         if core::mem::take(runs) {
-            board.wait_for_grant()?;
+            board.wait_for_grant_end()?;
         }
         board.max_stack_used().map(Some)
     }
@@ -134,7 +140,7 @@ impl RemoteCompanion {
     /// # Errors
     /// A board in lock step hangs or is gone.
     pub fn step(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
-        match &mut self.ends {
+        match &mut self.connection {
             BoardConnection::Links { .. } => {
                 // An error of the link is ignored: a board that is gone is silent, as without
                 // power.
@@ -142,7 +148,7 @@ impl RemoteCompanion {
                 Ok(())
             }
             BoardConnection::LockStep(lock_step) => {
-                let sent = lock_step.end_grant(now_us)?;
+                let sent = lock_step.finish_grant(now_us)?;
                 let started_us = lock_step.started_us;
                 for PortBytes { port, at_us, bytes } in sent {
                     match port {
@@ -150,7 +156,9 @@ impl RemoteCompanion {
                         Port::Swarm => self.broadcast_frames(now_us, &bytes, lines),
                     }
                 }
-                let BoardConnection::LockStep(lock_step) = &mut self.ends else { return Ok(()) };
+                let BoardConnection::LockStep(lock_step) = &mut self.connection else {
+                    return Ok(());
+                };
                 lock_step.begin_grant(now_us, lines)
             }
         }
@@ -158,7 +166,9 @@ impl RemoteCompanion {
 
     /// Passes on, in both directions, the bytes that have arrived by `now_us` on opened links.
     fn exchange_bytes(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
-        let BoardConnection::Links { autopilot, radio } = &mut self.ends else { return Ok(()) };
+        let BoardConnection::Links { autopilot, radio } = &mut self.connection else {
+            return Ok(());
+        };
         while let Some((_, bytes)) = lines.to_board.take_write_by(now_us) {
             autopilot.send(&bytes)?;
         }
@@ -199,7 +209,12 @@ impl RemoteCompanion {
         while let Some(frame) = self.framer.next(Instant::from_micros(now_us), &mut input) {
             let mut packet = [0; MAX_FRAME_LEN];
             let length = frame.encode(&mut packet);
-            lines.radio.broadcast(now_us, Some(lines.station), lines.places, &packet[..length]);
+            lines.radio.broadcast(
+                now_us,
+                Some(lines.station),
+                lines.true_positions,
+                &packet[..length],
+            );
             self.note_report(&frame, &mut lines.on_text);
         }
     }
@@ -227,11 +242,11 @@ impl RemoteCompanion {
 
 impl LockStep {
     /// Ends the grant of the last step; returns the bytes that the board sent in it.
-    fn end_grant(&mut self, now_us: u64) -> anyhow::Result<Vec<PortBytes>> {
-        if !core::mem::take(&mut self.runs) {
+    fn finish_grant(&mut self, now_us: u64) -> anyhow::Result<Vec<PortBytes>> {
+        if !core::mem::take(&mut self.grant_running) {
             return Ok(Vec::new());
         }
-        let answer = self.board.wait_for_grant()?;
+        let answer = self.board.wait_for_grant_end()?;
         if answer.restarted {
             self.started_us = now_us;
         }
@@ -253,7 +268,7 @@ impl LockStep {
         while let Some((arrives_us, bytes)) = lines.to_board.take_write_by(until_us) {
             pieces.push(PortBytes { port: Port::Autopilot, at_us: board_us(arrives_us), bytes });
         }
-        self.runs = true;
+        self.grant_running = true;
         self.board.begin_grant(board_us(until_us), &pieces)
     }
 }

@@ -31,10 +31,10 @@ pub struct FlownDivision {
 
 /// What one vehicle last reported.
 #[derive(Clone, Copy, Debug, Default)]
-struct Reported {
+struct VehicleReport {
     plan_crc: u32,
     number: u8,
-    counted: u32,
+    committed_hash: u32,
     /// Number of the division whose plan the vehicle flies; `flown_crc` is the CRC of that plan.
     flown_number: u8,
     flown_crc: u32,
@@ -43,10 +43,10 @@ struct Reported {
 /// The reports heard so far, and the divisions found in them.
 #[derive(Debug, Default)]
 pub struct DivisionLog {
-    vehicles: HashMap<u8, Reported>,
+    vehicles: HashMap<u8, VehicleReport>,
     /// Inputs of each division, by the hash that the vehicles reported for it.
     inputs_by_hash: HashMap<u32, Vec<VehicleDivisionInput>>,
-    reported: Vec<FlownDivision>,
+    flown: Vec<FlownDivision>,
 }
 
 impl DivisionLog {
@@ -60,28 +60,28 @@ impl DivisionLog {
                 continue;
             };
             if let Some(roster) = RosterReport::decode(frame.padded_payload(), frame.system) {
-                self.take_roster(t_s, &roster);
+                self.handle_roster(t_s, &roster);
             } else if let Some(intent) = Intent::decode(frame.padded_payload(), frame.system) {
-                self.take_intent(t_s, &intent);
+                self.handle_intent(t_s, &intent);
             }
         }
     }
 
-    fn take_roster(&mut self, t_s: f32, roster: &RosterReport) {
+    fn handle_roster(&mut self, t_s: f32, roster: &RosterReport) {
         let reported = self.vehicles.entry(roster.system_id).or_default();
-        (reported.number, reported.counted) = (roster.divisions, roster.committed_hash);
+        (reported.number, reported.committed_hash) = (roster.division_count, roster.committed_hash);
         if reported.number == reported.flown_number {
             reported.flown_crc = reported.plan_crc;
         }
-        self.log_flown_division(t_s, roster.system_id);
-        if roster.hash == 0 {
+        self.log_division_once_flown(t_s, roster.system_id);
+        if roster.pending_hash == 0 {
             return;
         }
         // A vehicle that took no part in the division before takes none in this one.
         let before = self.inputs_by_hash.get(&roster.committed_hash).cloned().unwrap_or_default();
-        let inputs = self.inputs_by_hash.entry(roster.hash).or_default();
+        let inputs = self.inputs_by_hash.entry(roster.pending_hash).or_default();
         for (i, entry) in roster.entries.iter().enumerate() {
-            let rank = i + usize::from(roster.first);
+            let rank = i + usize::from(roster.first_rank);
             inputs.resize(inputs.len().max(rank + 1), VehicleDivisionInput::default());
             if before.get(rank).is_none_or(|input| input.alive) {
                 inputs[rank] = VehicleDivisionInput::from_entry(entry);
@@ -89,25 +89,25 @@ impl DivisionLog {
         }
     }
 
-    fn take_intent(&mut self, t_s: f32, intent: &Intent) {
+    fn handle_intent(&mut self, t_s: f32, intent: &Intent) {
         self.vehicles.entry(intent.system_id).or_default().plan_crc = intent.plan_crc;
-        self.log_flown_division(t_s, intent.system_id);
+        self.log_division_once_flown(t_s, intent.system_id);
     }
 
     /// Logs a division for `vehicle` once it reports both a higher number of divisions and another
     /// plan.
-    fn log_flown_division(&mut self, t_s: f32, vehicle: u8) {
+    fn log_division_once_flown(&mut self, t_s: f32, vehicle: u8) {
         let reported = self.vehicles.entry(vehicle).or_default();
         if reported.number > reported.flown_number && reported.plan_crc != reported.flown_crc {
             (reported.flown_number, reported.flown_crc) = (reported.number, reported.plan_crc);
-            let Reported { number, counted, plan_crc, .. } = *reported;
-            let inputs = self.inputs_by_hash.get(&counted).cloned().unwrap_or_default();
-            self.reported.push(FlownDivision { t_s, vehicle, number, inputs, plan_crc });
+            let VehicleReport { number, committed_hash, plan_crc, .. } = *reported;
+            let inputs = self.inputs_by_hash.get(&committed_hash).cloned().unwrap_or_default();
+            self.flown.push(FlownDivision { t_s, vehicle, number, inputs, plan_crc });
         }
     }
 
     /// The divisions that vehicles flew, in order of time.
     pub fn into_divisions(self) -> Vec<FlownDivision> {
-        self.reported
+        self.flown
     }
 }

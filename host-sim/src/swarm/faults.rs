@@ -10,7 +10,7 @@
 //! | `position-jump` | the estimate moves by `offset_m`, 5 m east if not given | jumps back |
 //! | `origin-change` | the EKF origin moves by `offset_m`, `DEFAULT_ORIGIN_CHANGE_M` if not given | moves back |
 //! | `gps-loss` | no position | position again |
-//! | `battery-low` | `BATTERY_LEFT` of the charge is left | never |
+//! | `battery-low` | `BATTERY_LEFT_SHARE` of the charge is left | never |
 //! | `pilot-takeover` | Position or Brake mode by the pilot's switch | as `pilot-return` |
 //! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station commands the companion to continue | |
 //! | `autopilot-reboot` | motors off, mode and streams reset, silent in its boot | 3 s if not given |
@@ -38,13 +38,13 @@ use crate::scenario::{CompanionHost, FAULT_OBSTACLE, Fault, Scenario};
 const CORRUPTED_SHARE: f64 = 0.01;
 /// Share of the charge that `battery-low` leaves: below the companions' limit, above the
 /// autopilots'.
-const BATTERY_LEFT: f32 = 0.1;
+const BATTERY_LEFT_SHARE: f32 = 0.1;
 /// By how much `position-jump` moves the estimate if the fault has no `offset_m`, ENU metres.
 const DEFAULT_POSITION_JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
 /// By how much `origin-change` moves the EKF origin if the fault has no `offset_m`, ENU metres.
 const DEFAULT_ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
 /// Duration of a serial stall or an autopilot's boot if the fault has no `duration_s`, seconds.
-const DEFAULT_FAULT_S: f32 = 3.0;
+const DEFAULT_STALL_OR_BOOT_S: f32 = 3.0;
 
 /// Refuses faults that the simulation cannot play: resetting a companion needs it in this process,
 /// disturbing its planner too; a radio cut needs the simulated radio, a damaged roadmap a file.
@@ -92,9 +92,9 @@ pub struct FaultTargets<'a> {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum FaultStage {
-    Ahead,
-    Acting,
-    Over,
+    Pending,
+    Active,
+    Ended,
 }
 
 /// The scenario's faults, which of them act or are over, and which vehicles they have struck.
@@ -109,22 +109,22 @@ impl<'a> FaultScript<'a> {
     pub fn new(scenario: &'a Scenario) -> Self {
         Self {
             scenario,
-            stages: vec![FaultStage::Ahead; scenario.faults.len()],
+            stages: vec![FaultStage::Pending; scenario.faults.len()],
             struck: vec![false; scenario.vehicles.len()],
         }
     }
 
     /// Whether a fault has struck the vehicle.
-    pub fn is_struck(&self, vehicle: usize) -> bool {
+    pub fn was_struck(&self, vehicle: usize) -> bool {
         self.struck[vehicle]
     }
 
     /// Whether every fault is over, or acts and has no end.
-    pub fn is_over(&self) -> bool {
+    pub fn has_no_change_left(&self) -> bool {
         let ends = |fault: &Fault| fault.duration_s.is_some();
         let mut pairs = self.scenario.faults.iter().zip(&self.stages);
         pairs.all(|(fault, stage)| {
-            *stage == FaultStage::Over || (*stage == FaultStage::Acting && !ends(fault))
+            *stage == FaultStage::Ended || (*stage == FaultStage::Active && !ends(fault))
         })
     }
 
@@ -139,15 +139,15 @@ impl<'a> FaultScript<'a> {
         for (fault, stage) in self.scenario.faults.iter().zip(&mut self.stages) {
             let ends_s = fault.duration_s.map_or(f32::INFINITY, |lasts_s| fault.at_s + lasts_s);
             let next = match *stage {
-                FaultStage::Ahead if t_s >= fault.at_s => FaultStage::Acting,
-                FaultStage::Acting if t_s >= ends_s => FaultStage::Over,
+                FaultStage::Pending if t_s >= fault.at_s => FaultStage::Active,
+                FaultStage::Active if t_s >= ends_s => FaultStage::Ended,
                 _ => continue,
             };
             *stage = next;
             if let (FAULT_OBSTACLE, Some(place), Some(radius_m)) =
-                (fault.kind, fault.position, fault.radius_m)
+                (fault.kind, fault.obstacle_position, fault.obstacle_radius_m)
             {
-                let done = if next == FaultStage::Acting {
+                let done = if next == FaultStage::Active {
                     world.obstacles.push((place, radius_m));
                     let centre = enu_to_geodetic(&self.scenario.map.origin, &place);
                     world.ground_station.report_obstacle(centre, radius_m);
@@ -164,7 +164,7 @@ impl<'a> FaultScript<'a> {
                 if !fault.strikes(vehicle) {
                     continue;
                 }
-                let done = if next == FaultStage::Acting {
+                let done = if next == FaultStage::Active {
                     self.struck[i] = true;
                     begin_fault(fault, i, now_us, world)?;
                     "begins"
@@ -174,7 +174,7 @@ impl<'a> FaultScript<'a> {
                         i,
                         now_us,
                         world,
-                        f64::from(self.scenario.simulation.serial_corruption),
+                        f64::from(self.scenario.simulation.serial_corruption_per_byte),
                     );
                     "ends"
                 };
@@ -193,15 +193,17 @@ fn begin_fault(
     world: &mut FaultTargets<'_>,
 ) -> anyhow::Result<()> {
     let member = &mut world.members[i];
-    let spell_us = now_us + (fault.duration_s.unwrap_or(DEFAULT_FAULT_S) * 1e6) as u64;
+    let spell_us = now_us + (fault.duration_s.unwrap_or(DEFAULT_STALL_OR_BOOT_S) * 1e6) as u64;
     match fault.kind {
         "kill" => {
-            world.radio.set_outage(i, RadioOutage { tx: true, rx: true });
+            world.radio.set_outage(i, RadioOutage { tx_failed: true, rx_failed: true });
             member.cut_power();
         }
         "radio-cut" => {
-            let way = fault.direction.as_deref().unwrap_or("both");
-            world.radio.set_outage(i, RadioOutage { tx: way != "rx", rx: way != "tx" });
+            let way = fault.radio_cut_direction.as_deref().unwrap_or("both");
+            world
+                .radio
+                .set_outage(i, RadioOutage { tx_failed: way != "rx", rx_failed: way != "tx" });
         }
         "serial-stall" => member.stall_serial(spell_us),
         "serial-corrupt" => member.set_serial_corruption(CORRUPTED_SHARE),
@@ -214,13 +216,13 @@ fn begin_fault(
             member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(DEFAULT_ORIGIN_CHANGE_M));
         }
         "gps-loss" => member.autopilot.set_gps_fix(GpsFix::Lost),
-        "battery-low" => member.autopilot.set_battery(BATTERY_LEFT),
+        "battery-low" => member.autopilot.set_battery(BATTERY_LEFT_SHARE),
         "pilot-takeover" => member.autopilot.take_over_by_pilot(),
         "pilot-return" => return_from_pilot(i, now_us, world),
         "autopilot-reboot" => member.reboot_autopilot(spell_us),
         "companion-reset" => member.reset_companion(now_us)?,
-        "late-plan" => member.planner = PlanAnswer::Late,
-        "bad-roadmap" => member.planner = PlanAnswer::BadRoadmap,
+        "late-plan" => member.plan_answer = PlanAnswer::Withheld,
+        "bad-roadmap" => member.plan_answer = PlanAnswer::BadRoadmap,
         "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Pause),
         "return-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Return),
         "land-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Land),
@@ -244,7 +246,7 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
         }
         "gps-loss" => member.autopilot.set_gps_fix(GpsFix::Held),
         "pilot-takeover" => return_from_pilot(i, now_us, world),
-        "late-plan" | "bad-roadmap" => member.planner = PlanAnswer::Sound,
+        "late-plan" | "bad-roadmap" => member.plan_answer = PlanAnswer::Correct,
         "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Resume),
         // All other faults end by themselves or never.
         _ => {}

@@ -16,7 +16,7 @@ use super::simulated_vehicle::{SimulatedVehicle, is_finished};
 /// MAVLink component id of the ground station: MAV_COMP_ID_MISSIONPLANNER.
 const COMPONENT_ID: u8 = 190;
 /// Time after which a command that a vehicle has not obeyed is repeated, microseconds.
-const COMMAND_EVERY_US: u64 = 1_000_000;
+const COMMAND_REPEAT_US: u64 = 1_000_000;
 /// Time from the readiness of the first vehicle until ready vehicles are started without the
 /// others, microseconds.
 const START_WITHOUT_REST_US: u64 = 90_000_000;
@@ -62,9 +62,9 @@ impl OperatorCommand {
 pub struct GroundStation {
     system_id: u8,
     sequence: u8,
-    ready_us: Option<u64>,
-    first_us: Option<u64>,
-    last_us: u64,
+    first_ready_us: Option<u64>,
+    start_commanded_us: Option<u64>,
+    last_sent_us: u64,
     /// Commands to single vehicles: vehicle's index, command, and until when it is repeated.
     orders: Vec<(usize, OperatorCommand, u64)>,
     /// Centre and radius (metres) of each obstacle to report.
@@ -77,22 +77,22 @@ impl GroundStation {
         Self {
             system_id,
             sequence: 0,
-            ready_us: None,
-            first_us: None,
-            last_us: 0,
+            first_ready_us: None,
+            start_commanded_us: None,
+            last_sent_us: 0,
             orders: Vec::new(),
             obstacles: Vec::new(),
         }
     }
 
     /// Whether the swarm's start was commanded.
-    pub fn is_started(&self) -> bool {
-        self.first_us.is_some()
+    pub fn is_start_commanded(&self) -> bool {
+        self.start_commanded_us.is_some()
     }
 
     /// When the swarm's start was first commanded, seconds; 0 before.
-    pub fn started_s(&self) -> f64 {
-        self.first_us.map_or(0.0, |us| us as f64 * 1e-6)
+    pub fn start_commanded_s(&self) -> f64 {
+        self.start_commanded_us.map_or(0.0, |us| us as f64 * 1e-6)
     }
 
     /// Sets the command for one vehicle, repeated for 10 s; it replaces the vehicle's earlier one.
@@ -125,25 +125,26 @@ impl GroundStation {
     /// Frames that the ground station sends at `now_us`; empty if none is due.
     fn due_frames(&mut self, now_us: u64, members: &[SimulatedVehicle]) -> Vec<Vec<u8>> {
         let state = |m: &SimulatedVehicle| m.state();
-        if self.first_us.is_none() {
+        if self.start_commanded_us.is_none() {
             let ready = || members.iter().filter(|m| state(m) == State::Ready);
             if ready().next().is_some() {
-                self.ready_us.get_or_insert(now_us);
+                self.first_ready_us.get_or_insert(now_us);
             }
             let settled = members.iter().all(|m| state(m) == State::Ready || is_finished(state(m)));
-            let waited =
-                self.ready_us.is_some_and(|since_us| now_us >= since_us + START_WITHOUT_REST_US);
-            if !(self.ready_us.is_some() && (settled || waited)) {
+            let waited = self
+                .first_ready_us
+                .is_some_and(|since_us| now_us >= since_us + START_WITHOUT_REST_US);
+            if !(self.first_ready_us.is_some() && (settled || waited)) {
                 return Vec::new();
             }
-            self.first_us = Some(now_us);
-            self.last_us = now_us;
+            self.start_commanded_us = Some(now_us);
+            self.last_sent_us = now_us;
             return vec![self.command_frame(&command_long(START, ALL_SYSTEMS, 0.0))];
         }
-        if now_us < self.last_us + COMMAND_EVERY_US {
+        if now_us < self.last_sent_us + COMMAND_REPEAT_US {
             return Vec::new();
         }
-        self.last_us = now_us;
+        self.last_sent_us = now_us;
         // A pause that was obeyed is not repeated: another station may resume the vehicle.
         self.orders.retain(|&(of, order, until_us)| {
             now_us < until_us
@@ -192,7 +193,11 @@ const ALL_SYSTEMS: u8 = 0;
 
 /// Writes a MISSION_START of ground station `from` to `target_system` into `out`; returns its
 /// length.
-pub fn mission_start(from: u8, target_system: u8, out: &mut [u8; frame::MAX_FRAME_LEN]) -> usize {
+pub fn encode_mission_start(
+    from: u8,
+    target_system: u8,
+    out: &mut [u8; frame::MAX_FRAME_LEN],
+) -> usize {
     encode(&command_long(START, target_system, 0.0), from, 0, out)
 }
 

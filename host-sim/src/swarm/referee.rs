@@ -20,12 +20,12 @@ const CONTACT_ROUNDING_M: f32 = 1e-3;
 const DEADLOCK_S: f64 = 20.0;
 /// Longest wait for a vehicle out of radio range, seconds: 45 until it counts as lost, and some for
 /// those in between.
-const OUT_OF_RANGE_WAIT_S: f64 = 60.0;
+const MAX_OUT_OF_RANGE_WAIT_S: f64 = 60.0;
 /// Least increase of arc length along the path that counts as progress, metres.
-const COUNTS_AS_PROGRESS_M: f32 = 0.1;
+const MIN_COUNTED_PROGRESS_M: f32 = 0.1;
 /// Distance from its last place of progress at which a vehicle that reports no progress counts as
 /// moving, metres: more than it sways in hover.
-const OFF_HOVER_M: f32 = 1.0;
+const MOVED_FROM_HOVER_M: f32 = 1.0;
 /// Time between two points of the recorded tracks and samples, seconds.
 const RECORD_EVERY_S: f64 = 0.2;
 
@@ -64,25 +64,25 @@ pub struct DistanceSample {
     pub t_s: f32,
     /// Smallest distance between two centres, not both on the ground, metres; infinite if no such
     /// pair.
-    pub separation_m: f32,
+    pub min_separation_m: f32,
     /// Smallest distance of a flying centre to an obstacle, metres; infinite if none was near.
-    pub clearance_m: f32,
+    pub min_clearance_m: f32,
 }
 
 #[derive(Clone, Debug)]
 struct WatchedVehicle {
     id: u8,
     radius_m: f32,
-    last: Option<Point>,
+    last_position: Option<Point>,
     flown_m: f64,
     in_contact: bool,
     /// Where the vehicle's distance to the nearest obstacle was last measured, and that distance,
     /// metres.
-    measured: Option<(Point, f32)>,
+    measured_clearance: Option<(Point, f32)>,
     best_progress_m: f32,
-    progressed_at: Point,
-    progressed_s: f64,
-    stuck: bool,
+    progress_position: Point,
+    last_progress_s: f64,
+    in_deadlock: bool,
     track: Vec<(f32, Point)>,
 }
 
@@ -94,21 +94,21 @@ pub struct Referee<'a> {
     /// Height of uneven ground, which the grid does not hold; `None` over level ground.
     pub terrain: Option<&'a HeightGrid>,
     /// Obstacles of the map beside an area, which the grid does not hold; `None` without one.
-    pub walls: Option<&'a MapObstacles>,
+    pub area_obstacles: Option<&'a MapObstacles>,
     safety_distance_m: f32,
     vehicles: Vec<WatchedVehicle>,
     too_near: Vec<bool>,
     touching: Vec<bool>,
-    recorded_s: f64,
-    window: DistanceSample,
+    last_recorded_s: f64,
+    sample_so_far: DistanceSample,
     /// Whether a deadlock that ends no longer counts: where faults strike, vehicles wait until it
     /// is known what became of the struck vehicle, and for their turn to fly around it.
     pub retracts_ended_deadlocks: bool,
-    /// Whether a deadlock that ends by flying on within 60 s (`OUT_OF_RANGE_WAIT_S`) no longer
+    /// Whether a deadlock that ends by flying on within 60 s (`MAX_OUT_OF_RANGE_WAIT_S`) no longer
     /// counts: where vehicles may be out of radio range, they wait until one counts as lost.
     pub retracts_out_of_range_waits: bool,
     /// Spherical obstacles that are in no map: centre and radius, metres.
-    pub obstacles: Vec<(Point, f32)>,
+    pub sphere_obstacles: Vec<(Point, f32)>,
     /// Number of times that a body began to touch an obstacle.
     pub wall_contacts: u32,
     /// Number of times that a pair came nearer than the safety distance.
@@ -136,12 +136,12 @@ pub struct Incident {
     /// What happened.
     pub text: String,
     /// Whether it is a standstill that ended, and no longer counts as a deadlock.
-    pub ended: bool,
+    pub retracted: bool,
 }
 
 impl Incident {
     fn new(t_s: f64, vehicle: usize, text: String) -> Self {
-        Self { t_s, vehicle, text, ended: false }
+        Self { t_s, vehicle, text, retracted: false }
     }
 }
 
@@ -156,30 +156,30 @@ impl<'a> Referee<'a> {
         let watched = |&(id, radius_m): &(u8, f32)| WatchedVehicle {
             id,
             radius_m,
-            last: None,
+            last_position: None,
             flown_m: 0.0,
             in_contact: false,
-            measured: None,
+            measured_clearance: None,
             best_progress_m: f32::NEG_INFINITY,
-            progressed_at: Point::zeros(),
-            progressed_s: 0.0,
-            stuck: false,
+            progress_position: Point::zeros(),
+            last_progress_s: 0.0,
+            in_deadlock: false,
             track: Vec::new(),
         };
         Self {
             grid,
             field,
             terrain: None,
-            walls: None,
+            area_obstacles: None,
             safety_distance_m,
             vehicles: vehicles.iter().map(watched).collect(),
             too_near: vec![false; vehicles.len() * vehicles.len()],
             touching: vec![false; vehicles.len() * vehicles.len()],
-            recorded_s: f64::NEG_INFINITY,
-            window: EMPTY_SAMPLE,
+            last_recorded_s: f64::NEG_INFINITY,
+            sample_so_far: EMPTY_SAMPLE,
             retracts_ended_deadlocks: false,
             retracts_out_of_range_waits: false,
-            obstacles: Vec::new(),
+            sphere_obstacles: Vec::new(),
             wall_contacts: 0,
             violations: 0,
             deadlocks: 0,
@@ -196,15 +196,15 @@ impl<'a> Referee<'a> {
             self.watch_walls(i, t_s, now);
             self.watch_progress(i, t_s, now);
             let vehicle = &mut self.vehicles[i];
-            if let Some(last) = vehicle.last.replace(now.position) {
+            if let Some(last) = vehicle.last_position.replace(now.position) {
                 vehicle.flown_m += f64::from((now.position - last).norm());
             }
         }
         self.watch_pairs(t_s, seen);
-        if t_s - self.recorded_s >= RECORD_EVERY_S - 1e-6 {
-            self.recorded_s = t_s;
-            self.samples.push(DistanceSample { t_s: t_s as f32, ..self.window });
-            self.window = EMPTY_SAMPLE;
+        if t_s - self.last_recorded_s >= RECORD_EVERY_S - 1e-6 {
+            self.last_recorded_s = t_s;
+            self.samples.push(DistanceSample { t_s: t_s as f32, ..self.sample_so_far });
+            self.sample_so_far = EMPTY_SAMPLE;
             for (vehicle, now) in self.vehicles.iter_mut().zip(seen) {
                 vehicle.track.push((t_s as f32, now.position));
             }
@@ -222,12 +222,12 @@ impl<'a> Referee<'a> {
     }
 
     /// Whether a body in flight reaches into uneven ground; records its height above ground too.
-    fn reaches_ground(&mut self, place: &Point, radius_m: f32) -> bool {
+    fn check_ground_contact(&mut self, place: &Point, radius_m: f32) -> bool {
         let Some(ground_m) = self.terrain.and_then(|terrain| terrain.height_at(&place.xy())) else {
             return false;
         };
         let above_m = place.z - ground_m;
-        self.window.clearance_m = self.window.clearance_m.min(above_m);
+        self.sample_so_far.min_clearance_m = self.sample_so_far.min_clearance_m.min(above_m);
         self.min_clearance_m = self.min_clearance_m.min(above_m);
         above_m < radius_m - CONTACT_ROUNDING_M
     }
@@ -240,9 +240,10 @@ impl<'a> Referee<'a> {
         let radius_m = self.vehicles[i].radius_m;
         let flying = now.phase == RefereePhase::Flying;
         // Only a clearance that means contact, or is the smallest of this sample, must be exact.
-        let wanted = if flying { self.window.clearance_m.max(radius_m) } else { radius_m };
+        let wanted =
+            if flying { self.sample_so_far.min_clearance_m.max(radius_m) } else { radius_m };
         // A clearance changes by no more than the distance flown since it was measured.
-        let (at_least_m, at_most_m) = match self.vehicles[i].measured {
+        let (at_least_m, at_most_m) = match self.vehicles[i].measured_clearance {
             Some((place, clearance_m)) => {
                 let moved_m = (now.position - place).norm() + CONTACT_ROUNDING_M;
                 (clearance_m - moved_m, clearance_m + moved_m)
@@ -251,12 +252,13 @@ impl<'a> Referee<'a> {
         };
         let touches = if at_least_m < wanted && self.lower_bound_m(&now.position) < wanted {
             let reach = wanted.min(MAX_MEASURED_CLEARANCE_M);
-            let clearance_m = self.measure_m(&now.position, reach.min(at_most_m));
+            let clearance_m = self.clearance_up_to_m(&now.position, reach.min(at_most_m));
             if clearance_m < reach {
-                self.vehicles[i].measured = Some((now.position, clearance_m));
+                self.vehicles[i].measured_clearance = Some((now.position, clearance_m));
             }
             if flying && clearance_m < reach {
-                self.window.clearance_m = self.window.clearance_m.min(clearance_m);
+                self.sample_so_far.min_clearance_m =
+                    self.sample_so_far.min_clearance_m.min(clearance_m);
                 self.min_clearance_m = self.min_clearance_m.min(clearance_m);
             }
             let touches = clearance_m < radius_m - CONTACT_ROUNDING_M;
@@ -264,11 +266,11 @@ impl<'a> Referee<'a> {
         } else {
             false
         };
-        let touches = touches || (flying && self.reaches_ground(&now.position, radius_m));
+        let touches = touches || (flying && self.check_ground_contact(&now.position, radius_m));
         let inside = |&(centre, extent_m): &(Point, f32)| {
             (now.position - centre).norm() < radius_m + extent_m
         };
-        let touches = touches || self.obstacles.iter().any(inside);
+        let touches = touches || self.sphere_obstacles.iter().any(inside);
         let was_touching = std::mem::replace(&mut self.vehicles[i].in_contact, touches);
         if touches && !was_touching {
             self.wall_contacts += 1;
@@ -283,14 +285,14 @@ impl<'a> Referee<'a> {
 
     /// Lower bound of the distance to the nearest obstacle, metres.
     fn lower_bound_m(&self, place: &Point) -> f32 {
-        let walls_m = self.walls.map(|walls| walls.clearance_field().lower_bound_m(place));
+        let walls_m = self.area_obstacles.map(|walls| walls.clearance_field().lower_bound_m(place));
         walls_m.unwrap_or(f32::INFINITY).min(self.field.lower_bound_m(place))
     }
 
     /// Distance to the nearest obstacle, metres; `reach` if none is nearer.
-    fn measure_m(&self, place: &Point, reach: f32) -> f32 {
+    fn clearance_up_to_m(&self, place: &Point, reach: f32) -> f32 {
         let nearest_m = point_clearance(&self.grid, place, reach);
-        self.walls.map_or(nearest_m, |walls| {
+        self.area_obstacles.map_or(nearest_m, |walls| {
             nearest_m.min(point_clearance(&walls.map.grid(), place, reach))
         })
     }
@@ -298,7 +300,7 @@ impl<'a> Referee<'a> {
     /// Whether a body on or near the floor touches an obstacle cell whose top is above the body's
     /// centre.
     fn touches_beside(&self, position: &Point, radius_m: f32) -> bool {
-        let walls = self.walls.map(|walls| walls.map.grid());
+        let walls = self.area_obstacles.map(|walls| walls.map.grid());
         let mut grids = walls.iter().chain([&self.grid]);
         grids.any(|grid| touches_cell_beside(grid, position, radius_m))
     }
@@ -319,7 +321,8 @@ impl<'a> Referee<'a> {
                     }
                     _ => {}
                 }
-                self.window.separation_m = self.window.separation_m.min(apart);
+                self.sample_so_far.min_separation_m =
+                    self.sample_so_far.min_separation_m.min(apart);
                 let near = apart < self.safety_distance_m;
                 let was_near = std::mem::replace(&mut self.too_near[i * n + j], near);
                 if near && !was_near {
@@ -341,7 +344,7 @@ impl<'a> Referee<'a> {
                 }
             }
         }
-        self.min_separation_m = self.min_separation_m.min(self.window.separation_m);
+        self.min_separation_m = self.min_separation_m.min(self.sample_so_far.min_separation_m);
     }
 
     /// A vehicle need not keep the safety distance from a wreck; touching one is a wall contact.
@@ -374,37 +377,38 @@ impl<'a> Referee<'a> {
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
         // Progress decreases only if it is now counted along another path.
-        let on_other_path =
-            now.progress_m.filter(|progress_m| *progress_m < vehicle.best_progress_m - OFF_HOVER_M);
+        let on_other_path = now
+            .progress_m
+            .filter(|progress_m| *progress_m < vehicle.best_progress_m - MOVED_FROM_HOVER_M);
         if let Some(progress_m) = on_other_path {
-            vehicle.best_progress_m = progress_m - OFF_HOVER_M;
+            vehicle.best_progress_m = progress_m - MOVED_FROM_HOVER_M;
         }
         let moved = match now.progress_m {
-            Some(progress_m) => progress_m > vehicle.best_progress_m + COUNTS_AS_PROGRESS_M,
-            None => (now.position - vehicle.progressed_at).norm() > OFF_HOVER_M,
+            Some(progress_m) => progress_m > vehicle.best_progress_m + MIN_COUNTED_PROGRESS_M,
+            None => (now.position - vehicle.progress_position).norm() > MOVED_FROM_HOVER_M,
         };
         if now.phase != RefereePhase::Flying || now.holds_by_command || moved {
             vehicle.best_progress_m =
                 now.progress_m.unwrap_or(f32::NEG_INFINITY).max(vehicle.best_progress_m);
-            vehicle.progressed_at = now.position;
-            let stood_s = t_s - std::mem::replace(&mut vehicle.progressed_s, t_s);
+            vehicle.progress_position = now.position;
+            let stood_s = t_s - std::mem::replace(&mut vehicle.last_progress_s, t_s);
             // A vehicle whose power fails may have waited for a good reason.
             let ends = moved || now.phase != RefereePhase::Flying;
-            let waited = moved && stood_s <= OUT_OF_RANGE_WAIT_S;
+            let waited = moved && stood_s <= MAX_OUT_OF_RANGE_WAIT_S;
             let retracts = (ends && self.retracts_ended_deadlocks)
                 || (waited && self.retracts_out_of_range_waits);
-            if std::mem::take(&mut vehicle.stuck) && retracts {
+            if std::mem::take(&mut vehicle.in_deadlock) && retracts {
                 self.deadlocks -= 1;
-                let counted = |to: &&mut Incident| to.vehicle == i && to.text == no_progress();
+                let counted = |to: &&mut Incident| to.vehicle == i && to.text == no_progress_text();
                 if let Some(incident) = self.incidents.iter_mut().rfind(counted) {
-                    incident.ended = true;
+                    incident.retracted = true;
                     incident.text = format!("stood for {stood_s:.0} s");
                 }
             }
-        } else if t_s - vehicle.progressed_s > DEADLOCK_S && !vehicle.stuck {
-            vehicle.stuck = true;
+        } else if t_s - vehicle.last_progress_s > DEADLOCK_S && !vehicle.in_deadlock {
+            vehicle.in_deadlock = true;
             self.deadlocks += 1;
-            self.incidents.push(Incident::new(t_s, i, no_progress()));
+            self.incidents.push(Incident::new(t_s, i, no_progress_text()));
         }
     }
 }
@@ -435,14 +439,14 @@ fn touches_cell_beside(grid: &VoxelGrid<'_>, position: &Point, radius_m: f32) ->
     })
 }
 
-fn no_progress() -> String {
+fn no_progress_text() -> String {
     format!("no progress for {DEADLOCK_S} s")
 }
 
 /// Greatest clearance to an obstacle that is measured exactly, metres.
 const MAX_MEASURED_CLEARANCE_M: f32 = 3.0;
 const EMPTY_SAMPLE: DistanceSample =
-    DistanceSample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };
+    DistanceSample { t_s: 0.0, min_separation_m: f32::INFINITY, min_clearance_m: f32::INFINITY };
 
 #[cfg(test)]
 mod tests;

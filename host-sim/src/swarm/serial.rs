@@ -16,9 +16,9 @@ pub struct SimulatedSerialConfig {
     /// Time from a byte's last bit to the moment the receiver can read it, seconds.
     pub latency_s: f64,
     /// Probability that a byte arrives with one bit changed.
-    pub corruption: f64,
+    pub corruption_per_byte: f64,
     /// Size of the transmit buffer, bytes.
-    pub buffer: usize,
+    pub transmit_buffer_len: usize,
 }
 
 /// Share of bytes lost, or of writes damaged, above which the link is named as a cause of failure.
@@ -37,11 +37,11 @@ pub struct SerialLink {
     writes: VecDeque<(u64, usize)>,
     stalled_until_us: u64,
     /// Bytes given to [`Self::write`] so far.
-    pub offered: u64,
+    pub offered_bytes: u64,
     /// Bytes lost so far because the transmit buffer was full.
-    pub overrun: u64,
+    pub overrun_bytes: u64,
     /// Number of writes so far, lost ones included.
-    pub writes_sent: u64,
+    pub writes_offered: u64,
     /// Number of writes so far of which a byte was changed.
     pub writes_damaged: u64,
 }
@@ -56,9 +56,9 @@ impl SerialLink {
             bytes: VecDeque::new(),
             writes: VecDeque::new(),
             stalled_until_us: 0,
-            offered: 0,
-            overrun: 0,
-            writes_sent: 0,
+            offered_bytes: 0,
+            overrun_bytes: 0,
+            writes_offered: 0,
             writes_damaged: 0,
         }
     }
@@ -67,9 +67,9 @@ impl SerialLink {
     /// nothing.
     pub fn describe_fault(&self, lasted_s: f64) -> Option<String> {
         let share = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
-        let lost = share(self.overrun, self.offered);
+        let lost = share(self.overrun_bytes, self.offered_bytes);
         if lost > MIN_REPORTED_SHARE {
-            let offered = (self.offered as f64 / lasted_s.max(1e-3)) as u64;
+            let offered = (self.offered_bytes as f64 / lasted_s.max(1e-3)) as u64;
             let enough =
                 BAUDS.iter().find(|baud| *baud / 10 > offered).unwrap_or(&BAUDS[BAUDS.len() - 1]);
             return Some(format!(
@@ -80,14 +80,14 @@ impl SerialLink {
                 self.config.baud / 10
             ));
         }
-        let damaged = share(self.writes_damaged, self.writes_sent);
+        let damaged = share(self.writes_damaged, self.writes_offered);
         (damaged > MIN_REPORTED_SHARE).then(|| {
             format!(
                 "its serial link damaged {:.0} % of what it carried, and damaged messages are dropped: {} of its bytes \
                  change; a simulation.serial_corruption of {:.0e} damages less than {:.0} %",
                 100.0 * damaged,
-                self.config.corruption as f32,
-                self.config.corruption * MIN_REPORTED_SHARE / damaged,
+                self.config.corruption_per_byte as f32,
+                self.config.corruption_per_byte * MIN_REPORTED_SHARE / damaged,
                 100.0 * MIN_REPORTED_SHARE
             )
         })
@@ -95,10 +95,10 @@ impl SerialLink {
 
     /// Sends bytes as one write; all of them are lost if they do not fit the transmit buffer.
     pub fn write(&mut self, now_us: u64, data: &[u8]) {
-        self.offered += data.len() as u64;
-        self.writes_sent += 1;
-        if self.bytes.len() + data.len() > self.config.buffer {
-            self.overrun += data.len() as u64;
+        self.offered_bytes += data.len() as u64;
+        self.writes_offered += 1;
+        if self.bytes.len() + data.len() > self.config.transmit_buffer_len {
+            self.overrun_bytes += data.len() as u64;
             return;
         }
         let took_us = data.len() as u64 * 10_000_000 / u64::from(self.config.baud);
@@ -106,11 +106,11 @@ impl SerialLink {
         let arrives_us = self.busy_until_us + (self.config.latency_s * 1e6) as u64;
         self.writes.push_back((arrives_us, data.len()));
         self.bytes.extend(data);
-        if self.config.corruption > 0.0 {
+        if self.config.corruption_per_byte > 0.0 {
             let sent = self.bytes.len() - data.len();
             let mut damaged = false;
             for byte in self.bytes.range_mut(sent..) {
-                if uniform_unit(&mut self.rng) < self.config.corruption {
+                if uniform_unit(&mut self.rng) < self.config.corruption_per_byte {
                     *byte ^= 1 << (self.rng.next_u32() % 8);
                     damaged = true;
                 }
@@ -141,7 +141,7 @@ impl SerialLink {
 
     /// Sets the probability that a byte arrives changed.
     pub fn set_corruption(&mut self, corruption: f64) {
-        self.config.corruption = corruption;
+        self.config.corruption_per_byte = corruption;
     }
 
     /// Delivers nothing until `until_us`.

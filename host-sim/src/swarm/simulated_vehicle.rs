@@ -3,7 +3,7 @@
 mod observed;
 
 use anyhow::Context;
-use companion::storage::store::{MAX_READ, Store};
+use companion::storage::store::{MAX_READ_LEN, Store};
 use companion::{Config, Event, Instant, Link, PlanKind, PlanRequests, State};
 use planner_core::Point;
 use sim_autopilot::{Autopilot, Photo};
@@ -28,9 +28,9 @@ const GROUND_CHECK_STEPS: u64 = 25;
 pub enum PlanAnswer {
     /// With the right plan, at once.
     #[default]
-    Sound,
+    Correct,
     /// Not at all.
-    Late,
+    Withheld,
     /// With the result of planning on a damaged roadmap.
     BadRoadmap,
 }
@@ -48,7 +48,7 @@ pub struct SimulatedVehicle {
     /// The plans that the companion has requested and not got yet.
     plan_requests: PlanRequests,
     /// How a plan request is answered.
-    pub planner: PlanAnswer,
+    pub plan_answer: PlanAnswer,
     /// Text of the last warning of the mission table since the vehicle last followed its path.
     pub last_warning: Option<&'static str>,
     /// When the vehicle first left the ground, seconds.
@@ -57,19 +57,19 @@ pub struct SimulatedVehicle {
     /// that lost its power before.
     pub landed_s: Option<f64>,
     /// When the vehicle first stood or lay on the ground again, its motors off, seconds.
-    pub down_s: Option<f64>,
+    pub back_on_ground_s: Option<f64>,
     /// When the vehicle lost its power, or its motors in the air, seconds.
-    pub lost_s: Option<f64>,
+    pub power_lost_at_s: Option<f64>,
     config: Config<VEHICLES>,
     to_companion: SerialLink,
     to_autopilot: SerialLink,
     ground_m: f32,
-    bytes: Vec<u8>,
+    received_bytes: Vec<u8>,
     /// When the companion last started, microseconds of simulation time.
-    companion_us: u64,
+    companion_started_us: u64,
     /// Simulation time until which the autopilot boots, microseconds.
     boots_until_us: u64,
-    killed: bool,
+    power_cut: bool,
     wrecked: bool,
 }
 
@@ -89,19 +89,19 @@ impl SimulatedVehicle {
             flash: None,
             config,
             plan_requests: PlanRequests::new(),
-            planner: PlanAnswer::Sound,
+            plan_answer: PlanAnswer::Correct,
             last_warning: None,
             took_off_s: None,
             landed_s: None,
-            down_s: None,
-            lost_s: None,
+            back_on_ground_s: None,
+            power_lost_at_s: None,
             to_companion: SerialLink::new(serial, seed, 2 * id),
             to_autopilot: SerialLink::new(serial, seed, 2 * id + 1),
             ground_m: autopilot.start.z - autopilot.vehicle.radius_m,
-            bytes: Vec::new(),
-            companion_us: 0,
+            received_bytes: Vec::new(),
+            companion_started_us: 0,
             boots_until_us: 0,
-            killed: false,
+            power_cut: false,
             wrecked: false,
         })
     }
@@ -151,13 +151,13 @@ impl SimulatedVehicle {
     }
 
     /// Longest time that a lost vehicle takes to come down, seconds; 0 in a mission with goals.
-    pub fn lost_vehicle_down_s(&self) -> f32 {
-        self.config.lost_vehicle_down_s.unwrap_or(0.0)
+    pub fn lost_vehicle_down_after_s(&self) -> f32 {
+        self.config.lost_vehicle_down_after_s.unwrap_or(0.0)
     }
 
     /// Whether the vehicle has lost all power (`kill`).
     pub fn is_powerless(&self) -> bool {
-        self.killed
+        self.power_cut
     }
 
     /// Whether the vehicle fell because its motors stopped in the air.
@@ -168,7 +168,7 @@ impl SimulatedVehicle {
     /// Cuts the power of autopilot and companion for good.
     pub fn cut_power(&mut self) {
         self.cut_motors();
-        self.killed = true;
+        self.power_cut = true;
     }
 
     /// Restarts the autopilot: motors off; until `until_us` it neither sends nor receives.
@@ -189,7 +189,7 @@ impl SimulatedVehicle {
     /// As [`Self::new`]; none if that succeeded with the same settings.
     pub fn reset_companion(&mut self, now_us: u64) -> anyhow::Result<()> {
         self.start_companion()?;
-        self.companion_us = now_us;
+        self.companion_started_us = now_us;
         self.plan_requests = PlanRequests::new();
         Ok(())
     }
@@ -208,7 +208,7 @@ impl SimulatedVehicle {
 
     /// The companion's own time: since its last start.
     fn companion_now(&self, now_us: u64) -> Instant {
-        Instant::from_micros(now_us - self.companion_us)
+        Instant::from_micros(now_us - self.companion_started_us)
     }
 
     /// One physics step of the vehicle: its autopilot, and all bytes that arrive by the step's end.
@@ -228,12 +228,12 @@ impl SimulatedVehicle {
         let now_us = (step + 1) * STEP_US;
         if step % GROUND_CHECK_STEPS == station as u64 % GROUND_CHECK_STEPS {
             self.ground_m = mission
-                .ground_below(&self.autopilot.true_state().position)
+                .ground_z_below_m(&self.autopilot.true_state().position)
                 .unwrap_or(f32::NEG_INFINITY);
         }
         self.autopilot.step(STEP_S, self.ground_m);
         self.note_flight_times(now_us as f64 * 1e-6);
-        if self.killed {
+        if self.power_cut {
             return Ok(());
         }
         let booting = now_us < self.boots_until_us;
@@ -250,12 +250,12 @@ impl SimulatedVehicle {
         if self.board.is_some() {
             self.step_board(now_us, station, radio, places, log)?;
         } else {
-            self.to_companion.read(now_us, &mut self.bytes);
+            self.to_companion.read(now_us, &mut self.received_bytes);
             self.step_companion(now_us, station, radio, places, log);
         }
-        self.to_autopilot.read(now_us, &mut self.bytes);
-        if !self.bytes.is_empty() && !booting {
-            self.autopilot.handle_bytes(&self.bytes);
+        self.to_autopilot.read(now_us, &mut self.received_bytes);
+        if !self.received_bytes.is_empty() && !booting {
+            self.autopilot.handle_bytes(&self.received_bytes);
         }
         Ok(())
     }
@@ -266,12 +266,12 @@ impl SimulatedVehicle {
         if !truth.touching && truth.armed {
             self.took_off_s.get_or_insert(t_s);
         }
-        if self.killed || self.wrecked {
-            self.lost_s.get_or_insert(t_s);
+        if self.power_cut || self.wrecked {
+            self.power_lost_at_s.get_or_insert(t_s);
         }
         if self.took_off_s.is_some() && truth.touching && !truth.armed {
-            self.down_s.get_or_insert(t_s);
-            if !self.killed {
+            self.back_on_ground_s.get_or_insert(t_s);
+            if !self.power_cut {
                 self.landed_s.get_or_insert(t_s);
             }
         }
@@ -307,7 +307,7 @@ impl SimulatedVehicle {
                     to_autopilot: down,
                     radio,
                     station,
-                    places,
+                    true_positions: places,
                     on_text: &mut said,
                 },
             )
@@ -324,8 +324,8 @@ impl SimulatedVehicle {
         log: &mut Vec<report::LogEvent>,
     ) {
         let now = self.companion_now(now_us);
-        if !self.bytes.is_empty() {
-            self.companion.handle_bytes(Link::Autopilot, now, &self.bytes);
+        if !self.received_bytes.is_empty() {
+            self.companion.handle_bytes(Link::Autopilot, now, &self.received_bytes);
         }
         while let Some(packet) = radio.receive(now_us, station) {
             self.companion.handle_bytes(Link::Swarm, now, &packet);
@@ -339,8 +339,8 @@ impl SimulatedVehicle {
                 Event::PlanRequested(wanted) => self.plan_requests.add(wanted),
                 Event::RestartRequested => restarts = true,
                 // The companion also sends this as STATUSTEXT, so it is not logged.
-                Event::WaitsForStart { .. } => {}
-                Event::FlownAround { left } => {
+                Event::WaitsForUnstartedVehicle { .. } => {}
+                Event::DetourSkippedWaypoints { count: left } => {
                     let text = format!("Flown around: {left} waypoints are left");
                     let (t_s, vehicle) = ((now_us as f64 * 1e-6) as f32, Some(self.system_id()));
                     log.push(report::LogEvent { t_s, vehicle, level: Level::Info, text });
@@ -356,13 +356,13 @@ impl SimulatedVehicle {
             }
         }
         if let Some(flash) = &mut self.flash {
-            let mut read = [0; MAX_READ];
+            let mut read = [0; MAX_READ_LEN];
             while let Some(request) = self.companion.poll_flash() {
                 let outcome = flash.execute_request(request, &mut read);
                 self.companion.handle_flash(now, outcome);
             }
         }
-        self.drain_companion(now_us, station, radio, places);
+        self.send_companion_output(now_us, station, radio, places);
         if restarts {
             // An error is impossible: the same settings have made a companion before.
             let _ = self.reset_companion(now_us);
@@ -399,7 +399,7 @@ impl SimulatedVehicle {
 
     /// Whether the vehicle has no power, or its autopilot boots.
     fn is_offline(&self, now_us: u64) -> bool {
-        self.killed || now_us < self.boots_until_us
+        self.power_cut || now_us < self.boots_until_us
     }
 
     fn update_last_warning(&mut self, from: State, to: State, warning: Option<&'static str>) {
@@ -428,7 +428,7 @@ impl SimulatedVehicle {
 
     /// How the vehicle's flight ended: the state of its mission, and the warning that led there.
     pub fn describe_end(&self) -> String {
-        match (self.killed, self.last_warning) {
+        match (self.power_cut, self.last_warning) {
             (true, _) => "Killed".to_owned(),
             (false, Some(cause)) => format!("{:?}: {cause}", self.state()),
             (false, None) => format!("{:?}", self.state()),
@@ -438,7 +438,7 @@ impl SimulatedVehicle {
     /// Removes and returns the companion's most urgent plan request; `None` if there is none, or if
     /// requests are not answered (`late-plan`).
     pub fn take_plan_request(&self) -> Option<PlanKind> {
-        if self.planner == PlanAnswer::Late { None } else { self.plan_requests.take() }
+        if self.plan_answer == PlanAnswer::Withheld { None } else { self.plan_requests.take() }
     }
 
     /// Gives the companion the plan that it requested, or the failure.
@@ -452,7 +452,7 @@ impl SimulatedVehicle {
         self.companion.handle_plan(now, wanted, plan);
     }
 
-    fn drain_companion(
+    fn send_companion_output(
         &mut self,
         now_us: u64,
         station: usize,
@@ -483,7 +483,7 @@ impl SimulatedVehicle {
             vehicle,
             t_s: photo.time_us as f32 * 1e-6,
             position: photo.position,
-            heading: std::f32::consts::FRAC_PI_2 - photo.heading_rad,
+            yaw_enu_rad: std::f32::consts::FRAC_PI_2 - photo.heading_rad,
         };
         self.autopilot.drain_photos().into_iter().map(picture).collect()
     }

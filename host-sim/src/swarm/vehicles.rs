@@ -29,8 +29,8 @@ pub fn vehicles_on_pads(mission: &PreparedMission) -> anyhow::Result<Vec<Simulat
     let serial = SimulatedSerialConfig {
         baud: settings.serial_baud,
         latency_s: 0.001,
-        corruption: f64::from(settings.serial_corruption),
-        buffer: 4096,
+        corruption_per_byte: f64::from(settings.serial_corruption_per_byte),
+        transmit_buffer_len: 4096,
     };
     scenario
         .vehicles
@@ -40,7 +40,7 @@ pub fn vehicles_on_pads(mission: &PreparedMission) -> anyhow::Result<Vec<Simulat
             let config = autopilot_config(mission, vehicle, task.climb_m);
             let companion = companion_config(mission, vehicle.id)?;
             let mut member = SimulatedVehicle::new(&config, companion, serial, scenario.seed)?;
-            member.autopilot.land_on_offboard_loss();
+            member.autopilot.set_land_on_offboard_loss();
             match &vehicle.companion {
                 CompanionHost::InProcess { flash: None } => {}
                 CompanionHost::InProcess { flash: Some(file) } => {
@@ -86,9 +86,9 @@ fn autopilot_config(
         home: vehicle.home,
         start: pad,
         vehicle: airframe,
-        wind: Point::new(settings.wind_mps, 0.0, 0.0),
-        gust_mps: settings.gust_mps,
-        position_noise_m: settings.position_noise_m,
+        wind: Point::new(settings.mean_wind_mps, 0.0, 0.0),
+        gust_peak_mps: settings.gust_peak_mps,
+        position_noise_m: settings.position_noise_sd_m,
         estimator: estimator_errors(settings.estimator),
         seed: scenario.seed,
         ..autopilot::AutopilotConfig::default()

@@ -31,7 +31,10 @@ fn parse_coordinate_system(text: &str) -> Result<Crs, TerrainError> {
     let system = CoordinateSystem::wkt(text.trim())?;
     if system.unit_m.is_some_and(|unit_m| unit_m != 1.0) {
         let hint = "heights of an .asc are metres, and those of a grid in feet may be feet: gdalwarp -t_srs to metres";
-        return Err(TerrainError::System { what: "units that are not metres".to_owned(), hint });
+        return Err(TerrainError::UnusableCrs {
+            what: "units that are not metres".to_owned(),
+            hint,
+        });
     }
     Ok(Crs::Stated(Box::new(system)))
 }
@@ -41,10 +44,10 @@ struct GridHeader {
     /// Columns and rows.
     size: [usize; 2],
     /// The south-western corner.
-    low: [f64; 2],
-    cell: [f64; 2],
+    south_west_corner: [f64; 2],
+    cell_sides: [f64; 2],
     /// The number that stands for no height.
-    missing: f64,
+    missing_value: f64,
 }
 
 impl GridHeader {
@@ -94,14 +97,24 @@ impl GridHeader {
         for axis in 0..2 {
             low[axis] -= if middle[axis] { cell[axis] / 2.0 } else { 0.0 };
         }
-        Ok(Self { size: [columns as usize, rows as usize], low, cell, missing })
+        Ok(Self {
+            size: [columns as usize, rows as usize],
+            south_west_corner: low,
+            cell_sides: cell,
+            missing_value: missing,
+        })
     }
 }
 
 pub(super) fn parse(text: &str, crs: Crs) -> Result<Raster, TerrainError> {
     let bad = |why: &str| TerrainError::malformed(FORMAT, &why);
     let mut words = text.split_ascii_whitespace().peekable();
-    let GridHeader { size: [columns, rows], low, cell, missing } = GridHeader::read(&mut words)?;
+    let GridHeader {
+        size: [columns, rows],
+        south_west_corner: low,
+        cell_sides: cell,
+        missing_value: missing,
+    } = GridHeader::read(&mut words)?;
     let mut heights_m = Vec::with_capacity((columns * rows).min(text.len() / 2 + 1));
     for word in words {
         let value: f64 = word.parse().map_err(|_| bad(&format!("{word} is no height")))?;
@@ -122,8 +135,8 @@ pub(super) fn parse(text: &str, crs: Crs) -> Result<Raster, TerrainError> {
         crs,
         columns,
         rows,
-        corner: [low[0], low[1] + rows as f64 * cell[1]],
-        cell,
+        north_west_corner: [low[0], low[1] + rows as f64 * cell[1]],
+        cell_sides: cell,
         heights_m,
     })
 }

@@ -27,11 +27,11 @@ const RETURNS_PER_CELL: f64 = 4.0;
 /// Least side of a cell of the grid, metres.
 const MIN_CLOUD_CELL_M: f64 = 0.5;
 /// An empty cell is filled if cells on both sides, at most this many cells away, have heights.
-const BRIDGED_CELLS: usize = 3;
+const MAX_BRIDGED_CELLS: usize = 3;
 /// Number of returns decoded at a time.
 const RETURNS_PER_BATCH: u64 = 4096;
 /// Classes of returns that are measurement errors.
-const NOISE: [Classification; 2] = [Classification::LowPoint, Classification::HighNoise];
+const NOISE_CLASSES: [Classification; 2] = [Classification::LowPoint, Classification::HighNoise];
 
 pub(super) fn read(path: &Path, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError> {
     let length = files::regular_file_len(path)?;
@@ -59,8 +59,8 @@ where
     R: Read + Seek + Send + Sync + 'static,
 {
     let mut reader = Reader::new(file).map_err(|error| malformed(&error))?;
-    let (crs, unit_m) = coordinate_system(reader.header())?;
-    crs.check(frame.without_crs)?;
+    let (crs, unit_m) = crs_and_height_unit_m(reader.header())?;
+    crs.check_usable(frame.without_crs)?;
     let mut grid = empty_grid(reader.header(), &crs, frame)?;
     let mut points = PointDataBuilder::new().for_header(reader.header()).build();
     let most = reader.header().number_of_points();
@@ -75,22 +75,22 @@ where
         count += read;
         for point in points.points() {
             let point = point.map_err(|error| malformed(&error))?;
-            let deleted = point.is_withheld || NOISE.contains(&point.classification);
+            let deleted = point.is_withheld || NOISE_CLASSES.contains(&point.classification);
             if deleted || !point.z.is_finite() {
                 continue;
             }
-            if let Some(place) = crs.to_mission(frame.origin, [point.x, point.y]) {
+            if let Some(place) = crs.to_mission_frame(frame.origin, [point.x, point.y]) {
                 grid.raise_cell(&place, (point.z * unit_m) as f32);
             }
         }
     }
-    grid.fill_holes(BRIDGED_CELLS);
+    grid.fill_holes(MAX_BRIDGED_CELLS);
     Ok(grid)
 }
 
 /// The cloud's coordinate system, and metres in its unit of height: without a unit of their own,
 /// heights are in the unit of the coordinates.
-fn coordinate_system(header: &Header) -> Result<(Crs, f64), TerrainError> {
+fn crs_and_height_unit_m(header: &Header) -> Result<(Crs, f64), TerrainError> {
     let record = |id: u16| {
         let found = header
             .all_vlrs()
@@ -110,9 +110,9 @@ fn coordinate_system(header: &Header) -> Result<(Crs, f64), TerrainError> {
         Some(unit_m) => Some(unit_m),
         None => keys.height_unit_m()?,
     };
-    let unit_m = said.unwrap_or(crs.height_unit_m());
+    let unit_m = said.unwrap_or(crs.default_height_unit_m());
     if !(1e-3..=1e3).contains(&unit_m) {
-        return Err(TerrainError::system("heights in a unit of no length"));
+        return Err(TerrainError::unusable_crs("heights in a unit of no length"));
     }
     Ok((crs, unit_m))
 }
@@ -126,7 +126,7 @@ fn empty_grid(
     let bounds = header.bounds();
     let (low, high) = ([bounds.min.x, bounds.min.y], [bounds.max.x, bounds.max.y]);
     let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
-    let corners = corners.iter().filter_map(|corner| crs.to_mission(frame.origin, *corner));
+    let corners = corners.iter().filter_map(|corner| crs.to_mission_frame(frame.origin, *corner));
     let whole =
         corners.map(|place| [place, place]).reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])]);
     let count = header.number_of_points();

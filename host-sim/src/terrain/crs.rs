@@ -26,7 +26,7 @@ pub(super) enum Crs {
 /// A coordinate system that a file states.
 #[derive(Debug)]
 pub(super) struct CoordinateSystem {
-    own: Proj,
+    proj: Proj,
     wgs84: Proj,
     /// Metres in a unit of its horizontal coordinates; `None` if these are degrees.
     pub unit_m: Option<f64>,
@@ -37,7 +37,7 @@ impl CoordinateSystem {
     pub(super) fn epsg(code: u16) -> Result<Self, TerrainError> {
         let name = format!("EPSG:{code}");
         let Some(found) = crs_definitions::from_code(code) else {
-            return Err(TerrainError::system(&name));
+            return Err(TerrainError::unusable_crs(&name));
         };
         Self::proj(found.proj4, &name)
     }
@@ -45,7 +45,7 @@ impl CoordinateSystem {
     /// The system that well-known text (WKT) describes.
     pub(super) fn wkt(text: &str) -> Result<Self, TerrainError> {
         let name: String = text.split('"').nth(1).unwrap_or("an unnamed system").to_owned();
-        let unusable = || TerrainError::system(&name);
+        let unusable = || TerrainError::unusable_crs(&name);
         // Only the horizontal system is parsed; the vertical one may stand beside it.
         let start = ["PROJCS", "PROJCRS", "PROJECTEDCRS", "GEOGCS", "GEOGCRS", "GEODCRS"];
         let start = start.iter().find_map(|word| text.find(word)).ok_or_else(unusable)?;
@@ -55,7 +55,7 @@ impl CoordinateSystem {
     }
 
     fn proj(definition: &str, name: &str) -> Result<Self, TerrainError> {
-        let unusable = || TerrainError::system(name);
+        let unusable = || TerrainError::unusable_crs(name);
         // The library would silently leave out a datum shift by a grid file that it does not have.
         if ["+datum=NAD27", "+nadgrids=@", "+geoidgrids"]
             .iter()
@@ -64,29 +64,29 @@ impl CoordinateSystem {
         {
             return Err(unusable());
         }
-        let own = Proj::from_proj_string(definition).map_err(|_| unusable())?;
+        let proj = Proj::from_proj_string(definition).map_err(|_| unusable())?;
         let wgs84 = Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs")
             .map_err(|_| unusable())?;
-        if own.is_geocent() || !own.is_normalized_axis() || !own.has_inverse() {
+        if proj.is_geocent() || !proj.is_normalized_axis() || !proj.has_inverse() {
             return Err(unusable());
         }
-        let unit_m = (!own.is_latlong()).then(|| own.to_meter());
-        Ok(Self { own, wgs84, unit_m })
+        let unit_m = (!proj.is_latlong()).then(|| proj.to_meter());
+        Ok(Self { proj, wgs84, unit_m })
     }
 
-    pub(super) fn to_degrees(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+    pub(super) fn to_wgs84_degrees(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let mut place = match self.unit_m {
             Some(_) => (x, y, 0.0),
             None => (x.to_radians(), y.to_radians(), 0.0),
         };
-        transform(&self.own, &self.wgs84, &mut place).ok()?;
+        transform(&self.proj, &self.wgs84, &mut place).ok()?;
         let found = [place.0.to_degrees(), place.1.to_degrees()];
         found.iter().all(|degrees| degrees.is_finite()).then_some(found)
     }
 
-    fn of_degrees(&self, [lon, lat]: [f64; 2]) -> Option<[f64; 2]> {
+    fn wgs84_degrees_to_crs(&self, [lon, lat]: [f64; 2]) -> Option<[f64; 2]> {
         let mut place = (lon.to_radians(), lat.to_radians(), 0.0);
-        transform(&self.wgs84, &self.own, &mut place).ok()?;
+        transform(&self.wgs84, &self.proj, &mut place).ok()?;
         let found = match self.unit_m {
             Some(_) => [place.0, place.1],
             None => [place.0.to_degrees(), place.1.to_degrees()],
@@ -97,19 +97,21 @@ impl CoordinateSystem {
 
 impl Crs {
     /// Refuses a file without a coordinate system, unless its coordinates are then metres.
-    pub(super) fn check(&self, without_crs: WithoutCrs) -> Result<(), TerrainError> {
+    pub(super) fn check_usable(&self, without_crs: WithoutCrs) -> Result<(), TerrainError> {
         match self {
-            Self::Unstated if without_crs == WithoutCrs::Refused => Err(TerrainError::Nowhere(
-                "a .prj beside an .asc or gdal_translate -a_srs say it; in a mission with coordinates = \"metres\" its numbers \
-                 are metres about the origin",
-            )),
+            Self::Unstated if without_crs == WithoutCrs::Refused => {
+                Err(TerrainError::NoGeoreference(
+                    "a .prj beside an .asc or gdal_translate -a_srs say it; in a mission with \
+                     coordinates = \"metres\" its numbers are metres about the origin",
+                ))
+            }
             _ => Ok(()),
         }
     }
 
     /// Metres in a unit of height if the file gives heights no unit of their own: the unit of its
     /// horizontal coordinates, or metres if these are degrees.
-    pub(super) fn height_unit_m(&self) -> f64 {
+    pub(super) fn default_height_unit_m(&self) -> f64 {
         match self {
             Self::Unstated => 1.0,
             Self::Stated(system) => system.unit_m.unwrap_or(1.0),
@@ -118,11 +120,11 @@ impl Crs {
 
     /// A file's coordinates as a place in the mission frame, metres; `None` outside the system's
     /// domain.
-    pub(super) fn to_mission(&self, origin: &Geodetic, place: [f64; 2]) -> Option<Flat> {
+    pub(super) fn to_mission_frame(&self, origin: &Geodetic, place: [f64; 2]) -> Option<Flat> {
         match self {
             Self::Unstated => Some(Flat::new(place[0] as f32, place[1] as f32)),
             Self::Stated(system) => {
-                let [lon_deg, lat_deg] = system.to_degrees(place)?;
+                let [lon_deg, lat_deg] = system.to_wgs84_degrees(place)?;
                 let place = Geodetic { lat_deg, lon_deg, alt_m: origin.alt_m };
                 place.is_valid().then(|| geodetic_to_enu(origin, &place).xy())
             }
@@ -130,7 +132,7 @@ impl Crs {
     }
 
     /// A place in the mission frame as the file's coordinates; `None` outside the system's domain.
-    pub(super) fn at_mission_place(&self, origin: &Geodetic, place: &Flat) -> Option<[f64; 2]> {
+    pub(super) fn mission_frame_to_crs(&self, origin: &Geodetic, place: &Flat) -> Option<[f64; 2]> {
         match self {
             Self::Unstated => Some([f64::from(place.x), f64::from(place.y)]),
             Self::Stated(system) => {
@@ -142,21 +144,22 @@ impl Crs {
                     found = enu_to_geodetic(origin, &Point::new(place.x, place.y, up_m));
                     up_m -= (found.alt_m - origin.alt_m) as f32;
                 }
-                system.of_degrees([found.lon_deg, found.lat_deg])
+                system.wgs84_degrees_to_crs([found.lon_deg, found.lat_deg])
             }
         }
     }
 }
 
 /// Metres in the unit with this EPSG code.
-pub(super) fn unit_m(code: u16) -> Result<f64, TerrainError> {
+pub(super) fn epsg_unit_m(code: u16) -> Result<f64, TerrainError> {
     match code {
         9001 => Ok(1.0),
         9002 => Ok(FOOT_M),
         9003 => Ok(US_FOOT_M),
-        other => {
-            Err(TerrainError::System { what: format!("units of EPSG:{other}"), hint: WARP_HINT })
-        }
+        other => Err(TerrainError::UnusableCrs {
+            what: format!("units of EPSG:{other}"),
+            hint: WARP_HINT,
+        }),
     }
 }
 

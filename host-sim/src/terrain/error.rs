@@ -16,7 +16,7 @@ pub enum TerrainError {
     TooLong(u64),
     /// The file's name ends in none of the known formats.
     #[error("is in no known format: its name ends in none of .asc, .tif, .tiff, .las, .laz")]
-    Format,
+    UnknownFormat,
     /// The file's content is not in the format of its name.
     #[error("is not {format}: {why}")]
     Malformed {
@@ -27,7 +27,7 @@ pub enum TerrainError {
     },
     /// The file's coordinate system, or unit, cannot be used.
     #[error("is in {what}, which cannot be used; {hint}")]
-    System {
+    UnusableCrs {
         /// The coordinate system or unit that the file states.
         what: String,
         /// Remedy.
@@ -35,13 +35,13 @@ pub enum TerrainError {
     },
     /// The file states no coordinate system or no position; the text is a remedy.
     #[error("does not say where it is; {0}")]
-    Nowhere(&'static str),
+    NoGeoreference(&'static str),
     /// The file has more cells than [`MAX_CELLS`], or the requested box would have.
     #[error("has {0} cells here; at most {MAX_CELLS} are held")]
     TooManyCells(u128),
     /// The file has no height in the requested box.
     #[error("has no height here: {0} lies elsewhere, or holds none")]
-    Elsewhere(String),
+    NoHeightInWindow(String),
 }
 
 /// Remedy for a coordinate system that cannot be used.
@@ -56,7 +56,7 @@ impl TerrainError {
         }
     }
 
-    pub(super) fn system(what: &str) -> Self {
-        Self::System { what: printable(what), hint: WARP_HINT }
+    pub(super) fn unusable_crs(what: &str) -> Self {
+        Self::UnusableCrs { what: printable(what), hint: WARP_HINT }
     }
 }

@@ -24,13 +24,13 @@ const MIN_RISE_STEPS: f32 = 5.0;
 pub enum FieldError {
     /// The map has no height near this place, metres east and north.
     #[error("it has no height at [{0:.0}, {1:.0}], metres east and north of the origin")]
-    Hole(f32, f32),
+    NoHeightAt(f32, f32),
     /// This height, metres, does not fit into the file.
     #[error("a height of {0:.0} m is more than 3276 m from the mission's origin")]
-    High(f32),
+    HeightOutOfRange(f32),
     /// The box cannot be covered with at most [`MAX_NODES`] nodes.
     #[error("the area is too large or too small for it")]
-    Shape,
+    UnsuitableSize,
 }
 
 /// Inputs of a field besides the height map.
@@ -39,23 +39,23 @@ pub struct FieldConfig {
     /// The box that is flown over: least and greatest corner, metres.
     pub area: [Flat; 2],
     /// Greatest distance of a vehicle from its path to the side, metres.
-    pub reach_m: f32,
+    pub max_cross_track_m: f32,
     /// Steepest slope of the field, metres of height for each metre over ground.
-    pub slope: f32,
+    pub max_slope: f32,
 }
 
 impl FieldConfig {
     /// How far around a node the map's heights count for that node, metres. `cell_m` is the
     /// distance between nodes, `own_cell_m` the side of the map's cells.
-    fn around_m(&self, cell_m: f32, own_cell_m: f32) -> f32 {
+    fn heights_count_within_m(&self, cell_m: f32, own_cell_m: f32) -> f32 {
         // A height in a cell of the map may come from up to one cell beside it.
-        READ_AROUND_SAMPLE_CELLS * cell_m + self.reach_m + own_cell_m
+        READ_AROUND_SAMPLE_CELLS * cell_m + self.max_cross_track_m + own_cell_m
     }
 
     /// Distance between nodes, metres, unless the map's cells are larger.
-    fn least_cell_m(&self) -> f32 {
+    fn min_node_spacing_m(&self) -> f32 {
         let sides = self.area[1] - self.area[0];
-        let rise = MIN_RISE_STEPS * HEIGHT_STEP_M * std::f32::consts::SQRT_2 / self.slope;
+        let rise = MIN_RISE_STEPS * HEIGHT_STEP_M * std::f32::consts::SQRT_2 / self.max_slope;
         let fits = (sides.x * sides.y / (MAX_NODES as f32 * 0.9)).sqrt();
         // In a long and narrow box the added row of border nodes matters.
         let long = sides.amax() / (MAX_NODES as f32 / 8.0);
@@ -65,8 +65,9 @@ impl FieldConfig {
     /// The box in which the field needs heights, without the cells that a reader adds around any
     /// box.
     pub fn window(&self) -> [Flat; 2] {
-        let beyond =
-            Flat::repeat((READ_AROUND_SAMPLE_CELLS + 1.0) * self.least_cell_m() + self.reach_m);
+        let beyond = Flat::repeat(
+            (READ_AROUND_SAMPLE_CELLS + 1.0) * self.min_node_spacing_m() + self.max_cross_track_m,
+        );
         [self.area[0] - beyond, self.area[1] + beyond]
     }
 }
@@ -76,15 +77,19 @@ impl FieldConfig {
 /// # Errors
 /// The map has a hole in the window, or heights that do not fit into the file.
 pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, FieldError> {
-    let cell_m = config.least_cell_m().max(grid.cell_m());
+    let cell_m = config.min_node_spacing_m().max(grid.cell_m());
     let [low, high] = config.area;
     let count = |side: f32| ((side / cell_m).ceil() + 1.0).max(2.0) as u16;
-    let shape =
-        FieldShape { low, cell_m, columns: count(high.x - low.x), rows: count(high.y - low.y) };
+    let shape = FieldShape {
+        south_west: low,
+        cell_m,
+        columns: count(high.x - low.x),
+        rows: count(high.y - low.y),
+    };
     if shape.node_count() > MAX_NODES {
-        return Err(FieldError::Shape);
+        return Err(FieldError::UnsuitableSize);
     }
-    let around = Flat::repeat(config.around_m(cell_m, grid.cell_m()));
+    let around = Flat::repeat(config.heights_count_within_m(cell_m, grid.cell_m()));
     let (columns, rows) = (usize::from(shape.columns), usize::from(shape.rows));
     let mut nodes_dm = Vec::with_capacity(columns * rows);
     for row in 0..rows {
@@ -92,21 +97,21 @@ pub fn encode_field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, 
             let place = low + Flat::new(column as f32, row as f32) * cell_m;
             let found = grid.highest_in_box(&(place - around), &(place + around));
             let height_m = match found.highest_m {
-                Some(height_m) if !found.holes => height_m,
-                _ => return Err(FieldError::Hole(place.x, place.y)),
+                Some(height_m) if !found.has_holes => height_m,
+                _ => return Err(FieldError::NoHeightAt(place.x, place.y)),
             };
             let node_dm = (height_m / HEIGHT_STEP_M - 1e-3).ceil();
             if node_dm.abs() > f32::from(i16::MAX) {
-                return Err(FieldError::High(height_m));
+                return Err(FieldError::HeightOutOfRange(height_m));
             }
             nodes_dm.push(node_dm as i16);
         }
     }
     // Limit along one axis: a slope across both is steeper by the square root of two.
-    let most = (config.slope * cell_m / std::f32::consts::SQRT_2 / HEIGHT_STEP_M + 1e-3) as i32;
+    let most = (config.max_slope * cell_m / std::f32::consts::SQRT_2 / HEIGHT_STEP_M + 1e-3) as i32;
     limit_slope(&mut nodes_dm, columns, most.clamp(1, i32::from(i16::MAX)));
     let mut bytes = vec![0; shape.encoded_len()];
-    field::write(&shape, &nodes_dm, &mut bytes).map_err(|_| FieldError::Shape)?;
+    field::write(&shape, &nodes_dm, &mut bytes).map_err(|_| FieldError::UnsuitableSize)?;
     Ok(bytes)
 }
 

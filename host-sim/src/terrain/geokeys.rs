@@ -1,6 +1,6 @@
 //! GeoKeys: how GeoTIFF, and point clouds before LAS 1.4, state their coordinate system.
 
-use super::crs::{CoordinateSystem, Crs, unit_m};
+use super::crs::{CoordinateSystem, Crs, epsg_unit_m};
 use super::error::{TerrainError, WARP_HINT};
 
 const MODEL: u16 = 1024;
@@ -49,21 +49,26 @@ impl GeoKeys {
             (Some(1), Some(code), _) if code != USER_DEFINED => CoordinateSystem::epsg(code)?,
             (Some(2), _, Some(code)) if code != USER_DEFINED => CoordinateSystem::epsg(code)?,
             (Some(3), ..) => {
-                return Err(TerrainError::system("coordinates about the middle of the earth"));
+                return Err(TerrainError::unusable_crs(
+                    "coordinates about the middle of the earth",
+                ));
             }
             _ => match wkt {
                 Some(wkt) => CoordinateSystem::wkt(wkt)?,
                 None if self.0.is_empty() => return Ok(Crs::Unstated),
-                None => return Err(TerrainError::system("a system of its own")),
+                None => return Err(TerrainError::unusable_crs("a system of its own")),
             },
         };
-        let said =
-            self.get(LENGTH_UNIT).filter(|code| *code != USER_DEFINED).map(unit_m).transpose()?;
+        let said = self
+            .get(LENGTH_UNIT)
+            .filter(|code| *code != USER_DEFINED)
+            .map(epsg_unit_m)
+            .transpose()?;
         if let (Some(said), Some(known)) = (said, system.unit_m)
             && (said - known).abs() > 1e-6
         {
             let what = format!("units of {said} m, its coordinate system in units of {known} m");
-            return Err(TerrainError::System { what, hint: WARP_HINT });
+            return Err(TerrainError::UnusableCrs { what, hint: WARP_HINT });
         }
         Ok(Crs::Stated(Box::new(system)))
     }
@@ -71,16 +76,16 @@ impl GeoKeys {
     /// Metres in a unit of height; `None` if the keys do not state it.
     pub(super) fn height_unit_m(&self) -> Result<Option<f64>, TerrainError> {
         if let Some(code) = self.get(HEIGHT_UNIT) {
-            return unit_m(code).map(Some);
+            return epsg_unit_m(code).map(Some);
         }
         match self.get(VERTICAL) {
             None => Ok(None),
             Some(code) if METRE_HEIGHT_SYSTEMS.contains(&code) => Ok(Some(1.0)),
             Some(code) if FOOT_HEIGHT_SYSTEMS.contains(&code) => Ok(Some(super::crs::FOOT_M)),
             Some(code) if US_FOOT_HEIGHT_SYSTEMS.contains(&code) => Ok(Some(super::crs::US_FOOT_M)),
-            Some(code) => {
-                Err(TerrainError::system(&format!("heights of EPSG:{code} without their unit")))
-            }
+            Some(code) => Err(TerrainError::unusable_crs(&format!(
+                "heights of EPSG:{code} without their unit"
+            ))),
         }
     }
 }

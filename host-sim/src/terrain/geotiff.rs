@@ -67,7 +67,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
         (Some(unit_m), _) => unit_m,
         (None, Crs::Stated(system)) if system.unit_m.is_some_and(|unit_m| unit_m != 1.0) => {
             let hint = "gdal_edit.py -a_srs EPSG:2994+8228, with your numbers, says the unit of its heights";
-            return Err(TerrainError::System {
+            return Err(TerrainError::UnusableCrs {
                 what: "feet, and does not say whether its heights are".to_owned(),
                 hint,
             });
@@ -85,7 +85,7 @@ pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
         false => (value * unit_m) as f32,
     };
     let heights_m = read_heights(&mut decoder, columns, rows, value_m)?;
-    Ok(Raster { crs, columns, rows, corner, cell, heights_m })
+    Ok(Raster { crs, columns, rows, north_west_corner: corner, cell_sides: cell, heights_m })
 }
 
 /// The heights row by row, from strips or tiles.
@@ -141,12 +141,14 @@ fn georeference<R: Read + Seek>(
         _ => match tag(Tag::ModelTransformationTag)?.as_deref() {
             Some([a, b, _, x, c, d, _, y, ..]) => {
                 if *b != 0.0 || *c != 0.0 || *d > 0.0 {
-                    return Err(TerrainError::system("rows that do not run from west to east"));
+                    return Err(TerrainError::unusable_crs(
+                        "rows that do not run from west to east",
+                    ));
                 }
                 ([*x, *y], [*a, -d])
             }
             _ => {
-                return Err(TerrainError::Nowhere("gdal_translate -a_ullr -a_srs says it"));
+                return Err(TerrainError::NoGeoreference("gdal_translate -a_ullr -a_srs says it"));
             }
         },
     };

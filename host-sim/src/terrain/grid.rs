@@ -24,7 +24,7 @@ pub struct BoxHeights {
     /// The greatest height, metres; `None` if no cell has a height.
     pub highest_m: Option<f32>,
     /// Whether a cell has no height, or the box reaches out of the grid.
-    pub holes: bool,
+    pub has_holes: bool,
 }
 
 impl HeightGrid {
@@ -81,12 +81,12 @@ impl HeightGrid {
     }
 
     /// Number of cells with a height.
-    pub fn count(&self) -> usize {
+    pub fn known_cell_count(&self) -> usize {
         self.heights_m.iter().filter(|height_m| !height_m.is_nan()).count()
     }
 
     /// The lowest and the highest height, metres; `None` if no cell has a height.
-    pub fn range_m(&self) -> Option<[f32; 2]> {
+    pub fn height_range_m(&self) -> Option<[f32; 2]> {
         let known = || self.heights_m.iter().copied().filter(|height_m| !height_m.is_nan());
         Some([known().reduce(f32::min)?, known().reduce(f32::max)?])
     }
@@ -117,9 +117,9 @@ impl HeightGrid {
             let most = self.size[axis] as f32 - 1.0;
             // A place on the grid's far border counts as in the last cell.
             let over = high[axis] > self.bounds()[1][axis];
-            found.holes |= from < 0.0 || over || from > most;
+            found.has_holes |= from < 0.0 || over || from > most;
             if to < 0.0 || from > most || from > to {
-                return BoxHeights { highest_m: None, holes: true };
+                return BoxHeights { highest_m: None, has_holes: true };
             }
             ranges[axis] = (from.max(0.0) as usize, to.min(most) as usize);
         }
@@ -131,7 +131,7 @@ impl HeightGrid {
                             found.highest_m.map_or(height_m, |other| other.max(height_m));
                         found.highest_m = Some(highest_m);
                     }
-                    None => found.holes = true,
+                    None => found.has_holes = true,
                 }
             }
         }

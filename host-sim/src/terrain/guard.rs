@@ -6,7 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::Once;
 
 thread_local! {
-    static QUIET: Cell<bool> = const { Cell::new(false) };
+    static SUPPRESSES_PANIC_MESSAGE: Cell<bool> = const { Cell::new(false) };
 }
 
 /// The result of `decode`; `None` if it panics, without a panic message.
@@ -15,14 +15,14 @@ pub(super) fn catch_panic<T>(decode: impl FnOnce() -> T) -> Option<T> {
     ONCE.call_once(|| {
         let before = take_hook();
         set_hook(Box::new(move |info| {
-            if !QUIET.get() {
+            if !SUPPRESSES_PANIC_MESSAGE.get() {
                 before(info);
             }
         }));
     });
-    let outer = QUIET.replace(true);
+    let outer = SUPPRESSES_PANIC_MESSAGE.replace(true);
     // What a panic leaves half done is dropped with the closure, so unwinding is safe.
     let outcome = catch_unwind(AssertUnwindSafe(decode));
-    QUIET.set(outer);
+    SUPPRESSES_PANIC_MESSAGE.set(outer);
     outcome.ok()
 }

@@ -20,9 +20,9 @@ pub(super) struct Raster {
     pub columns: usize,
     pub rows: usize,
     /// Outer corner of the first cell, the north-western one, in the file's coordinates.
-    pub corner: [f64; 2],
+    pub north_west_corner: [f64; 2],
     /// Sides of a cell in the file's units, both positive.
-    pub cell: [f64; 2],
+    pub cell_sides: [f64; 2],
     /// Height of each cell, metres, row by row from the north; NaN: no height.
     pub heights_m: Vec<f32>,
 }
@@ -30,23 +30,29 @@ pub(super) struct Raster {
 impl Raster {
     /// The file's coordinates of a point given in cells east and south of the north-western corner.
     fn file_coordinates(&self, column: f64, row: f64) -> [f64; 2] {
-        [self.corner[0] + column * self.cell[0], self.corner[1] - row * self.cell[1]]
+        [
+            self.north_west_corner[0] + column * self.cell_sides[0],
+            self.north_west_corner[1] - row * self.cell_sides[1],
+        ]
     }
 
     fn cell_coordinates(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        [(x - self.corner[0]) / self.cell[0], (self.corner[1] - y) / self.cell[1]]
+        [
+            (x - self.north_west_corner[0]) / self.cell_sides[0],
+            (self.north_west_corner[1] - y) / self.cell_sides[1],
+        ]
     }
 
     /// Resamples the heights to a grid in the mission frame, whose cells are about as large as the
     /// file's.
     pub(super) fn resampled(&self, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError> {
-        self.crs.check(frame.without_crs)?;
+        self.crs.check_usable(frame.without_crs)?;
         let origin = frame.origin;
         let window = match frame.window {
             Some(window) => window,
             None => self
                 .bounds(origin)
-                .ok_or_else(|| TerrainError::system("a system that ends before it"))?,
+                .ok_or_else(|| TerrainError::unusable_crs("a system that ends before it"))?,
         };
         let nothing =
             |window: [Flat; 2]| HeightGrid::new(window, (window[1] - window[0]).amax().max(1.0));
@@ -54,7 +60,7 @@ impl Raster {
         let middle = touched.map(|(from, to)| (from + to) as f64 / 2.0);
         let cell_m = self
             .cell_m(origin, middle)
-            .ok_or_else(|| TerrainError::system("a system that ends before it"))?;
+            .ok_or_else(|| TerrainError::unusable_crs("a system that ends before it"))?;
         let window = match frame.window {
             Some(window) => self.align_box(origin, widened_window(window, cell_m), cell_m),
             None => window,
@@ -78,7 +84,7 @@ impl Raster {
                 let height_m = self.heights_m[row * self.columns + column];
                 let place = self.file_coordinates(column as f64 + 0.5, row as f64 + 0.5);
                 if let Some(place) =
-                    self.crs.to_mission(origin, place).filter(|_| !height_m.is_nan())
+                    self.crs.to_mission_frame(origin, place).filter(|_| !height_m.is_nan())
                 {
                     grid.raise_cell(&place, height_m);
                 }
@@ -90,7 +96,7 @@ impl Raster {
     /// The height of the file's cell at a place; `None` if that cell has none, and outside the
     /// file.
     pub(super) fn height_at(&self, origin: &Geodetic, place: &Flat) -> Option<f32> {
-        let [column, row] = self.cell_coordinates(self.crs.at_mission_place(origin, place)?);
+        let [column, row] = self.cell_coordinates(self.crs.mission_frame_to_crs(origin, place)?);
         let inside =
             column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
         let height_m =
@@ -101,7 +107,8 @@ impl Raster {
     /// Moves the box's least corner to a corner of the file's cells, so that the cells of both
     /// grids are the same where these are parallel.
     fn align_box(&self, origin: &Geodetic, [low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
-        let corner = self.crs.to_mission(origin, self.file_coordinates(0.0, self.rows as f64));
+        let corner =
+            self.crs.to_mission_frame(origin, self.file_coordinates(0.0, self.rows as f64));
         let Some(corner) = corner.filter(|corner| corner.amax() < 1e6) else { return [low, high] };
         let down = |axis: usize| {
             let cells =
@@ -117,7 +124,7 @@ impl Raster {
         let shares = || (0..=8).map(|k| f64::from(k) / 8.0);
         let border = shares().flat_map(|s| shares().map(move |t| (s, t)));
         let places = border.filter_map(|(s, t)| {
-            self.crs.to_mission(origin, self.file_coordinates(s * columns, t * rows))
+            self.crs.to_mission_frame(origin, self.file_coordinates(s * columns, t * rows))
         });
         places.map(|place| [place, place]).reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])])
     }
@@ -134,7 +141,7 @@ impl Raster {
             shares().map(move |t| low + (high - low).component_mul(&Flat::new(s, t)))
         });
         let cells = places.filter_map(|place| {
-            Some(self.cell_coordinates(self.crs.at_mission_place(origin, &place)?))
+            Some(self.cell_coordinates(self.crs.mission_frame_to_crs(origin, &place)?))
         });
         let [from, to] = cells.map(|cell| [cell, cell]).reduce(|a, b| {
             let pick =
@@ -154,8 +161,9 @@ impl Raster {
 
     /// The shorter side of a cell of the file, metres in the mission frame.
     fn cell_m(&self, origin: &Geodetic, [column, row]: [f64; 2]) -> Option<f32> {
-        let at =
-            |column: f64, row: f64| self.crs.to_mission(origin, self.file_coordinates(column, row));
+        let at = |column: f64, row: f64| {
+            self.crs.to_mission_frame(origin, self.file_coordinates(column, row))
+        };
         let here = at(column, row)?;
         let sides =
             [(at(column + 1.0, row)? - here).norm(), (at(column, row + 1.0)? - here).norm()];

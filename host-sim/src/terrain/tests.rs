@@ -94,7 +94,7 @@ proptest! {
             let sides = Flat::new(columns as f32, count as f32) * cell;
             let low = Flat::new(corner[0], corner[1]) + sides.component_mul(&Flat::new(x, y));
             let high = low + sides.component_mul(&Flat::new(wide, tall));
-            let mut want = BoxHeights { highest_m: None, holes: false };
+            let mut want = BoxHeights { highest_m: None, has_holes: false };
             let touches = |axis: usize, index: usize| {
                 let from = corner[axis] + index as f32 * cell;
                 high[axis] >= from && low[axis] < from + cell
@@ -102,13 +102,13 @@ proptest! {
             for (row, heights) in rows.iter().rev().enumerate() {
                 for (column, height_m) in heights.iter().enumerate() {
                     if touches(0, column) && touches(1, row) {
-                        want.holes |= height_m.is_none();
+                        want.has_holes |= height_m.is_none();
                         want.highest_m =
                             (*height_m).into_iter().chain(want.highest_m).reduce(f32::max);
                     }
                 }
             }
-            want.holes |= (0..2).any(|a| low[a] < corner[a] || high[a] > corner[a] + sides[a]);
+            want.has_holes |= (0..2).any(|a| low[a] < corner[a] || high[a] > corner[a] + sides[a]);
             prop_assert_eq!(grid.highest_in_box(&low, &high), want);
         }
     }
@@ -126,7 +126,7 @@ proptest! {
     ) {
         let raster = geotiff_of(&values, model, code, corner, cell);
         let Crs::Stated(system) = &raster.crs else { panic!("it names its system") };
-        let [lon_deg, lat_deg] = system.to_degrees(corner).unwrap();
+        let [lon_deg, lat_deg] = system.to_wgs84_degrees(corner).unwrap();
         // A frame with its origin at that corner, as missions are near their origin.
         let origin = Geodetic { lat_deg, lon_deg, alt_m: 0.0 };
         let grid = raster.resampled(&anywhere(&origin)).unwrap();
@@ -139,7 +139,7 @@ proptest! {
                         corner[0] + (column as f64 + s) * cell,
                         corner[1] - (row as f64 + t) * cell,
                     ];
-                    let place = raster.crs.to_mission(&origin, at).unwrap();
+                    let place = raster.crs.to_mission_frame(&origin, at).unwrap();
                     let reach = Flat::repeat(grid.cell_m());
                     let near = grid.highest_in_box(&(place - reach), &(place + reach));
                     if value != 99.0 {
@@ -218,7 +218,7 @@ fn what_cannot_be_honoured_is_refused_by_name() {
         let bytes = tiff([2, 2], &[1, 2, 3, 4], keys, [500_000.0, 4_800_000.0], 10.0);
         let read = geotiff::decode(Cursor::new(bytes))
             .and_then(|raster| raster.resampled(&anywhere(&ORIGIN)));
-        read.map(|grid| grid.count()).unwrap_err().to_string()
+        read.map(|grid| grid.known_cell_count()).unwrap_err().to_string()
     };
     for (keys, text) in [
         (keys(1, 1), "EPSG:1,"),
@@ -265,9 +265,9 @@ fn a_prj_says_where_an_esri_grid_is() {
     let grid = super::read(&path, &anywhere(&ORIGIN)).unwrap();
     // The same place by its EPSG number.
     let named = geotiff_of(&[1; 24 * 17], 1, 32630, [500_000.0, 4_794_020.0], 10.0);
-    let place = named.crs.to_mission(&ORIGIN, [500_005.0, 4_794_015.0]).unwrap();
+    let place = named.crs.to_mission_frame(&ORIGIN, [500_005.0, 4_794_015.0]).unwrap();
     assert_eq!(grid.height_at(&place), Some(1.0));
-    assert_eq!(grid.count(), 3);
+    assert_eq!(grid.known_cell_count(), 3);
     let feet = wkt.replace(r#"UNIT["Meter",1.0]"#, r#"UNIT["Foot_US",0.3048006096012192]"#);
     std::fs::write(path.with_extension("prj"), feet).unwrap();
     let error = super::read(&path, &anywhere(&ORIGIN)).unwrap_err().to_string();

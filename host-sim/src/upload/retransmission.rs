@@ -19,7 +19,7 @@ const MAX_TIMEOUT_S: f32 = 2.0;
 /// timeout (RFC 6298, section 2).
 const ROUND_TRIP_GAIN: f32 = 0.125;
 const DEVIATION_GAIN: f32 = 0.25;
-const DEVIATIONS: f32 = 4.0;
+const TIMEOUT_DEVIATIONS: f32 = 4.0;
 /// Most requests under way at once: the companion queues six.
 const MAX_UNDER_WAY: usize = 4;
 
@@ -27,7 +27,7 @@ const MAX_UNDER_WAY: usize = 4;
 pub struct Retransmission {
     /// Smoothed round trip time and its deviation, seconds; `None` before the first one.
     round_trip: Option<(f32, f32)>,
-    wait: Duration,
+    timeout: Duration,
     /// When the timeout last doubled: requests sent before that do not double it again.
     doubled_at: Clock,
     window: usize,
@@ -38,7 +38,7 @@ impl Retransmission {
     pub fn new(now: Clock) -> Self {
         Self {
             round_trip: None,
-            wait: Duration::from_secs_f32(MIN_TIMEOUT_S),
+            timeout: Duration::from_secs_f32(MIN_TIMEOUT_S),
             doubled_at: now,
             window: MAX_UNDER_WAY,
         }
@@ -51,10 +51,10 @@ impl Retransmission {
 
     /// Whether a request sent at `sent_at` has timed out. If so the timeout doubles and the window
     /// halves, once for all requests sent before.
-    pub fn check_timeout(&mut self, sent_at: Clock, now: Clock) -> bool {
-        let over = now.saturating_duration_since(sent_at) > self.wait;
+    pub fn back_off_if_timed_out(&mut self, sent_at: Clock, now: Clock) -> bool {
+        let over = now.saturating_duration_since(sent_at) > self.timeout;
         if over && sent_at >= self.doubled_at {
-            self.wait = (2 * self.wait).min(Duration::from_secs_f32(MAX_TIMEOUT_S));
+            self.timeout = (2 * self.timeout).min(Duration::from_secs_f32(MAX_TIMEOUT_S));
             self.doubled_at = now;
             self.window = (self.window / 2).max(1);
         }
@@ -72,8 +72,9 @@ impl Retransmission {
             ),
         };
         self.round_trip = Some((smoothed_s, deviation_s));
-        let wait_s = (smoothed_s + DEVIATIONS * deviation_s).clamp(MIN_TIMEOUT_S, MAX_TIMEOUT_S);
-        self.wait = Duration::from_secs_f32(wait_s);
+        let wait_s =
+            (smoothed_s + TIMEOUT_DEVIATIONS * deviation_s).clamp(MIN_TIMEOUT_S, MAX_TIMEOUT_S);
+        self.timeout = Duration::from_secs_f32(wait_s);
         self.window = (self.window + 1).min(MAX_UNDER_WAY);
     }
 }

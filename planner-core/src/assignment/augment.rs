@@ -18,7 +18,7 @@ pub(super) fn augment_from_row(
 ) -> bool {
     let row = state.free_rows[k];
     paths.distance.fill(f64::INFINITY);
-    let least = relax_columns(costs.row_costs(row, state.row), state.price, 0.0, row, paths);
+    let least = relax_columns(costs.row_costs(row, state.row_buffer), state.price, 0.0, row, paths);
     augment_shortest_path(costs, state, paths, least)
 }
 
@@ -33,7 +33,7 @@ pub(super) fn augment_from_free_rows(
     for row in
         (0..costs.rows as u16).filter(|&row| state.col_of_row[usize::from(row)] == UNASSIGNED)
     {
-        least = relax_columns(costs.row_costs(row, state.row), state.price, 0.0, row, paths);
+        least = relax_columns(costs.row_costs(row, state.row_buffer), state.price, 0.0, row, paths);
     }
     augment_shortest_path(costs, state, paths, least)
 }
@@ -61,30 +61,31 @@ fn augment_shortest_path(
                 paths.distance,
                 state.row_of_col,
                 least,
-                &mut paths.settled[from..],
+                &mut paths.settled_cols[from..],
             ) {
                 NearestColumns::Free(col) => break Some(col),
                 NearestColumns::Taken(count) => queued += count,
             }
             for k in from..queued {
-                let at = usize::from(paths.settled[k]);
+                let at = usize::from(paths.settled_cols[k]);
                 (paths.settled_price[k], paths.settled_distance[k]) = (state.price[at], least);
                 (state.price[at], paths.distance[at]) = (f64::NEG_INFINITY, f64::INFINITY);
             }
         }
-        let col = paths.settled[done];
+        let col = paths.settled_cols[done];
         let row = state.row_of_col[usize::from(col)];
         let offset = f64::from(costs.cost_at(row, col))
             - paths.settled_price[done]
             - paths.settled_distance[done];
-        next = relax_columns(costs.row_costs(row, state.row), state.price, offset, row, paths);
+        next =
+            relax_columns(costs.row_costs(row, state.row_buffer), state.price, offset, row, paths);
         done += 1;
     };
     for k in 0..queued {
         let rise = if end.is_some() { paths.settled_distance[k] - least } else { 0.0 };
-        state.price[usize::from(paths.settled[k])] = paths.settled_price[k] + rise;
+        state.price[usize::from(paths.settled_cols[k])] = paths.settled_price[k] + rise;
     }
-    end.map(|col| flip_augmenting_path(state, paths.previous, col)).is_some()
+    end.map(|col| flip_augmenting_path(state, paths.predecessor_row, col)).is_some()
 }
 
 /// Sets `distance = min(distance, cost - price - offset)` for all columns, with `row` as
@@ -99,7 +100,7 @@ fn relax_columns(
     let (lines, line_rest) = line.as_chunks::<SIMD_LANES>();
     let (prices, price_rest) = price.as_chunks::<SIMD_LANES>();
     let (distances, distance_rest) = paths.distance.as_chunks_mut::<SIMD_LANES>();
-    let (previous, previous_rest) = paths.previous.as_chunks_mut::<SIMD_LANES>();
+    let (previous, previous_rest) = paths.predecessor_row.as_chunks_mut::<SIMD_LANES>();
     let mut least = [f64::INFINITY; SIMD_LANES];
     for (((line, price), distance), previous) in
         lines.iter().zip(prices).zip(distances).zip(previous)
@@ -206,12 +207,12 @@ pub(super) fn augment_bottleneck(
         (0..costs.rows as u16).filter(|&row| state.col_of_row[usize::from(row)] == UNASSIGNED)
     {
         relax_by_largest_cost(
-            costs.row_costs(row, state.row),
+            costs.row_costs(row, state.row_buffer),
             f64::NEG_INFINITY,
             row,
             done,
             paths.distance,
-            paths.previous,
+            paths.predecessor_row,
         );
     }
     loop {
@@ -219,20 +220,27 @@ pub(super) fn augment_bottleneck(
         if least == f64::INFINITY {
             return None;
         }
-        match nearest_columns(paths.distance, state.row_of_col, least, paths.settled) {
+        match nearest_columns(paths.distance, state.row_of_col, least, paths.settled_cols) {
             NearestColumns::Free(col) => {
-                flip_augmenting_path(state, paths.previous, col);
+                flip_augmenting_path(state, paths.predecessor_row, col);
                 return Some(least as f32);
             }
             NearestColumns::Taken(count) => {
-                for &col in &paths.settled[..count] {
+                for &col in &paths.settled_cols[..count] {
                     done[usize::from(col)] = 1.0;
                     paths.distance[usize::from(col)] = f64::INFINITY;
                 }
-                for &col in &paths.settled[..count] {
+                for &col in &paths.settled_cols[..count] {
                     let row = state.row_of_col[usize::from(col)];
-                    let line = costs.row_costs(row, state.row);
-                    relax_by_largest_cost(line, least, row, done, paths.distance, paths.previous);
+                    let line = costs.row_costs(row, state.row_buffer);
+                    relax_by_largest_cost(
+                        line,
+                        least,
+                        row,
+                        done,
+                        paths.distance,
+                        paths.predecessor_row,
+                    );
                 }
             }
         }

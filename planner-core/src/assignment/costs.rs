@@ -27,14 +27,14 @@ pub enum AssignmentError {
     },
 }
 
-/// A checked cost matrix, transposed where necessary so that `rows <= cols`. Costs above `limit`
+/// A checked cost matrix, transposed where necessary so that `rows <= cols`. Costs above `max_cost`
 /// count as infinite.
 pub(super) struct CostMatrix<'a> {
-    pub(super) data: &'a [f32],
+    pub(super) costs: &'a [f32],
     pub(super) rows: usize,
     pub(super) cols: usize,
     pub(super) transposed: bool,
-    pub(super) limit: f32,
+    pub(super) max_cost: f32,
 }
 
 impl<'a> CostMatrix<'a> {
@@ -59,15 +59,15 @@ impl<'a> CostMatrix<'a> {
         }
         let transposed = rows > cols;
         let (rows, cols) = if transposed { (cols, rows) } else { (rows, cols) };
-        Ok(Self { data, rows, cols, transposed, limit: f32::INFINITY })
+        Ok(Self { costs: data, rows, cols, transposed, max_cost: f32::INFINITY })
     }
 
     #[inline]
     pub(super) fn cost_at(&self, row: u16, col: u16) -> f32 {
         let (row, col) = (usize::from(row), usize::from(col));
         let cost =
-            self.data[if self.transposed { col * self.rows + row } else { row * self.cols + col }];
-        if cost <= self.limit { cost } else { f32::INFINITY }
+            self.costs[if self.transposed { col * self.rows + row } else { row * self.cols + col }];
+        if cost <= self.max_cost { cost } else { f32::INFINITY }
     }
 
     /// The costs of one row: a slice of the matrix where rows are contiguous and no limit is set,
@@ -75,8 +75,8 @@ impl<'a> CostMatrix<'a> {
     #[inline]
     pub(super) fn row_costs<'b>(&'b self, row: u16, buffer: &'b mut [f32]) -> &'b [f32] {
         let row = usize::from(row);
-        if !self.transposed && self.limit == f32::INFINITY {
-            return &self.data[row * self.cols..][..self.cols];
+        if !self.transposed && self.max_cost == f32::INFINITY {
+            return &self.costs[row * self.cols..][..self.cols];
         }
         self.copy_row(row, buffer)
     }
@@ -84,8 +84,8 @@ impl<'a> CostMatrix<'a> {
     #[cold]
     fn copy_row<'b>(&self, row: usize, buffer: &'b mut [f32]) -> &'b [f32] {
         let (first, stride) = if self.transposed { (row, self.rows) } else { (row * self.cols, 1) };
-        for (copy, &cost) in buffer.iter_mut().zip(self.data[first..].iter().step_by(stride)) {
-            *copy = if cost <= self.limit { cost } else { f32::INFINITY };
+        for (copy, &cost) in buffer.iter_mut().zip(self.costs[first..].iter().step_by(stride)) {
+            *copy = if cost <= self.max_cost { cost } else { f32::INFINITY };
         }
         buffer
     }

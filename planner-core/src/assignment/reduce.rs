@@ -43,27 +43,27 @@ fn reduce_columns(
     // Many columns per pass, the last pass overlapping the one before: fewer passes over the rows
     // of a large matrix mean fewer cache misses. A small matrix has fewer columns than that.
     match costs.cols {
-        0..SIMD_LANES => cheapest_rows_by::<1>(costs, state.price, paths.previous),
+        0..SIMD_LANES => cheapest_rows_by::<1>(costs, state.price, paths.predecessor_row),
         SIMD_LANES..BLOCK_COLUMNS => {
-            cheapest_rows_by::<SIMD_LANES>(costs, state.price, paths.previous);
+            cheapest_rows_by::<SIMD_LANES>(costs, state.price, paths.predecessor_row);
         }
-        _ => cheapest_rows_by::<BLOCK_COLUMNS>(costs, state.price, paths.previous),
+        _ => cheapest_rows_by::<BLOCK_COLUMNS>(costs, state.price, paths.predecessor_row),
     }
     if state.price.contains(&f64::INFINITY) {
         return None;
     }
     // Here `settled` counts the columns of which a row is the cheapest.
-    paths.settled.fill(0);
+    paths.settled_cols.fill(0);
     for col in (0..costs.cols as u16).rev() {
-        let row = paths.previous[usize::from(col)];
-        paths.settled[usize::from(row)] += 1;
+        let row = paths.predecessor_row[usize::from(col)];
+        paths.settled_cols[usize::from(row)] += 1;
         if state.col_of_row[usize::from(row)] == UNASSIGNED {
             state.match_pair(row, col);
         }
     }
     let mut left = 0;
     for row in 0..costs.rows as u16 {
-        match paths.settled[usize::from(row)] {
+        match paths.settled_cols[usize::from(row)] {
             0 => {
                 state.free_rows[left] = row;
                 left += 1;
@@ -73,7 +73,7 @@ fn reduce_columns(
                 // With its price at minus infinity the row's own column cannot be the least of the
                 // others.
                 let price = core::mem::replace(&mut state.price[own], f64::NEG_INFINITY);
-                let slack = least_reduced_cost(costs.row_costs(row, state.row), state.price);
+                let slack = least_reduced_cost(costs.row_costs(row, state.row_buffer), state.price);
                 state.price[own] = if slack < f64::INFINITY { price - slack } else { price };
             }
             _ => {}
@@ -101,12 +101,12 @@ fn cheapest_rows<const K: usize>(
     least_row: &mut [u16],
 ) {
     let (mut least, mut rows) = ([f32::INFINITY; K], [0_u32; K]);
-    for (row, line) in (0..).zip(costs.data.chunks_exact(costs.cols)) {
+    for (row, line) in (0..).zip(costs.costs.chunks_exact(costs.cols)) {
         let Some(line) = line[first..].first_chunk::<K>() else { return };
         // Written as selects of one width, so that the compiler vectorises the lanes: which row is
         // cheaper cannot be predicted.
         for lane in 0..K {
-            let cheaper = (line[lane] < least[lane]) & (line[lane] <= costs.limit);
+            let cheaper = (line[lane] < least[lane]) & (line[lane] <= costs.max_cost);
             least[lane] = if cheaper { line[lane] } else { least[lane] };
             rows[lane] = if cheaper { row } else { rows[lane] };
         }
@@ -145,7 +145,7 @@ fn reduce_rows(
     while at < rows_in {
         let row = state.free_rows[at];
         at += 1;
-        let two = TwoCheapestColumns::of_row(costs.row_costs(row, state.row), state.price);
+        let two = TwoCheapestColumns::of_row(costs.row_costs(row, state.row_buffer), state.price);
         if two.least == f64::INFINITY {
             return None;
         }

@@ -13,7 +13,7 @@ pub(super) struct MatchingState<'w> {
     pub(super) row_of_col: &'w mut [u16],
     pub(super) col_of_row: &'w mut [u16],
     /// Buffer for a copy of one row of costs.
-    pub(super) row: &'w mut [f32],
+    pub(super) row_buffer: &'w mut [f32],
     /// Rows without a column, in the order in which they are matched.
     pub(super) free_rows: &'w mut [u16],
 }
@@ -34,9 +34,9 @@ impl MatchingState<'_> {
 /// Memory of one search for an augmenting path, one entry per column.
 pub(super) struct AugmentingPaths<'w> {
     pub(super) distance: &'w mut [f64],
-    pub(super) previous: &'w mut [u16],
+    pub(super) predecessor_row: &'w mut [u16],
     /// Settled columns in the order in which they were settled, with their price and distance.
-    pub(super) settled: &'w mut [u16],
+    pub(super) settled_cols: &'w mut [u16],
     pub(super) settled_price: &'w mut [f64],
     pub(super) settled_distance: &'w mut [f64],
 }

@@ -29,22 +29,24 @@ fn brute_force(costs: &[f32], rows: usize, cols: usize, objective: Objective) ->
             let cost = costs[row * cols + col];
             if cost < f32::INFINITY {
                 let next = Assignment {
-                    pairs: so_far.pairs + 1,
-                    total: so_far.total + f64::from(cost),
-                    largest: so_far.largest.max(cost),
+                    pair_count: so_far.pair_count + 1,
+                    total_cost: so_far.total_cost + f64::from(cost),
+                    largest_cost: so_far.largest_cost.max(cost),
                 };
                 extend(costs, cols, row + 1, used | 1 << col, next, best);
             }
         }
     }
-    let none = Assignment { pairs: 0, total: 0.0, largest: f32::NEG_INFINITY };
+    let none = Assignment { pair_count: 0, total_cost: 0.0, largest_cost: f32::NEG_INFINITY };
     let mut best = none;
     extend(costs, cols, 0, 0, none, &mut |found| {
         let better = match objective {
-            Objective::Total => found.total < best.total,
-            Objective::Makespan => (found.largest, found.total) < (best.largest, best.total),
+            Objective::Total => found.total_cost < best.total_cost,
+            Objective::Makespan => {
+                (found.largest_cost, found.total_cost) < (best.largest_cost, best.total_cost)
+            }
         };
-        if found.pairs > best.pairs || (found.pairs == best.pairs && better) {
+        if found.pair_count > best.pair_count || (found.pair_count == best.pair_count && better) {
             best = found;
         }
     });
@@ -62,7 +64,7 @@ enum Objective {
 /// of the pairs.
 fn check_assignment(costs: &[f32], cols: usize, out: &[Option<u16>], said: Assignment) {
     let mut used = vec![false; cols];
-    let mut sum = Assignment { pairs: 0, total: 0.0, largest: f32::NEG_INFINITY };
+    let mut sum = Assignment { pair_count: 0, total_cost: 0.0, largest_cost: f32::NEG_INFINITY };
     for (row, col) in
         out.iter().enumerate().filter_map(|(row, col)| col.map(|col| (row, usize::from(col))))
     {
@@ -70,13 +72,13 @@ fn check_assignment(costs: &[f32], cols: usize, out: &[Option<u16>], said: Assig
         let cost = costs[row * cols + col];
         assert!(cost.is_finite(), "row {row} sent where it cannot go");
         sum = Assignment {
-            pairs: sum.pairs + 1,
-            total: sum.total + f64::from(cost),
-            largest: sum.largest.max(cost),
+            pair_count: sum.pair_count + 1,
+            total_cost: sum.total_cost + f64::from(cost),
+            largest_cost: sum.largest_cost.max(cost),
         };
     }
-    assert_eq!((sum.pairs, sum.largest), (said.pairs, said.largest));
-    assert!((sum.total - said.total).abs() <= 1e-9 * sum.total.abs().max(1.0));
+    assert_eq!((sum.pair_count, sum.largest_cost), (said.pair_count, said.largest_cost));
+    assert!((sum.total_cost - said.total_cost).abs() <= 1e-9 * sum.total_cost.abs().max(1.0));
 }
 
 fn solve_checked<const N: usize>(
@@ -120,16 +122,16 @@ proptest! {
         for objective in [Objective::Total, Objective::Makespan] {
             let best = brute_force(&costs, rows, cols, objective);
             let ours = solve_checked(&costs, rows, cols, objective, &mut ws);
-            prop_assert_eq!(ours.pairs, best.pairs);
+            prop_assert_eq!(ours.pair_count, best.pair_count);
             prop_assert!(
-                (ours.total - best.total).abs() < 1e-4,
+                (ours.total_cost - best.total_cost).abs() < 1e-4,
                 "{:?} {:?} {:?}",
                 objective,
                 ours,
                 best
             );
             if objective == Objective::Makespan {
-                prop_assert_eq!(ours.largest, best.largest);
+                prop_assert_eq!(ours.largest_cost, best.largest_cost);
             }
         }
     }
@@ -154,11 +156,11 @@ fn or_library_instances_reach_their_published_optimum() {
         let n = numbers.next().unwrap() as usize;
         let costs: Vec<f32> = numbers.collect();
         let result = solve_checked(&costs, n, n, Objective::Total, &mut ws);
-        assert_eq!((result.pairs, result.total), (n, optimum(name)), "{name}");
+        assert_eq!((result.pair_count, result.total_cost), (n, optimum(name)), "{name}");
         // The same problem seen from the tasks.
         let transposed: Vec<f32> = (0..n * n).map(|k| costs[k % n * n + k / n]).collect();
         assert_eq!(
-            solve_checked(&transposed, n, n, Objective::Total, &mut ws).total,
+            solve_checked(&transposed, n, n, Objective::Total, &mut ws).total_cost,
             optimum(name)
         );
     }
@@ -193,5 +195,5 @@ fn huge_and_tiny_costs_lose_nothing_to_a_stand_in_for_infinity() {
         [1e-3, 2e-3, f32::INFINITY, 3e-3, 1e-3, 1e37, f32::INFINITY, f32::INFINITY, f32::INFINITY];
     let mut ws = AssignmentWorkspace::<CAPACITY>::new();
     let result = solve_checked(&costs, 3, 3, Objective::Total, &mut ws);
-    assert_eq!((result.pairs, result.total as f32), (2, 2e-3));
+    assert_eq!((result.pair_count, result.total_cost as f32), (2, 2e-3));
 }

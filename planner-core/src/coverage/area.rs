@@ -10,7 +10,7 @@ use libm::{fabs, sqrt};
 use super::Flat;
 
 /// Largest magnitude of a coordinate, metres: at 100 km f32 resolves 8 mm.
-pub const MAX_VERTEX_M: f32 = 150_000.0;
+pub const MAX_VERTEX_COORDINATE_M: f32 = 150_000.0;
 /// Vertices nearer than this count as one, metres.
 pub const SAME_VERTEX_M: f32 = 1e-3;
 /// Two edges count as crossing only if each reaches at least this far beyond the other, metres:
@@ -54,7 +54,7 @@ pub enum AreaError {
         /// The vertex.
         vertex: u16,
     },
-    /// A coordinate of a vertex is greater than [`MAX_VERTEX_M`] in magnitude.
+    /// A coordinate of a vertex is greater than [`MAX_VERTEX_COORDINATE_M`] in magnitude.
     TooFar {
         /// The vertex.
         vertex: u16,
@@ -106,7 +106,7 @@ pub struct Area<'a> {
 
 impl<'a> Area<'a> {
     /// An area without rings: it contains no point.
-    pub(super) const NOWHERE: Self = Self { vertices: &[], rings: &[] };
+    pub(super) const EMPTY: Self = Self { vertices: &[], rings: &[] };
 
     /// Checks the rings and returns the area.
     ///
@@ -117,7 +117,7 @@ impl<'a> Area<'a> {
         area.check_shape()?;
         area.check_duplicates()?;
         area.check_crossings()?;
-        area.check_sizes()?;
+        area.check_ring_areas()?;
         area.check_nesting()?;
         Ok(area)
     }
@@ -201,7 +201,7 @@ impl<'a> Area<'a> {
             if !(vertex.x.is_finite() && vertex.y.is_finite()) {
                 return Err(AreaError::NotFinite { vertex: i as u16 });
             }
-            if vertex.amax() > MAX_VERTEX_M {
+            if vertex.amax() > MAX_VERTEX_COORDINATE_M {
                 return Err(AreaError::TooFar { vertex: i as u16 });
             }
         }
@@ -219,7 +219,7 @@ impl<'a> Area<'a> {
         Ok(())
     }
 
-    fn check_sizes(&self) -> Result<(), AreaError> {
+    fn check_ring_areas(&self) -> Result<(), AreaError> {
         // A ring is flat if its area is less than that of a strip half as long as its perimeter and
         // a millimetre wide.
         let is_flat = |(_, ring): (_, &[Flat])| {

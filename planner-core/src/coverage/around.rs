@@ -3,10 +3,10 @@
 //!
 //! Home: the path leads vertically to the vehicle's own layer, in the layer on the shortest path to
 //! above its pad, and down. Obstacles in the layer are flown around: a visibility graph over the
-//! zones' corners ([`Transit::corners`]) and eight corners around each end of every [`KeepOutZone`]
-//! that reaches the layer is searched by A*. Legs stay above terrain. If there is no path in the
-//! layer, the same is tried at the height at which the vehicle hovers. Aside: the path leads
-//! straight to the nearest free point on rings around the vehicle.
+//! zones' corners ([`TransitGraph::corners`]) and eight corners around each end of every
+//! [`KeepOutZone`] that reaches the layer is searched by A*. Legs stay above terrain. If there is
+//! no path in the layer, the same is tried at the height at which the vehicle hovers. Aside: the
+//! path leads straight to the nearest free point on rings around the vehicle.
 //!
 //! No leg leaves the request's fence. ENU metres. Cost for n nodes: at most n² / 2 visibility
 //! checks, each against all edges of zones and all [`KeepOutZone`]s.
@@ -15,15 +15,15 @@ use heapless::Vec;
 use libm::{ceilf, cosf, fabsf, fminf, sinf};
 
 use super::Flat;
-use super::transit::Transit;
-use crate::detour::{self, DetourError, DetourRequest, Goal, KeepOutZone};
+use super::transit::TransitGraph;
+use crate::detour::{self, DetourError, DetourGoal, DetourRequest, KeepOutZone};
 use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::map::field::FieldView;
 use crate::roadmap::search::SearchError;
 use crate::{Length, Point};
 
 /// Most nodes of the visibility graph.
-const MAX_PLACES: usize = 320;
+const MAX_GRAPH_NODES: usize = 320;
 /// Corners around each end of a keep-out zone's axis.
 const CORNERS_PER_END: usize = 8;
 /// Distance of the corners from the zone's axis, as a multiple of its radius: the line between two
@@ -44,7 +44,7 @@ const SIDESTEP_DIRECTIONS: usize = 16;
 
 /// Fence, no-fly zones, terrain and keep-out zones that legs have to respect.
 struct LegConstraints<'a, 't, const N: usize> {
-    transit: &'a Transit<'t, N>,
+    transit: &'a TransitGraph<'t, N>,
     field: Option<FieldView<'a>>,
     obstacles: &'a [KeepOutZone],
     request: &'a DetourRequest,
@@ -78,14 +78,14 @@ impl<const N: usize> LegConstraints<'_, '_, N> {
     }
 }
 
-/// Writes a path to the goal ([`Goal::Home`]), or to a point aside, that keeps out of all
+/// Writes a path to the goal ([`DetourGoal::Home`]), or to a point aside, that keeps out of all
 /// `obstacles` and of the no-fly zones of `transit`, and stays above the field, to `out`. An
 /// obstacle that contains the vehicle already is shrunk.
 ///
 /// # Errors
 /// The reason why there is no such path.
 pub fn plan_detour<const N: usize, const W: usize>(
-    transit: &Transit<'_, N>,
+    transit: &TransitGraph<'_, N>,
     field: Option<FieldView<'_>>,
     request: &DetourRequest,
     obstacles: &mut [KeepOutZone],
@@ -93,7 +93,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
 ) -> Result<(), DetourError> {
     request.check().map_err(DetourError::Config)?;
     obstacles.iter().try_for_each(KeepOutZone::check).map_err(DetourError::Config)?;
-    let Goal::Home { over, layer_m } = request.goal else {
+    let DetourGoal::Home { above_pad: over, layer_z_m: layer_m } = request.goal else {
         return Err(DetourError::Search(SearchError::NoPath));
     };
     detour::shrink_zones(obstacles, &request.here);
@@ -101,7 +101,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
     let from = |points: &[Point], out: &mut Path<W>| {
         write_path(request, points, out).map_err(DetourError::Path)
     };
-    if request.aside {
+    if request.land_aside {
         let place =
             nearest_reachable_place(&clear).ok_or(DetourError::Search(SearchError::NoPath))?;
         return from(&[place], out);
@@ -131,7 +131,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
 /// # Errors
 /// The reason why there is no such path.
 pub fn plan_detour_for_vehicle<const N: usize, const W: usize, const G: usize>(
-    transit: &Transit<'_, N>,
+    transit: &TransitGraph<'_, N>,
     field: Option<FieldView<'_>>,
     request: &DetourRequest,
     obstacles: &mut [KeepOutZone],
@@ -141,7 +141,7 @@ pub fn plan_detour_for_vehicle<const N: usize, const W: usize, const G: usize>(
     out.task = Task::Goto(0);
     (out.climb_m, out.descent_m, out.depart_s) = (0.0, request.descent_m, 0.0);
     out.gates.clear();
-    out.plan_crc = 0;
+    out.swarm_plan_crc = 0;
     Ok(())
 }
 
@@ -166,18 +166,18 @@ fn nearest_reachable_place<const N: usize>(clear: &LegConstraints<'_, '_, N>) ->
 
 /// Nodes at one height, with the lengths of the shortest paths to them so far.
 struct VisibilityGraph {
-    places: Vec<Flat, MAX_PLACES>,
-    distance_m: [f32; MAX_PLACES],
-    previous: [u16; MAX_PLACES],
-    settled: [bool; MAX_PLACES],
+    nodes: Vec<Flat, MAX_GRAPH_NODES>,
+    distance_m: [f32; MAX_GRAPH_NODES],
+    previous: [u16; MAX_GRAPH_NODES],
+    settled: [bool; MAX_GRAPH_NODES],
 }
 
 impl VisibilityGraph {
     const EMPTY: Self = Self {
-        places: Vec::new(),
-        distance_m: [0.0; MAX_PLACES],
-        previous: [0; MAX_PLACES],
-        settled: [false; MAX_PLACES],
+        nodes: Vec::new(),
+        distance_m: [0.0; MAX_GRAPH_NODES],
+        previous: [0; MAX_GRAPH_NODES],
+        settled: [false; MAX_GRAPH_NODES],
     };
 
     /// Searches the shortest path between two points of the same height, and writes its points to
@@ -200,9 +200,9 @@ impl VisibilityGraph {
         self.settled.fill(false);
         self.distance_m[START_NODE] = 0.0;
         loop {
-            let open = (0..self.places.len())
+            let open = (0..self.nodes.len())
                 .filter(|&i| !self.settled[i] && self.distance_m[i].is_finite());
-            let whole = |i: usize| self.distance_m[i] + (self.places[i] - to.xy()).length();
+            let whole = |i: usize| self.distance_m[i] + (self.nodes[i] - to.xy()).length();
             let Some(next) = open.min_by(|&a, &b| whole(a).total_cmp(&whole(b))) else {
                 return Ok(false);
             };
@@ -210,14 +210,14 @@ impl VisibilityGraph {
                 break;
             }
             self.settled[next] = true;
-            let place = level(&self.places[next]);
-            for i in 0..self.places.len() {
-                let far_m = self.distance_m[next] + (self.places[i] - place.xy()).length();
+            let place = level(&self.nodes[next]);
+            for i in 0..self.nodes.len() {
+                let far_m = self.distance_m[next] + (self.nodes[i] - place.xy()).length();
                 // A visibility check costs more than the sum, so only links that would be shorter
                 // are checked.
                 if !self.settled[i]
                     && far_m < self.distance_m[i]
-                    && clear.is_leg_free(&place, &level(&self.places[i]))
+                    && clear.is_leg_free(&place, &level(&self.nodes[i]))
                 {
                     (self.distance_m[i], self.previous[i]) = (far_m, next as u16);
                 }
@@ -226,7 +226,7 @@ impl VisibilityGraph {
         let mut at = END_NODE;
         while at != START_NODE {
             points
-                .push(level(&self.places[at]))
+                .push(level(&self.nodes[at]))
                 .map_err(|_| DetourError::Path(PathError::PathFull))?;
             at = usize::from(self.previous[at]);
         }
@@ -243,8 +243,8 @@ impl VisibilityGraph {
         from: &Point,
         to: &Point,
     ) {
-        self.places.clear();
-        let mut add = |place: Flat| _ = self.places.push(place);
+        self.nodes.clear();
+        let mut add = |place: Flat| _ = self.nodes.push(place);
         add(from.xy());
         add(to.xy());
         clear.transit.corners().iter().for_each(|corner| add(*corner));

@@ -10,7 +10,7 @@ use crate::Length;
 use libm::{fmaxf, fminf};
 
 use super::CoverageError;
-use super::pack::Work;
+use super::pack::CoverageProblem;
 use crate::sort;
 
 /// Most vehicles for which the bound can be computed.
@@ -19,29 +19,32 @@ const MAX_VEHICLES: usize = 32;
 /// The lower bound on max C_k, seconds.
 ///
 /// # Errors
-/// Those of [`Work::check`] for at most 32 vehicles.
+/// Those of [`CoverageProblem::check`] for at most 32 vehicles.
 pub fn lower_bound_s<const L: usize, const N: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
 ) -> Result<f32, CoverageError> {
-    work.check::<MAX_VEHICLES>()?;
-    let fastest =
-        |speed: fn(&super::pack::Vehicle) -> f32| work.vehicles.iter().map(speed).fold(0.0, fmaxf);
+    problem.check::<MAX_VEHICLES>()?;
+    let fastest = |speed: fn(&super::pack::Vehicle) -> f32| {
+        problem.vehicles.iter().map(speed).fold(0.0, fmaxf)
+    };
     let cruise_mps = fastest(|v| v.cruise_mps);
     let vertical = |layer: u8| {
-        let delays = work.vehicles.iter().map(|vehicle| work.altitude_delay_s(vehicle, layer));
+        let delays =
+            problem.vehicles.iter().map(|vehicle| problem.altitude_delay_s(vehicle, layer));
         delays.fold(f32::INFINITY, fminf)
     };
     let mut longest = LargestValues::new();
     let mut furthest_s: f32 = 0.0;
     let mut nearest_m = [f32::INFINITY; MAX_VEHICLES];
-    for lane in work.tracks.lanes() {
-        let step = lane.length_m() / fmaxf((lane.count - 1) as f32, 1.0);
-        for k in 0..lane.count {
+    for lane in problem.tracks.lanes() {
+        let step = lane.length_m() / fmaxf((lane.waypoint_count - 1) as f32, 1.0);
+        for k in 0..lane.waypoint_count {
             let place = lane.waypoint(k);
             let mut least_s = f32::INFINITY;
-            for (near, vehicle) in nearest_m.iter_mut().zip(work.vehicles) {
+            for (near, vehicle) in nearest_m.iter_mut().zip(problem.vehicles) {
                 // The straight line: no path around zones is shorter.
-                let there_m = (place - vehicle.place).length() + (place - vehicle.home).length();
+                let there_m =
+                    (place - vehicle.transit_start).length() + (place - vehicle.home).length();
                 *near = fminf(*near, there_m);
                 least_s = fminf(least_s, there_m / vehicle.cruise_mps);
             }
@@ -51,12 +54,12 @@ pub fn lower_bound_s<const L: usize, const N: usize>(
             }
         }
     }
-    for pair in work.tracks.lanes().windows(2) {
-        longest.insert(pair[1].start_m - pair[0].start_m - pair[0].length_m());
+    for pair in problem.tracks.lanes().windows(2) {
+        longest.insert(pair[1].start_along_m - pair[0].start_along_m - pair[0].length_m());
     }
-    let nearest_m = &mut nearest_m[..work.vehicles.len()];
-    sort::sort_by(nearest_m, f32::total_cmp);
-    let (mut ground_m, mut delay_s, mut least_s) = (work.tracks.length_m(), 0.0, f32::INFINITY);
+    let nearest_m = &mut nearest_m[..problem.vehicles.len()];
+    sort::heapsort_by(nearest_m, f32::total_cmp);
+    let (mut ground_m, mut delay_s, mut least_s) = (problem.tracks.length_m(), 0.0, f32::INFINITY);
     for (flying, near) in nearest_m.iter().enumerate() {
         ground_m += near - if flying > 0 { longest.values[flying - 1] } else { 0.0 };
         delay_s += vertical(flying as u8 + 1);

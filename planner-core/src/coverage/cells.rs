@@ -5,11 +5,11 @@
 //! of a cell that is not flown yet. O(cells · lanes + lanes²) sums, and few distances around zones.
 
 use super::lanes::Lane;
-use super::transit::Transit;
+use super::transit::TransitGraph;
 use crate::Length;
 
 /// Groups lanes into cells. The lanes must be in the lane frame and in the order of their strips.
-/// Sets `first` of each lane to the number of its cell.
+/// Gives each lane the number of its cell.
 pub(super) fn group_into_cells(lanes: &mut [Lane]) {
     let touch = |a: &Lane, b: &Lane| a.from.x < b.to.x && b.from.x < a.to.x;
     let (mut cells, mut below, mut row) = (0, 0, 0);
@@ -27,21 +27,22 @@ pub(super) fn group_into_cells(lanes: &mut [Lane]) {
             let own = lanes[row..].iter().take_while(|lane| lane.strip == strip);
             own.filter(|lane| touch(&lanes[*i], lane)).count() == 1
         };
-        lanes[k].first = only.filter(alone).map_or(cells, |i| lanes[i].first);
-        cells += u32::from(lanes[k].first == cells);
+        let cell = only.filter(alone).map_or(cells, |i| lanes[i].cell());
+        lanes[k].set_cell(cell);
+        cells += u32::from(cell == cells);
     }
 }
 
 /// Whether a cell begins at lane `k`, or the lanes end there.
 pub(super) fn is_cell_boundary(lanes: &[Lane], k: usize) -> bool {
-    k == 0 || k == lanes.len() || lanes[k - 1].first != lanes[k].first
+    k == 0 || k == lanes.len() || lanes[k - 1].cell() != lanes[k].cell()
 }
 
 /// Sorts lanes that are grouped into cells: the first cell comes first, then each time the cell
 /// with the corner nearest to the end of the cell before.
-pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>) {
+pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &TransitGraph<'_, N>) {
     for k in 1..lanes.len() {
-        let place = lanes[..k].partition_point(|lane| lane.first <= lanes[k].first);
+        let place = lanes[..k].partition_point(|lane| lane.cell() <= lanes[k].cell());
         lanes[place..=k].rotate_right(1);
     }
     let mut turned = false;
@@ -57,10 +58,10 @@ pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &Transit<
         let len = end_of_cell(lanes, from) - from;
         lanes[done..from + len].rotate_right(len);
         let cell = &mut lanes[done..done + len];
-        if how.backwards {
+        if how.from_last_lane {
             cell.reverse();
         }
-        if how.turned {
+        if how.lanes_reversed {
             cell.iter_mut().for_each(Lane::reverse);
         }
         done += len;
@@ -69,9 +70,9 @@ pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &Transit<
 
 /// How a cell is flown: whether from its last lane to its first, and whether each lane is reversed.
 #[derive(Clone, Copy, Default)]
-struct CellEntry {
-    backwards: bool,
-    turned: bool,
+struct CellTraversal {
+    from_last_lane: bool,
+    lanes_reversed: bool,
 }
 
 /// Finds, among the cells from lane `done` on, the one with the corner nearest to the end of the
@@ -79,20 +80,20 @@ struct CellEntry {
 fn nearest_cell<const N: usize>(
     lanes: &[Lane],
     done: usize,
-    transit: &Transit<'_, N>,
-) -> (usize, CellEntry) {
+    transit: &TransitGraph<'_, N>,
+) -> (usize, CellTraversal) {
     let here = lanes[done - 1].to;
-    let mut best = (f32::INFINITY, done, CellEntry::default());
+    let mut best = (f32::INFINITY, done, CellTraversal::default());
     let mut from = done;
     while from < lanes.len() {
         let to = end_of_cell(lanes, from);
-        for (lane, backwards) in [(&lanes[from], false), (&lanes[to - 1], true)] {
-            for (corner, turned) in [(lane.from, false), (lane.to, true)] {
+        for (lane, from_last_lane) in [(&lanes[from], false), (&lanes[to - 1], true)] {
+            for (corner, lanes_reversed) in [(lane.from, false), (lane.to, true)] {
                 // No path around zones is shorter than the straight line.
                 if (corner - here).length() < best.0 {
                     let way = transit.distance_m(&here, &corner);
                     if way < best.0 {
-                        best = (way, from, CellEntry { backwards, turned });
+                        best = (way, from, CellTraversal { from_last_lane, lanes_reversed });
                     }
                 }
             }

@@ -7,7 +7,7 @@
 
 use super::CoverageError;
 use super::tracks::{Lane, Tracks};
-use super::transit::Transit;
+use super::transit::TransitGraph;
 use crate::flight::WaypointRange;
 
 /// Writes the lanes without the waypoints `done` to `left`. The ranges must be in ascending order
@@ -21,7 +21,7 @@ use crate::flight::WaypointRange;
 pub fn remaining_lanes<const L: usize, const N: usize>(
     tracks: &Tracks<L>,
     done: &[WaypointRange],
-    transit: &Transit<'_, N>,
+    transit: &TransitGraph<'_, N>,
     left: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
     if !is_sorted_disjoint(done)
@@ -30,12 +30,14 @@ pub fn remaining_lanes<const L: usize, const N: usize>(
         return Err(CoverageError::SettingOutOfRange("done"));
     }
     left.lanes.clear();
-    left.along = tracks.along;
+    left.lane_direction = tracks.lane_direction;
     for lane in tracks.lanes() {
-        let end = lane.first + lane.count;
-        let mut from = lane.first;
-        for range in done.iter().filter(|range| range.first < end && range.end > lane.first) {
-            push_lane_part(lane, from, range.first.max(lane.first), left)?;
+        let end = lane.first_waypoint + lane.waypoint_count;
+        let mut from = lane.first_waypoint;
+        for range in
+            done.iter().filter(|range| range.first < end && range.end > lane.first_waypoint)
+        {
+            push_lane_part(lane, from, range.first.max(lane.first_waypoint), left)?;
             from = range.end.min(end);
         }
         push_lane_part(lane, from, end, left)?;
@@ -62,11 +64,11 @@ fn push_lane_part<const L: usize>(
         return Ok(());
     }
     let part = Lane {
-        from: lane.waypoint(from - lane.first),
-        to: lane.waypoint(end - 1 - lane.first),
-        first: 0,
-        count: end - from,
-        start_m: 0.0,
+        from: lane.waypoint(from - lane.first_waypoint),
+        to: lane.waypoint(end - 1 - lane.first_waypoint),
+        first_waypoint: 0,
+        waypoint_count: end - from,
+        start_along_m: 0.0,
         strip: lane.strip,
     };
     left.lanes.push(part).map_err(|_| CoverageError::LanesFull)

@@ -5,25 +5,26 @@
 //! (vehicles, layers) holds the most waypoints, counted from the first, that this set of vehicles
 //! in this set of layers can photograph within T. A route's cost does not fall if it is extended at
 //! either end, by the triangle inequality; so each step takes as many waypoints as fit, which two
-//! pointers find for all first waypoints at once. T is found by bisection to [`TIME_RESOLUTION`].
+//! pointers find for all first waypoints at once. T is found by bisection to
+//! [`RELATIVE_TIME_RESOLUTION`].
 //!
 //! Cost: a few dozen rounds of Σ C(K, m)² · (K − m)² steps, m to K, and K² · n for the pointers.
 
 use super::CoverageError;
-use super::pack::{PackWorkspace, Route, RoutePlan, Work, binpat, set_costs};
+use super::pack::{CoverageProblem, PackWorkspace, Route, RoutePlan, binpat, set_costs};
 
 /// Most vehicles of an exact division.
 pub const MAX_EXACT_VEHICLES: usize = 10;
 /// Relative resolution to which the least T is found.
-pub const TIME_RESOLUTION: f32 = 1e-5;
+pub const RELATIVE_TIME_RESOLUTION: f32 = 1e-5;
 
 /// Memory that the caller lends, with lengths from [`ExactWorkspace::required_lengths`].
 pub struct ExactWorkspace<'a> {
     /// Transit lengths, metres: for each vehicle to every waypoint, and from every waypoint home.
-    pub ways_m: &'a mut [f32],
+    pub transit_lengths_m: &'a mut [f32],
     /// For each vehicle, layer and first waypoint, the number after the last waypoint that the
     /// vehicle can photograph within T.
-    pub reaches: &'a mut [u32],
+    pub reachable_ends: &'a mut [u32],
     /// States of the dynamic program: most waypoints photographed, and the step (vehicle and layer)
     /// that led there.
     pub states: &'a mut [(u32, u16)],
@@ -45,31 +46,34 @@ impl ExactWorkspace<'_> {
 /// Those of [`binpat`]; [`CoverageError::Vehicles`] for more than [`MAX_EXACT_VEHICLES`];
 /// [`CoverageError::WorkspaceTooSmall`].
 pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     ws: &mut ExactWorkspace<'_>,
     pack: &mut PackWorkspace<K>,
     out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
-    work.check::<K>()?;
-    let (count, waypoints) = (work.vehicles.len(), work.tracks.waypoint_count() as usize);
+    problem.check::<K>()?;
+    let (count, waypoints) = (problem.vehicles.len(), problem.tracks.waypoint_count() as usize);
     if count > MAX_EXACT_VEHICLES {
         return Err(CoverageError::Vehicles);
     }
     let [ways, reaches, states] = ExactWorkspace::required_lengths(count, waypoints);
-    if ws.ways_m.len() < ways || ws.reaches.len() < reaches || ws.states.len() < states {
+    if ws.transit_lengths_m.len() < ways
+        || ws.reachable_ends.len() < reaches
+        || ws.states.len() < states
+    {
         return Err(CoverageError::WorkspaceTooSmall);
     }
     // Upper bound of T: BINPAT's division is possible. Lower bound: 0 s.
-    binpat(work, pack, out)?;
-    let mut table = DivisionTable { work, ws, count, waypoints };
+    binpat(problem, pack, out)?;
+    let mut table = DivisionTable { problem, ws, vehicle_count: count, waypoint_count: waypoints };
     table.fill_transit_lengths();
-    let (mut low, mut high) = (0.0, out.max_cost_s() * (1.0 + TIME_RESOLUTION));
-    if table.fill_states(high) {
+    let (mut low, mut high) = (0.0, out.max_cost_s() * (1.0 + RELATIVE_TIME_RESOLUTION));
+    if table.find_division_within(high) {
         table.write_plan(out);
     }
-    while high - low > high * TIME_RESOLUTION {
+    while high - low > high * RELATIVE_TIME_RESOLUTION {
         let middle = low + (high - low) / 2.0;
-        if table.fill_states(middle) {
+        if table.find_division_within(middle) {
             table.write_plan(out);
             high = libm::fminf(middle, out.max_cost_s());
         } else {
@@ -80,25 +84,25 @@ pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
 }
 
 struct DivisionTable<'t, 'w, 'm, const L: usize, const N: usize> {
-    work: &'t Work<'w, L, N>,
+    problem: &'t CoverageProblem<'w, L, N>,
     ws: &'t mut ExactWorkspace<'m>,
-    count: usize,
-    waypoints: usize,
+    vehicle_count: usize,
+    waypoint_count: usize,
 }
 
 impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
     fn fill_transit_lengths(&mut self) {
-        for (v, vehicle) in self.work.vehicles.iter().enumerate() {
-            for i in 0..self.waypoints {
-                let Some(place) = self.work.tracks.waypoint(i as u32) else { continue };
-                let to = self.work.transit.distance_m(&vehicle.place, &place);
-                let home = if vehicle.place == vehicle.home {
+        for (v, vehicle) in self.problem.vehicles.iter().enumerate() {
+            for i in 0..self.waypoint_count {
+                let Some(place) = self.problem.tracks.waypoint(i as u32) else { continue };
+                let to = self.problem.transit.distance_m(&vehicle.transit_start, &place);
+                let home = if vehicle.transit_start == vehicle.home {
                     to
                 } else {
-                    self.work.transit.distance_m(&place, &vehicle.home)
+                    self.problem.transit.distance_m(&place, &vehicle.home)
                 };
-                self.ws.ways_m[2 * v * self.waypoints + i] = to;
-                self.ws.ways_m[(2 * v + 1) * self.waypoints + i] = home;
+                self.ws.transit_lengths_m[2 * v * self.waypoint_count + i] = to;
+                self.ws.transit_lengths_m[(2 * v + 1) * self.waypoint_count + i] = home;
             }
         }
     }
@@ -106,11 +110,13 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
     /// Whether vehicle `v` can photograph waypoints `from` to `end` − 1, transits included, with at
     /// most `most_m` metres of flight over ground; the way down to lower ground counts as so many.
     fn is_within_length(&self, v: usize, from: usize, end: usize, most_m: f32) -> bool {
-        let to = &self.ws.ways_m[2 * v * self.waypoints..][..self.waypoints];
-        let home = &self.ws.ways_m[(2 * v + 1) * self.waypoints..][..self.waypoints];
-        let along = |i: usize| self.work.tracks.distance_to_waypoint_m(i as u32);
-        let (forward_s, backward_s) = self.work.route_sink_times_s(v, from as u32, end as u32);
-        let cruise_mps = self.work.vehicles[v].cruise_mps;
+        let to = &self.ws.transit_lengths_m[2 * v * self.waypoint_count..][..self.waypoint_count];
+        let home =
+            &self.ws.transit_lengths_m[(2 * v + 1) * self.waypoint_count..][..self.waypoint_count];
+        let along = |i: usize| self.problem.tracks.distance_to_waypoint_m(i as u32);
+        let (forward_s, backward_s) =
+            self.problem.route_extra_vertical_times_s(v, from as u32, end as u32);
+        let cruise_mps = self.problem.vehicles[v].cruise_mps;
         let transit = libm::fminf(
             to[from] + home[end - 1] + forward_s * cruise_mps,
             to[end - 1] + home[from] + backward_s * cruise_mps,
@@ -119,12 +125,12 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
     }
 
     /// Computes all states for T = `time_s`. Returns whether some state has all waypoints.
-    fn fill_states(&mut self, time_s: f32) -> bool {
-        let (count, waypoints) = (self.count, self.waypoints);
+    fn find_division_within(&mut self, time_s: f32) -> bool {
+        let (count, waypoints) = (self.vehicle_count, self.waypoint_count);
         for v in 0..count {
-            let vehicle = self.work.vehicles[v];
+            let vehicle = self.problem.vehicles[v];
             for layer in 0..count {
-                let left_s = time_s - self.work.altitude_delay_s(&vehicle, layer as u8 + 1);
+                let left_s = time_s - self.problem.altitude_delay_s(&vehicle, layer as u8 + 1);
                 let most_m = left_s * vehicle.cruise_mps;
                 let mut end = 0;
                 for from in 0..waypoints {
@@ -132,9 +138,10 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
                     while end < waypoints && self.is_within_length(v, from, end + 1, most_m) {
                         end += 1;
                     }
-                    self.ws.reaches[(v * count + layer) * (waypoints + 1) + from] = end as u32;
+                    self.ws.reachable_ends[(v * count + layer) * (waypoints + 1) + from] =
+                        end as u32;
                 }
-                self.ws.reaches[(v * count + layer) * (waypoints + 1) + waypoints] =
+                self.ws.reachable_ends[(v * count + layer) * (waypoints + 1) + waypoints] =
                     waypoints as u32;
             }
         }
@@ -145,8 +152,8 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
                 let done = self.ws.states[flying * sets + layers].0;
                 for v in (0..count).filter(|v| flying >> v & 1 == 0) {
                     for layer in (0..count).filter(|layer| layers >> layer & 1 == 0) {
-                        let end =
-                            self.ws.reaches[(v * count + layer) * (waypoints + 1) + done as usize];
+                        let end = self.ws.reachable_ends
+                            [(v * count + layer) * (waypoints + 1) + done as usize];
                         let next = (flying | 1 << v) * sets + (layers | 1 << layer);
                         if end > self.ws.states[next].0 {
                             self.ws.states[next] = (end, (v * count + layer) as u16);
@@ -160,32 +167,36 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
 
     /// The state with the fewest vehicles that has all waypoints.
     fn complete_state(&self) -> Option<usize> {
-        let all = |state: &usize| self.ws.states[*state].0 as usize == self.waypoints;
-        (0..1usize << (2 * self.count)).filter(all).min_by_key(|state| state.count_ones())
+        let all = |state: &usize| self.ws.states[*state].0 as usize == self.waypoint_count;
+        (0..1usize << (2 * self.vehicle_count)).filter(all).min_by_key(|state| state.count_ones())
     }
 
     /// Writes the plan that leads to the state of [`Self::complete_state`].
     fn write_plan<const K: usize>(&self, out: &mut RoutePlan<K>) {
         let Some(mut state) = self.complete_state() else { return };
-        let (count, sets) = (self.count, 1usize << self.count);
-        let stride = self.waypoints + 1;
+        let (count, sets) = (self.vehicle_count, 1usize << self.vehicle_count);
+        let stride = self.waypoint_count + 1;
         out.routes.clear();
         while self.ws.states[state].1 != u16::MAX {
             let (end, step) = self.ws.states[state];
             let (v, layer) = (usize::from(step) / count, usize::from(step) % count);
             state = ((state / sets) & !(1 << v)) * sets + ((state % sets) & !(1 << layer));
             let first = self.ws.states[state].0;
-            debug_assert_eq!(self.ws.reaches[usize::from(step) * stride + first as usize], end);
-            let (ground_m, direction) = self
-                .work
-                .ground_distance_m(&self.work.vehicles[v], &self.work.route_ends(first, end));
+            debug_assert_eq!(
+                self.ws.reachable_ends[usize::from(step) * stride + first as usize],
+                end
+            );
+            let (ground_m, direction) = self.problem.ground_length_and_direction(
+                &self.problem.vehicles[v],
+                &self.problem.route_ends(first, end),
+            );
             let route = Route {
-                vehicle: v as u8,
-                first,
-                end,
+                vehicle_index: v as u8,
+                lowest_waypoint: first,
+                waypoint_end: end,
                 direction,
                 layer: layer as u8 + 1,
-                ground_m,
+                ground_length_m: ground_m,
                 cost_m: 0.0,
                 cost_s: 0.0,
             };
@@ -194,6 +205,6 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
             }
         }
         out.routes.reverse();
-        set_costs(self.work, out);
+        set_costs(self.problem, out);
     }
 }

@@ -13,14 +13,14 @@ use heapless::Vec;
 use self::builder::{FlightPathBuilder, point_at_height};
 use super::divide;
 use super::lanes::Lane;
-use super::pack::{Route, RouteDirection, RoutePlan, Vehicle, Work};
+use super::pack::{CoverageProblem, Route, RouteDirection, RoutePlan, Vehicle};
 use crate::flight::{
     Flight, HeadingMode, Path, PathError, PicturePlan, Task, Trigger, WaypointOrder, WaypointRange,
 };
 use crate::map::field::follow::TerrainFollowing;
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{
-    self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace,
+    self, DEFAULT_MAX_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace,
 };
 use crate::sort;
 use crate::{Length, Point};
@@ -34,13 +34,14 @@ pub const MAX_PATH_LENGTH_M: f32 = 6_553.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pad {
     /// Id of the vehicle, unique in the swarm.
-    pub id: u8,
-    /// First point of the vehicle's path, above the pad, over [`Vehicle::place`]; ENU metres.
-    pub start: Point,
+    pub vehicle_id: u8,
+    /// First point of the vehicle's path, above the pad, over [`Vehicle::transit_start`]; ENU
+    /// metres.
+    pub path_start: Point,
     /// Height of `start` above the pad, metres; 0 for a vehicle in the air.
     pub climb_m: f32,
     /// Height of the path's last point, above the vehicle's home: z in the mission frame, metres.
-    pub end_z_m: f32,
+    pub path_end_z_m: f32,
     /// Height of that point above the ground below it, metres.
     pub descent_m: f32,
     /// Whether the vehicle is in the air: without a route it flies home.
@@ -51,7 +52,7 @@ pub struct Pad {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CaptureSettings {
     /// Greatest distance over ground between neighbouring pictures, metres.
-    pub waypoint_m: f32,
+    pub max_picture_spacing_m: f32,
     /// Heading of the vehicles while they photograph.
     pub heading_mode: HeadingMode,
     /// How the cameras are triggered.
@@ -61,20 +62,21 @@ pub struct CaptureSettings {
 /// Inputs of [`plan_flights`] besides the routes.
 #[derive(Clone, Copy, Debug)]
 pub struct FlightInputs<'a> {
-    /// The vehicles' pads, in the order of [`Work::vehicles`].
+    /// The vehicles' pads, in the order of [`CoverageProblem::vehicles`].
     pub pads: &'a [Pad],
     /// Settings of the camera during a flight.
     pub capture: CaptureSettings,
     /// Clearance that every leg is taken to have, metres: there are no walls.
-    pub clearance_m: f32,
-    /// Separations and nominal speeds; legs are timed by the speeds in [`Work::vehicles`].
+    pub assumed_clearance_m: f32,
+    /// Separations and nominal speeds; legs are timed by the speeds in
+    /// [`CoverageProblem::vehicles`].
     pub schedule: ScheduleConfig,
     /// Most gates that a vehicle may have.
     pub max_gates: usize,
     /// Photographed waypoints of the area, ascending: the lanes do not contain them.
     pub photographed: &'a [WaypointRange],
     /// Transit layers that are occupied: bit `i` is layer `i`.
-    pub held_layers: u64,
+    pub occupied_layers: u64,
     /// Height band above terrain that lanes and paths between them follow, all below the lowest
     /// layer. `None` over level ground.
     pub following: Option<TerrainFollowing<'a>>,
@@ -98,32 +100,33 @@ pub fn plan_flights<
     const V: usize,
     const W: usize,
 >(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     routes: &RoutePlan<K>,
     inputs: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
-    check_inputs(work, &routes.routes, inputs)?;
+    check_inputs(problem, &routes.routes, inputs)?;
     out.flights.clear();
     let used = |layer: u8| routes.routes.iter().any(|route| route.layer == layer);
-    let mut layers = free_layers(inputs.held_layers).filter(|layer| !used(*layer));
+    let mut layers = free_layers(inputs.occupied_layers).filter(|layer| !used(*layer));
     for (index, pad) in inputs.pads.iter().enumerate() {
-        let flight = match routes.routes.iter().find(|route| usize::from(route.vehicle) == index) {
-            Some(route) => route_flight(work, route, inputs, pad),
-            None if pad.airborne => {
-                // Cannot fail: there are more layers than vehicles.
-                flight_home(
-                    work,
-                    layers.next().unwrap_or(u8::MAX),
-                    &work.vehicles[index],
-                    inputs,
-                    pad,
-                )
-            }
-            None => grounded_flight(pad),
-        };
-        let flight = flight.map_err(|e| PlanError::Path(pad.id, e))?;
+        let flight =
+            match routes.routes.iter().find(|route| usize::from(route.vehicle_index) == index) {
+                Some(route) => route_flight(problem, route, inputs, pad),
+                None if pad.airborne => {
+                    // Cannot fail: there are more layers than vehicles.
+                    flight_home(
+                        problem,
+                        layers.next().unwrap_or(u8::MAX),
+                        &problem.vehicles[index],
+                        inputs,
+                        pad,
+                    )
+                }
+                None => grounded_flight(pad),
+            };
+        let flight = flight.map_err(|e| PlanError::Path(pad.vehicle_id, e))?;
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
     let most_gates = schedule_departures(inputs, ws, out)?;
@@ -136,7 +139,7 @@ pub fn plan_flights<
             inputs.max_gates,
             ws,
         )
-        .map_err(|e| PlanError::Schedule(flight.id, e))?;
+        .map_err(|e| PlanError::Schedule(flight.vehicle_id, e))?;
     }
     out.set_crc(&inputs.schedule);
     Ok(())
@@ -144,30 +147,30 @@ pub fn plan_flights<
 
 /// Checks that all numbers are in range and that the inputs are consistent.
 fn check_inputs<const L: usize, const N: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     routes: &[Route],
     inputs: &FlightInputs<'_>,
 ) -> Result<(), PlanError> {
     inputs.schedule.check().map_err(PlanError::Config)?;
     let settings = [
-        ("mission_m", work.heights.mission_m),
-        ("layer_m", work.heights.layer_m),
-        ("waypoint_m", inputs.capture.waypoint_m),
+        ("mission_m", problem.heights.max_picture_height_m),
+        ("layer_m", problem.heights.layer_spacing_m),
+        ("waypoint_m", inputs.capture.max_picture_spacing_m),
     ];
-    crate::all_positive(&settings).map_err(PlanError::Config)?;
-    let all = work.tracks.waypoint_count();
+    crate::check_positive(&settings).map_err(PlanError::Config)?;
+    let all = problem.tracks.waypoint_count();
     let within = |route: &Route| {
-        route.first < route.end
-            && route.end <= all
-            && usize::from(route.vehicle) < work.vehicles.len()
+        route.lowest_waypoint < route.waypoint_end
+            && route.waypoint_end <= all
+            && usize::from(route.vehicle_index) < problem.vehicles.len()
     };
-    if inputs.pads.len() != work.vehicles.len()
+    if inputs.pads.len() != problem.vehicles.len()
         || !routes.iter().all(within)
         || !divide::is_sorted_disjoint(inputs.photographed)
     {
         return Err(PlanError::Terminals);
     }
-    for (index, (pad, vehicle)) in inputs.pads.iter().zip(work.vehicles).enumerate() {
+    for (index, (pad, vehicle)) in inputs.pads.iter().zip(problem.vehicles).enumerate() {
         let speeds = [
             ("cruise_mps", vehicle.cruise_mps),
             ("climb_mps", vehicle.climb_mps),
@@ -175,19 +178,19 @@ fn check_inputs<const L: usize, const N: usize>(
         ];
         let heights = [pad.climb_m, pad.descent_m];
         let places = pad
-            .start
+            .path_start
             .iter()
-            .chain(vehicle.place.iter())
+            .chain(vehicle.transit_start.iter())
             .chain(vehicle.home.iter())
-            .chain([&pad.end_z_m]);
-        if crate::all_positive(&speeds).is_err()
+            .chain([&pad.path_end_z_m]);
+        if crate::check_positive(&speeds).is_err()
             || !heights.iter().all(|height_m| *height_m >= 0.0 && height_m.is_finite())
             || !places.into_iter().all(|place| place.is_finite())
         {
-            return Err(PlanError::BadTask(pad.id));
+            return Err(PlanError::BadTask(pad.vehicle_id));
         }
-        if inputs.pads[..index].iter().any(|other| other.id == pad.id) {
-            return Err(PlanError::SameId(pad.id));
+        if inputs.pads[..index].iter().any(|other| other.vehicle_id == pad.vehicle_id) {
+            return Err(PlanError::SameId(pad.vehicle_id));
         }
     }
     Ok(())
@@ -213,7 +216,9 @@ fn schedule_departures<const V: usize, const W: usize>(
         let _ = order.push((flight.task.leaves_pad(), flight.duration_s(cfg), i));
     }
     // Vehicles that stay on their pads are scheduled before all others.
-    sort::sort_by(&mut order, |a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
+    sort::heapsort_by(&mut order, |a, b| {
+        a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2))
+    });
     let stay = order.iter().filter(|(flies, ..)| !flies).count();
     let mut tries = order.len();
     loop {
@@ -223,7 +228,7 @@ fn schedule_departures<const V: usize, const W: usize>(
                 tries = tries.saturating_sub(1);
                 if tries == 0 || place == stay || error != ScheduleError::Blocked {
                     return Err(PlanError::Schedule(
-                        out.flights[usize::from(order[place].2)].id,
+                        out.flights[usize::from(order[place].2)].vehicle_id,
                         error,
                     ));
                 }
@@ -269,16 +274,16 @@ fn schedule_in_order<const V: usize, const W: usize>(
 /// The flight of a vehicle that stays on its pad: one waypoint above the pad.
 fn grounded_flight<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
     let mut path = Path::new();
-    path.push(pad.start, 0.0)?;
-    let Pad { id, climb_m, .. } = *pad;
+    path.push(pad.path_start, 0.0)?;
+    let Pad { vehicle_id: id, climb_m, .. } = *pad;
     Ok(Flight {
-        id,
+        vehicle_id: id,
         task: Task::Stay,
         path,
         climb_m,
         descent_m: 0.0,
         depart_s: 0.0,
-        segment_m: MAX_TIMED_SEGMENT_M,
+        max_segment_m: DEFAULT_MAX_SEGMENT_M,
     })
 }
 
@@ -293,28 +298,32 @@ fn leg_duration_s(length_m: f32, most_mps: f32) -> f32 {
 }
 
 /// Numbers of the first and the last waypoint, both inclusive, of a lane that belong to the route.
-fn lane_part_of_route(lane: &Lane, route: &Route) -> (u32, u32) {
-    (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1)
+fn route_waypoints_on_lane(lane: &Lane, route: &Route) -> (u32, u32) {
+    (
+        lane.first_waypoint.max(route.lowest_waypoint),
+        (lane.first_waypoint + lane.waypoint_count).min(route.waypoint_end) - 1,
+    )
 }
 
 /// Heading of a vehicle on this route. A lane of one waypoint has no direction: on a route with
 /// such a lane the heading is fixed to the direction of the lanes, instead of following the path.
 fn heading_mode<const L: usize, const N: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     route: &Route,
     inputs: &FlightInputs<'_>,
 ) -> HeadingMode {
-    let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
+    let lanes = problem.tracks.lane_of(route.lowest_waypoint)
+        ..=problem.tracks.lane_of(route.waypoint_end - 1);
     let alone = |lane: usize| {
-        let lane = work.tracks.lanes().get(lane);
+        let lane = problem.tracks.lanes().get(lane);
         lane.is_some_and(
-            |lane| matches!(lane_part_of_route(lane, route), (begin, end) if begin == end),
+            |lane| matches!(route_waypoints_on_lane(lane, route), (begin, end) if begin == end),
         )
     };
-    let along = work.tracks.lane_direction();
+    let along = problem.tracks.lane_direction();
     match inputs.capture.heading_mode {
         HeadingMode::Ahead if lanes.into_iter().any(alone) => {
-            HeadingMode::Fixed(libm::atan2f(along.y, along.x))
+            HeadingMode::FixedEnuRad(libm::atan2f(along.y, along.x))
         }
         look => look,
     }
@@ -322,15 +331,17 @@ fn heading_mode<const L: usize, const N: usize>(
 
 /// The flight along a route, or along its first lanes if the whole route does not fit.
 fn route_flight<const L: usize, const N: usize, const W: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     route: &Route,
     inputs: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
-    let mut most = work.tracks.lane_of(route.end - 1) - work.tracks.lane_of(route.first) + 1;
+    let mut most = problem.tracks.lane_of(route.waypoint_end - 1)
+        - problem.tracks.lane_of(route.lowest_waypoint)
+        + 1;
     loop {
         let mut laid = 0;
-        let error = match partial_route_flight(work, route, inputs, pad, (most, &mut laid)) {
+        let error = match partial_route_flight(problem, route, inputs, pad, (most, &mut laid)) {
             Ok(flight) if flight.path.length_m() <= MAX_PATH_LENGTH_M => return Ok(flight),
             Ok(flight) => {
                 laid = (most as f32 * MAX_PATH_LENGTH_M / flight.path.length_m()) as usize;
@@ -349,75 +360,87 @@ fn route_flight<const L: usize, const N: usize, const W: usize>(
 /// The flight along the first `most` lanes of a route. `laid` becomes the number of lanes that had
 /// room, without the path home.
 fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     route: &Route,
     inputs: &FlightInputs<'_>,
     pad: &Pad,
     (most, laid): (usize, &mut usize),
 ) -> Result<Flight<W>, PathError> {
-    let vehicle = &work.vehicles[usize::from(route.vehicle)];
-    let CaptureSettings { waypoint_m, trigger, .. } = inputs.capture;
-    let look = heading_mode(work, route, inputs);
+    let vehicle = &problem.vehicles[usize::from(route.vehicle_index)];
+    let CaptureSettings { max_picture_spacing_m: waypoint_m, trigger, .. } = inputs.capture;
+    let look = heading_mode(problem, route, inputs);
     let done = inputs
         .photographed
         .iter()
         .map(|range| range.end - range.first)
         .fold(0, u32::saturating_add);
-    let area = work.tracks.waypoint_count().saturating_add(done);
+    let area = problem.tracks.waypoint_count().saturating_add(done);
     let backward = route.direction == RouteDirection::Backward;
     let order = if backward { WaypointOrder::Falling } else { WaypointOrder::Rising };
-    let mut photographs = PicturePlan::new(waypoint_m, look, trigger).with_area(area, order);
-    let mission_m = work.heights.mission_m;
-    let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
-    let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);
-    let mut draft =
-        FlightPathBuilder::new(work.transit, inputs.clearance_m, inputs.following, pad.start);
-    draft.add_straight_leg(pad.start)?;
-    draft.add_straight_leg(point_at_height(&vehicle.place, layer_m))?;
-    draft.add_legs_around_zones(&place(route.end_waypoints().0)?, layer_m)?;
-    let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
+    let mut photographs =
+        PicturePlan::new(waypoint_m, look, trigger).with_area_waypoints(area, order);
+    let max_picture_height_m = problem.heights.max_picture_height_m;
+    let layer_z_m = max_picture_height_m + f32::from(route.layer) * problem.heights.layer_spacing_m;
+    let place = |number: u32| problem.tracks.waypoint(number).ok_or(PathError::NotFinite);
+    let mut draft = FlightPathBuilder::new(
+        problem.transit,
+        inputs.assumed_clearance_m,
+        inputs.following,
+        pad.path_start,
+    );
+    draft.add_straight_leg(pad.path_start)?;
+    draft.add_straight_leg(point_at_height(&vehicle.transit_start, layer_z_m))?;
+    draft.add_legs_around_zones(&place(route.first_and_last().0)?, layer_z_m)?;
+    let lanes = problem.tracks.lane_of(route.lowest_waypoint)
+        ..=problem.tracks.lane_of(route.waypoint_end - 1);
     let (low, high) = (*lanes.start(), *lanes.end());
     photographs.is_first_part = most <= high - low;
     for lane in lanes.take(most) {
         let lane = if backward { high - (lane - low) } else { lane };
-        let Some(lane) = work.tracks.lanes().get(lane) else { continue };
-        let (begin, end) = lane_part_of_route(lane, route);
+        let Some(lane) = problem.tracks.lanes().get(lane) else { continue };
+        let (begin, end) = route_waypoints_on_lane(lane, route);
         let first = divide::original_waypoint_number(inputs.photographed, begin);
         let waypoints = WaypointRange { first, end: first.saturating_add(end + 1 - begin) };
         let (begin, end) = if backward { (end, begin) } else { (begin, end) };
         let (begin, end) = (place(begin)?, place(end)?);
         let from = match *laid {
-            0 => draft.descend_to_lane(&end, mission_m)?,
-            _ => draft.add_picture_legs_around_zones(&begin, mission_m)?,
+            0 => draft.descend_to_lane(&end, max_picture_height_m)?,
+            _ => draft.add_picture_legs_around_zones(&begin, max_picture_height_m)?,
         };
-        let to = draft.add_picture_leg(&end, mission_m)?;
+        let to = draft.add_picture_leg(&end, max_picture_height_m)?;
         photographs.add_stretch(from, to, waypoints)?;
         *laid += 1;
     }
-    finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, inputs, pad)
+    finish_with_return(draft, &ReturnInputs { layer_z_m, vehicle, photographs }, inputs, pad)
 }
 
 /// The flight home of a vehicle in the air without a route; it takes no pictures.
 fn flight_home<const L: usize, const N: usize, const W: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     layer: u8,
     vehicle: &Vehicle,
     inputs: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
-    let CaptureSettings { waypoint_m, heading_mode: look, trigger } = inputs.capture;
-    let layer_m = work.heights.mission_m + f32::from(layer) * work.heights.layer_m;
-    let mut draft =
-        FlightPathBuilder::new(work.transit, inputs.clearance_m, inputs.following, pad.start);
-    draft.add_straight_leg(pad.start)?;
+    let CaptureSettings { max_picture_spacing_m: waypoint_m, heading_mode: look, trigger } =
+        inputs.capture;
+    let layer_z_m =
+        problem.heights.max_picture_height_m + f32::from(layer) * problem.heights.layer_spacing_m;
+    let mut draft = FlightPathBuilder::new(
+        problem.transit,
+        inputs.assumed_clearance_m,
+        inputs.following,
+        pad.path_start,
+    );
+    draft.add_straight_leg(pad.path_start)?;
     let photographs = PicturePlan::new(waypoint_m, look, trigger);
-    finish_with_return(draft, &ReturnInputs { layer_m, vehicle, photographs }, inputs, pad)
+    finish_with_return(draft, &ReturnInputs { layer_z_m, vehicle, photographs }, inputs, pad)
 }
 
 /// Inputs for the end of a flight, from the last lane to home.
 struct ReturnInputs<'a> {
     /// Height of the transit layer, metres up in the mission frame.
-    layer_m: f32,
+    layer_z_m: f32,
     vehicle: &'a Vehicle,
     /// The pictures of the whole flight.
     photographs: PicturePlan,
@@ -430,10 +453,10 @@ fn finish_with_return<const N: usize, const W: usize>(
     inputs: &FlightInputs<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
-    let ReturnInputs { layer_m, vehicle, .. } = *way_home;
-    draft.add_straight_leg(point_at_height(&draft.here.xy(), layer_m))?;
-    draft.add_legs_around_zones(&vehicle.home, layer_m)?;
-    draft.add_straight_leg(point_at_height(&vehicle.home, pad.end_z_m))?;
+    let ReturnInputs { layer_z_m, vehicle, .. } = *way_home;
+    draft.add_straight_leg(point_at_height(&draft.here.xy(), layer_z_m))?;
+    draft.add_legs_around_zones(&vehicle.home, layer_z_m)?;
+    draft.add_straight_leg(point_at_height(&vehicle.home, pad.path_end_z_m))?;
     let seconds = |from: &Point, to: &Point| {
         let (way_m, up_m) = ((to - from).xy().length(), to.z - from.z);
         let z_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
@@ -441,13 +464,13 @@ fn finish_with_return<const N: usize, const W: usize>(
     };
     draft.path.set_times_by_leg(pad.climb_m / inputs.schedule.vertical_mps, seconds);
     let mut flight = Flight {
-        id: pad.id,
+        vehicle_id: pad.vehicle_id,
         task: Task::Photograph(way_home.photographs),
         path: draft.path,
         climb_m: pad.climb_m,
         descent_m: pad.descent_m,
         depart_s: 0.0,
-        segment_m: MAX_TIMED_SEGMENT_M,
+        max_segment_m: DEFAULT_MAX_SEGMENT_M,
     };
     flight.choose_segment_length();
     Ok(flight)

@@ -44,9 +44,9 @@ pub struct Spacing {
     /// The rectangle of ground that one image shows.
     pub footprint: Footprint,
     /// Greatest distance between neighbouring lanes, metres.
-    pub lane_m: f32,
+    pub max_lane_spacing_m: f32,
     /// Greatest distance between neighbouring waypoints of a lane, metres.
-    pub waypoint_m: f32,
+    pub max_waypoint_spacing_m: f32,
 }
 
 impl Camera {
@@ -133,14 +133,14 @@ impl Spacing {
         let sides = [
             ("footprint", self.footprint.along_m),
             ("footprint", self.footprint.across_m),
-            ("lane_m", self.lane_m),
-            ("waypoint_m", self.waypoint_m),
+            ("lane_m", self.max_lane_spacing_m),
+            ("waypoint_m", self.max_waypoint_spacing_m),
         ];
-        crate::all_positive(&sides).map_err(|error| CoverageError::SettingOutOfRange(error.0))?;
+        crate::check_positive(&sides).map_err(|error| CoverageError::SettingOutOfRange(error.0))?;
         // Spacings that were computed from the footprint may exceed it by a rounding.
         let beyond = |spacing: f32, side: f32| spacing > side * (1.0 + 1e-5);
-        if beyond(self.lane_m, self.footprint.across_m)
-            || beyond(self.waypoint_m, self.footprint.along_m)
+        if beyond(self.max_lane_spacing_m, self.footprint.across_m)
+            || beyond(self.max_waypoint_spacing_m, self.footprint.along_m)
         {
             return Err(CoverageError::Gaps);
         }

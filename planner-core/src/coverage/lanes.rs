@@ -5,7 +5,7 @@ use heapless::Vec;
 use libm::{ceilf, fmaxf};
 
 use super::footprint::Spacing;
-use super::transit::Transit;
+use super::transit::TransitGraph;
 use super::{CoverageError, Flat};
 
 /// Most waypoints of an area: up to here f32 counts exactly.
@@ -19,12 +19,12 @@ pub struct LanePattern {
     pub spacing: Spacing,
     /// Direction of the lanes, degrees counter-clockwise from east; `None` chooses the direction
     /// across which the area is least wide.
-    pub angle_deg: Option<f32>,
+    pub angle_from_east_deg: Option<f32>,
     /// Distance by which lanes begin before and end beyond the area's border, metres.
-    pub margin_m: f32,
+    pub border_overshoot_m: f32,
     /// Most changes of the lanes' order that the local search tries; only few of them compute a
     /// distance around zones.
-    pub search_steps: u32,
+    pub max_search_steps: u32,
 }
 
 /// One lane. Its waypoint `k` lies at the fraction `k / (count − 1)` of the way from `from` to
@@ -37,12 +37,12 @@ pub struct Lane {
     pub to: Flat,
     /// Number of the lane's first waypoint along the whole path. While lanes are being ordered: the
     /// number of the lane's cell.
-    pub first: u32,
+    pub first_waypoint: u32,
     /// Number of waypoints on the lane, at least 1.
-    pub count: u32,
+    pub waypoint_count: u32,
     /// Length of the path from its beginning to this lane, metres. While lanes are being ordered:
     /// length of the link to the next lane.
-    pub start_m: f32,
+    pub start_along_m: f32,
     /// Index of the strip in which the lane lies.
     pub strip: u16,
 }
@@ -55,7 +55,7 @@ impl Lane {
 
     /// Waypoint `k` of the lane, counted from 0; the last one for a larger `k`.
     pub fn waypoint(&self, k: u32) -> Flat {
-        if self.count < 2 {
+        if self.waypoint_count < 2 {
             self.from
         } else {
             self.from + (self.to - self.from) * self.fraction_at(k)
@@ -63,7 +63,30 @@ impl Lane {
     }
 
     fn fraction_at(&self, k: u32) -> f32 {
-        if self.count < 2 { 0.0 } else { k.min(self.count - 1) as f32 / (self.count - 1) as f32 }
+        if self.waypoint_count < 2 {
+            0.0
+        } else {
+            k.min(self.waypoint_count - 1) as f32 / (self.waypoint_count - 1) as f32
+        }
+    }
+
+    /// While lanes are being ordered: the number of the lane's cell, kept in `first_waypoint`.
+    pub(super) fn cell(&self) -> u32 {
+        self.first_waypoint
+    }
+
+    pub(super) fn set_cell(&mut self, cell: u32) {
+        self.first_waypoint = cell;
+    }
+
+    /// While lanes are being ordered: length of the link to the next lane, metres, kept in
+    /// `start_along_m`.
+    pub(super) fn link_to_next_m(&self) -> f32 {
+        self.start_along_m
+    }
+
+    pub(super) fn set_link_to_next_m(&mut self, link_m: f32) {
+        self.start_along_m = link_m;
     }
 
     /// Reverses the direction of the lane.
@@ -76,18 +99,18 @@ impl Lane {
 #[derive(Clone, Debug, Default)]
 pub struct Tracks<const L: usize> {
     pub(super) lanes: Vec<Lane, L>,
-    pub(super) along: Flat,
+    pub(super) lane_direction: Flat,
 }
 
 impl<const L: usize> Tracks<L> {
     /// Creates an empty path, without lanes: all zeros.
     pub const fn new() -> Self {
-        Self { lanes: Vec::new(), along: Flat::new(0.0, 0.0) }
+        Self { lanes: Vec::new(), lane_direction: Flat::new(0.0, 0.0) }
     }
 
     /// Unit vector along the lanes, east and north; 0 if there are no lanes.
     pub fn lane_direction(&self) -> Flat {
-        self.along
+        self.lane_direction
     }
 
     /// The lanes in the order of the path.
@@ -97,30 +120,30 @@ impl<const L: usize> Tracks<L> {
 
     /// Number of waypoints of all lanes.
     pub fn waypoint_count(&self) -> u32 {
-        self.lanes.last().map_or(0, |lane| lane.first + lane.count)
+        self.lanes.last().map_or(0, |lane| lane.first_waypoint + lane.waypoint_count)
     }
 
     /// Length of the path along all lanes, transits included, metres.
     pub fn length_m(&self) -> f32 {
-        self.lanes.last().map_or(0.0, |lane| lane.start_m + lane.length_m())
+        self.lanes.last().map_or(0.0, |lane| lane.start_along_m + lane.length_m())
     }
 
     /// Index of the lane of a waypoint, given by its number; the last lane for a larger number.
     pub fn lane_of(&self, waypoint: u32) -> usize {
-        self.lanes.partition_point(|lane| lane.first <= waypoint).saturating_sub(1)
+        self.lanes.partition_point(|lane| lane.first_waypoint <= waypoint).saturating_sub(1)
     }
 
     /// Position of a waypoint, east and north; `None` if there is no such number.
     pub fn waypoint(&self, number: u32) -> Option<Flat> {
         let lane = self.lanes.get(self.lane_of(number))?;
-        let k = number.checked_sub(lane.first).filter(|k| *k < lane.count)?;
+        let k = number.checked_sub(lane.first_waypoint).filter(|k| *k < lane.waypoint_count)?;
         Some(lane.waypoint(k))
     }
 
     /// Length of the path up to a waypoint, metres; up to the last one for a larger number.
     pub fn distance_to_waypoint_m(&self, number: u32) -> f32 {
         let Some(lane) = self.lanes.get(self.lane_of(number)) else { return 0.0 };
-        lane.start_m + lane.length_m() * lane.fraction_at(number - lane.first)
+        lane.start_along_m + lane.length_m() * lane.fraction_at(number - lane.first_waypoint)
     }
 
     /// Sets the number of waypoints of each lane by the spacing, numbers them, and computes lengths
@@ -128,14 +151,14 @@ impl<const L: usize> Tracks<L> {
     pub(super) fn space_waypoints<const N: usize>(
         &mut self,
         spacing: &Spacing,
-        transit: &Transit<'_, N>,
+        transit: &TransitGraph<'_, N>,
     ) -> Result<(), CoverageError> {
         for lane in &mut self.lanes {
-            let steps = ceilf(lane.length_m() / spacing.waypoint_m - 1e-3);
+            let steps = ceilf(lane.length_m() / spacing.max_waypoint_spacing_m - 1e-3);
             if steps > MAX_WAYPOINTS {
                 return Err(CoverageError::SettingOutOfRange("waypoint_m"));
             }
-            lane.count = if lane.length_m() < super::area::SAME_VERTEX_M {
+            lane.waypoint_count = if lane.length_m() < super::area::SAME_VERTEX_M {
                 1
             } else {
                 fmaxf(steps, 1.0) as u32 + 1
@@ -147,7 +170,7 @@ impl<const L: usize> Tracks<L> {
     /// Numbers the waypoints that each lane already has, and computes lengths along the path.
     pub(super) fn number_and_measure<const N: usize>(
         &mut self,
-        transit: &Transit<'_, N>,
+        transit: &TransitGraph<'_, N>,
     ) -> Result<(), CoverageError> {
         let (mut first, mut start_m) = (0, 0.0);
         let mut before: Option<Flat> = None;
@@ -155,8 +178,8 @@ impl<const L: usize> Tracks<L> {
             if let Some(before) = before {
                 start_m += transit.distance_m(&before, &lane.from);
             }
-            (lane.first, lane.start_m) = (first, start_m);
-            first += lane.count;
+            (lane.first_waypoint, lane.start_along_m) = (first, start_m);
+            first += lane.waypoint_count;
             if first as f32 > MAX_WAYPOINTS {
                 return Err(CoverageError::SettingOutOfRange("waypoint_m"));
             }

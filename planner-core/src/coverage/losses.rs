@@ -11,8 +11,8 @@ use heapless::Vec;
 use super::divide;
 use super::flights::{self, FlightInputs, Pad};
 use super::lanes::Tracks;
-use super::pack::{self, PackWorkspace, Route, RoutePlan, Vehicle, Work};
-use super::transit::Transit;
+use super::pack::{self, CoverageProblem, PackWorkspace, Route, RoutePlan, Vehicle};
+use super::transit::TransitGraph;
 use super::{CoverageError, Flat};
 use crate::flight::{Task, WaypointRange, WaypointSet};
 use crate::plan::{PlanError, SwarmPlan};
@@ -27,12 +27,12 @@ const MAX_ROUTE_ROTATIONS: usize = 3;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VehicleStatus {
     /// Whether the vehicle continues, and gets a part of the remaining lanes.
-    pub alive: bool,
+    pub continues: bool,
     /// Arc length of the vehicle's path up to which its pictures count as taken or promised,
     /// metres. A vehicle that continues holds there; at 0 it is still on its pad. If it does not
     /// continue, its last picture is taken again, since that picture may be missing. Infinite if it
     /// took all its pictures.
-    pub along_m: f32,
+    pub photographed_to_m: f32,
 }
 
 /// Memory of divisions, for areas of at most `L` lanes and fleets of at most `K` vehicles.
@@ -41,9 +41,9 @@ pub struct LossesWorkspace<const L: usize, const K: usize> {
     remaining: Tracks<L>,
     vehicles: Vec<Vehicle, K>,
     pads: Vec<Pad, K>,
-    rest: RoutePlan<K>,
+    survivor_routes: RoutePlan<K>,
     /// Transit layers of lost vehicles, which may be flying home in them: bit `i` is layer `i`.
-    held_layers: u64,
+    occupied_layers: u64,
 }
 
 impl<const L: usize, const K: usize> LossesWorkspace<L, K> {
@@ -54,8 +54,8 @@ impl<const L: usize, const K: usize> LossesWorkspace<L, K> {
             remaining: Tracks::new(),
             vehicles: Vec::new(),
             pads: Vec::new(),
-            rest: RoutePlan::new(),
-            held_layers: 0,
+            survivor_routes: RoutePlan::new(),
+            occupied_layers: 0,
         }
     }
 
@@ -68,11 +68,11 @@ impl<const L: usize, const K: usize> LossesWorkspace<L, K> {
     pub fn reset_with_done<'a, const N: usize>(
         &'a mut self,
         tracks: &'a Tracks<L>,
-        transit: &Transit<'_, N>,
+        transit: &TransitGraph<'_, N>,
         done: &[WaypointRange],
     ) -> Result<(&'a Tracks<L>, &'a [WaypointRange]), CoverageError> {
         self.done.clear();
-        self.held_layers = 0;
+        self.occupied_layers = 0;
         let all = tracks.waypoint_count();
         for range in done {
             let range = WaypointRange { first: range.first, end: range.end.min(all) };
@@ -105,10 +105,10 @@ impl<const L: usize, const K: usize> Default for LossesWorkspace<L, K> {
 #[derive(Clone, Copy)]
 pub struct Loss<'a, const L: usize, const N: usize> {
     /// The lanes of the whole area and all vehicles, as before any loss.
-    pub work: &'a Work<'a, L, N>,
+    pub problem: &'a CoverageProblem<'a, L, N>,
     /// Pads and settings with which the flights before the loss were planned.
     pub flight_inputs: &'a FlightInputs<'a>,
-    /// Status of each vehicle, in the order of [`Work::vehicles`].
+    /// Status of each vehicle, in the order of [`CoverageProblem::vehicles`].
     pub statuses: &'a [VehicleStatus],
 }
 
@@ -156,43 +156,50 @@ pub fn redivide_work<
     routes: &mut RoutePlan<K>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), LossesError> {
-    let Loss { work, flight_inputs, statuses } = *loss;
-    let known = |route: &Route| usize::from(route.vehicle) < statuses.len();
-    if statuses.len() != work.vehicles.len()
+    let Loss { problem, flight_inputs, statuses } = *loss;
+    let known = |route: &Route| usize::from(route.vehicle_index) < statuses.len();
+    if statuses.len() != problem.vehicles.len()
         || flight_inputs.pads.len() != statuses.len()
         || out.flights.len() != statuses.len()
         || !routes.routes.iter().all(known)
     {
         return Err(CoverageError::Vehicles.into());
     }
-    if !statuses.iter().all(|fate| fate.along_m >= 0.0) {
+    if !statuses.iter().all(|fate| fate.photographed_to_m >= 0.0) {
         return Err(CoverageError::SettingOutOfRange("along_m").into());
     }
     add_done_waypoints(statuses, ws, out)?;
     set_start_places(loss, ws, out)?;
-    for route in routes.routes.iter().filter(|route| !statuses[usize::from(route.vehicle)].alive) {
-        ws.held_layers |= layer_bit(route.layer);
+    for route in
+        routes.routes.iter().filter(|route| !statuses[usize::from(route.vehicle_index)].continues)
+    {
+        ws.occupied_layers |= layer_bit(route.layer);
     }
     routes.routes.clear();
-    match divide::remaining_lanes(work.tracks, ws.done.ranges(), work.transit, &mut ws.remaining) {
-        Ok(()) => divide_among_survivors(work, statuses, ws, pack, routes)?,
+    match divide::remaining_lanes(
+        problem.tracks,
+        ws.done.ranges(),
+        problem.transit,
+        &mut ws.remaining,
+    ) {
+        Ok(()) => divide_among_survivors(problem, statuses, ws, pack, routes)?,
         Err(CoverageError::NothingToCover) => {}
         Err(error) => return Err(error.into()),
     }
-    let work = Work { tracks: &ws.remaining, vehicles: &ws.vehicles, ..*work };
+    let problem = CoverageProblem { tracks: &ws.remaining, vehicles: &ws.vehicles, ..*problem };
     let flight_inputs = FlightInputs {
         pads: &ws.pads,
         photographed: ws.done.ranges(),
-        held_layers: ws.held_layers,
+        occupied_layers: ws.occupied_layers,
         ..*flight_inputs
     };
     let mut exchanges = routes.routes.len().min(MAX_ROUTE_ROTATIONS + 1);
     loop {
         exchanges = exchanges.saturating_sub(1);
-        match flights::plan_flights(&work, routes, &flight_inputs, schedule, out) {
+        match flights::plan_flights(&problem, routes, &flight_inputs, schedule, out) {
             // Two vehicles that hold close to each other may each bar the other's path.
             Err(PlanError::Schedule(_, ScheduleError::Blocked)) if exchanges > 0 => {
-                rotate_routes(&work, routes)?;
+                rotate_routes(&problem, routes)?;
             }
             done => return Ok(done?),
         }
@@ -201,25 +208,27 @@ pub fn redivide_work<
 
 /// Gives each route the vehicle of the next one, and the last that of the first.
 fn rotate_routes<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     routes: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
-    let Some(mut vehicle) = routes.routes.first().map(|route| route.vehicle) else { return Ok(()) };
+    let Some(mut vehicle) = routes.routes.first().map(|route| route.vehicle_index) else {
+        return Ok(());
+    };
     for route in routes.routes.iter_mut().rev() {
-        core::mem::swap(&mut route.vehicle, &mut vehicle);
-        (route.ground_m, route.direction) = work.ground_distance_m(
-            &work.vehicles[usize::from(route.vehicle)],
-            &work.route_ends(route.first, route.end),
+        core::mem::swap(&mut route.vehicle_index, &mut vehicle);
+        (route.ground_length_m, route.direction) = problem.ground_length_and_direction(
+            &problem.vehicles[usize::from(route.vehicle_index)],
+            &problem.route_ends(route.lowest_waypoint, route.waypoint_end),
         );
-        if !route.ground_m.is_finite() {
+        if !route.ground_length_m.is_finite() {
             return Err(CoverageError::Unreachable);
         }
     }
-    pack::set_costs(work, routes);
+    pack::set_costs(problem, routes);
     Ok(())
 }
 
-/// The bit of a transit layer in `held_layers`.
+/// The bit of a transit layer in `occupied_layers`.
 const fn layer_bit(layer: u8) -> u64 {
     1u64.wrapping_shl(layer as u32)
 }
@@ -232,8 +241,8 @@ fn add_done_waypoints<const L: usize, const K: usize, const V: usize, const W: u
 ) -> Result<(), CoverageError> {
     for (fate, flight) in statuses.iter().zip(&before.flights) {
         let Task::Photograph(photographs) = &flight.task else { continue };
-        let taken = photographs.taken_count(&flight.path, fate.along_m);
-        let sure = fate.alive || fate.along_m.is_infinite();
+        let taken = photographs.taken_count(&flight.path, fate.photographed_to_m);
+        let sure = fate.continues || fate.photographed_to_m.is_infinite();
         let count = if sure { taken } else { taken.saturating_sub(1) };
         for range in
             photographs.waypoints_of_pictures(&flight.path, WaypointRange { first: 0, end: count })
@@ -256,18 +265,20 @@ fn set_start_places<
     ws: &mut LossesWorkspace<L, K>,
     before: &SwarmPlan<V, W>,
 ) -> Result<(), CoverageError> {
-    let Loss { work, flight_inputs, statuses } = *loss;
+    let Loss { problem, flight_inputs, statuses } = *loss;
     ws.vehicles.clear();
     ws.pads.clear();
-    for (index, (vehicle, pad)) in work.vehicles.iter().zip(flight_inputs.pads).enumerate() {
+    for (index, (vehicle, pad)) in problem.vehicles.iter().zip(flight_inputs.pads).enumerate() {
         let (mut vehicle, mut pad) = (*vehicle, *pad);
         let (fate, flight) = (&statuses[index], &before.flights[index]);
-        pad.airborne =
-            fate.alive && (fate.along_m > 0.0 || flight.climb_m == 0.0) && flight.task.leaves_pad();
+        pad.airborne = fate.continues
+            && (fate.photographed_to_m > 0.0 || flight.climb_m == 0.0)
+            && flight.task.leaves_pad();
         if pad.airborne {
-            pad.start = flight.path.point_at(fate.along_m).ok_or(CoverageError::Vehicles)?;
+            pad.path_start =
+                flight.path.point_at(fate.photographed_to_m).ok_or(CoverageError::Vehicles)?;
             pad.climb_m = 0.0;
-            vehicle.place = Flat::new(pad.start.x, pad.start.y);
+            vehicle.transit_start = Flat::new(pad.path_start.x, pad.path_start.y);
         }
         ws.vehicles.push(vehicle).map_err(|_| CoverageError::Vehicles)?;
         ws.pads.push(pad).map_err(|_| CoverageError::Vehicles)?;
@@ -277,29 +288,30 @@ fn set_start_places<
 
 /// Divides the remaining lanes among the vehicles that continue.
 fn divide_among_survivors<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     statuses: &[VehicleStatus],
     ws: &mut LossesWorkspace<L, K>,
     pack: &mut PackWorkspace<K>,
     routes: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
     let living =
-        || statuses.iter().enumerate().filter(|(_, fate)| fate.alive).map(|(index, _)| index);
+        || statuses.iter().enumerate().filter(|(_, fate)| fate.continues).map(|(index, _)| index);
     let mut survivors: Vec<Vehicle, K> = living().map(|index| ws.vehicles[index]).collect();
     if survivors.iter().all(|vehicle| vehicle.weight == 0.0) {
         survivors.iter_mut().for_each(|vehicle| vehicle.weight = 1.0);
     }
     pack::binpat(
-        &Work { tracks: &ws.remaining, vehicles: &survivors, ..*work },
+        &CoverageProblem { tracks: &ws.remaining, vehicles: &survivors, ..*problem },
         pack,
-        &mut ws.rest,
+        &mut ws.survivor_routes,
     )?;
-    for route in &ws.rest.routes {
-        let vehicle = living().nth(usize::from(route.vehicle)).ok_or(CoverageError::Vehicles)?;
-        let layer =
-            flights::free_layers(ws.held_layers).nth(usize::from(route.layer).saturating_sub(1));
+    for route in &ws.survivor_routes.routes {
+        let vehicle =
+            living().nth(usize::from(route.vehicle_index)).ok_or(CoverageError::Vehicles)?;
+        let layer = flights::free_layers(ws.occupied_layers)
+            .nth(usize::from(route.layer).saturating_sub(1));
         let layer = layer.ok_or(CoverageError::Vehicles)?;
-        let route = Route { vehicle: vehicle as u8, layer, ..*route };
+        let route = Route { vehicle_index: vehicle as u8, layer, ..*route };
         routes.routes.push(route).map_err(|_| CoverageError::Vehicles)?;
     }
     Ok(())

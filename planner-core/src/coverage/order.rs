@@ -14,13 +14,13 @@
 use super::Flat;
 use super::cells::{is_cell_boundary, order_cells};
 use super::lanes::Lane;
-use super::transit::Transit;
+use super::transit::TransitGraph;
 use crate::Length;
 
 /// Least shortening of the path that counts, metres: a smaller one may be rounding.
 const MIN_GAIN_M: f32 = 1e-3;
 /// Most lanes that Or-opt moves together; in the first search these are whole cells.
-const MAX_MOVED: usize = 10;
+const MAX_MOVED_LANES: usize = 10;
 
 /// Sorts lanes into the order, and turns them in the directions, in which they are flown. The first
 /// `strips` of them run along the middle of strips, in the order of the strips, grouped into cells.
@@ -28,11 +28,11 @@ const MAX_MOVED: usize = 10;
 pub(super) fn order_lanes<const N: usize>(
     lanes: &mut [Lane],
     strips: usize,
-    transit: &Transit<'_, N>,
+    transit: &TransitGraph<'_, N>,
     search_steps: u32,
 ) {
     if lanes.windows(2).all(|pair| pair[0].strip < pair[1].strip) {
-        let first = usize::from(!is_first_lane_reversed(lanes));
+        let first = usize::from(!is_shorter_with_first_reversed(lanes));
         for lane in lanes.iter_mut().skip(first).step_by(2) {
             lane.reverse();
         }
@@ -45,14 +45,14 @@ pub(super) fn order_lanes<const N: usize>(
     (strips..lanes.len()).for_each(|k| search.insert_last(&mut lanes[..=k]));
     // From here on each lane is moved by itself: it is a cell of its own.
     for (lane, k) in lanes.iter_mut().zip(0..) {
-        lane.first = k;
+        lane.set_cell(k);
     }
     search.shorten(lanes);
 }
 
 /// Whether lanes in consecutive strips, flown back and forth, have shorter links if the first one
 /// is reversed.
-fn is_first_lane_reversed(lanes: &[Lane]) -> bool {
+fn is_shorter_with_first_reversed(lanes: &[Lane]) -> bool {
     let mut gain_m = 0.0;
     for (i, pair) in lanes.windows(2).enumerate() {
         let longer_m = (pair[1].to - pair[0].to).length() - (pair[1].from - pair[0].from).length();
@@ -61,10 +61,9 @@ fn is_first_lane_reversed(lanes: &[Lane]) -> bool {
     gain_m > MIN_GAIN_M
 }
 
-/// Local search over orders. During the search `start_m` of a lane is the length of the link from
-/// it to the next lane.
+/// Local search over orders, with the lengths of links in the lanes ([`Lane::link_to_next_m`]).
 struct LaneOrderSearch<'t, 'a, const N: usize> {
-    transit: &'t Transit<'a, N>,
+    transit: &'t TransitGraph<'a, N>,
     steps_left: u32,
 }
 
@@ -96,7 +95,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
     fn measure_links(&self, lanes: &mut [Lane], to: &[usize]) {
         for &k in to.iter().filter(|k| **k > 0) {
             let next = lanes.get(k).map(|lane| lane.from);
-            lanes[k - 1].start_m = self.transit_length_m(Some(lanes[k - 1].to), next);
+            let link_m = self.transit_length_m(Some(lanes[k - 1].to), next);
+            lanes[k - 1].set_link_to_next_m(link_m);
         }
     }
 
@@ -112,7 +112,7 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
                 if !self.take_search_step() {
                     return false;
                 }
-                let old = link_before_m(lanes, i) + lanes[j].start_m;
+                let old = link_before_m(lanes, i) + lanes[j].link_to_next_m();
                 let before = i.checked_sub(1).map(|k| lanes[k].to);
                 let after = lanes.get(j + 1).map(|lane| lane.from);
                 let (from, to) = (lanes[i].from, lanes[j].to);
@@ -134,13 +134,13 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         gained
     }
 
-    /// Or-opt: moves up to [`MAX_MOVED`] consecutive lanes, in the first search whole cells, as
-    /// they are or reversed, where that shortens the path. Returns whether any were moved; false
+    /// Or-opt: moves up to [`MAX_MOVED_LANES`] consecutive lanes, in the first search whole cells,
+    /// as they are or reversed, where that shortens the path. Returns whether any were moved; false
     /// when the search steps are used up.
     fn or_opt(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         let count = lanes.len();
-        for len in 1..=MAX_MOVED.min(count.saturating_sub(1)) {
+        for len in 1..=MAX_MOVED_LANES.min(count.saturating_sub(1)) {
             for i in 0..=count - len {
                 if !is_cell_boundary(lanes, i) || !is_cell_boundary(lanes, i + len) {
                     continue;
@@ -172,12 +172,12 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
     fn best_insertion(&mut self, lanes: &[Lane], i: usize, len: usize) -> Option<(usize, bool)> {
         let before = i.checked_sub(1).map(|k| lanes[k].to);
         let after = lanes.get(i + len).map(|lane| lane.from);
-        let links_m = link_before_m(lanes, i) + lanes[i + len - 1].start_m;
+        let links_m = link_before_m(lanes, i) + lanes[i + len - 1].link_to_next_m();
         if links_m - before.map_or(0.0, |before| straight_distance_m(after, before)) <= MIN_GAIN_M {
             return None;
         }
         let mut best = Insertion {
-            more_m: links_m - self.transit_length_m(before, after) - MIN_GAIN_M,
+            added_length_m: links_m - self.transit_length_m(before, after) - MIN_GAIN_M,
             at: None,
         };
         for place in (0..i).chain(i + len + 1..=lanes.len()).filter(|k| is_cell_boundary(lanes, *k))
@@ -193,8 +193,8 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
     /// Inserts the last lane where it lengthens the path least.
     fn insert_last(&self, lanes: &mut [Lane]) {
         let Some((last, others)) = lanes.split_last_mut() else { return };
-        last.start_m = 0.0;
-        let mut best = Insertion { more_m: f32::INFINITY, at: None };
+        last.set_link_to_next_m(0.0);
+        let mut best = Insertion { added_length_m: f32::INFINITY, at: None };
         (0..=others.len())
             .for_each(|place| self.try_insertion(others, place, [last.from, last.to], &mut best));
         let Some((place, turned)) = best.at else { return };
@@ -220,15 +220,15 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
         let gap = link_before_m(lanes, place);
         for (first, last, turned) in [(from, to, false), (to, from, true)] {
             if straight_distance_m(left, first) + straight_distance_m(right, last) - gap
-                >= best.more_m
+                >= best.added_length_m
             {
                 continue;
             }
             let more_m = self.transit_length_m(left, Some(first))
                 + self.transit_length_m(Some(last), right)
                 - gap;
-            if more_m < best.more_m {
-                *best = Insertion { more_m, at: Some((place, turned)) };
+            if more_m < best.added_length_m {
+                *best = Insertion { added_length_m: more_m, at: Some((place, turned)) };
             }
         }
     }
@@ -237,13 +237,13 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
 /// The best insertion so far: by how much it lengthens the path, before which lane, and whether the
 /// inserted lanes are reversed.
 struct Insertion {
-    more_m: f32,
+    added_length_m: f32,
     at: Option<(usize, bool)>,
 }
 
 /// Length of the link to lane `k` from the one before it, metres; 0 for the first lane.
 fn link_before_m(lanes: &[Lane], k: usize) -> f32 {
-    k.checked_sub(1).map_or(0.0, |before| lanes[before].start_m)
+    k.checked_sub(1).map_or(0.0, |before| lanes[before].link_to_next_m())
 }
 
 fn straight_distance_m(from: Option<Flat>, to: Flat) -> f32 {
@@ -255,7 +255,8 @@ fn reverse_lanes(lanes: &mut [Lane]) {
     lanes.reverse();
     // The link that led to a lane now leads from it.
     for k in 1..lanes.len() {
-        lanes[k - 1].start_m = lanes[k].start_m;
+        let link_m = lanes[k].link_to_next_m();
+        lanes[k - 1].set_link_to_next_m(link_m);
     }
     lanes.iter_mut().for_each(Lane::reverse);
 }

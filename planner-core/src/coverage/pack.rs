@@ -14,13 +14,15 @@
 //!
 //! Cost for K vehicles and n lanes: K · log n steps, K² transits, one assignment (K³).
 
+mod route_ends;
 mod sink;
 
 use heapless::Vec;
 use libm::fmaxf;
 
-use super::tracks::Tracks;
-use super::transit::Transit;
+use self::route_ends::RouteEnds;
+use super::tracks::{Lane, Tracks};
+use super::transit::TransitGraph;
 use super::{CoverageError, Flat};
 use crate::assignment::{AssignmentWorkspace, assign};
 use crate::map::field::follow::TerrainFollowing;
@@ -29,7 +31,7 @@ use crate::map::field::follow::TerrainFollowing;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
     /// Place where the vehicle begins its transit to the first waypoint, east and north.
-    pub place: Flat,
+    pub transit_start: Flat,
     /// Place where the vehicle's transit home ends, east and north.
     pub home: Flat,
     /// Cruise speed over ground, m/s.
@@ -48,9 +50,9 @@ pub struct Vehicle {
 pub struct Heights {
     /// h_m: height at which pictures are taken, metres above the ground from which vehicles take
     /// off.
-    pub mission_m: f32,
+    pub max_picture_height_m: f32,
     /// Vertical distance between neighbouring transit layers, metres.
-    pub layer_m: f32,
+    pub layer_spacing_m: f32,
 }
 
 /// What a track is: the smallest part of the path that goes to one vehicle as a whole.
@@ -71,41 +73,41 @@ pub enum RouteDirection {
     Backward,
 }
 
-/// The route of one vehicle: all waypoints with numbers `first` to `end` − 1.
+/// The route of one vehicle: all waypoints with numbers `lowest_waypoint` to `waypoint_end` − 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Route {
-    /// Index of the vehicle in [`Work::vehicles`].
-    pub vehicle: u8,
+    /// Index of the vehicle in [`CoverageProblem::vehicles`].
+    pub vehicle_index: u8,
     /// Lowest waypoint number of the route.
-    pub first: u32,
+    pub lowest_waypoint: u32,
     /// Highest waypoint number of the route plus one.
-    pub end: u32,
+    pub waypoint_end: u32,
     /// Direction in which the route is flown.
     pub direction: RouteDirection,
-    /// Transit layer, from 1: it is this many times [`Heights::layer_m`] above the height of
-    /// pictures.
+    /// Transit layer, from 1: it is this many times [`Heights::layer_spacing_m`] above the height
+    /// of pictures.
     pub layer: u8,
     /// Length over ground, metres: transit to the first waypoint, route, transit home.
-    pub ground_m: f32,
-    /// `ground_m` with climb and descent, metres.
+    pub ground_length_m: f32,
+    /// `ground_length_m` with climb and descent, metres.
     pub cost_m: f32,
-    /// C_k: `ground_m` at cruise speed, H_d, and the way down to and up from lower ground, seconds.
+    /// C_k: `ground_length_m` at cruise speed, H_d, extra descent and climb over terrain, seconds.
     pub cost_s: f32,
 }
 
 impl Route {
     /// Numbers of the first and the last waypoint in the direction of flight.
-    pub fn end_waypoints(&self) -> (u32, u32) {
-        let last = self.end.saturating_sub(1);
+    pub fn first_and_last(&self) -> (u32, u32) {
+        let last = self.waypoint_end.saturating_sub(1);
         match self.direction {
-            RouteDirection::Forward => (self.first, last),
-            RouteDirection::Backward => (last, self.first),
+            RouteDirection::Forward => (self.lowest_waypoint, last),
+            RouteDirection::Backward => (last, self.lowest_waypoint),
         }
     }
 
     /// Waypoint numbers in the order in which they are flown.
     pub fn waypoints(&self) -> impl Iterator<Item = u32> + use<> {
-        let Self { first, end, direction, .. } = *self;
+        let Self { lowest_waypoint: first, waypoint_end: end, direction, .. } = *self;
         (first..end).map(move |i| match direction {
             RouteDirection::Forward => i,
             RouteDirection::Backward => end - 1 - (i - first),
@@ -136,9 +138,9 @@ impl<const K: usize> RoutePlan<K> {
 /// Memory for packing with at most `K` vehicles.
 pub struct PackWorkspace<const K: usize> {
     transits_m: Vec<f32, 1024>,
-    columns: [Option<u16>; K],
+    assigned_vehicles: [Option<u16>; K],
     assignment: AssignmentWorkspace<K>,
-    ends: [u32; K],
+    bin_ends: [u32; K],
     pub(super) shares: [f32; K],
 }
 
@@ -148,9 +150,9 @@ impl<const K: usize> PackWorkspace<K> {
         assert!(K * K <= 1024, "the cost matrix has room for 32 vehicles");
         Self {
             transits_m: Vec::new(),
-            columns: [None; K],
+            assigned_vehicles: [None; K],
             assignment: AssignmentWorkspace::new(),
-            ends: [0; K],
+            bin_ends: [0; K],
             shares: [0.0; K],
         }
     }
@@ -170,11 +172,11 @@ impl<const K: usize> Default for PackWorkspace<K> {
 
 /// What is to be divided: the path, the transits around no-fly zones, vehicles and heights.
 #[derive(Clone, Copy)]
-pub struct Work<'a, const L: usize, const N: usize> {
+pub struct CoverageProblem<'a, const L: usize, const N: usize> {
     /// The lanes and the path along them.
     pub tracks: &'a Tracks<L>,
     /// Shortest paths around no-fly zones.
-    pub transit: &'a Transit<'a, N>,
+    pub transit: &'a TransitGraph<'a, N>,
     /// The vehicles among which the path is divided.
     pub vehicles: &'a [Vehicle],
     /// Heights of pictures and of transit layers.
@@ -185,7 +187,7 @@ pub struct Work<'a, const L: usize, const N: usize> {
     pub following: Option<TerrainFollowing<'a>>,
 }
 
-impl<const L: usize, const N: usize> Work<'_, L, N> {
+impl<const L: usize, const N: usize> CoverageProblem<'_, L, N> {
     /// Checks that all settings are in range.
     ///
     /// # Errors
@@ -199,20 +201,20 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         if self.tracks.lanes().is_empty() {
             return Err(CoverageError::NothingToCover);
         }
-        let heights = [("height_m", self.heights.mission_m), ("layer_m", self.heights.layer_m)];
-        crate::all_positive(&heights).map_err(|error| CoverageError::SettingOutOfRange(error.0))?;
+        let Heights { max_picture_height_m, layer_spacing_m } = self.heights;
+        let heights = [("height_m", max_picture_height_m), ("layer_m", layer_spacing_m)];
+        crate::check_positive(&heights).map_err(|e| CoverageError::SettingOutOfRange(e.0))?;
         for vehicle in self.vehicles {
             let speeds = [
                 ("cruise_mps", vehicle.cruise_mps),
                 ("climb_mps", vehicle.climb_mps),
                 ("descend_mps", vehicle.descend_mps),
             ];
-            crate::all_positive(&speeds)
-                .map_err(|error| CoverageError::SettingOutOfRange(error.0))?;
+            crate::check_positive(&speeds).map_err(|e| CoverageError::SettingOutOfRange(e.0))?;
             if !(vehicle.weight >= 0.0 && vehicle.weight.is_finite()) {
                 return Err(CoverageError::SettingOutOfRange("weight"));
             }
-            if !(vehicle.place.norm_squared() + vehicle.home.norm_squared()).is_finite() {
+            if !(vehicle.transit_start.norm_squared() + vehicle.home.norm_squared()).is_finite() {
                 return Err(CoverageError::SettingOutOfRange("place"));
             }
         }
@@ -224,7 +226,8 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
 
     /// H_d: time that a vehicle takes to climb to a layer and to descend from it, seconds.
     pub fn altitude_delay_s(&self, vehicle: &Vehicle, layer: u8) -> f32 {
-        let top_m = self.heights.mission_m + f32::from(layer) * self.heights.layer_m;
+        let top_m =
+            self.heights.max_picture_height_m + f32::from(layer) * self.heights.layer_spacing_m;
         top_m / vehicle.climb_mps + top_m / vehicle.descend_mps
     }
 
@@ -235,7 +238,7 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         RouteEnds {
             first: place(first),
             last: place(end - 1),
-            inside_m: self.tracks.distance_to_waypoint_m(end - 1)
+            between_m: self.tracks.distance_to_waypoint_m(end - 1)
                 - self.tracks.distance_to_waypoint_m(first),
         }
     }
@@ -243,80 +246,69 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
     /// Length over ground of a vehicle's flight along a route with these ends, metres, and the
     /// direction in which it takes less time.
     #[inline(never)]
-    pub(super) fn ground_distance_m(
+    pub(super) fn ground_length_and_direction(
         &self,
         vehicle: &Vehicle,
         ends: &RouteEnds,
     ) -> (f32, RouteDirection) {
         let transit_m = |from: &Flat, to: &Flat| {
-            self.transit.distance_m(&vehicle.place, from)
+            self.transit.distance_m(&vehicle.transit_start, from)
                 + self.transit.distance_m(to, &vehicle.home)
         };
         let forward = transit_m(&ends.first, &ends.last);
-        let backward = if vehicle.place == vehicle.home {
+        let backward = if vehicle.transit_start == vehicle.home {
             // If the vehicle starts and ends at one place, the transits are equal in both
             // directions.
             forward
         } else {
             transit_m(&ends.last, &ends.first)
         };
-        let (forward_s, backward_s) = self.sink_times_s(vehicle, ends);
+        let (forward_s, backward_s) = self.extra_vertical_times_s(vehicle, ends);
         match backward + backward_s * vehicle.cruise_mps < forward + forward_s * vehicle.cruise_mps
         {
-            true => (backward + ends.inside_m, RouteDirection::Backward),
-            false => (forward + ends.inside_m, RouteDirection::Forward),
+            true => (backward + ends.between_m, RouteDirection::Backward),
+            false => (forward + ends.between_m, RouteDirection::Forward),
         }
     }
-}
-
-/// First and last waypoint of a route, and the length of the path between them, metres.
-pub(super) struct RouteEnds {
-    first: Flat,
-    last: Flat,
-    inside_m: f32,
 }
 
 /// BINPAT, or SIMPLE-BINPAT where a track is a lane, with the vehicles' weights as shares.
 ///
 /// # Errors
-/// Those of [`Work::check`]; [`CoverageError::Unreachable`] if no path leads to a route.
+/// Those of [`CoverageProblem::check`]; [`CoverageError::Unreachable`] if no path leads to a route.
 pub fn binpat<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     ws: &mut PackWorkspace<K>,
     out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
-    work.check::<K>()?;
-    for (share, vehicle) in ws.shares.iter_mut().zip(work.vehicles) {
+    problem.check::<K>()?;
+    for (share, vehicle) in ws.shares.iter_mut().zip(problem.vehicles) {
         *share = vehicle.weight;
     }
-    let alike = work.vehicles.iter().all(|vehicle| vehicle.weight == work.vehicles[0].weight);
-    pack_routes(
-        work,
-        if alike { BinEligibility::Anyone } else { BinEligibility::SameWeight },
-        ws,
-        out,
-    )
+    let alike = problem.vehicles.iter().all(|vehicle| vehicle.weight == problem.vehicles[0].weight);
+    let bins = if alike { BinEligibility::Anyone } else { BinEligibility::SameWeight };
+    pack_routes(problem, bins, ws, out)
 }
 
 /// BINPAT with given shares, such as those that POWELL found: any vehicle may get any bin.
 ///
 /// # Errors
-/// Those of [`Work::check`]; [`CoverageError::SettingOutOfRange`] unless there is one share per
-/// vehicle, all finite and at least 0, and not all 0.
+/// Those of [`CoverageProblem::check`]; [`CoverageError::SettingOutOfRange`] unless there is one
+/// share per vehicle, all finite and at least 0, and not all 0.
 pub fn binpat_by_shares<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     shares: &[f32],
     ws: &mut PackWorkspace<K>,
     out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
-    work.check::<K>()?;
+    problem.check::<K>()?;
     let sound = |share: &f32| *share >= 0.0 && share.is_finite();
     let some = shares.iter().any(|share| *share > 0.0);
-    if shares.len() != work.vehicles.len() || !shares.iter().all(sound) || !some {
+    if shares.len() != problem.vehicles.len() || !shares.iter().all(sound) || !some {
         return Err(CoverageError::SettingOutOfRange("shares"));
     }
     ws.shares[..shares.len()].copy_from_slice(shares);
-    pack_routes(work, BinEligibility::Anyone, ws, out)
+    pack_routes(problem, BinEligibility::Anyone, ws, out)
 }
 
 /// Which vehicles may be assigned a bin.
@@ -330,15 +322,15 @@ pub(super) enum BinEligibility {
 
 /// Cuts the path into bins by `ws.shares`, assigns the bins to vehicles, and sets layers and costs.
 pub(super) fn pack_routes<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     bins: BinEligibility,
     ws: &mut PackWorkspace<K>,
     out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
-    let count = work.vehicles.len();
-    cbinpack(work.tracks, work.unit, &ws.shares[..count], &mut ws.ends[..count]);
-    assign_bins_to_vehicles(work, bins, ws, out)?;
-    set_layers_and_costs(work, out);
+    let count = problem.vehicles.len();
+    cbinpack(problem.tracks, problem.unit, &ws.shares[..count], &mut ws.bin_ends[..count]);
+    assign_bins_to_vehicles(problem, bins, ws, out)?;
+    set_layers_and_costs(problem, out);
     Ok(())
 }
 
@@ -377,25 +369,26 @@ fn fill_bin<const L: usize>(
 ) -> (u32, f32) {
     let lanes = tracks.lanes();
     // The lane in which the bin becomes full.
-    let lane = lanes.partition_point(|lane| lane.start_m + lane.length_m() <= full_m);
+    let lane = lanes.partition_point(|lane| lane.start_along_m + lane.length_m() <= full_m);
     let before = |lane: usize| {
-        let end = lanes.get(lane).map_or(tracks.waypoint_count(), |lane| lane.first);
+        let end = lanes.get(lane).map_or(tracks.waypoint_count(), |lane| lane.first_waypoint);
         let last = lane.checked_sub(1).map(|lane| &lanes[lane]);
-        (end, last.map_or(0.0, |lane| lane.start_m + lane.length_m()))
+        (end, last.map_or(0.0, |lane| lane.start_along_m + lane.length_m()))
     };
     let (fits, more) = match (unit, lanes.get(lane)) {
         (_, None) => return before(lane),
         (TrackUnit::Lane, Some(_)) => (before(lane), before(lane + 1)),
         (TrackUnit::Waypoint, Some(inside)) => {
-            let step_m = inside.length_m() / fmaxf((inside.count - 1) as f32, 1.0);
-            let into_m = full_m - inside.start_m;
+            let step_m = inside.length_m() / fmaxf((inside.waypoint_count - 1) as f32, 1.0);
+            let into_m = full_m - inside.start_along_m;
             if into_m < 0.0 {
-                (before(lane), (inside.first + 1, inside.start_m))
+                (before(lane), (inside.first_waypoint + 1, inside.start_along_m))
             } else {
                 let k = if step_m > 0.0 { (into_m / step_m) as u32 } else { 0 };
-                let at = |k: u32| (inside.first + k + 1, inside.start_m + step_m * k as f32);
-                let k = k.min(inside.count - 1);
-                (at(k), at((k + 1).min(inside.count - 1)))
+                let &Lane { first_waypoint, waypoint_count, start_along_m, .. } = inside;
+                let at = |k: u32| (first_waypoint + k + 1, start_along_m + step_m * k as f32);
+                let k = k.min(waypoint_count - 1);
+                (at(k), at((k + 1).min(waypoint_count - 1)))
             }
         }
     };
@@ -411,51 +404,54 @@ fn fill_bin<const L: usize>(
 
 /// Assigns each bin that is not empty to a vehicle so that the sum of all transits is least.
 fn assign_bins_to_vehicles<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     bins: BinEligibility,
     ws: &mut PackWorkspace<K>,
     out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
-    let count = work.vehicles.len();
+    let count = problem.vehicles.len();
     out.routes.clear();
     ws.transits_m.clear();
     let mut start = 0;
     for k in 0..count {
-        let end = ws.ends[k];
+        let end = ws.bin_ends[k];
         if end <= start {
             continue;
         }
         let route = Route {
-            vehicle: 0,
-            first: start,
-            end,
+            vehicle_index: 0,
+            lowest_waypoint: start,
+            waypoint_end: end,
             direction: RouteDirection::Forward,
             layer: 0,
-            ground_m: 0.0,
+            ground_length_m: 0.0,
             cost_m: 0.0,
             cost_s: 0.0,
         };
-        let ends = work.route_ends(start, end);
-        for vehicle in work.vehicles {
-            let may = bins == BinEligibility::Anyone || vehicle.weight == work.vehicles[k].weight;
-            let ground = work.ground_distance_m(vehicle, &ends).0;
-            let _ = ws.transits_m.push(if may { ground - ends.inside_m } else { f32::INFINITY });
+        let ends = problem.route_ends(start, end);
+        for vehicle in problem.vehicles {
+            let may =
+                bins == BinEligibility::Anyone || vehicle.weight == problem.vehicles[k].weight;
+            let ground = problem.ground_length_and_direction(vehicle, &ends).0;
+            let _ = ws.transits_m.push(if may { ground - ends.between_m } else { f32::INFINITY });
         }
         out.routes.push(route).map_err(|_| CoverageError::Vehicles)?;
         start = end;
     }
     let rows = out.routes.len();
-    let columns = &mut ws.columns[..rows];
+    let columns = &mut ws.assigned_vehicles[..rows];
     let found = assign(&ws.transits_m, rows, count, &mut ws.assignment, columns);
-    if found.map_err(|_| CoverageError::WorkspaceTooSmall)?.pairs < rows {
+    if found.map_err(|_| CoverageError::WorkspaceTooSmall)?.pair_count < rows {
         return Err(CoverageError::Unreachable);
     }
     for (row, route) in out.routes.iter_mut().enumerate() {
-        let vehicle = usize::from(ws.columns[row].ok_or(CoverageError::Unreachable)?);
-        route.vehicle = vehicle as u8;
-        (route.ground_m, route.direction) = work
-            .ground_distance_m(&work.vehicles[vehicle], &work.route_ends(route.first, route.end));
-        if !route.ground_m.is_finite() {
+        let vehicle = usize::from(ws.assigned_vehicles[row].ok_or(CoverageError::Unreachable)?);
+        route.vehicle_index = vehicle as u8;
+        (route.ground_length_m, route.direction) = problem.ground_length_and_direction(
+            &problem.vehicles[vehicle],
+            &problem.route_ends(route.lowest_waypoint, route.waypoint_end),
+        );
+        if !route.ground_length_m.is_finite() {
             return Err(CoverageError::Unreachable);
         }
     }
@@ -465,11 +461,12 @@ fn assign_bins_to_vehicles<const L: usize, const N: usize, const K: usize>(
 /// Gives the lowest layer to the route that takes longest over ground, the next one to the second
 /// longest, and so on; then sets the costs.
 pub(super) fn set_layers_and_costs<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     plan: &mut RoutePlan<K>,
 ) {
-    let seconds =
-        |route: &Route| route.ground_m / work.vehicles[usize::from(route.vehicle)].cruise_mps;
+    let seconds = |route: &Route| {
+        route.ground_length_m / problem.vehicles[usize::from(route.vehicle_index)].cruise_mps
+    };
     for i in 0..plan.routes.len() {
         let own = seconds(&plan.routes[i]);
         let longer = plan.routes.iter().enumerate().filter(|(j, other)| {
@@ -478,23 +475,26 @@ pub(super) fn set_layers_and_costs<const L: usize, const N: usize, const K: usiz
         });
         plan.routes[i].layer = longer.count() as u8 + 1;
     }
-    set_costs(work, plan);
+    set_costs(problem, plan);
 }
 
 /// Computes the costs of routes whose layers are set.
 pub(super) fn set_costs<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     plan: &mut RoutePlan<K>,
 ) {
     for route in &mut plan.routes {
-        let vehicle = &work.vehicles[usize::from(route.vehicle)];
-        let top_m = work.heights.mission_m + f32::from(route.layer) * work.heights.layer_m;
-        let ends = work.route_ends(route.first, route.end);
-        let sink_s = work.sink_times_s(vehicle, &ends);
-        route.cost_m =
-            route.ground_m + 2.0 * top_m + work.sink_m(&ends.first) + work.sink_m(&ends.last);
-        route.cost_s = route.ground_m / vehicle.cruise_mps
-            + work.altitude_delay_s(vehicle, route.layer)
+        let vehicle = &problem.vehicles[usize::from(route.vehicle_index)];
+        let top_m = problem.heights.max_picture_height_m
+            + f32::from(route.layer) * problem.heights.layer_spacing_m;
+        let ends = problem.route_ends(route.lowest_waypoint, route.waypoint_end);
+        let sink_s = problem.extra_vertical_times_s(vehicle, &ends);
+        route.cost_m = route.ground_length_m
+            + 2.0 * top_m
+            + problem.extra_descent_m(&ends.first)
+            + problem.extra_descent_m(&ends.last);
+        route.cost_s = route.ground_length_m / vehicle.cruise_mps
+            + problem.altitude_delay_s(vehicle, route.layer)
             + if route.direction == RouteDirection::Forward { sink_s.0 } else { sink_s.1 };
     }
 }

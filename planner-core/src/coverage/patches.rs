@@ -13,7 +13,7 @@ use super::CoverageError;
 use super::area::RingKind;
 use super::intervals::Interval;
 use super::lanes::Tracks;
-use super::strips::{Sets, Strips, WIDTH_ROUNDING};
+use super::strips::{LaneIntervalSets, Strips, WIDTH_ROUNDING_SHARE};
 use super::transit::ZONE_CLEARANCE_M;
 
 /// Number of parts into which a strip is cut.
@@ -22,7 +22,7 @@ const STRIP_PARTS: u32 = 8;
 /// Adds lanes for ground that no lane shows yet, in all strips that a no-fly zone reaches into.
 pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
     strips: &Strips<'_>,
-    ws: &mut Sets<V>,
+    ws: &mut LaneIntervalSets<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
     for strip in
@@ -58,7 +58,7 @@ fn lay_missing_lanes_in_part<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     (strip, border): (u16, f32),
     span: Interval,
-    ws: &mut Sets<V>,
+    ws: &mut LaneIntervalSets<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
     compute_uncovered(strips, span, out, ws)?;
@@ -89,9 +89,9 @@ fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Interval) -> bool {
     let spacing = strips.pattern.spacing;
     let across = spacing.footprint.across_m;
     let spare = fmaxf(across - strips.strip_width_m, 0.0) / 2.0;
-    let reach = across / 2.0 - fminf(spacing.lane_m / 19.0, spare * 0.99);
+    let reach = across / 2.0 - fminf(spacing.max_lane_spacing_m / 19.0, spare * 0.99);
     // A strip as wide as an image leaves no overlap, so a rounding error is tolerated.
-    let most = reach + strips.strip_width_m * WIDTH_ROUNDING;
+    let most = reach + strips.strip_width_m * WIDTH_ROUNDING_SHARE;
     v - low <= most && high - v <= most
 }
 
@@ -113,7 +113,7 @@ fn compute_uncovered<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     span: Interval,
     tracks: &Tracks<L>,
-    ws: &mut Sets<V>,
+    ws: &mut LaneIntervalSets<V>,
 ) -> Result<(), CoverageError> {
     strips.compute_needed(span, ws)?;
     strips.subtract_no_fly_zones(span, ws)?;

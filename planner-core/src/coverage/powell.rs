@@ -12,18 +12,18 @@
 //! the result is never worse than BINPAT's.
 
 use super::CoverageError;
-use super::pack::{BinEligibility, PackWorkspace, RoutePlan, Work, pack_routes};
+use super::pack::{BinEligibility, CoverageProblem, PackWorkspace, RoutePlan, pack_routes};
 
 /// Settings of the search.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PowellConfig {
     /// Most packings that are evaluated.
-    pub evaluations: u32,
+    pub max_evaluations: u32,
 }
 
 impl PowellConfig {
     /// The settings with which `host-sim` plans.
-    pub const USUAL: Self = Self { evaluations: 4000 };
+    pub const USUAL: Self = Self { max_evaluations: 4000 };
 }
 
 /// Number of intervals into which a line search divides the whole line.
@@ -37,8 +37,8 @@ const MIN_ROUND_GAIN: f32 = 1e-4;
 pub struct PowellWorkspace<const K: usize> {
     /// Workspace of the packings.
     pub pack: PackWorkspace<K>,
-    best: [f32; K],
-    current: [f32; K],
+    best_shares: [f32; K],
+    current_shares: [f32; K],
     directions: [[f32; K]; K],
     plan: RoutePlan<K>,
 }
@@ -48,8 +48,8 @@ impl<const K: usize> PowellWorkspace<K> {
     pub const fn new() -> Self {
         Self {
             pack: PackWorkspace::new(),
-            best: [0.0; K],
-            current: [0.0; K],
+            best_shares: [0.0; K],
+            current_shares: [0.0; K],
             directions: [[0.0; K]; K],
             plan: RoutePlan::new(),
         }
@@ -67,30 +67,30 @@ impl<const K: usize> Default for PowellWorkspace<K> {
 /// # Errors
 /// Those of [`super::pack::binpat`].
 pub fn powell<const L: usize, const N: usize, const K: usize>(
-    work: &Work<'_, L, N>,
+    problem: &CoverageProblem<'_, L, N>,
     config: &PowellConfig,
     ws: &mut PowellWorkspace<K>,
     out: &mut RoutePlan<K>,
 ) -> Result<(), CoverageError> {
-    work.check::<K>()?;
-    let count = work.vehicles.len();
+    problem.check::<K>()?;
+    let count = problem.vehicles.len();
     let mut search = ShareSearch {
-        work,
-        evaluations_left: config.evaluations.max(1),
-        least_cost: f32::INFINITY,
+        problem,
+        evaluations_left: config.max_evaluations.max(1),
+        least_cost_s: f32::INFINITY,
         ws,
         out,
     };
-    let weights = work.vehicles.iter().map(|vehicle| vehicle.weight);
+    let weights = problem.vehicles.iter().map(|vehicle| vehicle.weight);
     let largest = weights.clone().fold(0.0, libm::fmaxf);
-    for (share, weight) in search.ws.current.iter_mut().zip(weights) {
+    for (share, weight) in search.ws.current_shares.iter_mut().zip(weights) {
         *share = weight / largest;
     }
     let mut cost = search.evaluate()?;
     search.reset_directions(count);
     loop {
         let before = cost;
-        let from = search.ws.current;
+        let from = search.ws.current_shares;
         let (mut largest, mut at) = (0.0, 0);
         for k in 0..count {
             let line = search.ws.directions[k];
@@ -102,7 +102,7 @@ pub fn powell<const L: usize, const N: usize, const K: usize>(
         }
         // The sum of this round's moves becomes a search direction; it replaces the direction that
         // gained most.
-        let mut whole = search.ws.current;
+        let mut whole = search.ws.current_shares;
         whole.iter_mut().zip(from).for_each(|(to, from)| *to -= from);
         if whole[..count].iter().any(|step| *step != 0.0) {
             cost = search.line_search(&whole, count, cost)?;
@@ -113,14 +113,14 @@ pub fn powell<const L: usize, const N: usize, const K: usize>(
         }
     }
     let ShareSearch { ws, .. } = search;
-    ws.pack.shares = ws.best;
+    ws.pack.shares = ws.best_shares;
     Ok(())
 }
 
 struct ShareSearch<'s, 'w, const L: usize, const N: usize, const K: usize> {
-    work: &'s Work<'w, L, N>,
+    problem: &'s CoverageProblem<'w, L, N>,
     evaluations_left: u32,
-    least_cost: f32,
+    least_cost_s: f32,
     ws: &'s mut PowellWorkspace<K>,
     out: &'s mut RoutePlan<K>,
 }
@@ -138,15 +138,15 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
     fn evaluate(&mut self) -> Result<f32, CoverageError> {
         self.evaluations_left = self.evaluations_left.saturating_sub(1);
         let ws = &mut *self.ws;
-        if ws.current[..self.work.vehicles.len()].iter().all(|share| *share <= 0.0) {
+        if ws.current_shares[..self.problem.vehicles.len()].iter().all(|share| *share <= 0.0) {
             return Ok(f32::INFINITY);
         }
-        ws.pack.shares = ws.current;
-        pack_routes(self.work, BinEligibility::Anyone, &mut ws.pack, &mut ws.plan)?;
+        ws.pack.shares = ws.current_shares;
+        pack_routes(self.problem, BinEligibility::Anyone, &mut ws.pack, &mut ws.plan)?;
         let cost = ws.plan.max_cost_s();
-        if cost < self.least_cost {
-            self.least_cost = cost;
-            ws.best = ws.current;
+        if cost < self.least_cost_s {
+            self.least_cost_s = cost;
+            ws.best_shares = ws.current_shares;
             self.out.routes.clone_from(&ws.plan.routes);
         }
         Ok(cost)
@@ -160,7 +160,7 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
         count: usize,
         cost: f32,
     ) -> Result<f32, CoverageError> {
-        let from = self.ws.current;
+        let from = self.ws.current_shares;
         let Some((low, high)) = range_in_box(&from[..count], &line[..count]) else {
             return Ok(cost);
         };
@@ -202,7 +202,7 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
     }
 
     fn move_along(&mut self, from: &[f32; K], line: &[f32; K], at: f32) {
-        for (share, (from, line)) in self.ws.current.iter_mut().zip(from.iter().zip(line)) {
+        for (share, (from, line)) in self.ws.current_shares.iter_mut().zip(from.iter().zip(line)) {
             *share = (from + line * at).clamp(0.0, 1.0);
         }
     }

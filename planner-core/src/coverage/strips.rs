@@ -15,17 +15,17 @@ use crate::sort;
 
 /// Share of a lane spacing by which rounding may raise a width that is a whole number of lane
 /// spacings, without adding another strip.
-pub(super) const WIDTH_ROUNDING: f32 = 1e-4;
+pub(super) const WIDTH_ROUNDING_SHARE: f32 = 1e-4;
 
 /// Memory of the lanes' computation; `V` must be at least the number of the area's vertices.
 pub struct LaneWorkspace<const V: usize> {
     /// First the convex hull, then the area's vertices in the lane frame.
     pub(super) vertices: Vec<Flat, V>,
-    pub(super) sets: Sets<V>,
+    pub(super) sets: LaneIntervalSets<V>,
 }
 
 /// Sets of coordinates `u` along the lanes, on one line `v` or in one strip.
-pub(super) struct Sets<const V: usize> {
+pub(super) struct LaneIntervalSets<const V: usize> {
     crossings: Vec<f32, V>,
     pub(super) needed: Intervals<V>,
     /// The `u` at which a no-fly zone covers all of a strip, or is too near for a lane.
@@ -36,7 +36,7 @@ pub(super) struct Sets<const V: usize> {
 impl<const V: usize> LaneWorkspace<V> {
     /// Creates an empty workspace.
     pub const fn new() -> Self {
-        let sets = Sets {
+        let sets = LaneIntervalSets {
             crossings: Vec::new(),
             needed: Intervals::new(),
             barred: Intervals::new(),
@@ -54,24 +54,24 @@ impl<const V: usize> Default for LaneWorkspace<V> {
 
 /// The lane frame: `u` along the lanes and `v` across them, metres from the area's first vertex.
 pub(super) struct LaneFrame {
-    pub(super) base: Flat,
+    pub(super) origin: Flat,
     pub(super) direction: LaneDirection,
 }
 
 impl LaneFrame {
     pub(super) fn new(area: &Area<'_>, direction: LaneDirection) -> Self {
-        Self { base: area.vertices()[0], direction }
+        Self { origin: area.vertices()[0], direction }
     }
 
     /// A point of the mission frame in the lane frame.
-    pub(super) fn to_frame(&self, place: &Flat) -> Flat {
-        let from_base = place - self.base;
+    pub(super) fn to_lane_frame(&self, place: &Flat) -> Flat {
+        let from_base = place - self.origin;
         Flat::new(self.direction.along.dot(&from_base), self.direction.across.dot(&from_base))
     }
 
     /// A point of the lane frame in the mission frame.
-    pub(super) fn to_place(&self, point: &Flat) -> Flat {
-        self.base + self.direction.along * point.x + self.direction.across * point.y
+    pub(super) fn to_mission_frame(&self, point: &Flat) -> Flat {
+        self.origin + self.direction.along * point.x + self.direction.across * point.y
     }
 }
 
@@ -79,7 +79,7 @@ impl LaneFrame {
 pub(super) struct Strips<'a> {
     pub(super) area: Area<'a>,
     pub(super) pattern: LanePattern,
-    low: f32,
+    low_v_m: f32,
     pub(super) strip_width_m: f32,
     pub(super) count: usize,
 }
@@ -95,17 +95,26 @@ impl<'a> Strips<'a> {
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
                 (fminf(low, v), fmaxf(high, v))
             });
-        let count = fmaxf(ceilf((high - low) / pattern.spacing.lane_m - WIDTH_ROUNDING), 1.0);
+        let count = fmaxf(
+            ceilf((high - low) / pattern.spacing.max_lane_spacing_m - WIDTH_ROUNDING_SHARE),
+            1.0,
+        );
         if count > f32::from(u16::MAX) {
             return Err(CoverageError::LanesFull);
         }
         let wide = (high - low) / count;
-        Ok(Self { area: *area, pattern: *pattern, low, strip_width_m: wide, count: count as usize })
+        Ok(Self {
+            area: *area,
+            pattern: *pattern,
+            low_v_m: low,
+            strip_width_m: wide,
+            count: count as usize,
+        })
     }
 
     /// Lower and upper border of a strip: coordinates `v` across the lanes.
     pub(super) fn strip_borders(&self, strip: usize) -> Interval {
-        let low = self.low + strip as f32 * self.strip_width_m;
+        let low = self.low_v_m + strip as f32 * self.strip_width_m;
         [low, low + self.strip_width_m]
     }
 
@@ -118,7 +127,7 @@ impl<'a> Strips<'a> {
     pub(super) fn compute_needed<const V: usize>(
         &self,
         span: Interval,
-        ws: &mut Sets<V>,
+        ws: &mut LaneIntervalSets<V>,
     ) -> Result<(), CoverageError> {
         ws.needed.clear();
         project_rings(
@@ -142,7 +151,7 @@ impl<'a> Strips<'a> {
     pub(super) fn subtract_no_fly_zones<const V: usize>(
         &self,
         span: Interval,
-        ws: &mut Sets<V>,
+        ws: &mut LaneIntervalSets<V>,
     ) -> Result<(), CoverageError> {
         let span = self.inset(span);
         for (_, ring) in self.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly) {
@@ -173,7 +182,7 @@ impl<'a> Strips<'a> {
     fn compute_barred<const V: usize>(
         &self,
         v: f32,
-        ws: &mut Sets<V>,
+        ws: &mut LaneIntervalSets<V>,
     ) -> Result<(), CoverageError> {
         ws.barred.clear();
         for (_, ring) in self.area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::NoFly) {
@@ -194,7 +203,7 @@ impl<'a> Strips<'a> {
         &self,
         strip: u16,
         v: f32,
-        ws: &mut Sets<V>,
+        ws: &mut LaneIntervalSets<V>,
         out: &mut Tracks<L>,
     ) -> Result<(), CoverageError> {
         self.compute_barred(v, ws)?;
@@ -208,7 +217,7 @@ impl<'a> Strips<'a> {
         &self,
         strip: u16,
         v: f32,
-        ws: &mut Sets<V>,
+        ws: &mut LaneIntervalSets<V>,
         out: &mut Tracks<L>,
     ) -> Result<(), CoverageError> {
         self.compute_barred(v, ws)?;
@@ -224,16 +233,17 @@ impl<'a> Strips<'a> {
         &self,
         strip: u16,
         v: f32,
-        ws: &mut Sets<V>,
+        ws: &mut LaneIntervalSets<V>,
         out: &mut Tracks<L>,
     ) -> Result<(), CoverageError> {
         let mut push = |[from, to]: Interval| {
             let (from, to) = (Flat::new(from, v), Flat::new(to, v));
-            let lane = Lane { from, to, first: 0, count: 0, start_m: 0.0, strip };
+            let lane =
+                Lane { from, to, first_waypoint: 0, waypoint_count: 0, start_along_m: 0.0, strip };
             out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)
         };
-        let margin = self.pattern.margin_m;
-        let Sets { crossings, needed, barred, free } = ws;
+        let margin = self.pattern.border_overshoot_m;
+        let LaneIntervalSets { crossings, needed, barred, free } = ws;
         free.clear();
         for need in needed.spans() {
             let [from, to] = self.lane_extent(need, crossings);
@@ -278,10 +288,10 @@ impl<'a> Strips<'a> {
     pub(super) fn half_picture_along_m(&self) -> f32 {
         let spacing = self.pattern.spacing;
         let half = spacing.footprint.along_m / 2.0;
-        let cell_m = spacing.lane_m / 10.0;
+        let cell_m = spacing.max_lane_spacing_m / 10.0;
         let overlap_m = fminf(
-            spacing.footprint.across_m - spacing.lane_m,
-            spacing.footprint.along_m - spacing.waypoint_m,
+            spacing.footprint.across_m - spacing.max_lane_spacing_m,
+            spacing.footprint.along_m - spacing.max_waypoint_spacing_m,
         );
         if overlap_m < cell_m / 100.0 {
             half - cell_m / 100.0
@@ -304,7 +314,7 @@ fn line_crossings<const V: usize>(
             out.push(u).map_err(|_| CoverageError::LanesFull)?;
         }
     }
-    sort::sort_by(out, f32::total_cmp);
+    sort::heapsort_by(out, f32::total_cmp);
     Ok(())
 }
 

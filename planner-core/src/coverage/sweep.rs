@@ -78,7 +78,7 @@ fn convex_hull<const V: usize>(
     for (_, ring) in area.rings_with_kind().filter(|(kind, _)| *kind == RingKind::Outer) {
         sorted.extend_from_slice(ring).map_err(|_| AreaError::AreaFull)?;
     }
-    sort::sort_by(&mut sorted, |a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    sort::heapsort_by(&mut sorted, |a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let count = sorted.len();
     // The lower chain from left to right, then the upper chain from right to left.
     let mut side = 0;

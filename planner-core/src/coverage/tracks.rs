@@ -16,7 +16,7 @@ use super::order;
 use super::patches;
 use super::strips::{LaneFrame, Strips};
 use super::sweep::{LaneDirection, direction_of_least_width};
-use super::transit::Transit;
+use super::transit::TransitGraph;
 
 pub use super::lanes::{Lane, LanePattern, Tracks};
 pub use super::strips::LaneWorkspace;
@@ -28,29 +28,29 @@ pub use super::strips::LaneWorkspace;
 pub fn build_lanes<const L: usize, const V: usize, const N: usize>(
     area: &Area<'_>,
     pattern: &LanePattern,
-    transit: &Transit<'_, N>,
+    transit: &TransitGraph<'_, N>,
     ws: &mut LaneWorkspace<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
     pattern.spacing.check()?;
-    if !(pattern.margin_m >= 0.0 && pattern.margin_m.is_finite()) {
+    if !(pattern.border_overshoot_m >= 0.0 && pattern.border_overshoot_m.is_finite()) {
         return Err(CoverageError::SettingOutOfRange("margin_m"));
     }
     if area.vertices().len() > V {
         return Err(AreaError::AreaFull.into());
     }
     let LaneWorkspace { vertices, sets } = ws;
-    let direction = match pattern.angle_deg {
+    let direction = match pattern.angle_from_east_deg {
         Some(angle) if angle.is_finite() => LaneDirection::at_deg(angle),
         Some(_) => return Err(CoverageError::SettingOutOfRange("angle_deg")),
         None => direction_of_least_width(area, vertices)?,
     };
     out.lanes.clear();
-    out.along = direction.along;
+    out.lane_direction = direction.along;
     let frame = LaneFrame::new(area, direction);
     vertices.clear();
     vertices.extend_from_slice(area.vertices()).map_err(|_| AreaError::AreaFull)?;
-    vertices.iter_mut().for_each(|vertex| *vertex = frame.to_frame(vertex));
+    vertices.iter_mut().for_each(|vertex| *vertex = frame.to_lane_frame(vertex));
     let strips = Strips::new(&area.with_vertices(vertices), pattern)?;
     for strip in 0..strips.count {
         let span = strips.strip_borders(strip);
@@ -63,11 +63,12 @@ pub fn build_lanes<const L: usize, const V: usize, const N: usize>(
     }
     cells::group_into_cells(&mut out.lanes[..count]);
     for lane in &mut out.lanes {
-        (lane.from, lane.to) = (frame.to_place(&lane.from), frame.to_place(&lane.to));
+        (lane.from, lane.to) =
+            (frame.to_mission_frame(&lane.from), frame.to_mission_frame(&lane.to));
     }
     if out.lanes.is_empty() {
         return Err(CoverageError::NothingToCover);
     }
-    order::order_lanes(&mut out.lanes, count, transit, pattern.search_steps);
+    order::order_lanes(&mut out.lanes, count, transit, pattern.max_search_steps);
     out.space_waypoints(&pattern.spacing, transit)
 }

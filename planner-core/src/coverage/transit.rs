@@ -21,20 +21,20 @@ pub const ZONE_CLEARANCE_M: f32 = 0.25;
 
 /// The visibility graph of an area's no-fly zones with the shortest distances between its corners.
 /// At most `N` corners; 4 · N² bytes.
-pub struct Transit<'a, const N: usize> {
+pub struct TransitGraph<'a, const N: usize> {
     area: Area<'a>,
     corners: Vec<Flat, N>,
-    between_m: [[f32; N]; N],
+    corner_distances_m: [[f32; N]; N],
 }
 
-impl<const N: usize> Transit<'_, N> {
-    /// Creates an empty graph; [`Transit::set_area`] sets its area.
+impl<const N: usize> TransitGraph<'_, N> {
+    /// Creates an empty graph; [`TransitGraph::set_area`] sets its area.
     pub const fn empty() -> Self {
-        Self { area: Area::NOWHERE, corners: Vec::new(), between_m: [[0.0; N]; N] }
+        Self { area: Area::EMPTY, corners: Vec::new(), corner_distances_m: [[0.0; N]; N] }
     }
 }
 
-impl<'a, const N: usize> Transit<'a, N> {
+impl<'a, const N: usize> TransitGraph<'a, N> {
     /// Builds the graph for the area's no-fly zones, replacing the one before.
     ///
     /// # Errors
@@ -74,20 +74,20 @@ impl<'a, const N: usize> Transit<'a, N> {
         for i in 0..n {
             for j in 0..n {
                 let (a, b) = (self.corners[i], self.corners[j]);
-                self.between_m[i][j] =
+                self.corner_distances_m[i][j] =
                     if self.is_line_clear(&a, &b) { (b - a).length() } else { f32::INFINITY };
             }
-            self.between_m[i][i] = 0.0;
+            self.corner_distances_m[i][i] = 0.0;
         }
         for over in 0..n {
             for i in 0..n {
-                let first = self.between_m[i][over];
+                let first = self.corner_distances_m[i][over];
                 if first.is_infinite() {
                     continue;
                 }
                 for j in 0..n {
-                    let whole = first + self.between_m[over][j];
-                    self.between_m[i][j] = fminf(self.between_m[i][j], whole);
+                    let whole = first + self.corner_distances_m[over][j];
+                    self.corner_distances_m[i][j] = fminf(self.corner_distances_m[i][j], whole);
                 }
             }
         }
@@ -152,7 +152,7 @@ impl<'a, const N: usize> Transit<'a, N> {
                     continue;
                 }
                 for (j, last) in last_m.iter().enumerate() {
-                    let whole = first + self.between_m[i][j] + last;
+                    let whole = first + self.corner_distances_m[i][j] + last;
                     if whole < best.0 {
                         best = (whole, i, j);
                     }
@@ -204,7 +204,7 @@ impl<'a, const N: usize> Transit<'a, N> {
     }
 }
 
-impl<const N: usize> Default for Transit<'_, N> {
+impl<const N: usize> Default for TransitGraph<'_, N> {
     fn default() -> Self {
         Self::empty()
     }

@@ -20,11 +20,11 @@ const EDGES: [(u16, u16); 6] = [(0, 2), (1, 2), (0, 3), (1, 3), (2, 4), (4, 5)];
 
 fn request() -> DetourRequest {
     DetourRequest {
-        aside: false,
+        land_aside: false,
         here: Point::new(2.0, 0.0, 5.0),
         leg: [NODES[2], NODES[0]],
         leg_clearance_m: 1.2,
-        goal: Goal::Node(0),
+        goal: DetourGoal::RoadmapGoal(0),
         descent_m: 4.0,
         required_clearance_m: 0.8,
         fence: None,
@@ -79,7 +79,7 @@ fn the_shortest_way_is_taken_and_another_where_something_is_on_it() {
 fn a_goal_that_something_lies_below_is_blocked() {
     let lies = at(Point::new(8.0, 1.0, 1.5), 1.5);
     assert_eq!(planned(&request(), &[lies]), Err(DetourError::GoalBlocked));
-    let bad = DetourRequest { goal: Goal::Node(9), ..request() };
+    let bad = DetourRequest { goal: DetourGoal::RoadmapGoal(9), ..request() };
     assert_eq!(planned(&bad, &[]), Err(DetourError::Search(SearchError::BadNode(10))));
 }
 
@@ -116,7 +116,7 @@ fn no_way_leaves_the_fence() {
 
 #[test]
 fn aside_is_the_nearest_node_that_nobody_lands_on() {
-    let aside = DetourRequest { aside: true, ..request() };
+    let aside = DetourRequest { land_aside: true, ..request() };
     let down = landing(Point::new(3.0, 0.0, 20.0));
     let points = planned(&aside, &[down]).unwrap();
     assert_eq!(points.last(), Some(&NODES[0]), "{points:?}");
@@ -129,7 +129,7 @@ fn aside_is_the_nearest_node_that_nobody_lands_on() {
 #[test]
 fn aside_does_not_lead_up_to_a_vehicle_that_lands() {
     let aside =
-        DetourRequest { aside: true, leg: [NODES[2], NODES[2]], here: NODES[2], ..request() };
+        DetourRequest { land_aside: true, leg: [NODES[2], NODES[2]], here: NODES[2], ..request() };
     // The nodes on the floor are taken by others: only the shaft is left, down which another
     // vehicle lands.
     let floor = [at(NODES[0], 1.0), at(NODES[1], 1.0), at(NODES[3], 1.0)];

@@ -12,7 +12,7 @@ pub struct Waypoint {
     pub position: Point,
     /// Clearance of the leg that ends at this waypoint: distance from the leg to the nearest
     /// obstacle, metres.
-    pub clearance_m: f32,
+    pub leg_clearance_m: f32,
     /// Arc length from the first waypoint to this one, metres.
     pub along_m: f32,
     /// Scheduled arrival, seconds after take-off at nominal speed. In flight only the order of
@@ -79,14 +79,20 @@ impl<const W: usize> Path<W> {
                     return Err(PathError::NotFinite);
                 }
                 if along_m == last.along_m {
-                    last.clearance_m = fminf(last.clearance_m, clearance_m);
+                    last.leg_clearance_m = fminf(last.leg_clearance_m, clearance_m);
                     return Ok(());
                 }
                 along_m
             }
             None => 0.0,
         };
-        let waypoint = Waypoint { position, clearance_m, along_m, arrive_s: 0.0, leave_s: 0.0 };
+        let waypoint = Waypoint {
+            position,
+            leg_clearance_m: clearance_m,
+            along_m,
+            arrive_s: 0.0,
+            leave_s: 0.0,
+        };
         self.waypoints.push(waypoint).map_err(|_| PathError::PathFull)
     }
 
@@ -100,7 +106,7 @@ impl<const W: usize> Path<W> {
     }
 
     /// Sets arrival and departure of the last waypoint, seconds after take-off.
-    pub fn set_last_times(&mut self, at_s: f32, leave_s: f32) {
+    pub fn set_last_waypoint_times(&mut self, at_s: f32, leave_s: f32) {
         if let Some(last) = self.waypoints.last_mut() {
             (last.arrive_s, last.leave_s) = (at_s, leave_s);
         }
@@ -121,14 +127,14 @@ impl<const W: usize> Path<W> {
     // board.
     #[inline(never)]
     pub fn point_at(&self, along_m: f32) -> Option<Point> {
-        self.point_on(self.leg_at(along_m), along_m)
+        self.point_on(self.leg_end_index_at(along_m), along_m)
     }
 
     /// The points at arc lengths `from_m`, `from_m + step_m` and so on (`step_m` > 0), as
     /// [`Self::point_at`] computes them, in one pass along the path. Never ends; empty on an empty
     /// path.
     pub fn points_from(&self, from_m: f32, step_m: f32) -> impl Iterator<Item = Point> {
-        let mut leg = self.leg_at(from_m);
+        let mut leg = self.leg_end_index_at(from_m);
         let mut steps = 0u16;
         core::iter::from_fn(move || {
             let along_m = from_m + f32::from(steps) * step_m;
@@ -142,7 +148,7 @@ impl<const W: usize> Path<W> {
 
     /// Index of the waypoint that ends the leg on which an arc length lies; the number of waypoints
     /// beyond the last one.
-    fn leg_at(&self, along_m: f32) -> usize {
+    fn leg_end_index_at(&self, along_m: f32) -> usize {
         self.waypoints.partition_point(|w| w.along_m < along_m)
     }
 
@@ -164,7 +170,7 @@ impl<const W: usize> Path<W> {
     pub fn project(&self, position: &Point, near_m: f32, window_m: f32) -> f32 {
         let (low, high) = (near_m - window_m, near_m + window_m);
         let mut best = (f32::INFINITY, near_m);
-        let first = self.leg_at(low).max(1);
+        let first = self.leg_end_index_at(low).max(1);
         for leg in self.waypoints.get(first - 1..).unwrap_or_default().windows(2) {
             if leg[0].along_m > high {
                 break;

@@ -11,7 +11,7 @@ const REACHED_TOLERANCE_M: f32 = 1e-2;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum HeadingMode {
     /// One heading for the whole flight: radians from east, counter-clockwise.
-    Fixed(f32),
+    FixedEnuRad(f32),
     /// In the direction of flight.
     Ahead,
 }
@@ -48,7 +48,7 @@ pub struct PictureStretch<'p> {
     pub to_m: f32,
     /// Distance over ground between neighbouring pictures, metres; the length of the stretch over
     /// ground is a multiple of it. 0 for a single picture.
-    pub step_m: f32,
+    pub ground_spacing_m: f32,
     /// Number of pictures, at least one.
     pub count: u32,
     /// The waypoints of the path from one end of the stretch to the other.
@@ -61,7 +61,7 @@ pub struct PictureStretch<'p> {
 struct StraightSegment {
     begin_m: f32,
     length_m: f32,
-    ground_m: f32,
+    ground_length_m: f32,
 }
 
 /// The straight parts between these waypoints.
@@ -71,16 +71,16 @@ fn straight_segments(corners: &[Waypoint]) -> impl Iterator<Item = StraightSegme
         let step = ends[1].position - ends[0].position;
         // A level part is as long over ground as along the path, to the bit.
         let ground_m = if step.z == 0.0 { length_m } else { step.xy().length() };
-        StraightSegment { begin_m, length_m, ground_m }
+        StraightSegment { begin_m, length_m, ground_length_m: ground_m }
     })
 }
 
 impl<'p> PictureStretch<'p> {
     fn new(corners: &'p [Waypoint], count: u32) -> Option<Self> {
         let (from_m, to_m) = (corners.first()?.along_m, corners.last()?.along_m);
-        let ground_m: f32 = straight_segments(corners).map(|segment| segment.ground_m).sum();
+        let ground_m: f32 = straight_segments(corners).map(|segment| segment.ground_length_m).sum();
         let step_m = if count > 1 { ground_m / (count - 1) as f32 } else { 0.0 };
-        Some(Self { from_m, to_m, step_m, count, corners })
+        Some(Self { from_m, to_m, ground_spacing_m: step_m, count, corners })
     }
 
     /// Number of pictures, of the `count` on the stretch with these corners, at an arc length of up
@@ -100,22 +100,24 @@ impl<'p> PictureStretch<'p> {
 
     /// As [`Self::taken_count`], for an `along_m` between the ends of the stretch.
     fn taken_within(&self, along_m: f32) -> u32 {
-        if self.step_m <= 0.0 {
+        if self.ground_spacing_m <= 0.0 {
             return self.count;
         }
         // The cast saturates, so a quotient too large for a u32 gives the largest number.
-        ((self.ground_m(along_m) / self.step_m) as u32).saturating_add(1).min(self.count)
+        ((self.ground_distance_m(along_m) / self.ground_spacing_m) as u32)
+            .saturating_add(1)
+            .min(self.count)
     }
 
     /// Distance over ground from the beginning of the stretch to arc length `along_m`, metres.
-    fn ground_m(&self, along_m: f32) -> f32 {
+    fn ground_distance_m(&self, along_m: f32) -> f32 {
         let mut ground_m = 0.0;
         for segment in straight_segments(self.corners) {
             let left_m = along_m - segment.begin_m;
             if left_m < segment.length_m {
-                return ground_m + left_m * (segment.ground_m / segment.length_m);
+                return ground_m + left_m * (segment.ground_length_m / segment.length_m);
             }
-            ground_m += segment.ground_m;
+            ground_m += segment.ground_length_m;
         }
         ground_m
     }
@@ -123,12 +125,12 @@ impl<'p> PictureStretch<'p> {
     /// Arc length along the path of picture `k` of this stretch (from 0), metres; that of the last
     /// picture if `k` is too large.
     pub fn picture_at_m(&self, k: u32) -> f32 {
-        let mut left_m = self.step_m * k as f32;
+        let mut left_m = self.ground_spacing_m * k as f32;
         for segment in straight_segments(self.corners) {
-            if left_m < segment.ground_m {
-                return segment.begin_m + left_m * (segment.length_m / segment.ground_m);
+            if left_m < segment.ground_length_m {
+                return segment.begin_m + left_m * (segment.length_m / segment.ground_length_m);
             }
-            left_m -= segment.ground_m;
+            left_m -= segment.ground_length_m;
         }
         self.to_m
     }
@@ -139,19 +141,19 @@ impl<'p> PictureStretch<'p> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PicturePlan {
     /// Bit `i`: a stretch begins at waypoint `i` of the path.
-    begins: u64,
+    stretch_begin_bits: u64,
     /// Bit `i`: a stretch ends at waypoint `i` of the path.
-    ends: u64,
+    stretch_end_bits: u64,
     /// For each stretch, in order, the lowest number of the area's waypoints that it photographs.
-    numbers: [u16; Self::MAX_STRETCHES],
+    lowest_waypoints: [u16; Self::MAX_STRETCHES],
     /// For each stretch, in order, the number of its pictures.
-    counts: [u16; Self::MAX_STRETCHES],
+    picture_counts: [u16; Self::MAX_STRETCHES],
     /// Order of the area's waypoint numbers along the path.
     order: WaypointOrder,
-    /// Number of waypoints of the whole area; 0 if not set by [`Self::with_area`].
-    area: u32,
+    /// Number of waypoints of the whole area; 0 if not set by [`Self::with_area_waypoints`].
+    area_waypoint_count: u32,
     /// Greatest distance over ground between neighbouring pictures, metres.
-    pub spacing_m: f32,
+    pub max_spacing_m: f32,
     /// Heading of the vehicle along its path.
     pub heading_mode: HeadingMode,
     /// How the camera is triggered.
@@ -173,13 +175,13 @@ impl PicturePlan {
     pub const fn new(spacing_m: f32, look: HeadingMode, trigger: Trigger) -> Self {
         let (numbers, counts) = ([0; Self::MAX_STRETCHES], [0; Self::MAX_STRETCHES]);
         Self {
-            begins: 0,
-            ends: 0,
-            numbers,
-            counts,
+            stretch_begin_bits: 0,
+            stretch_end_bits: 0,
+            lowest_waypoints: numbers,
+            picture_counts: counts,
             order: WaypointOrder::Rising,
-            area: 0,
-            spacing_m,
+            area_waypoint_count: 0,
+            max_spacing_m: spacing_m,
             heading_mode: look,
             trigger,
             is_first_part: false,
@@ -188,13 +190,13 @@ impl PicturePlan {
 
     /// The same plan, for an area with `area` waypoints, whose numbers rise or fall along the path
     /// as `order` says.
-    pub const fn with_area(self, area: u32, order: WaypointOrder) -> Self {
-        Self { area, order, ..self }
+    pub const fn with_area_waypoints(self, area: u32, order: WaypointOrder) -> Self {
+        Self { area_waypoint_count: area, order, ..self }
     }
 
-    /// Number of waypoints of the whole area; 0 if not set by [`Self::with_area`].
+    /// Number of waypoints of the whole area; 0 if not set by [`Self::with_area_waypoints`].
     pub fn area_waypoint_count(&self) -> u32 {
-        self.area
+        self.area_waypoint_count
     }
 
     /// Adds a stretch from waypoint `from` to waypoint `to` of the path, both after the waypoints
@@ -214,13 +216,13 @@ impl PicturePlan {
         let count =
             waypoints.end.checked_sub(waypoints.first).and_then(|count| u16::try_from(count).ok());
         let count = count.filter(|count| *count > 0).ok_or(PathError::PathFull)?;
-        let stretch = self.begins.count_ones() as usize;
+        let stretch = self.stretch_begin_bits.count_ones() as usize;
         if from > to || to >= Self::MAX_PATH_WAYPOINTS || stretch >= Self::MAX_STRETCHES {
             return Err(PathError::PathFull);
         }
-        (self.numbers[stretch], self.counts[stretch]) = (number, count);
-        self.begins |= 1 << from;
-        self.ends |= 1 << to;
+        (self.lowest_waypoints[stretch], self.picture_counts[stretch]) = (number, count);
+        self.stretch_begin_bits |= 1 << from;
+        self.stretch_end_bits |= 1 << to;
         Ok(())
     }
 
@@ -239,9 +241,9 @@ impl PicturePlan {
         &self,
         path: &'p Path<W>,
     ) -> impl Iterator<Item = (&'p [Waypoint], u32)> {
-        let (mut begins, mut ends) = (self.begins, self.ends);
+        let (mut begins, mut ends) = (self.stretch_begin_bits, self.stretch_end_bits);
         let waypoints = path.waypoints();
-        self.counts.into_iter().map_while(move |count| {
+        self.picture_counts.into_iter().map_while(move |count| {
             let (from, to) = (begins.trailing_zeros() as usize, ends.trailing_zeros() as usize);
             let corners = waypoints.get(from..=to)?;
             begins &= begins - 1;
@@ -261,12 +263,13 @@ impl PicturePlan {
     /// Number of pictures certainly taken at arc length `along_m`: those up to one spacing before
     /// that arc length. A later one may still be missing.
     pub fn certainly_taken_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
-        self.taken_count(path, along_m - self.spacing_m)
+        self.taken_count(path, along_m - self.max_spacing_m)
     }
 
     /// Arc length of the last picture of the path, metres; `None` if there are no pictures.
     pub fn last_picture_m<const W: usize>(&self, path: &Path<W>) -> Option<f32> {
-        let last = Self::MAX_PATH_WAYPOINTS.checked_sub(1 + self.ends.leading_zeros() as usize)?;
+        let last = Self::MAX_PATH_WAYPOINTS
+            .checked_sub(1 + self.stretch_end_bits.leading_zeros() as usize)?;
         path.waypoints().get(last).map(|waypoint| waypoint.along_m)
     }
 
@@ -295,17 +298,19 @@ impl PicturePlan {
         pictures: WaypointRange,
     ) -> impl Iterator<Item = WaypointRange> {
         let (mut before, order) = (0u32, self.order);
-        self.corners_and_counts(path).zip(self.numbers).filter_map(move |((_, count), number)| {
-            let within = |picture: u32| picture.saturating_sub(before).min(count);
-            let (from, to) = (within(pictures.first), within(pictures.end));
-            before = before.saturating_add(count);
-            let skipped = match order {
-                WaypointOrder::Rising => from,
-                WaypointOrder::Falling => count - to,
-            };
-            let first = u32::from(number).saturating_add(skipped);
-            (from < to).then(|| WaypointRange { first, end: first.saturating_add(to - from) })
-        })
+        self.corners_and_counts(path).zip(self.lowest_waypoints).filter_map(
+            move |((_, count), number)| {
+                let within = |picture: u32| picture.saturating_sub(before).min(count);
+                let (from, to) = (within(pictures.first), within(pictures.end));
+                before = before.saturating_add(count);
+                let skipped = match order {
+                    WaypointOrder::Rising => from,
+                    WaypointOrder::Falling => count - to,
+                };
+                let first = u32::from(number).saturating_add(skipped);
+                (from < to).then(|| WaypointRange { first, end: first.saturating_add(to - from) })
+            },
+        )
     }
 
     /// Number of pictures along the whole path.

@@ -59,7 +59,7 @@ pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> 
 /// Squared distance from segment `p` to point `q`, m²: the same bits as [`segments_distance_sq`]
 /// for a second segment of length 0. Not inlined: a board has little flash.
 #[inline(never)]
-pub(crate) fn point_distance_sq(p: (&Point, &Point), q: &Point) -> f32 {
+pub(crate) fn segment_to_point_distance_sq(p: (&Point, &Point), q: &Point) -> f32 {
     let (d, r) = (p.1 - p.0, p.0 - q);
     let a = d.norm_squared();
     let s = if a > 0.0 { clamp_to_unit(-d.dot(&r) / a) } else { 0.0 };

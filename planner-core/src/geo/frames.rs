@@ -153,7 +153,8 @@ pub fn geodetic_to_ned(
         Projection::ArduPilot => {
             let scale = ARDUPILOT_M_PER_1E7_DEG * 1e7;
             let middle = ((origin.lat_deg + position.lat_deg) / 2.0).to_radians();
-            let east = wrap_deg(position.lon_deg - origin.lon_deg) * scale * cos(middle).max(0.01);
+            let east =
+                wrap_180_deg(position.lon_deg - origin.lon_deg) * scale * cos(middle).max(0.01);
             Vector3::new((position.lat_deg - origin.lat_deg) * scale, east, down)
         }
     }
@@ -174,13 +175,13 @@ pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<
             let lat = asin((cos(c) * sin(lat0) + north * sin(c) * cos(lat0) / c).clamp(-1.0, 1.0));
             let lon =
                 lon0 + atan2(east * sin(c), c * cos(lat0) * cos(c) - north * sin(lat0) * sin(c));
-            Geodetic { lat_deg: lat.to_degrees(), lon_deg: wrap_deg(lon.to_degrees()), alt_m }
+            Geodetic { lat_deg: lat.to_degrees(), lon_deg: wrap_180_deg(lon.to_degrees()), alt_m }
         }
         Projection::ArduPilot => {
             let scale = ARDUPILOT_M_PER_1E7_DEG * 1e7;
             let lat_deg = origin.lat_deg + ned.x / scale;
             let middle = ((origin.lat_deg + lat_deg) / 2.0).to_radians();
-            let lon_deg = wrap_deg(origin.lon_deg + ned.y / (scale * cos(middle).max(0.01)));
+            let lon_deg = wrap_180_deg(origin.lon_deg + ned.y / (scale * cos(middle).max(0.01)));
             Geodetic { lat_deg, lon_deg, alt_m }
         }
     }
@@ -188,7 +189,7 @@ pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<
 
 /// A longitude, or a difference of two, wrapped into [-180, 180] degrees. Unwrapped, a difference
 /// of 359.9999 degrees across the antimeridian would become 40 000 km instead of 11 m.
-fn wrap_deg(degrees: f64) -> f64 {
+fn wrap_180_deg(degrees: f64) -> f64 {
     if fabs(degrees) <= 180.0 { degrees } else { libm::remainder(degrees, 360.0) }
 }
 

@@ -32,7 +32,7 @@ const CRC_LEN: usize = 4;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldShape {
     /// The south-western node, metres east and north in the mission frame.
-    pub low: Flat,
+    pub south_west: Flat,
     /// Distance from one node to the next, metres.
     pub cell_m: f32,
     /// Nodes from west to east, at least 2.
@@ -57,7 +57,11 @@ impl FieldShape {
             return Err(FileError::Header("number of nodes"));
         }
         let sound = |value: f32| libm::fabsf(value) <= 1e6;
-        if !(self.cell_m >= 0.1 && self.cell_m <= 1e4 && sound(self.low.x) && sound(self.low.y)) {
+        if !(self.cell_m >= 0.1
+            && self.cell_m <= 1e4
+            && sound(self.south_west.x)
+            && sound(self.south_west.y))
+        {
             return Err(FileError::Header("place of nodes"));
         }
         Ok(())
@@ -127,8 +131,8 @@ impl<'a> FieldView<'a> {
             let first = fminf(floorf(cells), most - 1.0);
             (first as usize, cells - first)
         };
-        let (column, east) = axis(place.x, self.shape.low.x, self.shape.columns);
-        let (row, north) = axis(place.y, self.shape.low.y, self.shape.rows);
+        let (column, east) = axis(place.x, self.shape.south_west.x, self.shape.columns);
+        let (row, north) = axis(place.y, self.shape.south_west.y, self.shape.rows);
         let node = |column: usize, row: usize| {
             let index = row * usize::from(self.shape.columns) + column;
             self.nodes.get(index).map_or(0.0, |node| f32::from(i16::from_le_bytes(*node)))
@@ -157,7 +161,8 @@ fn parse_shape(header: &[u8; HEADER_LEN]) -> Result<FieldShape, FileError> {
         return Err(FileError::Version(word(8)));
     }
     let low = Flat::new(number(16), number(20));
-    let shape = FieldShape { low, cell_m: number(24), columns: word(10), rows: word(12) };
+    let shape =
+        FieldShape { south_west: low, cell_m: number(24), columns: word(10), rows: word(12) };
     shape.check()?;
     Ok(shape)
 }
@@ -174,7 +179,7 @@ pub fn write(shape: &FieldShape, nodes_dm: &[i16], out: &mut [u8]) -> Result<usi
         return Err(FileError::Length);
     }
     let words = [VERSION, shape.columns, shape.rows, 0];
-    let numbers = [shape.low.x, shape.low.y, shape.cell_m];
+    let numbers = [shape.south_west.x, shape.south_west.y, shape.cell_m];
     let head = MAGIC.into_iter().chain(words.into_iter().flat_map(u16::to_le_bytes));
     let head = head.chain(numbers.into_iter().flat_map(f32::to_le_bytes));
     let body = nodes_dm.iter().flat_map(|node| node.to_le_bytes());

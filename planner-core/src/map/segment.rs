@@ -17,8 +17,8 @@
 //! So for ends on the lattice (multiples of resolution / 16384; also a corner and a resolution for
 //! which `(p − min) / resolution` is exact, such as powers of two) the answer is right, touching
 //! included. For any other ends the answer is that for a segment whose ends are moved by at most
-//! [`snap_error_cells`]: 2⁻¹⁵ cell of snapping and two f32 roundings, 0.000 06 cell in a grid of
-//! 256 cells a side, 15 µm at 0.25 m.
+//! [`max_snap_error_cells`]: 2⁻¹⁵ cell of snapping and two f32 roundings, 0.000 06 cell in a grid
+//! of 256 cells a side, 15 µm at 0.25 m.
 //!
 //! # Cost
 //!
@@ -36,8 +36,8 @@ mod walk;
 
 pub(crate) use self::distance::is_farther_than;
 pub use self::distance::{point_clearance, segment_clearance};
-pub(crate) use self::lanes::lane_mask;
-pub use self::lattice::{FRACTION_BITS, MAX_SNAPPED, Snapped, snap, snap_error_cells};
+pub(crate) use self::lanes::brick_layer_mask;
+pub use self::lattice::{FRACTION_BITS, MAX_SNAPPED, Snapped, max_snap_error_cells, snap};
 pub(crate) use self::walk::snapped_rest_touches;
 pub use self::walk::snapped_segment_touches;
 use crate::Point;

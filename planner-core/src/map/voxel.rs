@@ -9,7 +9,7 @@
 use crate::Point;
 
 /// Cells along one edge of a brick.
-pub const BRICK_CELLS: u32 = 4;
+pub const CELLS_PER_BRICK_EDGE: u32 = 4;
 
 /// Reason why [`VoxelGrid::new`] refused a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,14 +43,14 @@ pub struct GridShape {
 impl GridShape {
     /// Number of bricks along each axis, the last one of which may be partly used.
     #[inline]
-    pub fn bricks(&self) -> [u32; 3] {
-        self.dims.map(|d| d.div_ceil(BRICK_CELLS))
+    pub fn brick_dims(&self) -> [u32; 3] {
+        self.dims.map(|d| d.div_ceil(CELLS_PER_BRICK_EDGE))
     }
 
     /// Number of bricks in the grid, which is the number of 64-bit words that it needs;
     /// `usize::MAX` on overflow.
     pub fn word_count(&self) -> usize {
-        self.bricks().iter().fold(1, |count: usize, &b| count.saturating_mul(b as usize))
+        self.brick_dims().iter().fold(1, |count: usize, &b| count.saturating_mul(b as usize))
     }
 
     /// Maximum corner of the grid in the mission frame, metres.
@@ -84,7 +84,7 @@ impl GridShape {
     /// cell, or an index beyond the words.
     #[inline]
     pub fn word_and_mask(&self, [i, j, k]: [u32; 3]) -> (usize, u64) {
-        let [bx, by, _] = self.bricks();
+        let [bx, by, _] = self.brick_dims();
         let word = (k / 4).wrapping_mul(by).wrapping_add(j / 4).wrapping_mul(bx).wrapping_add(i / 4)
             as usize;
         (word, 1 << ((k % 4) * 16 + (j % 4) * 4 + i % 4))
@@ -100,15 +100,17 @@ impl GridShape {
             [0x000f_000f_000f_000f, 0x00ff_00ff_00ff_00ff, 0x0fff_0fff_0fff_0fff],
             [0xffff, 0xffff_ffff, 0xffff_ffff_ffff],
         ];
-        let bricks = self.bricks();
-        (0..3).filter(|&axis| !self.dims[axis].is_multiple_of(BRICK_CELLS)).all(|axis| {
-            let padding = !BRICK_LAYER_MASKS[axis][(self.dims[axis] % BRICK_CELLS) as usize - 1];
+        let bricks = self.brick_dims();
+        (0..3).filter(|&axis| !self.dims[axis].is_multiple_of(CELLS_PER_BRICK_EDGE)).all(|axis| {
+            let padding =
+                !BRICK_LAYER_MASKS[axis][(self.dims[axis] % CELLS_PER_BRICK_EDGE) as usize - 1];
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             (0..bricks[u]).all(|at_u| {
                 (0..bricks[v]).all(|at_v| {
                     let mut cell = [0; 3];
                     (cell[axis], cell[u], cell[v]) = (bricks[axis] - 1, at_u, at_v);
-                    let (word, _) = self.word_and_mask(cell.map(|brick| brick * BRICK_CELLS));
+                    let (word, _) =
+                        self.word_and_mask(cell.map(|brick| brick * CELLS_PER_BRICK_EDGE));
                     words[word] & padding == 0
                 })
             })
@@ -139,13 +141,13 @@ pub enum Outside {
 #[derive(Clone, Copy, Debug)]
 pub struct VoxelGrid<'a> {
     shape: GridShape,
-    outside: Outside,
+    beyond_map: Outside,
     words: &'a [u64],
 }
 
 impl<'a> VoxelGrid<'a> {
     /// Checks shape, number of words and padding bits. Reads the bricks at the upper faces only.
-    pub fn new(shape: GridShape, outside: Outside, words: &'a [u64]) -> Result<Self, GridError> {
+    pub fn new(shape: GridShape, beyond_map: Outside, words: &'a [u64]) -> Result<Self, GridError> {
         shape.check()?;
         if words.len() != shape.word_count() {
             return Err(GridError::WordCount);
@@ -153,7 +155,7 @@ impl<'a> VoxelGrid<'a> {
         if !shape.padding_is_clear(words) {
             return Err(GridError::Padding);
         }
-        Ok(Self { shape, outside, words })
+        Ok(Self { shape, beyond_map, words })
     }
 
     /// Dimensions, position and resolution.
@@ -164,8 +166,8 @@ impl<'a> VoxelGrid<'a> {
 
     /// Whether the space beyond the faces is obstacle or free.
     #[inline]
-    pub fn outside(&self) -> Outside {
-        self.outside
+    pub fn beyond_map(&self) -> Outside {
+        self.beyond_map
     }
 
     /// The words, one per brick: x fastest, then y, then z.
@@ -179,7 +181,7 @@ impl<'a> VoxelGrid<'a> {
     #[inline]
     pub fn is_occupied(&self, cell: [u32; 3]) -> bool {
         if (0..3).any(|axis| cell[axis] >= self.shape.dims[axis]) {
-            return self.outside == Outside::Blocked;
+            return self.beyond_map == Outside::Blocked;
         }
         let (word, mask) = self.shape.word_and_mask(cell);
         self.words[word] & mask != 0
@@ -190,7 +192,7 @@ impl<'a> VoxelGrid<'a> {
     pub fn is_blocked_at(&self, p: &Point) -> bool {
         match self.shape.cell_of(p) {
             Some(cell) => self.is_occupied(cell),
-            None => self.outside == Outside::Blocked,
+            None => self.beyond_map == Outside::Blocked,
         }
     }
 }

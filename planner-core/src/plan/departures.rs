@@ -22,8 +22,8 @@ use crate::sort;
 /// Most comparisons of a take-off time with that of a scheduled flight, in a whole search: a third
 /// of a second on a board.
 const MAX_COMPARISONS: u32 = 150_000;
-/// Comparisons per pair of vehicles in a swarm larger than [`BOARD_VEHICLES`], if that is more than
-/// [`MAX_COMPARISONS`].
+/// Comparisons per pair of vehicles in a swarm larger than [`MAX_BOARD_VEHICLES`], if that is more
+/// than [`MAX_COMPARISONS`].
 const COMPARISONS_PER_PAIR: u32 = 200;
 /// Weight of the mean landing time relative to the last landing time: of two orders with the same
 /// end of the mission, the one with less waiting wins.
@@ -31,23 +31,24 @@ const MEAN_LANDING_WEIGHT: f32 = 0.02;
 
 /// For each pair of flights `i` and `j` the forbidden interval of the difference of their take-off
 /// times, that of `i` minus that of `j`, seconds.
-struct ForbiddenDifferences<'a> {
+struct ForbiddenDepartureDifferences<'a> {
     /// For a pair i < j the interval's lower end is at `[i][j]`, its upper end at `[j][i]`.
     ends: &'a [f32],
-    count: usize,
+    flight_count: usize,
 }
 
-impl ForbiddenDifferences<'_> {
+impl ForbiddenDepartureDifferences<'_> {
     fn forbidden_interval(&self, i: usize, j: usize) -> (f32, f32) {
         let (low, high) = (i.min(j), i.max(j));
-        let (from, to) = (self.ends[low * self.count + high], self.ends[high * self.count + low]);
+        let (from, to) =
+            (self.ends[low * self.flight_count + high], self.ends[high * self.flight_count + low]);
         if i < j { (from, to) } else { (-to, -from) }
     }
 
     /// Computes the take-off times of vehicles that are scheduled in this `order`, each as early as
     /// those before it allow. Returns the order's cost in seconds: last landing time plus weighted
     /// mean landing time. `comparisons_left` bounds the further comparisons.
-    fn departure_times(
+    fn order_cost_s(
         &self,
         order: &[u16],
         lasts_s: &[f32],
@@ -111,29 +112,29 @@ pub(super) fn improve_departure_order<
         return Ok(());
     }
     let ends = &mut ws.costs.as_flattened_mut()[..count * count];
-    find_differences(cfg, &out.flights, handover_s, &mut ws.schedule, ends)?;
-    let differences =
-        ForbiddenDifferences { ends: &ws.costs.as_flattened()[..count * count], count };
+    find_forbidden_differences(cfg, &out.flights, handover_s, &mut ws.schedule, ends)?;
+    let ends = &ws.costs.as_flattened()[..count * count];
+    let differences = ForbiddenDepartureDifferences { ends, flight_count: count };
     let by_departure = |a: &u16, b: &u16| {
         found_s[usize::from(*a)].total_cmp(&found_s[usize::from(*b)]).then(a.cmp(b))
     };
-    sort::sort_by(&mut order, by_departure);
+    sort::heapsort_by(&mut order, by_departure);
     let pairs = (order.len() * order.len()) as u32;
-    let mut comparisons_left = if count <= BOARD_VEHICLES {
+    let mut comparisons_left = if count <= MAX_BOARD_VEHICLES {
         MAX_COMPARISONS
     } else {
         MAX_COMPARISONS.max(COMPARISONS_PER_PAIR * pairs)
     };
     let mut departs_s = lasts_s.clone();
     let mut best =
-        differences.departure_times(&order, &lasts_s, &mut departs_s, &mut comparisons_left);
+        differences.order_cost_s(&order, &lasts_s, &mut departs_s, &mut comparisons_left);
     let mut rng = Pcg32::seed_from_u64(order.len() as u64);
     let mut below = |bound: usize| ((u64::from(rng.next_u32()) * bound as u64) >> 32) as usize;
     while comparisons_left > 0 {
         let (from, to) = (below(order.len()), below(order.len()));
         move_element(&mut order, from, to);
         let cost =
-            differences.departure_times(&order, &lasts_s, &mut departs_s, &mut comparisons_left);
+            differences.order_cost_s(&order, &lasts_s, &mut departs_s, &mut comparisons_left);
         if cost <= best {
             best = cost;
         } else {
@@ -158,8 +159,8 @@ pub(super) fn improve_departure_order<
 }
 
 /// Writes the forbidden interval of each pair of flights to `ends`, in the layout of
-/// [`ForbiddenDifferences::ends`].
-fn find_differences<const W: usize>(
+/// [`ForbiddenDepartureDifferences::ends`].
+fn find_forbidden_differences<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
     handover_s: f32,
@@ -169,8 +170,9 @@ fn find_differences<const W: usize>(
     let count = flights.len();
     for (i, a) in flights.iter().enumerate() {
         for (j, b) in flights.iter().enumerate().skip(i + 1) {
-            let differences = schedule::forbidden_differences(cfg, a, b, handover_s, ws);
-            let (from, to) = differences.map_err(|e| PlanError::Schedule(a.id, e))?;
+            let differences =
+                schedule::forbidden_departure_differences_s(cfg, a, b, handover_s, ws);
+            let (from, to) = differences.map_err(|e| PlanError::Schedule(a.vehicle_id, e))?;
             (ends[i * count + j], ends[j * count + i]) = (from, to);
         }
     }
@@ -178,7 +180,7 @@ fn find_differences<const W: usize>(
 }
 
 /// Largest swarm that is planned on a board.
-const BOARD_VEHICLES: usize = 32;
+const MAX_BOARD_VEHICLES: usize = 32;
 
 /// Schedules the vehicles in this order, each to take off as early as those before it allow.
 /// Vehicles that stay on their pads count as scheduled before all.

@@ -16,7 +16,7 @@ use crate::flight::{Flight, Path, PathError};
 use crate::roadmap::search::{self, SearchError, SearchWorkspace};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::sipp::{self, RouteQuery};
-use crate::schedule::{self, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, ScheduleError};
+use crate::schedule::{self, DEFAULT_MAX_SEGMENT_M, MAX_TIMED_SEGMENTS, ScheduleError};
 use crate::sort;
 
 /// Schedules all flights, those with the longest path first; if that fails, those with the shortest
@@ -46,20 +46,21 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
         let _ = (order.push(i as u16), shortest_m.push(length));
     }
     let mut failed = Ok(());
-    for first in [InitialOrder::Longest, InitialOrder::Shortest] {
+    for first in [InitialOrder::LongestFirst, InitialOrder::ShortestFirst] {
         // Vehicles that stay on their pads come first, since they block all others. Among equal
         // lengths the higher id is first (paper P3D §3.4).
-        sort::sort_by(&mut order, |&a, &b| {
+        sort::heapsort_by(&mut order, |&a, &b| {
             let (a, b) = (usize::from(a), usize::from(b));
             let (goals, ids) = (
                 [a, b].map(|i| out.flights[i].task.leaves_pad()),
-                (out.flights[b].id, out.flights[a].id),
+                (out.flights[b].vehicle_id, out.flights[a].vehicle_id),
             );
             let longer = shortest_m[b].total_cmp(&shortest_m[a]);
-            let longer = if first == InitialOrder::Longest { longer } else { longer.reverse() };
+            let longer =
+                if first == InitialOrder::LongestFirst { longer } else { longer.reverse() };
             goals[0].cmp(&goals[1]).then(longer).then(ids.0.cmp(&ids.1))
         });
-        let head_start = HeadStart { count: 0, head_start_s: 0.0, handover_s };
+        let head_start = HeadStart { early_vehicles: 0, head_start_s: 0.0, handover_s };
         failed = schedule_with_reordering(view, request, (&mut order, head_start), ws, out);
         if failed.is_ok() {
             break;
@@ -71,8 +72,8 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
 /// Order in which vehicles are scheduled in the first round.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum InitialOrder {
-    Longest,
-    Shortest,
+    LongestFirst,
+    ShortestFirst,
 }
 
 /// Schedules in this order. In the next round a vehicle for which no times were found is moved to
@@ -86,7 +87,7 @@ fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, cons
 ) -> Result<(), PlanError> {
     let mut failed = Ok(());
     let reorderings = order.len().min(MAX_REORDERINGS);
-    for round in 0..=reorderings + MAX_HEAD_STARTS {
+    for round in 0..=reorderings + MAX_HEAD_START_ROUNDS {
         let Err((place, error)) = schedule_round(view, request, order, &head_start, ws, out) else {
             return shorten_hovers(view, request, (order, &head_start), ws, out);
         };
@@ -94,8 +95,8 @@ fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, cons
         if round < reorderings {
             move_to_front(order, place, &out.flights);
         } else {
-            head_start.count = head_start.count.max(order.len() - place);
-            head_start.head_start_s += HEAD_START_S;
+            head_start.early_vehicles = head_start.early_vehicles.max(order.len() - place);
+            head_start.head_start_s += HEAD_START_STEP_S;
             order[place..].rotate_left(1);
         }
     }
@@ -110,7 +111,7 @@ fn move_to_front<const W: usize>(order: &mut [u16], place: usize, flights: &[Fli
 }
 
 /// Schedules in other orders while a vehicle would hover at one place for longer than
-/// [`LONG_HOVER_S`], and keeps the order in which the longest hover is shortest.
+/// [`MAX_ACCEPTED_HOVER_S`], and keeps the order in which the longest hover is shortest.
 ///
 /// Such a vehicle has to leave its pad for one that was scheduled before it and lands there, but
 /// its goal, or the way there, is only free much later. In the next round it is moved to the front,
@@ -126,7 +127,7 @@ fn shorten_hovers<const N: usize, const V: usize, const W: usize, const P: usize
     let mut best = order.clone();
     let mut has_best = true;
     for _ in 0..MAX_HOVER_REORDERINGS {
-        if shortest_s <= LONG_HOVER_S {
+        if shortest_s <= MAX_ACCEPTED_HOVER_S {
             break;
         }
         // Cannot fail: the order has every vehicle.
@@ -153,13 +154,13 @@ fn shorten_hovers<const N: usize, const V: usize, const W: usize, const P: usize
 
 /// Index of the vehicle that hovers longest at one waypoint, and for how long, seconds.
 fn longest_hover_s<const V: usize, const W: usize>(out: &SwarmPlan<V, W>) -> (usize, f32) {
-    let hovers = out.flights.iter().map(|flight| wait_durations_s(flight).0).enumerate();
+    let hovers = out.flights.iter().map(|flight| longest_and_total_wait_s(flight).0).enumerate();
     hovers.fold((0, 0.0), |longest, hover| if hover.1 > longest.1 { hover } else { longest })
 }
 
 /// Longest hover at one place for which no other order is tried, seconds: half of what counts as a
 /// standstill (20 s), since the vehicle that is waited for may be late.
-const LONG_HOVER_S: f32 = 10.0;
+const MAX_ACCEPTED_HOVER_S: f32 = 10.0;
 /// Most other orders that are tried for shorter hovers. Of 51 random swarms with a longer hover, 20
 /// are without within 8 rounds; twice as many rounds help one or two more.
 const MAX_HOVER_REORDERINGS: usize = 8;
@@ -168,15 +169,15 @@ const MAX_HOVER_REORDERINGS: usize = 8;
 /// rounds the others depart later instead. At most the number of vehicles, too: in a crowd where
 /// many swap places, nearly every vehicle has to leave its place before another one comes.
 const MAX_REORDERINGS: usize = 64;
-/// Most rounds in which the others depart later, each time by [`HEAD_START_S`] more.
-const MAX_HEAD_STARTS: usize = 8;
+/// Most rounds in which the others depart later, each time by [`HEAD_START_STEP_S`] more.
+const MAX_HEAD_START_ROUNDS: usize = 8;
 /// Time in which one of two vehicles that meet head-on can step aside into a side room, seconds.
-const HEAD_START_S: f32 = 3.0;
+const HEAD_START_STEP_S: f32 = 3.0;
 
-/// Head start: the last `count` vehicles in the order may take off at once, all others after
+/// Head start: the last `early_vehicles` in the order may take off at once, all others after
 /// `head_start_s`.
 struct HeadStart {
-    count: usize,
+    early_vehicles: usize,
     head_start_s: f32,
     /// Time from when a vehicle has left a place until another one may be there, seconds.
     handover_s: f32,
@@ -185,7 +186,7 @@ struct HeadStart {
 /// The vehicle to be scheduled next, and those before and after it.
 struct SchedulingTurn<'a> {
     /// Index of the vehicle in the request.
-    index: usize,
+    vehicle_index: usize,
     /// Indices of the vehicles that are scheduled already.
     before: &'a [u16],
     /// Indices of the vehicles that are still to be scheduled.
@@ -210,10 +211,13 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
             continue;
         }
         let (before, waiting) = (&order[..place], &order[place + 1..]);
-        let not_before_s =
-            if place + head_start.count < order.len() { head_start.head_start_s } else { 0.0 };
+        let not_before_s = if place + head_start.early_vehicles < order.len() {
+            head_start.head_start_s
+        } else {
+            0.0
+        };
         let turn = SchedulingTurn {
-            index,
+            vehicle_index: index,
             before,
             waiting,
             not_before_s,
@@ -222,8 +226,9 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
         let waits = plan_with_pad_wait(view, request, &turn, ws, out);
         let flight = match waits.map_err(|error| (place, error))? {
             Some(flight) => flight,
-            None => plan_with_path_waits(view, request, &turn, ws, out)
-                .map_err(|error| (place, PlanError::Schedule(out.flights[index].id, error)))?,
+            None => plan_with_path_waits(view, request, &turn, ws, out).map_err(|error| {
+                (place, PlanError::Schedule(out.flights[index].vehicle_id, error))
+            })?,
         };
         out.flights[index] = flight;
     }
@@ -239,7 +244,7 @@ fn plan_with_pad_wait<const N: usize, const V: usize, const W: usize, const P: u
     ws: &mut PlanWorkspace<N, V, P>,
     out: &SwarmPlan<V, W>,
 ) -> Result<Option<Flight<W>>, PlanError> {
-    let &SchedulingTurn { index, before, waiting, not_before_s, handover_s } = turn;
+    let &SchedulingTurn { vehicle_index: index, before, waiting, not_before_s, handover_s } = turn;
     let flight = &out.flights[index];
     let Some(goal) = flight.task.goal() else { return Ok(None) };
     let ends = PathEnds::new(request, index, goal);
@@ -249,7 +254,8 @@ fn plan_with_pad_wait<const N: usize, const V: usize, const W: usize, const P: u
         if find_path(view, request, &ends, &parked, &mut ws.search, &mut nodes)?.is_infinite() {
             continue;
         }
-        let mut path = path_from_nodes(view, &nodes).map_err(|e| PlanError::Path(flight.id, e))?;
+        let mut path =
+            path_from_nodes(view, &nodes).map_err(|e| PlanError::Path(flight.vehicle_id, e))?;
         path.set_times_at_speed(
             flight.climb_m / request.schedule.vertical_mps,
             request.schedule.cruise_mps,
@@ -262,7 +268,7 @@ fn plan_with_pad_wait<const N: usize, const V: usize, const W: usize, const P: u
         match schedule::departure_with_handover(cfg, &flight, from_s, scheduled, &mut ws.schedule) {
             Ok(depart_s) => return Ok(Some(Flight { depart_s, ..flight })),
             Err(ScheduleError::Blocked) => {}
-            Err(error) => return Err(PlanError::Schedule(flight.id, error)),
+            Err(error) => return Err(PlanError::Schedule(flight.vehicle_id, error)),
         }
     }
     Ok(None)
@@ -270,8 +276,8 @@ fn plan_with_pad_wait<const N: usize, const V: usize, const W: usize, const P: u
 
 /// The vehicle's flight on a route searched with waits and sidesteps, if possible clear of the pads
 /// of waiting vehicles. The flight that arrives earliest may take off only to wait long in the air.
-/// Then later take-offs are tried, until no wait is longer than [`LONG_WAIT_S`], with at most
-/// [`MAX_DEPARTURES`] searches; the flight whose longest wait is shortest is returned.
+/// Then later take-offs are tried, until no wait is longer than [`MAX_ACCEPTED_WAIT_S`], with at
+/// most [`MAX_DEPARTURE_TRIES`] searches; the flight whose longest wait is shortest is returned.
 fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -279,7 +285,7 @@ fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P:
     ws: &mut PlanWorkspace<N, V, P>,
     out: &SwarmPlan<V, W>,
 ) -> Result<Flight<W>, ScheduleError> {
-    let &SchedulingTurn { index, before, waiting, not_before_s, handover_s } = turn;
+    let &SchedulingTurn { vehicle_index: index, before, waiting, not_before_s, handover_s } = turn;
     let mut flight = out.flights[index].clone();
     let Some(goal) = flight.task.goal() else { return Ok(flight) };
     let PathEnds { from, to, vehicle } = PathEnds::new(request, index, goal);
@@ -290,8 +296,8 @@ fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P:
         let mut route =
             RouteQuery { cfg, from, to, not_before_s, parked: &parked.before_flight, handover_s };
         let mut best: Option<Flight<W>> = None;
-        flight.segment_m = MAX_TIMED_SEGMENT_M;
-        for _ in 0..MAX_DEPARTURES {
+        flight.max_segment_m = DEFAULT_MAX_SEGMENT_M;
+        for _ in 0..MAX_DEPARTURE_TRIES {
             let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
             match sipp::find_route(view, &route, passable, scheduled, &mut ws.sipp, &mut flight) {
                 // Searched again with the longer timed segments that the flight needs.
@@ -303,11 +309,11 @@ fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P:
                 Err(ScheduleError::Blocked) => break,
                 Err(error) => return Err(error),
             }
-            let (longest_s, all_s) = wait_durations_s(&flight);
-            if best.as_ref().is_none_or(|best| longest_s < wait_durations_s(best).0) {
+            let (longest_s, all_s) = longest_and_total_wait_s(&flight);
+            if best.as_ref().is_none_or(|best| longest_s < longest_and_total_wait_s(best).0) {
                 best = Some(flight.clone());
             }
-            if longest_s <= LONG_WAIT_S {
+            if longest_s <= MAX_ACCEPTED_WAIT_S {
                 break;
             }
             route.not_before_s = flight.depart_s + all_s;
@@ -320,14 +326,14 @@ fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P:
 }
 
 /// Most take-off times that are tried for one vehicle.
-const MAX_DEPARTURES: usize = 6;
+const MAX_DEPARTURE_TRIES: usize = 6;
 /// Longest wait in the air at one place that the planner accepts without trying a later take-off,
 /// seconds: a quarter of what counts as a standstill (20 s), since the vehicle that is waited for
 /// may be late.
-const LONG_WAIT_S: f32 = 5.0;
+const MAX_ACCEPTED_WAIT_S: f32 = 5.0;
 
 /// The longest wait of a flight at a waypoint, and the sum of all its waits there, seconds.
-fn wait_durations_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
+fn longest_and_total_wait_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
     let waits = flight.path.waypoints().iter().map(|w| w.leave_s - w.arrive_s);
     waits.fold((0.0, 0.0), |(longest, all), wait| (fmaxf(longest, wait), all + wait))
 }

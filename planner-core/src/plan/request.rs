@@ -44,7 +44,7 @@ pub struct PlanRequest<'a> {
     pub vehicles: &'a [VehicleTask],
     /// Height of each goal above the ground below it, metres; one entry for each goal of the
     /// roadmap.
-    pub descents_m: &'a [f32],
+    pub goal_descents_m: &'a [f32],
     /// Whether goals are given to vehicles or assigned.
     pub mode: GoalMode,
     /// Separations and nominal speeds.
@@ -73,7 +73,7 @@ impl PlanRequest<'_> {
                 return Err(PlanError::SameGoal(vehicle.id));
             }
         }
-        match self.descents_m.iter().position(|&height_m| !good(height_m)) {
+        match self.goal_descents_m.iter().position(|&height_m| !good(height_m)) {
             Some(goal) => Err(PlanError::BadDescent(goal as u16)),
             None => Ok(()),
         }

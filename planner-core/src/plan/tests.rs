@@ -45,8 +45,8 @@ fn open_roadmap(terminals: &[Point], starts: usize, nodes: usize, seed: u64) -> 
         edge_max_m: 8.0,
         tested_clearance_m: 0.0,
         max_clearance_m: 4.0,
-        starts: starts as u16,
-        goals: (terminals.len() - starts) as u16,
+        start_count: starts as u16,
+        goal_count: (terminals.len() - starts) as u16,
     };
     let mut bytes = std::vec![0; roadmap::encoded_len(points.len(), edges.len(), 0).unwrap()];
     roadmap::write(&header, &points, &edges, &mut bytes).unwrap();
@@ -81,8 +81,13 @@ fn plan(
     let mut ws = Box::new(PlanWorkspace::<1024, 16, 2048>::new());
     let mut out = SwarmPlan::new();
     let descents = std::vec![HEIGHT_M; goals];
-    let request =
-        PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, max_gates: 1024 };
+    let request = PlanRequest {
+        vehicles,
+        goal_descents_m: &descents,
+        mode,
+        schedule: SCHEDULE,
+        max_gates: 1024,
+    };
     plan_swarm(&view, &request, &mut ws, &mut out).map(|()| out)
 }
 
@@ -168,8 +173,8 @@ fn corridor(length_m: f32, side_at_m: f32, depth_m: f32) -> StdVec<u8> {
         edge_max_m: 8.0,
         tested_clearance_m: 0.0,
         max_clearance_m: 4.0,
-        starts: 2,
-        goals: 2,
+        start_count: 2,
+        goal_count: 2,
     };
     let mut bytes = std::vec![0; roadmap::encoded_len(nodes.len(), edges.len(), 0).unwrap()];
     roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
@@ -231,7 +236,7 @@ fn unlabelled_is_no_longer_than_labelled_and_makespan_no_later() {
         let makespan =
             plan(&bytes, &tasks(8), 8, GoalMode::Unlabelled(Objective::Makespan)).unwrap();
         // Detours around pads and landing places may lengthen a path a little.
-        assert!(total.total_m() <= labelled.total_m() * 1.05, "seed {seed}");
+        assert!(total.total_path_m() <= labelled.total_path_m() * 1.05, "seed {seed}");
         assert!(longest(&makespan) <= longest(&total) * 1.05, "seed {seed}");
     }
 }
@@ -307,8 +312,8 @@ fn queue(
         edge_max_m: edge_m,
         tested_clearance_m: 0.0,
         max_clearance_m: 4.0,
-        starts: vehicles as u16,
-        goals: vehicles as u16,
+        start_count: vehicles as u16,
+        goal_count: vehicles as u16,
     };
     let mut bytes = std::vec![0; roadmap::encoded_len(nodes.len(), edges.len(), 0).unwrap()];
     roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
@@ -322,8 +327,13 @@ fn fits<const G: usize>(bytes: &[u8], vehicles: &[VehicleTask]) -> (bool, Result
     let mut out = SwarmPlan::<16, 64>::new();
     let descents = std::vec![HEIGHT_M; vehicles.len()];
     let mode = GoalMode::Labelled;
-    let request =
-        PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, max_gates: G };
+    let request = PlanRequest {
+        vehicles,
+        goal_descents_m: &descents,
+        mode,
+        schedule: SCHEDULE,
+        max_gates: G,
+    };
     let planned = plan_swarm(&view, &request, &mut ws, &mut out);
     let mut own = VehiclePlan::<64, G>::default();
     let all = (0..vehicles.len())
@@ -351,7 +361,8 @@ fn flights_of_four_kilometres_are_scheduled_and_flown() {
     let plan = plan(&bytes, &vehicles, 3, GoalMode::Labelled).unwrap();
     for flight in &plan.flights {
         assert!(
-            flight.path.length_m() > 4000.0 && flight.segment_m > schedule::MAX_TIMED_SEGMENT_M
+            flight.path.length_m() > 4000.0
+                && flight.max_segment_m > schedule::DEFAULT_MAX_SEGMENT_M
         );
     }
     for speeds in [[10.0, 10.0, 10.0], [4.0, 10.0, 7.0]] {

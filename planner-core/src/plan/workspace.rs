@@ -26,7 +26,7 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
     }
 
     /// Sum of the lengths of all paths, metres.
-    pub fn total_m(&self) -> f64 {
+    pub fn total_path_m(&self) -> f64 {
         self.flights.iter().map(|f| f64::from(f.path.length_m())).sum()
     }
 }

@@ -2,7 +2,7 @@
 //! the header's limits, and distances to landmarks that are those of shortest paths.
 
 use super::format::{
-    LANDMARKS, MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, has_valid_coordinates,
+    LANDMARK_COUNT, MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, has_valid_coordinates,
 };
 use super::view::RoadmapView;
 
@@ -67,7 +67,7 @@ impl RoadmapView<'_> {
     /// ever smaller distances leads to the landmark, so none is too small; along the true shortest
     /// path, none is too large.)
     pub(super) fn check_landmarks(&self) -> Result<(), RoadmapError> {
-        if self.landmarks.is_empty() {
+        if self.landmark_distances.is_empty() {
             return Ok(());
         }
         let nodes = 0..self.nodes.len() as u16;
@@ -81,18 +81,18 @@ impl RoadmapView<'_> {
         let landmarks = [0, farthest];
         for node in nodes {
             let here = self.landmark_distances_m(node);
-            let (mut sound, mut explained) = (true, [false; LANDMARKS]);
+            let (mut sound, mut explained) = (true, [false; LANDMARK_COUNT]);
             for edge in self.half_edges(node) {
                 let length = self.distance_m(node, edge.target);
                 let there = self.landmark_distances_m(edge.target);
-                for i in 0..LANDMARKS {
+                for i in 0..LANDMARK_COUNT {
                     let reached = there[i] > 0.0 || edge.target == landmarks[i];
                     let way = there[i] + length;
                     sound &= !reached || here[i] <= way && (here[i] > 0.0 || node == landmarks[i]);
                     explained[i] |= reached && here[i] == way && there[i] < here[i];
                 }
             }
-            for i in 0..LANDMARKS {
+            for i in 0..LANDMARK_COUNT {
                 sound &= match here[i] {
                     0.0 => true,
                     way => {

@@ -27,10 +27,10 @@ pub const MAX_LANDMARK_DISTANCE_M: f32 = 4.0 * MAX_COORDINATE_M;
 pub const MAX_CLEARANCE_M: f32 = 65.535;
 
 /// Number of landmarks of a roadmap, unless it has none.
-pub const LANDMARKS: usize = 2;
+pub const LANDMARK_COUNT: usize = 2;
 
 pub(super) const NODE_LEN: usize = 12;
-pub(super) const LANDMARKS_LEN: usize = 4 * LANDMARKS;
+pub(super) const LANDMARK_DISTANCES_LEN: usize = 4 * LANDMARK_COUNT;
 pub(super) const HEIGHT_LEN: usize = 4;
 pub(super) const WORD_LEN: usize = 4;
 
@@ -103,10 +103,10 @@ pub struct RoadmapHeader {
     /// Largest clearance stored, metres: an edge that stores this value has at least this
     /// clearance.
     pub max_clearance_m: f32,
-    /// Number of start nodes, which are the nodes `0..starts`.
-    pub starts: u16,
-    /// Number of goal nodes, which are the nodes `starts..starts + goals`.
-    pub goals: u16,
+    /// Number of start nodes, which are the nodes `0..start_count`.
+    pub start_count: u16,
+    /// Number of goal nodes, which are the nodes `start_count..start_count + goal_count`.
+    pub goal_count: u16,
 }
 
 impl RoadmapHeader {
@@ -127,7 +127,7 @@ impl RoadmapHeader {
         if !(self.max_clearance_m >= 0.0 && self.max_clearance_m <= MAX_CLEARANCE_M) {
             return refuse("max_clearance_m");
         }
-        if usize::from(self.starts) + usize::from(self.goals) > node_count {
+        if usize::from(self.start_count) + usize::from(self.goal_count) > node_count {
             return refuse("terminals");
         }
         Ok(())
@@ -144,9 +144,9 @@ impl RoadmapHeader {
     /// is a millimetre below the tested clearance: the test is exact, the distance is rounded.
     pub(super) fn clearance_limits_m(&self) -> (f32, f32) {
         let metres = |millimetres: u16| f32::from(millimetres) / 1000.0;
-        let most = millimetres_down(self.max_clearance_m);
+        let most = floor_to_millimetres(self.max_clearance_m);
         (
-            metres(millimetres_down(self.tested_clearance_m).min(most).saturating_sub(1)),
+            metres(floor_to_millimetres(self.tested_clearance_m).min(most).saturating_sub(1)),
             metres(most),
         )
     }
@@ -154,7 +154,7 @@ impl RoadmapHeader {
 
 /// Metres as whole millimetres, rounded down. In f64 the product is exact, so only the cast rounds;
 /// it saturates at 65535.
-pub(super) fn millimetres_down(metres: f32) -> u16 {
+pub(super) fn floor_to_millimetres(metres: f32) -> u16 {
     (f64::from(metres) * 1000.0) as u16
 }
 
@@ -210,7 +210,7 @@ pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, RoadmapError> {
     let total = u32_at(head, 12) as usize;
     let (node_count, half_edge_count) = (u32_at(head, 60) as usize, u32_at(head, 64) as usize);
     let landmarks = u32_at(head, 68) as usize;
-    let sound = half_edge_count % 2 == 0 && (landmarks == 0 || landmarks == LANDMARKS);
+    let sound = half_edge_count % 2 == 0 && (landmarks == 0 || landmarks == LANDMARK_COUNT);
     if usize::from(u16_at(head, 10)) != HEADER_LEN || !sound {
         return Err(FileError::Length.into());
     }
@@ -224,8 +224,9 @@ pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, RoadmapError> {
 }
 
 /// Length of a roadmap file in bytes, or `None` if it exceeds the file's 32-bit length. `columns`
-/// is how many numbers are stored per node besides its position and row offset: 0, or [`LANDMARKS`]
-/// for [`write_with_landmarks`](super::write_with_landmarks), and one more with heights.
+/// is how many numbers are stored per node besides its position and row offset: 0, or
+/// [`LANDMARK_COUNT`] for [`write_with_landmarks`](super::write_with_landmarks), and one more with
+/// heights.
 pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> {
     let a_node = columns.checked_add(4)?;
     let words = nodes.checked_mul(a_node)?.checked_add(2)?.checked_add(edges.checked_mul(2)?)?;

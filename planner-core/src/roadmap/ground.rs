@@ -14,7 +14,7 @@ use super::view::RoadmapView;
 use crate::Point;
 
 /// Horizontal distance within which nodes count for the ground below a point, metres.
-pub const GROUND_REACH_M: f32 = 3.0;
+pub const MAX_GROUND_NODE_DISTANCE_M: f32 = 3.0;
 /// Most nodes, the nearest ones, that count for the ground below a point. With fewer, edges of the
 /// floor are missed; with more, the range of heights is too wide for a detour to leave the path.
 /// Measured by `tests/tests/detours.rs`.
@@ -23,17 +23,18 @@ const MAX_GROUND_NODES: usize = 6;
 impl RoadmapView<'_> {
     /// Height of the ground below a node, metres up in the mission frame; `None` if the file has no
     /// heights, or nothing is below the node.
-    pub fn ground_m(&self, node: u16) -> Option<f32> {
+    pub fn ground_z_m(&self, node: u16) -> Option<f32> {
         let height_m = f32::from_le_bytes(*self.heights.get(usize::from(node))?);
         height_m.is_finite().then(|| self.node(node).z - height_m)
     }
 
     /// Lowest and highest ground below `place`, metres up in the mission frame: of the nearest
-    /// nodes on the same storey within [`GROUND_REACH_M`]. `None` if none of these has a ground.
-    /// O(nodes).
-    pub fn ground_range_near(&self, place: &Point) -> Option<(f32, f32)> {
+    /// nodes on the same storey within [`MAX_GROUND_NODE_DISTANCE_M`]. `None` if none of these has
+    /// a ground. O(nodes).
+    pub fn ground_z_range_near(&self, place: &Point) -> Option<(f32, f32)> {
         let room_m = 2.0 * self.header.tested_clearance_m;
-        let mut nearest = [(GROUND_REACH_M * GROUND_REACH_M, None); MAX_GROUND_NODES];
+        let mut nearest =
+            [(MAX_GROUND_NODE_DISTANCE_M * MAX_GROUND_NODE_DISTANCE_M, None); MAX_GROUND_NODES];
         for node in 0..self.heights.len() as u16 {
             let at = self.node(node);
             let (east_m, north_m) = (at.x - place.x, at.y - place.y);
@@ -41,7 +42,7 @@ impl RoadmapView<'_> {
             if across >= nearest[MAX_GROUND_NODES - 1].0 || at.z + room_m < place.z {
                 continue;
             }
-            if let Some(ground_m) = self.ground_m(node).filter(|ground_m| *ground_m <= place.z) {
+            if let Some(ground_m) = self.ground_z_m(node).filter(|ground_m| *ground_m <= place.z) {
                 let mut witness = (across, Some(ground_m));
                 for other in nearest.iter_mut().filter(|other| across < other.0) {
                     core::mem::swap(other, &mut witness);

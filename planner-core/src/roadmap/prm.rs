@@ -1,7 +1,7 @@
 //! The probabilistic roadmap (PRM) of paper P3D §3.2, Algorithm 1: terminals (starts and goals) and
 //! random free nodes, joined where a straight flight between two keeps the clearance.
 //!
-//! Starts and goals are nodes; `nodes` random points of free space follow (the paper's count
+//! Starts and goals are nodes; `random_nodes` points of free space follow (the paper's count
 //! excludes the terminals as well). Two nodes are joined iff `edge_min_m ≤ length ≤ edge_max_m` and
 //! the segment between them keeps `clearance_m` ([`segment_is_clear`]). The edges are exactly those
 //! that a loop over all pairs finds ([`connect_all_pairs`]), with less work:
@@ -28,7 +28,8 @@ use rand_pcg::Pcg32;
 
 use self::config::LengthRange;
 pub use self::config::{
-    PrmConfig, PrmEdge, PrmError, Sampling, TRIES_PER_BRIDGE, TRIES_PER_NODE, squared_length,
+    MAX_TRIES_PER_BRIDGE, MAX_TRIES_PER_NODE, PrmConfig, PrmEdge, PrmError, Sampling,
+    squared_length,
 };
 use self::free_box::NodeVisibility;
 pub use self::neighbours::NodeIndex;
@@ -36,8 +37,8 @@ use crate::Point;
 use crate::map::segment::{point_clearance, segment_clearance, segment_is_clear};
 use crate::map::voxel::VoxelGrid;
 
-/// Writes the terminals and then `config.nodes` random free points into `nodes`; returns the number
-/// of nodes written, terminals included.
+/// Writes the terminals and then `config.random_nodes` random free points into `nodes`; returns the
+/// number of nodes written, terminals included.
 ///
 /// A random node lies in a cell that is neither an obstacle nor set in `never_sample` (unknown
 /// space that edges may cross), and farther than `clearance_m` from every obstacle: a nearer node
@@ -51,7 +52,7 @@ pub fn sample_nodes(
     nodes: &mut [Point],
 ) -> Result<usize, PrmError> {
     config.check()?;
-    let total = terminals.len() + config.nodes;
+    let total = terminals.len() + config.random_nodes;
     if total > nodes.len() || total > usize::from(u16::MAX) {
         return Err(PrmError::TooManyNodes);
     }
@@ -73,14 +74,14 @@ pub fn sample_nodes(
             Some(min + draws.next().component_mul(&size)).filter(&is_free)
         };
         let tries = if config.sampling == Sampling::Bridge && found % 2 == 1 {
-            TRIES_PER_BRIDGE
+            MAX_TRIES_PER_BRIDGE
         } else {
             0
         };
         let bridge = (0..tries).find_map(|_| {
             draw(&mut draws).filter(|p| passes_bridge_test(grid, config, p, draws.next()))
         });
-        let free = bridge.or_else(|| (0..TRIES_PER_NODE).find_map(|_| draw(&mut draws)));
+        let free = bridge.or_else(|| (0..MAX_TRIES_PER_NODE).find_map(|_| draw(&mut draws)));
         *node = free.ok_or(PrmError::NoFreeSpace(found))?;
     }
     Ok(total)
@@ -88,7 +89,7 @@ pub fn sample_nodes(
 
 /// Whether a point is farther than the edges' clearance from every obstacle; with clearance 0,
 /// whether its cell is free.
-fn point_has_clearance(grid: &VoxelGrid<'_>, config: &PrmConfig, p: &Point) -> bool {
+fn bridge_end_is_clear(grid: &VoxelGrid<'_>, config: &PrmConfig, p: &Point) -> bool {
     match config.clearance_m > 0.0 {
         true => segment_is_clear(grid, p, p, config.clearance_m),
         false => !grid.is_blocked_at(p),
@@ -103,37 +104,42 @@ fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &PrmConfig, p: &Point, draw:
     let offset = (draw - Point::new(0.5, 0.5, 0.5)) * (2.0 * reach_m);
     [p + offset, p - offset]
         .iter()
-        .all(|end| grid.shape().cell_of(end).is_some() && !point_has_clearance(grid, config, end))
+        .all(|end| grid.shape().cell_of(end).is_some() && !bridge_end_is_clear(grid, config, end))
 }
 
 /// Sequence of pseudo-random or Halton points of the unit cube, [0, 1) on each axis.
 struct SampleSequence {
     rng: Pcg32,
     sampling: Sampling,
-    index: u32,
-    shift: Point,
+    halton_index: u32,
+    halton_shift: Point,
 }
 
 impl SampleSequence {
     fn new(config: &PrmConfig) -> Self {
         let mut rng = Pcg32::seed_from_u64(config.seed);
-        let shift = uniform(&mut rng);
+        let shift = uniform_point(&mut rng);
         // The generator is seeded again, so that uniform points do not depend on the draw of
         // `shift`.
-        Self { rng: Pcg32::seed_from_u64(config.seed), sampling: config.sampling, index: 0, shift }
+        Self {
+            rng: Pcg32::seed_from_u64(config.seed),
+            sampling: config.sampling,
+            halton_index: 0,
+            halton_shift: shift,
+        }
     }
 
     fn next(&mut self) -> Point {
         match self.sampling {
-            Sampling::Uniform | Sampling::Bridge => uniform(&mut self.rng),
+            Sampling::Uniform | Sampling::Bridge => uniform_point(&mut self.rng),
             Sampling::Halton => {
-                self.index = self.index.wrapping_add(1);
+                self.halton_index = self.halton_index.wrapping_add(1);
                 let p = Point::new(
-                    radical_inverse(self.index, 2),
-                    radical_inverse(self.index, 3),
-                    radical_inverse(self.index, 5),
+                    radical_inverse(self.halton_index, 2),
+                    radical_inverse(self.halton_index, 3),
+                    radical_inverse(self.halton_index, 5),
                 );
-                (p + self.shift).map(|x| if x >= 1.0 { x - 1.0 } else { x })
+                (p + self.halton_shift).map(|x| if x >= 1.0 { x - 1.0 } else { x })
             }
         }
     }
@@ -141,7 +147,7 @@ impl SampleSequence {
 
 /// A uniform point of the unit cube, 24 random bits per axis, so every value is exact in f32 and
 /// below 1.
-fn uniform(rng: &mut Pcg32) -> Point {
+fn uniform_point(rng: &mut Pcg32) -> Point {
     let mut draw = || (rng.next_u32() >> 8) as f32 / (1 << 24) as f32;
     let (x, y) = (draw(), draw());
     Point::new(x, y, draw())
@@ -219,7 +225,7 @@ pub fn connect_range_with_clearance_bound<const NODES: usize, const CUBES: usize
             let (a, b) = (workspace.node(place), workspace.node(other));
             PrmEdge { a: a.min(b), b: a.max(b) }
         };
-        workspace.for_each_in_range(place, config, |places| {
+        workspace.for_each_later_in_range(place, config, |places| {
             let hint = |other| hint(edge(other));
             visibility.for_each_visible(workspace, places, hint, |other, room_m| {
                 found(edge(other), room_m)

@@ -110,7 +110,7 @@ pub trait Graph {
     fn view(&self) -> &RoadmapView<'_>;
 
     /// Length in metres of half-edge `k`, which leads from a node at `here` to node `target`.
-    fn length(&self, k: usize, here: &Point, target: u16) -> f32;
+    fn half_edge_length_m(&self, k: usize, here: &Point, target: u16) -> f32;
 
     /// Finds the half-edges that may shorten the path to their targets, where `reached` is the
     /// length of the path to `here`. Writes their indices within `half_edges` to `out` and returns
@@ -136,7 +136,7 @@ impl Graph for RoadmapView<'_> {
     }
 
     #[inline]
-    fn length(&self, _k: usize, here: &Point, target: u16) -> f32 {
+    fn half_edge_length_m(&self, _k: usize, here: &Point, target: u16) -> f32 {
         fpu::sqrtf((self.node(target) - here).norm_squared())
     }
 
@@ -195,7 +195,7 @@ impl Graph for RoadmapWithLengths<'_> {
     }
 
     #[inline]
-    fn length(&self, k: usize, _here: &Point, _target: u16) -> f32 {
+    fn half_edge_length_m(&self, k: usize, _here: &Point, _target: u16) -> f32 {
         self.lengths[k]
     }
 
@@ -318,8 +318,10 @@ pub fn cost_matrix<const N: usize>(
     if out.is_empty() {
         return Ok(());
     }
-    let ((starts_at, starts_across), (goals_at, goals_across)) =
-        (centre_and_diagonal(view, starts), centre_and_diagonal(view, goals));
+    let ((starts_at, starts_across), (goals_at, goals_across)) = (
+        bounding_box_centre_and_diagonal(view, starts),
+        bounding_box_centre_and_diagonal(view, goals),
+    );
     let between = fpu::sqrtf((goals_at - starts_at).norm_squared());
     let from_starts = starts.len() as f32 * (between + goals_across);
     let from_goals = goals.len() as f32 * (between + starts_across);
@@ -341,7 +343,7 @@ pub fn cost_matrix<const N: usize>(
 }
 
 /// Centre and diagonal of the bounding box of some nodes, metres.
-fn centre_and_diagonal(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
+fn bounding_box_centre_and_diagonal(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
     let first = nodes.first().map_or(Point::zeros(), |&node| view.node(node));
     let corners = nodes.iter().map(|&node| view.node(node));
     let (low, high) = corners.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)));
@@ -440,7 +442,7 @@ fn relax_edges<const N: usize>(
         for &place in gains.iter().take(count) {
             let (k, target) =
                 (first + usize::from(place), decode_target(&half_edges[usize::from(place)]));
-            let length = reached + graph.length(k, &here, target);
+            let length = reached + graph.half_edge_length_m(k, &here, target);
             let gain =
                 length < distance[usize::from(target)] && ws.heap.node_mark(target) != SETTLED;
             if gain && passable(node, &view.half_edge(k)) {

@@ -4,7 +4,7 @@ use std::vec::Vec;
 
 use proptest::prelude::*;
 
-use super::format::{HEIGHT_LEN, LANDMARKS_LEN, WORD_LEN};
+use super::format::{HEIGHT_LEN, LANDMARK_DISTANCES_LEN, WORD_LEN};
 use super::*;
 use crate::Point;
 use crate::file::{CRC32, FileError};
@@ -18,8 +18,8 @@ pub(crate) fn header(starts: u16, goals: u16) -> RoadmapHeader {
         edge_max_m: 80.0,
         tested_clearance_m: 0.25,
         max_clearance_m: 10.0,
-        starts,
-        goals,
+        start_count: starts,
+        goal_count: goals,
     }
 }
 
@@ -34,7 +34,7 @@ pub(crate) fn encode_with_landmarks(
     nodes: &[Point],
     edges: &[Edge],
 ) -> Vec<u8> {
-    let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len(), LANDMARKS).unwrap()];
+    let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len(), LANDMARK_COUNT).unwrap()];
     let mut ws = SearchWorkspace::<32>::new();
     assert_eq!(write_with_landmarks(header, nodes, edges, &[], &mut ws, &mut out), Ok(out.len()));
     out
@@ -191,7 +191,7 @@ fn what_follows_the_roadmap_in_its_slot_is_ignored() {
 #[test]
 fn the_default_board_fits_its_slot() {
     // A slot of 384 kB begins with three words of 32 bytes.
-    assert!(encoded_len(4096, 65536 / 2, LANDMARKS + 1).unwrap() <= 384 * 1024 - 96);
+    assert!(encoded_len(4096, 65536 / 2, LANDMARK_COUNT + 1).unwrap() <= 384 * 1024 - 96);
 }
 
 #[test]
@@ -219,7 +219,7 @@ fn bad_input_is_refused_by_name() {
         refuse(|_, _, edges| edges.push(Edge { a: 1, b: 0, clearance_m: 0.7 })),
         RoadmapError::Duplicate(0, 1)
     );
-    assert_eq!(refuse(|header, _, _| header.goals = 3), FileError::Header("terminals").into());
+    assert_eq!(refuse(|header, _, _| header.goal_count = 3), FileError::Header("terminals").into());
     assert_eq!(
         refuse(|header, _, _| header.origin.lat_deg = f64::NAN),
         FileError::Header("origin").into()
@@ -258,7 +258,7 @@ fn ways_to_landmarks_are_written_and_checked() {
         let bytes = encode_with_landmarks(&header(0, 0), &nodes[..few], &[]);
         assert!(RoadmapView::parse(&bytes).is_ok_and(|view| view.node_count() == few));
     }
-    let first = out.len() - 4 - 3 * LANDMARKS_LEN;
+    let first = out.len() - 4 - 3 * LANDMARK_DISTANCES_LEN;
     for wrong in [f32::NAN, f32::INFINITY, -1.0, 5.01, 1e30] {
         let mut changed = out.clone();
         changed[first..first + 4].copy_from_slice(&wrong.to_le_bytes());
@@ -278,7 +278,7 @@ fn ways_to_landmarks_are_written_and_checked() {
 
 fn with_heights(heights_m: &[f32]) -> Result<Vec<u8>, RoadmapError> {
     let (nodes, edges) = small();
-    let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len(), LANDMARKS + 1).unwrap()];
+    let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len(), LANDMARK_COUNT + 1).unwrap()];
     let mut ws = SearchWorkspace::<32>::new();
     let len = write_with_landmarks(&header(1, 1), &nodes, &edges, heights_m, &mut ws, &mut out)?;
     out.truncate(len);
@@ -291,7 +291,7 @@ fn heights_over_ground_are_written_and_checked() {
     assert_eq!(bytes[8], 2);
     let view = RoadmapView::parse(&bytes).unwrap();
     assert_eq!((view.byte_len(), view.has_landmarks()), (bytes.len(), true));
-    let grounds = [0, 1, 2, 3, u16::MAX].map(|node| view.ground_m(node));
+    let grounds = [0, 1, 2, 3, u16::MAX].map(|node| view.ground_z_m(node));
     assert_eq!(grounds, [Some(0.0), Some(0.75), None, None, None]);
     for wrong in [f32::NAN, f32::NEG_INFINITY, -1.0, -1e-9, 65_537.0] {
         assert_eq!(with_heights(&[1.0, wrong, 1.0]), Err(RoadmapError::Height(1)));
@@ -306,7 +306,7 @@ fn heights_over_ground_are_written_and_checked() {
     let old = with_heights(&[]).unwrap();
     let view = RoadmapView::parse(&old).unwrap();
     assert_eq!(
-        (old[8], view.ground_m(0), view.ground_range_near(&Point::zeros())),
+        (old[8], view.ground_z_m(0), view.ground_z_range_near(&Point::zeros())),
         (1, None, None)
     );
 }
@@ -318,11 +318,11 @@ fn the_ground_of_a_place_is_that_of_nodes_on_its_storey() {
     let places = [(0.0, 5.0, 1.0), (2.0, 6.0, 1.5), (1.0, 3.0, 3.0), (9.0, 5.0, 3.0)];
     let nodes: Vec<Point> = places.iter().map(|&(x, z, _)| Point::new(x, 0.0, z)).collect();
     let heights: Vec<f32> = places.iter().map(|&(.., height_m)| height_m).collect();
-    let mut out = vec![0; encoded_len(4, 0, LANDMARKS + 1).unwrap()];
+    let mut out = vec![0; encoded_len(4, 0, LANDMARK_COUNT + 1).unwrap()];
     let mut ws = SearchWorkspace::<4>::new();
     write_with_landmarks(&header(0, 0), &nodes, &[], &heights, &mut ws, &mut out).unwrap();
     let view = RoadmapView::parse(&out).unwrap();
-    let around = |x: f32, z: f32| view.ground_range_near(&Point::new(x, 0.0, z));
+    let around = |x: f32, z: f32| view.ground_z_range_near(&Point::new(x, 0.0, z));
     assert_eq!(
         around(1.0, 5.2),
         Some((4.0, 4.5)),
@@ -333,5 +333,5 @@ fn the_ground_of_a_place_is_that_of_nodes_on_its_storey() {
     assert_eq!(around(1.0, 3.6), None, "between the storeys");
     assert_eq!(around(9.0, 5.0), Some((2.0, 2.0)));
     assert_eq!(around(20.0, 5.0), None);
-    assert_eq!(view.ground_range_near(&Point::new(f32::NAN, 0.0, 1.0)), None);
+    assert_eq!(view.ground_z_range_near(&Point::new(f32::NAN, 0.0, 1.0)), None);
 }

@@ -1,9 +1,9 @@
 //! A roadmap read in place: its nodes, its half-edges and its distances to landmarks.
 
 use super::format::{
-    HEADER_LEN, HEIGHT_LEN, HalfEdge, LANDMARKS, LANDMARKS_LEN, NODE_LEN, RoadmapError,
-    RoadmapHeader, WORD_LEN, declared_len, decode_node, decode_target, f32_at, f64_at, u16_at,
-    u32_at,
+    HEADER_LEN, HEIGHT_LEN, HalfEdge, LANDMARK_COUNT, LANDMARK_DISTANCES_LEN, NODE_LEN,
+    RoadmapError, RoadmapHeader, WORD_LEN, declared_len, decode_node, decode_target, f32_at,
+    f64_at, u16_at, u32_at,
 };
 use crate::Point;
 use crate::file::{CRC32, FileError};
@@ -19,7 +19,7 @@ pub struct RoadmapView<'a> {
     pub(super) half_edges: &'a [[u8; WORD_LEN]],
     /// The distances to the landmarks, an entry for each node; empty if the roadmap has no
     /// landmarks.
-    pub(super) landmarks: &'a [[u8; LANDMARKS_LEN]],
+    pub(super) landmark_distances: &'a [[u8; LANDMARK_DISTANCES_LEN]],
     /// The heights above the ground, an entry for each node; empty if the roadmap has none.
     pub(super) heights: &'a [[u8; HEIGHT_LEN]],
 }
@@ -47,8 +47,8 @@ impl<'a> RoadmapView<'a> {
             edge_max_m: f32_at(head, 44),
             tested_clearance_m: f32_at(head, 48),
             max_clearance_m: f32_at(head, 52),
-            starts: u16_at(head, 56),
-            goals: u16_at(head, 58),
+            start_count: u16_at(head, 56),
+            goal_count: u16_at(head, 58),
         };
         header.check(counts[0])?;
         let view = Self::from_body(header, crc, &covered[HEADER_LEN..], counts);
@@ -77,7 +77,7 @@ impl<'a> RoadmapView<'a> {
             nodes: nodes.as_chunks().0,
             offsets: offsets.as_chunks().0,
             half_edges: half_edges.as_chunks().0,
-            landmarks: landmarks.as_chunks().0,
+            landmark_distances: landmarks.as_chunks().0,
             heights: heights.as_chunks().0,
         }
     }
@@ -98,24 +98,24 @@ impl<'a> RoadmapView<'a> {
         HEADER_LEN
             + self.nodes.len() * NODE_LEN
             + words * WORD_LEN
-            + self.landmarks.len() * LANDMARKS_LEN
+            + self.landmark_distances.len() * LANDMARK_DISTANCES_LEN
     }
 
     /// Whether the roadmap stores distances to landmarks.
     pub fn has_landmarks(&self) -> bool {
-        !self.landmarks.is_empty()
+        !self.landmark_distances.is_empty()
     }
 
     /// Lengths in metres of the shortest paths over all edges from a node to the two landmarks; 0
     /// for a landmark that the node has no path to. Both are 0 if the roadmap has no landmarks.
     #[inline]
-    pub(crate) fn landmark_distances_m(&self, node: u16) -> [f32; LANDMARKS] {
-        match self.landmarks.get(usize::from(node)) {
+    pub(crate) fn landmark_distances_m(&self, node: u16) -> [f32; LANDMARK_COUNT] {
+        match self.landmark_distances.get(usize::from(node)) {
             Some(b) => [
                 f32::from_le_bytes([b[0], b[1], b[2], b[3]]),
                 f32::from_le_bytes([b[4], b[5], b[6], b[7]]),
             ],
-            None => [0.0; LANDMARKS],
+            None => [0.0; LANDMARK_COUNT],
         }
     }
 

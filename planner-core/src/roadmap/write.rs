@@ -2,9 +2,9 @@
 //! sorted in place.
 
 use super::format::{
-    HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_LANDMARK_DISTANCE_M, MAX_NODES,
-    NODE_LEN, RoadmapError, RoadmapHeader, VERSION, VERSION_WITHOUT_HEIGHTS, WORD_LEN,
-    decode_target, encoded_len, has_valid_coordinates, millimetres_down,
+    HEADER_LEN, HEIGHT_LEN, LANDMARK_COUNT, LANDMARK_DISTANCES_LEN, MAGIC, MAX_LANDMARK_DISTANCE_M,
+    MAX_NODES, NODE_LEN, RoadmapError, RoadmapHeader, VERSION, VERSION_WITHOUT_HEIGHTS, WORD_LEN,
+    decode_target, encoded_len, floor_to_millimetres, has_valid_coordinates,
 };
 use super::view::RoadmapView;
 use crate::Point;
@@ -38,7 +38,7 @@ pub fn write(
     Ok(append_crc(out))
 }
 
-/// As [`write()`], with the shortest distances from each node to [`LANDMARKS`] landmarks, with
+/// As [`write()`], with the shortest distances from each node to [`LANDMARK_COUNT`] landmarks, with
 /// which a search in a building settles half as many nodes. The first landmark is node 0, a start
 /// if there are any; the second is the node farthest from it. Costs one more search per landmark.
 ///
@@ -55,26 +55,26 @@ pub fn write_with_landmarks<const N: usize>(
     if !heights_m.is_empty() && heights_m.len() != nodes.len() {
         return Err(RoadmapError::Height(heights_m.len().min(nodes.len()) as u16));
     }
-    let columns = LANDMARKS + usize::from(!heights_m.is_empty());
+    let columns = LANDMARK_COUNT + usize::from(!heights_m.is_empty());
     let out = write_graph(header, nodes, edges, columns, out)?;
     if nodes.is_empty() {
         return Ok(append_crc(out));
     }
     let body = &mut out[HEADER_LEN..];
     let heights_len = heights_m.len() * HEIGHT_LEN;
-    let numbers = nodes.len() * LANDMARKS_LEN + heights_len;
+    let numbers = nodes.len() * LANDMARK_DISTANCES_LEN + heights_len;
     let (graph, rest) = body.split_at_mut(body.len() - WORD_LEN - numbers);
-    let heights = &mut rest[nodes.len() * LANDMARKS_LEN..][..heights_len];
+    let heights = &mut rest[nodes.len() * LANDMARK_DISTANCES_LEN..][..heights_len];
     for (bytes, height_m) in heights.as_chunks_mut::<HEIGHT_LEN>().0.iter_mut().zip(heights_m) {
         *bytes = height_m.to_le_bytes();
     }
     let view = RoadmapView::from_body(*header, 0, graph, [nodes.len(), 2 * edges.len(), 0]);
-    let ways = &mut rest.as_chunks_mut::<WORD_LEN>().0[..nodes.len() * LANDMARKS];
+    let ways = &mut rest.as_chunks_mut::<WORD_LEN>().0[..nodes.len() * LANDMARK_COUNT];
     let mut landmark = 0;
-    for column in 0..LANDMARKS {
+    for column in 0..LANDMARK_COUNT {
         shortest_path_tree(&view, landmark, ws).map_err(|_| RoadmapError::WorkspaceTooSmall)?;
         let mut farthest_m = 0.0;
-        for (node, ways) in (0..nodes.len() as u16).zip(ways.chunks_exact_mut(LANDMARKS)) {
+        for (node, ways) in (0..nodes.len() as u16).zip(ways.chunks_exact_mut(LANDMARK_COUNT)) {
             let reached = Some(ws.distance_m(node)).filter(|way| way.is_finite());
             let way_m = reached.unwrap_or(0.0);
             if way_m > MAX_LANDMARK_DISTANCE_M {
@@ -89,7 +89,8 @@ pub fn write_with_landmarks<const N: usize>(
     // Where an edge is so short that adding it does not change an f32 sum, [`RoadmapView::parse`]
     // would refuse the file.
     let body = &out[HEADER_LEN..out.len() - WORD_LEN];
-    let view = RoadmapView::from_body(*header, 0, body, [nodes.len(), 2 * edges.len(), LANDMARKS]);
+    let view =
+        RoadmapView::from_body(*header, 0, body, [nodes.len(), 2 * edges.len(), LANDMARK_COUNT]);
     view.check_landmarks()?;
     view.check_heights()?;
     Ok(append_crc(out))
@@ -113,11 +114,11 @@ fn write_graph<'a>(
     check_edges(header, nodes, edges)?;
 
     let (head, rest) = out.split_at_mut(HEADER_LEN);
-    let version = if columns > LANDMARKS { VERSION } else { VERSION_WITHOUT_HEIGHTS };
+    let version = if columns > LANDMARK_COUNT { VERSION } else { VERSION_WITHOUT_HEIGHTS };
     write_header(
         header,
         version,
-        [nodes.len(), 2 * edges.len(), columns.min(LANDMARKS)],
+        [nodes.len(), 2 * edges.len(), columns.min(LANDMARK_COUNT)],
         needed,
         head,
     );
@@ -198,8 +199,8 @@ fn write_header(
     {
         put(&value.to_le_bytes());
     }
-    put(&header.starts.to_le_bytes());
-    put(&header.goals.to_le_bytes());
+    put(&header.start_count.to_le_bytes());
+    put(&header.goal_count.to_le_bytes());
     for count in counts {
         put(&(count as u32).to_le_bytes());
     }
@@ -226,9 +227,9 @@ fn write_rows(
         *offset = start.to_le_bytes();
         start += degree;
     }
-    let limit = millimetres_down(header.max_clearance_m);
+    let limit = floor_to_millimetres(header.max_clearance_m);
     for edge in edges {
-        let [c0, c1] = millimetres_down(edge.clearance_m).min(limit).to_le_bytes();
+        let [c0, c1] = floor_to_millimetres(edge.clearance_m).min(limit).to_le_bytes();
         for (from, to) in [(edge.a, edge.b), (edge.b, edge.a)] {
             let cursor = get(offsets, from);
             let [t0, t1] = to.to_le_bytes();

@@ -47,9 +47,9 @@ const _: () = assert!(
 struct SegmentBlock {
     bounding_box: BoundingBox,
     /// Axis of the capsule: from the beginning of the first segment to the end of the last.
-    line: (Point, Point),
+    capsule_axis: (Point, Point),
     /// Radius of the capsule: an upper bound on the distance of the segments from its axis, metres.
-    lateral_extent_m: f32,
+    capsule_radius_m: f32,
 }
 
 impl SegmentBlock {
@@ -60,10 +60,10 @@ impl SegmentBlock {
         let (first, last) = (&segments[0], &segments[segments.len() - 1]);
         let mut block = Self::around_line(first.from, last.to);
         segments.iter().for_each(|segment| block.bounding_box.include(&segment.to, &segment.to));
-        let rounding_m = fmaxf(LENGTH_ROUNDING_M, LENGTH_ROUNDING_SHARE * last.to_m);
-        let length_m = last.to_m - first.from_m + rounding_m;
+        let rounding_m = fmaxf(LENGTH_ROUNDING_M, LENGTH_ROUNDING_SHARE * last.end_m);
+        let length_m = last.end_m - first.wait_at_m + rounding_m;
         let bent_sq = length_m * length_m - (last.to - first.from).norm_squared();
-        block.lateral_extent_m = 0.5 * fpu::sqrtf(fmaxf(bent_sq, 0.0));
+        block.capsule_radius_m = 0.5 * fpu::sqrtf(fmaxf(bent_sq, 0.0));
         block
     }
 
@@ -71,21 +71,21 @@ impl SegmentBlock {
     fn around_line(from: Point, to: Point) -> Self {
         let mut bounding_box = BoundingBox(from, from);
         bounding_box.include(&to, &to);
-        Self { bounding_box, line: (from, to), lateral_extent_m: 0.0 }
+        Self { bounding_box, capsule_axis: (from, to), capsule_radius_m: 0.0 }
     }
 
     /// The block of all that is in a box: its radius is infinite, so only the box rules out pairs.
     fn from_box(bounding_box: BoundingBox) -> Self {
         Self {
             bounding_box,
-            line: (bounding_box.0, bounding_box.1),
-            lateral_extent_m: f32::INFINITY,
+            capsule_axis: (bounding_box.0, bounding_box.1),
+            capsule_radius_m: f32::INFINITY,
         }
     }
 
     fn capsules_come_near(&self, other: &Self, reach_m: f32) -> bool {
-        let apart_m = reach_m + self.lateral_extent_m + other.lateral_extent_m;
-        let (own, theirs) = (&self.line, &other.line);
+        let apart_m = reach_m + self.capsule_radius_m + other.capsule_radius_m;
+        let (own, theirs) = (&self.capsule_axis, &other.capsule_axis);
         // Between lines of 10^15 m the distance is not a number.
         apart_m.is_infinite()
             || segments_distance_sq((&own.0, &own.1), (&theirs.0, &theirs.1)) <= apart_m * apart_m
@@ -97,7 +97,7 @@ impl SegmentBlock {
 struct BoundingBox(Point, Point);
 
 impl BoundingBox {
-    const AROUND_NOTHING: Self = {
+    const EMPTY: Self = {
         let (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
         Self(Point::new(low, low, low), Point::new(high, high, high))
     };
@@ -135,42 +135,49 @@ impl BoundingBox {
 }
 
 /// The blocks of one flight, with boxes around groups of blocks and around all. Boxes are widened
-/// by `reach_m`, so that a line outside a box is in no conflict with the segments in it.
+/// by `conflict_distance_m`, so that a line outside a box is in no conflict with the segments in
+/// it.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
     blocks: Vec<SegmentBlock, MAX_BLOCKS>,
-    groups: Vec<BoundingBox, MAX_GROUPS>,
-    whole: BoundingBox,
+    group_boxes: Vec<BoundingBox, MAX_GROUPS>,
+    whole_box: BoundingBox,
     /// Distance from which on two segments are not in conflict, metres.
-    reach_m: f32,
+    conflict_distance_m: f32,
 }
 
 impl Blocks {
     pub(super) const fn new() -> Self {
         let whole = BoundingBox(Point::new(0.0, 0.0, 0.0), Point::new(0.0, 0.0, 0.0));
-        Self { blocks: Vec::new(), groups: Vec::new(), whole, reach_m: 0.0 }
+        Self {
+            blocks: Vec::new(),
+            group_boxes: Vec::new(),
+            whole_box: whole,
+            conflict_distance_m: 0.0,
+        }
     }
 
     /// Builds blocks, groups and the whole box from the timed segments of a flight.
     pub(super) fn rebuild(&mut self, cfg: &ScheduleConfig, segments: &[TimedSegment]) {
-        self.reach_m = fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M;
+        self.conflict_distance_m =
+            fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M;
         self.blocks.clear();
         for some in segments.chunks(SEGMENTS_PER_BLOCK) {
             let mut block = SegmentBlock::around_segments(some);
-            block.bounding_box.widen(self.reach_m);
+            block.bounding_box.widen(self.conflict_distance_m);
             // Cannot overflow: there are no more segments than all blocks have room for.
             let _ = self.blocks.push(block);
         }
-        self.groups.clear();
-        self.whole = BoundingBox::AROUND_NOTHING;
+        self.group_boxes.clear();
+        self.whole_box = BoundingBox::EMPTY;
         for blocks in self.blocks.chunks(BLOCKS_PER_GROUP) {
-            let mut around = BoundingBox::AROUND_NOTHING;
+            let mut around = BoundingBox::EMPTY;
             blocks
                 .iter()
                 .for_each(|block| around.include(&block.bounding_box.0, &block.bounding_box.1));
-            self.whole.include(&around.0, &around.1);
+            self.whole_box.include(&around.0, &around.1);
             // Cannot overflow: there are no more blocks than all groups have room for.
-            let _ = self.groups.push(around);
+            let _ = self.group_boxes.push(around);
         }
     }
 
@@ -205,7 +212,7 @@ impl Blocks {
     /// The blocks that may be in conflict with another flight on the straight line between two
     /// points.
     pub(super) fn blocks_near_line(&self, from: Point, to: Point) -> BlockSet {
-        if self.whole.is_line_beyond_face(&from, &to) {
+        if self.whole_box.is_line_beyond_face(&from, &to) {
             return 0;
         }
         self.blocks_near_block(&SegmentBlock::around_line(from, to))
@@ -226,14 +233,14 @@ impl Blocks {
     fn blocks_near_block(&self, other: &SegmentBlock) -> BlockSet {
         let mut near = 0;
         for (group, (around, blocks)) in
-            self.groups.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).enumerate()
+            self.group_boxes.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).enumerate()
         {
             if !around.overlaps(&other.bounding_box) {
                 continue;
             }
             for (bit, own) in blocks.iter().enumerate() {
                 if own.bounding_box.overlaps(&other.bounding_box)
-                    && own.capsules_come_near(other, self.reach_m)
+                    && own.capsules_come_near(other, self.conflict_distance_m)
                 {
                     near |= 1 << (group * BLOCKS_PER_GROUP + bit);
                 }
@@ -253,7 +260,7 @@ impl Blocks {
     ) {
         let mut line = BoundingBox(from, from);
         line.include(&to, &to);
-        line.widen(self.reach_m);
+        line.widen(self.conflict_distance_m);
         out.clear();
         for block in set_bit_indices(near) {
             let first = block * SEGMENTS_PER_BLOCK;

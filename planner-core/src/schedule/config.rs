@@ -1,6 +1,6 @@
 //! Settings of a schedule, and reasons why none can be made.
 
-use crate::{SettingError, all_positive};
+use crate::{SettingError, check_positive};
 
 /// Separations and nominal speeds of a schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub struct ScheduleConfig {
 impl ScheduleConfig {
     /// Checks that all numbers are positive and finite; the error names the first that is not.
     pub fn check(&self) -> Result<(), SettingError> {
-        all_positive(&[
+        check_positive(&[
             ("separation_m", self.separation_m),
             ("parked_separation_m", self.parked_separation_m),
             ("cruise_mps", self.cruise_mps),

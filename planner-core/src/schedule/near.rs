@@ -6,7 +6,8 @@
 use crate::Length;
 use libm::{fmaxf, fminf};
 
-use super::timed_segments::TimedSegment;
+use super::config::ScheduleConfig;
+use super::timed_segments::{TimedSegment, is_conflict};
 use crate::sort;
 
 /// Number of cells along one side of the grid.
@@ -20,9 +21,9 @@ pub(super) struct SegmentGrid {
     min: [f32; 2],
     cell_m: f32,
     /// Half of the length of the longest segment, metres.
-    half_m: f32,
+    max_half_length_m: f32,
     /// Index of the first segment of each cell, row by row.
-    starts: [u16; CELLS_PER_SIDE * CELLS_PER_SIDE + 1],
+    cell_starts: [u16; CELLS_PER_SIDE * CELLS_PER_SIDE + 1],
 }
 
 impl SegmentGrid {
@@ -31,21 +32,21 @@ impl SegmentGrid {
         Self {
             min: [0.0; 2],
             cell_m: 0.0,
-            half_m: 0.0,
-            starts: [0; CELLS_PER_SIDE * CELLS_PER_SIDE + 1],
+            max_half_length_m: 0.0,
+            cell_starts: [0; CELLS_PER_SIDE * CELLS_PER_SIDE + 1],
         }
     }
 
     /// Sorts `segments`, at most `u16::MAX` of them, by their cells, and indexes them.
     pub(super) fn sort_into_cells(&mut self, segments: &mut [TimedSegment]) {
         let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
-        self.half_m = 0.0;
+        self.max_half_length_m = 0.0;
         for segment in &*segments {
             let middle = middle(segment);
             for a in 0..2 {
                 (min[a], max[a]) = (fminf(min[a], middle[a]), fmaxf(max[a], middle[a]));
             }
-            self.half_m = fmaxf(self.half_m, half_length(segment));
+            self.max_half_length_m = fmaxf(self.max_half_length_m, half_length(segment));
         }
         let extent_m = fmaxf(max[0] - min[0], max[1] - min[1]);
         (self.min, self.cell_m) = (min, fmaxf(extent_m / CELLS_PER_SIDE as f32, MIN_CELL_M));
@@ -54,14 +55,15 @@ impl SegmentGrid {
             self.cell_index(1, y) * CELLS_PER_SIDE + self.cell_index(0, x)
         };
         // The order within a cell does not matter, as long as it is the same on all boards.
-        sort::sort_by(segments, |a, b| cell(a).cmp(&cell(b)));
-        self.starts.fill(0);
+        sort::heapsort_by(segments, |a, b| cell(a).cmp(&cell(b)));
+        self.cell_starts.fill(0);
         for segment in &*segments {
             let [x, y] = middle(segment);
-            self.starts[self.cell_index(1, y) * CELLS_PER_SIDE + self.cell_index(0, x) + 1] += 1;
+            self.cell_starts[self.cell_index(1, y) * CELLS_PER_SIDE + self.cell_index(0, x) + 1] +=
+                1;
         }
         for cell in 0..CELLS_PER_SIDE * CELLS_PER_SIDE {
-            self.starts[cell + 1] += self.starts[cell];
+            self.cell_starts[cell + 1] += self.cell_starts[cell];
         }
     }
 
@@ -79,7 +81,7 @@ impl SegmentGrid {
         own: &TimedSegment,
         apart_m: f32,
     ) -> impl Iterator<Item = &'a TimedSegment> {
-        let reach_m = apart_m + half_length(own) + self.half_m;
+        let reach_m = apart_m + half_length(own) + self.max_half_length_m;
         let middle = middle(own);
         let [columns, rows] = [0, 1].map(|axis| {
             (
@@ -88,10 +90,21 @@ impl SegmentGrid {
             )
         });
         (rows.0..=rows.1).flat_map(move |row| {
-            let from = self.starts[row * CELLS_PER_SIDE + columns.0];
-            let to = self.starts[row * CELLS_PER_SIDE + columns.1 + 1];
+            let from = self.cell_starts[row * CELLS_PER_SIDE + columns.0];
+            let to = self.cell_starts[row * CELLS_PER_SIDE + columns.1 + 1];
             &segments[usize::from(from)..usize::from(to)]
         })
+    }
+
+    /// The `segments` in conflict with `own`, whatever their times.
+    pub(super) fn conflicting_segments<'s>(
+        &'s self,
+        segments: &'s [TimedSegment],
+        cfg: &'s ScheduleConfig,
+        own: &'s TimedSegment,
+    ) -> impl Iterator<Item = &'s TimedSegment> {
+        let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
+        self.candidates_near(segments, own, apart_m).filter(|q| is_conflict(cfg, own, q))
     }
 }
 

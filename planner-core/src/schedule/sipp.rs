@@ -16,8 +16,8 @@ use libm::{fmaxf, fminf};
 use super::config::{ScheduleConfig, ScheduleError};
 use super::near::SegmentGrid;
 use super::timed_segments::{
-    Leg, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, MIN_PAD_HOLD_S, TimedSegment, WaitingPlaces,
-    cut_into_segments, is_conflict, segment_count,
+    DEFAULT_MAX_SEGMENT_M, Leg, MAX_TIMED_SEGMENTS, MIN_PAD_HOLD_S, TimedSegment,
+    cut_into_segments, is_conflict, leg_at_time_zero, leg_segment_count, parked_segment,
 };
 use super::{ForbiddenIntervals, add_forbidden_interval, first_allowed_departure};
 use crate::flight::{Flight, Path};
@@ -31,7 +31,7 @@ use crate::{Length, Point};
 struct SippState {
     node: u16,
     /// Index plus one of the next state of the same node; 0 ends the list.
-    next: u16,
+    next_of_node: u16,
     /// Index of the state from which this one is reached; its own index if it is reached by the
     /// climb from the pad.
     parent: u16,
@@ -40,19 +40,19 @@ struct SippState {
     /// Earliest arrival, seconds; infinite while the state is not reached.
     arrive_s: f32,
     /// End of the safe interval, seconds.
-    until_s: f32,
+    safe_until_s: f32,
     /// Start of the safe interval, seconds.
-    from_s: f32,
+    safe_from_s: f32,
 }
 
 const NO_STATE: SippState = SippState {
     node: 0,
-    next: 0,
+    next_of_node: 0,
     parent: 0,
     left_parent_s: 0.0,
     arrive_s: 0.0,
-    until_s: 0.0,
-    from_s: 0.0,
+    safe_until_s: 0.0,
+    safe_from_s: 0.0,
 };
 
 /// Memory for roadmaps of up to `N` nodes, `N` states, and `P` timed segments of scheduled flights.
@@ -62,11 +62,11 @@ pub struct SippWorkspace<const N: usize, const P: usize> {
     segments: Vec<TimedSegment, P>,
     cells: SegmentGrid,
     states: [SippState; N],
-    len: usize,
+    state_count: usize,
     /// Index plus one of each node's first state; 0 if its states have not been made.
-    first: [u16; N],
+    first_state: [u16; N],
     heap: Heap<N>,
-    cut: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
+    cut_segments: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
     forbidden: ForbiddenIntervals,
     /// Time from when another vehicle has left a place until this route may use it, seconds.
     handover_s: f32,
@@ -79,10 +79,10 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             segments: Vec::new(),
             cells: SegmentGrid::new(),
             states: [NO_STATE; N],
-            len: 0,
-            first: [0; N],
+            state_count: 0,
+            first_state: [0; N],
             heap: Heap::new(),
-            cut: Vec::new(),
+            cut_segments: Vec::new(),
             forbidden: Vec::new(),
             handover_s: 0.0,
         }
@@ -123,23 +123,17 @@ struct Climb {
 struct Landing {
     down: Leg,
     /// Time until which another vehicle needs the landing place, seconds.
-    after_s: f32,
+    free_from_s: f32,
 }
 
 /// A flight from one state, or from the pad, to another node.
 struct StateTransition {
-    node: u16,
+    to_node: u16,
     /// Index of the state from which it starts; `None` from the pad.
     parent: Option<u16>,
     /// First and last time of departure, seconds.
     leave_s: (f32, f32),
     duration_s: f32,
-}
-
-/// A straight leg that begins at time 0 and takes `duration_s`.
-fn leg_at_time_zero(from: Point, to: Point, duration_s: f32) -> Leg {
-    let length_m = (to - from).length();
-    Leg { from, to, length_m, from_s: 0.0, to_s: duration_s, stops: WaitingPlaces::Anywhere }
 }
 
 /// Finds the route of earliest arrival that is in no conflict with the flights `scheduled`. Reads
@@ -155,34 +149,34 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
     let cfg = route.cfg;
     check_inputs::<N, W>(view, route, flight)?;
     load_scheduled_segments(route, scheduled, ws)?;
-    ws.first[..view.node_count()].fill(0);
+    ws.first_state[..view.node_count()].fill(0);
     ws.heap.clear(N);
-    ws.len = 0;
+    ws.state_count = 0;
 
     let start = view.node(route.from);
     let pad = start - Point::new(0.0, 0.0, flight.climb_m);
     let goal = view.node(route.to);
     let up = Leg::vertical_leg(pad, start, flight.climb_m / cfg.vertical_mps);
     let climb =
-        Climb { up, latest_take_off_s: ws.latest_take_off_s(cfg, pad, &up, flight.segment_m) };
+        Climb { up, latest_take_off_s: ws.latest_take_off_s(cfg, pad, &up, flight.max_segment_m) };
     let landing = ws.plan_landing(cfg, goal, flight.descent_m)?;
-    let segment_m = flight.segment_m;
+    let max_segment_m = flight.max_segment_m;
     // Lower bound of the time from `there` to the goal, seconds: the heuristic of A*.
     let left_s = |there: &Point| (goal - there).length() / cfg.cruise_mps;
 
     ws.add_states(cfg, view, route.from);
-    ws.forbid_departures(cfg, &up, segment_m, (route.not_before_s, climb.latest_take_off_s));
+    ws.forbid_departures(cfg, &up, max_segment_m, (route.not_before_s, climb.latest_take_off_s));
     let leave_s = (route.not_before_s, climb.latest_take_off_s);
-    let hop = StateTransition { node: route.from, parent: None, leave_s, duration_s: up.to_s };
+    let hop = StateTransition { to_node: route.from, parent: None, leave_s, duration_s: up.to_s };
     ws.relax_intervals(&hop, left_s(&start));
     while let Some(state) = ws.heap.pop() {
         let reached = ws.states[usize::from(state)];
-        let leave_s = (reached.arrive_s, reached.until_s);
+        let leave_s = (reached.arrive_s, reached.safe_until_s);
         if reached.node == route.to {
-            ws.forbid_departures(cfg, &landing.down, segment_m, leave_s);
-            let from_s = fmaxf(reached.arrive_s, landing.after_s);
-            let land_s =
-                first_allowed_departure(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
+            ws.forbid_departures(cfg, &landing.down, max_segment_m, leave_s);
+            let from_s = fmaxf(reached.arrive_s, landing.free_from_s);
+            let land_s = first_allowed_departure(&ws.forbidden, from_s)
+                .filter(|&t| t <= reached.safe_until_s);
             if let Some(land_s) = land_s {
                 return write_flight(route, view, &climb, ws, (state, land_s), flight);
             }
@@ -196,10 +190,10 @@ pub fn find_route<'a, const N: usize, const P: usize, const W: usize>(
             let duration_s = (there - here).length() / cfg.cruise_mps;
             ws.add_states(cfg, view, edge.target);
             let hop =
-                StateTransition { node: edge.target, parent: Some(state), leave_s, duration_s };
+                StateTransition { to_node: edge.target, parent: Some(state), leave_s, duration_s };
             if ws.may_improve(&hop) {
                 let leg = leg_at_time_zero(here, there, duration_s);
-                ws.forbid_departures(cfg, &leg, segment_m, leave_s);
+                ws.forbid_departures(cfg, &leg, max_segment_m, leave_s);
                 ws.relax_intervals(&hop, left_s(&there));
             }
         }
@@ -220,8 +214,8 @@ fn check_inputs<const N: usize, const W: usize>(
         return Err(ScheduleError::BadIndex);
     }
     let vertical = [flight.climb_m, flight.descent_m]
-        .map(|length_m| segment_count(length_m, flight.segment_m) as usize);
-    let whole = flight.segment_m >= MAX_TIMED_SEGMENT_M && flight.segment_m.is_finite();
+        .map(|length_m| leg_segment_count(length_m, flight.max_segment_m) as usize);
+    let whole = flight.max_segment_m >= DEFAULT_MAX_SEGMENT_M && flight.max_segment_m.is_finite();
     if !whole || vertical[0].max(vertical[1]) > MAX_TIMED_SEGMENTS {
         return Err(ScheduleError::SegmentsFull);
     }
@@ -239,11 +233,11 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
     const { assert!(P <= u16::MAX as usize, "cells count segments in 16 bits") };
     ws.segments.clear();
     for other in scheduled {
-        cut_into_segments(cfg, other, &mut ws.cut)?;
-        for q in &ws.cut {
+        cut_into_segments(cfg, other, &mut ws.cut_segments)?;
+        for q in &ws.cut_segments {
             let absolute = TimedSegment {
-                from_s: q.from_s + other.depart_s,
-                to_s: q.to_s + other.depart_s + handover_s,
+                held_from_s: q.held_from_s + other.depart_s,
+                held_until_s: q.held_until_s + other.depart_s + handover_s,
                 ..*q
             };
             ws.segments.push(absolute).map_err(|_| ScheduleError::SegmentsFull)?;
@@ -251,8 +245,8 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
     }
     for &place in parked {
         let for_ever = TimedSegment {
-            from_s: f32::NEG_INFINITY,
-            to_s: f32::INFINITY,
+            held_from_s: f32::NEG_INFINITY,
+            held_until_s: f32::INFINITY,
             ..parked_segment(place)
         };
         ws.segments.push(for_ever).map_err(|_| ScheduleError::SegmentsFull)?;
@@ -261,72 +255,66 @@ fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
     Ok(())
 }
 
-/// The scheduled timed segments in conflict with `own`, whatever their times.
-fn conflicting_segments<'s>(
-    cells: &'s SegmentGrid,
-    segments: &'s [TimedSegment],
-    cfg: &'s ScheduleConfig,
-    own: &'s TimedSegment,
-) -> impl Iterator<Item = &'s TimedSegment> {
-    let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
-    cells.candidates_near(segments, own, apart_m).filter(|q| is_conflict(cfg, own, q))
-}
-
-/// Timed segment of a vehicle that is parked at a point; the caller sets the times.
-fn parked_segment(at: Point) -> TimedSegment {
-    TimedSegment { from: at, to: at, from_m: 0.0, to_m: 0.0, from_s: 0.0, to_s: 0.0, parked: true }
-}
-
 impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     fn conflicting_segments<'s>(
         &'s self,
         cfg: &'s ScheduleConfig,
         own: &'s TimedSegment,
     ) -> impl Iterator<Item = &'s TimedSegment> {
-        conflicting_segments(&self.cells, &self.segments, cfg, own)
+        self.cells.conflicting_segments(&self.segments, cfg, own)
     }
 
     /// Creates the states of a node, one for each safe interval, unless it has them already.
     fn add_states(&mut self, cfg: &ScheduleConfig, view: &RoadmapView<'_>, node: u16) {
-        if self.first[usize::from(node)] != 0 {
+        if self.first_state[usize::from(node)] != 0 {
             return;
         }
         let hover = TimedSegment { parked: false, ..parked_segment(view.node(node)) };
         self.forbidden.clear();
-        for q in conflicting_segments(&self.cells, &self.segments, cfg, &hover) {
-            add_forbidden_interval(&mut self.forbidden, q.from_s, q.to_s);
+        for q in self.cells.conflicting_segments(&self.segments, cfg, &hover) {
+            add_forbidden_interval(&mut self.forbidden, q.held_from_s, q.held_until_s);
         }
-        sort::sort_by(&mut self.forbidden, |a, b| a.0.total_cmp(&b.0));
+        sort::heapsort_by(&mut self.forbidden, |a, b| a.0.total_cmp(&b.0));
         let mut from_s = f32::NEG_INFINITY;
         for i in 0..=self.forbidden.len() {
             let (low, high) =
                 self.forbidden.get(i).copied().unwrap_or((f32::INFINITY, f32::INFINITY));
-            if low > from_s && self.len < N {
-                let first = &mut self.first[usize::from(node)];
+            if low > from_s && self.state_count < N {
+                let first = &mut self.first_state[usize::from(node)];
                 let state = SippState {
                     node,
-                    next: *first,
+                    next_of_node: *first,
                     arrive_s: f32::INFINITY,
-                    from_s,
-                    until_s: low,
+                    safe_from_s: from_s,
+                    safe_until_s: low,
                     ..NO_STATE
                 };
-                self.states[self.len] = state;
-                self.len += 1;
-                *first = self.len as u16;
+                self.states[self.state_count] = state;
+                self.state_count += 1;
+                *first = self.state_count as u16;
             }
             from_s = high;
         }
     }
 
     /// The latest take-off, seconds, before another vehicle needs the space of the pad.
-    fn latest_take_off_s(&self, cfg: &ScheduleConfig, pad: Point, up: &Leg, segment_m: f32) -> f32 {
+    fn latest_take_off_s(
+        &self,
+        cfg: &ScheduleConfig,
+        pad: Point,
+        up: &Leg,
+        max_segment_m: f32,
+    ) -> f32 {
         // Held from −∞, so that it is not in conflict with another vehicle's pad.
-        let on_pad = TimedSegment { from_s: f32::NEG_INFINITY, ..parked_segment(pad) };
+        let on_pad = TimedSegment { held_from_s: f32::NEG_INFINITY, ..parked_segment(pad) };
         // The pad is held until the vehicle has flown the first timed segment of its climb.
-        let off_pad_s = fmaxf(up.first_segment(segment_m).1, MIN_PAD_HOLD_S) + self.handover_s;
-        let needed_s =
-            self.conflicting_segments(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
+        let off_pad_s =
+            fmaxf(up.first_segment_length_and_duration(max_segment_m).1, MIN_PAD_HOLD_S)
+                + self.handover_s;
+        let needed_s = self
+            .conflicting_segments(cfg, &on_pad)
+            .map(|q| q.held_from_s)
+            .fold(f32::INFINITY, fminf);
         needed_s - off_pad_s
     }
 
@@ -343,25 +331,28 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         let standing = parked_segment(ground);
         let after_s = self
             .conflicting_segments(cfg, &standing)
-            .map(|q| q.to_s)
+            .map(|q| q.held_until_s)
             .fold(f32::NEG_INFINITY, fmaxf);
         if after_s == f32::INFINITY {
             return Err(ScheduleError::Blocked);
         }
-        Ok(Landing { down: Leg::vertical_leg(goal, ground, descent_m / cfg.vertical_mps), after_s })
+        Ok(Landing {
+            down: Leg::vertical_leg(goal, ground, descent_m / cfg.vertical_mps),
+            free_from_s: after_s,
+        })
     }
 
     /// Whether the transition might reach some state of its node earlier than it is reached now:
     /// checked without the scheduled segments on the way.
     fn may_improve(&self, hop: &StateTransition) -> bool {
-        let &StateTransition { node, leave_s: (from_s, until_s), duration_s, .. } = hop;
-        let mut at = self.first[usize::from(node)];
+        let &StateTransition { to_node, leave_s: (from_s, until_s), duration_s, .. } = hop;
+        let mut at = self.first_state[usize::from(to_node)];
         while at != 0 {
             let index = at - 1;
             let state = &self.states[usize::from(index)];
-            at = state.next;
-            let leave_s = fmaxf(from_s, state.from_s - duration_s);
-            let fits = leave_s <= until_s && leave_s + duration_s <= state.until_s;
+            at = state.next_of_node;
+            let leave_s = fmaxf(from_s, state.safe_from_s - duration_s);
+            let fits = leave_s <= until_s && leave_s + duration_s <= state.safe_until_s;
             if fits
                 && leave_s + duration_s < state.arrive_s
                 && self.heap.node_mark(index) != SETTLED
@@ -378,35 +369,35 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         &mut self,
         cfg: &ScheduleConfig,
         leg: &Leg,
-        segment_m: f32,
+        max_segment_m: f32,
         leave_s: (f32, f32),
     ) {
         self.forbidden.clear();
         let whole = TimedSegment {
             from: leg.from,
             to: leg.to,
-            from_m: 0.0,
-            to_m: leg.length_m,
-            from_s: 0.0,
-            to_s: leg.to_s,
+            wait_at_m: 0.0,
+            end_m: leg.length_m,
+            held_from_s: 0.0,
+            held_until_s: leg.to_s,
             parked: false,
         };
         let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
         let held_s = self.handover_s;
         for q in self.cells.candidates_near(&self.segments, &whole, apart_m) {
             // A segment that ends before, or begins after, all times in question forbids none.
-            if q.to_s < leave_s.0
-                || q.from_s - held_s - leg.to_s > leave_s.1
+            if q.held_until_s < leave_s.0
+                || q.held_from_s - held_s - leg.to_s > leave_s.1
                 || !is_conflict(cfg, &whole, q)
             {
                 continue;
             }
-            for p in leg.segments(0.0, leg.length_m, segment_m) {
+            for p in leg.segments(0.0, leg.length_m, max_segment_m) {
                 if is_conflict(cfg, &p, q) {
                     add_forbidden_interval(
                         &mut self.forbidden,
-                        q.from_s - held_s - p.to_s,
-                        q.to_s - p.from_s,
+                        q.held_from_s - held_s - p.held_until_s,
+                        q.held_until_s - p.held_from_s,
                     );
                 }
             }
@@ -416,19 +407,21 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     /// Sets the earliest arrival in every state of the transition's node, from which the flight to
     /// the goal takes at least `left_s`.
     fn relax_intervals(&mut self, hop: &StateTransition, left_s: f32) {
-        let &StateTransition { node, parent, leave_s: (from_s, until_s), duration_s } = hop;
-        let mut at = self.first[usize::from(node)];
+        let &StateTransition { to_node, parent, leave_s: (from_s, until_s), duration_s } = hop;
+        let mut at = self.first_state[usize::from(to_node)];
         while at != 0 {
             let index = at - 1;
             let state = self.states[usize::from(index)];
-            at = state.next;
+            at = state.next_of_node;
             if self.heap.node_mark(index) == SETTLED {
                 continue;
             }
-            let leave_s =
-                first_allowed_departure(&self.forbidden, fmaxf(from_s, state.from_s - duration_s));
+            let leave_s = first_allowed_departure(
+                &self.forbidden,
+                fmaxf(from_s, state.safe_from_s - duration_s),
+            );
             let Some(leave_s) =
-                leave_s.filter(|&t| t <= until_s && t + duration_s <= state.until_s)
+                leave_s.filter(|&t| t <= until_s && t + duration_s <= state.safe_until_s)
             else {
                 continue;
             };
@@ -466,12 +459,15 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
             (climb.up, climb.latest_take_off_s)
         } else {
             let from = view.node(before.node);
-            (leg_at_time_zero(from, here, (here - from).length() / cfg.cruise_mps), before.until_s)
+            (
+                leg_at_time_zero(from, here, (here - from).length() / cfg.cruise_mps),
+                before.safe_until_s,
+            )
         };
         let duration_s = leg.to_s;
         let earliest_s = reached.left_parent_s;
         let latest_s = fminf(leave_s - duration_s, until_s);
-        ws.forbid_departures(cfg, &leg, flight.segment_m, (earliest_s, latest_s));
+        ws.forbid_departures(cfg, &leg, flight.max_segment_m, (earliest_s, latest_s));
         // Not before the departure that the search found free: forbidden intervals that were merged
         // for want of room may cover that time.
         let left_s = fmaxf(super::last_allowed_departure(&ws.forbidden, latest_s), earliest_s);
@@ -492,7 +488,7 @@ fn write_flight<const N: usize, const P: usize, const W: usize>(
         let clearance_m = edge.map_or(view.header().max_clearance_m, |edge| edge.clearance_m);
         flight.path.push(view.node(node), clearance_m).map_err(|_| ScheduleError::SegmentsFull)?;
         let at_s = if before.is_none() { climb.up.to_s } else { arrive_s - flight.depart_s };
-        flight.path.set_last_times(at_s, fmaxf(leave_s - flight.depart_s, at_s));
+        flight.path.set_last_waypoint_times(at_s, fmaxf(leave_s - flight.depart_s, at_s));
         before = Some(node);
     }
     Ok(())

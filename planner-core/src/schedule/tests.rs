@@ -21,13 +21,13 @@ fn flight(id: u8, points: &[(f32, f32)]) -> Flight<8> {
     }
     path.set_times_at_speed(1.5 / CFG.vertical_mps, CFG.cruise_mps);
     Flight {
-        id,
+        vehicle_id: id,
         task: Task::Goto(0),
         path,
         climb_m: 1.5,
         descent_m: 1.5,
         depart_s: 0.0,
-        segment_m: MAX_TIMED_SEGMENT_M,
+        max_segment_m: DEFAULT_MAX_SEGMENT_M,
     }
 }
 
@@ -126,11 +126,11 @@ proptest! {
         ws.forbidden.clear();
         for (q, p) in ws.other.iter().flat_map(|q| ws.own.iter().map(move |p| (q, p))) {
             if is_conflict(&CFG, p, q) {
-                let from_s = depart_s + q.from_s - handover_s - p.to_s;
+                let from_s = depart_s + q.held_from_s - handover_s - p.held_until_s;
                 add_forbidden_interval(
                     &mut ws.forbidden,
                     from_s,
-                    depart_s + q.to_s + handover_s - p.from_s,
+                    depart_s + q.held_until_s + handover_s - p.held_from_s,
                 );
             }
         }

@@ -5,13 +5,13 @@ use heapless::Vec;
 use libm::fmaxf;
 
 use super::config::{ScheduleConfig, ScheduleError};
-use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geo::distance::segments_distance_sq;
+use crate::{Length, Point};
 
 /// Longest timed segment, metres. With shorter ones vehicles follow one another more closely,
 /// longer ones cost less.
-pub const MAX_TIMED_SEGMENT_M: f32 = 1.5;
+pub const DEFAULT_MAX_SEGMENT_M: f32 = 1.5;
 /// Most timed segments of one flight; a flight that would need more gets longer ones.
 pub const MAX_TIMED_SEGMENTS: usize = 320;
 /// Most doublings of the length of timed segments: to 1.5 km.
@@ -29,29 +29,30 @@ pub(super) struct TimedSegment {
     /// Arc length at which the vehicle would wait before it enters this segment, metres. That is
     /// the segment's beginning, or for a segment of a climb or descent the beginning of the whole
     /// climb or descent, within which no vehicle waits.
-    pub(super) from_m: f32,
+    pub(super) wait_at_m: f32,
     /// Arc length at which the segment ends, metres.
-    pub(super) to_m: f32,
-    /// Time from which the segment is held, seconds: when the vehicle leaves `from_m`.
-    pub(super) from_s: f32,
+    pub(super) end_m: f32,
+    /// Time from which the segment is held, seconds: when the vehicle leaves `wait_at_m`.
+    pub(super) held_from_s: f32,
     /// Time at which the vehicle has left the segment, seconds.
-    pub(super) to_s: f32,
+    pub(super) held_until_s: f32,
     pub(super) parked: bool,
 }
 
 impl<const W: usize> Flight<W> {
-    /// Sets `segment_m` to the shortest of [`MAX_TIMED_SEGMENT_M`], twice that, four times that …
-    /// with which the flight has at most [`MAX_TIMED_SEGMENTS`] timed segments.
+    /// Sets `max_segment_m` to the shortest of [`DEFAULT_MAX_SEGMENT_M`], twice that, four times
+    /// that … with which the flight has at most [`MAX_TIMED_SEGMENTS`] timed segments.
     pub(crate) fn choose_segment_length(&mut self) {
-        self.segment_m = MAX_TIMED_SEGMENT_M;
+        self.max_segment_m = DEFAULT_MAX_SEGMENT_M;
         for _ in 0..MAX_SEGMENT_DOUBLINGS {
             // Each leg's number of segments is rounded up, so the path's length alone may show that
             // there are too many.
-            let too_many = self.path.length_m() > self.segment_m * (MAX_TIMED_SEGMENTS + 1) as f32;
+            let too_many =
+                self.path.length_m() > self.max_segment_m * (MAX_TIMED_SEGMENTS + 1) as f32;
             if !too_many && self.segment_count() <= MAX_TIMED_SEGMENTS {
                 break;
             }
-            self.segment_m *= 2.0;
+            self.max_segment_m *= 2.0;
         }
     }
 
@@ -74,7 +75,7 @@ impl<const W: usize> Flight<W> {
             [down_m(waypoints.first(), self.climb_m), down_m(waypoints.last(), self.descent_m)];
         let lengths = ends.into_iter().chain(legs);
         let moving = lengths
-            .map(|length_m| segment_count(length_m, self.segment_m))
+            .map(|length_m| leg_segment_count(length_m, self.max_segment_m))
             .fold(0, u32::saturating_add);
         let holds = self.path.waypoints().iter().filter(|w| w.leave_s > w.arrive_s).count();
         (moving as usize).saturating_add(2 + holds)
@@ -85,12 +86,12 @@ impl<const W: usize> Flight<W> {
 /// be missing; a leg of length 0 has no segments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StraightPart {
-    before: Option<TimedSegment>,
+    stay_before: Option<TimedSegment>,
     pub(super) leg: Leg,
     /// Arc lengths of the leg's beginning and end, metres.
     from_m: f32,
     to_m: f32,
-    after: Option<TimedSegment>,
+    stay_after: Option<TimedSegment>,
 }
 
 impl StraightPart {
@@ -98,20 +99,20 @@ impl StraightPart {
     /// them.
     pub(super) fn check_segment_count(
         &self,
-        segment_m: f32,
+        max_segment_m: f32,
         most: usize,
     ) -> Result<(), ScheduleError> {
-        let fits = segment_count(self.leg.length_m, segment_m) as usize <= most;
+        let fits = leg_segment_count(self.leg.length_m, max_segment_m) as usize <= most;
         if fits { Ok(()) } else { Err(ScheduleError::SegmentsFull) }
     }
 
-    /// Passes the part's timed segments, the leg's at most `segment_m` long, to `visit` in order.
-    /// Not inlined: a board has little flash.
+    /// Passes the part's timed segments, the leg's at most `max_segment_m` long, to `visit` in
+    /// order. Not inlined: a board has little flash.
     #[inline(never)]
-    pub(super) fn for_each_segment(&self, segment_m: f32, visit: &mut dyn FnMut(TimedSegment)) {
-        self.before.into_iter().for_each(&mut *visit);
-        self.leg.segments(self.from_m, self.to_m, segment_m).for_each(&mut *visit);
-        self.after.into_iter().for_each(visit);
+    pub(super) fn for_each_segment(&self, max_segment_m: f32, visit: &mut dyn FnMut(TimedSegment)) {
+        self.stay_before.into_iter().for_each(&mut *visit);
+        self.leg.segments(self.from_m, self.to_m, max_segment_m).for_each(&mut *visit);
+        self.stay_after.into_iter().for_each(visit);
     }
 }
 
@@ -139,8 +140,8 @@ pub(super) fn straight_part<const W: usize>(
     let hold = hold_segment(begin.position, begin.along_m, begin.arrive_s, begin.leave_s);
     let before = holds.then_some(TimedSegment { parked: false, ..hold });
     Some(match next {
-        Some(next) => StraightPart { before, ..leg_part(begin, next) },
-        None => StraightPart { before, ..descent_part(flight, begin, vertical_mps) },
+        Some(next) => StraightPart { stay_before: before, ..leg_part(begin, next) },
+        None => StraightPart { stay_before: before, ..descent_part(flight, begin, vertical_mps) },
     })
 }
 
@@ -163,9 +164,22 @@ pub(super) fn part_leg_ends<const W: usize>(
     Some((begin, next.unwrap_or(below(begin, flight.descent_m))))
 }
 
+/// Timed segment of a vehicle that is parked at a point; the caller sets the times.
+pub(super) fn parked_segment(at: Point) -> TimedSegment {
+    hold_segment(at, 0.0, 0.0, 0.0)
+}
+
 /// Timed segment of a vehicle that stays at a point, whose arc length is `m`.
 fn hold_segment(at: Point, m: f32, from_s: f32, to_s: f32) -> TimedSegment {
-    TimedSegment { from: at, to: at, from_m: m, to_m: m, from_s, to_s, parked: true }
+    TimedSegment {
+        from: at,
+        to: at,
+        wait_at_m: m,
+        end_m: m,
+        held_from_s: from_s,
+        held_until_s: to_s,
+        parked: true,
+    }
 }
 
 fn climb_part<const W: usize>(flight: &Flight<W>, first: &Waypoint) -> StraightPart {
@@ -174,18 +188,18 @@ fn climb_part<const W: usize>(flight: &Flight<W>, first: &Waypoint) -> StraightP
     if !flight.task.leaves_pad() {
         let before = Some(hold_segment(pad, from_m, f32::NEG_INFINITY, f32::INFINITY));
         return StraightPart {
-            before,
+            stay_before: before,
             leg: Leg::vertical_leg(pad, pad, 0.0),
             from_m,
             to_m: from_m,
-            after: None,
+            stay_after: None,
         };
     }
     let leg = Leg::vertical_leg(pad, first.position, first.arrive_s);
-    let (left_m, left_s) = leg.first_segment(flight.segment_m);
+    let (left_m, left_s) = leg.first_segment_length_and_duration(flight.max_segment_m);
     let on_pad = hold_segment(pad, from_m, f32::NEG_INFINITY, fmaxf(left_s, MIN_PAD_HOLD_S));
-    let before = Some(TimedSegment { to_m: left_m - flight.climb_m, ..on_pad });
-    StraightPart { before, leg, from_m, to_m, after: None }
+    let before = Some(TimedSegment { end_m: left_m - flight.climb_m, ..on_pad });
+    StraightPart { stay_before: before, leg, from_m, to_m, stay_after: None }
 }
 
 fn leg_part(begin: &Waypoint, next: &Waypoint) -> StraightPart {
@@ -195,9 +209,15 @@ fn leg_part(begin: &Waypoint, next: &Waypoint) -> StraightPart {
         length_m: next.along_m - begin.along_m,
         from_s: begin.leave_s,
         to_s: next.arrive_s,
-        stops: WaitingPlaces::Anywhere,
+        waiting_places: WaitingPlaces::BeforeEachSegment,
     };
-    StraightPart { before: None, leg, from_m: begin.along_m, to_m: next.along_m, after: None }
+    StraightPart {
+        stay_before: None,
+        leg,
+        from_m: begin.along_m,
+        to_m: next.along_m,
+        stay_after: None,
+    }
 }
 
 fn descent_part<const W: usize>(
@@ -214,11 +234,11 @@ fn descent_part<const W: usize>(
         ..Leg::vertical_leg(last.position, ground, 0.0)
     };
     let landed = hold_segment(ground, end_m, last.leave_s, f32::INFINITY);
-    let after = Some(TimedSegment { from_m: last.along_m, ..landed });
-    StraightPart { before: None, leg, from_m: last.along_m, to_m: end_m, after }
+    let after = Some(TimedSegment { wait_at_m: last.along_m, ..landed });
+    StraightPart { stay_before: None, leg, from_m: last.along_m, to_m: end_m, stay_after: after }
 }
 
-/// Cuts a flight into timed segments of at most `flight.segment_m` metres.
+/// Cuts a flight into timed segments of at most `flight.max_segment_m` metres.
 pub(super) fn cut_into_segments<const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
@@ -227,8 +247,10 @@ pub(super) fn cut_into_segments<const W: usize>(
     out.clear();
     let mut full = false;
     for part in (0..).map_while(|part| straight_part(cfg.vertical_mps, flight, part)) {
-        part.check_segment_count(flight.segment_m, MAX_TIMED_SEGMENTS - out.len())?;
-        part.for_each_segment(flight.segment_m, &mut |segment| full |= out.push(segment).is_err());
+        part.check_segment_count(flight.max_segment_m, MAX_TIMED_SEGMENTS - out.len())?;
+        part.for_each_segment(flight.max_segment_m, &mut |segment| {
+            full |= out.push(segment).is_err();
+        });
     }
     if full { Err(ScheduleError::SegmentsFull) } else { Ok(()) }
 }
@@ -237,9 +259,9 @@ pub(super) fn cut_into_segments<const W: usize>(
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum WaitingPlaces {
     /// Before each timed segment of the leg.
-    Anywhere,
+    BeforeEachSegment,
     /// Before the whole leg only.
-    Before,
+    BeforeLegOnly,
 }
 
 /// A straight leg flown at constant speed, with its times in seconds.
@@ -250,7 +272,7 @@ pub(super) struct Leg {
     pub(super) length_m: f32,
     pub(super) from_s: f32,
     pub(super) to_s: f32,
-    pub(super) stops: WaitingPlaces,
+    pub(super) waiting_places: WaitingPlaces,
 }
 
 impl Leg {
@@ -262,25 +284,25 @@ impl Leg {
             length_m: libm::fabsf(to.z - from.z),
             from_s: 0.0,
             to_s,
-            stops: WaitingPlaces::Before,
+            waiting_places: WaitingPlaces::BeforeLegOnly,
         }
     }
 
     /// Length in metres and duration in seconds of the leg's first timed segment.
-    pub(super) fn first_segment(&self, segment_m: f32) -> (f32, f32) {
-        let share = 1.0 / fmaxf(segment_count(self.length_m, segment_m) as f32, 1.0);
+    pub(super) fn first_segment_length_and_duration(&self, max_segment_m: f32) -> (f32, f32) {
+        let share = 1.0 / fmaxf(leg_segment_count(self.length_m, max_segment_m) as f32, 1.0);
         (self.length_m * share, (self.to_s - self.from_s) * share)
     }
 
-    /// The timed segments of the leg, at most `segment_m` long; `from_m` and `to_m` are the arc
+    /// The timed segments of the leg, at most `max_segment_m` long; `from_m` and `to_m` are the arc
     /// lengths of its ends.
     pub(super) fn segments(
         self,
         from_m: f32,
         to_m: f32,
-        segment_m: f32,
+        max_segment_m: f32,
     ) -> impl Iterator<Item = TimedSegment> {
-        let parts = segment_count(self.length_m, segment_m);
+        let parts = leg_segment_count(self.length_m, max_segment_m);
         let at = move |part: u32| {
             if part == parts {
                 // The next leg begins at exactly this point, bit by bit.
@@ -298,29 +320,50 @@ impl Leg {
         (0..parts).map(move |part| {
             let (to, to_m, to_s) = at(part + 1);
             let (from, start_m, start_s) = core::mem::replace(&mut begin, (to, to_m, to_s));
-            let (from_m, from_s) = if self.stops == WaitingPlaces::Before {
+            let (from_m, from_s) = if self.waiting_places == WaitingPlaces::BeforeLegOnly {
                 (from_m, self.from_s)
             } else {
                 (start_m, start_s)
             };
-            TimedSegment { from, to, from_m, to_m, from_s, to_s, parked: false }
+            TimedSegment {
+                from,
+                to,
+                wait_at_m: from_m,
+                end_m: to_m,
+                held_from_s: from_s,
+                held_until_s: to_s,
+                parked: false,
+            }
         })
     }
 }
 
+/// A straight leg that begins at time 0 and takes `duration_s`.
+pub(super) fn leg_at_time_zero(from: Point, to: Point, duration_s: f32) -> Leg {
+    let length_m = (to - from).length();
+    Leg {
+        from,
+        to,
+        length_m,
+        from_s: 0.0,
+        to_s: duration_s,
+        waiting_places: WaitingPlaces::BeforeEachSegment,
+    }
+}
+
 /// Number of timed segments of a leg; 0 for length 0.
-pub(super) fn segment_count(length_m: f32, segment_m: f32) -> u32 {
-    libm::ceilf(length_m / segment_m) as u32
+pub(super) fn leg_segment_count(length_m: f32, max_segment_m: f32) -> u32 {
+    libm::ceilf(length_m / max_segment_m) as u32
 }
 
 /// Whether two timed segments come nearer than the separation, whatever their times are.
 pub(super) fn is_conflict(cfg: &ScheduleConfig, p: &TimedSegment, q: &TimedSegment) -> bool {
-    if p.parked && q.parked && p.from_s.is_infinite() == q.from_s.is_infinite() {
+    if p.parked && q.parked && p.held_from_s.is_infinite() == q.held_from_s.is_infinite() {
         // Two pads, or two landing places, never conflict: their distance is given by the mission.
         return false;
     }
     let apart = if p.parked || q.parked { cfg.parked_separation_m } else { cfg.separation_m };
-    let reach = apart + 0.5 * (p.to_m - p.from_m + q.to_m - q.from_m);
+    let reach = apart + 0.5 * (p.end_m - p.wait_at_m + q.end_m - q.wait_at_m);
     let middles = (p.from + p.to - q.from - q.to) * 0.5;
     middles.norm_squared() < reach * reach
         && segments_distance_sq((&p.from, &p.to), (&q.from, &q.to)) < apart * apart

@@ -7,7 +7,7 @@ proptest! {
         numbers in proptest::collection::vec(0u8..40, 0..120),
     ) {
         let (mut sorted, mut expected) = (numbers.clone(), numbers);
-        sort_by(&mut sorted, Ord::cmp);
+        heapsort_by(&mut sorted, Ord::cmp);
         expected.sort_unstable();
         prop_assert_eq!(sorted, expected);
     }

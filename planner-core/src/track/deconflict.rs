@@ -13,7 +13,7 @@ use heapless::Vec;
 use libm::{fmaxf, fminf};
 
 use crate::flight::{Gate, Path};
-use crate::{Length, Point, SettingError, all_positive};
+use crate::{Length, Point, SettingError, check_positive};
 
 /// Rule by which vehicles are kept apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +42,7 @@ pub struct DeconflictConfig {
 impl DeconflictConfig {
     /// Checks that all numbers are positive and finite; the error names the first that is not.
     pub fn check(&self) -> Result<(), SettingError> {
-        all_positive(&[
+        check_positive(&[
             ("safety_distance_m", self.safety_distance_m),
             ("cruise_mps", self.cruise_mps),
             ("accel_mps2", self.accel_mps2),
@@ -72,7 +72,7 @@ pub struct Neighbour {
     /// an obstacle.
     pub out_of_plan: bool,
     /// Whether the neighbour flies a detour, off its path of the plan.
-    pub detours: bool,
+    pub on_detour: bool,
 }
 
 /// The own vehicle, for which [`advise`] is called.
@@ -88,7 +88,7 @@ pub struct OwnVehicle<'a, const W: usize> {
     /// The path that the vehicle flies.
     pub path: &'a Path<W>,
     /// Whether `path` is a detour, not the path of the plan.
-    pub detours: bool,
+    pub on_detour: bool,
 }
 
 /// Limits of the own vehicle's speed and distance that keep it clear of its neighbours.
@@ -101,12 +101,13 @@ pub struct Advice {
     pub stop_within_m: f32,
     /// System id of the neighbour that the own vehicle stops for, or by [`Method::Algorithm2`]
     /// slows for; 0 for none.
-    pub waiting_for: u8,
+    pub waiting_for_id: u8,
 }
 
 impl Advice {
     /// No limits: no gate and no neighbour asks for a stop.
-    pub const FREE: Self = Self { speed_scale: 1.0, stop_within_m: f32::INFINITY, waiting_for: 0 };
+    pub const FREE: Self =
+        Self { speed_scale: 1.0, stop_within_m: f32::INFINITY, waiting_for_id: 0 };
 }
 
 /// Most points of the own path that are compared with a neighbour's predicted positions: four
@@ -120,7 +121,7 @@ const PATH_SAMPLE_S: f32 = 0.25;
 const DISTANCE_ROUNDING_M: f32 = 0.05;
 /// Distance beyond a gate at which the reference still counts as standing at it, metres: a small
 /// overshoot of the stop must not carry the vehicle through.
-const GATE_OVERSHOOT_M: f32 = 0.1;
+const MAX_GATE_OVERSHOOT_M: f32 = 0.1;
 /// Overshoot of a braking vehicle over its reference, as seconds of flight at the part of the
 /// cruise speed above [`BRAKING_OVERSHOOT_ABOVE_MPS`]: from 5.8 m/s an overshoot of 0.5 m was
 /// measured.
@@ -131,10 +132,10 @@ const BRAKING_OVERSHOOT_ABOVE_MPS: f32 = 3.0;
 /// a stop from this speed overshoots by 0.4 m, and detours keep 0.5 m beyond the safety distance.
 const MAX_PASSING_MPS: f32 = 5.0;
 /// Greatest speed of a neighbour that hovers, m/s.
-const HOVERING_MPS: f32 = 1.0;
+const MAX_HOVERING_MPS: f32 = 1.0;
 
 /// Distance that is kept so that a stop from this speed ends outside the safety distance, metres.
-fn stopping_distance_apart_m(cfg: &DeconflictConfig, speed_mps: f32) -> f32 {
+fn stop_separation_m(cfg: &DeconflictConfig, speed_mps: f32) -> f32 {
     cfg.safety_distance_m
         + BRAKING_OVERSHOOT_S * fmaxf(speed_mps - BRAKING_OVERSHOOT_ABOVE_MPS, 0.0)
 }
@@ -172,7 +173,7 @@ fn advise_by_algorithm2(
         Some(n) => Advice {
             speed_scale: 1.0 / ((f32::from(n.rank) + 1.0) * 1.5),
             stop_within_m: f32::INFINITY,
-            waiting_for: n.id,
+            waiting_for_id: n.id,
         },
         None => Advice::FREE,
     }
@@ -188,32 +189,34 @@ fn advise_by_priority<const W: usize>(
     let mut stop = |within_m: f32, id: u8| {
         if within_m < advice.stop_within_m {
             advice.stop_within_m = within_m;
-            advice.waiting_for = id;
+            advice.waiting_for_id = id;
         }
     };
     // Gates further ahead than twice the braking distance plus one sample step are ignored for now.
     let horizon_m = own.along_m
         + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2
         + cfg.cruise_mps * PATH_SAMPLE_S;
-    let ahead = &gates[gates.partition_point(|gate| gate.at_m < own.along_m - GATE_OVERSHOOT_M)..];
+    let ahead =
+        &gates[gates.partition_point(|gate| gate.at_m < own.along_m - MAX_GATE_OVERSHOOT_M)..];
     for gate in ahead.iter().take_while(|gate| gate.at_m <= horizon_m) {
-        let passed = find_neighbour(neighbours, gate.id).is_some_and(|n| {
-            n.out_of_plan || n.progress_m.is_some_and(|progress_m| progress_m >= gate.until_m)
+        let passed = find_neighbour(neighbours, gate.wait_for_id).is_some_and(|n| {
+            n.out_of_plan
+                || n.progress_m.is_some_and(|progress_m| progress_m >= gate.open_from_progress_m)
         });
         if !passed {
-            stop(fmaxf(gate.at_m - own.along_m, 0.0), gate.id);
+            stop(fmaxf(gate.at_m - own.along_m, 0.0), gate.wait_for_id);
             break;
         }
     }
-    let unplanned = |n: &&Neighbour| n.progress_m.is_none() || n.detours || own.detours;
+    let unplanned = |n: &&Neighbour| n.progress_m.is_none() || n.on_detour || own.on_detour;
     let ahead = PathSamples::new(cfg, own);
     let mut slow_within_m = f32::INFINITY;
     for n in neighbours.iter().filter(|n| !n.grounded).filter(unplanned) {
         let conflict_m = |speed_mps: f32| {
-            ahead.distance_to_conflict_m(stopping_distance_apart_m(cfg, speed_mps), own, n)
+            ahead.distance_to_conflict_m(stop_separation_m(cfg, speed_mps), own, n)
         };
         let Some(distance_m) = conflict_m(cfg.cruise_mps) else { continue };
-        let hovers = n.velocity.norm_squared() <= HOVERING_MPS * HOVERING_MPS;
+        let hovers = n.velocity.norm_squared() <= MAX_HOVERING_MPS * MAX_HOVERING_MPS;
         if hovers && cfg.cruise_mps > MAX_PASSING_MPS && conflict_m(MAX_PASSING_MPS).is_none() {
             slow_within_m = fminf(slow_within_m, distance_m);
         } else {
@@ -273,7 +276,7 @@ impl PathSamples {
             let room_m = least_m - apart_m - DISTANCE_ROUNDING_M;
             let comes_near = || {
                 let from = if last.0 == i { last.1 } else { away(i, &self.points[i - 1]) };
-                closest_approach_sq(&from, &to).is_some_and(|square| square < near)
+                interior_closest_approach_sq(&from, &to).is_some_and(|square| square < near)
             };
             if to.norm_squared() < near || room_m < look_m && comes_near() {
                 return Some(i as f32 * self.step_m);
@@ -288,7 +291,7 @@ impl PathSamples {
 
 /// Square of the least distance from the origin to the segment between two points, if that is
 /// inside the segment; `None` if the least distance is at one of the segment's ends.
-fn closest_approach_sq(from: &Point, to: &Point) -> Option<f32> {
+fn interior_closest_approach_sq(from: &Point, to: &Point) -> Option<f32> {
     let step = to - from;
     let ahead = to.dot(&step);
     if ahead <= 0.0 {

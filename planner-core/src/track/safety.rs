@@ -13,8 +13,8 @@
 //!
 //! ENU metres. Sets have no times, so two vehicles that pass a place one after the other still
 //! conflict there. Cost: the segments of one set times those of the other;
-//! [`NeighbourMotion::reach_m`] is a cheap bound that rules out the many far neighbours. The own
-//! set is prepared once ([`OwnSet`]), so that most segments of the others are ruled out without
+//! [`NeighbourMotion::max_reach_m`] is a cheap bound that rules out the many far neighbours. The
+//! own set is prepared once ([`OwnSet`]), so that most segments of the others are ruled out without
 //! computing a distance.
 
 mod own;
@@ -22,9 +22,11 @@ mod place;
 mod set;
 
 pub use self::own::{Legs, OwnSet};
-pub use self::place::{OFF_REPORTED_PATH_M, OFF_REPORTED_PATH_S, PlaceOnPoints, ReportedPathReach};
+pub use self::place::{
+    OFF_REPORTED_PATH_M, OFF_REPORTED_PATH_PER_SPEED_S, PlaceOnPoints, ReportedPathReach,
+};
 pub use self::set::ReachableSet;
-use crate::{Point, SettingError, all_positive};
+use crate::{Point, SettingError, check_positive};
 
 /// Time from a decision of the filter to the first motion that follows it, seconds: two setpoint
 /// periods.
@@ -48,7 +50,7 @@ pub struct Braking {
 impl Braking {
     /// Distance from the beginning of braking at this speed to rest, metres.
     #[inline]
-    pub fn stop_m(&self, speed_mps: f32) -> f32 {
+    pub fn stop_distance_m(&self, speed_mps: f32) -> f32 {
         let ramp_s = self.accel_mps2 / self.jerk_mps3;
         0.5 * speed_mps * (speed_mps / self.accel_mps2 + ramp_s)
     }
@@ -70,7 +72,7 @@ pub struct NeighbourMotion<'a> {
     pub delay_s: f32,
     /// Points that the neighbour reports to fly along next; empty while a pilot or a failsafe flies
     /// it.
-    pub points: &'a [Point],
+    pub reported_points: &'a [Point],
     /// Where the neighbour is on its reported points.
     pub place_on_points: PlaceOnPoints,
     /// How far its reported points lead the neighbour, from its position.
@@ -82,7 +84,7 @@ pub struct NeighbourMotion<'a> {
     pub grounded: bool,
     /// Height down to which the column below the neighbour belongs to its set, metres up in the
     /// mission frame; `None` while it flies along its points.
-    pub column_to_m: Option<f32>,
+    pub column_bottom_z_m: Option<f32>,
 }
 
 /// Bounds of a neighbour's motion, from which its reachable set is computed.
@@ -93,17 +95,17 @@ pub struct MotionBounds {
     /// Greatest speed that a neighbour is assumed to fly at, m/s.
     pub speed_max_mps: f32,
     /// Time after which a vehicle that no other vehicle hears has stopped, seconds.
-    pub silent_s: f32,
+    pub stopped_when_unheard_for_s: f32,
 }
 
 impl MotionBounds {
     /// Checks that all numbers are positive and finite; the error names the first that is not.
     pub fn check(&self) -> Result<(), SettingError> {
-        all_positive(&[
+        check_positive(&[
             ("accel_mps2", self.braking.accel_mps2),
             ("jerk_mps3", self.braking.jerk_mps3),
             ("speed_max_mps", self.speed_max_mps),
-            ("silent_s", self.silent_s),
+            ("silent_s", self.stopped_when_unheard_for_s),
         ])
     }
 }
@@ -119,7 +121,7 @@ impl NeighbourMotion<'_> {
     /// Upper bound of the distance from `position` to any place of the neighbour's set, with
     /// `ahead_s` more seconds of flight, metres. The column is not counted.
     #[inline]
-    pub fn reach_m(&self, bounds: &MotionBounds, ahead_s: f32) -> f32 {
+    pub fn max_reach_m(&self, bounds: &MotionBounds, ahead_s: f32) -> f32 {
         if self.grounded {
             return 0.0;
         }
@@ -127,7 +129,8 @@ impl NeighbourMotion<'_> {
             return self.reach_any_direction_m(bounds);
         }
         let until_stop_m = self.distance_until_stop_m(bounds, ahead_s);
-        let ReportedPathReach { beyond_m, most_m } = self.reported_path_reach;
+        let ReportedPathReach { added_reach_m: beyond_m, max_reach_m: most_m } =
+            self.reported_path_reach;
         fast_min(until_stop_m + beyond_m + self.lateral_reach_m(bounds), most_m)
     }
 
@@ -141,7 +144,8 @@ impl NeighbourMotion<'_> {
     fn reach_any_direction_m(&self, bounds: &MotionBounds) -> f32 {
         // The neighbour learns that no vehicle hears it from messages that are delayed as much as
         // its own.
-        bounds.speed_max_mps * fast_min(self.data_age_s(), bounds.silent_s + 2.0 * self.delay_s)
+        bounds.speed_max_mps
+            * fast_min(self.data_age_s(), bounds.stopped_when_unheard_for_s + 2.0 * self.delay_s)
     }
 
     /// Distance that the neighbour may fly until it has stopped, with `ahead_s` more seconds of
@@ -156,7 +160,7 @@ impl NeighbourMotion<'_> {
         let max_mps = bounds.speed_max_mps;
         let most_mps = if self.speed_mps > max_mps { self.speed_mps } else { max_mps };
         let speed_mps = fast_min(fast_min(self.speed_mps + gained_mps, most_mps), 2.0 * max_mps);
-        let stop_m = bounds.braking.stop_m(speed_mps);
+        let stop_m = bounds.braking.stop_distance_m(speed_mps);
         speed_mps * (self.data_age_s() + REACTION_S + MAX_LAG_S)
             + stop_m
             + ahead_s * bounds.speed_max_mps
@@ -173,7 +177,7 @@ impl NeighbourMotion<'_> {
         let mut set = ReachableSet::at(self.position);
         if self.grounded {
             // A column too, since the height of the ground may be unknown.
-            set.add_column(self.column_to_m);
+            set.add_column(self.column_bottom_z_m);
             return set;
         }
         if self.age_s > FRESH_S {
@@ -181,13 +185,13 @@ impl NeighbourMotion<'_> {
         } else {
             self.add_motion(&mut set, bounds, ahead_s);
         }
-        set.add_column(self.column_to_m);
+        set.add_column(self.column_bottom_z_m);
         set
     }
 
     fn add_motion(&self, set: &mut ReachableSet, bounds: &MotionBounds, ahead_s: f32) {
         let joint = self.place_on_points();
-        if let Some((nearest, ahead)) = joint.ahead(&self.position, self.points) {
+        if let Some((nearest, ahead)) = joint.ahead(&self.position, self.reported_points) {
             let ahead = core::iter::once(nearest).chain(ahead.iter().copied());
             set.extend_along(
                 ahead,
@@ -207,7 +211,7 @@ impl NeighbourMotion<'_> {
     #[inline]
     fn place_on_points(&self) -> PlaceOnPoints {
         if self.place_on_points == PlaceOnPoints::Unknown {
-            PlaceOnPoints::find(&self.position, self.points, &self.velocity)
+            PlaceOnPoints::find(&self.position, self.reported_points, &self.velocity)
         } else {
             self.place_on_points
         }

@@ -12,7 +12,7 @@ fn a_stop_that_is_advised_too_late_is_as_long_as_flown() {
         advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.02).unwrap();
     }
     let (from_m, brakes_m) = (tracker.along_m, braking_distance_m(&cfg, &path, &tracker));
-    let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 2 };
+    let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for_id: 2 };
     while tracker.speed_mps > 0.0 {
         advance(&cfg, &path, &mut tracker, &stop, 0.02).unwrap();
     }

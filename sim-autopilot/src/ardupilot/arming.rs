@@ -10,9 +10,9 @@ impl Copter {
     pub(super) fn check_arming(&self, sensors: &SensorReadings) -> Result<(), &'static str> {
         if !self.mode.allows_arming() {
             Err("Arm: Mode not armable")
-        } else if self.tuning.checks && !self.position_known(sensors.now_us) {
+        } else if self.tuning.arming_checks_enabled && !self.position_known(sensors.now_us) {
             Err("Arm: Need Position Estimate")
-        } else if sensors.battery < self.tuning.battery_to_arm {
+        } else if sensors.battery < self.tuning.battery_to_arm_share {
             Err("Arm: Battery 1 below minimum arming capacity")
         } else {
             Ok(())
@@ -39,7 +39,7 @@ impl Copter {
         self.since.idle_us = sensors.now_us;
         self.goal = GuidedGoal::STOP;
         platform.announce_origin();
-        platform.set_home_here();
+        platform.set_home_here_unless_fixed();
         platform.send_text(6, "Arming motors");
         CommandOutcome::Done
     }
@@ -56,7 +56,7 @@ impl Copter {
         self.armed = false;
         self.takeoff = None;
         self.failsafe = None;
-        self.speed = None;
+        self.commanded_speed = None;
         CommandOutcome::Done
     }
 }

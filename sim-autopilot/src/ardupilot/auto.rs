@@ -16,14 +16,18 @@ use crate::platform::{Platform, SensorReadings};
 use crate::services::itinerary::{LandedState, MissionLeg, interpolate_height};
 
 /// Distance within which the place of a landing is reached, metres.
-const LANDING_REACHED_M: f32 = 0.5;
+const LANDING_POINT_REACHED_M: f32 = 0.5;
 /// Distance to the target beyond which the vehicle turns its heading towards it, metres.
 const TURN_BEYOND_M: f32 = 2.0;
 
 impl Copter {
     /// Whether AUTO can be entered; if the take-off is missing, sends a STATUSTEXT.
     pub(super) fn can_enter_auto(&self, platform: &mut Platform) -> bool {
-        if platform.has_mission() && self.armed && self.landed && !platform.mission_takes_off() {
+        if platform.has_mission()
+            && self.armed
+            && self.landed
+            && !platform.mission_begins_with_takeoff()
+        {
             platform.send_text(2, "Auto: Missing Takeoff Cmd");
             return false;
         }
@@ -46,7 +50,7 @@ impl Copter {
         self.mode == CopterMode::Auto
             && match self.auto.leg {
                 Some(MissionLeg::Land { .. }) => true,
-                Some(MissionLeg::Return) => self.leg == RtlLeg::Land,
+                Some(MissionLeg::Return) => self.rtl_leg == RtlLeg::Land,
                 _ => false,
             }
     }
@@ -75,12 +79,12 @@ impl Copter {
             return;
         }
         let landed = if self.landed { LandedState::OnGround } else { LandedState::InAir };
-        let leg = platform.fly_mission(sensors, landed);
-        if let Some(speed) = platform.missions.speed.take() {
-            self.speed = (speed > 0.0).then_some(speed);
+        let leg = platform.advance_mission(sensors, landed);
+        if let Some(speed) = platform.missions.take_requested_speed() {
+            self.commanded_speed = (speed > 0.0).then_some(speed);
         }
         if leg != self.auto.leg {
-            self.auto.from = MissionLeg::leg_end(self.auto.leg, &sensors.position);
+            self.auto.leg_start = MissionLeg::leg_end(self.auto.leg, &sensors.position);
             // The take-off climbs at least 1 m.
             self.takeoff = match leg {
                 Some(MissionLeg::TakeOff { up }) if self.landed => {
@@ -89,7 +93,7 @@ impl Copter {
                 _ => None,
             };
             if leg == Some(MissionLeg::Return) {
-                self.leg = RtlLeg::Climb { up: f32::NAN };
+                self.rtl_leg = RtlLeg::Climb { up: f32::NAN };
             }
         }
         self.auto.leg = leg;
@@ -102,15 +106,15 @@ impl Copter {
         }
         let at = self.reference.position;
         match self.auto.leg {
-            Some(MissionLeg::To { at, .. }) => {
+            Some(MissionLeg::FlyTo { at, .. }) => {
                 let off = at - sensors.position;
                 if libm::hypotf(off.x, off.y) > TURN_BEYOND_M {
                     self.auto.heading = Some(libm::atan2f(off.x, off.y));
                 }
-                self.auto.stay = Some(at);
+                self.auto.hold_point = Some(at);
                 let reference = &self.reference;
                 let (up, rate) = interpolate_height(
-                    &self.auto.from,
+                    &self.auto.leg_start,
                     &at,
                     &reference.position,
                     &reference.velocity,
@@ -120,21 +124,21 @@ impl Copter {
                 GuidedGoal { heading, velocity, ..GuidedGoal::hold(Point::new(at.x, at.y, up)) }
             }
             Some(MissionLeg::TakeOff { up }) => {
-                let stay = self.auto.stay.unwrap_or(at);
+                let stay = self.auto.hold_point.unwrap_or(at);
                 GuidedGoal::hold(Point::new(stay.x, stay.y, up))
             }
             Some(MissionLeg::Land { at: Some([east, north]) })
                 if libm::hypotf(east - sensors.position.x, north - sensors.position.y)
-                    > LANDING_REACHED_M
+                    > LANDING_POINT_REACHED_M
                     && !sensors.touching =>
             {
-                let up = self.auto.stay.map_or(at.z, |stay| stay.z);
+                let up = self.auto.hold_point.map_or(at.z, |stay| stay.z);
                 GuidedGoal::hold(Point::new(east, north, up))
             }
             Some(MissionLeg::Land { .. }) => self.landing_goal(sensors),
             Some(MissionLeg::Return) => self.return_goal(sensors),
             Some(MissionLeg::Wait(_)) | None => {
-                self.auto.stay.map_or(GuidedGoal::STOP, GuidedGoal::hold)
+                self.auto.hold_point.map_or(GuidedGoal::STOP, GuidedGoal::hold)
             }
         }
     }

@@ -12,9 +12,9 @@ pub(super) struct Auto {
     /// Leg of the mission that is flown now.
     pub(super) leg: Option<MissionLeg>,
     /// Start of that leg, ENU metres.
-    pub(super) from: Point,
+    pub(super) leg_start: Point,
     /// Point at which the vehicle holds while no leg moves it, ENU metres.
-    pub(super) stay: Option<Point>,
+    pub(super) hold_point: Option<Point>,
     /// Heading of the last leg, radians clockwise from north.
     pub(super) heading: Option<f32>,
 }

@@ -5,7 +5,8 @@ use super::setpoint::GuidedGoal;
 use super::{Copter, CopterMode, STREAMS};
 use crate::link::cmd;
 use crate::link::command::{
-    ACCEPTED, Arming, CUSTOM_MODE, DENIED, FAILED, ReceivedCommand, UNSUPPORTED, message_id,
+    ACCEPTED, Arming, CUSTOM_MODE, DENIED, FAILED, ReceivedCommand, UNSUPPORTED,
+    message_id_from_param,
 };
 use crate::link::msg;
 use crate::link::port::Sender;
@@ -61,7 +62,7 @@ impl Copter {
             }
             cmd::DO_REPOSITION => self.reposition(platform, command),
             cmd::DO_CHANGE_SPEED => {
-                self.speed = (command.param[1] > 0.0).then_some(command.param[1]);
+                self.commanded_speed = (command.param[1] > 0.0).then_some(command.param[1]);
                 ACCEPTED
             }
             cmd::DO_SET_HOME => platform.handle_set_home(command).result_or(FAILED),
@@ -78,7 +79,7 @@ impl Copter {
             }
             cmd::GET_MESSAGE_INTERVAL => platform.report_interval(from, command.param[0], FAILED),
             cmd::SET_MESSAGE_INTERVAL => platform.set_interval(from, command, &STREAMS, DENIED),
-            cmd::REQUEST_MESSAGE => match message_id(command.param[0]) {
+            cmd::REQUEST_MESSAGE => match message_id_from_param(command.param[0]) {
                 Some(id) if STREAMS.iter().any(|stream| stream.0 == id) => {
                     platform.ports[from.port].requested_once.push(id);
                     ACCEPTED
@@ -126,7 +127,7 @@ impl Copter {
         if !guided || !to.iter().all(|x| x.is_finite()) {
             return if guided { DENIED } else { FAILED };
         }
-        self.fly_to(GuidedGoal::hold(to), &sensors);
+        self.set_guided_goal(GuidedGoal::hold(to), &sensors);
         ACCEPTED
     }
 }

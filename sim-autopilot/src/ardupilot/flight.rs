@@ -11,7 +11,7 @@ use crate::platform::SensorReadings;
 
 /// Distance below its target height at which a take-off is complete, metres. With this value
 /// landed_state 2 comes 9.3 s after a command to 10 m, as recorded.
-const TAKEN_OFF_M: f32 = 0.12;
+const TAKEOFF_DONE_BELOW_TARGET_M: f32 = 0.12;
 /// Profile of a lift-off as recorded: time since lift-off until which each entry applies (s), and
 /// upward acceleration (m/s²). First the throttle slowly passes hover while the controllers'
 /// integrals wind up; then they push.
@@ -26,19 +26,19 @@ impl Copter {
     /// The demand of the mode in this step.
     pub(super) fn demand(&mut self, sensors: &SensorReadings, dt: f32) -> Demand {
         let mut tuning = self.tuning;
-        tuning.speed = self.speed.unwrap_or(tuning.speed);
+        tuning.speed_max = self.commanded_speed.unwrap_or(tuning.speed_max);
         let goal = match self.mode {
             CopterMode::Auto => self.auto_goal(sensors),
             CopterMode::Guided if self.takeoff.is_some() => self.take_off_goal(),
             CopterMode::Guided => self.guided_goal(sensors.now_us, dt),
             CopterMode::Brake => {
-                tuning.acceleration = BRAKE_MPS2;
+                tuning.acceleration_max = BRAKE_MPS2;
                 GuidedGoal::STOP
             }
             CopterMode::Stabilize | CopterMode::AltHold | CopterMode::Loiter => {
-                tuning.speed_down = tuning.stick_sink;
+                tuning.descend_max = tuning.low_stick_descent_rate;
                 GuidedGoal {
-                    velocity: Point::new(0.0, 0.0, -tuning.stick_sink),
+                    velocity: Point::new(0.0, 0.0, -tuning.low_stick_descent_rate),
                     ..GuidedGoal::STOP
                 }
             }
@@ -68,7 +68,7 @@ impl Copter {
             acceleration: Point::new(a.x * d, a.y * d, a.z),
             heading: goal.heading,
             heading_rate: goal.heading_rate,
-            lift_off: self.lift_off_acceleration(sensors.now_us),
+            lift_off_acceleration: self.lift_off_acceleration(sensors.now_us),
             ..tuning.default_demand()
         }
     }
@@ -86,7 +86,7 @@ impl Copter {
         let Some(takeoff) = self.takeoff else { return GuidedGoal::STOP };
         let at = self.reference.position;
         let goal = GuidedGoal::hold(Point::new(at.x, at.y, takeoff.up));
-        if takeoff.up - at.z < TAKEN_OFF_M {
+        if takeoff.up - at.z < TAKEOFF_DONE_BELOW_TARGET_M {
             self.takeoff = None;
             self.goal = goal;
         }
@@ -96,7 +96,7 @@ impl Copter {
     /// The goal of Guided in this step. A goal position moves with the goal velocity, which becomes
     /// zero after `GUID_TIMEOUT`.
     fn guided_goal(&mut self, now_us: u64, dt: f32) -> GuidedGoal {
-        let age_us = now_us.saturating_sub(self.goal_us);
+        let age_us = now_us.saturating_sub(self.goal_set_us);
         if self.goal.expires && age_us > micros_from_s(self.tuning.guided_timeout_s) {
             self.goal =
                 GuidedGoal { velocity: Point::zeros(), acceleration: Point::zeros(), ..self.goal };
@@ -115,8 +115,8 @@ impl Copter {
         let tuning = &self.tuning;
         let above_low = sensors.position.z - sensors.home.z - tuning.land_slow_below.max(1.0);
         let rate =
-            approach_rate(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
-        let sink = rate.min(tuning.speed_down).max(tuning.land_speed);
+            approach_rate(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_max_z);
+        let sink = rate.min(tuning.descend_max).max(tuning.land_speed);
         GuidedGoal { velocity: Point::new(0.0, 0.0, -sink), ..GuidedGoal::STOP }
     }
 
@@ -124,29 +124,29 @@ impl Copter {
         let home = sensors.home;
         let at = self.reference.position;
         let away = libm::hypotf(home.x - sensors.position.x, home.y - sensors.position.y);
-        if let RtlLeg::Climb { up } = &mut self.leg
+        if let RtlLeg::Climb { up } = &mut self.rtl_leg
             && up.is_nan()
         {
             // Near home the cone `RTL_CONE_SLOPE` limits the climb.
-            let height = self.tuning.return_height.min(away * self.tuning.return_cone);
+            let height = self.tuning.return_height.min(away * self.tuning.return_cone_slope);
             *up = (home.z + height).max(sensors.position.z);
         }
-        match self.leg {
+        match self.rtl_leg {
             RtlLeg::Climb { up } => {
                 if up - sensors.position.z < ARRIVED_M {
-                    self.leg = RtlLeg::Cross { up };
+                    self.rtl_leg = RtlLeg::Cross { up };
                 }
                 GuidedGoal::hold(Point::new(at.x, at.y, up))
             }
             RtlLeg::Cross { up } => {
                 if away < ARRIVED_M {
-                    self.leg = RtlLeg::Wait { since_us: sensors.now_us, up };
+                    self.rtl_leg = RtlLeg::Wait { since_us: sensors.now_us, up };
                 }
                 GuidedGoal::hold(Point::new(home.x, home.y, up))
             }
             RtlLeg::Wait { since_us, up } => {
                 if sensors.now_us - since_us >= micros_from_s(self.tuning.return_loiter_s) {
-                    self.leg = RtlLeg::Land;
+                    self.rtl_leg = RtlLeg::Land;
                     self.reference = CopterReference::new(at, self.reference.velocity);
                 }
                 GuidedGoal::hold(Point::new(home.x, home.y, up))

@@ -80,53 +80,53 @@ pub fn default_params(system_id: u8, airframe: &AirframeParameters) -> Params {
     Params::new(DEFAULTS, Encoding::Cast, &own)
 }
 
-const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
+const NO_DEMAND: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 
 /// Values of the parameters that have an effect, each named by its effect. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
 #[expect(missing_docs, reason = "each is the parameter it is read from, in `CopterTuning::new`")]
 pub struct CopterTuning {
     pub gains: Gains,
-    pub speed: f32,
-    pub speed_up: f32,
-    pub speed_down: f32,
-    pub acceleration: f32,
-    pub acceleration_z: f32,
-    pub jerk: f32,
-    pub jerk_z: f32,
+    pub speed_max: f32,
+    pub climb_max: f32,
+    pub descend_max: f32,
+    pub acceleration_max: f32,
+    pub acceleration_max_z: f32,
+    pub jerk_max: f32,
+    pub jerk_max_z: f32,
     pub land_speed: f32,
     pub land_slow_below: f32,
-    pub stick_sink: f32,
+    pub low_stick_descent_rate: f32,
     pub guided_timeout_s: f32,
     pub disarm_delay_s: f32,
     pub return_height: f32,
-    pub return_cone: f32,
+    pub return_cone_slope: f32,
     pub return_loiter_s: f32,
     pub gcs_failsafe: bool,
     pub gcs_timeout_s: f32,
     pub gcs_system: u8,
     pub estimator_failsafe: bool,
-    pub battery_action: i32,
-    pub battery_low: f32,
-    pub battery_to_arm: f32,
-    pub checks: bool,
+    pub low_battery_action: i32,
+    pub battery_low_share: f32,
+    pub battery_to_arm_share: f32,
+    pub arming_checks_enabled: bool,
 }
 
 impl CopterTuning {
     /// A demand without position, velocity or heading.
     pub(super) fn default_demand(&self) -> Demand {
         Demand {
-            position: NONE,
-            velocity: NONE,
-            acceleration: NONE,
+            position: NO_DEMAND,
+            velocity: NO_DEMAND,
+            acceleration: NO_DEMAND,
             heading: f32::NAN,
             heading_rate: f32::NAN,
             // The reference keeps these limits; the controller may exceed them to correct errors.
-            speed_max: 1.5 * self.speed,
-            climb_max: 1.5 * self.speed_up,
-            descend_max: 1.5 * self.speed_down.max(self.stick_sink),
-            lift_off: f32::NAN,
-            thrust_min: 0.15,
+            speed_max: 1.5 * self.speed_max,
+            climb_max: 1.5 * self.climb_max,
+            descend_max: 1.5 * self.descend_max.max(self.low_stick_descent_rate),
+            lift_off_acceleration: f32::NAN,
+            min_thrust_per_weight: 0.15,
             height_rate_weight: 0.0,
         }
     }
@@ -143,32 +143,32 @@ impl CopterTuning {
                 velocity_p: [params.f32_value("PSC_VELXY_P"), params.f32_value("PSC_VELZ_P")],
                 velocity_i: [params.f32_value("PSC_VELXY_I"), params.f32_value("PSC_VELZ_I")],
                 velocity_d: [params.f32_value("PSC_VELXY_D"), 0.0],
-                tilt_tan: libm::tanf((whole_cm("ANGLE_MAX")).clamp(10.0, 80.0).to_radians()),
+                tilt_max_tan: libm::tanf((whole_cm("ANGLE_MAX")).clamp(10.0, 80.0).to_radians()),
                 heading_rate_max: cm("ATC_SLEW_YAW").to_radians(),
             },
-            speed: cm("WPNAV_SPEED"),
-            speed_up: cm("WPNAV_SPEED_UP"),
-            speed_down: cm("WPNAV_SPEED_DN"),
-            acceleration: cm("WPNAV_ACCEL").max(0.5),
-            acceleration_z: cm("WPNAV_ACCEL_Z").max(0.5),
-            jerk: params.f32_value("PSC_JERK_XY").max(1.0),
-            jerk_z: params.f32_value("PSC_JERK_Z").max(1.0),
+            speed_max: cm("WPNAV_SPEED"),
+            climb_max: cm("WPNAV_SPEED_UP"),
+            descend_max: cm("WPNAV_SPEED_DN"),
+            acceleration_max: cm("WPNAV_ACCEL").max(0.5),
+            acceleration_max_z: cm("WPNAV_ACCEL_Z").max(0.5),
+            jerk_max: params.f32_value("PSC_JERK_XY").max(1.0),
+            jerk_max_z: params.f32_value("PSC_JERK_Z").max(1.0),
             land_speed: whole_cm("LAND_SPEED"),
             land_slow_below: whole_cm("LAND_ALT_LOW"),
-            stick_sink: or(whole_cm("PILOT_SPEED_DN"), whole_cm("PILOT_SPEED_UP")),
+            low_stick_descent_rate: or(whole_cm("PILOT_SPEED_DN"), whole_cm("PILOT_SPEED_UP")),
             guided_timeout_s: params.f32_value("GUID_TIMEOUT").max(0.1),
             disarm_delay_s: params.i32_value("DISARM_DELAY") as f32,
             return_height: whole_cm("RTL_ALT"),
-            return_cone: params.f32_value("RTL_CONE_SLOPE"),
+            return_cone_slope: params.f32_value("RTL_CONE_SLOPE"),
             return_loiter_s: 0.001 * params.i32_value("RTL_LOIT_TIME") as f32,
             gcs_failsafe: params.i32_value("FS_GCS_ENABLE") != 0,
             gcs_timeout_s: params.f32_value("FS_GCS_TIMEOUT"),
             gcs_system: params.i32_value("SYSID_MYGCS") as u8,
             estimator_failsafe: params.i32_value("FS_EKF_ACTION") != 0,
-            battery_action: params.i32_value("BATT_FS_LOW_ACT"),
-            battery_low: params.f32_value("BATT_LOW_MAH") / capacity,
-            battery_to_arm: params.i32_value("BATT_ARM_MAH") as f32 / capacity,
-            checks: params.i32_value("ARMING_CHECK") != 0,
+            low_battery_action: params.i32_value("BATT_FS_LOW_ACT"),
+            battery_low_share: params.f32_value("BATT_LOW_MAH") / capacity,
+            battery_to_arm_share: params.i32_value("BATT_ARM_MAH") as f32 / capacity,
+            arming_checks_enabled: params.i32_value("ARMING_CHECK") != 0,
         }
     }
 }

@@ -35,25 +35,25 @@ impl CopterReference {
     pub fn advance(&mut self, goal: &GuidedGoal, tuning: &CopterTuning, dt: f32) {
         let error = goal.position.map_or(Point::zeros(), |position| position - self.position);
         // Horizontal axes, limited as one vector.
-        let (limit, jerk) = (tuning.acceleration, tuning.jerk);
-        let mut wanted = with_length(error.x, error.y, |e| {
+        let (limit, jerk) = (tuning.acceleration_max, tuning.jerk_max);
+        let mut wanted = map_length(error.x, error.y, |e| {
             approach_rate(e, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit)
         });
-        wanted = with_length(wanted.0, wanted.1, |speed| speed.min(tuning.speed));
+        wanted = map_length(wanted.0, wanted.1, |speed| speed.min(tuning.speed_max));
         wanted = (wanted.0 + goal.velocity.x, wanted.1 + goal.velocity.y);
         let lack = (wanted.0 - self.velocity.x, wanted.1 - self.velocity.y);
-        let push = with_length(lack.0, lack.1, |e| approach_rate(e, jerk / limit, jerk).min(limit));
+        let push = map_length(lack.0, lack.1, |e| approach_rate(e, jerk / limit, jerk).min(limit));
         let step = (
             push.0 + goal.acceleration.x - self.acceleration.x,
             push.1 + goal.acceleration.y - self.acceleration.y,
         );
-        let step = with_length(step.0, step.1, |change| change.min(jerk * dt));
+        let step = map_length(step.0, step.1, |change| change.min(jerk * dt));
         self.acceleration.x += step.0;
         self.acceleration.y += step.1;
         // Vertical axis.
-        let (limit, jerk) = (tuning.acceleration_z, tuning.jerk_z);
+        let (limit, jerk) = (tuning.acceleration_max_z, tuning.jerk_max_z);
         let rate = approach_rate(error.z, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit);
-        let rate = rate.max(-tuning.speed_down).min(tuning.speed_up) + goal.velocity.z;
+        let rate = rate.max(-tuning.descend_max).min(tuning.climb_max) + goal.velocity.z;
         let push = approach_rate(rate - self.velocity.z, jerk / limit, jerk).max(-limit).min(limit);
         let step = push + goal.acceleration.z - self.acceleration.z;
         self.acceleration.z += step.max(-jerk * dt).min(jerk * dt);
@@ -63,7 +63,7 @@ impl CopterReference {
 }
 
 /// The vector (x, y) with its length changed by the function `length`.
-fn with_length(x: f32, y: f32, length: impl Fn(f32) -> f32) -> (f32, f32) {
+fn map_length(x: f32, y: f32, length: impl Fn(f32) -> f32) -> (f32, f32) {
     let norm = libm::hypotf(x, y);
     if norm < 1e-6 {
         return (0.0, 0.0);

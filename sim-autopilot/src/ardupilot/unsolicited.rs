@@ -8,7 +8,7 @@ use crate::platform::Platform;
 /// Period at which ArduCopter updates STAT_RUNTIME and sends it, microseconds.
 const STAT_RUNTIME_EVERY_US: u64 = 30_000_000;
 /// Value of MAV_PARAM_TYPE_INT32.
-const INT32: u8 = 6;
+const PARAM_TYPE_INT32: u8 = 6;
 
 impl Copter {
     /// Sends the messages of a boot: a STATUSTEXT and one SYS_STATUS.
@@ -30,8 +30,8 @@ impl Copter {
             self.reported_origin_and_position[1] = true;
             platform.send_text(6, "EKF3 IMU0 is using GPS");
         }
-        if now_us >= self.runtime_us + STAT_RUNTIME_EVERY_US {
-            self.runtime_us = now_us;
+        if now_us >= self.runtime_sent_us + STAT_RUNTIME_EVERY_US {
+            self.runtime_sent_us = now_us;
             self.send_runtime_param(platform, (now_us / 1_000_000) as f32);
         }
     }
@@ -43,7 +43,7 @@ impl Copter {
         payload[4..6].copy_from_slice(&(self.params.len() as u16).to_le_bytes());
         payload[6..8].copy_from_slice(&u16::MAX.to_le_bytes());
         payload[8..20].copy_from_slice(b"STAT_RUNTIME");
-        payload[24] = INT32;
+        payload[24] = PARAM_TYPE_INT32;
         platform.ports.iter_mut().for_each(|port| port.send_raw(PARAM_VALUE, &payload));
     }
 }

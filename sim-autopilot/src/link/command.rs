@@ -22,11 +22,11 @@ pub struct ReceivedCommand {
     /// Parameter 5 as a number, for commands where it is no latitude.
     pub param5: f32,
     /// Latitude and longitude (parameters 5 and 6), degrees; NaN where not given.
-    pub place: [f64; 2],
+    pub lat_lon_deg: [f64; 2],
     /// Parameter 7, for most commands an altitude, metres.
     pub z: f32,
     /// Whether altitude `z` counts from home; false: from sea level.
-    pub relative: bool,
+    pub relative_to_home: bool,
 }
 
 impl ReceivedCommand {
@@ -35,11 +35,11 @@ impl ReceivedCommand {
         let place = [f64::from(fields.f32(16)), f64::from(fields.f32(20))];
         Self {
             id: fields.u16(28),
-            param: first_four(fields),
+            param: params_1_to_4(fields),
             param5: fields.f32(16),
-            place,
+            lat_lon_deg: place,
             z: fields.f32(24),
-            relative: false,
+            relative_to_home: false,
         }
     }
 
@@ -53,16 +53,16 @@ impl ReceivedCommand {
         let place = [degrees(16), degrees(20)];
         Self {
             id: fields.u16(28),
-            param: first_four(fields),
+            param: params_1_to_4(fields),
             param5: fields.i32(16) as f32,
-            place,
+            lat_lon_deg: place,
             z: fields.f32(24),
-            relative,
+            relative_to_home: relative,
         }
     }
 }
 
-fn first_four(fields: &PayloadReader<'_>) -> [f32; 4] {
+fn params_1_to_4(fields: &PayloadReader<'_>) -> [f32; 4] {
     [fields.f32(0), fields.f32(4), fields.f32(8), fields.f32(12)]
 }
 
@@ -107,6 +107,6 @@ impl Arming {
 }
 
 /// The message id that a float parameter holds; `None` outside 24 bits.
-pub fn message_id(value: f32) -> Option<u32> {
+pub fn message_id_from_param(value: f32) -> Option<u32> {
     (0.0..16_777_216.0).contains(&value).then_some(value as u32)
 }

@@ -126,7 +126,7 @@ enum ParsedFront {
 pub struct PortFramer {
     bytes: Vec<u8>,
     /// Time at which each byte arrived, microseconds since boot.
-    came_us: Vec<u64>,
+    arrival_us: Vec<u64>,
 }
 
 impl PortFramer {
@@ -134,12 +134,12 @@ impl PortFramer {
     /// it; `None` if there is none.
     pub fn next(&mut self, now_us: u64, input: &mut &[u8]) -> Option<CheckedFrame> {
         self.bytes.extend_from_slice(input);
-        self.came_us.resize(self.bytes.len(), now_us);
+        self.arrival_us.resize(self.bytes.len(), now_us);
         *input = &[];
         loop {
             let noise = self.bytes.iter().position(|byte| matches!(*byte, V1_START | V2_START));
             self.drop_first(noise.unwrap_or(self.bytes.len()));
-            let first_us = *self.came_us.first()?;
+            let first_us = *self.arrival_us.first()?;
             match parse_front(&self.bytes) {
                 ParsedFront::Whole(total) => {
                     let frame = CheckedFrame::from_bytes(&self.bytes[..total]);
@@ -154,7 +154,7 @@ impl PortFramer {
 
     fn drop_first(&mut self, count: usize) {
         self.bytes.drain(..count);
-        self.came_us.drain(..count);
+        self.arrival_us.drain(..count);
     }
 }
 

@@ -75,9 +75,9 @@ pub struct Port {
     system_id: u8,
     sequence: u8,
     queue: Vec<u8>,
-    sent: usize,
+    sent_bytes: usize,
     /// Number of messages dropped because the send queue was full.
-    pub dropped: u64,
+    pub dropped_messages: u64,
     /// Telemetry streams, in a fixed order.
     pub streams: Vec<Stream>,
     next_due_us: u64,
@@ -112,8 +112,8 @@ impl Port {
             system_id,
             sequence: 0,
             queue: Vec::new(),
-            sent: 0,
-            dropped: 0,
+            sent_bytes: 0,
+            dropped_messages: 0,
             streams,
             next_due_us: 0,
             pending_acks: Vec::new(),
@@ -146,12 +146,12 @@ impl Port {
 
     /// Whether the send queue has room for one more frame; if not, counts the frame as dropped.
     fn admit_frame(&mut self) -> bool {
-        if self.sent == self.queue.len() {
+        if self.sent_bytes == self.queue.len() {
             self.queue.clear();
-            self.sent = 0;
+            self.sent_bytes = 0;
         }
-        let room = self.queue.len() - self.sent <= MAX_QUEUED_BYTES - MAX_FRAME_LEN;
-        self.dropped += u64::from(!room);
+        let room = self.queue.len() - self.sent_bytes <= MAX_QUEUED_BYTES - MAX_FRAME_LEN;
+        self.dropped_messages += u64::from(!room);
         room
     }
 
@@ -231,7 +231,7 @@ impl Port {
 
     /// Whether the send queue is so full that telemetry is dropped.
     pub fn is_congested(&self) -> bool {
-        self.queue.len() - self.sent > MAX_QUEUED_TELEMETRY
+        self.queue.len() - self.sent_bytes > MAX_QUEUED_TELEMETRY
     }
 
     /// Whether any stream has a message due.
@@ -256,7 +256,7 @@ impl Port {
         }
         self.next_due_us = next;
         if self.is_congested() {
-            self.dropped += due.len() as u64;
+            self.dropped_messages += due.len() as u64;
             due.clear();
         }
     }
@@ -275,7 +275,7 @@ impl Port {
     /// Moves queued bytes into `out`, as many whole frames as fit, and returns their number. 280
     /// bytes hold any frame.
     pub fn poll_transmit(&mut self, out: &mut [u8]) -> usize {
-        let waiting = &self.queue[self.sent..];
+        let waiting = &self.queue[self.sent_bytes..];
         let mut len = 0;
         while let Some(&[_, payload]) = waiting.get(len..len + 2) {
             let end = len + 12 + usize::from(payload);
@@ -285,7 +285,7 @@ impl Port {
             len = end;
         }
         out[..len].copy_from_slice(&waiting[..len]);
-        self.sent += len;
+        self.sent_bytes += len;
         len
     }
 }

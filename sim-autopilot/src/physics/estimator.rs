@@ -38,12 +38,12 @@ impl EstimatorErrors {
 struct ErrorModel {
     sigma_mps: f32,
     tau_s: f32,
-    pull_s: f32,
+    gps_pull_tau_s: f32,
     max_error_m: f32,
 }
 
 impl ErrorModel {
-    const NONE: Self = Self { sigma_mps: 0.0, tau_s: 1.0, pull_s: 1.0, max_error_m: 0.0 };
+    const NONE: Self = Self { sigma_mps: 0.0, tau_s: 1.0, gps_pull_tau_s: 1.0, max_error_m: 0.0 };
 }
 
 /// Models of the horizontal axes and of the height, and the range of the constant height error,
@@ -55,18 +55,18 @@ fn error_models(
     match (estimator, autopilot) {
         (EstimatorErrors::Perfect, _) => (ErrorModel::NONE, ErrorModel::NONE, [0.0, 0.0]),
         (EstimatorErrors::Rtk, _) => (
-            ErrorModel { sigma_mps: 0.02, tau_s: 3.0, pull_s: 1.5, max_error_m: 0.1 },
-            ErrorModel { sigma_mps: 0.03, tau_s: 3.0, pull_s: 1.5, max_error_m: 0.15 },
+            ErrorModel { sigma_mps: 0.02, tau_s: 3.0, gps_pull_tau_s: 1.5, max_error_m: 0.1 },
+            ErrorModel { sigma_mps: 0.03, tau_s: 3.0, gps_pull_tau_s: 1.5, max_error_m: 0.15 },
             [0.0, 0.0],
         ),
         (EstimatorErrors::Recorded, SimulatedKind::Px4) => (
-            ErrorModel { sigma_mps: 0.23, tau_s: 3.5, pull_s: 0.75, max_error_m: 0.75 },
-            ErrorModel { sigma_mps: 0.13, tau_s: 4.0, pull_s: 2.0, max_error_m: 0.7 },
+            ErrorModel { sigma_mps: 0.23, tau_s: 3.5, gps_pull_tau_s: 0.75, max_error_m: 0.75 },
+            ErrorModel { sigma_mps: 0.13, tau_s: 4.0, gps_pull_tau_s: 2.0, max_error_m: 0.7 },
             [-0.43, 0.34],
         ),
         (EstimatorErrors::Recorded, SimulatedKind::Ardupilot) => (
-            ErrorModel { sigma_mps: 0.02, tau_s: 1.5, pull_s: 1.25, max_error_m: 0.11 },
-            ErrorModel { sigma_mps: 0.005, tau_s: 6.0, pull_s: 6.0, max_error_m: 0.08 },
+            ErrorModel { sigma_mps: 0.02, tau_s: 1.5, gps_pull_tau_s: 1.25, max_error_m: 0.11 },
+            ErrorModel { sigma_mps: 0.005, tau_s: 6.0, gps_pull_tau_s: 6.0, max_error_m: 0.08 },
             [0.0, 0.0],
         ),
     }
@@ -77,14 +77,14 @@ fn error_models(
 pub struct EstimateErrorState {
     random: Gaussian,
     axes: [ErrorModel; 3],
-    drift: Point,
+    position_drift: Point,
     height_bias_m: f32,
     /// Position error, ENU metres.
     pub position: Point,
     /// Velocity error, ENU m/s.
     pub velocity: Point,
     /// Rate of change of the position error, ENU m/s.
-    pub rate: Point,
+    pub position_rate: Point,
 }
 
 impl EstimateErrorState {
@@ -98,11 +98,11 @@ impl EstimateErrorState {
         let mut errors = Self {
             random,
             axes: [across, across, up],
-            drift: Point::zeros(),
+            position_drift: Point::zeros(),
             height_bias_m: height_m[0] + share * (height_m[1] - height_m[0]),
             position: Point::zeros(),
             velocity: Point::zeros(),
-            rate: Point::zeros(),
+            position_rate: Point::zeros(),
         };
         // After 30 s the start at zero has no effect any more.
         for _ in 0..(30.0 / UPDATE_PERIOD_S) as usize {
@@ -122,18 +122,21 @@ impl EstimateErrorState {
             let keep = libm::expf(-UPDATE_PERIOD_S / axis.tau_s);
             let kick = axis.sigma_mps * libm::sqrtf(1.0 - keep * keep);
             self.velocity[k] = keep * self.velocity[k] + kick * self.random.sample();
-            self.rate[k] = self.velocity[k] - self.drift[k] / axis.pull_s;
-            self.drift[k] += self.rate[k] * UPDATE_PERIOD_S;
+            self.position_rate[k] = self.velocity[k] - self.position_drift[k] / axis.gps_pull_tau_s;
+            self.position_drift[k] += self.position_rate[k] * UPDATE_PERIOD_S;
         }
-        let across = libm::sqrtf(self.drift.x * self.drift.x + self.drift.y * self.drift.y);
+        let across = libm::sqrtf(
+            self.position_drift.x * self.position_drift.x
+                + self.position_drift.y * self.position_drift.y,
+        );
         let most_m = self.axes[0].max_error_m;
         if across > most_m {
-            self.drift.x *= most_m / across;
-            self.drift.y *= most_m / across;
+            self.position_drift.x *= most_m / across;
+            self.position_drift.y *= most_m / across;
         }
         let up_m = self.axes[2].max_error_m;
-        self.drift.z = self.drift.z.clamp(-up_m, up_m);
-        self.position = self.drift + Point::new(0.0, 0.0, self.height_bias_m);
+        self.position_drift.z = self.position_drift.z.clamp(-up_m, up_m);
+        self.position = self.position_drift + Point::new(0.0, 0.0, self.height_bias_m);
     }
 }
 

@@ -70,7 +70,7 @@ impl LocalFrame {
 
     /// Renews the linear approximation if `enu` is more than 50 m from its centre; to be called in
     /// every step.
-    pub fn recentre(&mut self, enu: &Vector3<f64>) {
+    pub fn recentre_if_far(&mut self, enu: &Vector3<f64>) {
         if (enu - self.centre).norm_squared() > RENEW_BEYOND_M * RENEW_BEYOND_M {
             self.linearise(*enu);
         }

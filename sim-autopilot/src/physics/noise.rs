@@ -22,7 +22,7 @@ const GUST_TAU_S: f32 = 2.5;
 /// 2010, §2).
 const GUST_PEAK_FACTOR: f32 = 3.0;
 /// Ratio of vertical to horizontal gusts near the ground (MIL-F-8785C, low altitude).
-const VERTICAL_SHARE: f32 = 0.5;
+const VERTICAL_GUST_SHARE: f32 = 0.5;
 /// Time constant of the slow position error, seconds: GPS multipath and ionosphere.
 const BIAS_TAU_S: f32 = 60.0;
 /// Time constant of the fast position error, seconds: GPS noise that the estimator does not filter
@@ -100,7 +100,7 @@ impl Disturbance {
     pub fn new(mean_wind: Point, gust_peak_mps: f32, position_noise_m: f32, seed: u64) -> Self {
         let mut random = Gaussian::new(seed);
         let sigma = gust_peak_mps / GUST_PEAK_FACTOR;
-        let sigma = Point::new(sigma, sigma, VERTICAL_SHARE * sigma);
+        let sigma = Point::new(sigma, sigma, VERTICAL_GUST_SHARE * sigma);
         let gust =
             (gust_peak_mps > 0.0).then(|| OrnsteinUhlenbeck::new(sigma, GUST_TAU_S, &mut random));
         let errors = (position_noise_m > 0.0).then(|| {
@@ -157,12 +157,12 @@ impl Disturbance {
     }
 }
 
-/// The gust clamped to its peak: as a vector horizontally, and by [`VERTICAL_SHARE`] of it
+/// The gust clamped to its peak: as a vector horizontally, and by [`VERTICAL_GUST_SHARE`] of it
 /// vertically.
 fn clamp_gust(gust: &Point, peak_mps: f32) -> Point {
     let across = libm::sqrtf(gust.x * gust.x + gust.y * gust.y);
     let share = if across > peak_mps { peak_mps / across } else { 1.0 };
-    let up = VERTICAL_SHARE * peak_mps;
+    let up = VERTICAL_GUST_SHARE * peak_mps;
     Point::new(gust.x * share, gust.y * share, gust.z.clamp(-up, up))
 }
 

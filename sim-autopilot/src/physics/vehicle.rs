@@ -120,9 +120,9 @@ pub struct Demand {
     pub descend_max: f32,
     /// Upward acceleration that replaces the vertical control, m/s²; NaN: the cascade controls the
     /// height.
-    pub lift_off: f32,
+    pub lift_off_acceleration: f32,
     /// Least thrust, as a fraction of the weight.
-    pub thrust_min: f32,
+    pub min_thrust_per_weight: f32,
     /// Weight (0 to 1) of the height's rate of change in the climb rate that is controlled; the
     /// rest is the estimated velocity.
     pub height_rate_weight: f32,
@@ -140,7 +140,7 @@ pub struct Gains {
     /// Derivative gains of velocity: `MPC_XY_VEL_D_ACC`, `MPC_Z_VEL_D_ACC`.
     pub velocity_d: [f32; 2],
     /// Tangent of the largest tilt, `MPC_TILTMAX_AIR`.
-    pub tilt_tan: f32,
+    pub tilt_max_tan: f32,
     /// Largest rate of turn, `MPC_YAWRAUTO_MAX`, rad/s.
     pub heading_rate_max: f32,
 }
@@ -151,7 +151,7 @@ pub struct Multicopter {
     airframe: AirframeParameters,
     state: TrueState,
     position: Vector3<f64>,
-    thrust: Point,
+    thrust_minus_gravity: Point,
     integral: Point,
     /// Velocity that the cascade commands, ENU m/s; for telemetry.
     pub velocity_setpoint: Point,
@@ -177,7 +177,7 @@ impl Multicopter {
             airframe,
             state,
             position: position.cast::<f64>(),
-            thrust: Point::zeros(),
+            thrust_minus_gravity: Point::zeros(),
             integral: Point::zeros(),
             velocity_setpoint: Point::zeros(),
             acceleration_setpoint: Point::zeros(),
@@ -202,7 +202,11 @@ impl Multicopter {
     /// Acceleration by thrust alone, without gravity, ENU m/s²: it points along the body's vertical
     /// axis.
     pub fn specific_force(&self) -> Point {
-        Point::new(self.thrust.x, self.thrust.y, self.thrust.z + GRAVITY)
+        Point::new(
+            self.thrust_minus_gravity.x,
+            self.thrust_minus_gravity.y,
+            self.thrust_minus_gravity.z + GRAVITY,
+        )
     }
 
     /// Records what the autopilot reports.
@@ -267,17 +271,17 @@ impl Multicopter {
                 - gains.velocity_d[k] * self.state.acceleration[axis]
                 + if feed.is_nan() { 0.0 } else { feed };
         }
-        if demand.lift_off.is_finite() {
-            asked.z = demand.lift_off;
+        if demand.lift_off_acceleration.is_finite() {
+            asked.z = demand.lift_off_acceleration;
             self.integral.z = 0.0;
             error.z = 0.0;
         }
         // Thrust is never negative and at most twice the weight, since hovering takes half
         // throttle.
-        let bounded_z = asked.z.clamp((demand.thrust_min - 1.0) * GRAVITY, GRAVITY);
+        let bounded_z = asked.z.clamp((demand.min_thrust_per_weight - 1.0) * GRAVITY, GRAVITY);
         let across = libm::sqrtf(asked.x * asked.x + asked.y * asked.y);
         let across_max =
-            ((bounded_z + GRAVITY) * gains.tilt_tan).min(self.airframe.acceleration_max_mps2);
+            ((bounded_z + GRAVITY) * gains.tilt_max_tan).min(self.airframe.acceleration_max_mps2);
         let saturated_z = bounded_z != asked.z;
         let saturated_xy = across > across_max;
         asked.z = bounded_z;
@@ -321,15 +325,16 @@ impl Multicopter {
         let clearance = (self.position.z - rest) as f32;
         let target = if lift { self.acceleration_setpoint } else { Point::new(0.0, 0.0, -GRAVITY) };
         let blend = dt / (dt + self.airframe.lag_s);
-        let step = (target - self.thrust) * blend;
+        let step = (target - self.thrust_minus_gravity) * blend;
         let most = self.airframe.jerk_max_mps3 * dt;
         let norm = step.norm_squared();
-        self.thrust +=
+        self.thrust_minus_gravity +=
             if lift && norm > most * most { step * (most / libm::sqrtf(norm)) } else { step };
 
         let push = wind.component_mul(&Point::new(1.0, 1.0, VERTICAL_WIND_SHARE))
             * self.airframe.wind_per_s;
-        let mut acceleration = self.thrust + push - self.state.velocity * self.airframe.drag_per_s;
+        let mut acceleration =
+            self.thrust_minus_gravity + push - self.state.velocity * self.airframe.drag_per_s;
         if clearance <= GROUND_CONTACT_M && acceleration.z <= 0.0 {
             // The ground carries the weight that thrust does not, and friction prevents sliding.
             acceleration = Point::zeros();
@@ -356,7 +361,8 @@ impl Multicopter {
     fn drain_battery(&mut self, motors: MotorState, dt: f32) {
         let load = match motors {
             MotorState::Lifting => {
-                power_ratio_at_speed(self.state.velocity.norm()) + 0.1 * self.thrust.z.max(0.0)
+                power_ratio_at_speed(self.state.velocity.norm())
+                    + 0.1 * self.thrust_minus_gravity.z.max(0.0)
             }
             MotorState::Idle => 0.04,
         };

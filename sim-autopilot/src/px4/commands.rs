@@ -9,7 +9,7 @@ use super::firmware::Px4;
 use crate::link::cmd;
 use crate::link::command::{
     ACCEPTED, Arming, CUSTOM_MODE, CommandOutcome, DENIED, FAILED, ReceivedCommand,
-    TEMPORARILY_REJECTED, UNSUPPORTED, message_id,
+    TEMPORARILY_REJECTED, UNSUPPORTED, message_id_from_param,
 };
 use crate::link::port::Sender;
 use crate::link::wire::PayloadReader;
@@ -50,7 +50,7 @@ impl Px4 {
             }
             cmd::DO_REPOSITION => self.reposition(platform, command),
             cmd::DO_CHANGE_SPEED => {
-                self.commander.set_cruise(command.param[1]);
+                self.commander.set_cruise_speed(command.param[1]);
                 ACCEPTED
             }
             cmd::DO_SET_HOME => platform.handle_set_home(command).result_or(DENIED),
@@ -72,7 +72,7 @@ impl Px4 {
             cmd::SET_MESSAGE_INTERVAL => {
                 platform.set_interval(from, command, &telemetry::PX4_STREAMS, FAILED)
             }
-            cmd::REQUEST_MESSAGE => match message_id(command.param[0]) {
+            cmd::REQUEST_MESSAGE => match message_id_from_param(command.param[0]) {
                 Some(id) if self.has_message(id) => {
                     platform.ports[from.port].requested_once.push(id);
                     ACCEPTED
@@ -124,7 +124,7 @@ impl Px4 {
 
     /// Executes MISSION_START: enters AUTO.MISSION and arms. Returns the MAV_RESULT.
     fn start_mission(&mut self, platform: &mut Platform) -> u8 {
-        self.commander.note_mission(platform);
+        self.commander.note_stored_mission(platform);
         if !platform.has_mission()
             || self.change_mode(platform, Px4Mode::Mission) == CommandOutcome::Refused
         {
@@ -138,7 +138,7 @@ impl Px4 {
         let was_armed = self.commander.armed();
         let armed = self.commander.arm(&sensors, &self.tuning, arming);
         if armed.is_done() && !was_armed {
-            platform.set_home_here();
+            platform.set_home_here_unless_fixed();
         }
         armed
     }
@@ -147,7 +147,7 @@ impl Px4 {
         // The altitude counts from sea level or home; converting it to the mission frame's height
         // needs latitude and longitude, here the vehicle's.
         let up = if command.z.is_finite() && command.z != 0.0 {
-            let base = if command.relative { platform.home.alt_m } else { 0.0 };
+            let base = if command.relative_to_home { platform.home.alt_m } else { 0.0 };
             let here = platform.frame.geodetic_from_enu(platform.vehicle.position());
             let target = Geodetic { alt_m: f64::from(command.z) + base, ..here };
             platform.frame.enu_from_geodetic(&target).z as f32
@@ -161,7 +161,7 @@ impl Px4 {
     fn reposition(&mut self, platform: &Platform, command: &ReceivedCommand) -> u8 {
         let Some(to) = platform.reposition_target(command) else { return DENIED };
         let sensors = platform.sensors();
-        self.commander.set_cruise(command.param[0]);
+        self.commander.set_cruise_speed(command.param[0]);
         let heading = command.param[3];
         self.commander
             .reposition(&to, heading, &sensors, &self.tuning)

@@ -57,7 +57,7 @@ impl Px4 {
         platform: &mut Platform,
         sensors: &SensorReadings,
     ) -> FlightModeOutput {
-        self.commander.note_mission(platform);
+        self.commander.note_stored_mission(platform);
         if let Some((from, mode)) = self.pending_mode.take() {
             let changed = match mode {
                 Some(mode) => self.commander.request_mode(mode, sensors, &self.tuning),
@@ -94,14 +94,14 @@ impl Px4 {
         }
         let landed =
             if self.commander.landed() { LandedState::OnGround } else { LandedState::InAir };
-        let leg = platform.fly_mission(sensors, landed);
+        let leg = platform.advance_mission(sensors, landed);
         let mission = &mut self.commander.mission;
         if leg != mission.leg {
-            mission.from = MissionLeg::leg_end(mission.leg, &sensors.position);
+            mission.leg_start = MissionLeg::leg_end(mission.leg, &sensors.position);
         }
         mission.leg = leg;
-        if let Some(speed) = platform.missions.speed.take() {
-            self.commander.set_cruise(speed);
+        if let Some(speed) = platform.missions.take_requested_speed() {
+            self.commander.set_cruise_speed(speed);
         }
         if self.commander.mission.leg == Some(MissionLeg::Return) {
             self.commander.mission.leg = None;
@@ -118,11 +118,11 @@ impl Px4 {
             autopilot: SimulatedKind::Px4,
             custom_mode: self.commander.mode().custom_mode(),
             intended_mode: self.commander.intended_mode().custom_mode(),
-            flags,
+            base_mode: flags,
             system_status,
             armable: self.commander.is_armable(sensors, &self.tuning),
             landed_state: self.commander.landed_state(),
-            guided: true,
+            reports_position_target: true,
             ekf_flags: 0,
             origin_known: true,
             // PX4 sends LOCAL_POSITION_NED only while the estimate is valid.

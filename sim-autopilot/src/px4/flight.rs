@@ -20,7 +20,7 @@ const ARRIVED_M: f32 = 0.5;
 const TURN_BEYOND_M: f32 = 2.0;
 /// Largest descent rate seen in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5. It is the rate of
 /// change of the height, which PX4 controls in Land; the velocity reported meanwhile reached 1.6.
-const MAX_LAND_MPS: f32 = 1.3;
+const MAX_LAND_DESCENT_MPS: f32 = 1.3;
 /// Lag of the measured distance to the ground, seconds: PX4 starts to crawl at 0.85 m, not at
 /// `MPC_LAND_ALT3` (1 m).
 const GROUND_DISTANCE_LAG_S: f32 = 0.2;
@@ -29,9 +29,9 @@ impl Commander {
     /// Initialises a mode that is entered: stopping point, heading, first leg of a return.
     pub(super) fn enter_mode(&mut self, mode: Px4Mode, sensors: &SensorReadings) {
         self.hold_point = sensors.position + glide::stopping_offset(&sensors.velocity);
-        self.glide = SmoothedApproach::new(sensors.now_us, &sensors.position, &sensors.velocity);
+        self.approach = SmoothedApproach::new(sensors.now_us, &sensors.position, &sensors.velocity);
         self.hold_heading = sensors.heading;
-        self.leg = ReturnLeg::Climb { up: f32::NAN };
+        self.return_leg = ReturnLeg::Climb { up: f32::NAN };
         self.descent = None;
         if mode == Px4Mode::Takeoff {
             (self.hold_point.x, self.hold_point.y) = (sensors.position.x, sensors.position.y);
@@ -57,9 +57,12 @@ impl Commander {
         let held = Demand {
             position: self.hold_point,
             heading: self.hold_heading,
-            speed_max: self.cruise.unwrap_or(tuning.cruise).min(tuning.speed_max),
-            climb_max: tuning.auto_up.min(tuning.climb_max),
-            descend_max: tuning.auto_down.min(tuning.descend_max),
+            speed_max: self
+                .commanded_cruise_speed
+                .unwrap_or(tuning.cruise_speed)
+                .min(tuning.speed_max),
+            climb_max: tuning.auto_climb_max.min(tuning.climb_max),
+            descend_max: tuning.auto_descend_max.min(tuning.descend_max),
             ..tuning.default_demand()
         };
         match self.mode() {
@@ -80,10 +83,10 @@ impl Commander {
                 if !self.landed && sensors.position.z > up - ARRIVED_M {
                     // The height is reached: PX4 continues in Hold at this height.
                     self.intended_mode = Px4Mode::Hold;
-                    self.after_disarm = Px4Mode::Hold;
+                    self.mode_after_disarm = Px4Mode::Hold;
                     self.takeoff_up = f32::NAN;
                     self.hold_point.z = up;
-                    self.glide =
+                    self.approach =
                         SmoothedApproach::new(sensors.now_us, &self.hold_point, &Point::zeros());
                 }
                 let position = Point::new(self.hold_point.x, self.hold_point.y, up);
@@ -109,8 +112,8 @@ impl Commander {
         tuning: &Px4Tuning,
         held: &Demand,
     ) -> Demand {
-        self.glide.advance(sensors.now_us, &self.hold_point, held.speed_max, tuning.auto_jerk);
-        let SmoothedApproach { position, ramps: [east, north], .. } = self.glide;
+        self.approach.advance(sensors.now_us, &self.hold_point, held.speed_max, tuning.auto_jerk);
+        let SmoothedApproach { position, ramps: [east, north], .. } = self.approach;
         let up = f32::NAN;
         Demand {
             position: Point::new(position.x, position.y, held.position.z),
@@ -134,7 +137,7 @@ impl Commander {
                 let climb_max = tuning.takeoff_speed.min(held.climb_max);
                 Demand { position: self.hold_point, climb_max, ..held }
             }
-            Some(MissionLeg::To { at, heading, .. }) => {
+            Some(MissionLeg::FlyTo { at, heading, .. }) => {
                 let off = at - sensors.position;
                 if heading.is_finite() {
                     self.hold_heading = heading;
@@ -143,7 +146,7 @@ impl Commander {
                 }
                 self.hold_point = at;
                 let (up, rate) = interpolate_height(
-                    &self.mission.from,
+                    &self.mission.leg_start,
                     &at,
                     &sensors.position,
                     &sensors.velocity,
@@ -179,9 +182,11 @@ impl Commander {
         let [high, low] = tuning.land_slow_below;
         let height = sensors.position.z - sensors.home.z;
         let share = ((height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
-        let mut sink =
-            MAX_LAND_MPS.min(tuning.land_speed + share * (tuning.auto_down - tuning.land_speed));
-        if sensors.distance - sensors.velocity.z * GROUND_DISTANCE_LAG_S < tuning.land_crawl_below {
+        let mut sink = MAX_LAND_DESCENT_MPS
+            .min(tuning.land_speed + share * (tuning.auto_descend_max - tuning.land_speed));
+        if sensors.ground_distance - sensors.velocity.z * GROUND_DISTANCE_LAG_S
+            < tuning.land_crawl_below
+        {
             sink = CRAWL_FACTOR * tuning.land_crawl_speed;
         }
         let descent = match &mut self.descent {
@@ -217,7 +222,7 @@ impl Commander {
     ) -> Demand {
         let away =
             libm::hypotf(sensors.home.x - sensors.position.x, sensors.home.y - sensors.position.y);
-        if let ReturnLeg::Climb { up } = &mut self.leg
+        if let ReturnLeg::Climb { up } = &mut self.return_leg
             && up.is_nan()
         {
             let mut height = tuning.return_height;
@@ -227,16 +232,16 @@ impl Commander {
             }
             *up = (sensors.home.z + height).max(sensors.position.z);
         }
-        match self.leg {
+        match self.return_leg {
             ReturnLeg::Climb { up } => {
                 if sensors.position.z > up - ARRIVED_M {
-                    self.leg = ReturnLeg::Cross { up };
+                    self.return_leg = ReturnLeg::Cross { up };
                 }
                 Demand { position: Point::new(self.hold_point.x, self.hold_point.y, up), ..held }
             }
             ReturnLeg::Cross { up } => {
                 if away < ARRIVED_M {
-                    self.leg = ReturnLeg::Descend;
+                    self.return_leg = ReturnLeg::Descend;
                     (self.hold_point.x, self.hold_point.y) = (sensors.home.x, sensors.home.y);
                 }
                 Demand { position: Point::new(sensors.home.x, sensors.home.y, up), ..held }
@@ -244,7 +249,7 @@ impl Commander {
             ReturnLeg::Descend => {
                 let up = sensors.home.z + tuning.return_descend_height;
                 if sensors.position.z < up + ARRIVED_M {
-                    self.leg = ReturnLeg::Land;
+                    self.return_leg = ReturnLeg::Land;
                 }
                 Demand { position: Point::new(self.hold_point.x, self.hold_point.y, up), ..held }
             }

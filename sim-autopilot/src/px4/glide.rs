@@ -24,7 +24,7 @@ pub fn stopping_offset(velocity: &Point) -> Point {
 /// velocity and keeps the automatic modes' limits.
 #[derive(Clone, Copy, Debug)]
 pub struct SmoothedApproach {
-    at_us: u64,
+    updated_us: u64,
     /// Position, ENU metres; its height is not used.
     pub position: Point,
     /// Velocity and acceleration east and north.
@@ -35,13 +35,17 @@ impl SmoothedApproach {
     /// A setpoint that starts at `position` with `velocity`.
     pub fn new(now_us: u64, position: &Point, velocity: &Point) -> Self {
         let ramp = |rate| JerkLimitedRate { rate, derivative: 0.0 };
-        Self { at_us: now_us, position: *position, ramps: [ramp(velocity.x), ramp(velocity.y)] }
+        Self {
+            updated_us: now_us,
+            position: *position,
+            ramps: [ramp(velocity.x), ramp(velocity.y)],
+        }
     }
 
     /// Moves the setpoint towards `target` until `now_us`, with at most `speed_max` m/s and `jerk`
     /// m/s³.
     pub fn advance(&mut self, now_us: u64, target: &Point, speed_max: f32, jerk: f32) {
-        let since_us = now_us.saturating_sub(core::mem::replace(&mut self.at_us, now_us));
+        let since_us = now_us.saturating_sub(core::mem::replace(&mut self.updated_us, now_us));
         let dt = (since_us as f32 * 1e-6).min(MAX_STEP_S);
         let off = [target.x - self.position.x, target.y - self.position.y];
         let away = libm::hypotf(off[0], off[1]);

@@ -118,7 +118,7 @@ pub fn default_params(system_id: u8, airframe: &AirframeParameters) -> Params {
     Params::new(DEFAULTS, Encoding::Bytewise, &own)
 }
 
-const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
+const NO_DEMAND: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 
 /// Values of the parameters that have an effect, each named by its effect. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
@@ -128,9 +128,9 @@ pub struct Px4Tuning {
     pub speed_max: f32,
     pub climb_max: f32,
     pub descend_max: f32,
-    pub cruise: f32,
-    pub auto_up: f32,
-    pub auto_down: f32,
+    pub cruise_speed: f32,
+    pub auto_climb_max: f32,
+    pub auto_descend_max: f32,
     pub land_speed: f32,
     pub land_slow_below: [f32; 2],
     pub land_crawl_speed: f32,
@@ -142,17 +142,17 @@ pub struct Px4Tuning {
     pub takeoff_height: f32,
     pub spool_up_s: f32,
     pub land_trigger_s: f32,
-    pub offboard_loss_s: f32,
+    pub offboard_loss_timeout_s: f32,
     pub offboard_loss_action: i32,
-    pub disarm_land_s: f32,
+    pub disarm_after_landing_s: f32,
     pub disarm_preflight_s: f32,
     pub return_height: f32,
     pub return_descend_height: f32,
     pub return_min_distance: f32,
     pub return_cone_tan: f32,
     pub low_battery_action: i32,
-    pub battery_critical: f32,
-    pub battery_low: f32,
+    pub battery_critical_share: f32,
+    pub battery_low_share: f32,
 }
 
 impl Px4Tuning {
@@ -160,17 +160,17 @@ impl Px4Tuning {
     /// flight.
     pub(super) fn default_demand(&self) -> Demand {
         Demand {
-            position: NONE,
-            velocity: NONE,
-            acceleration: NONE,
+            position: NO_DEMAND,
+            velocity: NO_DEMAND,
+            acceleration: NO_DEMAND,
             heading: f32::NAN,
             heading_rate: f32::NAN,
             speed_max: self.speed_max,
             climb_max: self.climb_max,
             descend_max: self.descend_max,
-            lift_off: f32::NAN,
+            lift_off_acceleration: f32::NAN,
             // MPC_THR_MIN 0.12 divided by a hover thrust of 0.49.
-            thrust_min: 0.245,
+            min_thrust_per_weight: 0.245,
             height_rate_weight: 0.0,
         }
     }
@@ -192,7 +192,7 @@ impl Px4Tuning {
                     params.f32_value("MPC_XY_VEL_D_ACC"),
                     params.f32_value("MPC_Z_VEL_D_ACC"),
                 ],
-                tilt_tan: libm::tanf(
+                tilt_max_tan: libm::tanf(
                     params.f32_value("MPC_TILTMAX_AIR").clamp(1.0, 80.0).to_radians(),
                 ),
                 heading_rate_max: params.f32_value("MPC_YAWRAUTO_MAX").to_radians(),
@@ -200,9 +200,9 @@ impl Px4Tuning {
             speed_max: params.f32_value("MPC_XY_VEL_MAX"),
             climb_max: params.f32_value("MPC_Z_VEL_MAX_UP"),
             descend_max: params.f32_value("MPC_Z_VEL_MAX_DN"),
-            cruise: params.f32_value("MPC_XY_CRUISE"),
-            auto_up: params.f32_value("MPC_Z_V_AUTO_UP"),
-            auto_down: params.f32_value("MPC_Z_V_AUTO_DN"),
+            cruise_speed: params.f32_value("MPC_XY_CRUISE"),
+            auto_climb_max: params.f32_value("MPC_Z_V_AUTO_UP"),
+            auto_descend_max: params.f32_value("MPC_Z_V_AUTO_DN"),
             land_speed: params.f32_value("MPC_LAND_SPEED"),
             land_slow_below: [params.f32_value("MPC_LAND_ALT1"), params.f32_value("MPC_LAND_ALT2")],
             land_crawl_speed: params.f32_value("MPC_LAND_CRWL"),
@@ -214,9 +214,9 @@ impl Px4Tuning {
             takeoff_height: params.f32_value("MIS_TAKEOFF_ALT"),
             spool_up_s: params.f32_value("COM_SPOOLUP_TIME"),
             land_trigger_s: params.f32_value("LNDMC_TRIG_TIME"),
-            offboard_loss_s: params.f32_value("COM_OF_LOSS_T"),
+            offboard_loss_timeout_s: params.f32_value("COM_OF_LOSS_T"),
             offboard_loss_action: params.i32_value("COM_OBL_RC_ACT"),
-            disarm_land_s: params.f32_value("COM_DISARM_LAND"),
+            disarm_after_landing_s: params.f32_value("COM_DISARM_LAND"),
             disarm_preflight_s: params.f32_value("COM_DISARM_PRFLT"),
             return_height: params.f32_value("RTL_RETURN_ALT"),
             return_descend_height: params.f32_value("RTL_DESCEND_ALT"),
@@ -225,8 +225,8 @@ impl Px4Tuning {
                 (params.i32_value("RTL_CONE_ANG").clamp(0, 90) as f32).to_radians(),
             ),
             low_battery_action: params.i32_value("COM_LOW_BAT_ACT"),
-            battery_critical: params.f32_value("BAT_CRIT_THR"),
-            battery_low: params.f32_value("BAT_LOW_THR"),
+            battery_critical_share: params.f32_value("BAT_CRIT_THR"),
+            battery_low_share: params.f32_value("BAT_LOW_THR"),
         }
     }
 }

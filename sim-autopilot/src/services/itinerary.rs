@@ -24,7 +24,7 @@ use crate::services::mission::MissionItem;
 
 /// Horizontal distance at which a waypoint is reached, metres: `NAV_ACC_RAD` of PX4's multicopters,
 /// ArduCopter's `WPNAV_RADIUS`.
-const REACHED_M: f32 = 2.0;
+const DEFAULT_ACCEPTANCE_RADIUS_M: f32 = 2.0;
 /// Vertical distance at which a waypoint is reached, metres (`NAV_MC_ALT_RAD`).
 const REACHED_HEIGHT_M: f32 = 0.8;
 /// Largest heading error at which PX4 counts a waypoint as reached, radians (`MIS_YAW_ERR`, 12°).
@@ -46,8 +46,8 @@ pub(crate) enum MissionLeg {
     /// Climb to height `up`, ENU metres.
     TakeOff { up: f32 },
     /// Fly to point `at`, with a heading (radians; NaN: none), and stay there (seconds).
-    /// `reached_m` is the acceptance radius, metres.
-    To { at: Point, heading: f32, stay_s: f32, reached_m: f32 },
+    /// `acceptance_radius_m` is the acceptance radius, metres.
+    FlyTo { at: Point, heading: f32, stay_s: f32, acceptance_radius_m: f32 },
     /// Land, at this point (east, north; metres) if one is given.
     Land { at: Option<[f32; 2]> },
     /// Return home and land.
@@ -59,7 +59,7 @@ impl MissionLeg {
     /// `here`.
     pub(crate) fn leg_end(leg: Option<Self>, here: &Point) -> Point {
         match leg {
-            Some(Self::To { at, .. }) => at,
+            Some(Self::FlyTo { at, .. }) => at,
             _ => *here,
         }
     }
@@ -76,7 +76,7 @@ pub(crate) fn interpolate_height(
 ) -> (f32, f32) {
     let (way, up) = ((at - from).xy(), at.z - from.z);
     let length = way.norm();
-    if length < REACHED_M {
+    if length < DEFAULT_ACCEPTANCE_RADIUS_M {
         return (at.z, 0.0);
     }
     let share = ((here - from).xy().dot(&way) / (length * length)).clamp(0.0, 1.0);
@@ -98,38 +98,38 @@ fn item_command(item: &MissionItem) -> u16 {
 
 impl Platform {
     /// Number of the first item that is flown.
-    fn first_item(&self) -> u16 {
+    fn first_flown_item(&self) -> u16 {
         u16::from(self.config.autopilot == SimulatedKind::Ardupilot)
     }
 
     /// Whether a mission with items to fly is stored.
     pub(crate) fn has_mission(&self) -> bool {
-        self.missions.items().len() > usize::from(self.first_item())
+        self.missions.items().len() > usize::from(self.first_flown_item())
     }
 
     /// Whether the mission begins with a take-off; it may have a delay before.
-    pub(crate) fn mission_takes_off(&self) -> bool {
-        let flown = self.missions.items().iter().skip(usize::from(self.first_item()));
-        let mut legs = flown.map(item_command).filter(|&id| is_flown(id) && id != NAV_DELAY);
+    pub(crate) fn mission_begins_with_takeoff(&self) -> bool {
+        let flown = self.missions.items().iter().skip(usize::from(self.first_flown_item()));
+        let mut legs = flown.map(item_command).filter(|&id| has_leg(id) && id != NAV_DELAY);
         legs.next() == Some(NAV_TAKEOFF)
     }
 
     /// Executes the commands that are due and returns the leg to fly; `None` once all items are
     /// completed.
-    pub(crate) fn fly_mission(
+    pub(crate) fn advance_mission(
         &mut self,
         sensors: &SensorReadings,
         landed: LandedState,
     ) -> Option<MissionLeg> {
-        let first = self.first_item();
-        self.missions.progress.begin_no_earlier_than(first);
+        let first = self.first_flown_item();
+        self.missions.progress.skip_items_before(first);
         while let Some(item) =
-            self.missions.items().get(usize::from(self.missions.progress.current)).copied()
+            self.missions.items().get(usize::from(self.missions.progress.current_item)).copied()
         {
             match self.leg_of_item(&item) {
                 Some(leg) => {
-                    let begun = self.missions.progress.since_us.is_some();
-                    self.missions.progress.since_us.get_or_insert(sensors.now_us);
+                    let begun = self.missions.progress.item_begun_us.is_some();
+                    self.missions.progress.item_begun_us.get_or_insert(sensors.now_us);
                     if !(begun && self.is_leg_done(&leg, sensors, landed)) {
                         return Some(leg);
                     }
@@ -164,11 +164,15 @@ impl Platform {
             NAV_WAYPOINT => {
                 let radians = heading.to_radians();
                 let asked_m = item_f32(item, 4);
-                MissionLeg::To {
+                MissionLeg::FlyTo {
                     at: self.item_position(item),
                     heading: radians - turn * libm::roundf(radians / turn),
                     stay_s: item_f32(item, 0),
-                    reached_m: if asked_m > 0.0 { asked_m } else { REACHED_M },
+                    acceptance_radius_m: if asked_m > 0.0 {
+                        asked_m
+                    } else {
+                        DEFAULT_ACCEPTANCE_RADIUS_M
+                    },
                 }
             }
             NAV_LAND => {
@@ -200,15 +204,15 @@ impl Platform {
 
     fn execute_item(&mut self, item: &MissionItem) {
         match item_command(item) {
-            DO_CHANGE_SPEED => self.missions.speed = Some(item_f32(item, 4)),
+            DO_CHANGE_SPEED => self.missions.requested_speed = Some(item_f32(item, 4)),
             id @ (DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST) => {
                 self.execute_camera_command(&ReceivedCommand {
                     id,
                     param: [0, 4, 8, 12].map(|at| item_f32(item, at)),
                     param5: item_i32(item, 16) as f32,
-                    place: [f64::NAN; 2],
+                    lat_lon_deg: [f64::NAN; 2],
                     z: item_f32(item, 24),
-                    relative: false,
+                    relative_to_home: false,
                 });
             }
             _ => {}
@@ -226,9 +230,9 @@ impl Platform {
             sensors.now_us.saturating_sub(us.unwrap_or(sensors.now_us)) as f32 * 1e-6
         };
         match *leg {
-            MissionLeg::Wait(s) => since(self.missions.progress.since_us) >= s,
+            MissionLeg::Wait(s) => since(self.missions.progress.item_begun_us) >= s,
             MissionLeg::TakeOff { up } => in_air && sensors.position.z > up - REACHED_HEIGHT_M,
-            MissionLeg::To { at, heading, stay_s, reached_m } => {
+            MissionLeg::FlyTo { at, heading, stay_s, acceptance_radius_m: reached_m } => {
                 let off = at - sensors.position;
                 // NaN: no heading to wait for.
                 let turned = wrap_pi_once(heading - sensors.heading).abs() < MAX_YAW_ERROR_RAD;
@@ -249,6 +253,6 @@ impl Platform {
     }
 }
 
-fn is_flown(id: u16) -> bool {
+fn has_leg(id: u16) -> bool {
     matches!(id, NAV_WAYPOINT | NAV_RETURN_TO_LAUNCH | NAV_LAND | NAV_TAKEOFF | NAV_DELAY)
 }

@@ -25,8 +25,8 @@ const INVALID_SEQUENCE: u8 = 13;
 const MISSION_TYPES: usize = 3;
 /// Most items of a mission: 724 as in ArduCopter on small boards; PX4 has at least 500.
 const MAX_ITEMS: u16 = 724;
-const RETRY_US: u64 = 250_000;
-const RETRIES: u32 = 20;
+const RETRY_AFTER_US: u64 = 250_000;
+const MAX_RETRIES: u32 = 20;
 
 /// An item as the first 37 bytes of MISSION_ITEM_INT's payload, without the mission type.
 pub(crate) type MissionItem = [u8; 37];
@@ -35,10 +35,10 @@ pub(crate) type MissionItem = [u8; 37];
 #[derive(Clone, Debug)]
 struct MissionUpload {
     from: Sender,
-    kind: u8,
+    mission_type: u8,
     count: u16,
     items: Vec<MissionItem>,
-    asked_us: u64,
+    requested_us: u64,
     retries: u32,
 }
 
@@ -46,25 +46,25 @@ struct MissionUpload {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct MissionProgress {
     /// Number of the current item; the number of items when all are completed.
-    pub current: u16,
-    pub(crate) since_us: Option<u64>,
+    pub current_item: u16,
+    pub(crate) item_begun_us: Option<u64>,
     pub(crate) arrived_us: Option<u64>,
 }
 
 impl MissionProgress {
     /// Progress at the start of item `current`.
     pub(crate) fn starting_at(current: u16) -> Self {
-        Self { current, ..Self::default() }
+        Self { current_item: current, ..Self::default() }
     }
 
     /// Skips the items before `first`.
-    pub(crate) fn begin_no_earlier_than(&mut self, first: u16) {
-        self.current = self.current.max(first);
+    pub(crate) fn skip_items_before(&mut self, first: u16) {
+        self.current_item = self.current_item.max(first);
     }
 
     /// Completes the current item: the next one begins. Returns the number of the completed one.
     pub(super) fn complete_item(&mut self) -> u16 {
-        let completed = self.current;
+        let completed = self.current_item;
         *self = Self::starting_at(completed + 1);
         completed
     }
@@ -81,7 +81,7 @@ impl MissionProgress {
 
     /// The current item starts from its beginning when the mission is continued.
     pub(crate) fn restart_item(&mut self) {
-        (self.since_us, self.arrived_us) = (None, None);
+        (self.item_begun_us, self.arrived_us) = (None, None);
     }
 }
 
@@ -93,10 +93,15 @@ pub struct Missions {
     /// Progress of the mission that is flown.
     pub(crate) progress: MissionProgress,
     /// Speed that a mission item set, m/s, until the mode logic takes it.
-    pub(crate) speed: Option<f32>,
+    pub(super) requested_speed: Option<f32>,
 }
 
 impl Missions {
+    /// Takes the speed that a mission item requested since the last call, m/s.
+    pub(crate) fn take_requested_speed(&mut self) -> Option<f32> {
+        self.requested_speed.take()
+    }
+
     /// Items of the stored mission.
     pub(crate) fn items(&self) -> &[MissionItem] {
         &self.stored[0]
@@ -106,11 +111,11 @@ impl Missions {
     /// drops the upload.
     pub(crate) fn retry_item_request(&mut self, now_us: u64, index: usize, port: &mut Port) {
         let Some(upload) = &mut self.upload else { return };
-        if upload.from.port != index || now_us < upload.asked_us + RETRY_US {
+        if upload.from.port != index || now_us < upload.requested_us + RETRY_AFTER_US {
             return;
         }
         upload.retries += 1;
-        if upload.retries > RETRIES {
+        if upload.retries > MAX_RETRIES {
             self.upload = None;
             return;
         }
@@ -120,9 +125,12 @@ impl Missions {
 
 impl MissionUpload {
     fn request_item(&mut self, now_us: u64, port: &mut Port) {
-        self.asked_us = now_us;
+        self.requested_us = now_us;
         let [low, high] = (self.items.len() as u16).to_le_bytes();
-        port.send_raw(REQUEST_INT, &[low, high, self.from.system, self.from.component, self.kind]);
+        port.send_raw(
+            REQUEST_INT,
+            &[low, high, self.from.system, self.from.component, self.mission_type],
+        );
     }
 }
 
@@ -172,10 +180,10 @@ impl Missions {
             COUNT => {
                 let mut upload = MissionUpload {
                     from,
-                    kind,
+                    mission_type: kind,
                     count: fields.u16(0),
                     items: Vec::new(),
-                    asked_us: 0,
+                    requested_us: 0,
                     retries: 0,
                 };
                 upload.request_item(now_us, port);
@@ -206,7 +214,8 @@ impl Missions {
         let Some(upload) = &mut self.upload else {
             return send_mission_ack(port, from, INVALID_SEQUENCE, kind);
         };
-        if upload.from.system_and_component() != from.system_and_component() || upload.kind != kind
+        if upload.from.system_and_component() != from.system_and_component()
+            || upload.mission_type != kind
         {
             return send_mission_ack(port, from, INVALID_SEQUENCE, kind);
         }

@@ -27,7 +27,7 @@ const XY_POSITION_CONTROL: u32 = 0x4000;
 
 /// Messages that many dialects do not have: id, CRC_EXTRA and payload as recorded from PX4 1.17.
 /// Their contents do not matter; they test that receivers skip unknown messages.
-const RECORDED: [(u32, u8, &[u8]); 5] = [
+const RECORDED_MESSAGES: [(u32, u8, &[u8]); 5] = [
     (8, 117, &[0xA0, 0x6F, 0x6D, 0, 0, 0, 0, 0, 0x29, 0x60, 0, 0, 0, 0, 0, 0, 0xAB, 9]),
     (
         380,
@@ -46,9 +46,9 @@ const RECORDED: [(u32, u8, &[u8]); 5] = [
     (441, 169, &[0, 0, 0, 0, 255, 255, 255, 255, 4, 0, 0, 0, 0, 255, 255, 255, 255]),
 ];
 
-/// Sends message `id` of [`RECORDED`].
+/// Sends message `id` of [`RECORDED_MESSAGES`].
 pub(crate) fn send_recorded(id: u32, port: &mut Port) {
-    if let Some(&(_, seed, payload)) = RECORDED.iter().find(|message| message.0 == id) {
+    if let Some(&(_, seed, payload)) = RECORDED_MESSAGES.iter().find(|message| message.0 == id) {
         port.send_with_crc_extra(id, seed, payload);
     }
 }
@@ -72,7 +72,7 @@ impl Snapshot {
         let autopilot = if self.is_px4() { 12 } else { 3 };
         port.send_raw(
             HEARTBEAT,
-            &[a, b, c, d, 2, autopilot, status.flags, status.system_status, 3],
+            &[a, b, c, d, 2, autopilot, status.base_mode, status.system_status, 3],
         );
     }
 
@@ -82,7 +82,7 @@ impl Snapshot {
         if self.status.armable {
             health |= PREARM;
         }
-        if !self.gps.2 {
+        if !self.gps_error_and_fix.2 {
             health &= !(XY_POSITION_CONTROL | 0x20);
         }
         let bits = dialect::MavSysStatusSensor::from_bits_retain;
@@ -104,7 +104,7 @@ impl Snapshot {
     }
 
     pub(crate) fn send_gps(&self, port: &mut Port) {
-        let (north, east, fix) = self.gps;
+        let (north, east, fix) = self.gps_error_and_fix;
         let cos = libm::cos(self.geodetic.lat_deg.to_radians()).max(0.01);
         let at = Geodetic {
             lat_deg: self.geodetic.lat_deg + f64::from(north) / 111_195.0,
@@ -182,7 +182,7 @@ impl Snapshot {
             afx: a.x,
             afy: a.y,
             afz: a.z,
-            yaw: self.heading.0,
+            yaw: self.heading_and_rate.0,
             yaw_rate: 0.0,
             type_mask: dialect::PositionTargetTypemask::empty(),
             coordinate_frame: dialect::MavFrame::MAV_FRAME_LOCAL_NED,
@@ -198,7 +198,7 @@ impl Snapshot {
             zacc: -self.specific_force.norm(),
             xgyro: 0.0,
             ygyro: 0.0,
-            zgyro: self.heading.1,
+            zgyro: self.heading_and_rate.1,
             xmag: 0.21,
             ymag: 0.0,
             zmag: 0.39,
@@ -215,7 +215,7 @@ impl Snapshot {
             time_boot_ms: self.boot_ms(),
             min_distance: 0,
             max_distance: 10_000,
-            current_distance: (100.0 * self.height).clamp(0.0, 10_000.0) as u16,
+            current_distance: (100.0 * self.height_above_ground).clamp(0.0, 10_000.0) as u16,
             mavtype: dialect::MavDistanceSensor::MAV_DISTANCE_SENSOR_LASER,
             id: 0,
             orientation: dialect::MavSensorOrientation::MAV_SENSOR_ROTATION_PITCH_270,
@@ -316,7 +316,7 @@ impl Snapshot {
             vz: v.z,
             rollspeed: 0.0,
             pitchspeed: 0.0,
-            yawspeed: self.heading.1,
+            yawspeed: self.heading_and_rate.1,
             pose_covariance,
             velocity_covariance,
             frame_id: dialect::MavFrame::MAV_FRAME_LOCAL_NED,

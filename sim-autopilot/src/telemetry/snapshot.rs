@@ -22,7 +22,7 @@ pub struct Snapshot {
     /// Whether the motors are armed.
     pub armed: bool,
     /// Mission: number of the current item, and number of items.
-    pub mission: (u16, u16),
+    pub mission_item_and_count: (u16, u16),
     /// Number of pictures since boot.
     pub pictures: u32,
     /// Estimated position, NED about the EKF origin, metres.
@@ -33,7 +33,7 @@ pub struct Snapshot {
     pub geodetic: Geodetic,
     /// GPS receiver: position error north and east beyond the estimate's (metres), and whether it
     /// has a fix.
-    pub gps: (f32, f32, bool),
+    pub gps_error_and_fix: (f32, f32, bool),
     /// Home as latitude, longitude and altitude, and as NED about the EKF origin (metres).
     pub home: (Geodetic, Vector3<f64>),
     /// EKF origin.
@@ -41,11 +41,11 @@ pub struct Snapshot {
     /// Acceleration by thrust alone, NED m/s²; it points up.
     pub specific_force: Vector3<f32>,
     /// Heading (radians clockwise from north) and rate of turn (rad/s).
-    pub heading: (f32, f32),
+    pub heading_and_rate: (f32, f32),
     /// Position, velocity and acceleration setpoints of the controller, NED.
     pub target: [Vector3<f64>; 3],
     /// Height of the body above where it would rest on the ground, metres.
-    pub height: f32,
+    pub height_above_ground: f32,
     /// Horizontal and vertical accuracy that the estimator reports, metres.
     pub accuracy: [f32; 2],
     /// Remaining battery charge, 0 to 1.
@@ -88,8 +88,9 @@ pub fn attitude_from_specific_force(force: &Vector3<f32>, heading: f32) -> Attit
 
 impl Snapshot {
     pub(crate) fn attitude(&self) -> &Attitude {
-        self.attitude
-            .get_or_init(|| attitude_from_specific_force(&self.specific_force, self.heading.0))
+        self.attitude.get_or_init(|| {
+            attitude_from_specific_force(&self.specific_force, self.heading_and_rate.0)
+        })
     }
 
     pub(crate) fn is_px4(&self) -> bool {
@@ -106,7 +107,7 @@ impl Snapshot {
     }
 
     pub(crate) fn heading_deg(&self) -> f32 {
-        let degrees = self.heading.0.to_degrees();
+        let degrees = self.heading_and_rate.0.to_degrees();
         if degrees < 0.0 { degrees + 360.0 } else { degrees }
     }
 }

@@ -25,7 +25,7 @@ fn it_floods_at_once_at_px4s_rates() {
     }
     let counters = bench.framer.counters();
     assert_eq!((counters.bad_crc, counters.noise_bytes), (0, 0));
-    assert!(counters.unknown >= 9, "GNSS_INTEGRITY is in no dialect here: {counters:?}");
+    assert!(counters.unknown_id >= 9, "GNSS_INTEGRITY is in no dialect here: {counters:?}");
     assert!(
         [8, 380, 410, 411, 436].iter().all(|&id| bench.of(id).count() >= 2),
         "newer than many dialects"
@@ -41,7 +41,7 @@ fn sequence_numbers_have_no_gap() {
     let gap =
         |pair: &[(f64, Frame)]| u32::from(pair[1].1.sequence.wrapping_sub(pair[0].1.sequence)) - 1;
     let gaps: u32 = bench.received.windows(2).map(gap).sum();
-    assert!(gaps <= bench.framer.counters().unknown, "{gaps} numbers are missing");
+    assert!(gaps <= bench.framer.counters().unknown_id, "{gaps} numbers are missing");
 }
 
 #[test]
@@ -233,7 +233,7 @@ fn what_cannot_be_simulated_is_refused_by_name() {
             .contains("EKF origin")
     );
     assert!(
-        refuse(AutopilotConfig { gust_mps: f32::NAN, ..AutopilotConfig::default() })
+        refuse(AutopilotConfig { gust_peak_mps: f32::NAN, ..AutopilotConfig::default() })
             .contains("gust")
     );
 }

@@ -43,15 +43,15 @@ pub struct Recording {
     /// Which autopilot flew the vehicle.
     pub autopilot: SimulatedKind,
     /// EKF origin of the autopilot.
-    pub origin: Geodetic,
+    pub ekf_origin: Geodetic,
     /// Positions and velocities that the autopilot estimated.
     pub estimate: Vec<Sample>,
     /// True positions and velocities.
     pub truth: Vec<Sample>,
     /// When the vehicle armed for its flight, and when it disarmed, seconds.
-    pub armed_s: (f64, f64),
+    pub armed_span_s: (f64, f64),
     /// When the mission began to follow its path, and when it began to land, seconds.
-    pub follow_s: (f64, f64),
+    pub follow_span_s: (f64, f64),
     pub(super) setpoints: Vec<Setpoint>,
     pub(super) messages: Vec<(f64, Message)>,
 }

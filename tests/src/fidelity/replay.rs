@@ -10,10 +10,10 @@ use planner_core::Point;
 use sim_autopilot::{Autopilot, AutopilotConfig, SimulatedKind};
 
 use super::recording::{Message, Recording, Sample, Setpoint};
-use super::{Correction, Estimator};
+use super::{Correction, EstimateErrors};
 
 /// Simulated seconds per second of the wall clock: PX4's SIH ran 0.4 to 1.1 % slow when recorded.
-const PX4_CLOCK: f64 = 0.9925;
+const PX4_CLOCK_RATE: f64 = 0.9925;
 const STEP_S: f64 = 0.004;
 /// Simulated time before the first record, seconds: by then ArduCopter has booted and has a
 /// position.
@@ -22,27 +22,29 @@ const COMMAND_LONG: (u32, u8) = (76, 152);
 /// Control law of the recorded companion (8314848, `guidance::correction`): acceleration for each
 /// metre and for each m/s off the reference, 1/s² and 1/s, and its bound, m/s². From the recorded
 /// estimate it gives the recorded accelerations to within 0.02 m/s².
-const HOLD_PER_S2: f64 = 3.0;
-const DAMP_PER_S: f64 = 1.5;
-const HOLD_MOST_MPS2: f64 = 1.5;
+const POSITION_GAIN_PER_S2: f64 = 3.0;
+const VELOCITY_GAIN_PER_S: f64 = 1.5;
+const MAX_CORRECTION_MPS2: f64 = 1.5;
 /// Bound on the acceleration of that companion's reference, m/s².
-const CHANGE_MOST_MPS2: f64 = 2.0;
+const MAX_REFERENCE_ACCEL_MPS2: f64 = 2.0;
 
 impl Recording {
     /// Where the vehicle stood in the second before it armed, by its estimate, NED metres.
-    fn start(&self) -> Vector3<f64> {
+    fn start_ned(&self) -> Vector3<f64> {
         let before = || {
-            self.estimate.iter().filter(|s| s.t_s < self.armed_s.0 && s.t_s > self.armed_s.0 - 1.0)
+            self.estimate
+                .iter()
+                .filter(|s| s.t_s < self.armed_span_s.0 && s.t_s > self.armed_span_s.0 - 1.0)
         };
         before().map(|s| s.position).sum::<Vector3<f64>>() / before().count().max(1) as f64
     }
 
     fn config(&self) -> AutopilotConfig {
-        let ned = self.start();
+        let ned = self.start_ned();
         AutopilotConfig {
             autopilot: self.autopilot,
-            world_origin: self.origin,
-            ekf_origin: self.origin,
+            world_origin: self.ekf_origin,
+            ekf_origin: self.ekf_origin,
             start: Point::new(ned.y as f32, ned.x as f32, -ned.z as f32),
             estimator_ready_s: 1.0,
             distance_sensor: true,
@@ -52,7 +54,7 @@ impl Recording {
 
     /// Errors of the recorded estimate, estimated minus true: ENU metres and m/s, at the times of
     /// the recorded truth.
-    pub fn errors(&self) -> Vec<(f64, Point, Point)> {
+    pub fn estimate_errors(&self) -> Vec<(f64, Point, Point)> {
         let enu = |v: Vector3<f64>| Point::new(v.y as f32, v.x as f32, -v.z as f32);
         let mut errors = Vec::new();
         let mut later = self.estimate.as_slice();
@@ -73,10 +75,11 @@ impl Recording {
     }
 
     /// The position error that the replay counts as zero: the mean in the second before arming, as
-    /// for [`Self::start`], or without one the first error.
-    fn zero(&self, errors: &[(f64, Point, Point)]) -> Point {
-        let before =
-            || errors.iter().filter(|e| e.0 < self.armed_s.0 && e.0 > self.armed_s.0 - 1.0);
+    /// for [`Self::start_ned`], or without one the first error.
+    fn zero_error(&self, errors: &[(f64, Point, Point)]) -> Point {
+        let before = || {
+            errors.iter().filter(|e| e.0 < self.armed_span_s.0 && e.0 > self.armed_span_s.0 - 1.0)
+        };
         let first = errors.first().map_or(Point::zeros(), |e| e.1);
         let n = before().count();
         if n > 0 { before().map(|e| e.1).sum::<Point>() / n as f32 } else { first }
@@ -87,24 +90,24 @@ impl Recording {
     ///
     /// # Panics
     /// Does not panic for a recording that [`super::recordings`] has read.
-    pub fn replay(&self, estimator: Estimator<'_>, correction: Correction) -> Vec<Sample> {
+    pub fn replay(&self, estimator: EstimateErrors<'_>, correction: Correction) -> Vec<Sample> {
         let errors = match estimator {
-            Estimator::Perfect => Vec::new(),
-            Estimator::Recorded => self.errors(),
-            Estimator::Of(other) => other.errors(),
+            EstimateErrors::Perfect => Vec::new(),
+            EstimateErrors::Recorded => self.estimate_errors(),
+            EstimateErrors::Of(other) => other.estimate_errors(),
         };
-        let zero = self.zero(&errors);
+        let zero = self.zero_error(&errors);
         let mut errors = errors.iter().peekable();
         let mut last = (0.0, Point::zeros());
         let config = self.config();
         let mut autopilot = Autopilot::new(&config).expect("a recorded place is one");
-        autopilot.land_on_offboard_loss();
+        autopilot.set_land_on_offboard_loss();
         let ground_m = config.start.z - config.vehicle.radius_m;
-        let clock = if self.autopilot == SimulatedKind::Px4 { PX4_CLOCK } else { 1.0 };
+        let clock = if self.autopilot == SimulatedKind::Px4 { PX4_CLOCK_RATE } else { 1.0 };
         let (mut setpoints, mut messages) =
             (self.setpoints.iter().peekable(), self.messages.iter().peekable());
         let (mut sequence, mut buffer) = (0_u8, [0; 512]);
-        let begin_s = self.armed_s.0 - 4.0;
+        let begin_s = self.armed_span_s.0 - 4.0;
         // Messages before the replayed part set the autopilot up, so they are sent at once.
         while let Some((_, message)) = messages.next_if(|(t_s, _)| *t_s < begin_s) {
             feed_message(&mut autopilot, message, &mut sequence);
@@ -112,7 +115,7 @@ impl Recording {
         while setpoints.next_if(|s| s.t_s < begin_s).is_some() {}
         let mut last_setpoint: Option<Setpoint> = None;
         let mut flown = Vec::new();
-        for seen in self.flown() {
+        for seen in self.flown_estimates() {
             let due_us = |t_s: f64| ((WARM_UP_S + (t_s - begin_s) * clock) * 1e6) as u64;
             while autopilot.time_us() < due_us(seen.t_s) {
                 let now_us = autopilot.time_us();
@@ -122,7 +125,7 @@ impl Recording {
                 while let Some(setpoint) = setpoints.next_if(|s| due_us(s.t_s) <= now_us) {
                     let mut sent = *setpoint;
                     if let (Correction::Simulated, Some(last)) = (correction, last_setpoint) {
-                        corrected(&mut sent, &last, &autopilot);
+                        correct_acceleration(&mut sent, &last, &autopilot);
                     }
                     last_setpoint = Some(*setpoint);
                     feed_setpoint(&mut autopilot, &sent, &mut sequence);
@@ -152,21 +155,21 @@ fn ned(enu: &Point) -> Vector3<f64> {
 /// Replaces a setpoint's horizontal acceleration by what the recorded companion would send for the
 /// simulated vehicle: the change of its reference's speed, and the correction back to it. A
 /// setpoint without acceleration (on the ground, under a pilot) stays as it is.
-fn corrected(setpoint: &mut Setpoint, last: &Setpoint, autopilot: &Autopilot) {
+fn correct_acceleration(setpoint: &mut Setpoint, last: &Setpoint, autopilot: &Autopilot) {
     let [north, east, _] = setpoint.acceleration;
     if north == 0.0 && east == 0.0 {
         return;
     }
     let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
     let [position, velocity] = autopilot.estimate().map(|enu| ned(&enu));
-    let mut off = (wide(setpoint.position) - position) * HOLD_PER_S2
-        + (wide(setpoint.velocity) - velocity) * DAMP_PER_S;
+    let mut off = (wide(setpoint.position) - position) * POSITION_GAIN_PER_S2
+        + (wide(setpoint.velocity) - velocity) * VELOCITY_GAIN_PER_S;
     off.z = 0.0;
-    off *= HOLD_MOST_MPS2 / off.norm().max(HOLD_MOST_MPS2);
+    off *= MAX_CORRECTION_MPS2 / off.norm().max(MAX_CORRECTION_MPS2);
     let (speed, was) = (wide(setpoint.velocity).norm(), wide(last.velocity).norm());
     let change = (speed - was) / (setpoint.t_s - last.t_s).max(0.02);
     let along = wide(setpoint.velocity) / speed.max(0.01);
-    let sent = off + along * change.clamp(-CHANGE_MOST_MPS2, CHANGE_MOST_MPS2);
+    let sent = off + along * change.clamp(-MAX_REFERENCE_ACCEL_MPS2, MAX_REFERENCE_ACCEL_MPS2);
     (setpoint.acceleration[0], setpoint.acceleration[1]) = (sent.x as f32, sent.y as f32);
 }
 

@@ -20,9 +20,9 @@ impl Entropy for Dice {
 
 /// A fuzzer's bytes.
 #[derive(Debug)]
-pub struct Bytes<'a>(pub &'a [u8]);
+pub struct FuzzBytes<'a>(pub &'a [u8]);
 
-impl Entropy for Bytes<'_> {
+impl Entropy for FuzzBytes<'_> {
     fn bits(&mut self) -> u64 {
         let mut word = [0; 8];
         let length = self.0.len().min(8);

@@ -12,9 +12,9 @@ use planner_core::Point;
 use planner_core::geo::frames;
 
 use super::entropy::Entropy;
-use super::{Flight, ID, Mission, NEIGHBOUR, ORIGIN, intent};
+use super::{AttackedFlight, Mission, NEIGHBOUR_ID, ORIGIN, VICTIM_ID, neighbour_intent};
 
-impl Flight {
+impl AttackedFlight {
     /// Forges one frame of one of `messages`, and gives it to the companion on one of `links`.
     pub(super) fn forge(&mut self, entropy: &mut impl Entropy, links: &[Link], messages: &[u32]) {
         let head = entropy.bits();
@@ -22,9 +22,9 @@ impl Flight {
         let link = links[pick(0, links.len() as u64) as usize];
         let message_id = messages[pick(1, messages.len() as u64) as usize];
         let system = match pick(8, 6) {
-            0..=2 if link == Link::Autopilot => ID,
-            0 | 1 => NEIGHBOUR,
-            2 => ID,
+            0..=2 if link == Link::Autopilot => VICTIM_ID,
+            0 | 1 => NEIGHBOUR_ID,
+            2 => VICTIM_ID,
             3 => 1 + pick(16, 5) as u8,
             // Any sender but the mission's ground station, whose forged frames only signing could
             // detect.
@@ -37,7 +37,7 @@ impl Flight {
         };
         let header = Header { system, component, sequence: (head >> 32) as u8 };
         let mut payload = [0; 255];
-        let length = self.fill(message_id, &mut payload, entropy, (head >> 40) as u8);
+        let length = self.fill_payload(message_id, &mut payload, entropy, (head >> 40) as u8);
         let extra = frame::extra_crc(message_id).unwrap_or(0);
         let mut out = [0; MAX_FRAME_LEN];
         let length = frame::encode_raw(header, message_id, extra, &payload[..length], &mut out);
@@ -47,23 +47,31 @@ impl Flight {
 
     /// Fills a payload with random or extreme numbers, some replaced by believable ones; returns
     /// its length.
-    fn fill(&self, id: u32, payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
+    fn fill_payload(
+        &self,
+        id: u32,
+        payload: &mut [u8; 255],
+        entropy: &mut impl Entropy,
+        how: u8,
+    ) -> usize {
         if id == TUNNEL_DATA::ID && how & 3 != 0 {
             return match self.mission == Mission::Area && how & 3 == 1 {
                 true => fill_roster(payload, entropy, how),
                 false => self.fill_intent(payload, entropy, how),
             };
         }
-        let length =
-            LENGTHS.iter().find(|(known, _)| *known == id).map_or(255, |(_, length)| *length);
+        let length = PAYLOAD_LENGTHS
+            .iter()
+            .find(|(known, _)| *known == id)
+            .map_or(255, |(_, length)| *length);
         for word in payload[..length].chunks_mut(4) {
             let bits = entropy.bits();
             let value = match bits % 8 {
                 0 => (bits >> 8) as u32,
                 1 => 0,
                 2 => u32::MAX,
-                3 => EDGES[(bits >> 8) as usize % EDGES.len()].to_bits(),
-                _ => number(bits >> 8, 50.0).to_bits(),
+                3 => EXTREME_NUMBERS[(bits >> 8) as usize % EXTREME_NUMBERS.len()].to_bits(),
+                _ => scaled_number(bits >> 8, 50.0).to_bits(),
             };
             word.copy_from_slice(&value.to_le_bytes()[..word.len()]);
         }
@@ -73,21 +81,21 @@ impl Flight {
 
     /// Fills a payload with an intent like those of the neighbour; returns its length.
     fn fill_intent(&self, payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
-        let mut intent = intent();
+        let mut intent = neighbour_intent();
         let bits = entropy.bits();
-        intent.system_id = if how & 8 == 0 { NEIGHBOUR } else { bits as u8 };
+        intent.system_id = if how & 8 == 0 { NEIGHBOUR_ID } else { bits as u8 };
         intent.flags = (bits >> 8) as u8;
         intent.mission_crc = if how & 16 == 0 { 0xC0FFEE } else { bits as u32 };
         intent.plan_crc = if how & 32 == 0 { 5 } else { (bits >> 16) as u32 };
         intent.heard_bits = (bits >> 24) as u32;
-        intent.ground_m = number(bits >> 32, 10.0);
+        intent.ground_m = scaled_number(bits >> 32, 10.0);
         intent.may_come_down = how & 64 != 0;
-        intent.progress_m = number(bits >> 40, 30.0);
-        intent.gates_open_up_to_m = number(bits >> 48, 5.0);
+        intent.progress_m = scaled_number(bits >> 40, 30.0);
+        intent.gates_open_up_to_m = scaled_number(bits >> 48, 5.0);
         for _ in 0..(bits >> 56) as usize % (MAX_POINTS + 1) {
             let bits = entropy.bits();
             let here = self.autopilot.position;
-            let near = |shift: u32| number(bits >> shift, 6.0);
+            let near = |shift: u32| scaled_number(bits >> shift, 6.0);
             let point = here + Point::new(near(0), near(16), near(32));
             intent.points.push(point).expect("no more than fit");
         }
@@ -124,9 +132,9 @@ impl Flight {
                 payload[12..16].copy_from_slice(&((geodetic.alt_m * 1e3) as i32).to_le_bytes());
             }
             75 | 76 => {
-                let command = COMMANDS[usize::from(how) % COMMANDS.len()];
+                let command = FORGED_COMMANDS[usize::from(how) % FORGED_COMMANDS.len()];
                 payload[28..30].copy_from_slice(&command.to_le_bytes());
-                payload[30] = if how & 1 == 0 { ID } else { 0 };
+                payload[30] = if how & 1 == 0 { VICTIM_ID } else { 0 };
                 payload[31] = if how & 2 == 0 { COMPANION_COMPONENT } else { 0 };
                 if how & 4 == 0 {
                     payload[..4].copy_from_slice(&f32::from(how >> 7).to_le_bytes());
@@ -150,7 +158,7 @@ impl Flight {
                 } else {
                     0
                 };
-                (payload[at], payload[at + 1]) = (ID, COMPANION_COMPONENT);
+                (payload[at], payload[at + 1]) = (VICTIM_ID, COMPANION_COMPONENT);
             }
             _ => {}
         }
@@ -158,12 +166,12 @@ impl Flight {
 }
 
 /// A random number between −`size` and `size`.
-fn number(bits: u64, size: f32) -> f32 {
+fn scaled_number(bits: u64, size: f32) -> f32 {
     (f32::from(bits as u16) / 32768.0 - 1.0) * size
 }
 
 /// Payload length of each message, bytes.
-const LENGTHS: [(u32, usize); 19] = [
+const PAYLOAD_LENGTHS: [(u32, usize); 19] = [
     (0, 9),
     (1, 31),
     (20, 20),
@@ -185,9 +193,9 @@ const LENGTHS: [(u32, usize); 19] = [
     (253, 54),
 ];
 /// Numbers of commands that a companion obeys, and of some that it does not.
-const COMMANDS: [u16; 12] = [20, 21, 176, 193, 246, 300, 400, 511, 512, 5004, 22, 0xFFFF];
+const FORGED_COMMANDS: [u16; 12] = [20, 21, 176, 193, 246, 300, 400, 511, 512, 5004, 22, 0xFFFF];
 /// Numbers at the bounds of f32.
-const EDGES: [f32; 10] = [
+const EXTREME_NUMBERS: [f32; 10] = [
     f32::NAN,
     f32::INFINITY,
     f32::NEG_INFINITY,
@@ -221,16 +229,16 @@ fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> 
         if rank == 0 && !about_it { RosterReportEntry::default() } else { drawn }
     };
     let roster = RosterReport {
-        system_id: if how & 8 == 0 { NEIGHBOUR } else { bits as u8 },
-        divisions: if ahead { (bits >> 8) as u8 } else { 0 },
+        system_id: if how & 8 == 0 { NEIGHBOUR_ID } else { bits as u8 },
+        division_count: if ahead { (bits >> 8) as u8 } else { 0 },
         in_flight: bits >> 4 & 1 != 0,
-        hears_flight: bits >> 5 & 1 != 0,
+        hears_vehicle_in_flight: bits >> 5 & 1 != 0,
         // The plan of the flight, whose CRC is 5, or another one.
-        plan: if how & 32 == 0 { 5 } else { (bits >> 16) as u8 },
-        first: if how & 64 == 0 { 0 } else { 1 + (bits >> 16) as u8 % 255 },
+        plan_crc8: if how & 32 == 0 { 5 } else { (bits >> 16) as u8 },
+        first_rank: if how & 64 == 0 { 0 } else { 1 + (bits >> 16) as u8 % 255 },
         mission_crc: if how & 16 == 0 { 0xC0FFEE } else { bits as u32 },
         committed_hash: (bits >> 24) as u32 % 3,
-        hash: (bits >> 32) as u32,
+        pending_hash: (bits >> 32) as u32,
         entries: (0..1 + (bits >> 56) as usize % roster::MAX_ENTRIES_PER_MESSAGE)
             .map(&mut entry_of)
             .collect(),

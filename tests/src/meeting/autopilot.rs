@@ -26,7 +26,7 @@ const PX4_POSITION: u32 = 0x0003_0000;
 /// ArduCopter's custom mode in which a pilot flies: LOITER.
 const ARDUPILOT_LOITER: u32 = 5;
 /// Age of the last setpoint at which PX4 counts the stream as lost, seconds (`COM_OF_LOSS_T`).
-const PX4_LOSS_S: f32 = 1.0;
+const PX4_SETPOINT_LOSS_S: f32 = 1.0;
 
 /// What the autopilot does by itself after a loss of setpoints, or in a failsafe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ pub enum Catch {
 
 /// What controls the vehicle at this moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Flown {
+pub enum ControlSource {
     /// The companion, by setpoints.
     Setpoints,
     /// The autopilot, by a command of the companion: a landing or a take-off.
@@ -87,16 +87,16 @@ pub struct Autopilot {
     pub mode: u32,
     /// Whether the motors are on.
     pub armed: bool,
-    critical: bool,
+    in_failsafe: bool,
     /// Whether the companion has commanded the mode of landing.
     landing_commanded: bool,
     /// What the autopilot does after a loss of setpoints.
-    pub on_loss: Failsafe,
-    lost: bool,
+    pub on_setpoint_loss: Failsafe,
+    setpoints_lost: bool,
     /// Velocity that the pilot commands, ENU m/s.
-    pub pilot: Point,
+    pub pilot_velocity: Point,
     /// Where its pilot gave the vehicle back last; `None` if nowhere.
-    pub left_at: Option<Point>,
+    pub given_back_at: Option<Point>,
     target: Option<Target>,
     takeoff_z: Option<f32>,
     airborne: bool,
@@ -109,9 +109,9 @@ pub struct Autopilot {
     streams: BTreeSet<u16>,
     sequence: u8,
     framer: Framer,
-    phase: u64,
+    stream_phase: u64,
     /// Checks the setpoints that the autopilot received.
-    pub check: SetpointCheck,
+    pub setpoint_check: SetpointCheck,
     /// Number of times it was armed.
     pub armings: u32,
 }
@@ -137,12 +137,12 @@ impl Autopilot {
             home: pad,
             mode: if kind == AutopilotKind::Px4 { px4::HOLD } else { 0 },
             armed: false,
-            critical: false,
+            in_failsafe: false,
             landing_commanded: false,
-            on_loss: Failsafe::Land,
-            lost: false,
-            pilot: Point::zeros(),
-            left_at: None,
+            on_setpoint_loss: Failsafe::Land,
+            setpoints_lost: false,
+            pilot_velocity: Point::zeros(),
+            given_back_at: None,
             target: None,
             takeoff_z: None,
             airborne: false,
@@ -154,8 +154,8 @@ impl Autopilot {
             streams: BTreeSet::new(),
             sequence: 0,
             framer: Framer::new(),
-            phase,
-            check,
+            stream_phase: phase,
+            setpoint_check: check,
             armings: 0,
         }
     }
@@ -166,48 +166,57 @@ impl Autopilot {
     }
 
     /// What controls the vehicle now.
-    pub fn flown(&self) -> Flown {
+    pub fn control_source(&self) -> ControlSource {
         if self.mode == self.kind.setpoint_mode() {
-            if self.takeoff_z.is_some() { Flown::Commanded } else { Flown::Setpoints }
-        } else if self.mode == self.kind.land_mode() && self.landing_commanded && !self.critical {
-            Flown::Commanded
+            if self.takeoff_z.is_some() {
+                ControlSource::Commanded
+            } else {
+                ControlSource::Setpoints
+            }
+        } else if self.mode == self.kind.land_mode() && self.landing_commanded && !self.in_failsafe
+        {
+            ControlSource::Commanded
         } else {
-            Flown::Other
+            ControlSource::Other
         }
     }
 
     /// Position of the last setpoint; `None` without one.
-    pub fn asked(&self) -> Option<Point> {
+    pub fn last_setpoint_position(&self) -> Option<Point> {
         self.target?.position
     }
 
     /// The pilot takes over by the mode switch, and flies with `velocity`.
-    pub fn take_over(&mut self, velocity: Point) {
-        self.enter(if self.kind == AutopilotKind::Px4 { PX4_POSITION } else { ARDUPILOT_LOITER });
-        self.pilot = velocity;
+    pub fn pilot_takes_over(&mut self, velocity: Point) {
+        self.enter_mode(if self.kind == AutopilotKind::Px4 {
+            PX4_POSITION
+        } else {
+            ARDUPILOT_LOITER
+        });
+        self.pilot_velocity = velocity;
     }
 
     /// The pilot switches back to Offboard or Guided; PX4 accepts that only while setpoints arrive.
-    pub fn give_back(&mut self, now: Instant) {
-        if self.kind == AutopilotKind::ArduPilot || self.age_s(now) < 0.5 {
-            self.left_at = Some(self.position);
-            self.enter(self.kind.setpoint_mode());
+    pub fn pilot_gives_back(&mut self, now: Instant) {
+        if self.kind == AutopilotKind::ArduPilot || self.setpoint_age_s(now) < 0.5 {
+            self.given_back_at = Some(self.position);
+            self.enter_mode(self.kind.setpoint_mode());
         }
     }
 
     /// The pilot switches to the mode of landing.
     pub fn pilot_lands(&mut self) {
-        self.enter(self.kind.land_mode());
+        self.enter_mode(self.kind.land_mode());
     }
 
     /// The autopilot enters a failsafe of its own.
-    pub fn fail(&mut self, how: Failsafe) {
-        self.enter(match how {
+    pub fn enter_failsafe(&mut self, how: Failsafe) {
+        self.enter_mode(match how {
             Failsafe::Land => self.kind.land_mode(),
             Failsafe::Return if self.kind == AutopilotKind::Px4 => px4::RTL,
             Failsafe::Return => ardupilot::RTL,
         });
-        self.critical = true;
+        self.in_failsafe = true;
     }
 
     /// From now on something holds the vehicle where it is.
@@ -220,16 +229,17 @@ impl Autopilot {
         self.caught.is_some()
     }
 
-    fn enter(&mut self, mode: u32) {
+    fn enter_mode(&mut self, mode: u32) {
         if mode != self.mode {
             // The setpoints sent in the mode before were not followed.
-            self.check.restart();
+            self.setpoint_check.begin_stream();
         }
-        (self.mode, self.critical, self.lost, self.landing_commanded) = (mode, false, false, false);
+        (self.mode, self.in_failsafe, self.setpoints_lost, self.landing_commanded) =
+            (mode, false, false, false);
         self.takeoff_z = None;
     }
 
-    fn age_s(&self, now: Instant) -> f32 {
+    fn setpoint_age_s(&self, now: Instant) -> f32 {
         self.target.map_or(f32::INFINITY, |target| (now - target.at).as_secs_f32())
     }
 
@@ -238,10 +248,10 @@ impl Autopilot {
         if self.kind == AutopilotKind::Px4
             && self.mode == px4::OFFBOARD
             && self.armed
-            && self.age_s(now) > PX4_LOSS_S
+            && self.setpoint_age_s(now) > PX4_SETPOINT_LOSS_S
         {
-            self.fail(self.on_loss);
-            self.lost = true;
+            self.enter_failsafe(self.on_setpoint_loss);
+            self.setpoints_lost = true;
         }
         self.fly(now, floor_z);
         self.report(now, out);

@@ -12,7 +12,7 @@ use super::packet::ORIGIN;
 use super::scene::Lie;
 
 /// Position and velocity of a report, ENU metres and m/s.
-pub(super) fn place_of(data: &GLOBAL_POSITION_INT_DATA) -> (Point, Point) {
+pub(super) fn reported_position_and_velocity(data: &GLOBAL_POSITION_INT_DATA) -> (Point, Point) {
     let place = Geodetic {
         lat_deg: f64::from(data.lat) * 1e-7,
         lon_deg: f64::from(data.lon) * 1e-7,
@@ -23,12 +23,12 @@ pub(super) fn place_of(data: &GLOBAL_POSITION_INT_DATA) -> (Point, Point) {
 }
 
 /// The frame with the lie in its data; `None` if the lie is about other data.
-pub(super) fn forge(frame: &frame::Frame, lie: Lie) -> Option<Vec<u8>> {
+pub(super) fn forge_report(frame: &frame::Frame, lie: Lie) -> Option<Vec<u8>> {
     let header =
         Header { system: frame.system, component: frame.component, sequence: frame.sequence };
     let mut out = [0; MAX_FRAME_LEN];
     if let Some(mut data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
-        let (mut place, mut velocity) = place_of(&data);
+        let (mut place, mut velocity) = reported_position_and_velocity(&data);
         match lie {
             Lie::Position(off) => place += off,
             Lie::Velocity(off) => velocity += off,

@@ -15,23 +15,23 @@ use companion::link::intent::{GROUNDED, Intent, LANDED};
 use planner_core::Point;
 
 use super::autopilot::STEP_S;
-use super::scene::{CRUISE_MPS, SAFETY_M};
+use super::scene::{CRUISE_MPS, SAFETY_DISTANCE_M};
 
 /// Deceleration of a stop along a path, m/s².
-const ACCEL: f32 = 1.5;
+const STOP_ACCEL_MPS2: f32 = 1.5;
 /// Jerk of a stop by the safety filter, m/s³.
-const JERK: f32 = 8.0;
+const STOP_JERK_MPS3: f32 = 8.0;
 /// Time by which a vehicle lags behind its setpoint, seconds.
 const LAG_S: f32 = 0.35;
 /// Greatest age at which a neighbour's reported points are believed, seconds.
-const FRESH_S: f32 = 1.0;
+const MAX_POINTS_AGE_S: f32 = 1.0;
 /// Age up to which the ball of a silent neighbour grows, seconds.
-const GROWS_S: f32 = 3.0;
+const BALL_GROWS_UNTIL_S: f32 = 3.0;
 /// Steps for which sets may be apart within one approach.
-const GAP_STEPS: usize = 40;
+const MAX_GAP_STEPS: usize = 40;
 /// Margin, metres: a stop counts as one that would have kept the safety distance only if it keeps
 /// that plus this margin.
-const SURE_M: f32 = 0.05;
+const KEPT_MARGIN_M: f32 = 0.05;
 
 /// What a vehicle last received from another one.
 #[derive(Clone, Debug, Default)]
@@ -50,8 +50,10 @@ pub struct ReachableSet {
 }
 
 /// Distance that a vehicle covers from this speed: `before_s` at that speed, then a stop, metres.
-fn reach(speed: f32, before_s: f32) -> f32 {
-    speed * before_s + speed * speed / (2.0 * ACCEL) + speed * ACCEL / (2.0 * JERK)
+fn stop_distance_m(speed: f32, before_s: f32) -> f32 {
+    speed * before_s
+        + speed * speed / (2.0 * STOP_ACCEL_MPS2)
+        + speed * STOP_ACCEL_MPS2 / (2.0 * STOP_JERK_MPS3)
 }
 
 /// Distance between two segments, metres.
@@ -82,8 +84,8 @@ pub fn distance(p: (Point, Point), q: (Point, Point)) -> f32 {
 pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<ReachableSet> {
     let (position, velocity, _, at_s) = heard.position?;
     let age_s = now_s - at_s;
-    if age_s > FRESH_S {
-        let radius_m = CRUISE_MPS * age_s.min(GROWS_S);
+    if age_s > MAX_POINTS_AGE_S {
+        let radius_m = CRUISE_MPS * age_s.min(BALL_GROWS_UNTIL_S);
         return Some(ReachableSet { segments: vec![(position, position)], radius_m });
     }
     let intent = heard.intent.as_ref();
@@ -91,7 +93,7 @@ pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Reachabl
         return Some(ReachableSet { segments: vec![(position, position)], radius_m: 0.0 });
     }
     let speed = velocity.norm();
-    let mut left_m = reach(speed, age_s + 0.1);
+    let mut left_m = stop_distance_m(speed, age_s + 0.1);
     let mut set = ReachableSet { segments: vec![(position, position)], radius_m: 0.0 };
     let next = intent.and_then(|i| i.points.iter().find(|p| (*p - position).norm() > 0.05));
     let on_points = next.is_some_and(|next| {
@@ -114,7 +116,7 @@ pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Reachabl
         }
     } else if speed > 1e-3 {
         set.segments.push((position, position + velocity * (left_m / speed)));
-        set.radius_m = 0.5 * ACCEL * age_s * age_s;
+        set.radius_m = 0.5 * STOP_ACCEL_MPS2 * age_s * age_s;
     }
     if velocity.z < -0.2 || intent.is_some_and(|i| i.may_come_down) {
         set.segments.push((position, Point::new(position.x, position.y, floor_z.min(position.z))));
@@ -133,7 +135,8 @@ fn stopping_set(position: Point, velocity: Point) -> ReachableSet {
     let speed = velocity.norm();
     let mut segments = vec![(position, position)];
     if speed > 1e-3 {
-        segments.push((position, position + velocity * (reach(speed, 0.1 + LAG_S) / speed)));
+        segments
+            .push((position, position + velocity * (stop_distance_m(speed, 0.1 + LAG_S) / speed)));
     }
     ReachableSet { segments, radius_m: 0.0 }
 }
@@ -158,9 +161,9 @@ pub struct VehicleState {
     /// Whether the vehicle is off the ground.
     pub airborne: bool,
     /// Whether its companion controls it, and so could stop it.
-    pub own: bool,
+    pub companion_controls: bool,
     /// Whether it lands by its autopilot, at its companion's command.
-    pub lands: bool,
+    pub lands_on_command: bool,
     /// Whether it has heard no other vehicle for so long that it has to land where it is.
     pub deaf: bool,
 }
@@ -173,35 +176,35 @@ pub struct Violation {
     /// When the vehicles were nearest, seconds.
     pub at_s: f32,
     /// Their distance at that time, metres.
-    pub least_m: f32,
+    pub min_distance_m: f32,
     /// When the sets of each vehicle first came too near in this approach, seconds; `None`: never.
-    pub warned_s: [Option<f32>; 2],
-    /// Smallest distance if each vehicle had stopped from its `warned_s` on, metres.
-    pub kept_m: f32,
+    pub sets_near_since_s: [Option<f32>; 2],
+    /// Smallest distance if each vehicle had stopped from its `sets_near_since_s` on, metres.
+    pub distance_if_stopped_m: f32,
 }
 
 impl Violation {
     /// Whether stops would have kept the safety distance, so that the filter failed.
     pub fn is_failure(&self) -> bool {
-        self.kept_m >= SAFETY_M + SURE_M
+        self.distance_if_stopped_m >= SAFETY_DISTANCE_M + KEPT_MARGIN_M
     }
 }
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Approach {
-    since: usize,
-    last: usize,
+    first_step: usize,
+    last_step: usize,
 }
 
 /// Watches and judges a meeting.
 #[derive(Debug)]
 pub struct Oracle {
-    count: usize,
+    vehicle_count: usize,
     tracks: Vec<Vec<VehicleState>>,
     approaches: Vec<Option<Approach>>,
     /// For each pair that is too near: when its sets came too near, the step at which the pair was
     /// nearest, and that distance.
-    near: Vec<Option<Near>>,
+    ongoing: Vec<Option<OngoingViolation>>,
     /// Approaches below the safety distance that have ended.
     pub violations: Vec<Violation>,
     touching: Vec<bool>,
@@ -209,38 +212,38 @@ pub struct Oracle {
     /// other one, distance in metres.
     pub touches: Vec<(f32, usize, usize, f32)>,
     /// Touches of a vehicle that was carried off unheard: no message places it there.
-    pub unforeseen: usize,
+    pub unforeseen_touches: usize,
     /// Smallest distance between two vehicles, not both on the ground, metres.
-    pub least_m: f32,
+    pub min_distance_m: f32,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Near {
-    warned: [Option<usize>; 2],
-    nearest: usize,
-    least_m: f32,
+struct OngoingViolation {
+    sets_near_since: [Option<usize>; 2],
+    nearest_step: usize,
+    min_distance_m: f32,
 }
 
 /// Distance of centres below which two vehicles touch, metres: twice the hull's radius.
 pub const TOUCH_M: f32 = 0.6;
 /// Closing speed below which a vehicle does not count as moving toward the other, m/s.
-const TOWARD_MPS: f32 = 0.15;
+const MIN_CLOSING_MPS: f32 = 0.15;
 /// Distance beyond the safety distance at which an approach ends, metres.
-const APART_M: f32 = 0.1;
+const APPROACH_ENDS_M: f32 = 0.1;
 
 impl Oracle {
     /// A judge of `count` vehicles.
     pub fn new(count: usize) -> Self {
         Self {
-            count,
+            vehicle_count: count,
             tracks: vec![Vec::new(); count],
             approaches: vec![None; count * count],
-            near: vec![None; count * count],
+            ongoing: vec![None; count * count],
             violations: Vec::new(),
             touching: vec![false; count * count],
             touches: Vec::new(),
-            unforeseen: 0,
-            least_m: f32::INFINITY,
+            unforeseen_touches: 0,
+            min_distance_m: f32::INFINITY,
         }
     }
 
@@ -255,12 +258,12 @@ impl Oracle {
         let step = self.tracks[0].len();
         self.tracks.iter_mut().zip(seen).for_each(|(track, seen)| track.push(*seen));
         let now_s = step as f32 * STEP_S;
-        for a in 0..self.count {
-            for b in 0..self.count {
+        for a in 0..self.vehicle_count {
+            for b in 0..self.vehicle_count {
                 if a == b {
                     continue;
                 }
-                if step.is_multiple_of(2) && seen[a].airborne && seen[a].own {
+                if step.is_multiple_of(2) && seen[a].airborne && seen[a].companion_controls {
                     self.judge_sets(step, now_s, (a, b), &seen[a], &heard(a, b), &floor_z);
                 }
                 if a < b {
@@ -268,8 +271,9 @@ impl Oracle {
                     // in which others assume a silent vehicle.
                     let carried = |from: usize, to: usize| {
                         heard(from, to).position.is_some_and(|(place, _, _, at_s)| {
-                            now_s - at_s > GROWS_S
-                                && (place - seen[to].position).norm() > CRUISE_MPS * GROWS_S
+                            now_s - at_s > BALL_GROWS_UNTIL_S
+                                && (place - seen[to].position).norm()
+                                    > CRUISE_MPS * BALL_GROWS_UNTIL_S
                         })
                     };
                     self.judge_distance(step, (a, b), seen, carried);
@@ -293,16 +297,16 @@ impl Oracle {
             return;
         }
         let Some(theirs) = neighbour_set(heard, now_s, floor_z(&position)) else { return };
-        let ours = if own.lands {
+        let ours = if own.lands_on_command {
             landing_set(own.position, floor_z(&own.position))
         } else {
             stopping_set(own.position, own.velocity)
         };
-        if ours.distance(&theirs) < SAFETY_M {
-            let approach = &mut self.approaches[a * self.count + b];
+        if ours.distance(&theirs) < SAFETY_DISTANCE_M {
+            let approach = &mut self.approaches[a * self.vehicle_count + b];
             match approach {
-                Some(known) if step - known.last <= GAP_STEPS => known.last = step,
-                _ => *approach = Some(Approach { since: step, last: step }),
+                Some(known) if step - known.last_step <= MAX_GAP_STEPS => known.last_step = step,
+                _ => *approach = Some(Approach { first_step: step, last_step: step }),
             }
         }
     }
@@ -314,42 +318,46 @@ impl Oracle {
         seen: &[VehicleState],
         carried: impl Fn(usize, usize) -> bool,
     ) {
-        let at = a * self.count + b;
+        let at = a * self.vehicle_count + b;
         if !seen[a].airborne && !seen[b].airborne {
-            self.end_near(a, b);
+            self.end_violation(a, b);
             self.touching[at] = false;
             return;
         }
         let apart = seen[b].position - seen[a].position;
         let apart_m = apart.norm();
-        self.least_m = self.least_m.min(apart_m);
-        if apart_m < SAFETY_M && self.near[at].is_none() {
+        self.min_distance_m = self.min_distance_m.min(apart_m);
+        if apart_m < SAFETY_DISTANCE_M && self.ongoing[at].is_none() {
             let warned = |from: usize, to: usize| {
-                let known = self.approaches[from * self.count + to];
-                known.filter(|known| step - known.last <= GAP_STEPS).map(|known| known.since)
+                let known = self.approaches[from * self.vehicle_count + to];
+                known
+                    .filter(|known| step - known.last_step <= MAX_GAP_STEPS)
+                    .map(|known| known.first_step)
             };
-            self.near[at] = Some(Near {
-                warned: [warned(a, b), warned(b, a)],
-                nearest: step,
-                least_m: apart_m,
+            self.ongoing[at] = Some(OngoingViolation {
+                sets_near_since: [warned(a, b), warned(b, a)],
+                nearest_step: step,
+                min_distance_m: apart_m,
             });
-        } else if apart_m > SAFETY_M + APART_M {
-            self.end_near(a, b);
+        } else if apart_m > SAFETY_DISTANCE_M + APPROACH_ENDS_M {
+            self.end_violation(a, b);
         }
-        if let Some(near) = &mut self.near[at]
-            && apart_m < near.least_m
+        if let Some(near) = &mut self.ongoing[at]
+            && apart_m < near.min_distance_m
         {
-            (near.nearest, near.least_m) = (step, apart_m);
+            (near.nearest_step, near.min_distance_m) = (step, apart_m);
         }
         let toward = |own: &VehicleState, apart: Point| {
-            own.airborne && own.own && own.velocity.dot(&apart) > TOWARD_MPS * apart_m
+            own.airborne
+                && own.companion_controls
+                && own.velocity.dot(&apart) > MIN_CLOSING_MPS * apart_m
         };
         if apart_m < TOUCH_M {
             let now_s = step as f32 * STEP_S;
             for (from, to, apart) in [(a, b, apart), (b, a, -apart)] {
                 if toward(&seen[from], apart) && !self.touching[at] {
                     match carried(from, to) {
-                        true => self.unforeseen += 1,
+                        true => self.unforeseen_touches += 1,
                         false => self.touches.push((now_s, from, to, apart_m)),
                     }
                     self.touching[at] = true;
@@ -362,12 +370,15 @@ impl Oracle {
 
     /// Position of a vehicle at `step` if it had begun to stop at `warned`, on the path that it
     /// flew.
-    fn stopped(&self, vehicle: usize, warned: Option<usize>, step: usize) -> Point {
+    fn position_if_stopped(&self, vehicle: usize, warned: Option<usize>, step: usize) -> Point {
         let track = &self.tracks[vehicle];
         let Some(warned) = warned.filter(|warned| *warned < step) else {
             return track[step].position;
         };
-        if track[warned..=step].iter().any(|seen| !seen.own || (seen.deaf && seen.lands)) {
+        if track[warned..=step]
+            .iter()
+            .any(|seen| !seen.companion_controls || (seen.deaf && seen.lands_on_command))
+        {
             // A pilot or failsafe flew it, so its companion could not have stopped it. Nor could a
             // vehicle that hears no other any more stay up for good.
             return track[step].position;
@@ -377,10 +388,10 @@ impl Oracle {
         let before_s = 0.1 + LAG_S;
         let braked_s = (time_s - before_s).max(0.0);
         // The jerk of the stop costs half a ramp at full speed.
-        let ramp_s = ACCEL / (2.0 * JERK);
-        let brakes_s = (braked_s - ramp_s).clamp(0.0, speed / ACCEL);
+        let ramp_s = STOP_ACCEL_MPS2 / (2.0 * STOP_JERK_MPS3);
+        let brakes_s = (braked_s - ramp_s).clamp(0.0, speed / STOP_ACCEL_MPS2);
         let gone_m = speed * (time_s.min(before_s) + braked_s.min(ramp_s)) + speed * brakes_s
-            - 0.5 * ACCEL * brakes_s * brakes_s;
+            - 0.5 * STOP_ACCEL_MPS2 * brakes_s * brakes_s;
         // The stop would have been on the path that it flew.
         let mut left_m = gone_m;
         for pair in track[warned..=step].windows(2) {
@@ -395,30 +406,31 @@ impl Oracle {
         track[step].position
     }
 
-    fn end_near(&mut self, a: usize, b: usize) {
-        let Some(near) = self.near[a * self.count + b].take() else { return };
-        let first = near.warned.iter().flatten().min().copied().unwrap_or(near.nearest);
+    fn end_violation(&mut self, a: usize, b: usize) {
+        let Some(near) = self.ongoing[a * self.vehicle_count + b].take() else { return };
+        let first =
+            near.sets_near_since.iter().flatten().min().copied().unwrap_or(near.nearest_step);
         let mut kept_m = f32::INFINITY;
-        for step in first..=near.nearest {
-            let apart =
-                self.stopped(a, near.warned[0], step) - self.stopped(b, near.warned[1], step);
+        for step in first..=near.nearest_step {
+            let apart = self.position_if_stopped(a, near.sets_near_since[0], step)
+                - self.position_if_stopped(b, near.sets_near_since[1], step);
             kept_m = kept_m.min(apart.norm());
         }
         let seconds = |step: usize| step as f32 * STEP_S;
         self.violations.push(Violation {
             pair: (a, b),
-            at_s: seconds(near.nearest),
-            least_m: near.least_m,
-            warned_s: near.warned.map(|warned| warned.map(seconds)),
-            kept_m,
+            at_s: seconds(near.nearest_step),
+            min_distance_m: near.min_distance_m,
+            sets_near_since_s: near.sets_near_since.map(|warned| warned.map(seconds)),
+            distance_if_stopped_m: kept_m,
         });
     }
 
     /// Ends the meeting: approaches that still last are judged.
     pub fn finish(&mut self) {
-        for a in 0..self.count {
-            for b in a + 1..self.count {
-                self.end_near(a, b);
+        for a in 0..self.vehicle_count {
+            for b in a + 1..self.vehicle_count {
+                self.end_violation(a, b);
             }
         }
     }

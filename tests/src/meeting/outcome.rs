@@ -15,31 +15,31 @@ pub struct Outcome {
     /// Whether the vehicles flew one common plan.
     pub on_plan: bool,
     /// Whether one vehicle lied in its reports.
-    pub lies: bool,
+    pub has_liar: bool,
     /// Number of vehicles.
-    pub vehicles: usize,
+    pub vehicle_count: usize,
     /// Approaches of two vehicles below the safety distance.
     pub violations: Vec<Violation>,
     /// Touches: time in seconds, index of the vehicle that moved toward the other one, index of the
     /// other one, distance in metres.
     pub touches: Vec<(f32, usize, usize, f32)>,
     /// Number of touches of a vehicle that was carried off unheard.
-    pub unforeseen: usize,
+    pub unforeseen_touches: usize,
     /// Indices of the vehicles not on the ground at the end, and their companions' states.
-    pub stuck: Vec<(usize, State)>,
+    pub not_landed: Vec<(usize, State)>,
     /// Number of vehicles held above another one by what catches them, or where their pilot left
     /// them.
-    pub held: usize,
+    pub held_above_another: usize,
     /// Smallest distance of two vehicles, metres.
-    pub least_m: f32,
+    pub min_distance_m: f32,
     /// When the meeting ended, seconds.
     pub ended_s: f32,
     /// Statistics of the setpoints of all vehicles.
     pub setpoints: SetpointStats,
     /// Setpoints unfit to be flown: vehicle, seconds, and why.
-    pub unfit: Vec<(usize, f64, String)>,
+    pub unfit_setpoints: Vec<(usize, f64, String)>,
     /// Number of vehicles that landed at their goals.
-    pub arrived: usize,
+    pub arrived_count: usize,
     /// Number of stops by the safety filter, of all vehicles.
     pub filter_stops: u32,
     /// Longest stop by the safety filter for a neighbour that was heard, seconds.
@@ -47,7 +47,7 @@ pub struct Outcome {
     /// Longest stop by the safety filter for a neighbour that was silent for more than a second.
     pub longest_unheard_stop_s: f32,
     /// Greatest number of times that one vehicle found its path blocked.
-    pub most_blocked: u32,
+    pub max_blocked_count: u32,
     /// Log of what happened, if that was requested.
     pub trace: Vec<String>,
 }
@@ -59,22 +59,36 @@ impl Outcome {
     }
 
     /// Whether the meeting broke a rule; a meeting with a liar may have vehicles too near.
-    pub fn is_bad(&self) -> bool {
-        let near = !self.lies && self.failures().next().is_some();
-        near || !self.touches.is_empty() || !self.stuck.is_empty()
+    pub fn breaks_rule(&self) -> bool {
+        let near = !self.has_liar && self.failures().next().is_some();
+        near || !self.touches.is_empty() || !self.not_landed.is_empty()
     }
 }
 
 /// One line of text about a meeting.
-pub fn line(outcome: &Outcome) -> String {
-    let Outcome { seed, kind, vehicles, ended_s, least_m, arrived, .. } = outcome;
+pub fn outcome_line(outcome: &Outcome) -> String {
+    let Outcome {
+        seed,
+        kind,
+        vehicle_count: vehicles,
+        ended_s,
+        min_distance_m: least_m,
+        arrived_count: arrived,
+        ..
+    } = outcome;
     let plan = if outcome.on_plan { "on plan" } else { "off plan" };
-    let lies = if outcome.lies { ", a liar" } else { "" };
+    let lies = if outcome.has_liar { ", a liar" } else { "" };
     let mut line = format!(
         "seed {seed}: {kind}, {vehicles} vehicles {plan}{lies}, {ended_s:.0} s, nearest {least_m:.2} m, {arrived} arrived"
     );
     for violation in &outcome.violations {
-        let Violation { pair, at_s, least_m, kept_m, warned_s } = violation;
+        let Violation {
+            pair,
+            at_s,
+            min_distance_m: least_m,
+            distance_if_stopped_m: kept_m,
+            sets_near_since_s: warned_s,
+        } = violation;
         let verdict = if violation.is_failure() { "TOO NEAR" } else { "unavoidable" };
         line += &format!(
             "; {verdict} {}-{} at {at_s:.1} s {least_m:.2} m (warned {warned_s:.1?}, kept {kept_m:.2})",
@@ -85,7 +99,7 @@ pub fn line(outcome: &Outcome) -> String {
     for (at_s, from, to, apart_m) in &outcome.touches {
         line += &format!("; TOUCH {} of {} at {at_s:.1} s {apart_m:.2} m", from + 1, to + 1);
     }
-    for (i, state) in &outcome.stuck {
+    for (i, state) in &outcome.not_landed {
         line += &format!("; STUCK {} in {state:?}", i + 1);
     }
     line
@@ -103,11 +117,11 @@ pub struct Summary {
     /// Meetings with a touch by a vehicle's own motion.
     pub touches: [usize; 2],
     /// Meetings with a touch of a vehicle that was carried off unheard.
-    pub unforeseen: usize,
+    pub unforeseen_touches: usize,
     /// Meetings with a vehicle that had not landed at the end.
-    pub stuck: [usize; 2],
+    pub not_landed: [usize; 2],
     /// Meetings with a vehicle that waits above another one where its pilot left it.
-    pub held: usize,
+    pub held_above_another: usize,
     /// Number of vehicles, and of those that landed at their goals.
     pub arrived: (usize, usize),
 }
@@ -116,27 +130,27 @@ pub struct Summary {
 pub fn summary(outcomes: &[Outcome]) -> Summary {
     let mut sum = Summary::default();
     for outcome in outcomes {
-        let at = usize::from(outcome.lies);
+        let at = usize::from(outcome.has_liar);
         let failed = outcome.failures().next().is_some();
         sum.meetings[at] += 1;
         sum.too_near[at] += usize::from(failed);
         sum.unavoidable[at] += usize::from(!failed && !outcome.violations.is_empty());
         sum.touches[at] += usize::from(!outcome.touches.is_empty());
-        sum.unforeseen += usize::from(outcome.unforeseen > 0);
-        sum.stuck[at] += usize::from(!outcome.stuck.is_empty());
-        sum.held += usize::from(outcome.held > 0);
-        sum.arrived.0 += outcome.vehicles;
-        sum.arrived.1 += outcome.arrived;
+        sum.unforeseen_touches += usize::from(outcome.unforeseen_touches > 0);
+        sum.not_landed[at] += usize::from(!outcome.not_landed.is_empty());
+        sum.held_above_another += usize::from(outcome.held_above_another > 0);
+        sum.arrived.0 += outcome.vehicle_count;
+        sum.arrived.1 += outcome.arrived_count;
     }
     sum
 }
 
 impl Summary {
     /// Whether a rule was broken: also if over 5 % of honest meetings were unavoidably too near.
-    pub fn is_bad(&self) -> bool {
+    pub fn breaks_rule(&self) -> bool {
         self.too_near[0] > 0
             || self.touches != [0; 2]
-            || self.stuck != [0; 2]
+            || self.not_landed != [0; 2]
             || self.unavoidable[0] * 20 > self.meetings[0]
     }
 }
@@ -152,11 +166,19 @@ impl std::fmt::Display for Summary {
                 self.too_near[at],
                 self.unavoidable[at],
                 self.touches[at],
-                self.stuck[at]
+                self.not_landed[at]
             )?;
         }
-        writeln!(f, "{} with one that waits above another where its pilot left it", self.held)?;
-        writeln!(f, "{} with a touch of a vehicle that was carried off unheard", self.unforeseen)?;
+        writeln!(
+            f,
+            "{} with one that waits above another where its pilot left it",
+            self.held_above_another
+        )?;
+        writeln!(
+            f,
+            "{} with a touch of a vehicle that was carried off unheard",
+            self.unforeseen_touches
+        )?;
         write!(f, "{} of {} vehicles landed at their goals", self.arrived.1, self.arrived.0)
     }
 }

@@ -18,8 +18,8 @@ pub(super) enum RadioContent {
 
 /// A frame on its way to a receiver.
 pub(super) struct Packet {
-    pub(super) at: Instant,
+    pub(super) due_at: Instant,
     pub(super) from: usize,
     pub(super) bytes: Vec<u8>,
-    pub(super) said: RadioContent,
+    pub(super) content: RadioContent,
 }

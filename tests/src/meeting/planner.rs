@@ -32,7 +32,7 @@ pub(super) fn detour_in_the_open(
         Point::new(angle.cos(), angle.sin(), 0.0)
     });
     let offs: Vec<Point> = offs.collect();
-    if request.aside {
+    if request.land_aside {
         for rise in [0.0, 2.5, 5.0].map(|rise| Point::new(0.0, 0.0, rise)) {
             for length in [3.0, 5.0, 8.0] {
                 for off in &offs {
@@ -47,7 +47,7 @@ pub(super) fn detour_in_the_open(
         let way = ways.into_iter().find(|way| {
             way.windows(2).all(|leg| clear(leg[0], leg[1])) && way.last().is_some_and(rests)
         })?;
-        return along(&way, own, request.descent_m);
+        return plan_along(&way, own, request.descent_m);
     }
     ways.push(vec![here, last]);
     for length in [2.5, 4.0, 6.0] {
@@ -67,10 +67,10 @@ pub(super) fn detour_in_the_open(
             && way.windows(2).all(|leg| clear(leg[0], leg[1]))
             && keep.iter().all(|k| oracle::distance((last, ground), (k.from, k.to)) >= k.radius_m)
     })?;
-    along(&way, own, request.descent_m)
+    plan_along(&way, own, request.descent_m)
 }
 
-fn along(way: &[Point], own: &Plan, descent_m: f32) -> Option<Plan> {
+fn plan_along(way: &[Point], own: &Plan, descent_m: f32) -> Option<Plan> {
     let mut path = Path::new();
     for point in way {
         path.push(*point, 2.0).ok()?;

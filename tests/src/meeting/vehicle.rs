@@ -6,52 +6,54 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::geo::frames::{self, Geodetic};
 
-use super::autopilot::{Autopilot, Flown};
+use super::autopilot::{Autopilot, ControlSource};
 use super::oracle::{Heard, VehicleState};
 use super::packet::{ORIGIN, Packet};
-use super::scene::{self, CLIMB_MPS, CRUISE_MPS, GATES, SAFETY_M, Scene, VEHICLES, WAYPOINTS};
-use crate::setpoints::{Limits, SetpointCheck};
+use super::scene::{
+    self, CLIMB_MPS, CRUISE_MPS, GATES, SAFETY_DISTANCE_M, Scene, VEHICLES, WAYPOINTS,
+};
+use crate::setpoints::{SetpointCheck, SetpointLimits};
 
 /// Fence that no vehicle may leave, metres: lowest and highest corner.
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
 /// Time without any message after which a vehicle counts as deaf, seconds: it has stopped, and
 /// lands after 20 s.
-const DEAF_S: f32 = 20.0;
+const DEAF_AFTER_S: f32 = 20.0;
 /// Time within which a neighbour's position was received for the safety filter to expect it on its
 /// reported points, seconds; later it may be anywhere within a ball (SPEC §4).
-const HEARD_S: f32 = 1.0;
+const HEARD_WITHIN_S: f32 = 1.0;
 /// Speed above which a vehicle does not count as stopped, m/s.
-const MOVES_MPS: f32 = 0.7;
+const MOVES_ABOVE_MPS: f32 = 0.7;
 /// Speed limit of setpoints, m/s: the nominal speed plus the excess of a setpoint that catches up.
-const SPEED_MPS: f32 = 2.2;
+const MAX_SETPOINT_SPEED_MPS: f32 = 2.2;
 
-type Mate = Companion<VEHICLES, WAYPOINTS, GATES>;
+type MeetingCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
 
 /// A vehicle of a meeting with its companion.
 pub(super) struct MeetingVehicle {
-    pub(super) companion: Mate,
+    pub(super) companion: MeetingCompanion,
     pub(super) autopilot: Autopilot,
     pub(super) inbox: Vec<Packet>,
     pub(super) heard: Vec<Heard>,
     pub(super) framer: Framer,
-    pub(super) dead: bool,
-    pub(super) sends: bool,
-    pub(super) hears: bool,
-    pub(super) bytes: Vec<u8>,
-    pub(super) commands: u8,
+    pub(super) companion_dead: bool,
+    pub(super) radio_sends: bool,
+    pub(super) radio_hears: bool,
+    pub(super) bytes_to_companion: Vec<u8>,
+    pub(super) command_sequence: u8,
     /// Number of stops by the safety filter.
-    pub(super) stops: u32,
+    pub(super) filter_stops: u32,
     /// System ids of all vehicles, in the order of `heard`.
     ids: Vec<u8>,
     /// Since when the present stop lasts, and whether the neighbour that the filter stops for was
-    /// silent for longer than [`HEARD_S`] in it.
-    pub(super) stopped: Option<(Instant, bool)>,
+    /// silent for longer than [`HEARD_WITHIN_S`] in it.
+    pub(super) stop_since: Option<(Instant, bool)>,
     /// Longest stop by the safety filter for a neighbour that was heard, seconds, and the longest
     /// one for one that was silent.
     pub(super) longest_stop_s: f32,
     pub(super) longest_unheard_stop_s: f32,
     /// Number of times that its companion found its path blocked.
-    pub(super) blocked: u32,
+    pub(super) blocked_count: u32,
 }
 
 fn config(scene: &Scene, i: usize) -> Config<VEHICLES> {
@@ -60,13 +62,13 @@ fn config(scene: &Scene, i: usize) -> Config<VEHICLES> {
     let mut config = Config::new(own.id, start(own), ORIGIN);
     config.roster.clear();
     for vehicle in &scene.vehicles {
-        let entry = RosterEntry { system_id: vehicle.id, start: start(vehicle) };
+        let entry = RosterEntry { system_id: vehicle.id, path_start: start(vehicle) };
         config.roster.push(entry).expect("a meeting fits");
     }
     config.mission_crc = 0xC0FFEE;
     config.cruise_mps = CRUISE_MPS;
     config.climb_mps = CLIMB_MPS;
-    config.safety_distance_m = SAFETY_M;
+    config.safety_distance_m = SAFETY_DISTANCE_M;
     config.geofence = Some(FENCE);
     config
 }
@@ -86,33 +88,36 @@ impl MeetingVehicle {
         let (low, high) = (ned(&FENCE.0), ned(&FENCE.1));
         let (low, high) = (low.inf(&high), low.sup(&high));
         let slack = Vector3::repeat(0.05);
-        let limits = Limits { speed_mps: SPEED_MPS, fence: Some((low - slack, high + slack)) };
+        let limits = SetpointLimits {
+            max_speed_mps: MAX_SETPOINT_SPEED_MPS,
+            fence: Some((low - slack, high + slack)),
+        };
         let mut autopilot = Autopilot::new(
             vehicle.kind,
             vehicle.id,
             (ORIGIN, ekf_origin),
             vehicle.pad,
-            vehicle.phase,
+            vehicle.stream_phase,
             SetpointCheck::new(limits),
         );
-        autopilot.on_loss = vehicle.on_loss;
+        autopilot.on_setpoint_loss = vehicle.on_setpoint_loss;
         Self {
-            companion: Mate::new(config(scene, i)).expect("a sound configuration"),
+            companion: MeetingCompanion::new(config(scene, i)).expect("a sound configuration"),
             autopilot,
             inbox: Vec::new(),
             heard: vec![Heard::default(); scene.vehicles.len()],
             framer: Framer::new(),
-            dead: false,
-            sends: true,
-            hears: true,
-            bytes: Vec::new(),
-            commands: 0,
-            stops: 0,
+            companion_dead: false,
+            radio_sends: true,
+            radio_hears: true,
+            bytes_to_companion: Vec::new(),
+            command_sequence: 0,
+            filter_stops: 0,
             ids: scene.vehicles.iter().map(|vehicle| vehicle.id).collect(),
-            stopped: None,
+            stop_since: None,
             longest_stop_s: 0.0,
             longest_unheard_stop_s: 0.0,
-            blocked: 0,
+            blocked_count: 0,
         }
     }
 
@@ -120,17 +125,17 @@ impl MeetingVehicle {
     /// no neighbour any more (a wait at a gate may follow), or the vehicle flies again.
     pub(super) fn note_stops(&mut self, now: Instant) {
         let (stops, blocker) =
-            (self.companion.filter_stop_count(), self.companion.query_filter(now));
-        if core::mem::replace(&mut self.stops, stops) != stops {
-            self.stopped.get_or_insert((now, false));
-        } else if blocker == 0 || self.autopilot.velocity.norm() > MOVES_MPS {
-            self.stopped = None;
+            (self.companion.filter_stop_count(), self.companion.query_filter_blocker(now));
+        if core::mem::replace(&mut self.filter_stops, stops) != stops {
+            self.stop_since.get_or_insert((now, false));
+        } else if blocker == 0 || self.autopilot.velocity.norm() > MOVES_ABOVE_MPS {
+            self.stop_since = None;
         }
-        let Some((since, unheard)) = &mut self.stopped else { return };
+        let Some((since, unheard)) = &mut self.stop_since else { return };
         let now_s = now.as_micros() as f32 * 1e-6;
         let stops_for = self.ids.iter().position(|&id| id == blocker).map(|k| &self.heard[k]);
         let silent =
-            |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s > HEARD_S);
+            |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s > HEARD_WITHIN_S);
         *unheard |= stops_for.is_some_and(silent);
         let longest_s = match unheard {
             true => &mut self.longest_unheard_stop_s,
@@ -139,24 +144,27 @@ impl MeetingVehicle {
         *longest_s = longest_s.max((now - *since).as_secs_f32());
     }
 
-    pub(super) fn seen(&self, now_s: f32) -> VehicleState {
-        let lately = |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s < DEAF_S);
+    pub(super) fn state_for_judge(&self, now_s: f32) -> VehicleState {
+        let lately =
+            |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s < DEAF_AFTER_S);
         // In the landing mode, or led down by setpoints.
-        let lands = (self.autopilot.flown() == Flown::Commanded
+        let lands = (self.autopilot.control_source() == ControlSource::Commanded
             && self.autopilot.mode == self.autopilot.kind.land_mode())
             || self.companion.state() == State::Land;
         VehicleState {
             position: self.autopilot.position,
             velocity: self.autopilot.velocity,
             airborne: self.autopilot.is_airborne(),
-            own: !self.dead && self.autopilot.armed && self.autopilot.flown() != Flown::Other,
-            lands,
+            companion_controls: !self.companion_dead
+                && self.autopilot.armed
+                && self.autopilot.control_source() != ControlSource::Other,
+            lands_on_command: lands,
             deaf: !self.heard.iter().any(lately),
         }
     }
 
-    pub(super) fn rests(&self) -> bool {
+    pub(super) fn is_at_rest(&self) -> bool {
         let over = matches!(self.companion.state(), State::Done | State::Aborted);
-        !self.autopilot.armed && !self.autopilot.is_airborne() && (over || self.dead)
+        !self.autopilot.armed && !self.autopilot.is_airborne() && (over || self.companion_dead)
     }
 }

@@ -18,7 +18,7 @@
 mod links;
 mod model;
 
-use flockmate_tests::number;
+use flockmate_tests::number_from_env;
 use links::partitions;
 use model::{FleetModel, Flight, MOST, Planted, Radio, SETTLES, State};
 use stateright::{Checker, Model};
@@ -43,14 +43,14 @@ fn search_right(count: usize, radio: Radio, losses: u8, slow: Option<usize>) {
 
 /// Whether searches of more than a minute run too.
 fn searches_all() -> bool {
-    number("FLOCKMATE_MODEL", 0) >= 4
+    number_from_env("FLOCKMATE_MODEL", 0) >= 4
 }
 
 /// Of four vehicles up to two are lost, while any partition changes up to twice: run alone, since
 /// that takes minutes and gigabytes.
 #[test]
 fn four_vehicles_with_two_losses_and_two_changes() {
-    match number("FLOCKMATE_MODEL", 0) {
+    match number_from_env("FLOCKMATE_MODEL", 0) {
         5 => search_right(4, Radio::Parts(1), 2, None),
         6 => search_right(4, Radio::Parts(2), 1, None),
         7.. => search_right(4, Radio::Parts(2), 2, None),

@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex};
 use companion::link::roster::{RosterReport, ShareStatus};
 use companion::swarm::fleet::{Fleet, FleetTimeouts, OwnReport, StartStatus, VehicleReception};
 use companion::time::{Duration, Instant};
-use flockmate_tests::parts::{WAYPOINT_DM, parts};
+use flockmate_tests::parts::{WAYPOINT_DM, divide_waypoints};
 
 use crate::links::{Links, one_way, partitions};
 
@@ -151,9 +151,9 @@ impl FleetModel {
         let silent = if planted == Planted::TakenOverEarly { 4 } else { SILENT };
         let limits = FleetTimeouts {
             lease: ticks(LEASE),
-            heard: ticks(0),
-            silent: ticks(silent),
-            down: ticks(silent),
+            heard_within: ticks(0),
+            lost_after: ticks(silent),
+            down_after: ticks(silent),
         };
         Self {
             count,
@@ -175,7 +175,8 @@ impl FleetModel {
 
     /// The waypoints of a vehicle's path, and whether its part continues after them.
     fn path(&self, vehicle: &Vehicle) -> (Vec<u32>, bool) {
-        let mut part = parts(&self.whole, &vehicle.fleet, self.count).0.swap_remove(vehicle.rank);
+        let mut part =
+            divide_waypoints(&self.whole, &vehicle.fleet, self.count).0.swap_remove(vehicle.rank);
         let goes_on = part.len() > self.most;
         part.truncate(self.most);
         (part, goes_on)
@@ -217,7 +218,7 @@ impl FleetModel {
         vehicle.hears = 0;
         for (from, message) in heard {
             vehicle.hears |= 1 << from;
-            vehicle.fleet.handle_roster(*from, &message.roster, StartStatus::Started);
+            vehicle.fleet.handle_roster_report(*from, &message.roster, StartStatus::Started);
         }
         if self.planted == Planted::PresentAlone {
             self.forget_silent(&mut vehicle);
@@ -227,7 +228,7 @@ impl FleetModel {
             heard_at: bit(vehicle.hears, rank).then_some(now),
             hears_us: heard.iter().any(|(from, m)| *from == rank && bit(m.hears, vehicle.rank)),
             heard_by_others: heard.iter().any(|(from, m)| *from != rank && bit(m.hears, rank)),
-            hears: heard.iter().find(|(from, _)| *from == rank).map_or(0, |(_, m)| m.hears),
+            heard_bits: heard.iter().find(|(from, _)| *from == rank).map_or(0, |(_, m)| m.hears),
         };
         let (path, goes_on) = self.path(&vehicle);
         let done = usize::from(vehicle.along) >= path.len();
@@ -240,17 +241,17 @@ impl FleetModel {
         let promise = vehicle.fleet.commitment_dm();
         let own = OwnReport {
             status: standing,
-            waits: false,
+            waits_for_start: false,
             airborne: true,
-            division: vehicle.division,
+            path_division_count: vehicle.division,
             progress_dm: vehicle.along * WAYPOINT_DM,
-            commitment_dm: Some((vehicle.along + 1).min(path.len() as u16) * WAYPOINT_DM),
+            new_commitment_dm: Some((vehicle.along + 1).min(path.len() as u16) * WAYPOINT_DM),
             holds: done || promise.is_some_and(|dm| vehicle.along * WAYPOINT_DM >= dm),
             wants_division: done && goes_on,
         };
         vehicle.fleet.step(now, &own, hearing);
-        if vehicle.fleet.needs_division() {
-            let hash = parts(&self.whole, &vehicle.fleet, self.count).1;
+        if vehicle.fleet.is_division_to_be_computed() {
+            let hash = divide_waypoints(&self.whole, &vehicle.fleet, self.count).1;
             vehicle.fleet.set_hash_from_plan(hash);
         }
         if vehicle.fleet.division_count() > vehicle.division {
@@ -277,8 +278,8 @@ impl FleetModel {
 
     /// Plants the error: a silent vehicle does not count any more, as if it had left.
     fn forget_silent(&self, vehicle: &mut Vehicle) {
-        let mut roster = vehicle.fleet.roster_message(0);
-        roster.hash = 0;
+        let mut roster = vehicle.fleet.roster_report(0);
+        roster.pending_hash = 0;
         for rank in (0..self.count).filter(|rank| *rank != vehicle.rank) {
             let silent = &mut vehicle.silent[rank];
             *silent =
@@ -288,7 +289,7 @@ impl FleetModel {
             }
         }
         for sender in (0..self.count).filter(|rank| *rank != vehicle.rank).take(1) {
-            vehicle.fleet.handle_roster(sender, &roster, StartStatus::Started);
+            vehicle.fleet.handle_roster_report(sender, &roster, StartStatus::Started);
         }
     }
 
@@ -301,7 +302,7 @@ impl FleetModel {
         let sends = if vehicle.flight == Flight::Dead {
             0
         } else {
-            let message = Message { hears: vehicle.hears, roster: vehicle.fleet.roster_message(0) };
+            let message = Message { hears: vehicle.hears, roster: vehicle.fleet.roster_report(0) };
             let messages = &mut known.messages;
             *known.message_numbers.entry(message).or_insert_with_key(|message| {
                 messages.push(message.clone());

@@ -24,7 +24,7 @@ use super::sources::{Source, Tree};
 const PAGE: &str = "docs/margins.md";
 const CRATES: [&str; 3] = ["planner-core", "companion", "host-sim"];
 /// Published figures that the plans are compared with: nothing is decided by them.
-const FIGURES: &str = "host-sim/src/paper/";
+const PUBLISHED_FIGURES: &str = "host-sim/src/paper/";
 /// Ends of constants' names, and the unit that each means; of two that fit, the first holds.
 const UNITS: [(&str, &str); 12] = [
     ("_BYTES_PER_S", "byte/s"),
@@ -41,12 +41,12 @@ const UNITS: [(&str, &str); 12] = [
     ("_US", "µs"),
 ];
 /// Types of one number with a unit.
-const NUMBERS: [&str; 11] =
+const NUMBER_TYPES: [&str; 11] =
     ["f32", "f64", "u8", "u16", "u32", "u64", "i8", "i16", "i32", "i64", "Point"];
 /// Functions that make a `Duration` of a whole number, and how many of it are a second.
-const MAKERS: [(&str, u64); 4] =
+const DURATION_CONSTRUCTORS: [(&str, u64); 4] =
     [("secs", 1), ("from_secs", 1), ("from_millis", 1_000), ("from_micros", 1_000_000)];
-const HEAD: &str = "# Distances, times, speeds and accelerations
+const PAGE_HEAD: &str = "# Distances, times, speeds and accelerations
 
 Every one that the code on board (planner-core, companion) or the host (host-sim) decides by, with
 its reason: margins, reserves, leads, windows, limits. A duration is in seconds. Made from the
@@ -55,7 +55,7 @@ sources: `FLOCKMATE_WRITE=1 cargo xtask structure`. How margins add up to an arg
 not here.
 ";
 
-struct Distance {
+struct PageRow {
     value: String,
     unit: &'static str,
     reason: String,
@@ -63,35 +63,35 @@ struct Distance {
 }
 
 /// The listed constants, by file and name.
-type Found = BTreeMap<(String, String), Distance>;
+type RowsByFileAndName = BTreeMap<(String, String), PageRow>;
 
 /// Compares docs/margins.md with the sources, or writes it where `FLOCKMATE_WRITE` is set. Returns
 /// a line for each fault.
 pub fn check_margins_page() -> Result<Vec<String>> {
     let mut sources = Vec::new();
     for name in CRATES {
-        for tree in Tree::of_crate(Path::new(name))? {
+        for tree in Tree::trees_of_crate(Path::new(name))? {
             sources.extend(tree.sources);
         }
     }
     let mut listing = Listing::default();
     for source in &sources {
         let file = source.path.display().to_string();
-        if !file.starts_with(FIGURES) {
+        if !file.starts_with(PUBLISHED_FIGURES) {
             listing.add(&file, &source.items, &fs::read_to_string(&source.path)?);
         }
     }
-    let Listing { mut found, mut wrong, .. } = listing;
+    let Listing { rows: mut found, faults: mut wrong, .. } = listing;
     for source in &sources {
-        let mut used = Used(BTreeSet::new());
+        let mut used = UsedNames(BTreeSet::new());
         source.items.iter().for_each(|item| used.visit_item(item));
         for ((_, name), distance) in &mut found {
             if used.0.contains(name) {
-                distance.users.push(short(source));
+                distance.users.push(path_in_crate(source));
             }
         }
     }
-    let page = page(&found);
+    let page = page_text(&found);
     if env::var_os("FLOCKMATE_WRITE").is_some() {
         fs::write(PAGE, &page)?;
     } else if fs::read_to_string(PAGE).ok().as_deref() != Some(&page) {
@@ -105,11 +105,11 @@ pub fn check_margins_page() -> Result<Vec<String>> {
 /// What was found in the files so far.
 #[derive(Default)]
 struct Listing {
-    found: Found,
+    rows: RowsByFileAndName,
     /// The file of each name.
     files: BTreeMap<String, String>,
     /// A line for each fault.
-    wrong: Vec<String>,
+    faults: Vec<String>,
 }
 
 impl Listing {
@@ -119,14 +119,14 @@ impl Listing {
         items.iter().for_each(|item| constants.visit_item(item));
         for Constant { name, unit, reason, seconds, bytes } in constants.0 {
             if let Some(other) = self.files.insert(name.clone(), file.to_owned()) {
-                self.wrong.push(format!("{file}: {name} is the name of another one in {other}"));
+                self.faults.push(format!("{file}: {name} is the name of another one in {other}"));
             }
             if reason.is_empty() {
-                self.wrong.push(format!("{file}: {name} has no reason"));
+                self.faults.push(format!("{file}: {name} has no reason"));
             }
             let value = seconds.unwrap_or_else(|| in_one_line(&text[bytes]));
-            let distance = Distance { value, unit, reason, users: Vec::new() };
-            self.found.insert((file.to_owned(), name), distance);
+            let distance = PageRow { value, unit, reason, users: Vec::new() };
+            self.rows.insert((file.to_owned(), name), distance);
         }
     }
 }
@@ -146,39 +146,56 @@ struct Constant {
 struct Constants(Vec<Constant>);
 
 impl Constants {
-    fn add(&mut self, name: &Ident, kind: &Type, attributes: &[Attribute], value: &Value<'_>) {
+    fn add(
+        &mut self,
+        name: &Ident,
+        kind: &Type,
+        attributes: &[Attribute],
+        value: &ValueTokens<'_>,
+    ) {
         let name = name.to_string();
-        let Some(unit) = unit(&name, kind) else { return };
-        let seconds = is(kind, "Duration").then(|| seconds(value.is)).flatten();
-        let bytes = value.after.byte_range().end..value.before.byte_range().start;
-        self.0.push(Constant { name, unit, reason: reason(attributes), seconds, bytes });
+        let Some(unit) = listed_unit(&name, kind) else { return };
+        let seconds =
+            is_type_named(kind, "Duration").then(|| duration_seconds(value.expression)).flatten();
+        let bytes = value.equals_sign.byte_range().end..value.semicolon.byte_range().start;
+        self.0.push(Constant { name, unit, reason: doc_comment_line(attributes), seconds, bytes });
     }
 }
 
 /// The value of a constant, between `=` and `;`.
-struct Value<'a> {
-    is: &'a Expr,
-    after: Span,
-    before: Span,
+struct ValueTokens<'a> {
+    expression: &'a Expr,
+    equals_sign: Span,
+    semicolon: Span,
 }
 
 impl<'a> Visit<'a> for Constants {
     fn visit_item_const(&mut self, item: &'a syn::ItemConst) {
         let (after, before) = (item.eq_token.spans[0], item.semi_token.spans[0]);
-        self.add(&item.ident, &item.ty, &item.attrs, &Value { is: &item.expr, after, before });
+        self.add(
+            &item.ident,
+            &item.ty,
+            &item.attrs,
+            &ValueTokens { expression: &item.expr, equals_sign: after, semicolon: before },
+        );
         visit::visit_item_const(self, item);
     }
 
     fn visit_impl_item_const(&mut self, item: &'a syn::ImplItemConst) {
         let (after, before) = (item.eq_token.spans[0], item.semi_token.spans[0]);
-        self.add(&item.ident, &item.ty, &item.attrs, &Value { is: &item.expr, after, before });
+        self.add(
+            &item.ident,
+            &item.ty,
+            &item.attrs,
+            &ValueTokens { expression: &item.expr, equals_sign: after, semicolon: before },
+        );
         visit::visit_impl_item_const(self, item);
     }
 }
 
 /// The unit of a constant, if the page lists constants of its name and type.
-fn unit(name: &str, kind: &Type) -> Option<&'static str> {
-    if is(kind, "Duration") {
+fn listed_unit(name: &str, kind: &Type) -> Option<&'static str> {
+    if is_type_named(kind, "Duration") {
         return Some("s");
     }
     let (_, unit) = UNITS.into_iter().find(|(end, _)| name.ends_with(end))?;
@@ -197,7 +214,7 @@ fn is_numeric(kind: &Type) -> bool {
                     _ => false,
                 })
             }
-            PathArguments::None => NUMBERS.iter().any(|number| last.ident == number),
+            PathArguments::None => NUMBER_TYPES.iter().any(|number| last.ident == number),
             _ => false,
         }),
         _ => false,
@@ -205,17 +222,17 @@ fn is_numeric(kind: &Type) -> bool {
 }
 
 /// Whether a type's last name is `name`.
-fn is(kind: &Type, name: &str) -> bool {
+fn is_type_named(kind: &Type, name: &str) -> bool {
     let Type::Path(path) = kind else { return false };
     path.path.segments.last().is_some_and(|last| last.ident == name)
 }
 
 /// The seconds of a `Duration` that a whole number makes.
-fn seconds(value: &Expr) -> Option<String> {
+fn duration_seconds(value: &Expr) -> Option<String> {
     let Expr::Call(call) = value else { return None };
     let Expr::Path(maker) = &*call.func else { return None };
     let maker = &maker.path.segments.last()?.ident;
-    let (_, second) = MAKERS.into_iter().find(|(name, _)| maker == name)?;
+    let (_, second) = DURATION_CONSTRUCTORS.into_iter().find(|(name, _)| maker == name)?;
     let Some(Expr::Lit(ExprLit { lit: Lit::Int(number), .. })) = call.args.first() else {
         return None;
     };
@@ -227,9 +244,9 @@ fn seconds(value: &Expr) -> Option<String> {
 }
 
 /// Collects the identifiers that expressions use.
-struct Used(BTreeSet<String>);
+struct UsedNames(BTreeSet<String>);
 
-impl<'a> Visit<'a> for Used {
+impl<'a> Visit<'a> for UsedNames {
     fn visit_expr_path(&mut self, path: &'a syn::ExprPath) {
         if let Some(last) = path.path.segments.last() {
             self.0.insert(last.ident.to_string());
@@ -244,7 +261,7 @@ fn in_one_line(text: &str) -> String {
 }
 
 /// The doc comment of an item, joined to one line of a Markdown table.
-fn reason(attributes: &[Attribute]) -> String {
+fn doc_comment_line(attributes: &[Attribute]) -> String {
     let line = |attribute: &Attribute| {
         let Meta::NameValue(meta) = &attribute.meta else { return None };
         let Expr::Lit(ExprLit { lit: Lit::Str(text), .. }) = &meta.value else { return None };
@@ -260,13 +277,13 @@ fn reason(attributes: &[Attribute]) -> String {
         .replace("`]", "`")
 }
 
-fn short(source: &Source) -> String {
+fn path_in_crate(source: &Source) -> String {
     let path = source.path.display().to_string();
     path.split_once("/src/").map_or(path.clone(), |(_, file)| file.to_owned())
 }
 
-fn page(found: &Found) -> String {
-    let mut page = HEAD.to_owned();
+fn page_text(found: &RowsByFileAndName) -> String {
+    let mut page = PAGE_HEAD.to_owned();
     let mut before = "";
     for ((file, name), distance) in found {
         if file != before {
@@ -276,7 +293,7 @@ fn page(found: &Found) -> String {
             );
             before = file;
         }
-        let Distance { value, unit, reason, users } = distance;
+        let PageRow { value, unit, reason, users } = distance;
         let users = users.join(", ");
         let _ = writeln!(page, "| `{name}` | {value} | {unit} | {reason} | {users} |");
     }

@@ -12,10 +12,11 @@ const MAX_REEXPORTS: usize = 6;
 
 /// Every cycle: a set of files that import each other, directly or not. Each cycle is returned as
 /// the list of its imports, `file → file`.
-pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
+pub fn import_cycles(tree: &Tree) -> Vec<Vec<String>> {
     let imports: Vec<BTreeSet<usize>> =
-        (0..tree.sources.len()).map(|at| of_file(tree, at)).collect();
-    let reach: Vec<BTreeSet<usize>> = (0..imports.len()).map(|at| reached(&imports, at)).collect();
+        (0..tree.sources.len()).map(|at| files_imported_by(tree, at)).collect();
+    let reach: Vec<BTreeSet<usize>> =
+        (0..imports.len()).map(|at| reachable_files(&imports, at)).collect();
     let mut seen: BTreeSet<usize> = BTreeSet::new();
     let mut found = Vec::new();
     for (at, from_here) in reach.iter().enumerate() {
@@ -25,12 +26,12 @@ pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
         let cycle: Vec<usize> =
             from_here.iter().copied().filter(|other| reach[*other].contains(&at)).collect();
         seen.extend(&cycle);
-        found.push(edges(tree, &imports, &cycle));
+        found.push(imports_within(tree, &imports, &cycle));
     }
     found
 }
 
-fn edges(tree: &Tree, imports: &[BTreeSet<usize>], cycle: &[usize]) -> Vec<String> {
+fn imports_within(tree: &Tree, imports: &[BTreeSet<usize>], cycle: &[usize]) -> Vec<String> {
     let name = |file: usize| tree.sources[file].path.display().to_string();
     let of = |from: usize| {
         cycle.iter().filter(move |to| imports[from].contains(to)).map(move |to| (from, *to))
@@ -42,7 +43,7 @@ fn edges(tree: &Tree, imports: &[BTreeSet<usize>], cycle: &[usize]) -> Vec<Strin
         .collect()
 }
 
-fn reached(imports: &[BTreeSet<usize>], from: usize) -> BTreeSet<usize> {
+fn reachable_files(imports: &[BTreeSet<usize>], from: usize) -> BTreeSet<usize> {
     let mut reached = BTreeSet::new();
     let mut open: Vec<usize> = imports[from].iter().copied().collect();
     while let Some(file) = open.pop() {
@@ -53,12 +54,12 @@ fn reached(imports: &[BTreeSet<usize>], from: usize) -> BTreeSet<usize> {
     reached
 }
 
-fn of_file(tree: &Tree, at: usize) -> BTreeSet<usize> {
+fn files_imported_by(tree: &Tree, at: usize) -> BTreeSet<usize> {
     let file = |import| match import {
         Import::File(file) => Some(file),
         Import::Named(_) => None,
     };
-    of(tree, at).into_iter().filter_map(file).collect()
+    imports_of(tree, at).into_iter().filter_map(file).collect()
 }
 
 /// What a path of a file leads to.
@@ -71,24 +72,24 @@ pub enum Import {
 }
 
 /// What the file with index `at` imports.
-pub fn of(tree: &Tree, at: usize) -> BTreeSet<Import> {
+pub fn imports_of(tree: &Tree, at: usize) -> BTreeSet<Import> {
     let source = &tree.sources[at];
-    let mut paths = Paths { module: source.module.clone(), found: Vec::new() };
+    let mut paths = ItemPaths { module: source.module.clone(), found: Vec::new() };
     source.items.iter().for_each(|item| paths.visit_item(item));
     let imports = paths.found.iter().filter_map(|(module, path)| {
-        let file = resolve(tree, module, path, MAX_REEXPORTS).map(Import::File);
+        let file = defining_file(tree, module, path, MAX_REEXPORTS).map(Import::File);
         file.or_else(|| path.first().cloned().map(Import::Named))
     });
     imports.filter(|import| *import != Import::File(at)).collect()
 }
 
 /// Collects the item paths in a file, each with the module in which it stands.
-struct Paths {
+struct ItemPaths {
     module: Vec<String>,
     found: Vec<(Vec<String>, Vec<String>)>,
 }
 
-impl Visit<'_> for Paths {
+impl Visit<'_> for ItemPaths {
     /// Visits nothing: a path in `pub(in path)` is no import.
     fn visit_visibility(&mut self, _: &Visibility) {}
 
@@ -102,7 +103,7 @@ impl Visit<'_> for Paths {
     }
 
     fn visit_item_use(&mut self, item: &ItemUse) {
-        flatten(&item.tree, &mut Vec::new(), &mut |path, _| {
+        for_each_used_path(&item.tree, &mut Vec::new(), &mut |path, _| {
             self.found.push((self.module.clone(), path));
         });
     }
@@ -124,7 +125,7 @@ pub fn exported_names(tree: &Tree) -> BTreeSet<String> {
         if let Item::Use(item) = item
             && matches!(item.vis, Visibility::Public(_))
         {
-            flatten(&item.tree, &mut Vec::new(), &mut |_, name| {
+            for_each_used_path(&item.tree, &mut Vec::new(), &mut |_, name| {
                 names.insert(name);
             });
         }
@@ -133,11 +134,15 @@ pub fn exported_names(tree: &Tree) -> BTreeSet<String> {
 }
 
 /// Calls `give` for every path of a `use`, with the name that it brings into scope.
-fn flatten(tree: &UseTree, before: &mut Vec<String>, give: &mut impl FnMut(Vec<String>, String)) {
+fn for_each_used_path(
+    tree: &UseTree,
+    before: &mut Vec<String>,
+    give: &mut impl FnMut(Vec<String>, String),
+) {
     match tree {
         UseTree::Path(part) => {
             before.push(part.ident.to_string());
-            flatten(&part.tree, before, give);
+            for_each_used_path(&part.tree, before, give);
             before.pop();
         }
         UseTree::Name(name) => {
@@ -155,14 +160,21 @@ fn flatten(tree: &UseTree, before: &mut Vec<String>, give: &mut impl FnMut(Vec<S
             give(path, pair.rename.to_string());
         }
         UseTree::Glob(_) => give([before.clone(), vec!["*".to_owned()]].concat(), "*".to_owned()),
-        UseTree::Group(group) => group.items.iter().for_each(|tree| flatten(tree, before, give)),
+        UseTree::Group(group) => {
+            group.items.iter().for_each(|tree| for_each_used_path(tree, before, give));
+        }
     }
 }
 
 /// Index in `tree.sources` of the file that defines the item that `path`, used in `module`, names;
 /// `None` if it is in another crate. `passed_on` is the number of `pub use` items that may still be
 /// followed.
-fn resolve(tree: &Tree, module: &[String], path: &[String], passed_on: usize) -> Option<usize> {
+fn defining_file(
+    tree: &Tree,
+    module: &[String],
+    path: &[String],
+    passed_on: usize,
+) -> Option<usize> {
     let (first, rest) = path.split_first()?;
     let whole = match first.as_str() {
         "crate" => rest.to_vec(),
@@ -203,9 +215,9 @@ fn reexported_file(
         if matches!(item.vis, Visibility::Inherited) {
             continue;
         }
-        flatten(&item.tree, &mut Vec::new(), &mut |path, given| {
+        for_each_used_path(&item.tree, &mut Vec::new(), &mut |path, given| {
             if given == name {
-                behind = behind.or_else(|| resolve(tree, module, &path, left - 1));
+                behind = behind.or_else(|| defining_file(tree, module, &path, left - 1));
             }
         });
     }

@@ -6,7 +6,7 @@ use super::imports::{self, Import};
 use super::sources::Tree;
 
 /// Files of the parts of host-sim that plan; they know no simulation.
-const PLANNING: [&str; 22] = [
+const PLANNING_FILES: [&str; 22] = [
     "host-sim/src/area",
     "host-sim/src/area.rs",
     "host-sim/src/capacity.rs",
@@ -32,9 +32,9 @@ const PLANNING: [&str; 22] = [
 ];
 
 /// Which files must not import which crates and files.
-const RULES: &[(&[&str], &[&str])] = &[
+const FORBIDDEN_IMPORTS: &[(&[&str], &[&str])] = &[
     (
-        &PLANNING,
+        &PLANNING_FILES,
         &["sim_autopilot", "host-sim/src/swarm", "host-sim/src/flown", "host-sim/src/commands"],
     ),
     (&["host-sim/src/swarm"], &["host-sim/src/flown", "host-sim/src/commands"]),
@@ -100,15 +100,16 @@ const LAYERS: [Layers; 2] = [
 ];
 
 /// A line for each import that points up.
-pub fn upward(tree: &Tree) -> Vec<String> {
+pub fn upward_imports(tree: &Tree) -> Vec<String> {
     let mut found = Vec::new();
     for (at, source) in tree.sources.iter().enumerate() {
         let above = |to: &Path| {
-            let ruled =
-                RULES.iter().any(|(below, above)| holds(below, &source.path) && holds(above, to));
+            let ruled = FORBIDDEN_IMPORTS.iter().any(|(below, above)| {
+                contains_file(below, &source.path) && contains_file(above, to)
+            });
             ruled || LAYERS.iter().any(|layers| is_above(layers, &source.path, to))
         };
-        for import in imports::of(tree, at) {
+        for import in imports::imports_of(tree, at) {
             let to = match import {
                 Import::File(file) => tree.sources[file].path.clone(),
                 Import::Named(name) => name.into(),
@@ -126,23 +127,24 @@ pub fn upward(tree: &Tree) -> Vec<String> {
 }
 
 /// Whether one of the `places` is the file, or a folder above it.
-fn holds(places: &[&str], file: &Path) -> bool {
+fn contains_file(places: &[&str], file: &Path) -> bool {
     places.iter().any(|place| file.starts_with(place))
 }
 
 /// Whether both files are in layers of the crate, and `to` in the higher one.
 fn is_above(layers: &Layers, from: &Path, to: &Path) -> bool {
-    matches!((height(layers, from), height(layers, to)), (Some(from), Some(to)) if to > from)
+    let indices = (layer_index(layers, from), layer_index(layers, to));
+    matches!(indices, (Some(from), Some(to)) if to > from)
 }
 
 /// Whether a file is in the crate and in none of its layers. The crate's root is in none.
 fn is_in_no_layer(layers: &Layers, file: &Path) -> bool {
     let root = Path::new(layers.0).join("lib.rs");
-    file.starts_with(layers.0) && file != root && height(layers, file).is_none()
+    file.starts_with(layers.0) && file != root && layer_index(layers, file).is_none()
 }
 
 /// Place of a file's layer in the order; `None` for a file in no layer of this crate.
-fn height((folder, order): &Layers, file: &Path) -> Option<usize> {
+fn layer_index((folder, order): &Layers, file: &Path) -> Option<usize> {
     let module = file.strip_prefix(folder).ok()?.iter().next()?;
     order.iter().position(|layer| Path::new(module).with_extension("") == Path::new(layer))
 }

@@ -10,24 +10,24 @@ use anyhow::{Context, Result, anyhow};
 use proc_macro2::{Delimiter, LineColumn, TokenStream, TokenTree};
 
 /// Most lines of a file.
-const LINES: usize = 500;
+const MAX_FILE_LINES: usize = 500;
 /// Most characters of a line, as in `rustfmt.toml`.
-const WIDTH: usize = 100;
+const MAX_LINE_CHARS: usize = 100;
 /// Least characters of a command in a document that may make its line too long.
-const COMMAND: usize = 60;
+const MIN_LONG_COMMAND_CHARS: usize = 60;
 /// Most bytes of the map of the code, `ARCHITECTURE.md`.
-const MAP_BYTES: usize = 18_000;
+const MAX_ARCHITECTURE_BYTES: usize = 18_000;
 /// A part of this program, not a file of tests.
-const HOST_TESTS: &str = "host_tests.rs";
+const HOST_TESTS_FILE: &str = "host_tests.rs";
 /// Folders that are not searched: they hold no sources of ours.
-const OTHERS: [&str; 2] = ["target", ".git"];
+const SKIPPED_FOLDERS: [&str; 2] = ["target", ".git"];
 
 /// Exceptions from either limit: file and reason.
 const EXCEPTIONS: &[(&str, &str)] = &[];
 
 /// Every file and line beyond the limits in the Rust files of the repository, as a line to print;
 /// with the reason if the file is listed as an exception.
-pub fn beyond() -> Result<Vec<(String, Option<&'static str>)>> {
+pub fn faults_of_files() -> Result<Vec<(String, Option<&'static str>)>> {
     let mut files = Vec::new();
     find_sources(Path::new(""), &mut files)?;
     files.sort();
@@ -37,18 +37,24 @@ pub fn beyond() -> Result<Vec<(String, Option<&'static str>)>> {
         let name = file.display().to_string();
         let exception = EXCEPTIONS.iter().find(|(of, _)| *of == name);
         let misplaced = misplaced_module(&file, &text).map(str::to_owned);
-        for what in beyond_in(&text).with_context(|| name.clone())?.into_iter().chain(misplaced) {
+        for what in
+            faults_in_source(&text).with_context(|| name.clone())?.into_iter().chain(misplaced)
+        {
             found.push((format!("{name}{what}"), exception.map(|(_, reason)| *reason)));
         }
     }
-    for page in find_pages()? {
+    for page in find_documents()? {
         let text = fs::read_to_string(&page).with_context(|| page.display().to_string())?;
-        found
-            .extend(beyond_in_prose(&text).map(|what| (format!("{}{what}", page.display()), None)));
+        found.extend(
+            long_prose_lines(&text).map(|what| (format!("{}{what}", page.display()), None)),
+        );
     }
     let map_bytes = fs::read("ARCHITECTURE.md").context("ARCHITECTURE.md")?.len();
-    if map_bytes > MAP_BYTES {
-        found.push((format!("ARCHITECTURE.md has {map_bytes} bytes, more than {MAP_BYTES}"), None));
+    if map_bytes > MAX_ARCHITECTURE_BYTES {
+        found.push((
+            format!("ARCHITECTURE.md has {map_bytes} bytes, more than {MAX_ARCHITECTURE_BYTES}"),
+            None,
+        ));
     }
     Ok(found)
 }
@@ -60,7 +66,7 @@ fn find_sources(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
         let entry = entry?;
         let path = folder.join(entry.file_name());
         if entry.file_type()?.is_dir() {
-            if !OTHERS.iter().any(|other| entry.file_name() == *other) {
+            if !SKIPPED_FOLDERS.iter().any(|other| entry.file_name() == *other) {
                 find_sources(&path, files)?;
             }
         } else if path.extension().is_some_and(|extension| extension == "rs") {
@@ -78,7 +84,8 @@ fn misplaced_module(file: &Path, text: &str) -> Option<&'static str> {
         None
     } else if name == "mod.rs" {
         Some(" is to be named after its folder, beside it")
-    } else if name.ends_with("_test.rs") || (name.ends_with("_tests.rs") && name != HOST_TESTS) {
+    } else if name.ends_with("_test.rs") || (name.ends_with("_tests.rs") && name != HOST_TESTS_FILE)
+    {
         Some(" is to be the tests.rs of a module")
     } else if text.lines().any(|line| !line.starts_with(' ') && line.ends_with("mod tests {")) {
         Some(" has its unit tests inline: they stand in tests.rs")
@@ -88,7 +95,7 @@ fn misplaced_module(file: &Path, text: &str) -> Option<&'static str> {
 }
 
 /// The documents: the Markdown files of the repository, of its crates and of `docs`.
-fn find_pages() -> Result<Vec<PathBuf>> {
+fn find_documents() -> Result<Vec<PathBuf>> {
     let mut pages = Vec::new();
     for folder in fs::read_dir(".")? {
         let folder = folder?.path();
@@ -106,30 +113,35 @@ fn find_pages() -> Result<Vec<PathBuf>> {
 }
 
 /// Lines of prose in a document that are too long, each as a line to print without the file's name.
-/// Tables, blocks of code, addresses and commands of [`COMMAND`] characters cannot be broken.
-fn beyond_in_prose(text: &str) -> impl Iterator<Item = String> + '_ {
+/// Tables, blocks of code, addresses and commands of [`MIN_LONG_COMMAND_CHARS`] characters cannot
+/// be broken.
+fn long_prose_lines(text: &str) -> impl Iterator<Item = String> + '_ {
     let mut in_code = false;
     text.lines().enumerate().filter_map(move |(index, line)| {
         in_code ^= line.trim_start().starts_with("```");
         let is_whole = |line: &str| {
             line.starts_with('|')
                 || line.contains("://")
-                || line.split('`').skip(1).step_by(2).any(|code| code.chars().count() >= COMMAND)
+                || line
+                    .split('`')
+                    .skip(1)
+                    .step_by(2)
+                    .any(|code| code.chars().count() >= MIN_LONG_COMMAND_CHARS)
         };
         let length = line.chars().count();
-        let long = !in_code && length > WIDTH && !is_whole(line);
-        long.then(|| format!(":{} has {length} characters, more than {WIDTH}", index + 1))
+        let long = !in_code && length > MAX_LINE_CHARS && !is_whole(line);
+        long.then(|| format!(":{} has {length} characters, more than {MAX_LINE_CHARS}", index + 1))
     })
 }
 
 /// The faults of one file, each as a line to print without the file's name.
-fn beyond_in(text: &str) -> Result<Vec<String>> {
+fn faults_in_source(text: &str) -> Result<Vec<String>> {
     let mut found = Vec::new();
     let count = text.lines().count();
-    if count > LINES {
-        found.push(format!(" has {count} lines, more than {LINES}"));
+    if count > MAX_FILE_LINES {
+        found.push(format!(" has {count} lines, more than {MAX_FILE_LINES}"));
     }
-    let is_long = |line: &str| line.chars().count() > WIDTH;
+    let is_long = |line: &str| line.chars().count() > MAX_LINE_CHARS;
     if !text.lines().any(is_long) {
         return Ok(found);
     }
@@ -143,7 +155,10 @@ fn beyond_in(text: &str) -> Result<Vec<String>> {
             |comment: &str| comment.trim_start_matches(['/', '!', ' ']).starts_with(['|', '`']);
         if is_long(line) && !comment.map_or(may_be_long[index], is_whole) {
             let length = line.chars().count();
-            found.push(format!(":{} has {length} characters, more than {WIDTH}", index + 1));
+            found.push(format!(
+                ":{} has {length} characters, more than {MAX_LINE_CHARS}",
+                index + 1
+            ));
         }
     }
     Ok(found)
@@ -156,7 +171,7 @@ fn mark_unbreakable(tokens: TokenStream, lines: &mut [bool]) {
     let mut may_skip = false;
     for token in tokens {
         let (start, end) = (token.span().start(), token.span().end());
-        if is_skipped || is_string_beyond(&token, start, end) {
+        if is_skipped || is_unbreakable_string(&token, start, end) {
             lines[start.line - 1..end.line].fill(true);
         }
         match token {
@@ -179,10 +194,12 @@ fn mark_unbreakable(tokens: TokenStream, lines: &mut [bool]) {
     }
 }
 
-/// Whether this is a string of several lines, or one that crosses column [`WIDTH`].
-fn is_string_beyond(token: &TokenTree, start: LineColumn, end: LineColumn) -> bool {
+/// Whether this is a string of several lines, or one that crosses column [`MAX_LINE_CHARS`].
+fn is_unbreakable_string(token: &TokenTree, start: LineColumn, end: LineColumn) -> bool {
     let is_string = matches!(token, TokenTree::Literal(text) if text.to_string().contains('"'));
-    is_string && (end.line > start.line || (start.column < WIDTH && end.column >= WIDTH))
+    is_string
+        && (end.line > start.line
+            || (start.column < MAX_LINE_CHARS && end.column >= MAX_LINE_CHARS))
 }
 
 #[cfg(test)]

@@ -6,13 +6,13 @@ use syn::{FnArg, ImplItemFn, ItemFn, ItemStruct, Signature, TraitItemFn, Type};
 use super::sources::Tree;
 
 /// Most fields of a struct; the exceptions are settings and telemetry records.
-const FIELDS: usize = 20;
+const MAX_FIELDS: usize = 20;
 /// Most fields of `Companion`.
-const COMPANION_FIELDS: usize = 12;
+const MAX_COMPANION_FIELDS: usize = 12;
 /// Most lines of a function's body.
-const LINES: usize = 60;
+const MAX_BODY_LINES: usize = 60;
 /// Most arguments of a function, without `self`.
-const ARGUMENTS: usize = 6;
+const MAX_ARGUMENTS: usize = 6;
 
 const SETTINGS: &str = "settings: a field for each parameter that acts";
 const DRAWS: &str = "what is drawn follows from the order of the draws, which one body shows";
@@ -136,21 +136,21 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
         "one pass over the pictures, each of which changes what the next adds",
     ),
     ("host-sim/src/coverage/export.rs", "flight_items", "the items of a mission in their order"),
-    ("tests/src/bin/deconfliction/cases.rs", "all", "a table of cases, a few lines each"),
+    ("tests/src/bin/deconfliction/cases.rs", "all_meetings", "a table of cases, a few lines each"),
     (
         "tests/src/meeting/autopilot.rs",
         "Autopilot",
         "the whole state of a vehicle and its autopilot, flat",
     ),
-    ("tests/src/meeting/scene/happenings.rs", "happenings", DRAWS),
-    ("tests/src/meeting/scene/ways.rs", "way", DRAWS),
-    ("tests/src/swarms.rs", "drawn", DRAWS),
+    ("tests/src/meeting/scene/happenings.rs", "draw_events", DRAWS),
+    ("tests/src/meeting/scene/ways.rs", "draw_path", DRAWS),
+    ("tests/src/swarms.rs", "draw", DRAWS),
 ];
 
 /// Every struct and function beyond the limits, as a line to print; with the reason if it is listed
 /// as an exception.
-pub fn beyond(tree: &Tree) -> Vec<(String, Option<&'static str>)> {
-    let mut shape = Shape { file: String::new(), found: Vec::new() };
+pub fn beyond_size_limits(tree: &Tree) -> Vec<(String, Option<&'static str>)> {
+    let mut shape = ShapeVisitor { file: String::new(), found: Vec::new() };
     for source in &tree.sources {
         shape.file = source.path.display().to_string();
         source.items.iter().for_each(|item| shape.visit_item(item));
@@ -167,13 +167,13 @@ pub fn unused_exceptions(found: &[String]) -> Vec<String> {
     unused.map(|(file, name, _)| format!("{file}: {name} needs no exception")).collect()
 }
 
-struct Shape {
+struct ShapeVisitor {
     file: String,
     found: Vec<(String, Option<&'static str>)>,
 }
 
-impl Shape {
-    fn judge(&mut self, name: &str, count: usize, most: usize, of: &str) {
+impl ShapeVisitor {
+    fn note_if_beyond(&mut self, name: &str, count: usize, most: usize, of: &str) {
         if count > most {
             let exception = EXCEPTIONS
                 .iter()
@@ -186,18 +186,18 @@ impl Shape {
         }
     }
 
-    fn function(&mut self, signature: &Signature, lines: usize) {
+    fn judge_function(&mut self, signature: &Signature, lines: usize) {
         let name = signature.ident.to_string();
         let arguments =
             signature.inputs.iter().filter(|input| matches!(input, FnArg::Typed(_))).count();
-        self.judge(&name, lines, LINES, "lines");
-        self.judge(&name, arguments, ARGUMENTS, "arguments");
-        let bools = signature.inputs.iter().filter(|input| is_bool(input)).count();
-        self.judge(&name, bools, 0, "`bool` arguments");
+        self.note_if_beyond(&name, lines, MAX_BODY_LINES, "lines");
+        self.note_if_beyond(&name, arguments, MAX_ARGUMENTS, "arguments");
+        let bools = signature.inputs.iter().filter(|input| has_bool_type(input)).count();
+        self.note_if_beyond(&name, bools, 0, "`bool` arguments");
     }
 }
 
-impl Visit<'_> for Shape {
+impl Visit<'_> for ShapeVisitor {
     fn visit_item_mod(&mut self, item: &syn::ItemMod) {
         if item.ident != "tests" {
             visit::visit_item_mod(self, item);
@@ -206,28 +206,28 @@ impl Visit<'_> for Shape {
 
     fn visit_item_struct(&mut self, item: &ItemStruct) {
         let name = item.ident.to_string();
-        let most = if name == "Companion" { COMPANION_FIELDS } else { FIELDS };
-        self.judge(&name, item.fields.len(), most, "fields");
+        let most = if name == "Companion" { MAX_COMPANION_FIELDS } else { MAX_FIELDS };
+        self.note_if_beyond(&name, item.fields.len(), most, "fields");
     }
 
     fn visit_item_fn(&mut self, item: &ItemFn) {
-        self.function(&item.sig, lines(&item.block));
+        self.judge_function(&item.sig, body_lines(&item.block));
         visit::visit_item_fn(self, item);
     }
 
     fn visit_trait_item_fn(&mut self, item: &TraitItemFn) {
-        self.function(&item.sig, item.default.as_ref().map_or(0, lines));
+        self.judge_function(&item.sig, item.default.as_ref().map_or(0, body_lines));
         visit::visit_trait_item_fn(self, item);
     }
 
     fn visit_impl_item_fn(&mut self, item: &ImplItemFn) {
-        self.function(&item.sig, lines(&item.block));
+        self.judge_function(&item.sig, body_lines(&item.block));
         visit::visit_impl_item_fn(self, item);
     }
 }
 
 /// Whether an argument is a `bool`, or a tuple with one.
-fn is_bool(input: &FnArg) -> bool {
+fn has_bool_type(input: &FnArg) -> bool {
     let plain = |ty: &Type| matches!(ty, Type::Path(path) if path.path.is_ident("bool"));
     let FnArg::Typed(input) = input else { return false };
     match &*input.ty {
@@ -237,7 +237,7 @@ fn is_bool(input: &FnArg) -> bool {
 }
 
 /// Number of lines between a function's braces.
-fn lines(block: &syn::Block) -> usize {
+fn body_lines(block: &syn::Block) -> usize {
     let braces = block.brace_token.span;
     (braces.close().start().line - braces.open().start().line).saturating_sub(1)
 }

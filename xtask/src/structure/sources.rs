@@ -27,7 +27,7 @@ pub struct Tree {
 
 impl Tree {
     /// The trees of a crate: its library, its program, and the programs in `src/bin`.
-    pub fn of_crate(folder: &Path) -> Result<Vec<Self>> {
+    pub fn trees_of_crate(folder: &Path) -> Result<Vec<Self>> {
         let source = folder.join("src");
         let mut roots = vec![source.join("lib.rs"), source.join("main.rs")];
         if let Ok(programs) = fs::read_dir(source.join("bin")) {
@@ -37,22 +37,22 @@ impl Tree {
             }
         }
         roots.sort();
-        roots.iter().filter(|root| root.exists()).map(|root| Self::of_root(root)).collect()
+        roots.iter().filter(|root| root.exists()).map(|root| Self::from_root(root)).collect()
     }
 
-    fn of_root(root: &Path) -> Result<Self> {
+    fn from_root(root: &Path) -> Result<Self> {
         let mut tree = Self { sources: Vec::new(), modules: BTreeMap::new() };
         let folder = root.parent().context("a root lies in a folder")?;
-        tree.read(root, folder, &[])?;
+        tree.read_file(root, folder, &[])?;
         Ok(tree)
     }
 
     /// Parses the file `path` and, recursively, the files of its modules, which lie in `folder`.
-    fn read(&mut self, path: &Path, folder: &Path, module: &[String]) -> Result<()> {
+    fn read_file(&mut self, path: &Path, folder: &Path, module: &[String]) -> Result<()> {
         let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let file = syn::parse_file(&text).with_context(|| path.display().to_string())?;
         let items: Vec<Item> =
-            file.items.into_iter().filter(|item| !is_test(attributes(item))).collect();
+            file.items.into_iter().filter(|item| !is_test_only(attributes(item))).collect();
         let at = self.sources.len();
         self.modules.insert(module.to_vec(), at);
         self.sources.push(Source {
@@ -86,7 +86,7 @@ impl Tree {
             let found = named.or_else(|| places.into_iter().find(|place| place.exists()));
             let found =
                 found.with_context(|| format!("{}: no file of mod {name}", path.display()))?;
-            self.read(&found, &folder.join(&name), &inner)?;
+            self.read_file(&found, &folder.join(&name), &inner)?;
         }
         Ok(())
     }
@@ -103,7 +103,7 @@ fn attributes(item: &Item) -> &[Attribute] {
 }
 
 /// Whether an item with these attributes is compiled for tests only (`#[cfg(test)]`).
-fn is_test(attributes: &[Attribute]) -> bool {
+fn is_test_only(attributes: &[Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         attribute.path().is_ident("cfg")
             && attribute.parse_args::<syn::Meta>().is_ok_and(|meta| meta.path().is_ident("test"))

@@ -14,34 +14,34 @@ use super::sources::Tree;
 /// The file of the enum `State`.
 const STATE_FILE: &str = "companion/src/state.rs";
 /// Files and folders that may name several states at once: those of `State`, the table, and tests.
-const MAY_NAME_SETS: [&str; 4] =
+const MAY_NAME_STATE_SETS: [&str; 4] =
     [STATE_FILE, "companion/src/state", "companion/src/mission/table.rs", "tests/src"];
 
 /// Names of the mission's states.
 pub fn state_names() -> Result<BTreeSet<String>> {
-    let trees = Tree::of_crate(Path::new("companion"))?;
+    let trees = Tree::trees_of_crate(Path::new("companion"))?;
     let items =
         trees.iter().flat_map(|tree| &tree.sources).filter(|s| s.path.ends_with("state.rs"));
     let states = items.flat_map(|source| &source.items).find_map(|item| match item {
         Item::Enum(item) if item.ident == "State" => Some(item),
         _ => None,
     });
-    Ok(names_of(states.context(STATE_FILE)?))
+    Ok(variant_names(states.context(STATE_FILE)?))
 }
 
-fn names_of(item: &ItemEnum) -> BTreeSet<String> {
+fn variant_names(item: &ItemEnum) -> BTreeSet<String> {
     item.variants.iter().map(|variant| variant.ident.to_string()).collect()
 }
 
 /// A line for each pattern that names two or more states.
-pub fn sets(tree: &Tree, names: &BTreeSet<String>) -> Vec<String> {
+pub fn written_out_state_sets(tree: &Tree, names: &BTreeSet<String>) -> Vec<String> {
     let mut found = Vec::new();
     for source in &tree.sources {
-        if MAY_NAME_SETS.iter().any(|place| source.path.starts_with(place)) {
+        if MAY_NAME_STATE_SETS.iter().any(|place| source.path.starts_with(place)) {
             continue;
         }
         let file = source.path.display();
-        let sets = sets_in(&source.items, names).into_iter();
+        let sets = lines_of_state_sets(&source.items, names).into_iter();
         found.extend(sets.map(|line| {
             format!("{file}:{line} names several states: a set of them is a predicate of `State`")
         }));
@@ -50,20 +50,20 @@ pub fn sets(tree: &Tree, names: &BTreeSet<String>) -> Vec<String> {
 }
 
 /// Line numbers of the patterns in `items` that name two or more states.
-fn sets_in(items: &[Item], names: &BTreeSet<String>) -> Vec<usize> {
-    let mut sets = Sets { names, lines: Vec::new() };
+fn lines_of_state_sets(items: &[Item], names: &BTreeSet<String>) -> Vec<usize> {
+    let mut sets = StateSetVisitor { names, lines: Vec::new() };
     items.iter().for_each(|item| sets.visit_item(item));
     sets.lines
 }
 
-struct Sets<'a> {
+struct StateSetVisitor<'a> {
     names: &'a BTreeSet<String>,
     lines: Vec<usize>,
 }
 
-impl Sets<'_> {
+impl StateSetVisitor<'_> {
     /// The state that a pattern is: `State::Name`, or the bare name after `use State::*`.
-    fn state<'p>(&self, pattern: &'p Pat) -> Option<&'p Ident> {
+    fn state_name<'p>(&self, pattern: &'p Pat) -> Option<&'p Ident> {
         let (name, kind) = match pattern {
             Pat::Ident(bare) => (&bare.ident, None),
             Pat::Path(path) => {
@@ -78,9 +78,9 @@ impl Sets<'_> {
     }
 }
 
-impl Visit<'_> for Sets<'_> {
+impl Visit<'_> for StateSetVisitor<'_> {
     fn visit_pat_or(&mut self, pattern: &PatOr) {
-        let mut states = pattern.cases.iter().filter_map(|case| self.state(case));
+        let mut states = pattern.cases.iter().filter_map(|case| self.state_name(case));
         if let (Some(first), Some(_)) = (states.next(), states.next()) {
             self.lines.push(first.span().start().line);
         }

@@ -17,7 +17,7 @@ use super::imports;
 use super::sources::Tree;
 
 /// Methods of options and containers that change them.
-const CHANGING: [&str; 18] = [
+const CHANGING_METHODS: [&str; 18] = [
     "take",
     "replace",
     "insert",
@@ -40,30 +40,33 @@ const CHANGING: [&str; 18] = [
 
 /// Names of the fields that other crates may write.
 pub fn public_fields(tree: &Tree) -> BTreeSet<String> {
-    let fields = fields(tree);
-    let public =
-        |(name, owners): (String, Vec<Reach>)| owners.contains(&Reach::All).then_some(name);
+    let fields = reach_of_fields(tree);
+    let public = |(name, owners): (String, Vec<FieldReach>)| {
+        owners.contains(&FieldReach::All).then_some(name)
+    };
     fields.into_iter().filter_map(public).collect()
 }
 
 /// A line for each foreign write. Fields named in `records` are not looked at.
-pub fn foreign(tree: &Tree, records: &BTreeSet<String>) -> Vec<String> {
-    let fields = fields(tree);
+pub fn foreign_writes(tree: &Tree, records: &BTreeSet<String>) -> Vec<String> {
+    let fields = reach_of_fields(tree);
     let mut found = Vec::new();
     for source in &tree.sources {
-        let mut writes = Writes(Vec::new());
+        let mut writes = WriteCollector(Vec::new());
         source.items.iter().for_each(|item| writes.visit_item(item));
         for (name, line) in writes.0.into_iter().filter(|(name, _)| name.len() > 1) {
             let Some(owners) = fields.get(&name).filter(|_| !records.contains(&name)) else {
                 continue;
             };
-            let may_write = |owner: &Reach| match owner {
-                Reach::All => true,
-                Reach::Module(module) | Reach::Crate(module) => source.module.starts_with(module),
+            let may_write = |owner: &FieldReach| match owner {
+                FieldReach::All => true,
+                FieldReach::Module(module) | FieldReach::Crate(module) => {
+                    source.module.starts_with(module)
+                }
             };
             let owner = owners.iter().find_map(|owner| match owner {
-                Reach::Crate(module) => Some(module.join("::")),
-                Reach::All | Reach::Module(_) => None,
+                FieldReach::Crate(module) => Some(module.join("::")),
+                FieldReach::All | FieldReach::Module(_) => None,
             });
             if let Some(owner) = owner.filter(|_| !owners.iter().any(may_write)) {
                 found.push(format!(
@@ -78,7 +81,7 @@ pub fn foreign(tree: &Tree, records: &BTreeSet<String>) -> Vec<String> {
 
 /// Who may write a field.
 #[derive(PartialEq)]
-enum Reach {
+enum FieldReach {
     /// Other crates too.
     All,
     /// By the compiler the whole crate, by our rule this module and what it contains.
@@ -87,11 +90,11 @@ enum Reach {
     Module(Vec<String>),
 }
 
-fn fields(tree: &Tree) -> BTreeMap<String, Vec<Reach>> {
+fn reach_of_fields(tree: &Tree) -> BTreeMap<String, Vec<FieldReach>> {
     let public = public_modules(tree);
     let exported = imports::exported_names(tree);
     let mut fields =
-        Fields { module: Vec::new(), is_public: false, exported, reach: BTreeMap::new() };
+        FieldCollector { module: Vec::new(), is_public: false, exported, reach: BTreeMap::new() };
     for source in &tree.sources {
         fields.module.clone_from(&source.module);
         fields.is_public = public.contains(&source.module);
@@ -115,30 +118,32 @@ fn public_modules(tree: &Tree) -> BTreeSet<Vec<String>> {
 }
 
 /// Collects the structs' fields of a file.
-struct Fields {
+struct FieldCollector {
     module: Vec<String>,
     is_public: bool,
     /// Names that `pub use` gives to other crates.
     exported: BTreeSet<String>,
-    reach: BTreeMap<String, Vec<Reach>>,
+    reach: BTreeMap<String, Vec<FieldReach>>,
 }
 
-impl Visit<'_> for Fields {
+impl Visit<'_> for FieldCollector {
     fn visit_item_struct(&mut self, item: &ItemStruct) {
         let is_public = self.is_public || self.exported.contains(&item.ident.to_string());
         for field in &item.fields {
             let Some(name) = &field.ident else { continue };
             let reach = match &field.vis {
-                Visibility::Public(_) if is_public => Reach::All,
-                Visibility::Public(_) => Reach::Crate(self.module.clone()),
+                Visibility::Public(_) if is_public => FieldReach::All,
+                Visibility::Public(_) => FieldReach::Crate(self.module.clone()),
                 Visibility::Restricted(within) if within.path.is_ident("crate") => {
-                    Reach::Crate(self.module.clone())
+                    FieldReach::Crate(self.module.clone())
                 }
-                Visibility::Restricted(within) if within.path.is_ident("super") => Reach::Module(
-                    self.module.split_last().map_or(Vec::new(), |(_, up)| up.to_vec()),
-                ),
+                Visibility::Restricted(within) if within.path.is_ident("super") => {
+                    FieldReach::Module(
+                        self.module.split_last().map_or(Vec::new(), |(_, up)| up.to_vec()),
+                    )
+                }
                 Visibility::Restricted(_) | Visibility::Inherited => {
-                    Reach::Module(self.module.clone())
+                    FieldReach::Module(self.module.clone())
                 }
             };
             self.reach.entry(name.to_string()).or_default().push(reach);
@@ -147,24 +152,24 @@ impl Visit<'_> for Fields {
 }
 
 /// Collects the fields that a file writes, each with its line.
-struct Writes(Vec<(String, usize)>);
+struct WriteCollector(Vec<(String, usize)>);
 
-impl Writes {
-    fn written(&mut self, place: &Expr) {
+impl WriteCollector {
+    fn note_written_field(&mut self, place: &Expr) {
         match place {
             Expr::Field(field) => {
                 if let Member::Named(name) = &field.member {
                     self.0.push((name.to_string(), name.span().start().line));
                 }
             }
-            Expr::Index(index) => self.written(&index.expr),
-            Expr::Paren(inner) => self.written(&inner.expr),
+            Expr::Index(index) => self.note_written_field(&index.expr),
+            Expr::Paren(inner) => self.note_written_field(&inner.expr),
             _ => {}
         }
     }
 }
 
-impl Visit<'_> for Writes {
+impl Visit<'_> for WriteCollector {
     fn visit_item_mod(&mut self, item: &ItemMod) {
         if item.ident != "tests" {
             visit::visit_item_mod(self, item);
@@ -172,7 +177,7 @@ impl Visit<'_> for Writes {
     }
 
     fn visit_expr_assign(&mut self, assignment: &syn::ExprAssign) {
-        self.written(&assignment.left);
+        self.note_written_field(&assignment.left);
         visit::visit_expr_assign(self, assignment);
     }
 
@@ -188,21 +193,21 @@ impl Visit<'_> for Writes {
                 | BinOp::BitXorAssign(_)
         );
         if assigns {
-            self.written(&binary.left);
+            self.note_written_field(&binary.left);
         }
         visit::visit_expr_binary(self, binary);
     }
 
     fn visit_expr_reference(&mut self, reference: &syn::ExprReference) {
         if reference.mutability.is_some() {
-            self.written(&reference.expr);
+            self.note_written_field(&reference.expr);
         }
         visit::visit_expr_reference(self, reference);
     }
 
     fn visit_expr_method_call(&mut self, call: &syn::ExprMethodCall) {
-        if CHANGING.contains(&call.method.to_string().as_str()) {
-            self.written(&call.receiver);
+        if CHANGING_METHODS.contains(&call.method.to_string().as_str()) {
+            self.note_written_field(&call.receiver);
         }
         visit::visit_expr_method_call(self, call);
     }

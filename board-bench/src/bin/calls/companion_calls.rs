@@ -3,7 +3,7 @@
 
 use board_bench::calls::{Meter, flight};
 use board_bench::cases;
-use companion::config::USUAL_GROUND_STATIONS;
+use companion::config::DEFAULT_GROUND_STATION_IDS;
 use companion::config::parameters::{self, Parameters};
 use companion::link::commands;
 use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
@@ -12,7 +12,7 @@ use companion::link::roster::{self, RosterReport};
 use companion::storage::mission_file::{
     self, MissionBlock, MissionGoal, MissionHeader, MissionVehicle, MissionView,
 };
-use companion::storage::store::{FlashFault, FlashRequest, MAX_READ, ReadFlash, Store};
+use companion::storage::store::{FlashFault, FlashRequest, MAX_READ_LEN, ReadFlash, Store};
 use companion::swarm::fleet::{Fleet, FleetTimeouts, OwnReport, StartStatus, VehicleReception};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
@@ -26,9 +26,9 @@ use planner_core::track::deconflict::Method;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-const COMPANION: usize = size_of::<BoardCompanion>();
+const COMPANION_BYTES: usize = size_of::<BoardCompanion>();
 /// Bytes that the shell passes to the companion at once.
-const CHUNK: usize = 256;
+const CHUNK_LEN: usize = 256;
 const FILE_TRANSFER: u32 = 110;
 const PARAM_REQUEST_LIST: u32 = 21;
 const PARAM_SET: u32 = 23;
@@ -42,8 +42,8 @@ const CRC32: u8 = 14;
 const BURST_READ: u8 = 15;
 const ACK: u8 = 128;
 /// Data bytes of an FTP packet.
-const FTP_DATA: usize = 239;
-const GROUND: (u8, u8) = (255, 190);
+const FTP_DATA_LEN: usize = 239;
+const GROUND_STATION_IDS: (u8, u8) = (255, 190);
 
 /// Makes all counted calls of companion on the ground, each part in a function that is not inlined:
 /// a companion takes 36 kB of the stack, and three in one stack frame overran the statics below the
@@ -67,7 +67,7 @@ fn measure_grounded_companion(meter: &mut impl Meter) {
         meter,
         now: Instant::ZERO + Duration::from_secs(11),
         sequence: 0,
-        packet: 0,
+        ftp_sequence: 0,
     }
     .run();
 }
@@ -80,7 +80,7 @@ fn measure_framing(meter: &mut impl Meter) {
     let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");
     let mut framer = Framer::new();
     for round in 0..200_u64 {
-        let mut chunk = [0; CHUNK];
+        let mut chunk = [0; CHUNK_LEN];
         chunk.iter_mut().for_each(|byte| *byte = rng.next_u32() as u8);
         if !round.is_multiple_of(4) {
             for start in chunk.chunks_exact_mut(10) {
@@ -92,7 +92,7 @@ fn measure_framing(meter: &mut impl Meter) {
         meter.call("frame::Framer::next, 256 hostile bytes", size_of::<Framer>(), || {
             while framer.next(now, &mut input).is_some() {}
         });
-        meter.call("Companion::handle_bytes, 256 hostile bytes", COMPANION, || {
+        meter.call("Companion::handle_bytes, 256 hostile bytes", COMPANION_BYTES, || {
             companion.handle_bytes(Link::Swarm, now, &chunk);
         });
     }
@@ -133,11 +133,11 @@ fn measure_mission_parsing(meter: &mut impl Meter) {
         schedule: cases::SCHEDULE,
         safety_distance_m: 1.5,
         geofence: None,
-        ground_stations: USUAL_GROUND_STATIONS,
+        ground_stations: DEFAULT_GROUND_STATION_IDS,
     };
     let vehicle = |id: u8| MissionVehicle {
         task: VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.0, goal: Some(0) },
-        start: Point::new(f32::from(id), 0.0, 1.0),
+        path_start: Point::new(f32::from(id), 0.0, 1.0),
         radius_m: 0.3,
         speed_max_mps: 5.0,
     };
@@ -189,24 +189,26 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
                 heard_at: speaks.then_some(now),
                 hears_us: speaks,
                 heard_by_others: speaks,
-                hears: u32::MAX >> (round / 10),
+                heard_bits: u32::MAX >> (round / 10),
             }
         };
         let promise_dm = Some(100 + round);
         let own = OwnReport {
             progress_dm: 10 * round,
-            commitment_dm: promise_dm,
+            new_commitment_dm: promise_dm,
             holds: true,
             ..OwnReport::default()
         };
         meter.call("fleet::Fleet::step, 32", bytes, || fleet.step(now, &own, hearing));
-        if meter.call("fleet::Fleet::needs_division", bytes, || fleet.needs_division()) {
+        if meter.call("fleet::Fleet::is_division_to_be_computed", bytes, || {
+            fleet.is_division_to_be_computed()
+        }) {
             meter.call("fleet::Fleet::set_hash_from_plan", bytes, || fleet.set_hash_from_plan(7));
         }
-        meter.call("fleet::Fleet::division_hash", bytes, || fleet.division_hash());
+        meter.call("fleet::Fleet::division_inputs_hash", bytes, || fleet.division_inputs_hash());
         for first in [0, roster::MAX_ENTRIES_PER_MESSAGE] {
             let mut reported =
-                meter.call("fleet::Fleet::roster_message", bytes, || fleet.roster_message(first));
+                meter.call("fleet::Fleet::roster_report", bytes, || fleet.roster_report(first));
             let mut payload = [0; roster::MAX_LEN];
             meter.call("roster::RosterReport::encode", 0, || reported.encode(&mut payload));
             let mut padded = [0; 255];
@@ -220,8 +222,8 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
                     (10 * round + 5, promise_dm, true);
             }
             let sender = 1 + usize::from(round) % (VEHICLES / 2);
-            meter.call("fleet::Fleet::handle_roster, 32", bytes, || {
-                fleet.handle_roster(sender, &reported, StartStatus::Started)
+            meter.call("fleet::Fleet::handle_roster_report, 32", bytes, || {
+                fleet.handle_roster_report(sender, &reported, StartStatus::Started)
             });
         }
     }
@@ -263,7 +265,7 @@ struct GroundedCompanion<'a, M> {
     meter: &'a mut M,
     now: Instant,
     sequence: u8,
-    packet: u16,
+    ftp_sequence: u16,
 }
 
 impl<M: Meter> GroundedCompanion<'_, M> {
@@ -274,8 +276,8 @@ impl<M: Meter> GroundedCompanion<'_, M> {
         let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
         let file = &memory::bank2()[..roadmap.byte_len()];
         self.request_ftp(CREATE, 0, b"roadmap.bin");
-        for (i, piece) in file.chunks(FTP_DATA).enumerate() {
-            self.request_ftp(WRITE, (i * FTP_DATA) as u32, piece);
+        for (i, piece) in file.chunks(FTP_DATA_LEN).enumerate() {
+            self.request_ftp(WRITE, (i * FTP_DATA_LEN) as u32, piece);
         }
         self.request_ftp(TERMINATE, 0, &[]);
         self.request_ftp(CRC32, 0, b"roadmap.bin");
@@ -310,19 +312,20 @@ impl<M: Meter> GroundedCompanion<'_, M> {
         let store = self
             .meter
             .call("store::Store::mount", size_of::<Store>(), || Store::mount(LAYOUT, flash));
-        let found = store.roadmap().is_some();
+        let found = store.map_range().is_some();
         let companion = &mut self.companion;
-        self.meter.call("Companion::attach_store", COMPANION, || companion.attach_store(store));
+        self.meter
+            .call("Companion::attach_store", COMPANION_BYTES, || companion.attach_store(store));
         self.drain_outputs();
         found
     }
 
     /// Sends an FTP request, and repeats it until it is acknowledged.
     fn request_ftp(&mut self, opcode: u8, offset: u32, data: &[u8]) {
-        self.packet = self.packet.wrapping_add(1);
+        self.ftp_sequence = self.ftp_sequence.wrapping_add(1);
         let mut payload = [0; 254];
         (payload[1], payload[2]) = (1, companion::COMPANION_COMPONENT);
-        payload[3..5].copy_from_slice(&self.packet.to_le_bytes());
+        payload[3..5].copy_from_slice(&self.ftp_sequence.to_le_bytes());
         (payload[6], payload[7]) = (opcode, data.len() as u8);
         payload[11..15].copy_from_slice(&offset.to_le_bytes());
         payload[15..15 + data.len()].copy_from_slice(data);
@@ -338,12 +341,16 @@ impl<M: Meter> GroundedCompanion<'_, M> {
     fn feed_frame(&mut self, id: u32, payload: &[u8]) -> bool {
         self.now = self.now + Duration::from_millis(20);
         self.sequence = self.sequence.wrapping_add(1);
-        let header = Header { system: GROUND.0, component: GROUND.1, sequence: self.sequence };
+        let header = Header {
+            system: GROUND_STATION_IDS.0,
+            component: GROUND_STATION_IDS.1,
+            sequence: self.sequence,
+        };
         let mut bytes = [0; MAX_FRAME_LEN];
         let extra = frame::extra_crc(id).expect("a message of the dialect");
         let len = frame::encode_raw(header, id, extra, payload, &mut bytes);
         let (now, companion) = (self.now, &mut self.companion);
-        self.meter.call("Companion::handle_bytes, a frame", COMPANION, || {
+        self.meter.call("Companion::handle_bytes, a frame", COMPANION_BYTES, || {
             companion.handle_bytes(Link::Autopilot, now, &bytes[..len]);
         });
         self.drain_outputs()
@@ -355,20 +362,21 @@ impl<M: Meter> GroundedCompanion<'_, M> {
         let Self { companion, flash, meter, now, .. } = self;
         let now = *now;
         let mut granted = false;
-        meter.call(flight::OTHER_STEP, COMPANION, || companion.handle_timeout(now));
+        meter.call(flight::OTHER_STEP_ROW, COMPANION_BYTES, || companion.handle_timeout(now));
         loop {
             let mut out = [0; MAX_FRAME_LEN];
             let mut len = 0;
             for link in [Link::Autopilot, Link::Swarm] {
-                len = meter.call("Companion::poll_transmit", COMPANION, || {
+                len = meter.call("Companion::poll_transmit", COMPANION_BYTES, || {
                     companion.poll_transmit(link, &mut out)
                 });
                 granted |= len > 16 && out[7..10] == [110, 0, 0] && out[16] == ACK;
             }
             let event: Option<Event> =
-                meter.call("Companion::poll_event", COMPANION, || companion.poll_event());
-            let mut bytes = [0; MAX_READ];
-            let request = meter.call("Companion::poll_flash", COMPANION, || companion.poll_flash());
+                meter.call("Companion::poll_event", COMPANION_BYTES, || companion.poll_event());
+            let mut bytes = [0; MAX_READ_LEN];
+            let request =
+                meter.call("Companion::poll_flash", COMPANION_BYTES, || companion.poll_flash());
             let idle = request.is_none() && event.is_none() && len == 0;
             let outcome = match request {
                 None if idle => return granted,
@@ -386,7 +394,7 @@ impl<M: Meter> GroundedCompanion<'_, M> {
                 }
             };
             let outcome = outcome.map(|len| &bytes[..len]);
-            meter.call("Companion::handle_flash", COMPANION, || {
+            meter.call("Companion::handle_flash", COMPANION_BYTES, || {
                 companion.handle_flash(now, outcome)
             });
         }

@@ -34,11 +34,11 @@ const MAX_ROWS: usize = 160;
 
 /// Counts instructions of calls, without those of reading the clock. A row holds a call's name, the
 /// bytes it is lent and its largest count.
-struct Instructions {
+struct InstructionMeter {
     rows: Vec<(&'static str, usize, u64), MAX_ROWS>,
 }
 
-impl Meter for Instructions {
+impl Meter for InstructionMeter {
     fn call<T>(&mut self, name: &'static str, bytes: usize, work: impl FnOnce() -> T) -> T {
         let idle = clock::instructions();
         let before = clock::instructions();
@@ -55,7 +55,7 @@ impl Meter for Instructions {
 #[cortex_m_rt::entry]
 fn main() -> ! {
     clock::start();
-    let mut meter = Instructions { rows: Vec::new() };
+    let mut meter = InstructionMeter { rows: Vec::new() };
     let [calls, flights] = planner_calls::measure_planner_calls(&mut meter);
     println!("coverage {calls:08x} {flights:08x}");
     companion_calls::measure_companion_calls(&mut meter);
@@ -65,14 +65,14 @@ fn main() -> ! {
     for (name, bytes, count) in &meter.rows {
         println!("call {count} {bytes} {name}");
     }
-    println!("stack {} {}", stack::used_bytes(), stack::size_bytes());
+    println!("stack {} {}", stack::max_used_bytes(), stack::size_bytes());
     semihosting::process::exit(0)
 }
 
 /// Counts the instructions of control steps in flight: of at least [`cases::STEP_CASES`] among
 /// neighbours on the plan, and of as many where most left it or fell silent.
 #[inline(never)]
-fn measure_flights(meter: &mut Instructions) {
+fn measure_flights(meter: &mut InstructionMeter) {
     let mut steps = [0; 2];
     for seed in 0.. {
         let plan = flight::random_plan(&mut Pcg32::seed_from_u64(seed));
@@ -91,7 +91,7 @@ fn measure_flights(meter: &mut Instructions) {
 
 /// Counts the instructions of control steps of coverage missions in flight.
 #[inline(never)]
-fn measure_area_flights(meter: &mut Instructions) {
+fn measure_area_flights(meter: &mut InstructionMeter) {
     let mut steps = 0;
     for seed in 0.. {
         let plan = flight::random_area_plan(&mut Pcg32::seed_from_u64(seed));
@@ -106,7 +106,7 @@ fn measure_area_flights(meter: &mut Instructions) {
 
 /// Counts the instructions of the safety filter alone.
 #[inline(never)]
-fn measure_safety_filter(meter: &mut Instructions) {
+fn measure_safety_filter(meter: &mut InstructionMeter) {
     for seed in 0..FILTER_FLIGHTS {
         let plan = flight::random_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");

@@ -11,12 +11,12 @@ use firmware::workspace::{PlannerWorkspace, WorkspaceOverlay};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
-use planner_core::detour::{self, DetourRequest, Goal, KeepOutZone, ZoneKind};
+use planner_core::detour::{self, DetourGoal, DetourRequest, KeepOutZone, ZoneKind};
 use planner_core::flight::{Flight, Path, Task, VehiclePlan};
 use planner_core::geo::frames::{self, Geodetic, Projection};
 use planner_core::map::segment;
 use planner_core::map::voxel::{Outside, VoxelGrid};
-use planner_core::plan::{self, Goals, SwarmPlan};
+use planner_core::plan::{self, AssignedGoals, SwarmPlan};
 use planner_core::roadmap::prm::{self, PrmConfig};
 use planner_core::roadmap::search::{self, RoadmapWithLengths, SearchWorkspace};
 use planner_core::roadmap::{self, HalfEdge, RoadmapHeader, RoadmapView};
@@ -45,7 +45,7 @@ const SMALL_ROADMAP_NODES: usize = 300;
 /// Memory of the bench beside the workspace overlay.
 struct BenchMemory {
     plan: Plan,
-    small: prm::NodeIndex<SMALL_ROADMAP_NODES, 1024>,
+    small_index: prm::NodeIndex<SMALL_ROADMAP_NODES, 1024>,
     nodes: [Point; SMALL_ROADMAP_NODES],
     edges: [prm::PrmEdge; 1024],
     kept: Vec<roadmap::Edge, 1024>,
@@ -56,7 +56,7 @@ struct BenchMemory {
 static WORKSPACE: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static BENCH_MEMORY: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMemory {
     plan: Plan::new(),
-    small: prm::NodeIndex::new(),
+    small_index: prm::NodeIndex::new(),
     nodes: [Point::new(0.0, 0.0, 0.0); SMALL_ROADMAP_NODES],
     edges: [prm::PrmEdge { a: 0, b: 0 }; 1024],
     kept: Vec::new(),
@@ -193,7 +193,7 @@ fn measure_plans(
     let bytes = size_of::<PlannerWorkspace>();
     let (vehicles, descents_m) = (cases::vehicle_tasks(view), cases::goal_descents(view));
     let request = cases::plan_request(&vehicles, &descents_m);
-    let mut goals = Goals::new();
+    let mut goals = AssignedGoals::new();
     let good = "the demo has a plan";
     meter
         .call("plan::compute_costs, 10 × 10", bytes, || plan::compute_costs(view, &request, ws))
@@ -214,7 +214,7 @@ fn measure_plans(
     let bytes = size_of::<SippWorkspace<ROADMAP_NODES, TIMED_SEGMENTS>>();
     for (index, flight) in plan.flights.iter().enumerate() {
         let Some(goal) = flight.task.goal() else { continue };
-        let (from, to) = (index as u16, view.header().starts + goal);
+        let (from, to) = (index as u16, view.header().start_count + goal);
         let route = RouteQuery {
             cfg: &cases::SCHEDULE,
             from,
@@ -224,7 +224,7 @@ fn measure_plans(
             handover_s: 0.0,
         };
         let passable = |_: u16, edge: &HalfEdge| view.has_clearance(edge, cases::CLEARANCE_M);
-        let others = plan.flights.iter().filter(|other| other.id != flight.id);
+        let others = plan.flights.iter().filter(|other| other.vehicle_id != flight.vehicle_id);
         let mut own = flight.clone();
         // That no route exists is a valid result too.
         let _ = meter.call("schedule::sipp::find_route, past 9", bytes, || {
@@ -261,22 +261,22 @@ fn measure_largest_swarm(
             path.set_times_at_speed(1.0, cfg.cruise_mps)
         });
         let id = 1 + plan.flights.len() as u8;
-        let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::MAX_TIMED_SEGMENT_M);
+        let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::DEFAULT_MAX_SEGMENT_M);
         let flight = Flight {
-            id,
+            vehicle_id: id,
             task: Task::Goto(0),
             path,
             climb_m,
             descent_m,
             depart_s: 0.0,
-            segment_m: piece_m,
+            max_segment_m: piece_m,
         };
         plan.flights.push(flight).expect("there is room");
     }
     let bytes = size_of::<ScheduleWorkspace>();
     let mut own = VehiclePlan::<WAYPOINTS, GATES>::default();
     for (index, flight) in plan.flights.iter().enumerate() {
-        let others = || plan.flights.iter().filter(|other| other.id != flight.id);
+        let others = || plan.flights.iter().filter(|other| other.vehicle_id != flight.vehicle_id);
         let _ = meter.call("schedule::earliest_departure, past 31", bytes, || {
             schedule::earliest_departure(cfg, flight, 0.0, others(), &mut ws.schedule)
         });
@@ -310,11 +310,11 @@ fn measure_detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut 
             })
             .collect();
         let request = DetourRequest {
-            aside: case % 2 == 0,
+            land_aside: case % 2 == 0,
             here,
             leg: [here, other],
             leg_clearance_m: 1.0,
-            goal: Goal::Node(0),
+            goal: DetourGoal::RoadmapGoal(0),
             descent_m: 0.5,
             required_clearance_m: cases::CLEARANCE_M,
             fence: None,
@@ -342,7 +342,7 @@ fn measure_paths(meter: &mut impl Meter) {
     for case in 0..MANY_CASES {
         let mut path: Path<WAYPOINTS> = Path::new();
         for waypoint in flight::random_path(&mut rng).waypoints() {
-            let (next, clearance_m) = (waypoint.position, waypoint.clearance_m);
+            let (next, clearance_m) = (waypoint.position, waypoint.leg_clearance_m);
             meter
                 .call("flight::Path::push", 0, || path.push(next, clearance_m))
                 .expect("there is room");
@@ -457,13 +457,13 @@ fn measure_host_calls(
     search: &mut Search,
     beside: &mut BenchMemory,
 ) {
-    let BenchMemory { small, nodes, edges, kept, file, lengths, .. } = beside;
-    let config = PrmConfig { nodes: SMALL_ROADMAP_NODES, ..cases::ROADMAP_CONFIG };
+    let BenchMemory { small_index, nodes, edges, kept, file, lengths, .. } = beside;
+    let config = PrmConfig { random_nodes: SMALL_ROADMAP_NODES, ..cases::ROADMAP_CONFIG };
     let good = "the building has room";
     prm::sample_nodes(grid, None, &[], &config, nodes).expect(good);
     let count = meter
         .call("prm::connect, 300", size_of::<prm::NodeIndex<SMALL_ROADMAP_NODES, 1024>>(), || {
-            prm::connect(grid, nodes, &config, small, edges)
+            prm::connect(grid, nodes, &config, small_index, edges)
         })
         .expect(good);
     let mut pairs = 0;
@@ -480,8 +480,8 @@ fn measure_host_calls(
         edge_max_m: config.edge_max_m,
         tested_clearance_m: 0.0,
         max_clearance_m: 2.0,
-        starts: 0,
-        goals: 0,
+        start_count: 0,
+        goal_count: 0,
     };
     meter
         .call("roadmap::write, 300", 0, || roadmap::write(&header, nodes, kept, file))

@@ -13,9 +13,9 @@ struct Counts {
 
 impl Meter for Counts {
     fn call<T>(&mut self, name: &'static str, _bytes: usize, work: impl FnOnce() -> T) -> T {
-        self.steps += usize::from(name == STEP || name == HARD_STEP);
-        self.in_areas += usize::from(name == AREA_STEP);
-        self.filtered += usize::from(name == FILTER);
+        self.steps += usize::from(name == STEP_ROW || name == HARD_STEP_ROW);
+        self.in_areas += usize::from(name == AREA_STEP_ROW);
+        self.filtered += usize::from(name == FILTER_ROW);
         work()
     }
 }

@@ -1,12 +1,12 @@
 //! What the landing detector's and the HEARTBEAT's reports say now.
 
-use super::{MAX_HEARTBEAT_AGE, MAX_POSITION_AGE, MAX_SILENCE, Telemetry};
+use super::{MAX_HEARTBEAT_AGE, MAX_HEARTBEAT_GAP, MAX_POSITION_AGE, Telemetry};
 use crate::autopilot::landed::RISEN_M;
 use crate::time::{Duration, Instant};
 
 impl Telemetry {
     /// Whether the landing detector last reported flight.
-    pub fn reports_flight(&self) -> bool {
+    pub fn last_reported_flight(&self) -> bool {
         self.landed.is_some_and(|report| !report.on_ground)
     }
 
@@ -17,7 +17,7 @@ impl Telemetry {
 
     /// Whether the landing detector reported the ground in the last 1.2 s.
     pub(in crate::autopilot) fn lately_reported_ground(&self, now: Instant) -> bool {
-        self.landed.is_some_and(|report| report.is_new_ground(now))
+        self.landed.is_some_and(|report| report.is_recent_ground(now))
     }
 
     /// Whether the landing detector reports the ground. Unless the vehicle rests disarmed, an old
@@ -27,7 +27,7 @@ impl Telemetry {
         let z_m = if known { self.position.z } else { f32::NAN };
         self.landed.is_some_and(|report| match self.rests_disarmed(now) {
             true => report.on_ground,
-            false => report.holds_ground(z_m, now),
+            false => report.still_says_ground(z_m, now),
         })
     }
 
@@ -36,15 +36,15 @@ impl Telemetry {
     pub(crate) fn rests_disarmed(&self, now: Instant) -> bool {
         let heard = self.heartbeat_age(now) < MAX_HEARTBEAT_AGE;
         let risen = self.position.z > self.heartbeat_z_m + RISEN_M;
-        !self.armed && (heard || !(risen || self.reports_flight()))
+        !self.armed && (heard || !(risen || self.last_reported_flight()))
     }
 
-    /// Time for which HEARTBEATs have come without a gap of 4.5 s ([`MAX_SILENCE`]); zero in such a
-    /// gap.
-    pub(crate) fn heard_for(&self, now: Instant) -> Duration {
-        match self.heartbeat_age(now) > MAX_SILENCE {
+    /// Time for which HEARTBEATs have come without a gap of 4.5 s ([`MAX_HEARTBEAT_GAP`]); zero in
+    /// such a gap.
+    pub(crate) fn heartbeats_heard_for(&self, now: Instant) -> Duration {
+        match self.heartbeat_age(now) > MAX_HEARTBEAT_GAP {
             true => Duration::default(),
-            false => now - self.heard_since,
+            false => now - self.heartbeats_since,
         }
     }
 }

@@ -158,5 +158,5 @@ fn what_was_flown_while_the_estimator_was_not_ready_is_no_jump() {
     }
     bench.ekf_flags = 0x33F;
     bench.run(0.5);
-    assert!(!bench.companion.telemetry.is_settling(bench.now), "{:?}", bench.texts);
+    assert!(!bench.companion.telemetry.is_position_settling(bench.now), "{:?}", bench.texts);
 }

@@ -72,7 +72,7 @@ fn over_four_pictures() -> Bench {
     let mut photographs = PicturePlan::new(2.0, HeadingMode::Ahead, Trigger::None);
     photographs.add_stretch(1, 3, WaypointRange { first: 0, end: 4 }).unwrap();
     let mut config = two_vehicles();
-    config.lost_vehicle_down_s = Some(60.0);
+    config.lost_vehicle_down_after_s = Some(60.0);
     let mut b = Bench::new(config);
     b.answer_plan = Some(Ok(Plan { task: Task::Photograph(photographs), ..field_plan() }));
     b.neighbour = FAR_AWAY;
@@ -100,10 +100,10 @@ fn the_number_of_photographed_waypoints_is_sent_each_second() {
     b.start();
     let mut values = Vec::new();
     while b.state() != Done && values.len() < 90 {
-        let before_m = b.companion.guidance.along_m();
+        let before_m = b.companion.guidance.reference_along_m();
         let sent = done_count(&mut b);
         assert_eq!(sent.len(), 1, "{:?} {:?}", b.state(), b.texts);
-        let after_m = b.companion.guidance.along_m();
+        let after_m = b.companion.guidance.reference_along_m();
         let past = |along_m: f32| ((along_m - 2.0) / 2.0).floor().clamp(0.0, 4.0);
         if b.state() == Follow {
             assert!((past(before_m)..=past(after_m)).contains(&sent[0]), "{sent:?} at {after_m}");
@@ -136,8 +136,9 @@ fn a_new_start_leaves_out_what_is_done_unless_flk_resume_is_0() {
         let mut b = over_four_pictures();
         b.start();
         b.run_until(Follow, 30.0);
-        let flown_m =
-            |b: &Bench| b.companion.guidance.progress_m(b.state(), &b.companion.guidance_inputs());
+        let flown_m = |b: &Bench| {
+            b.companion.guidance.reported_progress_m(b.state(), &b.companion.guidance_inputs())
+        };
         while flown_m(&b) < 5.5 {
             b.tick();
         }

@@ -25,7 +25,7 @@ pub(super) const FAR_AWAY: Option<(Point, u8, f32, u32)> =
 
 /// Place 2.5 m ahead on the vehicle's path, at this height.
 fn ahead(b: &Bench, height_m: f32) -> Point {
-    let (plan, along_m) = (b.companion.mission.plan(), b.companion.guidance.along_m());
+    let (plan, along_m) = (b.companion.mission.plan(), b.companion.guidance.reference_along_m());
     let place = plan.and_then(|plan| plan.path.point_at(along_m.max(0.0) + 2.5));
     let place = place.unwrap_or(GOAL);
     Point::new(place.x, place.y, height_m)
@@ -40,8 +40,11 @@ pub(super) fn over_a_field(kind: AutopilotKind) -> Bench {
 /// As [`over_a_field`], with settings changed by `set`.
 pub(super) fn over_a_field_with(kind: AutopilotKind, set: impl Fn(&mut Config<4>)) -> Bench {
     let mut config = two_vehicles();
-    config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
-    config.lost_vehicle_down_s = Some(60.0);
+    config
+        .roster
+        .push(RosterEntry { system_id: 78, path_start: Point::new(8.0, 28.0, 1.5) })
+        .unwrap();
+    config.lost_vehicle_down_after_s = Some(60.0);
     set(&mut config);
     let mut bench = match kind {
         AutopilotKind::Px4 => Bench::new(config),
@@ -56,7 +59,7 @@ pub(super) fn over_a_field_with(kind: AutopilotKind, set: impl Fn(&mut Config<4>
 /// A roster report of vehicle 77 with this vehicle's own view of the fleet.
 pub(super) fn own_roster(b: &Bench) -> RosterReport {
     let fleet = b.companion.neighbours.fleet().expect("an area");
-    RosterReport { system_id: 77, mission_crc: 0xC0FFEE, ..fleet.roster_message(0) }
+    RosterReport { system_id: 77, mission_crc: 0xC0FFEE, ..fleet.roster_report(0) }
 }
 
 /// The frame of a roster report.
@@ -95,12 +98,12 @@ impl Other {
             return;
         }
         let mine = own_roster(b);
-        let counted = self.known.as_ref().map_or(0, |known| known.divisions);
+        let counted = self.known.as_ref().map_or(0, |known| known.division_count);
         let mut known = match &self.known {
-            Some(known) if counted > mine.divisions => known.clone(),
-            _ => RosterReport { hash: mine.hash, ..mine.clone() },
+            Some(known) if counted > mine.division_count => known.clone(),
+            _ => RosterReport { pending_hash: mine.pending_hash, ..mine.clone() },
         };
-        if known.divisions == mine.divisions {
+        if known.division_count == mine.division_count {
             known.entries[1] = RosterReportEntry {
                 commitment_dm: Some(50),
                 holds: true,
@@ -109,21 +112,26 @@ impl Other {
             };
             known.entries[2].status = ShareStatus::Left;
             let own = mine.entries[0];
-            if known.divisions == 0
-                && mine.hash != 0
+            if known.division_count == 0
+                && mine.pending_hash != 0
                 && own.holds
                 && own.status == ShareStatus::Alive
             {
                 self.counts_after = self.counts_after.saturating_sub(1);
             }
-            if known.divisions == 0 && mine.hash != 0 && own.holds && self.counts_after == 0 {
+            if known.division_count == 0
+                && mine.pending_hash != 0
+                && own.holds
+                && self.counts_after == 0
+            {
                 let entry = |e: &RosterReportEntry| RosterReportEntry {
                     incarnation: e.incarnation,
                     status: e.status,
                     ..RosterReportEntry::default()
                 };
                 known.entries = known.entries.iter().map(entry).collect();
-                (known.divisions, known.committed_hash, known.hash) = (1, mine.hash, 0);
+                (known.division_count, known.committed_hash, known.pending_hash) =
+                    (1, mine.pending_hash, 0);
             }
         }
         if !self.mute {
@@ -156,17 +164,18 @@ impl Watch {
         self.other.tick(b);
         let (state, fleet) = (b.state(), b.companion.neighbours.fleet().expect("an area"));
         let guidance = &b.companion.guidance;
-        let said = format!("{state:?} at {} m: {:#?} {:?}", guidance.along_m(), self.log, b.texts);
+        let along_m = guidance.reference_along_m();
+        let said = format!("{state:?} at {along_m} m: {:#?} {:?}", self.log, b.texts);
         let detours = &b.companion.detours;
         let homeward = guidance.returning || detours.is_homeward() || detours.lands_at_end();
         let flies = state == Follow && !homeward;
         let behind = fleet.division_count() > b.companion.mission.division_count();
         let held_m = f32::from(fleet.held_at_dm()) / 10.0;
         assert!(
-            !behind || !flies || guidance.along_m() <= held_m + 0.3,
+            !behind || !flies || along_m <= held_m + 0.3,
             "on another's part, held {held_m} m: {said}"
         );
-        let left = fleet.roster_message(0).entries[0].status == ShareStatus::Left;
+        let left = fleet.roster_report(0).entries[0].status == ShareStatus::Left;
         assert!(!left || !flies, "flies on though it left: {said}");
         // On the way back there are no gates.
         self.near &= b.neighbour != FAR_AWAY;
@@ -315,7 +324,7 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
     b.run_until(Follow, 30.0);
     b.neighbour = None;
     b.run(15.0);
-    let along_m = b.companion.guidance.along_m();
+    let along_m = b.companion.guidance.reference_along_m();
     assert!(
         b.state() == Follow && (17.5..18.3).contains(&along_m),
         "{:?} {along_m} {:?}",
@@ -396,10 +405,10 @@ impl Lie {
         let mut roster = own_roster(b);
         roster.system_id = self.system_id;
         roster.mission_crc = if self.crc { roster.mission_crc } else { 7 };
-        roster.divisions = self.divisions.unwrap_or(roster.divisions);
-        roster.first = self.first.unwrap_or(roster.first);
-        roster.committed_hash = self.counted.unwrap_or(roster.hash);
-        roster.hash = self.hash.unwrap_or(roster.hash);
+        roster.division_count = self.divisions.unwrap_or(roster.division_count);
+        roster.first_rank = self.first.unwrap_or(roster.first_rank);
+        roster.committed_hash = self.counted.unwrap_or(roster.pending_hash);
+        roster.pending_hash = self.hash.unwrap_or(roster.pending_hash);
         for &(rank, incarnation, standing, done_dm, promise_dm, holds) in &self.entries {
             let standing = ALL[usize::from(standing)];
             roster.entries[rank] = RosterReportEntry {
@@ -472,18 +481,18 @@ fn a_vehicle_over_an_area_whose_lease_ends_stands_and_lands_whatever_the_radios_
     for (kind, radio_range_m) in [(Px4, 60.0), (ArduPilot, 60.0), (Px4, 10_000.0)] {
         let mut b = over_a_field_with(kind, |config| {
             config.radio_range_m = radio_range_m;
-            (config.cruise_mps, config.slowest_mps) = (0.4, 0.4);
+            (config.cruise_mps, config.slowest_vehicle_mps) = (0.4, 0.4);
         });
         b.start();
         b.run_until(Follow, 40.0);
         b.neighbour = None;
         b.run_until(SwarmLinkLost, 25.0);
-        let along_m = b.companion.guidance.along_m();
+        let along_m = b.companion.guidance.reference_along_m();
         for _ in 0..15 {
             b.run(1.0);
             assert_eq!(b.state(), SwarmLinkLost, "{radio_range_m} m: {:?}", b.texts);
         }
-        let more_m = b.companion.guidance.along_m() - along_m;
+        let more_m = b.companion.guidance.reference_along_m() - along_m;
         assert!(more_m < 1.0, "{radio_range_m} m: {more_m} m further");
         b.run_until(Land, 10.0);
     }

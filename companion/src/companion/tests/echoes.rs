@@ -24,7 +24,7 @@ fn echo_changes_anything(id: u8) -> bool {
     let before = known(&mut bench);
     let rank = bench.companion.neighbours.own_rank() as u8;
     for sequence in 0..=u8::MAX {
-        let echo = Some(IntentEcho { rank, sequence, held: 0 });
+        let echo = Some(IntentEcho { rank, sequence, held_ticks: 0 });
         let intent = Intent { system_id: id, mission_crc: 0xC0FFEE, echo, ..Intent::default() };
         let mut payload = [0; 133];
         let len = intent.encode(&mut payload);

@@ -104,7 +104,8 @@ fn no_place_counts_as_reached_before_the_vehicle_is_there_at_any_speed() {
                 break;
             }
             let guidance = &bench.companion.guidance;
-            along_m = guidance.progress_m(bench.state(), &bench.companion.guidance_inputs());
+            along_m =
+                guidance.reported_progress_m(bench.state(), &bench.companion.guidance_inputs());
             early_m = early_m.max(along_m - path.project(&bench.enu, along_m, 40.0));
         }
         assert!(along_m > 50.0, "{along_m} m flown at {cruise_mps} m/s");
@@ -146,7 +147,7 @@ proptest::proptest! {
             while bench.state() == State::Follow {
                 bench.run(0.05);
                 bench.false_ground = kind == AutopilotKind::Px4
-                    && bench.companion.guidance.is_descending()
+                    && bench.companion.guidance.is_in_descent()
                     && bench.enu.z < higher_m;
                 proptest::prop_assert!(bench.setpoints.len() < 5000, "{kind:?}: it never lands");
             }
@@ -267,7 +268,7 @@ proptest::proptest! {
         let mut touched = None;
         while bench.state() == State::Follow {
             bench.run(0.05);
-            if bench.companion.guidance.is_descending() && bench.enu.z <= higher_m {
+            if bench.companion.guidance.is_in_descent() && bench.enu.z <= higher_m {
                 bench.enu.z = higher_m;
                 touched = touched.or(Some(bench.now));
             }

@@ -136,18 +136,18 @@ impl Flight {
     fn tick(&mut self) {
         // The place of a step is that of the setpoint before it.
         let guidance = &self.bench.companion.guidance;
-        let (place, before_m) = (guidance.smoother.position(), guidance.setpoint_m);
+        let (place, before_m) = (guidance.smoother.position(), guidance.setpoint_along_m);
         self.bench.tick();
         let guidance = &self.bench.companion.guidance;
-        if !self.bench.state().is_on_path() || guidance.is_descending() {
+        if !self.bench.state().is_on_path() || guidance.is_in_descent() {
             self.reference.places.clear();
             return;
         }
         let found = self.reference.nearest(&self.path, &place);
-        self.reference.note(guidance.along_m());
+        self.reference.note(guidance.reference_along_m());
         // The first step after an interruption seeks the place again.
         let Some((first_m, last_m, _)) = found.filter(|found| found.2 < BESIDE_M) else { return };
-        let at_m = guidance.setpoint_m;
+        let at_m = guidance.setpoint_along_m;
         (self.early_m, self.late_m) =
             (self.early_m.max(at_m - last_m), self.late_m.max(first_m - at_m));
         let step_m = guidance.cruise_mps() * 0.05;
@@ -170,7 +170,7 @@ impl Flight {
     fn drift(&mut self, by_s: f32) {
         let guidance = &self.bench.companion.guidance;
         let by_m = by_s * guidance.cruise_mps();
-        let from_m = self.path.project(&self.bench.enu, guidance.setpoint_m, 3.0);
+        let from_m = self.path.project(&self.bench.enu, guidance.setpoint_along_m, 3.0);
         for tick in 0..40 {
             let left = 1.0 - (tick + 1) as f32 / 40.0;
             self.bench.enu = self.path.point_at(from_m + by_m * (1.0 - left * left)).unwrap();
@@ -186,10 +186,10 @@ impl Flight {
                 self.order(1.0);
             }
             Interruption::Halt(ahead_m) => {
-                let along_m = self.bench.companion.guidance.along_m();
-                self.bench.companion.guidance.set_halt_m(along_m + ahead_m);
+                let along_m = self.bench.companion.guidance.reference_along_m();
+                self.bench.companion.guidance.set_division_hold_m(along_m + ahead_m);
                 self.run(ticks);
-                self.bench.companion.guidance.set_halt_m(f32::INFINITY);
+                self.bench.companion.guidance.set_division_hold_m(f32::INFINITY);
             }
             Interruption::Pilot(by_s) => {
                 self.bench.mode = 0x0003_0000;

@@ -7,7 +7,7 @@ use super::divisions::over_a_field;
 use super::*;
 use crate::link::frame::Frame;
 use crate::link::intent::{GROUNDED, Intent, ON_PLAN};
-use crate::margins::{late_report_flight_s, unheard_stretch_m};
+use crate::margins::{max_unheard_travel_m, unheard_flight_by_delay_s};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use planner_core::flight::{Gate, Path};
@@ -42,7 +42,7 @@ fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
                 bench.swarm.iter().rev().find_map(|f| Intent::decode(f.padded_payload(), SYSTEM));
             let (reported, from) = (reported.expect("five a second"), bench.enu);
             bench.neighbour = None;
-            beyond += usize::from(reported.unheard_point_count > 0);
+            beyond += usize::from(reported.unheard_flight_point_count > 0);
             for _ in 0..500 {
                 bench.run(0.1);
                 if !matches!(bench.state(), TakeOff | Climb | Follow) {
@@ -123,7 +123,7 @@ proptest::proptest! {
         // An intent is sent each 0.2 s: each that the echo is behind adds 0.1 s each way.
         let delay_s = 0.1 * delay as f32;
         let mut config = Config { cruise_mps, ..two_vehicles() };
-        (config.slowest_mps, config.fastest_mps) = (cruise_mps, cruise_mps);
+        (config.slowest_vehicle_mps, config.fastest_vehicle_mps) = (cruise_mps, cruise_mps);
         let mut bench = Bench::new(config);
         bench.step_m = cruise_mps * 0.06;
         bench.neighbour_echoes = Some(delay);
@@ -133,7 +133,7 @@ proptest::proptest! {
         }
         let mut plan = VehiclePlan { path, ..plan() };
         if let Some(at_m) = gate_m {
-            plan.gates.push(Gate { at_m, id: 77, until_m: 100.0 }).unwrap();
+            plan.gates.push(Gate { at_m, wait_for_id: 77, open_from_progress_m: 100.0 }).unwrap();
         }
         bench.answer_plan = Some(Ok(plan));
         bench.neighbour = Some((Point::new(8.0, 60.0, 0.0), GROUNDED | ON_PLAN, 99.0, 5));
@@ -159,7 +159,8 @@ proptest::proptest! {
         }
         bench.run_until(State::Land, 60.0);
         let rests_m = bench.enu.x - START.x - heard_m;
-        let most_m = unheard_stretch_m(cruise_mps) + cruise_mps * late_report_flight_s(estimated_s);
+        let most_m = max_unheard_travel_m(cruise_mps)
+            + cruise_mps * unheard_flight_by_delay_s(estimated_s);
         // The reported points end at the gate.
         let gate_on_m = gate_m.map_or(f32::INFINITY, |at_m| (at_m - heard_m).max(0.0) + 0.6);
         let most_m = most_m.min(gate_on_m);
@@ -180,7 +181,7 @@ fn a_vehicle_heard_again_reports_no_progress_that_it_has_yet_to_make() {
     for cruise_mps in [1.0, 2.0, 3.0] {
         for lost_s in [6.0, 8.0, 10.0, 12.0] {
             let mut config = Config { cruise_mps, ..two_vehicles() };
-            (config.slowest_mps, config.fastest_mps) = (cruise_mps, cruise_mps);
+            (config.slowest_vehicle_mps, config.fastest_vehicle_mps) = (cruise_mps, cruise_mps);
             let mut bench = Bench::new(config);
             bench.step_m = cruise_mps * 0.06;
             bench.neighbour_echoes = Some(0);
@@ -189,7 +190,9 @@ fn a_vehicle_heard_again_reports_no_progress_that_it_has_yet_to_make() {
                 path.push(START + Point::new(x, 0.0, 0.0), 1.2).unwrap();
             }
             let mut plan = VehiclePlan { path, ..plan() };
-            plan.gates.push(Gate { at_m: 10.0, id: 77, until_m: 100.0 }).unwrap();
+            plan.gates
+                .push(Gate { at_m: 10.0, wait_for_id: 77, open_from_progress_m: 100.0 })
+                .unwrap();
             bench.answer_plan = Some(Ok(plan));
             bench.neighbour = Some((Point::new(8.0, 60.0, 0.0), GROUNDED | ON_PLAN, 99.0, 5));
             bench.run_until(State::Ready, 6.0);

@@ -49,8 +49,8 @@ proptest::proptest! {
             (l.descend_mps, 0.1, 1.0),
             (l.accel_mps2, 0.2, 1.5),
             (l.accel_z_mps2, 0.2, 1.5),
-            (l.max_accel_mps2[0], 0.2, 2.25),
-            (l.max_accel_mps2[1], 0.2, 2.25),
+            (l.max_setpoint_accel_mps2[0], 0.2, 2.25),
+            (l.max_setpoint_accel_mps2[1], 0.2, 2.25),
             (l.jerk_mps3, 1.0, 4.0),
         ] {
             proptest::prop_assert!((least..=most).contains(&value), "{l:?}");
@@ -60,8 +60,12 @@ proptest::proptest! {
 
 #[test]
 fn a_slow_vehicle_expects_its_neighbours_to_be_as_fast_as_the_fastest() {
-    let config = Config { cruise_mps: 0.5, slowest_mps: 0.5, fastest_mps: 6.0, ..config() };
+    let config =
+        Config { cruise_mps: 0.5, slowest_vehicle_mps: 0.5, fastest_vehicle_mps: 6.0, ..config() };
     let limits = GuidanceLimits::new(&config, &AutopilotKind::Px4.default_limits());
     assert_eq!(limits.track.cruise_mps, 0.5);
-    assert_eq!(filter_bounds(&limits.track, limits.fastest_mps).speed_max_mps, 6.0);
+    assert_eq!(
+        neighbour_motion_bounds(&limits.track, limits.fastest_vehicle_mps).speed_max_mps,
+        6.0
+    );
 }

@@ -22,7 +22,7 @@ fn above(x: f32, y: f32, z: f32) -> Neighbour {
         progress_m: None,
         grounded: false,
         out_of_plan: false,
-        detours: false,
+        on_detour: false,
     }
 }
 
@@ -36,15 +36,15 @@ fn column(x: f32, y: f32, radius_m: f32) -> KeepOutZone {
 /// takes.
 fn search(columns: &[KeepOutZone]) -> (EvadeTarget, usize) {
     let path = path();
-    let mut search = EvadeSearch { found: EvadeTarget::Back(99.0), ..EvadeSearch::default() };
+    let mut search = EvadeSearch { last_target: EvadeTarget::Back(99.0), ..EvadeSearch::default() };
     for steps in 1.. {
         // Each neighbour gives up to 16 columns.
         let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
         search.continue_search(&path, 9.0, 31, |i, visit| {
             of(i).iter().for_each(|column| visit(*column));
         });
-        if search.found != EvadeTarget::Back(99.0) {
-            return (search.found, steps);
+        if search.last_target != EvadeTarget::Back(99.0) {
+            return (search.last_target, steps);
         }
         assert!(steps < 100);
     }
@@ -62,7 +62,7 @@ fn a_place_below_one_that_comes_down_is_exchanged_for_one_before_it() {
     // A waiting place that is no whole number of steps from the start of the path.
     let mut search = EvadeSearch::default();
     search.continue_search(&path(), 1.1, 1, |_, visit| visit(column(2.1, 0.0, 2.0)));
-    assert_eq!(search.found, EvadeTarget::Back(0.0), "its start is the last place");
+    assert_eq!(search.last_target, EvadeTarget::Back(0.0), "its start is the last place");
 }
 
 #[test]

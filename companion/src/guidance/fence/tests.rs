@@ -24,7 +24,7 @@ fn a_stop_is_as_long_as_flown() {
                 break;
             }
         }
-        let formula = stopping_distance_m(speed, accel, brake);
+        let formula = stop_distance_m(speed, accel, brake);
         assert!(fabsf(formula - furthest) < 0.01, "{speed} {accel}: {formula} {furthest}");
     }
 }

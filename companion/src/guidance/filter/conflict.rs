@@ -6,7 +6,7 @@ use planner_core::track::safety::{self, MotionBounds, OwnSet, REACTION_S, Reacha
 use planner_core::{Length, Point};
 
 use super::super::{Guidance, GuidanceInputs, Phase};
-use super::{FilterConflict, FlightDirection, MAX_STOP_FOR_STRANGER};
+use super::{FilterConflict, FlightDirection, PASS_STRANGER_AFTER};
 use crate::autopilot::telemetry::Telemetry;
 use crate::config::limits::Urgency;
 use crate::state::State;
@@ -48,15 +48,15 @@ impl Guidance {
         let velocity_mps = fpu::sqrtf(telemetry.velocity.norm_squared());
         // Beside its path the vehicle flies straight to where it continues on it.
         let joins =
-            self.phase == Phase::Join || (self.phase == Phase::Path && self.raw_point_at_rest);
+            self.phase == Phase::Join || (self.phase == Phase::Path && self.raw_point_at_setpoint);
         let join = if joins { path.point_at(self.tracker.along_m) } else { None };
-        let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
+        let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_along_m };
         let reference_mps = fpu::sqrtf(self.smoother.velocity().norm_squared());
         let speed_mps = reference_mps.max(velocity_mps - STOPPING_SWAY_MPS);
         let braking_m = bounds
             .braking
-            .stop_m(speed_mps)
-            .max(self.smoother.stopping_distance_m(Urgency::Urgent));
+            .stop_distance_m(speed_mps)
+            .max(self.smoother.stop_distance_m(Urgency::Urgent));
         let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
         let here = self.smoother.position();
         let points = path.waypoints();
@@ -86,19 +86,19 @@ impl Guidance {
     ) -> Option<FilterConflict> {
         let safety_m = self.deconflict.safety_distance_m;
         let place = scene.telemetry.position;
-        let lands = state.lands();
+        let lands = state.lands_or_landing_is_held();
         let hears_nobody = neighbours.hears_nobody(now);
         // Hearing nobody, the vehicle flies on only to a landing place aside.
-        let deaf = hears_nobody && (lands || (self.on_path && self.ends_away_from_goal));
+        let deaf = hears_nobody && (lands || (self.has_begun_path && self.ends_away_from_goal));
         // Like a landing, a guided descent in a coverage mission checks for unheard vehicles on the
         // ground.
-        let comes_down = lands || (self.is_descending() && neighbours.fleet().is_some());
+        let comes_down = lands || (self.is_in_descent() && neighbours.fleet().is_some());
         let floor_m = scene
             .plan
             .filter(|_| comes_down)
             .map(|plan| self.lowest_possible_ground_m(state, scene, plan));
         let mut near = 0;
-        let on_plan = self.on_plan(state, scene);
+        let on_plan = self.flies_by_plan(state, scene);
         let most_apart_m = (safety_m + OVERSHOOT_MARGIN_M.max(neighbours.pair_position_error_m()))
             .max(2.0 * self.track.radius_m + STRANGER_HULL_GAP_M);
         let reach = ReachQuery {
@@ -113,7 +113,7 @@ impl Guidance {
         };
         let follows = !lands && !hears_nobody;
         let mut next = 0;
-        while let Some((i, entry, dead)) = neighbours.next_within(next, now, &reach) {
+        while let Some((i, entry, dead)) = neighbours.next_within_reach(next, now, &reach) {
             next = i + 1;
             let mut met = entry.filter_neighbour(now);
             if dead {
@@ -129,10 +129,11 @@ impl Guidance {
                 // Gates keep two vehicles on the plan apart, whatever the delay of their messages.
                 met.ignore_message_delay();
             }
-            if met.lost && !(lands || deaf) && neighbours.may_fly_on_unheard(entry, now, &reach) {
+            if met.lost && !(lands || deaf) && neighbours.may_fly_on_though_dead(entry, now, &reach)
+            {
                 // Where no neighbour is heard this vehicle's receiver may have failed: the others
                 // are not lost, they fly on.
-                met.fly_on_for(bounds.silent_s);
+                met.fly_on_for(bounds.stopped_when_unheard_for_s);
             }
             let silent = met.lost || met.motion.age_s > safety::FRESH_S;
             if (lands || deaf) && silent {
@@ -152,16 +153,16 @@ impl Guidance {
             }
             // Flying back to its pad, before its path, or hearing nobody, this vehicle has no other
             // landing place.
-            let last_place = self.returning || !self.on_path || deaf;
+            let last_place = self.returning || !self.has_begun_path || deaf;
             let lies = met.motion.grounded || met.lost || (deaf && silent);
             // The end of its path in a coverage mission is above its pad; by then it has sought a
             // place aside in vain.
             let at_end = || {
                 entry.would_fly_all_points_unheard()
-                    && scene.plan.is_some_and(|p| self.has_reached_end(&p.path))
+                    && scene.plan.is_some_and(|p| self.is_reference_at_end_of(&p.path))
             };
             let rests = lies && held >= LATE_LANDING_AFTER && (last_place || at_end());
-            let lands_late = lands && (rests || (met.stranger && held >= MAX_STOP_FOR_STRANGER));
+            let lands_late = lands && (rests || (met.stranger && held >= PASS_STRANGER_AFTER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + STRANGER_HULL_GAP_M
             } else if (met.motion.grounded || met.stands) && by_gates {
@@ -169,7 +170,7 @@ impl Guidance {
                 // tracking errors of both.
                 safety_m
             } else if met.motion.grounded {
-                let vertical = lands || state == State::Climb || self.is_descending();
+                let vertical = lands || state == State::Climb || self.is_in_descent();
                 safety_m + if vertical { 0.0 } else { TRACKING_MARGIN_M }
             } else if by_gates || met.lost {
                 safety_m + OVERSHOOT_MARGIN_M
@@ -187,14 +188,14 @@ impl Guidance {
             if silent && !hears_nobody && !met.stranger && below() {
                 return Some(FilterConflict {
                     id: met.id,
-                    yields: true,
+                    own_yields: true,
                     stranger: false,
-                    rests: met.lost,
+                    is_grounded_or_lost: met.lost,
                 });
             }
-            let reach_m = apart_m + met.motion.reach_m(bounds, ahead_s);
-            let away = own.distance_from_box(&met.motion.position);
-            let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
+            let reach_m = apart_m + met.motion.max_reach_m(bounds, ahead_s);
+            let away = own.box_distances(&met.motion.position);
+            let above_m = if met.motion.column_bottom_z_m.is_some() { 0.0 } else { away.z };
             if away.x * away.x + away.y * away.y + above_m * above_m >= reach_m * reach_m {
                 continue;
             }
@@ -208,20 +209,25 @@ impl Guidance {
                     || met.before_climb.is_some_and(low)
             };
             if near > MAX_NEAR_COMPARED || meets() {
-                let yields = self.yields_to(state, scene, &met);
-                let rests = met.motion.grounded || met.lost;
-                return Some(FilterConflict { id: met.id, yields, stranger: met.stranger, rests });
+                let own_yields = self.yields_to(state, scene, &met);
+                let is_grounded_or_lost = met.motion.grounded || met.lost;
+                return Some(FilterConflict {
+                    id: met.id,
+                    own_yields,
+                    stranger: met.stranger,
+                    is_grounded_or_lost,
+                });
             }
         }
         None
     }
 
-    pub(super) fn on_plan<const W: usize, const G: usize>(
+    pub(super) fn flies_by_plan<const W: usize, const G: usize>(
         &self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,
     ) -> bool {
-        !self.returning && !scene.is_on_detour() && !state.lands()
+        !self.returning && !scene.is_on_detour() && !state.lands_or_landing_is_held()
     }
 
     /// Whether this vehicle lets the neighbour `met` go first: a vehicle on the plan goes before
@@ -233,15 +239,15 @@ impl Guidance {
         met: &FilterNeighbour<'_>,
     ) -> bool {
         // A vehicle with another plan than the neighbour's counts as off the plan.
-        let on_plan = self.on_plan(state, scene) && met.shares_plan;
+        let on_plan = self.flies_by_plan(state, scene) && met.shares_plan;
         if met.stranger || met.on_plan != on_plan {
             return met.stranger || met.on_plan;
         }
-        let along_m = if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY };
+        let along_m = if self.has_begun_path { self.tracker.along_m } else { f32::NEG_INFINITY };
         let waits = |plan: &VehiclePlan<W, G>| {
-            plan.gates.iter().any(|gate| gate.id == met.id && gate.at_m >= along_m)
+            plan.gates.iter().any(|gate| gate.wait_for_id == met.id && gate.at_m >= along_m)
         };
-        if on_plan && self.advice.waiting_for == met.id && scene.plan.is_some_and(waits) {
+        if on_plan && self.advice.waiting_for_id == met.id && scene.plan.is_some_and(waits) {
             return true;
         }
         // A neighbour on the plan that reports that it waits lets this vehicle go first.

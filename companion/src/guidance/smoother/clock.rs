@@ -12,7 +12,7 @@ use super::{ClockPace, END_JERK_SHARE, STOP_DECAY_PER_S, SetpointSmoother, TICK_
 const PLANNED_JERK_SHARE: f32 = 0.9;
 /// Share of the jerk limit with which the clock's speeding up ends: small, since nothing depends on
 /// how soon the clock runs at 1 again.
-const RISE_JERK_SHARE: f32 = 0.15;
+const SPEED_UP_END_JERK_SHARE: f32 = 0.15;
 /// Least speed of the curve by which the clock's acceleration is divided, m/s.
 const MIN_CURVE_MPS: f32 = 0.2;
 
@@ -34,7 +34,7 @@ impl SetpointSmoother {
         // step of the acceleration.
         let lack = (pace.speed_share.clamp(0.0, 1.0) - clock) * speed;
         let size = fmaxf(fabsf(lack) - fabsf(self.clock_acceleration) * speed * dt_s, 0.0);
-        let end_share = if lack > 0.0 { RISE_JERK_SHARE } else { END_JERK_SHARE };
+        let end_share = if lack > 0.0 { SPEED_UP_END_JERK_SHARE } else { END_JERK_SHARE };
         let end_jerk = end_share * limits.jerk(pace.urgency);
         let rate = fminf(fminf(accel, sqrtf(2.0 * end_jerk * size)), STOP_DECAY_PER_S * size);
         let wanted = if lack < 0.0 { -rate } else { rate };

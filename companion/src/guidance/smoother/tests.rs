@@ -16,7 +16,7 @@ const LIMITS: MotionLimits = MotionLimits {
     descend_mps: 1.0,
     accel_mps2: 1.5,
     accel_z_mps2: 1.5,
-    max_accel_mps2: [2.25, 2.0],
+    max_setpoint_accel_mps2: [2.25, 2.0],
     jerk_mps3: 4.0,
 };
 
@@ -67,7 +67,7 @@ proptest! {
                 let braking_m = v * v / 3.0 + 2.0 * v * TICK_S + 0.05;
                 if path
                     .point_at(tracker.along_m + braking_m)
-                    .is_some_and(|ahead| !smoother.is_place_allowed(&ahead))
+                    .is_some_and(|ahead| !smoother.is_within_fence_slack(&ahead))
                 {
                     advice.stop_within_m = advice.stop_within_m.min(braking_m);
                 }
@@ -87,7 +87,7 @@ proptest! {
                 "velocity off by {off} m/s in {dt_s} s"
             );
             let a = smoother.acceleration();
-            let [across, up] = LIMITS.max_accel_mps2;
+            let [across, up] = LIMITS.max_setpoint_accel_mps2;
             prop_assert!(a.xy().norm() <= across + 1e-4 && a.z.abs() <= up + 1e-4, "{a:?}");
             let jerk = (a - acceleration).norm() / dt_s;
             let most = LIMITS.jerk(smoother.urgency);
@@ -125,7 +125,7 @@ proptest! {
         slow_climber in any::<bool>(),
     ) {
         let limits = if slow_climber {
-            MotionLimits { accel_z_mps2: 1.0, max_accel_mps2: [2.25, 1.0], ..LIMITS }
+            MotionLimits { accel_z_mps2: 1.0, max_setpoint_accel_mps2: [2.25, 1.0], ..LIMITS }
         } else {
             LIMITS
         };
@@ -138,7 +138,7 @@ proptest! {
             smoother.follow_vehicle(place + came_at * (TICK_S * step as f32), TICK_S);
             smoother.mark_sent();
         }
-        smoother.hold_with_velocity(&came_at);
+        smoother.brake_from_velocity(&came_at);
         let mut step = 0;
         for (x, y, z, speed_mps, steps) in targets {
             let target = low + size.component_mul(&Point::new(x, y, z));
@@ -164,7 +164,7 @@ proptest! {
                     "{place:?}"
                 );
                 let a = smoother.acceleration();
-                let [across, up] = limits.max_accel_mps2;
+                let [across, up] = limits.max_setpoint_accel_mps2;
                 // Two axes that begin to brake at once pass the disc's edge by a hair.
                 prop_assert!(a.xy().norm() <= across * 1.02 && a.z.abs() <= up + 1e-3, "{a:?}");
                 let jerk = (a - before).norm() / dt_s.min(0.2);

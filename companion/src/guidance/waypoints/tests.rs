@@ -7,8 +7,9 @@ fn waypoints_are_loaded_one_by_one_and_the_last_ends_the_path() {
         path.push(Point::new(x, y, 1.0), 1.0).unwrap();
     }
     let mut waypoints = Algorithm2Waypoints::default();
-    let mut at =
-        |x: f32, y: f32| waypoints.next_waypoint(&path, &Point::new(x, y, 1.0)).map(|p| (p.x, p.y));
+    let mut at = |x: f32, y: f32| {
+        waypoints.update_current_waypoint(&path, &Point::new(x, y, 1.0)).map(|p| (p.x, p.y))
+    };
     assert_eq!(at(-1.0, 0.0), Some((0.0, 0.0)));
     assert_eq!(at(-0.41, 0.0), Some((0.0, 0.0)), "outside Wp_radius");
     assert_eq!(at(-0.39, 0.0), Some((5.0, 0.0)));
@@ -18,7 +19,7 @@ fn waypoints_are_loaded_one_by_one_and_the_last_ends_the_path() {
     assert_eq!(at(0.0, 0.0), None, "completed for good");
     assert!(waypoints.is_completed());
     assert_eq!(
-        Algorithm2Waypoints::default().next_waypoint(&Path::<4>::new(), &Point::zeros()),
+        Algorithm2Waypoints::default().update_current_waypoint(&Path::<4>::new(), &Point::zeros()),
         None
     );
 }

@@ -23,7 +23,7 @@ proptest! {
             mission_crc,
             round,
             flies,
-            is_left_out_by_plan: plan,
+            are_ranges_left_out_by_plan: plan,
             ranges,
         };
         prop_assert_eq!(PhotographedReport::decode(&encoded(&report), 9), Some(report.clone()));

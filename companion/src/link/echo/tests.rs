@@ -1,7 +1,7 @@
 use super::*;
 use proptest::prelude::*;
 
-const PATH: ReportedPath = ReportedPath { along_m: 0.0, ends_m: 0.0 };
+const PATH: ReportedPath = ReportedPath { along_m: 0.0, points_end_m: 0.0 };
 
 proptest! {
     #[test]
@@ -31,7 +31,7 @@ proptest! {
             sent.note_sent(i, PATH, Instant::from_millis(u64::from(i) * 200));
         }
         for (sequence, held, at_ms) in echoes {
-            let echo = IntentEcho { rank: 0, sequence, held };
+            let echo = IntentEcho { rank: 0, sequence, held_ticks: held };
             if let Some(delay_s) =
                 sent.message_delay_s(&echo, Instant::from_millis(4000 + at_ms))
             {
@@ -46,10 +46,12 @@ proptest! {
 fn the_newest_intent_that_arrived_says_where_its_points_led() {
     let mut sent = SentIntents::default();
     let at = |i: u8| Instant::from_millis(1000 + u64::from(i) * 200);
-    (0..8).for_each(|i| sent.note_sent(i, ReportedPath { ends_m: f32::from(i), ..PATH }, at(i)));
-    let echo = |sequence| IntentEcho { rank: 0, sequence, held: 0 };
+    (0..8).for_each(|i| {
+        sent.note_sent(i, ReportedPath { points_end_m: f32::from(i), ..PATH }, at(i));
+    });
+    let echo = |sequence| IntentEcho { rank: 0, sequence, held_ticks: 0 };
     let mut arrived =
-        |sequence| sent.note_arrival(&echo(sequence)).map(|sent| (sent.at, sent.path.ends_m));
+        |sequence| sent.note_arrival(&echo(sequence)).map(|sent| (sent.at, sent.path.points_end_m));
     assert_eq!(arrived(3), Some((at(3), 3.0)));
     assert_eq!(arrived(2), None, "overtaken");
     assert_eq!(arrived(99), None, "never sent");

@@ -89,7 +89,7 @@ fn unknown_ids_are_skipped_whole() {
     let bytes = [unknown(), heartbeat(1), unknown(), unknown(), heartbeat(2)].concat();
     let mut framer = Framer::new();
     assert_eq!(sequences(&drain(&mut framer, Instant::ZERO, &bytes)), [1, 2]);
-    assert_eq!(framer.counters(), Counters { frames: 2, unknown: 3, ..Counters::default() });
+    assert_eq!(framer.counters(), Counters { frames: 2, unknown_id: 3, ..Counters::default() });
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn an_unknown_frame_at_the_end_of_a_burst_is_skipped_too() {
     let mut framer = Framer::new();
     assert!(drain(&mut framer, Instant::ZERO, &unknown()).is_empty());
     assert_eq!(sequences(&drain(&mut framer, Instant::from_millis(500), &heartbeat(1))), [1]);
-    assert_eq!(framer.counters(), Counters { frames: 1, unknown: 1, ..Counters::default() });
+    assert_eq!(framer.counters(), Counters { frames: 1, unknown_id: 1, ..Counters::default() });
 }
 
 #[test]
@@ -121,7 +121,7 @@ fn a_partial_frame_expires_and_frees_what_it_held_back() {
     assert!(drain(&mut framer, Instant::ZERO, &bytes).is_empty());
     assert_eq!(framer.expires_at(), Some(Instant::from_millis(100)));
     assert_eq!(sequences(&drain(&mut framer, Instant::from_micros(100_001), &[])), [1]);
-    assert_eq!(framer.counters().expired, 1);
+    assert_eq!(framer.counters().expired_partial, 1);
     assert_eq!(framer.expires_at(), None);
 }
 

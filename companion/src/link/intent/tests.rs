@@ -13,10 +13,10 @@ fn sample(count: usize) -> Intent {
         heard_bits: 0x8000_0005,
         ground_m: -0.5,
         may_come_down: count == 3,
-        unheard_delay_s: 15 * count as u8,
-        echo: (count > 2).then_some(IntentEcho { rank: 254, sequence: 9, held: count as u8 }),
+        unheard_flight_delay_s: 15 * count as u8,
+        echo: (count > 2).then_some(IntentEcho { rank: 254, sequence: 9, held_ticks: count as u8 }),
         points,
-        unheard_point_count: count as u8 / 2,
+        unheard_flight_point_count: count as u8 / 2,
     }
 }
 

@@ -12,7 +12,7 @@ use super::*;
 use crate::link::done;
 use crate::link::frame::{self, Header};
 use crate::link::roster::{self, RosterReport, RosterReportEntry};
-use crate::storage::store::{ErasePermission, MAX_READ};
+use crate::storage::store::{ErasePermission, MAX_READ_LEN};
 use crate::testing::fake_autopilot::*;
 use crate::testing::fake_flash::{Flash, execute, started};
 use crate::{Duration, Link, State};
@@ -77,7 +77,7 @@ impl Greedy {
 
     fn drain(&mut self) {
         let now = self.bench.now;
-        let mut read = [0; MAX_READ];
+        let mut read = [0; MAX_READ_LEN];
         while let Some(request) = self.bench.companion.poll_flash() {
             let outcome = execute(&mut self.flash, request, ErasePermission::Allowed, &mut read)
                 .expect("no power cut");
@@ -131,13 +131,13 @@ fn the_radio_gets_no_more_whatever_is_asked() {
     ground.bench.run_until(State::Ready, 6.0);
     ground.run(20);
     assert!(
-        ground.most_in_a_second() <= state_bytes_per_s(HZ) + DISARMED_BYTES_PER_S + saved,
+        ground.most_in_a_second() <= state_bytes_per_s(HZ) + DISARMED_EXTRA_BYTES_PER_S + saved,
         "{}",
         ground.most_in_a_second()
     );
-    assert!(ground.bytes() <= 20 * (state_bytes_per_s(HZ) + DISARMED_BYTES_PER_S) + saved);
+    assert!(ground.bytes() <= 20 * (state_bytes_per_s(HZ) + DISARMED_EXTRA_BYTES_PER_S) + saved);
     assert!(
-        ground.bytes() > 20 * DISARMED_BYTES_PER_S / 2,
+        ground.bytes() > 20 * DISARMED_EXTRA_BYTES_PER_S / 2,
         "it was asked for more: {}",
         ground.bytes()
     );
@@ -147,12 +147,12 @@ fn the_radio_gets_no_more_whatever_is_asked() {
     air.run(20);
     assert_eq!(air.bench.state(), State::Follow);
     assert!(
-        air.most_in_a_second() <= state_bytes_per_s(HZ) + ARMED_BYTES_PER_S + saved,
+        air.most_in_a_second() <= state_bytes_per_s(HZ) + ARMED_EXTRA_BYTES_PER_S + saved,
         "{}",
         air.most_in_a_second()
     );
     assert!(
-        air.bytes() <= 20 * (state_bytes_per_s(HZ) + ARMED_BYTES_PER_S) + saved,
+        air.bytes() <= 20 * (state_bytes_per_s(HZ) + ARMED_EXTRA_BYTES_PER_S) + saved,
         "{}",
         air.bytes()
     );
@@ -166,7 +166,7 @@ fn the_radio_gets_no_more_whatever_is_asked() {
 #[test]
 fn rosters_go_out_whatever_is_asked_and_are_counted() {
     let mut over_area = two_vehicles();
-    over_area.lost_vehicle_down_s = Some(60.0);
+    over_area.lost_vehicle_down_after_s = Some(60.0);
     let mut bench = Bench::new(over_area);
     bench.answer_plan = Some(Ok(field_plan()));
     bench.neighbour = Some((Point::new(8.0, 120.0, 1.5), crate::link::intent::ON_PLAN, 0.0, 5));
@@ -178,11 +178,11 @@ fn rosters_go_out_whatever_is_asked_and_are_counted() {
     air.run(20);
     assert_eq!(air.bench.state(), State::Follow);
     assert!((39..=41).contains(&air.rosters), "{}", air.rosters);
-    let most = state_bytes_per_s(HZ) + COVERAGE_BYTES_PER_S + ARMED_BYTES_PER_S;
+    let most = state_bytes_per_s(HZ) + COVERAGE_STATE_BYTES_PER_S + ARMED_EXTRA_BYTES_PER_S;
     assert!(air.bytes() <= 20 * most + MAX_BURST_BYTES + MAX_FRAME_LEN as u32, "{}", air.bytes());
 }
 
-/// The table of docs/coverage.md, and the reports of [`COVERAGE_BYTES_PER_S`].
+/// The table of docs/coverage.md, and the reports of [`COVERAGE_STATE_BYTES_PER_S`].
 #[test]
 fn reports_of_a_coverage_mission_are_as_long_as_said() {
     let roster = |vehicles: usize| {
@@ -194,7 +194,7 @@ fn reports_of_a_coverage_mission_are_as_long_as_said() {
     assert_eq!(roster(4) - roster(3), 5, "5 bytes a vehicle");
     assert_eq!(NAMED_VALUE_FLOAT_DATA::ENCODED_LEN + 12, 30);
     assert_eq!(done::MAX_LEN + 12, 141);
-    assert_eq!(COVERAGE_BYTES_PER_S, 575 + 30 + 141);
+    assert_eq!(COVERAGE_STATE_BYTES_PER_S, 575 + 30 + 141);
     assert_ne!(roster::PAYLOAD_TYPE, crate::link::intent::PAYLOAD_TYPE);
 }
 
@@ -225,12 +225,15 @@ fn what_is_owed_is_paid_back_by_time() {
     let mut rate_limit = RadioTokenBucket::default();
     let at = |ms| Instant::ZERO + Duration::from_millis(ms);
     let mut sent = 0;
-    while rate_limit.may_send(at(0), ARMED_BYTES_PER_S) {
+    while rate_limit.may_send(at(0), ARMED_EXTRA_BYTES_PER_S) {
         rate_limit.take_tokens(MAX_FRAME_LEN);
         sent += MAX_FRAME_LEN as u32;
     }
     assert!((MAX_BURST_BYTES..=MAX_BURST_BYTES + MAX_FRAME_LEN as u32).contains(&sent));
-    assert!(!rate_limit.may_send(at(10), ARMED_BYTES_PER_S));
-    assert!(rate_limit.may_send(at(1100), ARMED_BYTES_PER_S));
-    assert!(rate_limit.may_send(at(u64::from(u32::MAX)), ARMED_BYTES_PER_S), "and never overflows");
+    assert!(!rate_limit.may_send(at(10), ARMED_EXTRA_BYTES_PER_S));
+    assert!(rate_limit.may_send(at(1100), ARMED_EXTRA_BYTES_PER_S));
+    assert!(
+        rate_limit.may_send(at(u64::from(u32::MAX)), ARMED_EXTRA_BYTES_PER_S),
+        "and never overflows"
+    );
 }

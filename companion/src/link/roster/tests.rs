@@ -16,7 +16,7 @@ proptest! {
             1..=MAX_ENTRIES_PER_MESSAGE,
         ),
         head in (0u8..16, any::<u8>(), any::<u8>(), any::<u32>(), any::<u32>(), any::<u32>()),
-        [in_flight, hears_flight] in any::<[bool; 2]>(),
+        [in_flight, hears_vehicle_in_flight] in any::<[bool; 2]>(),
     ) {
         let entries = entries
             .iter()
@@ -34,14 +34,14 @@ proptest! {
         let (divisions, first, plan, mission_crc, counted, hash) = head;
         let roster = RosterReport {
             system_id: 9,
-            divisions,
+            division_count: divisions,
             in_flight,
-            hears_flight,
-            first,
-            plan,
+            hears_vehicle_in_flight,
+            first_rank: first,
+            plan_crc8: plan,
             mission_crc,
             committed_hash: counted,
-            hash,
+            pending_hash: hash,
             entries,
         };
         prop_assert_eq!(RosterReport::decode(&padded(&roster), 9), Some(roster.clone()));

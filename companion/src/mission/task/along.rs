@@ -20,5 +20,5 @@ pub(crate) struct PathProgress {
     /// Distance of the reference along that path, metres: where a vehicle that holds comes to rest.
     pub(crate) reference_m: f32,
     /// Relation of that path to the path of the plan.
-    pub(crate) place: PathRelation,
+    pub(crate) relation: PathRelation,
 }

@@ -31,7 +31,7 @@ const REPEAT_EVERY: Duration = Duration::from_millis(300);
 const MAX_TRIES: u8 = 5;
 /// Distance before a picture's place within which the reference of a vehicle that holds counts as
 /// there, metres.
-const HELD_WITHIN_M: f32 = 0.3;
+const HOLDS_AT_PICTURE_WITHIN_M: f32 = 0.3;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;
 /// Shortest horizontal length of a stretch from which a heading is computed, metres.
@@ -64,7 +64,7 @@ impl CameraCommand {
         match self {
             Self::Every(step_m) => Outgoing::TriggerEvery { step_m, at_once: true },
             Self::Off => Outgoing::TriggerEvery { step_m: 0.0, at_once: false },
-            Self::Picture => Outgoing::Picture,
+            Self::Picture => Outgoing::TakePicture,
         }
     }
 }
@@ -72,26 +72,26 @@ impl CameraCommand {
 /// State of the camera commands along one path.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CameraControl {
-    /// Index of the current stretch, and number (`picture`) of the next picture on it.
-    stretch: usize,
-    picture: u32,
+    /// Index of the current stretch, and number (`next_picture`) of the next picture on it.
+    stretch_index: usize,
+    next_picture: u32,
     /// On a detour beside the path: place along the detour where the next picture is taken, metres.
-    beside_m: f32,
+    next_detour_picture_m: f32,
     /// Which path the vehicle flies.
-    place: PathRelation,
+    path_relation: PathRelation,
     /// The trigger in use from the first picture of a stretch or detour to the last; with
     /// [`Trigger::Distance`] the autopilot's trigger is on. `None` elsewhere.
-    running: Option<Trigger>,
+    running_trigger: Option<Trigger>,
     commands: Deque<CameraCommand, MAX_COMMANDS>,
     /// Number of commands sent since the last answer, repetitions included.
     tries: u8,
     /// Whether the first queued command was sent.
-    sent: bool,
+    current_sent: bool,
     /// Whether a command was dropped or refused: from then on such failures are not reported.
-    failed: bool,
+    failure_reported: bool,
     /// The trigger of the picture at or just ahead of this place of the path; `None` if no picture
     /// is due there.
-    due: Option<Trigger>,
+    due_trigger: Option<Trigger>,
 }
 
 impl CameraControl {
@@ -103,42 +103,42 @@ impl CameraControl {
         path: &Path<W>,
         along: PathProgress,
     ) -> bool {
-        let before = core::mem::replace(&mut self.place, along.place);
+        let before = core::mem::replace(&mut self.path_relation, along.relation);
         if photographs.trigger != Trigger::None {
-            let beside = along.place == PathRelation::Beside;
+            let beside = along.relation == PathRelation::Beside;
             if beside != (before == PathRelation::Beside) {
                 // Pictures begin again where the vehicle leaves its path, and where it comes back:
                 // neither place may lie in a gap between two pictures.
-                self.beside_m = 0.0;
+                self.next_detour_picture_m = 0.0;
                 self.switch_off();
             }
-            self.due = None;
-            match photographs.stretches(path).nth(self.stretch) {
+            self.due_trigger = None;
+            match photographs.stretches(path).nth(self.stretch_index) {
                 _ if beside => self.photograph_whole_detour(photographs, along.progress_m),
-                Some(shots) if along.place == PathRelation::OnPath => {
+                Some(shots) if along.relation == PathRelation::OnPath => {
                     self.update_trigger(photographs.trigger, &shots, along);
                 }
                 _ => self.end_early(),
             }
         }
-        (before, along.place) == (PathRelation::OnPath, PathRelation::Elsewhere)
+        (before, along.relation) == (PathRelation::OnPath, PathRelation::Elsewhere)
     }
 
     /// Begins another path; commands that are still queued are sent first. A vehicle that holds
     /// where a picture is due takes it now: the autopilot's trigger may lag behind the last
     /// pictures, and is switched off.
     pub(super) fn begin_path(&mut self) {
-        match self.due.take() {
+        match self.due_trigger.take() {
             Some(Trigger::Distance) => self.queue_command(CameraCommand::Every(0.0)),
             Some(_) => self.queue_command(CameraCommand::Picture),
             None => self.switch_off(),
         }
-        (self.stretch, self.picture, self.running) = (0, 0, None);
-        (self.place, self.beside_m) = (PathRelation::Elsewhere, 0.0);
+        (self.stretch_index, self.next_picture, self.running_trigger) = (0, 0, None);
+        (self.path_relation, self.next_detour_picture_m) = (PathRelation::Elsewhere, 0.0);
     }
 
     fn switch_off(&mut self) {
-        if self.running.take() == Some(Trigger::Distance) {
+        if self.running_trigger.take() == Some(Trigger::Distance) {
             self.queue_command(CameraCommand::Off);
         }
     }
@@ -146,7 +146,7 @@ impl CameraControl {
     /// Takes a last picture if the vehicle leaves its path before the last one there, and switches
     /// the trigger off.
     fn end_early(&mut self) {
-        match self.running.take() {
+        match self.running_trigger.take() {
             Some(Trigger::Distance) => self.queue_command(CameraCommand::Every(0.0)),
             Some(_) => self.queue_command(CameraCommand::Picture),
             None => {}
@@ -155,7 +155,7 @@ impl CameraControl {
 
     /// Switches the autopilot's trigger by distance on, with a picture at once.
     fn switch_on(&mut self, step_m: f32) {
-        if self.running.replace(Trigger::Distance).is_none() {
+        if self.running_trigger.replace(Trigger::Distance).is_none() {
             self.queue_command(CameraCommand::Every(step_m));
         }
     }
@@ -163,12 +163,12 @@ impl CameraControl {
     /// On a detour beside the path pictures are taken at the path's spacing, even beside parts of
     /// the path without pictures.
     fn photograph_whole_detour(&mut self, photographs: &PicturePlan, progress_m: f32) {
-        let spacing_m = photographs.spacing_m;
+        let spacing_m = photographs.max_spacing_m;
         if photographs.trigger == Trigger::Distance {
             self.switch_on(spacing_m);
-        } else if progress_m >= self.beside_m {
-            self.beside_m = progress_m + spacing_m;
-            self.running = Some(photographs.trigger);
+        } else if progress_m >= self.next_detour_picture_m {
+            self.next_detour_picture_m = progress_m + spacing_m;
+            self.running_trigger = Some(photographs.trigger);
             self.queue_command(CameraCommand::Picture);
         }
     }
@@ -182,11 +182,12 @@ impl CameraControl {
         let progress_m = along.progress_m;
         let next_m = match trigger {
             Trigger::Distance => shots.from_m,
-            _ => shots.picture_at_m(self.picture),
+            _ => shots.picture_at_m(self.next_picture),
         };
         // A vehicle counts as holding once its setpoint stands; it may still be up to a metre short
         // of it.
-        self.due = Some(trigger).filter(|_| along.reference_m >= next_m - HELD_WITHIN_M);
+        self.due_trigger =
+            Some(trigger).filter(|_| along.reference_m >= next_m - HOLDS_AT_PICTURE_WITHIN_M);
         if progress_m < shots.from_m {
             self.switch_off();
             return;
@@ -194,26 +195,29 @@ impl CameraControl {
         let distance = trigger == Trigger::Distance;
         match trigger {
             Trigger::Distance if progress_m < shots.to_m => {
-                self.switch_on(shots.step_m);
+                self.switch_on(shots.ground_spacing_m);
                 return;
             }
             Trigger::Distance => self.queue_command(CameraCommand::Every(0.0)),
             _ => {
                 // Of several pictures passed within one step one is taken: all would show the same.
-                let before = self.picture;
-                while self.picture < shots.count && shots.picture_at_m(self.picture) <= progress_m {
-                    self.picture += 1;
+                let before = self.next_picture;
+                while self.next_picture < shots.count
+                    && shots.picture_at_m(self.next_picture) <= progress_m
+                {
+                    self.next_picture += 1;
                 }
-                if self.picture > before {
-                    self.due = None;
-                    self.running = Some(trigger);
+                if self.next_picture > before {
+                    self.due_trigger = None;
+                    self.running_trigger = Some(trigger);
                     self.queue_command(CameraCommand::Picture);
                 }
             }
         }
-        if distance || self.picture == shots.count {
-            self.due = None;
-            (self.stretch, self.picture, self.running) = (self.stretch + 1, 0, None);
+        if distance || self.next_picture == shots.count {
+            self.due_trigger = None;
+            (self.stretch_index, self.next_picture, self.running_trigger) =
+                (self.stretch_index + 1, 0, None);
         }
     }
 
@@ -222,7 +226,7 @@ impl CameraControl {
         // farthest away. Its tries count for the next command, so that the silence is reported.
         if self.commands.is_full() {
             self.commands.pop_front();
-            self.sent = false;
+            self.current_sent = false;
         }
         let _ = self.commands.push_back(order);
     }
@@ -236,40 +240,40 @@ impl CameraControl {
         links: &mut Links,
     ) {
         let Some(&order) = self.commands.front() else { return };
-        if self.sent && !timers.is_due(Timer::CameraCommand, now) {
+        if self.current_sent && !timers.is_due(Timer::CameraCommand, now) {
             return;
         }
         if self.tries == MAX_TRIES {
             // A command that was not sent stays: the tries were those of an earlier command, which
             // was dropped when the queue was full.
-            if self.sent {
+            if self.current_sent {
                 self.commands.pop_front();
             }
-            (self.tries, self.sent) = (0, false);
-            if !core::mem::replace(&mut self.failed, true) {
+            (self.tries, self.current_sent) = (0, false);
+            if !core::mem::replace(&mut self.failure_reported, true) {
                 links.send_text(Severity::Warning, "Camera trigger is not acknowledged");
             }
             return;
         }
         links.push(Link::Autopilot, order.to_message());
         self.tries += 1;
-        self.sent = true;
+        self.current_sent = true;
         timers.set(Timer::CameraCommand, now + REPEAT_EVERY);
     }
 
     fn drop_current_command(&mut self) {
         self.commands.pop_front();
-        (self.tries, self.sent) = (0, false);
+        (self.tries, self.current_sent) = (0, false);
     }
 
     pub(super) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
-        let waits =
-            self.sent && self.commands.front().is_some_and(|o| o.mav_command() == ack.command);
+        let waits = self.current_sent
+            && self.commands.front().is_some_and(|o| o.mav_command() == ack.command);
         if !waits {
             return;
         }
         self.drop_current_command();
-        if ack.result != ACCEPTED && !core::mem::replace(&mut self.failed, true) {
+        if ack.result != ACCEPTED && !core::mem::replace(&mut self.failure_reported, true) {
             links.send_text_with_numbers(
                 Severity::Warning,
                 "Autopilot refuses the camera: # (result #)",
@@ -287,7 +291,7 @@ pub(super) fn heading<const W: usize>(
     path: &Path<W>,
     along_m: f32,
 ) -> Option<f32> {
-    if let HeadingMode::Fixed(heading) = photographs.heading_mode {
+    if let HeadingMode::FixedEnuRad(heading) = photographs.heading_mode {
         return Some(heading);
     }
     let mut found = None;

@@ -22,7 +22,7 @@ use crate::timers::{Timer, Timers};
 
 /// Deviation of a vehicle from its path, metres: a neighbour within the safety distance plus this
 /// of the path blocks it.
-pub(super) const BLOCKED_WITHIN_M: f32 = 0.25;
+pub(super) const BLOCKED_BEYOND_SAFETY_DISTANCE_M: f32 = 0.25;
 /// Distance beyond where the vehicle can stop within which a keep-out zone blocks its path, metres.
 /// The vehicle photographs the path up to its stop, and the detour cuts off no more than this of
 /// the rest. It is the distance flown at 15 m/s while the zones of 32 vehicles are compared with
@@ -30,13 +30,14 @@ pub(super) const BLOCKED_WITHIN_M: f32 = 0.25;
 const BLOCKED_BEYOND_STOP_M: f32 = 8.0;
 /// Added to [`BLOCKED_BEYOND_STOP_M`] once the path is blocked, metres: the vehicle may have
 /// stopped a little sooner than expected.
-const STAYS_BLOCKED_BEYOND_M: f32 = 4.0;
+const BEYOND_STOP_HYSTERESIS_M: f32 = 4.0;
 /// Distance from the path within which a zone blocks it, beyond the safety distance, and distance
 /// beyond where the vehicle can stop up to which that counts, metres.
-pub(super) const BLOCKED_M: [f32; 2] = [BLOCKED_WITHIN_M, BLOCKED_BEYOND_STOP_M];
-/// As [`BLOCKED_M`], of a path that is blocked already, metres.
-pub(super) const STAYS_BLOCKED_M: [f32; 2] =
-    [DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + STAYS_BLOCKED_BEYOND_M];
+pub(super) const BLOCKED_BESIDE_AND_BEYOND_STOP_M: [f32; 2] =
+    [BLOCKED_BEYOND_SAFETY_DISTANCE_M, BLOCKED_BEYOND_STOP_M];
+/// As [`BLOCKED_BESIDE_AND_BEYOND_STOP_M`], of a path that is blocked already, metres.
+pub(super) const STAYS_BLOCKED_BESIDE_AND_BEYOND_STOP_M: [f32; 2] =
+    [DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + BEYOND_STOP_HYSTERESIS_M];
 /// Distance from the vehicle within which zones count, and along the path within which a block is
 /// searched, for the place where a detour returns to the path, metres.
 const LOOK_AHEAD_M: f32 = 60.0;
@@ -44,9 +45,9 @@ const LOOK_AHEAD_M: f32 = 60.0;
 /// block the detour again.
 pub(super) const DETOUR_MARGIN_M: f32 = 0.5;
 /// Time from a search that found no detour to the next search.
-pub(super) const DETOUR_BESIDE_RETRY: Duration = Duration::from_secs(30);
+pub(super) const REJOIN_SEARCH_PAUSE: Duration = Duration::from_secs(30);
 /// Maximum number of detours while one plan is flown.
-const MAX_DETOURS: u8 = 16;
+const MAX_DETOURS_PER_PLAN: u8 = 16;
 /// Maximum number of keep-out zones that are compared with the path.
 const MAX_REJOIN_ZONES: usize = 8;
 /// Maximum number of places on the path that are compared with the zones.
@@ -72,15 +73,15 @@ impl AreaDetourSearches {
         self.found = self.found.saturating_add(1);
     }
 
-    /// Whether a detour may be sought now: not within [`DETOUR_BESIDE_RETRY`] of a failure, and
-    /// [`MAX_DETOURS`] times at most.
+    /// Whether a detour may be sought now: not within [`REJOIN_SEARCH_PAUSE`] of a failure, and
+    /// [`MAX_DETOURS_PER_PLAN`] times at most.
     pub(super) fn may_seek(&self, now: Instant, timers: &Timers) -> bool {
-        self.found < MAX_DETOURS && timers.is_due(Timer::RejoinSearch, now)
+        self.found < MAX_DETOURS_PER_PLAN && timers.is_due(Timer::RejoinSearch, now)
     }
 }
 
-/// Number of values of `index` for [`neighbour_zones`]: two for each neighbour.
-fn neighbour_zones_count<const V: usize, const W: usize, const G: usize>(
+/// Number of values of `index` for [`visit_neighbour_zones`]: two for each neighbour.
+fn neighbour_zone_index_count<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
 ) -> usize {
     2 * view.neighbours.len()
@@ -90,17 +91,17 @@ fn neighbour_zones_count<const V: usize, const W: usize, const G: usize>(
 /// these are, below n, the zones of neighbour `index`'s places; from n on the column in which
 /// neighbour `index − n` may come down, if it is in the air off the plan. Reported obstacles are
 /// not among them.
-fn neighbour_zones<const V: usize, const W: usize, const G: usize>(
+fn visit_neighbour_zones<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     index: usize,
     visit: &mut dyn FnMut(KeepOutZone),
 ) {
     let apart_m = view.config.safety_distance_m + DETOUR_MARGIN_M;
     match index.checked_sub(view.neighbours.len()) {
-        None => view.neighbours.zones_of(index, view.now, [apart_m; 2], visit),
+        None => view.neighbours.for_each_zone_of(index, view.now, [apart_m; 2], visit),
         Some(i) => {
             let beside_m = apart_m + view.neighbours.pair_position_error_m();
-            view.neighbours.landing_column(i, view.now, beside_m, |column| {
+            view.neighbours.visit_landing_column(i, view.now, beside_m, |column| {
                 visit(KeepOutZone { kind: ZoneKind::Static, ..column });
             });
         }
@@ -108,11 +109,12 @@ fn neighbour_zones<const V: usize, const W: usize, const G: usize>(
 }
 
 /// Passes the keep-out zones of all other vehicles in a coverage mission to `visit`.
-pub(super) fn zones_of_others<const V: usize, const W: usize, const G: usize>(
+pub(super) fn visit_zones_of_others<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     visit: &mut dyn FnMut(KeepOutZone),
 ) {
-    (0..neighbour_zones_count(view)).for_each(|index| neighbour_zones(view, index, visit));
+    (0..neighbour_zone_index_count(view))
+        .for_each(|index| visit_neighbour_zones(view, index, visit));
 }
 
 /// Distance of a place from the surface of a zone, metres; negative inside.
@@ -129,7 +131,7 @@ pub(super) fn is_barred<const V: usize, const W: usize, const G: usize>(
     place: &Point,
 ) -> bool {
     let mut barred = known.iter().any(|zone| distance_to_zone_m(zone, place) <= 0.0);
-    zones_of_others(view, &mut |zone| barred |= distance_to_zone_m(&zone, place) <= 0.0);
+    visit_zones_of_others(view, &mut |zone| barred |= distance_to_zone_m(&zone, place) <= 0.0);
     barred
 }
 
@@ -140,22 +142,22 @@ pub(super) fn first_rejoin_m<const V: usize, const W: usize, const G: usize>(
     known: &[KeepOutZone],
 ) -> Option<f32> {
     let plan = view.mission.plan()?;
-    let (from_m, here) = (view.guidance.along_m(), view.telemetry.position);
+    let (from_m, here) = (view.guidance.reference_along_m(), view.telemetry.position);
     let waypoints = plan.path.waypoints();
     let home_m = waypoints.iter().nth_back(1)?.along_m;
-    let most_m = view.guidance.gates_open_up_to_m(&view.scene).min(home_m);
+    let most_m = view.guidance.gates_open_up_to_m(&view.guidance_inputs).min(home_m);
     let mut things = Vec::<KeepOutZone, MAX_REJOIN_ZONES>::new();
     let add = |thing: KeepOutZone, things: &mut Vec<_, MAX_REJOIN_ZONES>| {
         _ = (distance_to_zone_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
     };
     known.iter().for_each(|thing| add(*thing, &mut things));
-    for index in 0..neighbour_zones_count(view) {
+    for index in 0..neighbour_zone_index_count(view) {
         // Zones beyond the list's capacity are left out here: the shell's search for the detour
         // knows all of them.
         if things.is_full() {
             break;
         }
-        neighbour_zones(view, index, &mut |thing| add(thing, &mut things));
+        visit_neighbour_zones(view, index, &mut |thing| add(thing, &mut things));
     }
     let (mut at_m, mut met) = (from_m, false);
     for _ in 0..MAX_SAMPLES {

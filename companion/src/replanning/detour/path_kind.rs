@@ -18,10 +18,10 @@ pub(crate) struct RejoinPlace {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RejoinPlaces {
     /// Place where the vehicle left its path, or where it is to hold for a division.
-    pub own: RejoinPlace,
-    /// First free place beyond the block as it was when the vehicle left, used if `own` stays
-    /// barred; equal to `own` where there was none.
-    pub beyond: RejoinPlace,
+    pub first_choice: RejoinPlace,
+    /// First free place beyond the block as it was when the vehicle left, used if `first_choice`
+    /// stays barred; equal to `first_choice` where there was none.
+    pub beyond_block: RejoinPlace,
 }
 
 /// Purpose of a path requested from the shell.
@@ -33,7 +33,7 @@ pub(crate) enum DetourPurpose {
     /// where it comes back to its path.
     Aside(Option<RejoinPlaces>),
     /// Aside, to land where no other vehicle lies.
-    Landing,
+    LandingAside,
     /// Straight home in a coverage mission.
     Home,
     /// Around an obstacle in a coverage mission, back to this place on the own path.
@@ -58,22 +58,22 @@ pub(crate) enum PathKind {
 impl DetourPurpose {
     /// Whether the path ends aside, where the vehicle only makes room, or lands.
     pub(crate) fn is_aside(&self) -> bool {
-        matches!(self, Self::Aside(_) | Self::Landing)
+        matches!(self, Self::Aside(_) | Self::LandingAside)
     }
 
     /// Place where the vehicle comes back to its own path in a coverage mission; `None` if it does
     /// not.
-    pub(crate) fn rejoin(&self) -> Option<RejoinPlace> {
+    pub(crate) fn rejoin_place(&self) -> Option<RejoinPlace> {
         match self {
             Self::Rejoin(back) => Some(*back),
-            Self::Aside(places) => places.map(|places| places.own),
+            Self::Aside(places) => places.map(|places| places.first_choice),
             _ => None,
         }
     }
 
     /// Whether the vehicle comes back to its plan after this path.
-    pub(crate) fn keeps_to_plan(&self) -> bool {
-        self.rejoin().is_some()
+    pub(crate) fn returns_to_plan(&self) -> bool {
+        self.rejoin_place().is_some()
     }
 }
 
@@ -95,7 +95,7 @@ impl PathKind {
     pub(crate) fn without_rejoin(self) -> Self {
         match self {
             Self::PlanReady => Self::Plan,
-            Self::Detour(purpose) if purpose.keeps_to_plan() => Self::OffPlan,
+            Self::Detour(purpose) if purpose.returns_to_plan() => Self::OffPlan,
             other => other,
         }
     }

@@ -1,6 +1,6 @@
 //! Which path a vehicle flies, and whether it comes back from there to its plan's path.
 //!
-//! Constant work but for [`Detours::rejoin_from_aside`], once a search.
+//! Constant work but for [`Detours::rejoin_place_from_aside`], once a search.
 
 use super::path_kind::{DetourPurpose, PathKind, RejoinPlace, RejoinPlaces};
 use super::{Detours, beside};
@@ -28,13 +28,13 @@ impl Detours {
     }
 
     /// Purpose of the path that is requested from the shell; `None` if none is.
-    pub(crate) fn sought(&self) -> Option<DetourPurpose> {
-        self.sought
+    pub(crate) fn requested_purpose(&self) -> Option<DetourPurpose> {
+        self.requested_purpose
     }
 
     /// Forgets the request for a path: the vehicle stays on the path that it flies.
     pub(crate) fn cancel_request(&mut self) {
-        (self.sought, self.request_read, self.detour_ready) = (None, false, false);
+        (self.requested_purpose, self.request_read, self.detour_ready) = (None, false, false);
     }
 
     /// Whether the vehicle flies straight home in a coverage mission, stops for that, or seeks the
@@ -48,17 +48,17 @@ impl Detours {
     pub(crate) fn ends_away_from_goal(&self) -> bool {
         self.path_kind
             .purpose()
-            .is_some_and(|purpose| purpose.is_aside() || purpose.keeps_to_plan())
+            .is_some_and(|purpose| purpose.is_aside() || purpose.returns_to_plan())
     }
 
     /// Whether the vehicle flies, in a coverage mission, a detour back to its plan's path, or aside
     /// with a place there to come back to.
     pub(crate) fn is_beside_plan(&self) -> bool {
-        self.path_kind.purpose().is_some_and(|purpose| purpose.keeps_to_plan())
+        self.path_kind.purpose().is_some_and(|purpose| purpose.returns_to_plan())
     }
 
     /// Whether the detour that is flown ends on the plan's path in a coverage mission.
-    pub(crate) fn leads_back(&self) -> bool {
+    pub(crate) fn ends_on_plan_path(&self) -> bool {
         matches!(self.path_kind, PathKind::Detour(DetourPurpose::Rejoin(_)))
     }
 
@@ -67,24 +67,26 @@ impl Detours {
     pub(crate) fn rejoin_places(&self) -> Option<RejoinPlaces> {
         match self.path_kind {
             PathKind::Detour(DetourPurpose::Aside(places)) => places,
-            _ => self.rejoin().map(|own| RejoinPlaces { own, beyond: own }),
+            _ => {
+                self.rejoin_place().map(|own| RejoinPlaces { first_choice: own, beyond_block: own })
+            }
         }
     }
 
     /// Place where the vehicle is to come back to its path in a coverage mission; `None` if it does
     /// not come back.
-    pub(crate) fn rejoin(&self) -> Option<RejoinPlace> {
-        self.path_kind.purpose().and_then(|purpose| purpose.rejoin())
+    pub(crate) fn rejoin_place(&self) -> Option<RejoinPlace> {
+        self.path_kind.purpose().and_then(|purpose| purpose.rejoin_place())
     }
 
     /// Place where a vehicle aside returns to its path now: where it left the path; or beyond the
     /// block, once the first place has been barred, or no way to it was found, for too long. `None`
     /// while the vehicle waits for that place to be free.
-    pub(crate) fn rejoin_from_aside<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn rejoin_place_from_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> Option<RejoinPlace> {
-        let RejoinPlaces { own, beyond } = self.rejoin_places()?;
+        let RejoinPlaces { first_choice: own, beyond_block: beyond } = self.rejoin_places()?;
         let barred = own != beyond && beside::is_barred(view, self.obstacles.all(), &own.position);
         let most_s = if barred { MAX_BARRED_WAIT_S } else { MAX_REJOIN_SEARCH_S };
         match self.blocked_for(view.now) >= Duration::from_secs(most_s) {
@@ -134,12 +136,12 @@ impl Detours {
     }
 
     /// Whether the vehicle seeks a landing place aside.
-    pub(crate) fn seeks_landing(&self) -> bool {
-        self.sought == Some(DetourPurpose::Landing)
+    pub(crate) fn seeks_landing_aside(&self) -> bool {
+        self.requested_purpose == Some(DetourPurpose::LandingAside)
     }
 
     /// Whether the vehicle lands at the end of the detour that it flies.
     pub(crate) fn lands_at_end(&self) -> bool {
-        self.path_kind == PathKind::Detour(DetourPurpose::Landing)
+        self.path_kind == PathKind::Detour(DetourPurpose::LandingAside)
     }
 }

@@ -3,15 +3,16 @@
 //!
 //! Cost: a request lists every known keep-out zone.
 
-use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
+use planner_core::detour::{DetourGoal, DetourRequest, KeepOutZone};
 use planner_core::flight::Waypoint;
 use planner_core::{Length, Point};
 
-use super::beside::{self, BLOCKED_WITHIN_M, DETOUR_BESIDE_RETRY, DETOUR_MARGIN_M};
-use super::homeward::RETURN_RETRY;
+use super::beside::{self, BLOCKED_BEYOND_SAFETY_DISTANCE_M, DETOUR_MARGIN_M, REJOIN_SEARCH_PAUSE};
+use super::homeward::HOME_SEARCH_PAUSE;
 use super::path_kind::{DetourPurpose, PathKind};
 use super::{
-    DETOUR_RETRY_S, Detours, EARLY_GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER, TURN_DELAY_S,
+    Detours, EARLY_GIVE_UP_AFTER_S, MAX_FAILED_SEARCHES, MAX_SEARCH_PAUSE_S, STUCK_AFTER,
+    TURN_DELAY_PER_VEHICLE_S,
 };
 use crate::guidance::evade;
 use crate::replanning::view::DetourView;
@@ -20,7 +21,7 @@ use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
 /// Time from a search that found no landing place aside to the next search, seconds.
-const SIDESTEP_RETRY_S: u64 = 30;
+const ASIDE_SEARCH_PAUSE_S: u64 = 30;
 /// Time for which a landing was held, after which a vehicle that hears no other one seeks a landing
 /// place aside.
 const HELD_LANDING_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
@@ -33,19 +34,19 @@ const SETPOINT_ON_PATH_M: f32 = 0.1;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RetryOutlook {
     /// A silent vehicle may still be coming down; once on the ground it leaves more room.
-    Settles,
+    SilentVehicleComesDown,
     /// Another vehicle may still move.
-    Open,
+    OthersMayMove,
     /// No other vehicle will move any more.
-    Closed,
+    NoneWillMove,
 }
 
 /// Ends of the leg on which the reference is: the one ahead, then the one behind.
-fn leg_ahead<'a, const V: usize, const W: usize, const G: usize>(
+fn reference_leg_ends<'a, const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'a, V, W, G>,
 ) -> Option<[&'a Waypoint; 2]> {
     let points = view.mission.plan()?.path.waypoints();
-    let along_m = view.guidance.along_m();
+    let along_m = view.guidance.reference_along_m();
     let last = points.len().saturating_sub(1);
     let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(last);
     Some([points.get(next)?, points.get(next.saturating_sub(1))?])
@@ -58,8 +59,8 @@ impl Detours {
     pub(super) fn search_pause_s<const V: usize, const W: usize, const G: usize>(
         view: &DetourView<'_, V, W, G>,
     ) -> u64 {
-        let blocked = view.neighbours.blocked_count_before(u8::MAX);
-        (TURN_DELAY_S * (blocked + 4)).min(DETOUR_RETRY_S)
+        let blocked = view.neighbours.blocked_count_below_id(u8::MAX);
+        (TURN_DELAY_PER_VEHICLE_S * (blocked + 4)).min(MAX_SEARCH_PAUSE_S)
     }
 
     /// Whether a blocked vehicle in a coverage mission is no longer held by a gate or by the safety
@@ -67,45 +68,47 @@ impl Detours {
     pub(super) fn is_freed_over_area<const V: usize, const W: usize, const G: usize>(
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
-        view.config.lost_vehicle_down_s.is_some()
+        view.config.lost_vehicle_down_after_s.is_some()
             && view.mission.state() == State::Blocked
-            && view.guidance.advice.waiting_for == 0
+            && view.guidance.advice.waiting_for_id == 0
             && view.guidance.filter.hindered_for(view.now) == Duration::default()
     }
 
     /// Whether this vehicle may search for a landing place beside its path: its task leaves the
     /// pad; it hears another vehicle, all others rest, or its landing has been held for
-    /// [`HELD_LANDING_SIDESTEP_AFTER`]; and no search aside failed within [`SIDESTEP_RETRY_S`].
+    /// [`HELD_LANDING_SIDESTEP_AFTER`]; and no search aside failed within [`ASIDE_SEARCH_PAUSE_S`].
     pub(crate) fn may_seek_landing_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> bool {
-        let retries = |at: Instant| view.now - at >= Duration::from_secs(SIDESTEP_RETRY_S);
+        let retries = |at: Instant| view.now - at >= Duration::from_secs(ASIDE_SEARCH_PAUSE_S);
         view.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
             && (!view.neighbours.hears_nobody(view.now)
                 || view.neighbours.are_all_landed_or_out()
                 || view.guidance.filter.column_blocked_for(view.now) >= HELD_LANDING_SIDESTEP_AFTER)
-            && self.no_way_aside_at.is_none_or(retries)
+            && self.aside_search_failed_at.is_none_or(retries)
     }
 
     /// Whether this vehicle seeks no further detour: enough searches failed, or enough detours led
     /// nowhere.
     pub(crate) fn has_given_up_detours(&self) -> bool {
         self.no_retry
-            || self.failures.saturating_add(self.detours_without_progress) >= MAX_DETOUR_SEARCHES
+            || self.failed_searches.saturating_add(self.detours_without_progress)
+                >= MAX_FAILED_SEARCHES
     }
 
     /// Time for which this vehicle has waited below a vehicle that lands, unable to leave along its
-    /// path; zero for [`DETOUR_RETRY_S`] after a search aside failed.
+    /// path; zero for [`MAX_SEARCH_PAUSE_S`] after a search aside failed.
     pub(crate) fn time_below_landing<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> Duration {
-        let retries = |at: Instant| view.now - at >= Duration::from_secs(DETOUR_RETRY_S);
+        let retries = |at: Instant| view.now - at >= Duration::from_secs(MAX_SEARCH_PAUSE_S);
         let may_seek = |_: &Instant| {
-            view.guidance.is_setpoint_at_reference() && self.no_way_aside_at.is_none_or(retries)
+            view.guidance.is_setpoint_at_reference()
+                && self.aside_search_failed_at.is_none_or(retries)
         };
-        let trapped = view.guidance.trapped_since().filter(may_seek);
+        let trapped = view.guidance.trapped_below_since().filter(may_seek);
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 
@@ -115,14 +118,14 @@ impl Detours {
         if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Rejoin(_)) {
             self.path_kind = self.path_kind.without_rejoin();
         }
-        (self.sought, self.request_read) = (Some(purpose), false);
+        (self.requested_purpose, self.request_read) = (Some(purpose), false);
         self.obstacles.mark_requested();
         self.detour_ready = false;
     }
 
     /// Notes that the shell reads the request: its next answer belongs to it.
     pub(crate) fn note_request_read(&mut self) {
-        self.request_read = self.sought.is_some();
+        self.request_read = self.requested_purpose.is_some();
     }
 
     /// Whether the shell has read the request.
@@ -145,12 +148,13 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> Option<Point> {
         let (guidance, config) = (view.guidance, view.config);
-        let spare_m = leg_ahead(view)?[0].clearance_m - config.required_clearance_m;
-        let checked = config.lost_vehicle_down_s.is_some()
-            || guidance.setpoint_off_path_m(&view.scene) <= spare_m.max(SETPOINT_ON_PATH_M);
-        match checked && self.seeks_landing() && guidance.is_setpoint_still() {
+        let spare_m = reference_leg_ends(view)?[0].leg_clearance_m - config.required_clearance_m;
+        let checked = config.lost_vehicle_down_after_s.is_some()
+            || guidance.setpoint_off_path_m(&view.guidance_inputs)
+                <= spare_m.max(SETPOINT_ON_PATH_M);
+        match checked && self.seeks_landing_aside() && guidance.is_setpoint_still() {
             true => Some(guidance.setpoint_position()),
-            false => view.mission.plan()?.path.point_at(guidance.along_m()),
+            false => view.mission.plan()?.path.point_at(guidance.reference_along_m()),
         }
     }
 
@@ -161,28 +165,28 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
         mut visit: impl FnMut(KeepOutZone),
     ) -> Option<DetourRequest> {
-        let (sought, plan) = (self.sought?, view.mission.plan()?);
-        let along_m = view.guidance.along_m();
-        let [ahead, behind] = leg_ahead(view)?;
+        let (requested, plan) = (self.requested_purpose?, view.mission.plan()?);
+        let along_m = view.guidance.reference_along_m();
+        let [ahead, behind] = reference_leg_ends(view)?;
         let apart_m = view.config.safety_distance_m;
         self.obstacles.all().iter().for_each(|obstacle| visit(*obstacle));
-        match view.config.lost_vehicle_down_s {
-            Some(_) if !sought.is_aside() => beside::zones_of_others(view, &mut visit),
+        match view.config.lost_vehicle_down_after_s {
+            Some(_) if !requested.is_aside() => beside::visit_zones_of_others(view, &mut visit),
             _ => {
                 // The zone of a grounded vehicle is only as wide as what blocks a path, so that a
                 // goal planned beside it can be reached.
-                let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_WITHIN_M];
-                view.neighbours.for_each_place(view.now, apart, &mut visit);
+                let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_BEYOND_SAFETY_DISTANCE_M];
+                view.neighbours.for_each_keep_out_zone(view.now, apart, &mut visit);
             }
         }
-        if sought.is_aside() {
+        if requested.is_aside() {
             view.neighbours.for_each_landing_column(
                 view.now,
                 apart_m + evade::EVADE_MARGIN_M,
                 &mut visit,
             );
         }
-        if sought == DetourPurpose::Landing {
+        if requested == DetourPurpose::LandingAside {
             let height_m = plan.path.point_at(along_m)?.z;
             view.neighbours.for_each_landing_zone(
                 view.now,
@@ -190,16 +194,17 @@ impl Detours {
                 visit,
             );
         }
-        let (goal, descent_m) = match view.config.lost_vehicle_down_s {
-            Some(_) => match sought.rejoin() {
+        let (goal, descent_m) = match view.config.lost_vehicle_down_after_s {
+            Some(_) => match requested.rejoin_place() {
                 Some(back) => {
-                    let (over, ground_m) = (back.position, view.guidance.ground_m(plan));
-                    (Goal::Home { over, layer_m: over.z }, (over.z - ground_m).max(0.0))
+                    let (over, ground_m) = (back.position, view.guidance.planned_ground_m(plan));
+                    let home = DetourGoal::Home { above_pad: over, layer_z_m: over.z };
+                    (home, (over.z - ground_m).max(0.0))
                 }
                 None => view.mission.home_goal(),
             },
             None => match plan.task.goal() {
-                Some(goal) => (Goal::Node(goal), plan.descent_m),
+                Some(goal) => (DetourGoal::RoadmapGoal(goal), plan.descent_m),
                 // The flight ends over the vehicle's own pad.
                 None if plan.task.leaves_pad() => view.mission.home_goal(),
                 None => return None,
@@ -207,14 +212,14 @@ impl Detours {
         };
         let here = self.start_of_detour(view)?;
         let off_m = plan.path.point_at(along_m).map_or(0.0, |on| (on - here).length());
-        let over_area = view.config.lost_vehicle_down_s.is_some();
+        let over_area = view.config.lost_vehicle_down_after_s.is_some();
         // From beside the leg the first way to its end has that much less room.
         let off_m = if over_area || off_m <= SETPOINT_ON_PATH_M { 0.0 } else { off_m };
         Some(DetourRequest {
-            aside: sought.is_aside(),
+            land_aside: requested.is_aside(),
             here,
             leg: [ahead.position, behind.position],
-            leg_clearance_m: ahead.clearance_m - off_m,
+            leg_clearance_m: ahead.leg_clearance_m - off_m,
             goal,
             descent_m,
             required_clearance_m: view.config.required_clearance_m,
@@ -237,13 +242,13 @@ impl Detours {
         let on_detour = self.path_kind.is_detour();
         let stuck = on_detour && now - progress_at > STUCK_AFTER;
         let fruitless = if stuck { self.detours_without_progress.saturating_add(1) } else { 0 };
-        self.obstacles.avoid_requested();
+        self.obstacles.mark_requested_avoided();
         let Self { mut home, area_searches: mut field_searches, .. } = *self;
         home.end();
         field_searches.note_found();
         *self = Self {
             obstacles: core::mem::take(&mut self.obstacles),
-            left_plan: self.left_plan || !purpose.keeps_to_plan(),
+            left_plan: self.left_plan || !purpose.returns_to_plan(),
             left_at_m: if on_detour { self.left_at_m } else { progress_m },
             path_kind: PathKind::Detour(purpose),
             detour_ready: true,
@@ -258,7 +263,7 @@ impl Detours {
     /// Notes that there is no free place on the plan's path to return to, so that no detour can be
     /// requested.
     pub(crate) fn note_no_rejoin_place(now: Instant, timers: &mut Timers) {
-        timers.set(Timer::RejoinSearch, now + DETOUR_BESIDE_RETRY);
+        timers.set(Timer::RejoinSearch, now + REJOIN_SEARCH_PAUSE);
     }
 
     /// Notes that the shell found no path from `along_m` metres along the path, and whether to
@@ -270,36 +275,37 @@ impl Detours {
         now: Instant,
         timers: &mut Timers,
     ) {
-        match self.sought {
+        match self.requested_purpose {
             // The path home is sought again after a while.
             Some(DetourPurpose::Home) => {
-                return timers.set(Timer::HomeSearch, now + RETURN_RETRY);
+                return timers.set(Timer::HomeSearch, now + HOME_SEARCH_PAUSE);
             }
             // A failed search for a path aside does not count as a failed search for a detour.
-            Some(DetourPurpose::Aside(_) | DetourPurpose::Landing) => {
-                self.no_way_aside_at = Some(now);
+            Some(DetourPurpose::Aside(_) | DetourPurpose::LandingAside) => {
+                self.aside_search_failed_at = Some(now);
                 return;
             }
             Some(DetourPurpose::Rejoin(_)) => return Self::note_no_rejoin_place(now, timers),
             Some(DetourPurpose::Goal) | None => {}
         }
         self.failed_at = now;
-        if outlook == RetryOutlook::Settles {
+        if outlook == RetryOutlook::SilentVehicleComesDown {
             // Each failure delays the next request, but alone never ends the search: once the
             // silent vehicle is on the ground, a detour may be found.
-            self.failures = self.failures.saturating_add(1).min(MAX_DETOUR_SEARCHES - 1);
+            self.failed_searches =
+                self.failed_searches.saturating_add(1).min(MAX_FAILED_SEARCHES - 1);
             return;
         }
         if (along_m - self.failed_at_m).abs() > SAME_SEARCH_PLACE_M {
-            (self.failures_here, self.failed_at_m) = (0, along_m);
+            (self.failed_searches_here, self.failed_at_m) = (0, along_m);
         }
-        if self.failures_here == 0 {
+        if self.failed_searches_here == 0 {
             self.failed_since = now;
         }
-        self.failures = self.failures.saturating_add(1);
-        self.failures_here = self.failures_here.saturating_add(1);
+        self.failed_searches = self.failed_searches.saturating_add(1);
+        self.failed_searches_here = self.failed_searches_here.saturating_add(1);
         let long = now - self.failed_since >= Duration::from_secs(EARLY_GIVE_UP_AFTER_S);
-        let often = long && self.failures_here >= MAX_DETOUR_SEARCHES - 1;
-        self.no_retry = often || outlook == RetryOutlook::Closed;
+        let often = long && self.failed_searches_here >= MAX_FAILED_SEARCHES - 1;
+        self.no_retry = often || outlook == RetryOutlook::NoneWillMove;
     }
 }

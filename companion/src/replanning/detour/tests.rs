@@ -112,7 +112,7 @@ fn a_vehicle_that_hears_a_lower_system_id_claim_waits_again() {
 #[test]
 fn a_vehicle_stopped_on_its_way_down_lets_others_fly_around() {
     let mut bench = beside_a_lower_id();
-    while bench.companion.guidance.stands_outside_descent() || bench.enu.z > 1.2 {
+    while bench.companion.guidance.is_setpoint_still_outside_descent() || bench.enu.z > 1.2 {
         bench.run(0.05);
     }
     assert_eq!(bench.state(), State::Follow);
@@ -138,7 +138,10 @@ fn a_vehicle_that_died_may_have_been_flown_back_to_its_pad() {
     bench.neighbour = None;
     bench.run(60.0);
     let mut reported = Vec::new();
-    bench.companion.neighbours.for_each_place(bench.now, [1.5; 2], |place| reported.push(place));
+    bench
+        .companion
+        .neighbours
+        .for_each_keep_out_zone(bench.now, [1.5; 2], |place| reported.push(place));
     assert!(
         reported.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5),
         "{reported:?}"
@@ -164,7 +167,10 @@ fn kept_off(flags: u8, positions: Positions) -> Vec<KeepOutZone> {
     }
     bench.run(30.0);
     let mut reported = Vec::new();
-    bench.companion.neighbours.for_each_place(bench.now, [1.5; 2], |place| reported.push(place));
+    bench
+        .companion
+        .neighbours
+        .for_each_keep_out_zone(bench.now, [1.5; 2], |place| reported.push(place));
     reported
 }
 
@@ -228,7 +234,7 @@ fn what_was_found_for_one_plan_opens_no_gate_of_the_next() {
     for tenth in 0..8 {
         let mut bench = Bench::new(two_vehicles());
         let mut plan = plan();
-        plan.gates.push(Gate { at_m: -1.5, id: 77, until_m: 5.0 }).unwrap();
+        plan.gates.push(Gate { at_m: -1.5, wait_for_id: 77, open_from_progress_m: 5.0 }).unwrap();
         bench.answer_plan = Some(Ok(plan.clone()));
         bench.neighbour = Some((Point::new(30.0, 40.0, 0.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
         bench.run_until(State::Ready, 8.0);
@@ -254,7 +260,7 @@ fn a_vehicle_flown_around_by_one_plan_is_looked_at_for_the_next() {
     bench.no_position = true;
     bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
     bench.run(3.0);
-    bench.companion.neighbours.mark_avoided(bench.now);
+    bench.companion.neighbours.mark_out_of_plan_avoided(bench.now);
     bench.no_position = false;
     bench.run_until(State::Ready, 20.0);
     bench.start();
@@ -293,20 +299,31 @@ fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
         let along_m = (rng.next_u32() % 20) as f32;
         for _ in 0..rng.next_u32() % 9 {
             now = now + Duration::from_millis(1_000 + u64::from(rng.next_u32() % 29_000));
-            detours.note_failure(along_m, RetryOutlook::Settles, now, &mut Timers::default());
+            detours.note_failure(
+                along_m,
+                RetryOutlook::SilentVehicleComesDown,
+                now,
+                &mut Timers::default(),
+            );
             let after = |ms: u64| now + Duration::from_millis(ms);
-            let pause_s = TURN_DELAY_S * (2 + u64::from(rng.next_u32() % 6));
+            let pause_s = TURN_DELAY_PER_VEHICLE_S * (2 + u64::from(rng.next_u32() % 6));
             let before = after(1000 * pause_s - 1);
             assert!(!detours.may_search_again(pause_s, before), "searches without a pause");
             assert!(detours.may_search_again(pause_s, after(1000 * pause_s)));
             assert!(!detours.has_given_up_detours(), "that vehicle may yet leave more room");
         }
-        let (mut asked, outlook) =
-            (0, if rng.next_u32() % 2 == 0 { RetryOutlook::Open } else { RetryOutlook::Closed });
+        let (mut asked, outlook) = (
+            0,
+            if rng.next_u32() % 2 == 0 {
+                RetryOutlook::OthersMayMove
+            } else {
+                RetryOutlook::NoneWillMove
+            },
+        );
         while !detours.has_given_up_detours() {
             detours.note_failure(along_m, outlook, now, &mut Timers::default());
             asked += 1;
         }
-        assert!((1..=MAX_DETOUR_SEARCHES).contains(&asked), "{asked}");
+        assert!((1..=MAX_FAILED_SEARCHES).contains(&asked), "{asked}");
     }
 }

@@ -90,11 +90,11 @@ proptest::proptest! {
             }
             if plans {
                 obstacles.mark_requested();
-                obstacles.avoid_requested();
+                obstacles.mark_requested_avoided();
                 model.iter_mut().for_each(|(_, avoided)| *avoided = true);
             }
             proptest::prop_assert!(
-                obstacles.avoided <= obstacles.count() && obstacles.count() <= MAX_OBSTACLES
+                obstacles.avoided_count <= obstacles.count() && obstacles.count() <= MAX_OBSTACLES
             );
             let places: std::collections::BTreeSet<i32> =
                 obstacles.known.iter().map(|o| libm::roundf(o.from.x) as i32).collect();
@@ -102,7 +102,7 @@ proptest::proptest! {
                 model.iter().map(|(x, _)| i32::from(*x)).collect();
             proptest::prop_assert_eq!(places, wanted);
             for (x, avoided) in &model {
-                let new = obstacles.known[obstacles.avoided..]
+                let new = obstacles.known[obstacles.avoided_count..]
                     .iter()
                     .any(|o| libm::roundf(o.from.x) as i32 == i32::from(*x));
                 proptest::prop_assert!(*avoided || new, "{}", x);

@@ -20,7 +20,7 @@ type Outcome = Result<(), NakError>;
 /// The last answered requests and the last closed session, with their outcomes.
 #[derive(Clone, Debug, Default)]
 pub struct DuplicateDetection {
-    done: [Option<AnsweredRequest>; MAX_REMEMBERED],
+    answered: [Option<AnsweredRequest>; MAX_REMEMBERED],
     next: usize,
     closed: Option<ClosedSession>,
 }
@@ -53,7 +53,7 @@ impl DuplicateDetection {
                 at,
             });
         } else {
-            self.done[self.next] =
+            self.answered[self.next] =
                 Some(AnsweredRequest { request: request_fingerprint(request), outcome, at });
             self.next = (self.next + 1) % MAX_REMEMBERED;
         }
@@ -64,7 +64,7 @@ impl DuplicateDetection {
         let print = request_fingerprint(request);
         let known =
             |done: &&AnsweredRequest| done.request == print && now - done.at < REPETITION_WINDOW;
-        self.done.iter().flatten().find(known).map(|done| done.outcome)
+        self.answered.iter().flatten().find(known).map(|done| done.outcome)
     }
 
     /// Outcome of closing the session that the request names, if that was within the last 10 s

@@ -43,9 +43,9 @@ pub enum NakError {
     Errno(u8),
     InvalidSize,
     InvalidSession,
-    Sessions,
+    NoSessionsAvailable,
     EndOfFile,
-    Unknown,
+    UnknownCommand,
     Protected,
     NotFound,
 }
@@ -56,7 +56,7 @@ pub const EFBIG: u8 = 27;
 impl From<UploadError> for NakError {
     fn from(why: UploadError) -> Self {
         match why {
-            UploadError::Armed | UploadError::Waiting => Self::Protected,
+            UploadError::Armed | UploadError::AwaitsRestart => Self::Protected,
             UploadError::Incomplete | UploadError::Damaged | UploadError::Flash => Self::Errno(EIO),
         }
     }
@@ -88,7 +88,7 @@ pub fn upload_text(file: File, result: Result<(), UploadError>) -> Text {
         (File::Field, Ok(())) => 8,
         (File::Mission, Ok(())) => 1,
         (_, Err(UploadError::Armed)) => 3,
-        (_, Err(UploadError::Waiting)) => 4,
+        (_, Err(UploadError::AwaitsRestart)) => 4,
         (_, Err(UploadError::Incomplete)) => 5,
         (_, Err(UploadError::Damaged)) => 6,
         (_, Err(UploadError::Flash)) => 7,
@@ -108,7 +108,7 @@ pub struct FtpRequest {
 }
 
 impl FtpRequest {
-    pub fn read(link: usize, frame: &Frame) -> Self {
+    pub fn from_frame(link: usize, frame: &Frame) -> Self {
         let p = &frame.padded_payload()[3..];
         let mut data = [0; MAX_DATA];
         data.copy_from_slice(&p[HEADER_LEN..HEADER_LEN + MAX_DATA]);

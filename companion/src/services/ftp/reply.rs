@@ -31,9 +31,9 @@ impl Ftp {
             NakError::Errno(errno) => return self.set_reply(request, NAK, 0, &[2, errno]),
             NakError::InvalidSize => 3,
             NakError::InvalidSession => 4,
-            NakError::Sessions => 5,
+            NakError::NoSessionsAvailable => 5,
             NakError::EndOfFile => 6,
-            NakError::Unknown => 7,
+            NakError::UnknownCommand => 7,
             NakError::Protected => 9,
             NakError::NotFound => 10,
         };

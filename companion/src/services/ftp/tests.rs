@@ -46,7 +46,7 @@ fn a_roadmap_goes_up_and_comes_back_over_any_link() {
         assert!(
             world
                 .store
-                .roadmap()
+                .map_range()
                 .is_some_and(|extent| extent.end - extent.start == file.len() as u32)
         );
     }
@@ -161,7 +161,7 @@ fn a_damaged_upload_keeps_the_old_file_and_says_so() {
 
 /// A field of heights of `rows` rows.
 fn field_file(rows: u16) -> Vec<u8> {
-    let shape = FieldShape { low: Flat::new(-20.0, 10.0), cell_m: 5.0, columns: 31, rows };
+    let shape = FieldShape { south_west: Flat::new(-20.0, 10.0), cell_m: 5.0, columns: 31, rows };
     let heights: Vec<i16> = (0..31 * rows as i16).map(|node| 3 * node - 400).collect();
     let mut bytes = vec![0; shape.encoded_len()];
     field::write(&shape, &heights, &mut bytes).unwrap();
@@ -181,7 +181,7 @@ fn a_field_goes_into_its_slots_in_turn_and_a_damaged_one_keeps_the_old() {
             let sum = world.ask(9, op::CRC32, 0, b"field.bin");
             assert_eq!(sum.data, client_crc(&file).to_le_bytes());
             world.restart();
-            let extent = world.store.roadmap().expect("it is in a slot");
+            let extent = world.store.map_range().expect("it is in a slot");
             slots.push(extent.start / LAYOUT.slot_len);
             assert_eq!(bytes_at(&world.flash, Some(extent)), Some(&file[..]));
             // Files with any byte damaged, and a file of another kind, are refused.

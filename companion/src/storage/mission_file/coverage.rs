@@ -5,7 +5,7 @@
 //! The shares W of POWELL-BINPAT (paper CPP §3.2.3) are computed on the host.
 
 use planner_core::coverage::Flat;
-use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind};
+use planner_core::coverage::area::{MAX_VERTEX_COORDINATE_M, Ring, RingKind};
 use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::pack::{Heights, TrackUnit};
 use planner_core::file::FileError;
@@ -13,8 +13,8 @@ use planner_core::flight::Trigger;
 
 use super::error::MissionError;
 use super::numbers::{MAX_SPEED_MPS, f32_at, is_positive_up_to, put_numbers, u16_at, u32_at};
-pub use crate::config::Ground;
-use crate::margins::{LEASE_DELAY_S, LEASE_S, UNHEARD_NOTICED_S};
+pub use crate::config::UnevenGround;
+use crate::margins::{LEASE_RENEWAL_DELAY_S, LEASE_S, UNHEARD_NOTICED_AFTER_S};
 
 /// Bytes of the block before the first vehicle's share.
 const HEAD_LEN: usize = 60;
@@ -32,9 +32,9 @@ pub const MAX_SEARCH_STEPS_OF_FILE: u32 = 20_000_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeadingRule {
     /// The same heading on all lanes.
-    Sweep,
+    SameOnAllLanes,
     /// The direction of flight.
-    Lane,
+    DirectionOfFlight,
 }
 
 /// Which vehicles a part of the area may be assigned to.
@@ -50,11 +50,11 @@ pub enum PartEligibility {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoverageHeader {
     /// The smallest part of the area that is assigned to one vehicle: a lane or a waypoint.
-    pub unit: TrackUnit,
+    pub assignment_unit: TrackUnit,
     /// Which vehicles a part may be assigned to.
-    pub parts: PartEligibility,
+    pub part_eligibility: PartEligibility,
     /// Heading of the vehicles on the lanes.
-    pub heading: HeadingRule,
+    pub heading_rule: HeadingRule,
     /// How the pictures are triggered.
     pub trigger: Trigger,
     /// Most changes of the lanes' order that the planner tries.
@@ -65,12 +65,12 @@ pub struct CoverageHeader {
     pub spacing: Spacing,
     /// Direction of the lanes, degrees from east, counter-clockwise; `None` for the direction of
     /// least width of the area.
-    pub angle_deg: Option<f32>,
+    pub lane_angle_deg: Option<f32>,
     /// Distance by which lanes begin and end beyond the area's edge, metres.
-    pub margin_m: f32,
+    pub lane_overshoot_m: f32,
     /// Heights of uneven ground; the mission then needs the field whose CRC is its `roadmap_crc`.
     /// `None` for level ground.
-    pub ground: Option<Ground>,
+    pub ground: Option<UnevenGround>,
 }
 
 /// Share and vertical speeds of one vehicle.
@@ -86,7 +86,7 @@ pub struct VehicleShare {
 
 /// The coverage block as it is to be written.
 #[derive(Clone, Copy, Debug)]
-pub struct CoverageParts<'a> {
+pub struct CoverageBlock<'a> {
     /// Settings that all vehicles share.
     pub header: CoverageHeader,
     /// Share of each vehicle, in the order of the mission's vehicles.
@@ -97,7 +97,7 @@ pub struct CoverageParts<'a> {
     pub vertices: &'a [Flat],
 }
 
-impl CoverageParts<'_> {
+impl CoverageBlock<'_> {
     /// Length of the block, bytes.
     pub fn encoded_len(&self) -> usize {
         encoded_len(self.shares.len(), self.rings.len(), self.vertices.len())
@@ -108,29 +108,32 @@ impl CoverageParts<'_> {
         let h = &self.header;
         out[..2].copy_from_slice(&(self.vertices.len() as u16).to_le_bytes());
         out[2..4].copy_from_slice(&(self.rings.len() as u16).to_le_bytes());
-        out[4] = u8::from(h.unit == TrackUnit::Waypoint);
-        out[5] = u8::from(h.parts == PartEligibility::SameWeight);
-        out[6] = u8::from(h.heading == HeadingRule::Lane);
+        out[4] = u8::from(h.assignment_unit == TrackUnit::Waypoint);
+        out[5] = u8::from(h.part_eligibility == PartEligibility::SameWeight);
+        out[6] = u8::from(h.heading_rule == HeadingRule::DirectionOfFlight);
         out[7] = match h.trigger {
             Trigger::Distance => 0,
             Trigger::Waypoint => 1,
             Trigger::None => 2,
         };
         out[8..12].copy_from_slice(&h.search_steps.to_le_bytes());
-        let Spacing { footprint, lane_m, waypoint_m } = h.spacing;
-        let angle_deg = h.angle_deg.unwrap_or(f32::NAN);
+        let Spacing { footprint, max_lane_spacing_m: lane_m, max_waypoint_spacing_m: waypoint_m } =
+            h.spacing;
+        let angle_deg = h.lane_angle_deg.unwrap_or(f32::NAN);
         let numbers = [
-            h.heights.mission_m,
-            h.heights.layer_m,
+            h.heights.max_picture_height_m,
+            h.heights.layer_spacing_m,
             footprint.along_m,
             footprint.across_m,
             lane_m,
             waypoint_m,
             angle_deg,
-            h.margin_m,
+            h.lane_overshoot_m,
         ]
         .into_iter()
-        .chain(h.ground.map_or([0.0; 4], |g| [g.height_m, g.tolerance_m, g.low_m, g.high_m]));
+        .chain(h.ground.map_or([0.0; 4], |g| {
+            [g.min_height_above_ground_m, g.height_tolerance_m, g.low_m, g.high_m]
+        }));
         let (head, rest) = out.split_at_mut(HEAD_LEN);
         put_numbers(head, 12, numbers);
         let (shares, rest) = rest.split_at_mut(self.shares.len() * SHARE_LEN);
@@ -171,18 +174,21 @@ pub struct CoverageView<'a> {
 /// Time, in addition to that of its descent, after which a vehicle that no other vehicle hears any
 /// more is on the ground, seconds: its lease, age and delay of the last message, the stop, the wait
 /// of the row `SwarmLinkLost`, and the slow end of a descent.
-const UNHEARD_DOWN_S: f32 = LEASE_S as f32 + UNHEARD_NOTICED_S + LEASE_DELAY_S + 5.0 + 20.0 + 15.0;
+const UNHEARD_DOWN_EXCEPT_DESCENT_S: f32 =
+    LEASE_S as f32 + UNHEARD_NOTICED_AFTER_S + LEASE_RENEWAL_DELAY_S + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {
     /// Time, seconds, after which a vehicle that no other vehicle hears any more is on the ground:
-    /// the end of its lease, the delays and the stop (`UNHEARD_DOWN_S`), and the descent from
-    /// the highest layer at the slowest vehicle's descent speed.
-    pub fn unheard_vehicle_down_s(&self) -> f32 {
-        let Heights { mission_m, layer_m } = self.header.heights;
+    /// the end of its lease, the delays and the stop (`UNHEARD_DOWN_EXCEPT_DESCENT_S`), and the
+    /// descent from the highest layer at the slowest vehicle's descent speed.
+    pub fn unheard_vehicle_down_after_s(&self) -> f32 {
+        let Heights { max_picture_height_m: mission_m, layer_spacing_m: layer_m } =
+            self.header.heights;
         let low_m = self.header.ground.map_or(0.0, |ground| ground.low_m);
         let slowest_mps =
             self.shares().map(|share| share.descend_mps).fold(f32::INFINITY, libm::fminf);
-        UNHEARD_DOWN_S + (mission_m - low_m + layer_m * self.shares.len() as f32) / slowest_mps
+        UNHEARD_DOWN_EXCEPT_DESCENT_S
+            + (mission_m - low_m + layer_m * self.shares.len() as f32) / slowest_mps
     }
 
     /// Checks the coverage block of a mission with so many vehicles.
@@ -204,12 +210,12 @@ impl<'a> CoverageView<'a> {
             vertices: vertices.as_chunks().0,
         };
         if let Some(i) = view.shares().position(|share| !share.is_valid()) {
-            return Err(MissionError::Vehicle(i as u16));
+            return Err(MissionError::InvalidVehicle(i as u16));
         }
         if view.rings.iter().any(|ring| ring[2] > 2 || ring[3] != 0) {
             return refuse("rings");
         }
-        if view.vertices().any(|v| !v.iter().all(|c| libm::fabsf(*c) <= MAX_VERTEX_M)) {
+        if view.vertices().any(|v| !v.iter().all(|c| libm::fabsf(*c) <= MAX_VERTEX_COORDINATE_M)) {
             return refuse("vertices");
         }
         Ok(view)
@@ -266,21 +272,22 @@ impl CoverageHeader {
     fn parse(head: &[u8; HEAD_LEN]) -> Result<Self, MissionError> {
         let refuse = |name| Err(FileError::Header(name).into());
         let angle_deg = f32_at(head, 36);
-        let [height_m, tolerance_m, low_m, high_m] = [44, 48, 52, 56].map(|at| f32_at(head, at));
+        let [min_height_above_ground_m, height_tolerance_m, low_m, high_m] =
+            [44, 48, 52, 56].map(|at| f32_at(head, at));
         let header = Self {
-            unit: match head[4] {
+            assignment_unit: match head[4] {
                 0 => TrackUnit::Lane,
                 1 => TrackUnit::Waypoint,
                 _ => return refuse("unit"),
             },
-            parts: match head[5] {
+            part_eligibility: match head[5] {
                 0 => PartEligibility::Anyone,
                 1 => PartEligibility::SameWeight,
                 _ => return refuse("parts"),
             },
-            heading: match head[6] {
-                0 => HeadingRule::Sweep,
-                1 => HeadingRule::Lane,
+            heading_rule: match head[6] {
+                0 => HeadingRule::SameOnAllLanes,
+                1 => HeadingRule::DirectionOfFlight,
                 _ => return refuse("heading"),
             },
             trigger: match head[7] {
@@ -290,17 +297,20 @@ impl CoverageHeader {
                 _ => return refuse("trigger"),
             },
             search_steps: u32_at(head, 8),
-            heights: Heights { mission_m: f32_at(head, 12), layer_m: f32_at(head, 16) },
+            heights: Heights {
+                max_picture_height_m: f32_at(head, 12),
+                layer_spacing_m: f32_at(head, 16),
+            },
             spacing: Spacing {
                 footprint: Footprint { along_m: f32_at(head, 20), across_m: f32_at(head, 24) },
-                lane_m: f32_at(head, 28),
-                waypoint_m: f32_at(head, 32),
+                max_lane_spacing_m: f32_at(head, 28),
+                max_waypoint_spacing_m: f32_at(head, 32),
             },
-            angle_deg: (!angle_deg.is_nan()).then_some(angle_deg),
-            margin_m: f32_at(head, 40),
-            ground: (head[44..60] != [0; 16]).then_some(Ground {
-                height_m,
-                tolerance_m,
+            lane_angle_deg: (!angle_deg.is_nan()).then_some(angle_deg),
+            lane_overshoot_m: f32_at(head, 40),
+            ground: (head[44..60] != [0; 16]).then_some(UnevenGround {
+                min_height_above_ground_m,
+                height_tolerance_m,
                 low_m,
                 high_m,
             }),
@@ -314,26 +324,27 @@ impl CoverageHeader {
         if self.spacing.check().is_err() {
             return refuse("spacing");
         }
-        let heights = [self.heights.mission_m, self.heights.layer_m];
-        if !heights.iter().all(|h| is_positive_up_to(*h, MAX_VERTEX_M)) {
+        let heights = [self.heights.max_picture_height_m, self.heights.layer_spacing_m];
+        if !heights.iter().all(|h| is_positive_up_to(*h, MAX_VERTEX_COORDINATE_M)) {
             return refuse("heights");
         }
         if self.search_steps > MAX_SEARCH_STEPS_OF_FILE {
             return refuse("search_steps");
         }
-        if self.angle_deg.is_some_and(|angle| !angle.is_finite()) {
+        if self.lane_angle_deg.is_some_and(|angle| !angle.is_finite()) {
             return refuse("angle_deg");
         }
-        if !(0.0..=MAX_VERTEX_M).contains(&self.margin_m) {
+        if !(0.0..=MAX_VERTEX_COORDINATE_M).contains(&self.lane_overshoot_m) {
             return refuse("margin_m");
         }
-        let sound = |ground: &Ground| {
+        let sound = |ground: &UnevenGround| {
             let ends = [ground.low_m, ground.high_m];
-            is_positive_up_to(ground.height_m, MAX_VERTEX_M)
-                && is_positive_up_to(ground.tolerance_m, MAX_VERTEX_M)
-                && ends.iter().all(|m| libm::fabsf(*m) <= MAX_VERTEX_M)
+            is_positive_up_to(ground.min_height_above_ground_m, MAX_VERTEX_COORDINATE_M)
+                && is_positive_up_to(ground.height_tolerance_m, MAX_VERTEX_COORDINATE_M)
+                && ends.iter().all(|m| libm::fabsf(*m) <= MAX_VERTEX_COORDINATE_M)
                 && ground.low_m <= ground.high_m
-                && ground.high_m + ground.height_m <= self.heights.mission_m
+                && ground.high_m + ground.min_height_above_ground_m
+                    <= self.heights.max_picture_height_m
         };
         if !self.ground.as_ref().is_none_or(sound) {
             return refuse("ground");

@@ -12,22 +12,22 @@ pub enum MissionError {
     File(FileError),
     /// The vehicle at this index has no system id, one that another vehicle has, or a number out of
     /// range.
-    Vehicle(u16),
+    InvalidVehicle(u16),
     /// In labelled mode, the vehicle with this system id has the same goal as another vehicle.
     SameGoal(u8),
     /// The vehicle with this system id starts outside the geofence.
     StartOutside(u8),
     /// The goal at this index has a number out of range.
-    Goal(u16),
+    InvalidGoal(u16),
     /// The goal at this index lies outside the geofence.
     GoalOutside(u16),
     /// The output buffer is too small for the mission file of `needed` bytes.
-    MissionFull {
+    BufferTooSmall {
         /// Length of the mission file, bytes.
         needed: usize,
     },
     /// The mission has more vehicles or goals than this companion has room for.
-    RosterFull,
+    TooManyVehiclesOrGoals,
     /// No vehicle of the mission has this system id.
     NotInRoster(u8),
 }
@@ -36,13 +36,13 @@ impl fmt::Display for MissionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File(error) => error.fmt(f),
-            Self::Vehicle(index) => write!(f, "vehicle no. {index} is unsound or twice"),
+            Self::InvalidVehicle(index) => write!(f, "vehicle no. {index} is unsound or twice"),
             Self::SameGoal(id) => write!(f, "vehicle {id} has another one's goal"),
             Self::StartOutside(id) => write!(f, "vehicle {id} starts outside the geofence"),
-            Self::Goal(index) => write!(f, "goal {index} is out of range"),
+            Self::InvalidGoal(index) => write!(f, "goal {index} is out of range"),
             Self::GoalOutside(index) => write!(f, "goal {index} lies outside the geofence"),
-            Self::MissionFull { needed } => write!(f, "it takes {needed} bytes"),
-            Self::RosterFull => write!(f, "it has too many vehicles or goals"),
+            Self::BufferTooSmall { needed } => write!(f, "it takes {needed} bytes"),
+            Self::TooManyVehiclesOrGoals => write!(f, "it has too many vehicles or goals"),
             Self::NotInRoster(id) => write!(f, "it has no vehicle {id}"),
         }
     }

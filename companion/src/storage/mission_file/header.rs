@@ -10,7 +10,7 @@ use planner_core::track::deconflict::Method;
 
 use super::error::MissionError;
 use super::numbers::{MAX_SPEED_MPS, in_range, is_positive_up_to};
-use crate::config::GROUND_STATIONS;
+use crate::config::MAX_GROUND_STATIONS;
 
 /// Settings of a mission that all its vehicles share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +35,7 @@ pub struct MissionHeader {
     /// stay; `None` for no geofence.
     pub geofence: Option<(Point, Point)>,
     /// System ids of the ground stations whose commands count; 0 for an unused entry.
-    pub ground_stations: [u8; GROUND_STATIONS],
+    pub ground_stations: [u8; MAX_GROUND_STATIONS],
 }
 
 impl MissionHeader {
@@ -69,7 +69,7 @@ impl MissionHeader {
         if !self.geofence.as_ref().is_none_or(sound) {
             return refuse("geofence");
         }
-        if self.ground_stations == [0; GROUND_STATIONS] {
+        if self.ground_stations == [0; MAX_GROUND_STATIONS] {
             return refuse("ground_stations");
         }
         Ok(())

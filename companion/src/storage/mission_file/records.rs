@@ -21,7 +21,7 @@ pub struct MissionVehicle {
     /// System id, required clearance, height of the path's start above the pad, and goal.
     pub task: VehicleTask,
     /// First point of the vehicle's path, above its pad, in the mission frame.
-    pub start: Point,
+    pub path_start: Point,
     /// Radius of the vehicle's hull, metres.
     pub radius_m: f32,
     /// Greatest speed of the vehicle, m/s.
@@ -42,7 +42,7 @@ impl MissionVehicle {
         let task = &self.task;
         task.id != 0
             && task.goal.is_none_or(|goal| usize::from(goal) < goals)
-            && in_range(&self.start)
+            && in_range(&self.path_start)
             && (0.0..=MAX_COORDINATE_M).contains(&task.climb_m)
             && is_positive_up_to(task.required_clearance_m, MAX_COORDINATE_M)
             && is_positive_up_to(self.radius_m, MAX_COORDINATE_M)
@@ -58,7 +58,7 @@ impl MissionVehicle {
                 climb_m: f32_at(b, 24),
                 goal: (goal != NO_GOAL).then_some(goal),
             },
-            start: point_at(b, 4),
+            path_start: point_at(b, 4),
             radius_m: f32_at(b, 16),
             speed_max_mps: f32_at(b, 28),
         }
@@ -70,7 +70,7 @@ impl MissionVehicle {
         b[2..4].copy_from_slice(&self.task.goal.unwrap_or(NO_GOAL).to_le_bytes());
         let numbers =
             [self.radius_m, self.task.required_clearance_m, self.task.climb_m, self.speed_max_mps];
-        put_numbers(&mut b, 4, self.start.iter().copied().chain(numbers));
+        put_numbers(&mut b, 4, self.path_start.iter().copied().chain(numbers));
         b
     }
 }

@@ -31,7 +31,7 @@ fn header() -> MissionHeader {
 fn vehicle(id: u8, goal: Option<u16>) -> MissionVehicle {
     MissionVehicle {
         task: VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.2, goal },
-        start: Point::new(0.1 * f32::from(id), 3.0, 1.5),
+        path_start: Point::new(0.1 * f32::from(id), 3.0, 1.5),
         radius_m: 0.3,
         speed_max_mps: 1.5,
     }
@@ -66,7 +66,7 @@ fn all_vehicles_know_the_slowest_and_the_fastest_of_the_mission() {
         for (id, speed_max_mps) in speeds {
             let config = view.companion_config::<3>(id).unwrap();
             assert_eq!(config.cruise_mps, speed_max_mps.min(cruise_mps));
-            assert_eq!((config.slowest_mps, config.fastest_mps), expected, "{id}");
+            assert_eq!((config.slowest_vehicle_mps, config.fastest_vehicle_mps), expected, "{id}");
         }
     }
 }
@@ -92,7 +92,7 @@ fn comes_back_as_written() {
     let (mut tasks, mut descents) = (Vec::<_, 3>::new(), Vec::new());
     let request = view.plan_request(&mut tasks, &mut descents, 128).unwrap();
     assert_eq!(
-        (request.vehicles.len(), request.descents_m, request.mode),
+        (request.vehicles.len(), request.goal_descents_m, request.mode),
         (3, &[1.5, 1.5][..], header().mode)
     );
     let whole = [file.as_slice(), &[0xFF; 40]].concat();
@@ -107,8 +107,8 @@ fn roadmap(starts: u16, goals: u16) -> List<u8> {
         edge_max_m: 5.0,
         tested_clearance_m: 0.5,
         max_clearance_m: 10.0,
-        starts,
-        goals,
+        start_count: starts,
+        goal_count: goals,
     };
     let nodes: List<_> = (0..starts + goals).map(|i| Point::new(f32::from(i), 0.0, 1.5)).collect();
     let mut out = vec![0; roadmap::encoded_len(nodes.len(), 0, 0).unwrap()];
@@ -142,7 +142,7 @@ fn a_companion_is_configured_from_it() {
     assert_eq!((config.cruise_mps, config.geofence), (1.5, header().geofence));
     assert_eq!(config.ground_stations, [255, 0, 245, 9]);
     assert_eq!(view.companion_config::<3>(9), Err(MissionError::NotInRoster(9)));
-    assert_eq!(view.companion_config::<2>(2), Err(MissionError::RosterFull));
+    assert_eq!(view.companion_config::<2>(2), Err(MissionError::TooManyVehiclesOrGoals));
     assert!(view.plan_request(&mut Vec::<_, 2>::new(), &mut Vec::new(), 128).is_err());
 }
 
@@ -169,12 +169,12 @@ fn what_is_not_sound_is_refused_by_name() {
         (forged(72, &nan), FileError::Header("parked_separation_m").into()),
         (forged(100, &nan), FileError::Header("schedule_mps").into()),
         (forged(76, &99.0f32.to_le_bytes()), FileError::Header("geofence").into()),
-        (forged(vehicle_at(1, 0), &[7]), MissionError::Vehicle(1)),
-        (forged(vehicle_at(0, 0), &[0]), MissionError::Vehicle(0)),
-        (forged(vehicle_at(2, 2), &[2, 0]), MissionError::Vehicle(2)),
-        (forged(vehicle_at(2, 4), &nan), MissionError::Vehicle(2)),
-        (forged(vehicle_at(0, 24), &(-0.1f32).to_le_bytes()), MissionError::Vehicle(0)),
-        (forged(HEADER_LEN + 3 * VEHICLE_LEN + 12, &nan), MissionError::Goal(0)),
+        (forged(vehicle_at(1, 0), &[7]), MissionError::InvalidVehicle(1)),
+        (forged(vehicle_at(0, 0), &[0]), MissionError::InvalidVehicle(0)),
+        (forged(vehicle_at(2, 2), &[2, 0]), MissionError::InvalidVehicle(2)),
+        (forged(vehicle_at(2, 4), &nan), MissionError::InvalidVehicle(2)),
+        (forged(vehicle_at(0, 24), &(-0.1f32).to_le_bytes()), MissionError::InvalidVehicle(0)),
+        (forged(HEADER_LEN + 3 * VEHICLE_LEN + 12, &nan), MissionError::InvalidGoal(0)),
         (forged(vehicle_at(2, 4), &(-5.1f32).to_le_bytes()), MissionError::StartOutside(250)),
         (
             forged(HEADER_LEN + 3 * VEHICLE_LEN + GOAL_LEN + 8, &60.5f32.to_le_bytes()),
@@ -188,11 +188,11 @@ fn what_is_not_sound_is_refused_by_name() {
     let one = [vehicle(1, None)];
     assert_eq!(
         write_mission(&header(), &one, &MissionBlock::Goals(&[]), &mut small),
-        Err(MissionError::MissionFull { needed })
+        Err(MissionError::BufferTooSmall { needed })
     );
     assert_eq!(
         write_mission(&header(), &[vehicle(1, Some(0))], &MissionBlock::Goals(&[]), &mut [0; 200]),
-        Err(MissionError::Vehicle(0))
+        Err(MissionError::InvalidVehicle(0))
     );
 }
 
@@ -223,12 +223,12 @@ fn a_text_has_room_for_why_a_mission_is_refused() {
         FileError::Length.into(),
         FileError::Header("parked_separation_m").into(),
         FileError::Crc.into(),
-        MissionError::Vehicle(u16::MAX),
+        MissionError::InvalidVehicle(u16::MAX),
         MissionError::SameGoal(255),
         MissionError::StartOutside(255),
         MissionError::GoalOutside(u16::MAX),
-        MissionError::MissionFull { needed: usize::MAX },
-        MissionError::RosterFull,
+        MissionError::BufferTooSmall { needed: usize::MAX },
+        MissionError::TooManyVehiclesOrGoals,
     ] {
         assert!(error.to_string().len() <= 41, "{error}");
     }

@@ -5,17 +5,17 @@ use planner_core::file::CRC32;
 
 /// Bytes of a flash word of the H743: programmed together, and after a power loss complete or torn.
 /// The words of other boards' flash are smaller, and their length divides this one.
-pub const WORD: usize = 32;
+pub const WORD_LEN: usize = 32;
 /// Most bytes that one request programs: a page of the RP2350's flash.
-pub const MAX_PROGRAM: usize = 256;
+pub const MAX_PROGRAM_LEN: usize = 256;
 /// Most bytes that one request reads.
-pub const MAX_READ: usize = 1024;
+pub const MAX_READ_LEN: usize = 1024;
 
 /// State of a running CRC-32 before its first byte.
 pub(crate) const CRC_START: u32 = u32::MAX;
 
 /// Continues a running CRC-32 (ISO-HDLC without its last inversion) with more bytes.
-pub(crate) fn crc_step(state: u32, bytes: &[u8]) -> u32 {
+pub(crate) fn continue_crc(state: u32, bytes: &[u8]) -> u32 {
     let mut digest = CRC32.digest_with_initial(state.reverse_bits());
     digest.update(bytes);
     !digest.finalize()
@@ -33,23 +33,31 @@ pub struct FlashLayout {
     /// Length of a slot, bytes: whole sectors.
     pub slot_len: u32,
     /// Length of a half of the journal, bytes: whole sectors.
-    pub half_len: u32,
+    pub journal_half_len: u32,
     /// Whether the processor stands still while the flash is programmed: then it is erased and
     /// programmed only where [`ErasePermission`] is not `Forbidden`, on the ground.
-    pub stalls: bool,
+    pub stalls_processor: bool,
 }
 
 impl FlashLayout {
     /// Bank 2 of the STM32H743: 8 sectors of 128 kB, slots in 0–2 and 3–5, journal in 6 and 7.
-    pub const H743: Self =
-        Self { sector_len: 128 << 10, slot_len: 384 << 10, half_len: 128 << 10, stalls: false };
+    pub const H743: Self = Self {
+        sector_len: 128 << 10,
+        slot_len: 384 << 10,
+        journal_half_len: 128 << 10,
+        stalls_processor: false,
+    };
     /// 832 kB of the RP2350's external flash, in sectors of 4 kB.
-    pub const PICO2: Self =
-        Self { sector_len: 4 << 10, slot_len: 384 << 10, half_len: 32 << 10, stalls: true };
+    pub const PICO2: Self = Self {
+        sector_len: 4 << 10,
+        slot_len: 384 << 10,
+        journal_half_len: 32 << 10,
+        stalls_processor: true,
+    };
 
     /// Length of the storage bank, bytes.
     pub const fn len(&self) -> u32 {
-        2 * self.slot_len + 2 * self.half_len
+        2 * self.slot_len + 2 * self.journal_half_len
     }
 
     /// Whether the storage bank has length 0.
@@ -79,15 +87,15 @@ pub enum FlashRequest<'a> {
         /// Offset of the sector's first byte.
         at: u32,
     },
-    /// Program a multiple of [`WORD`] bytes, at most [`MAX_PROGRAM`], at a multiple of [`WORD`];
-    /// they were erased before.
+    /// Program a multiple of [`WORD_LEN`] bytes, at most [`MAX_PROGRAM_LEN`], at a multiple of
+    /// [`WORD_LEN`]; they were erased before.
     Program {
         /// Offset of the first byte.
         at: u32,
         /// Bytes to program.
         bytes: &'a [u8],
     },
-    /// Read bytes, at most [`MAX_READ`].
+    /// Read bytes, at most [`MAX_READ_LEN`].
     Read {
         /// Offset of the first byte.
         at: u32,
@@ -140,7 +148,7 @@ pub enum ReadOutcome<'a> {
     /// The bytes requested by [`Store::request_read`](super::Store::request_read).
     Bytes(&'a [u8]),
     /// The running CRC-32 requested by [`Store::request_crc`](super::Store::request_crc).
-    Sum(u32),
+    Crc(u32),
     /// The flash could not read the bytes.
     Failed,
 }

@@ -12,15 +12,15 @@
 //! relies on one such word: a seal counts only with its CRC, and an area is written only if it is
 //! marked "clean" and not "used".
 
-use super::flash::{FlashFault, FlashLayout, MAX_PROGRAM, ReadFlash, WORD, crc32};
+use super::flash::{FlashFault, FlashLayout, MAX_PROGRAM_LEN, ReadFlash, WORD_LEN, crc32};
 
 /// Offset of an area's data from its first byte.
-pub const DATA_OFFSET: u32 = MAX_PROGRAM as u32;
-const USED_OFFSET: u32 = WORD as u32;
-const SEAL_OFFSET: u32 = 2 * WORD as u32;
+pub const DATA_OFFSET: u32 = MAX_PROGRAM_LEN as u32;
+const USED_OFFSET: u32 = WORD_LEN as u32;
+const SEAL_OFFSET: u32 = 2 * WORD_LEN as u32;
 
-const CLEAN: [u8; WORD] = *b"FLKCLEAN: erased, may be written";
-const USED: [u8; WORD] = *b"FLKUSED:  written to, seal ahead";
+const CLEAN: [u8; WORD_LEN] = *b"FLKCLEAN: erased, may be written";
+const USED: [u8; WORD_LEN] = *b"FLKUSED:  written to, seal ahead";
 const SEAL_MAGIC: [u8; 4] = *b"FLKS";
 
 /// One of the four areas of the storage bank.
@@ -29,7 +29,7 @@ pub enum FlashArea {
     /// Slot 0 or 1, for a roadmap or a field.
     Slot(usize),
     /// Half 0 or 1 of the journal.
-    Half(usize),
+    JournalHalf(usize),
 }
 
 impl FlashArea {
@@ -37,7 +37,7 @@ impl FlashArea {
     pub fn offset(self, layout: &FlashLayout) -> u32 {
         match self {
             Self::Slot(i) => i as u32 * layout.slot_len,
-            Self::Half(i) => 2 * layout.slot_len + i as u32 * layout.half_len,
+            Self::JournalHalf(i) => 2 * layout.slot_len + i as u32 * layout.journal_half_len,
         }
     }
 
@@ -45,7 +45,7 @@ impl FlashArea {
     pub fn len(self, layout: &FlashLayout) -> u32 {
         match self {
             Self::Slot(_) => layout.slot_len,
-            Self::Half(_) => layout.half_len,
+            Self::JournalHalf(_) => layout.journal_half_len,
         }
     }
 
@@ -61,7 +61,7 @@ impl FlashArea {
 }
 
 /// Offset in the storage bank, and the word to program there.
-pub type WordToProgram = (u32, [u8; WORD]);
+pub type WordToProgram = (u32, [u8; WORD_LEN]);
 
 /// The word that marks an area as completely erased.
 pub fn clean_mark(layout: &FlashLayout, area: FlashArea) -> WordToProgram {
@@ -89,40 +89,40 @@ pub struct Seal {
     /// CRC-32 in the last four bytes of the slot's file; 0 in the journal.
     pub crc: u32,
     /// Whether the slot's file is a field of heights, not a roadmap.
-    pub field: bool,
+    pub is_height_field: bool,
 }
 
 impl Seal {
-    fn to_bytes(self) -> [u8; WORD] {
-        let mut word = [0; WORD];
+    fn to_bytes(self) -> [u8; WORD_LEN] {
+        let mut word = [0; WORD_LEN];
         word[..4].copy_from_slice(&SEAL_MAGIC);
         word[4..8].copy_from_slice(&self.sequence.to_le_bytes());
         word[8..12].copy_from_slice(&self.len.to_le_bytes());
         word[12..16].copy_from_slice(&self.crc.to_le_bytes());
-        word[16] = u8::from(self.field);
+        word[16] = u8::from(self.is_height_field);
         append_word_crc(&mut word);
         word
     }
 
-    fn from_bytes(word: &[u8; WORD]) -> Option<Self> {
+    fn from_bytes(word: &[u8; WORD_LEN]) -> Option<Self> {
         (word[..4] == SEAL_MAGIC && has_valid_word_crc(word)).then(|| Self {
             sequence: u32_at(word, 4),
             len: u32_at(word, 8),
             crc: u32_at(word, 12),
-            field: word[16] == 1,
+            is_height_field: word[16] == 1,
         })
     }
 }
 
 /// Writes the CRC-32 of a word's first 28 bytes into its last 4.
-pub fn append_word_crc(word: &mut [u8; WORD]) {
-    let crc = crc32(&word[..WORD - 4]);
-    word[WORD - 4..].copy_from_slice(&crc.to_le_bytes());
+pub fn append_word_crc(word: &mut [u8; WORD_LEN]) {
+    let crc = crc32(&word[..WORD_LEN - 4]);
+    word[WORD_LEN - 4..].copy_from_slice(&crc.to_le_bytes());
 }
 
 /// Whether a word's last 4 bytes are the CRC-32 of its first 28.
-pub fn has_valid_word_crc(word: &[u8; WORD]) -> bool {
-    crc32(&word[..WORD - 4]) == u32_at(word, WORD - 4)
+pub fn has_valid_word_crc(word: &[u8; WORD_LEN]) -> bool {
+    crc32(&word[..WORD_LEN - 4]) == u32_at(word, WORD_LEN - 4)
 }
 
 /// The little-endian u32 at offset `at`.
@@ -162,11 +162,11 @@ pub fn read_condition(
 ) -> AreaCondition {
     let at = area.offset(layout);
     let mut word = |offset| {
-        let mut word = [0; WORD];
+        let mut word = [0; WORD_LEN];
         flash.read(at + offset, &mut word).map(|()| word)
     };
     let (clean, used, sealed) = (word(0), word(USED_OFFSET), word(SEAL_OFFSET));
-    if clean == Ok(CLEAN) && used == Ok([0xFF; WORD]) && sealed == Ok([0xFF; WORD]) {
+    if clean == Ok(CLEAN) && used == Ok([0xFF; WORD_LEN]) && sealed == Ok([0xFF; WORD_LEN]) {
         return AreaCondition::Clean;
     }
     let Some(seal) = sealed.ok().and_then(|word| Seal::from_bytes(&word)) else {
@@ -183,14 +183,14 @@ pub fn read_condition(
 
 /// CRC-32 of a file in flash without its last four bytes, which are its own CRC.
 fn file_crc(at: u32, len: u32, flash: &mut impl ReadFlash) -> Result<u32, FlashFault> {
-    let mut block = [0; MAX_PROGRAM];
+    let mut block = [0; MAX_PROGRAM_LEN];
     let (mut sum, mut done) = (super::flash::CRC_START, 0);
     let covered = len.saturating_sub(4);
     while done < covered {
-        let count = (covered - done).min(MAX_PROGRAM as u32);
+        let count = (covered - done).min(MAX_PROGRAM_LEN as u32);
         let block = &mut block[..count as usize];
         flash.read(at + done, block)?;
-        sum = super::flash::crc_step(sum, block);
+        sum = super::flash::continue_crc(sum, block);
         done += count;
     }
     Ok(!sum)

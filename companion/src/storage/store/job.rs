@@ -13,7 +13,7 @@ pub enum FlashJob {
     /// Read bytes for a caller of the store.
     Read { at: u32, len: usize },
     /// Compute the running CRC-32 of a file for a caller of the store: done up to `at`.
-    Sum { at: u32, end: u32, sum: u32 },
+    Crc { at: u32, end: u32, sum: u32 },
     /// Erase an area, sector by sector; next the sector at `at`.
     Erase { area: FlashArea, at: u32 },
     /// Program the word that marks an area as erased completely.
@@ -27,7 +27,7 @@ pub enum FlashJob {
     FlushRest { slot: FlashArea, done: u32 },
     /// Read an upload back and compute its CRC-32; `tail` collects the file's last four bytes, its
     /// own CRC.
-    Check { slot: FlashArea, done: u32, sum: u32, tail: [u8; 4] },
+    CheckUploadCrc { slot: FlashArea, done: u32, sum: u32, tail: [u8; 4] },
     /// Program the seal of an area whose data was read back.
     Seal(FlashArea, Seal),
     /// Read the seal of an area back.

@@ -3,8 +3,8 @@
 
 use super::Store;
 use super::flash::{
-    CRC_START, ErasePermission, File, FlashFault, FlashRequest, MAX_PROGRAM, MAX_READ, ReadOutcome,
-    WORD, crc_step,
+    CRC_START, ErasePermission, File, FlashFault, FlashRequest, MAX_PROGRAM_LEN, MAX_READ_LEN,
+    ReadOutcome, WORD_LEN, continue_crc,
 };
 use super::flash_area::{self, AreaCondition, FlashArea, Seal};
 use super::job::FlashJob;
@@ -20,8 +20,8 @@ impl Store {
         if self.request_pending {
             return None;
         }
-        let reads = matches!(self.job, FlashJob::Read { .. } | FlashJob::Sum { .. });
-        if self.layout.stalls && erasing == ErasePermission::Forbidden && !reads {
+        let reads = matches!(self.job, FlashJob::Read { .. } | FlashJob::Crc { .. });
+        if self.layout.stalls_processor && erasing == ErasePermission::Forbidden && !reads {
             return None;
         }
         if self.job == FlashJob::None {
@@ -41,8 +41,8 @@ impl Store {
                 return None;
             }
             FlashJob::Read { at, len } => FlashRequest::Read { at, len },
-            FlashJob::Sum { at, end, .. } => {
-                FlashRequest::Read { at, len: MAX_READ.min((end - at) as usize) }
+            FlashJob::Crc { at, end, .. } => {
+                FlashRequest::Read { at, len: MAX_READ_LEN.min((end - at) as usize) }
             }
             FlashJob::Erase { at, .. } => FlashRequest::Erase { at },
             FlashJob::MarkClean(_) | FlashJob::MarkUsed(_) | FlashJob::Seal(..) => {
@@ -62,21 +62,26 @@ impl Store {
             FlashJob::FlushRest { slot, done } => {
                 let at = self.reassembly.flushed_len() + done;
                 let left = self.reassembly.file_len() - at;
-                let count = left.next_multiple_of(WORD as u32).min(MAX_PROGRAM as u32) as usize;
+                let count =
+                    left.next_multiple_of(WORD_LEN as u32).min(MAX_PROGRAM_LEN as u32) as usize;
                 FlashRequest::Program {
                     at: slot.data_offset(layout) + at,
                     bytes: &self.buffer[..count],
                 }
             }
-            FlashJob::Check { slot, done, .. } => {
+            FlashJob::CheckUploadCrc { slot, done, .. } => {
                 let left = (self.reassembly.file_len() - done) as usize;
-                FlashRequest::Read { at: slot.data_offset(layout) + done, len: left.min(MAX_READ) }
+                FlashRequest::Read {
+                    at: slot.data_offset(layout) + done,
+                    len: left.min(MAX_READ_LEN),
+                }
             }
-            FlashJob::SealCheck(area, seal) => {
-                FlashRequest::Read { at: flash_area::seal_mark(layout, area, &seal).0, len: WORD }
-            }
+            FlashJob::SealCheck(area, seal) => FlashRequest::Read {
+                at: flash_area::seal_mark(layout, area, &seal).0,
+                len: WORD_LEN,
+            },
             FlashJob::Record(record) => {
-                let data_at = record.at + WORD as u32 + record.done;
+                let data_at = record.at + WORD_LEN as u32 + record.done;
                 let left = (record.step_len() - record.done) as usize;
                 match (record.step, record.source) {
                     (RecordStep::Head, _) => {
@@ -84,16 +89,18 @@ impl Store {
                             journal::record_head(record.kind, record.len, record.crc);
                         FlashRequest::Program { at: record.at, bytes: &self.program_word }
                     }
-                    (RecordStep::Load, RecordSource::Flash(from)) => {
-                        FlashRequest::Read { at: from + record.done, len: left.min(MAX_PROGRAM) }
-                    }
+                    (RecordStep::Load, RecordSource::Flash(from)) => FlashRequest::Read {
+                        at: from + record.done,
+                        len: left.min(MAX_PROGRAM_LEN),
+                    },
                     (RecordStep::Load | RecordStep::Data, _) => {
-                        let count = left.next_multiple_of(WORD).min(MAX_PROGRAM);
+                        let count = left.next_multiple_of(WORD_LEN).min(MAX_PROGRAM_LEN);
                         FlashRequest::Program { at: data_at, bytes: &self.buffer[..count] }
                     }
-                    (RecordStep::Verify, _) => {
-                        FlashRequest::Read { at: record.at + record.done, len: left.min(MAX_READ) }
-                    }
+                    (RecordStep::Verify, _) => FlashRequest::Read {
+                        at: record.at + record.done,
+                        len: left.min(MAX_READ_LEN),
+                    },
                 }
             }
         })
@@ -115,7 +122,7 @@ impl Store {
             _ => return,
         };
         let rest = rest.unwrap_or_default();
-        let count = rest.len().min(MAX_PROGRAM);
+        let count = rest.len().min(MAX_PROGRAM_LEN);
         self.buffer.fill(0xFF);
         self.buffer[..count].copy_from_slice(&rest[..count]);
     }
@@ -149,7 +156,7 @@ impl Store {
                     if state == UploadState::Closing {
                         let all = self.reassembly.flushed_len() >= self.reassembly.file_len();
                         return Some(if all {
-                            self.begin_crc_check(slot)
+                            self.crc_check_job(slot)
                         } else {
                             FlashJob::FlushRest { slot, done: 0 }
                         });
@@ -158,25 +165,26 @@ impl Store {
             }
             _ => {}
         }
-        if let Some(job) = self.choose_record(erasing) {
+        if let Some(job) = self.choose_record_job(erasing) {
             return Some(job);
         }
-        if let FlashJob::Erase { .. } = self.paused_job {
-            return Some(core::mem::replace(&mut self.paused_job, FlashJob::None));
+        if let FlashJob::Erase { .. } = self.paused_erasure {
+            return Some(core::mem::replace(&mut self.paused_erasure, FlashJob::None));
         }
-        let uploads = matches!(self.upload, Some((_, UploadState::Taking | UploadState::Closing)));
+        let uploads =
+            matches!(self.upload, Some((_, UploadState::Receiving | UploadState::Closing)));
         let area =
             self.next_area_to_erase().filter(|_| may_erase && !uploads && !self.erasure_failed)?;
         Some(self.erase_job(area))
     }
 
-    fn begin_crc_check(&self, slot: FlashArea) -> FlashJob {
-        FlashJob::Check { slot, done: 0, sum: CRC_START, tail: [0; 4] }
+    fn crc_check_job(&self, slot: FlashArea) -> FlashJob {
+        FlashJob::CheckUploadCrc { slot, done: 0, sum: CRC_START, tail: [0; 4] }
     }
 
     pub(super) fn erase_job(&mut self, area: FlashArea) -> FlashJob {
         *self.condition_mut(area) = AreaCondition::Dirty;
-        self.paused_job = FlashJob::None;
+        self.paused_erasure = FlashJob::None;
         FlashJob::Erase { area, at: area.offset(&self.layout) }
     }
 
@@ -193,18 +201,18 @@ impl Store {
         match (job, outcome) {
             (FlashJob::None | FlashJob::Abandoned, _) => {}
             (FlashJob::Read { .. }, Ok(bytes)) => return Some(ReadOutcome::Bytes(bytes)),
-            (FlashJob::Read { .. } | FlashJob::Sum { .. }, Err(_)) => {
+            (FlashJob::Read { .. } | FlashJob::Crc { .. }, Err(_)) => {
                 return Some(ReadOutcome::Failed);
             }
-            (FlashJob::Sum { at, end, sum }, Ok(bytes)) => {
-                let (at, sum) = (at + bytes.len() as u32, crc_step(sum, bytes));
+            (FlashJob::Crc { at, end, sum }, Ok(bytes)) => {
+                let (at, sum) = (at + bytes.len() as u32, continue_crc(sum, bytes));
                 if bytes.is_empty() {
                     return Some(ReadOutcome::Failed);
                 }
                 if at >= end {
-                    return Some(ReadOutcome::Sum(sum));
+                    return Some(ReadOutcome::Crc(sum));
                 }
-                self.job = FlashJob::Sum { at, end, sum };
+                self.job = FlashJob::Crc { at, end, sum };
             }
             (FlashJob::Erase { .. } | FlashJob::MarkClean(_), Err(_)) => self.erasure_failed = true,
             (FlashJob::Erase { area, at }, Ok(_)) => {
@@ -217,15 +225,15 @@ impl Store {
             (FlashJob::MarkUsed(area), Ok(_)) => self.handle_area_marked(area),
             (FlashJob::Flush(_), Ok(_)) => self.reassembly.drop_first_block(),
             (FlashJob::FlushRest { slot, done }, Ok(_)) => {
-                let done = done + MAX_PROGRAM as u32;
+                let done = done + MAX_PROGRAM_LEN as u32;
                 let more = self.reassembly.flushed_len() + done < self.reassembly.file_len();
                 self.job = if more {
                     FlashJob::FlushRest { slot, done }
                 } else {
-                    self.begin_crc_check(slot)
+                    self.crc_check_job(slot)
                 };
             }
-            (FlashJob::Check { slot, done, sum, tail }, Ok(bytes)) => {
+            (FlashJob::CheckUploadCrc { slot, done, sum, tail }, Ok(bytes)) => {
                 self.check_upload_crc(slot, done, sum, tail, bytes);
             }
             (FlashJob::Seal(area, seal), Ok(_)) => self.job = FlashJob::SealCheck(area, seal),
@@ -247,7 +255,7 @@ impl Store {
             (
                 FlashJob::Flush(slot)
                 | FlashJob::FlushRest { slot, .. }
-                | FlashJob::Check { slot, .. },
+                | FlashJob::CheckUploadCrc { slot, .. },
                 Err(_),
             ) => {
                 self.discard_area(slot);
@@ -262,9 +270,9 @@ impl Store {
         *self.condition_mut(area) = AreaCondition::Open;
         match area {
             FlashArea::Slot(_) => {
-                self.upload = self.upload.map(|(file, _)| (file, UploadState::Taking));
+                self.upload = self.upload.map(|(file, _)| (file, UploadState::Receiving));
             }
-            FlashArea::Half(half) => {
+            FlashArea::JournalHalf(half) => {
                 let at = area.data_offset(&self.layout);
                 self.journal.compacting = Some(Compaction { half, at, step: 0, mission: None });
             }
@@ -277,10 +285,11 @@ impl Store {
         *self.condition_mut(area) = AreaCondition::Dirty;
         match area {
             FlashArea::Slot(_) => self.end_upload(Err(UploadError::Flash)),
-            FlashArea::Half(_) => {
+            FlashArea::JournalHalf(_) => {
                 self.journal.compacting = None;
-                self.journal.failures += 1;
-                (self.unsaved, self.unsaved_photographed) = (true, !self.photographed.is_empty());
+                self.journal.consecutive_failures += 1;
+                (self.parameters_unsaved, self.photographed_unsaved) =
+                    (true, !self.photographed.is_empty());
             }
         }
     }
@@ -294,19 +303,19 @@ impl Store {
         bytes: &[u8],
     ) {
         let len = self.reassembly.file_len();
-        let field = matches!(self.upload, Some((File::Field, _)));
+        let is_height_field = matches!(self.upload, Some((File::Field, _)));
         if (done == 0 && !self.is_file_head(bytes, len)) || bytes.is_empty() {
             return self.end_upload(Err(UploadError::Damaged));
         }
         // The last four bytes of the file are the CRC-32 of all others.
         let covered = (len - 4).saturating_sub(done) as usize;
         let (body, end) = bytes.split_at(covered.min(bytes.len()));
-        let sum = crc_step(sum, body);
+        let sum = continue_crc(sum, body);
         let done = done + bytes.len() as u32;
         let at = 4 - (len - (done - end.len() as u32)).min(4) as usize;
         tail[at..at + end.len()].copy_from_slice(end);
         if done < len {
-            self.job = FlashJob::Check { slot, done, sum, tail };
+            self.job = FlashJob::CheckUploadCrc { slot, done, sum, tail };
             return;
         }
         let crc = u32::from_le_bytes(tail);
@@ -314,20 +323,21 @@ impl Store {
             return self.end_upload(Err(UploadError::Damaged));
         }
         let number = |c: &AreaCondition| c.seal().map_or(0, |seal| seal.sequence);
-        let newest = self.slots.iter().map(number).max().unwrap_or(0).max(self.removed_up_to);
-        self.job = FlashJob::Seal(slot, Seal { sequence: newest + 1, len, crc, field });
+        let newest =
+            self.slots.iter().map(number).max().unwrap_or(0).max(self.removed_up_to_sequence);
+        self.job = FlashJob::Seal(slot, Seal { sequence: newest + 1, len, crc, is_height_field });
     }
 
     fn handle_sealed(&mut self, area: FlashArea, seal: Seal) {
         *self.condition_mut(area) = AreaCondition::Sealed(seal);
         match area {
             FlashArea::Slot(_) => self.end_upload(Ok(())),
-            FlashArea::Half(half) => {
+            FlashArea::JournalHalf(half) => {
                 if let Some(compaction) = self.journal.compacting.take() {
-                    self.journal.active = Some(half);
-                    self.journal.end = compaction.at;
+                    self.journal.active_half = Some(half);
+                    self.journal.next_record_at = compaction.at;
                     self.journal.mission = compaction.mission;
-                    self.journal.failures = 0;
+                    self.journal.consecutive_failures = 0;
                 }
             }
         }

@@ -6,7 +6,7 @@
 //! counts. A head that is neither erased nor valid ends the journal: the next record goes to the
 //! other half.
 
-use super::flash::{MAX_PROGRAM, WORD};
+use super::flash::{MAX_PROGRAM_LEN, WORD_LEN};
 use super::flash_area::{AreaCondition, append_word_crc};
 use super::records::{Compaction, RecordKind};
 use crate::config::parameters::STORED_LEN;
@@ -21,44 +21,44 @@ pub struct Journal {
     /// Condition of each half.
     pub(super) halves: [AreaCondition; 2],
     /// The sealed half whose records count; `None` if there is none.
-    pub(super) active: Option<usize>,
+    pub(super) active_half: Option<usize>,
     /// Offset of the next record in the storage bank; the half's end if it takes no more.
-    pub(super) end: u32,
+    pub(super) next_record_at: u32,
     /// Range of the mission file in the storage bank; `None` if there is none.
     pub(super) mission: Option<Range<u32>>,
     /// CRC-32 of the mission file, as in its record.
     pub(super) mission_crc: u32,
     /// Whether the mission file was removed and no record says so yet.
-    pub(super) removed: bool,
+    pub(super) mission_removal_unsaved: bool,
     /// The compaction under way: the other half is being filled.
     pub(super) compacting: Option<Compaction>,
     /// Failed attempts in a row to write a record or a half.
-    pub(super) failures: u8,
+    pub(super) consecutive_failures: u8,
 }
 
 impl Default for Journal {
     fn default() -> Self {
         Self {
             halves: [AreaCondition::Dirty; 2],
-            active: None,
-            end: 0,
+            active_half: None,
+            next_record_at: 0,
             mission: None,
             mission_crc: 0,
-            removed: false,
+            mission_removal_unsaved: false,
             compacting: None,
-            failures: 0,
+            consecutive_failures: 0,
         }
     }
 }
 
 /// Bytes of a record with `data` bytes of data: its head, and the data in whole words.
 pub fn record_len(data: u32) -> u32 {
-    WORD as u32 + data.next_multiple_of(WORD as u32)
+    WORD_LEN as u32 + data.next_multiple_of(WORD_LEN as u32)
 }
 
 /// The head of a record, one flash word.
-pub fn record_head(kind: RecordKind, len: u32, crc: u32) -> [u8; WORD] {
-    let mut word = [0; WORD];
+pub fn record_head(kind: RecordKind, len: u32, crc: u32) -> [u8; WORD_LEN] {
+    let mut word = [0; WORD_LEN];
     word[..4].copy_from_slice(&RECORD_MAGIC);
     word[4] = kind as u8;
     word[8..12].copy_from_slice(&len.to_le_bytes());
@@ -70,4 +70,4 @@ pub fn record_head(kind: RecordKind, len: u32, crc: u32) -> [u8; WORD] {
 /// Bytes of the data of the parameters' record: the removed slots' sequence number, and all
 /// parameters.
 pub const PARAMETERS_LEN: usize = 4 + STORED_LEN;
-const _: () = assert!(PARAMETERS_LEN <= MAX_PROGRAM);
+const _: () = assert!(PARAMETERS_LEN <= MAX_PROGRAM_LEN);

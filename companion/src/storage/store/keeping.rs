@@ -1,7 +1,9 @@
 //! Writing the records of the journal, and its compaction into the other half when one is full.
 
 use super::Store;
-use super::flash::{CRC_START, ErasePermission, File, MAX_PROGRAM, WORD, crc_step, crc32};
+use super::flash::{
+    CRC_START, ErasePermission, File, MAX_PROGRAM_LEN, WORD_LEN, continue_crc, crc32,
+};
 use super::flash_area::{AreaCondition, FlashArea, Seal};
 use super::job::FlashJob;
 use super::journal::{self, record_len};
@@ -11,12 +13,12 @@ use super::upload_state::{UploadError, UploadState};
 impl Store {
     /// The job for the next record: of the compaction under way, else of what was changed. `None`
     /// if nothing is to be written, or the other half is not erased yet.
-    pub(super) fn choose_record(&mut self, erasing: ErasePermission) -> Option<FlashJob> {
+    pub(super) fn choose_record_job(&mut self, erasing: ErasePermission) -> Option<FlashJob> {
         if let Some(compaction) = self.journal.compacting.clone() {
             return Some(self.continue_compaction(compaction));
         }
         let closing = self.is_mission_upload_closing();
-        if self.journal.failures >= MAX_JOURNAL_TRIES {
+        if self.journal.consecutive_failures >= MAX_JOURNAL_TRIES {
             if closing {
                 self.end_upload(Err(UploadError::Flash));
             }
@@ -24,25 +26,26 @@ impl Store {
         }
         let (kind, len) = if closing {
             (RecordKind::Mission, self.reassembly.file_len())
-        } else if self.journal.removed {
+        } else if self.journal.mission_removal_unsaved {
             (RecordKind::Mission, 0)
-        } else if self.unsaved {
+        } else if self.parameters_unsaved {
             (RecordKind::Parameters, journal::PARAMETERS_LEN as u32)
-        } else if self.unsaved_photographed {
+        } else if self.photographed_unsaved {
             (RecordKind::Photographed, self.photographed.len() as u32)
         } else {
             return None;
         };
         let fits = |active: usize| {
-            self.journal.end + record_len(len) <= FlashArea::Half(active).end(&self.layout)
+            self.journal.next_record_at + record_len(len)
+                <= FlashArea::JournalHalf(active).end(&self.layout)
         };
-        if !self.journal.active.is_some_and(fits) {
+        if !self.journal.active_half.is_some_and(fits) {
             return self.begin_compaction(erasing);
         }
-        let at = self.journal.end;
+        let at = self.journal.next_record_at;
         Some(FlashJob::Record(match kind {
-            RecordKind::Parameters => self.parameters_record(at),
-            RecordKind::Photographed => self.photographed_record(at),
+            RecordKind::Parameters => self.make_parameters_record(at),
+            RecordKind::Photographed => self.make_photographed_record(at),
             RecordKind::Mission => {
                 let rest =
                     if len == 0 { &[] } else { self.reassembly.last_part().unwrap_or_default() };
@@ -62,9 +65,9 @@ impl Store {
     fn continue_compaction(&mut self, compaction: Compaction) -> FlashJob {
         let Compaction { half, at, step, mission } = compaction;
         match (step, self.journal.mission.clone()) {
-            (0, _) => FlashJob::Record(self.parameters_record(at)),
+            (0, _) => FlashJob::Record(self.make_parameters_record(at)),
             (1, _) if !self.photographed.is_empty() => {
-                FlashJob::Record(self.photographed_record(at))
+                FlashJob::Record(self.make_photographed_record(at))
             }
             (1 | 2, Some(kept)) => FlashJob::Record(JournalRecord {
                 kind: RecordKind::Mission,
@@ -80,20 +83,22 @@ impl Store {
                 let number = |c: &AreaCondition| c.seal().map_or(0, |seal| seal.sequence);
                 let newest = self.journal.halves.iter().map(number).max().unwrap_or(0);
                 self.journal.compacting = Some(Compaction { half, at, step: 3, mission });
-                let seal = Seal { sequence: newest + 1, len: 0, crc: 0, field: false };
-                FlashJob::Seal(FlashArea::Half(half), seal)
+                let seal = Seal { sequence: newest + 1, len: 0, crc: 0, is_height_field: false };
+                FlashJob::Seal(FlashArea::JournalHalf(half), seal)
             }
         }
     }
 
     fn begin_compaction(&mut self, erasing: ErasePermission) -> Option<FlashJob> {
-        let half = usize::from(self.journal.active == Some(0));
+        let half = usize::from(self.journal.active_half == Some(0));
         match self.journal.halves[half] {
-            AreaCondition::Clean => Some(FlashJob::MarkUsed(FlashArea::Half(half))),
+            AreaCondition::Clean => Some(FlashJob::MarkUsed(FlashArea::JournalHalf(half))),
             _ => {
                 let refused = match erasing {
                     _ if self.erasure_failed => UploadError::Flash,
-                    ErasePermission::Allowed => return Some(self.erase_job(FlashArea::Half(half))),
+                    ErasePermission::Allowed => {
+                        return Some(self.erase_job(FlashArea::JournalHalf(half)));
+                    }
                     ErasePermission::NotYet => return None,
                     ErasePermission::Forbidden => UploadError::Armed,
                 };
@@ -105,20 +110,20 @@ impl Store {
         }
     }
 
-    fn parameters_record(&mut self, at: u32) -> JournalRecord {
+    fn make_parameters_record(&mut self, at: u32) -> JournalRecord {
         let len = journal::PARAMETERS_LEN;
         self.buffer.fill(0xFF);
-        self.buffer[..4].copy_from_slice(&self.removed_up_to.to_le_bytes());
+        self.buffer[..4].copy_from_slice(&self.removed_up_to_sequence.to_le_bytes());
         self.buffer[4..len].copy_from_slice(&self.parameters.to_bytes());
-        self.unsaved = false;
+        self.parameters_unsaved = false;
         self.buffer_record(RecordKind::Parameters, at, len)
     }
 
-    fn photographed_record(&mut self, at: u32) -> JournalRecord {
+    fn make_photographed_record(&mut self, at: u32) -> JournalRecord {
         let len = self.photographed.len();
         self.buffer.fill(0xFF);
         self.buffer[..len].copy_from_slice(&self.photographed);
-        self.unsaved_photographed = false;
+        self.photographed_unsaved = false;
         self.buffer_record(RecordKind::Photographed, at, len)
     }
 
@@ -141,7 +146,7 @@ impl Store {
             (RecordStep::Head, RecordSource::Buffer) => record.step = RecordStep::Data,
             (RecordStep::Head, _) => record.step = RecordStep::Load,
             (RecordStep::Load, RecordSource::Flash(_)) => {
-                let count = bytes.len().min(MAX_PROGRAM);
+                let count = bytes.len().min(MAX_PROGRAM_LEN);
                 self.buffer.fill(0xFF);
                 self.buffer[..count].copy_from_slice(&bytes[..count]);
                 record.step = RecordStep::Data;
@@ -149,7 +154,7 @@ impl Store {
                 return;
             }
             (RecordStep::Load | RecordStep::Data, _) => {
-                record.done = (record.done + MAX_PROGRAM as u32).min(record.len);
+                record.done = (record.done + MAX_PROGRAM_LEN as u32).min(record.len);
                 record.step = if matches!(record.source, RecordSource::Buffer) {
                     RecordStep::Data
                 } else {
@@ -157,7 +162,7 @@ impl Store {
                 };
             }
             (RecordStep::Verify, _) => {
-                let head = if record.done == 0 { WORD } else { 0 };
+                let head = if record.done == 0 { WORD_LEN } else { 0 };
                 let Some((head, data)) = bytes.split_at_checked(head).filter(|_| !bytes.is_empty())
                 else {
                     return self.fail_record();
@@ -167,7 +172,7 @@ impl Store {
                 {
                     return self.fail_record();
                 }
-                record.sum = crc_step(record.sum, data);
+                record.sum = continue_crc(record.sum, data);
                 record.done += bytes.len() as u32;
             }
         }
@@ -184,7 +189,7 @@ impl Store {
     }
 
     fn finish_record(&mut self, record: &JournalRecord) {
-        let data_at = record.at + WORD as u32;
+        let data_at = record.at + WORD_LEN as u32;
         let held = (record.len > 0).then_some(data_at..data_at + record.len);
         let end = record.at + record_len(record.len);
         if let Some(compaction) = &mut self.journal.compacting {
@@ -199,12 +204,12 @@ impl Store {
             }
             return;
         }
-        self.journal.end = end;
-        self.journal.failures = 0;
+        self.journal.next_record_at = end;
+        self.journal.consecutive_failures = 0;
         if record.kind == RecordKind::Mission {
             self.journal.mission = held;
             self.journal.mission_crc = record.crc;
-            self.journal.removed = false;
+            self.journal.mission_removal_unsaved = false;
             if record.len > 0 {
                 self.end_upload(Ok(()));
             }
@@ -215,12 +220,13 @@ impl Store {
     /// and its data is written again.
     pub(super) fn fail_record(&mut self) {
         if let Some(compaction) = self.journal.compacting.clone() {
-            return self.discard_area(FlashArea::Half(compaction.half));
+            return self.discard_area(FlashArea::JournalHalf(compaction.half));
         }
-        self.journal.failures += 1;
-        (self.unsaved, self.unsaved_photographed) = (true, !self.photographed.is_empty());
-        if let Some(active) = self.journal.active {
-            self.journal.end = FlashArea::Half(active).end(&self.layout);
+        self.journal.consecutive_failures += 1;
+        (self.parameters_unsaved, self.photographed_unsaved) =
+            (true, !self.photographed.is_empty());
+        if let Some(active) = self.journal.active_half {
+            self.journal.next_record_at = FlashArea::JournalHalf(active).end(&self.layout);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Reassembly of an upload: the bytes received that are not in flash yet. Pieces may come in any
 //! order within a window of 4 kB.
 
-use super::flash::MAX_PROGRAM;
+use super::flash::MAX_PROGRAM_LEN;
 
 /// Bytes of the reassembly window: a mission file fits in it, a roadmap passes through. With one
 /// mark bit per byte the reassembly takes 4.5 kB.
@@ -13,7 +13,7 @@ pub enum PieceOutcome {
     /// The piece was stored, or had been received before.
     Stored,
     /// The window cannot take the piece yet: the client must send it again.
-    Later,
+    RetryLater,
     /// The file would be longer than its slot or the window.
     TooLarge,
 }
@@ -23,34 +23,39 @@ pub enum PieceOutcome {
 pub struct UploadReassembly {
     bytes: [u8; WINDOW_LEN],
     /// One bit for each byte of the window: whether it was received.
-    marks: [u64; WINDOW_LEN / 64],
-    /// Offset in the file of the window's first byte; a multiple of [`MAX_PROGRAM`].
-    front: u32,
+    received_bits: [u64; WINDOW_LEN / 64],
+    /// Offset in the file of the window's first byte; a multiple of [`MAX_PROGRAM_LEN`].
+    window_start: u32,
     /// End of the furthest piece received, as an offset in the file.
-    high: u32,
+    received_end: u32,
 }
 
 impl Default for UploadReassembly {
     fn default() -> Self {
-        Self { bytes: [0; WINDOW_LEN], marks: [0; WINDOW_LEN / 64], front: 0, high: 0 }
+        Self {
+            bytes: [0; WINDOW_LEN],
+            received_bits: [0; WINDOW_LEN / 64],
+            window_start: 0,
+            received_end: 0,
+        }
     }
 }
 
 impl UploadReassembly {
     /// Begins with an empty file.
     pub fn reset(&mut self) {
-        self.marks.fill(0);
-        (self.front, self.high) = (0, 0);
+        self.received_bits.fill(0);
+        (self.window_start, self.received_end) = (0, 0);
     }
 
     /// Number of leading bytes of the file that are in flash already.
     pub fn flushed_len(&self) -> u32 {
-        self.front
+        self.window_start
     }
 
     /// Length of the file, as far as pieces were received.
     pub fn file_len(&self) -> u32 {
-        self.high
+        self.received_end
     }
 
     /// Stores a piece of a file of at most `most` bytes.
@@ -58,45 +63,51 @@ impl UploadReassembly {
         let Some(end) = offset.checked_add(piece.len() as u32).filter(|end| *end <= most) else {
             return PieceOutcome::TooLarge;
         };
-        if end > self.front + WINDOW_LEN as u32 {
-            return PieceOutcome::Later;
+        if end > self.window_start + WINDOW_LEN as u32 {
+            return PieceOutcome::RetryLater;
         }
-        self.high = self.high.max(end);
+        self.received_end = self.received_end.max(end);
         // The part of the piece before the window is in flash already.
-        let skipped = self.front.saturating_sub(offset).min(piece.len() as u32);
-        let at = (offset + skipped - self.front.min(offset + skipped)) as usize;
+        let skipped = self.window_start.saturating_sub(offset).min(piece.len() as u32);
+        let at = (offset + skipped - self.window_start.min(offset + skipped)) as usize;
         let piece = &piece[skipped as usize..];
         self.bytes[at..at + piece.len()].copy_from_slice(piece);
         for i in at..at + piece.len() {
-            self.marks[i / 64] |= 1 << (i % 64);
+            self.received_bits[i / 64] |= 1 << (i % 64);
         }
         PieceOutcome::Stored
     }
 
     /// Number of bytes received without a gap from the window's first byte on, at most `most`.
     fn contiguous_len(&self, most: usize) -> usize {
-        let gap = self.marks.iter().position(|marks| *marks != u64::MAX);
-        let run = gap.map_or(WINDOW_LEN, |i| 64 * i + self.marks[i].trailing_ones() as usize);
+        let gap = self.received_bits.iter().position(|bits| *bits != u64::MAX);
+        let run =
+            gap.map_or(WINDOW_LEN, |i| 64 * i + self.received_bits[i].trailing_ones() as usize);
         run.min(most)
     }
 
-    /// The window's first block of [`MAX_PROGRAM`] bytes; `None` until it is received completely.
-    pub fn next_block(&self) -> Option<&[u8; MAX_PROGRAM]> {
-        if self.contiguous_len(MAX_PROGRAM) < MAX_PROGRAM { None } else { self.bytes.first_chunk() }
+    /// The window's first block of [`MAX_PROGRAM_LEN`] bytes; `None` until it is received
+    /// completely.
+    pub fn next_block(&self) -> Option<&[u8; MAX_PROGRAM_LEN]> {
+        if self.contiguous_len(MAX_PROGRAM_LEN) < MAX_PROGRAM_LEN {
+            None
+        } else {
+            self.bytes.first_chunk()
+        }
     }
 
     /// The bytes from the window to the file's end; `None` if one of them is missing.
     pub fn last_part(&self) -> Option<&[u8]> {
-        let len = (self.high - self.front.min(self.high)) as usize;
+        let len = (self.received_end - self.window_start.min(self.received_end)) as usize;
         (len <= WINDOW_LEN && self.contiguous_len(len) == len).then(|| &self.bytes[..len])
     }
 
     /// Drops the window's first block, which is in flash now.
     pub fn drop_first_block(&mut self) {
-        self.bytes.copy_within(MAX_PROGRAM.., 0);
-        self.marks.copy_within(MAX_PROGRAM / 64.., 0);
-        self.marks[(WINDOW_LEN - MAX_PROGRAM) / 64..].fill(0);
-        self.front += MAX_PROGRAM as u32;
+        self.bytes.copy_within(MAX_PROGRAM_LEN.., 0);
+        self.received_bits.copy_within(MAX_PROGRAM_LEN / 64.., 0);
+        self.received_bits[(WINDOW_LEN - MAX_PROGRAM_LEN) / 64..].fill(0);
+        self.window_start += MAX_PROGRAM_LEN as u32;
     }
 }
 

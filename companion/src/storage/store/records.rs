@@ -1,7 +1,7 @@
 //! Records of the journal while they are written: the next new record or, once a half is full,
 //! copies of the records that count to the other half.
 
-use super::flash::WORD;
+use super::flash::WORD_LEN;
 use core::ops::Range;
 
 /// Kind of a record of the journal.
@@ -37,7 +37,7 @@ pub struct JournalRecord {
 impl JournalRecord {
     /// Bytes that the current step processes: the data, when the record is read back also its head.
     pub fn step_len(&self) -> u32 {
-        if self.step == RecordStep::Verify { WORD as u32 + self.len } else { self.len }
+        if self.step == RecordStep::Verify { WORD_LEN as u32 + self.len } else { self.len }
     }
 }
 

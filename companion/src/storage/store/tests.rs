@@ -41,7 +41,7 @@ fn files_come_back_after_a_restart() {
     let mut flash = Flash::new(1);
     let mut store = started(&mut flash);
     assert_eq!(
-        (store.roadmap(), store.mission(), store.file_size(File::Roadmap)),
+        (store.map_range(), store.mission_range(), store.file_size(File::Roadmap)),
         (None, None, None)
     );
     for (round, nodes) in [300, 10, 600].into_iter().enumerate() {
@@ -50,35 +50,35 @@ fn files_come_back_after_a_restart() {
             assert_eq!(upload(&mut store, &mut flash, file, bytes, 239).unwrap(), Ok(()));
             assert_eq!(store.file_size(file), Some(bytes.len() as u32));
         }
-        assert_eq!(store.roadmap().is_some(), round > 0, "used from the next start on");
+        assert_eq!(store.map_range().is_some(), round > 0, "used from the next start on");
         if round > 0 {
             assert_eq!(
                 store.open_upload(File::Roadmap, ErasePermission::Allowed),
-                Err(UploadError::Waiting),
+                Err(UploadError::AwaitsRestart),
                 "one waits already"
             );
         }
         store = started(&mut flash);
-        assert_eq!(bytes_at(&flash, store.roadmap()), Some(road.as_slice()));
-        assert_eq!(bytes_at(&flash, store.mission()), Some(flown.as_slice()));
-        assert!(RoadmapView::parse(bytes_at(&flash, store.roadmap()).unwrap()).is_ok());
+        assert_eq!(bytes_at(&flash, store.map_range()), Some(road.as_slice()));
+        assert_eq!(bytes_at(&flash, store.mission_range()), Some(flown.as_slice()));
+        assert!(RoadmapView::parse(bytes_at(&flash, store.map_range()).unwrap()).is_ok());
     }
     store.remove_file(File::Roadmap);
     store.remove_file(File::Mission);
     run(&mut store, &mut flash, ErasePermission::Forbidden).unwrap();
     assert_eq!((store.file_size(File::Roadmap), store.file_size(File::Mission)), (None, None));
     store = started(&mut flash);
-    assert_eq!((store.roadmap(), store.mission()), (None, None));
+    assert_eq!((store.map_range(), store.mission_range()), (None, None));
     assert_eq!(upload(&mut store, &mut flash, File::Roadmap, &roadmap(20), 80).unwrap(), Ok(()));
     store = started(&mut flash);
-    assert_eq!(bytes_at(&flash, store.roadmap()), Some(roadmap(20).as_slice()));
+    assert_eq!(bytes_at(&flash, store.map_range()), Some(roadmap(20).as_slice()));
 }
 
 #[test]
 fn a_field_takes_the_place_of_the_roadmap_and_gives_it_back() {
     let mut flash = Flash::new(3);
     let mut store = started(&mut flash);
-    let shape = FieldShape { low: Flat::zeros(), cell_m: 5.0, columns: 30, rows: 20 };
+    let shape = FieldShape { south_west: Flat::zeros(), cell_m: 5.0, columns: 30, rows: 20 };
     let mut heights = std::vec![0; shape.encoded_len()];
     field::write(&shape, &[70; 600], &mut heights).unwrap();
     let road = roadmap(30);
@@ -98,7 +98,7 @@ fn a_field_takes_the_place_of_the_roadmap_and_gives_it_back() {
             (store.file_size(own), store.file_size(other)),
             (Some(bytes.len() as u32), None)
         );
-        assert_eq!(bytes_at(&flash, store.roadmap()), Some(bytes.as_slice()));
+        assert_eq!(bytes_at(&flash, store.map_range()), Some(bytes.as_slice()));
     }
     store.remove_file(File::Field);
     assert!(store.file_size(File::Roadmap).is_some(), "the field was not there");
@@ -131,8 +131,8 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
         assert_eq!(store.upload_state(), Some(UploadState::Ended(Err(UploadError::Incomplete))));
     }
     store = started(&mut flash);
-    assert_eq!(bytes_at(&flash, store.roadmap()), Some(road.as_slice()));
-    assert_eq!(bytes_at(&flash, store.mission()), Some(flown.as_slice()));
+    assert_eq!(bytes_at(&flash, store.map_range()), Some(road.as_slice()));
+    assert_eq!(bytes_at(&flash, store.mission_range()), Some(flown.as_slice()));
     assert_eq!(store.open_upload(File::Mission, ErasePermission::Allowed), Ok(()));
     assert_eq!(store.take_piece(4000, &[0; 97]), PieceOutcome::TooLarge);
     assert_eq!(store.open_upload(File::Roadmap, ErasePermission::Allowed), Ok(()));
@@ -142,7 +142,7 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
 
 /// Executes the requests of the store while armed: only reads are allowed.
 fn run_armed(store: &mut Store, flash: &mut Flash) {
-    let mut read = [0; MAX_READ];
+    let mut read = [0; MAX_READ_LEN];
     while let Some(request) = store.poll_request(ErasePermission::Forbidden) {
         assert!(matches!(request, FlashRequest::Read { .. }), "{request:?} while armed");
         let outcome = execute(flash, request, ErasePermission::Forbidden, &mut read)
@@ -154,7 +154,7 @@ fn run_armed(store: &mut Store, flash: &mut Flash) {
 #[test]
 fn a_flash_that_stalls_only_reads_while_armed() {
     let mut flash = Flash::new(1);
-    let layout = FlashLayout { stalls: true, ..LAYOUT };
+    let layout = FlashLayout { stalls_processor: true, ..LAYOUT };
     let mut store = Store::mount(layout, &mut flash);
     run(&mut store, &mut flash, ErasePermission::Allowed).unwrap();
     let (road, flown) = (roadmap(300), mission(9));
@@ -228,7 +228,7 @@ fn nothing_is_erased_while_armed() {
     assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))));
     let store = Store::mount(LAYOUT, &mut flash);
     assert_eq!(store.parameters().get(0), Some(("FLK_ACCEL", 3.5)));
-    assert_eq!(bytes_at(&flash, store.roadmap()), Some(road.as_slice()));
+    assert_eq!(bytes_at(&flash, store.map_range()), Some(road.as_slice()));
 }
 
 #[test]
@@ -245,7 +245,7 @@ fn parameters_outlive_many_changes_and_the_mission_with_them() {
             store = started(&mut flash);
         }
         assert_eq!(store.parameters().get(0), Some(("FLK_ACCEL", value)));
-        assert_eq!(bytes_at(&flash, store.mission()), Some(flown.as_slice()));
+        assert_eq!(bytes_at(&flash, store.mission_range()), Some(flown.as_slice()));
     }
 }
 
@@ -258,7 +258,7 @@ fn a_read_goes_first_between_two_sectors() {
     // One slot is to be erased, as after a restart with a new roadmap.
     flash.bytes[LAYOUT.slot_len as usize..2 * LAYOUT.slot_len as usize].fill(0);
     let mut store = Store::mount(LAYOUT, &mut flash);
-    let (mut erased, mut read, mut given) = (Vec::new(), [0; MAX_READ], 0);
+    let (mut erased, mut read, mut given) = (Vec::new(), [0; MAX_READ_LEN], 0);
     for turn in 0..100 {
         if turn % 2 == 1 {
             store.request_read(File::Roadmap, 0, 100);
@@ -322,7 +322,7 @@ fn cut_anywhere(
             flash.power = None;
         }
         let mut store = started(&mut flash);
-        let (road, flown) = (bytes_at(&flash, store.roadmap()), bytes_at(&flash, store.mission()));
+        let [road, flown] = [store.map_range(), store.mission_range()].map(|r| bytes_at(&flash, r));
         let is_new = road == Some(new_road.as_slice());
         assert!(is_new || road == Some(old_road.as_slice()), "cut {cut}: neither roadmap is whole");
         assert!(
@@ -344,8 +344,8 @@ fn cut_anywhere(
             "cut {cut}"
         );
         store = started(&mut flash);
-        assert_eq!(bytes_at(&flash, store.roadmap()), Some(new_road.as_slice()), "cut {cut}");
-        assert_eq!(bytes_at(&flash, store.mission()), Some(new_mission.as_slice()), "cut {cut}");
+        assert_eq!(bytes_at(&flash, store.map_range()), Some(new_road.as_slice()), "cut {cut}");
+        assert_eq!(bytes_at(&flash, store.mission_range()), Some(&new_mission[..]), "cut {cut}");
     }
     std::println!("{cuts} cuts: {} found the old roadmap, {} the new", found[0], found[1]);
 }
@@ -396,12 +396,12 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
                     FlashRequest::Program { .. } => failing == 1,
                     FlashRequest::Read { .. } => failing == 2,
                 };
-                let nothing = [0; MAX_READ];
+                let nothing = [0; MAX_READ_LEN];
                 let len = if let FlashRequest::Read { len, .. } = request { len } else { 0 };
                 store.handle_flash_outcome(if bad { Err(FlashFault) } else { Ok(&nothing[..len]) });
             }
             match store.upload_state() {
-                Some(UploadState::Taking)
+                Some(UploadState::Receiving)
                     if store.take_piece(0, &road[..200]) == PieceOutcome::Stored =>
                 {
                     store.finish_upload();
@@ -447,7 +447,7 @@ fn a_record_whose_head_did_not_come_out_is_written_again() {
     store.open_upload(File::Mission, ErasePermission::Allowed).unwrap();
     flown.chunks(200).enumerate().for_each(|(i, part)| _ = store.take_piece(i as u32 * 200, part));
     store.finish_upload();
-    let mut read = [0; MAX_READ];
+    let mut read = [0; MAX_READ_LEN];
     let mut heads = 0;
     while let Some(request) = store.poll_request(ErasePermission::Allowed) {
         let head = match request {
@@ -468,10 +468,10 @@ fn a_record_whose_head_did_not_come_out_is_written_again() {
     assert!(heads > 1, "{heads}");
     assert_eq!(store.upload_state(), Some(UploadState::Ended(Ok(()))));
     let store = started(&mut flash);
-    assert_eq!(bytes_at(&flash, store.mission()), Some(flown.as_slice()));
+    assert_eq!(bytes_at(&flash, store.mission_range()), Some(flown.as_slice()));
 }
 
-fn flown_head(flown: &[u8]) -> [u8; WORD] {
+fn flown_head(flown: &[u8]) -> [u8; WORD_LEN] {
     journal::record_head(records::RecordKind::Mission, flown.len() as u32, 0)
 }
 
@@ -493,8 +493,8 @@ fn a_roadmap_that_cannot_be_used_is_refused_or_given_up_for_the_one_before() {
     let new = roadmap(90);
     upload(&mut store, &mut flash, File::Roadmap, &new, 239).unwrap().unwrap();
     let mut store = Store::mount(LAYOUT, &mut flash);
-    assert_eq!(bytes_at(&flash, store.roadmap()), Some(new.as_slice()));
+    assert_eq!(bytes_at(&flash, store.map_range()), Some(new.as_slice()));
     assert!(store.fall_back_to_older_roadmap());
-    assert_eq!(bytes_at(&flash, store.roadmap()), Some(old.as_slice()));
-    assert!(!store.fall_back_to_older_roadmap() && store.roadmap().is_none());
+    assert_eq!(bytes_at(&flash, store.map_range()), Some(old.as_slice()));
+    assert!(!store.fall_back_to_older_roadmap() && store.map_range().is_none());
 }

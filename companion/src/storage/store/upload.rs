@@ -16,41 +16,42 @@ impl Store {
     }
 
     /// Begins an upload, and abandons one under way. Pieces are accepted once
-    /// [`Self::upload_state`] is `Taking`.
+    /// [`Self::upload_state`] is `Receiving`.
     ///
     /// # Errors
-    /// [`UploadError::Armed`] or [`UploadError::Waiting`].
+    /// [`UploadError::Armed`] or [`UploadError::AwaitsRestart`].
     pub fn open_upload(&mut self, file: File, erasing: ErasePermission) -> Result<(), UploadError> {
         if self.upload_state() == Some(UploadState::Closing) {
-            return Err(UploadError::Waiting);
+            return Err(UploadError::AwaitsRestart);
         }
         self.abandon_upload();
-        if self.layout.stalls && erasing == ErasePermission::Forbidden {
+        if self.layout.stalls_processor && erasing == ErasePermission::Forbidden {
             return Err(UploadError::Armed);
         }
         if file != File::Mission {
-            let slot = self.writable_slot().ok_or(UploadError::Waiting)?;
+            let slot = self.writable_slot().ok_or(UploadError::AwaitsRestart)?;
             if self.slots[slot] != AreaCondition::Clean && erasing == ErasePermission::Forbidden {
                 return Err(UploadError::Armed);
             }
             self.erasure_failed = false;
         }
         self.reassembly.reset();
-        let state = if file == File::Mission { UploadState::Taking } else { UploadState::Opening };
+        let state =
+            if file == File::Mission { UploadState::Receiving } else { UploadState::Opening };
         self.upload = Some((file, state));
         Ok(())
     }
 
-    /// Accepts a piece of the file at `offset`; `Later` if no upload is open for pieces.
+    /// Accepts a piece of the file at `offset`; `RetryLater` if no upload is open for pieces.
     pub fn take_piece(&mut self, offset: u32, piece: &[u8]) -> PieceOutcome {
         match self.upload {
-            Some((File::Mission, UploadState::Taking)) => {
+            Some((File::Mission, UploadState::Receiving)) => {
                 self.reassembly.insert(offset, piece, WINDOW_LEN as u32)
             }
-            Some((File::Roadmap | File::Field, UploadState::Taking)) => {
+            Some((File::Roadmap | File::Field, UploadState::Receiving)) => {
                 self.reassembly.insert(offset, piece, self.layout.slot_len - DATA_OFFSET)
             }
-            _ => PieceOutcome::Later,
+            _ => PieceOutcome::RetryLater,
         }
     }
 
@@ -58,7 +59,7 @@ impl Store {
     /// [`Self::upload_state`] becomes `Closing`, then `Ended`; at once `Ended` for a file that is
     /// incomplete or damaged.
     pub fn finish_upload(&mut self) {
-        let Some((file, UploadState::Taking)) = self.upload else { return };
+        let Some((file, UploadState::Receiving)) = self.upload else { return };
         let state = match (file, self.reassembly.last_part()) {
             (_, Some([])) => UploadState::Ended(Err(UploadError::Damaged)),
             (_, None) => UploadState::Ended(Err(UploadError::Incomplete)),
@@ -106,7 +107,7 @@ impl Store {
     /// The slot for the next upload: neither in use nor with the newest file.
     pub(super) fn writable_slot(&self) -> Option<usize> {
         let newest = self.newest_slot();
-        (0..2).find(|i| Some(*i) != self.in_use && Some(*i) != newest)
+        (0..2).find(|i| Some(*i) != self.slot_in_use && Some(*i) != newest)
     }
 
     /// The slot into which an upload is being written.

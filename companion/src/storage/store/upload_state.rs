@@ -6,7 +6,7 @@ pub enum UploadError {
     /// An area would have to be erased or programmed, and the vehicle is armed.
     Armed,
     /// No slot is free: one is in use, and the other has a newer file that waits for a restart.
-    Waiting,
+    AwaitsRestart,
     /// Bytes of the file are missing.
     Incomplete,
     /// The file is of another kind than its name, or its CRC is wrong.
@@ -21,7 +21,7 @@ pub enum UploadState {
     /// A slot for the upload is being erased or marked as used.
     Opening,
     /// Pieces of the file are accepted.
-    Taking,
+    Receiving,
     /// All pieces were sent; the file is being written, read back and sealed.
     Closing,
     /// The upload has ended: the file is stored, or an error says why not.

@@ -38,18 +38,18 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether this vehicle has its lease: a majority lately reported that they hear it.
     pub fn has_lease(&self, now: Instant) -> bool {
-        now - self.lease_at <= self.limits.lease
+        now - self.lease_renewed_at <= self.limits.lease
     }
 
     /// Time since a majority last reported that they hear this vehicle.
     pub(crate) fn lease_age(&self, now: Instant) -> Duration {
-        now - self.lease_at
+        now - self.lease_renewed_at
     }
 
     /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
     /// takes no part, and needs no lease.
     pub fn unheard_for(&self, now: Instant) -> Duration {
-        if self.vehicle_takes_part(usize::from(self.own)) {
+        if self.vehicle_takes_part(usize::from(self.own_rank)) {
             self.lease_age(now)
         } else {
             Duration::default()
@@ -59,28 +59,29 @@ impl<const V: usize> Fleet<V> {
     /// Whether the others count this vehicle as lost, or have divided its part; false for one that
     /// has finished its part.
     pub fn is_excluded(&self) -> bool {
-        self.excluded && self.members[usize::from(self.own)].entry.status != ShareStatus::Finished
+        self.excluded
+            && self.members[usize::from(self.own_rank)].entry.status != ShareStatus::Finished
     }
 
     /// Whether this vehicle flies its part of the area, or will.
     pub(crate) fn takes_part(&self) -> bool {
-        self.vehicle_takes_part(usize::from(self.own))
+        self.vehicle_takes_part(usize::from(self.own_rank))
     }
 
     /// Whether this vehicle has left the mission and reported that.
     pub(crate) fn has_reported_leaving(&self) -> bool {
-        self.members[usize::from(self.own)].entry.status == ShareStatus::Left
+        self.members[usize::from(self.own_rank)].entry.status == ShareStatus::Left
     }
 
     /// Whether another vehicle takes part, or left a part that is not divided yet.
     pub(crate) fn is_reserve_needed(&self) -> bool {
-        let mut others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own));
+        let mut others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own_rank));
         self.is_dividing() || others.any(|rank| self.vehicle_takes_part(rank))
     }
 
     /// Whether another vehicle flies, or has flown and finished, left or was lost since it was
     /// started.
-    pub(crate) fn has_flight_begun(&self) -> bool {
+    pub(crate) fn has_others_flight_begun(&self) -> bool {
         let ended = |member: &FleetVehicle| member.entry.status != ShareStatus::Alive;
         self.is_another_in_flight() || self.members.iter().any(ended)
     }
@@ -98,7 +99,7 @@ impl<const V: usize> Fleet<V> {
     }
 
     pub(super) fn count_silent_as_lost(&mut self, now: Instant) {
-        let silent = self.limits.silent;
+        let silent = self.limits.lost_after;
         for member in self.members.iter_mut().filter(|m| m.has_part && now - m.heard_at >= silent) {
             member.entry.status = member.entry.status.max(ShareStatus::Lost);
         }
@@ -108,7 +109,7 @@ impl<const V: usize> Fleet<V> {
     /// once it can start and no flight is under way.
     pub(super) fn rejoin_if_ready(&mut self, now: Instant, own: ShareStatus) {
         let RosterReportEntry { incarnation, status, .. } =
-            self.members[usize::from(self.own)].entry;
+            self.members[usize::from(self.own_rank)].entry;
         if status == ShareStatus::Left
             && own == ShareStatus::Alive
             && !self.airborne
@@ -123,15 +124,15 @@ impl<const V: usize> Fleet<V> {
     /// makes the division binding once it is agreed. To be called only if this vehicle's path is
     /// that of the last binding division.
     pub(super) fn step_division(&mut self, now: Instant, own: &OwnReport) {
-        let takes_part = self.vehicle_takes_part(usize::from(self.own));
+        let takes_part = self.vehicle_takes_part(usize::from(self.own_rank));
         let asks = own.wants_division && takes_part && !self.divisions.is_full();
         if !self.is_dividing() && !asks {
             return;
         }
         // This vehicle's commitment, in its next report, also requests the division from the
         // others.
-        let entry = &mut self.members[usize::from(self.own)].entry;
-        entry.commitment_dm = entry.commitment_dm.or(own.commitment_dm);
+        let entry = &mut self.members[usize::from(self.own_rank)].entry;
+        entry.commitment_dm = entry.commitment_dm.or(own.new_commitment_dm);
         entry.holds |= own.holds && entry.commitment_dm.is_some();
         self.prepare_division_inputs(now);
         if self.is_division_agreed(now) {

@@ -7,45 +7,46 @@ use crate::link::roster::{MAX_ENTRIES_PER_MESSAGE, RosterReport, RosterReportEnt
 impl<const V: usize> Fleet<V> {
     /// Handles the roster report of the vehicle of rank `sender`; `own`: whether this vehicle was
     /// started.
-    pub fn handle_roster(&mut self, sender: usize, roster: &RosterReport, own: StartStatus) {
-        if sender >= self.members.len() || sender == usize::from(self.own) {
+    pub fn handle_roster_report(&mut self, sender: usize, roster: &RosterReport, own: StartStatus) {
+        if sender >= self.members.len() || sender == usize::from(self.own_rank) {
             return;
         }
         self.note_flight(sender, roster);
         let here = self.divisions.len() as u8;
         // The sender may fly, or have flown, by another plan: before a restart, or without what was
         // photographed meanwhile. Its divisions and places then belong to another plan than ours.
-        let same_plan = roster.plan == self.plan;
-        if same_plan && roster.divisions > here {
+        let same_plan = roster.plan_crc8 == self.plan_crc8;
+        if same_plan && roster.division_count > here {
             let status = self.sender_status(sender, roster);
             if !self.adopt_division(roster, status) && status != ShareStatus::Left {
                 self.excluded = own == StartStatus::Started;
             }
         }
-        let same = same_plan && usize::from(roster.divisions) == self.divisions.len();
+        let same = same_plan && usize::from(roster.division_count) == self.divisions.len();
         if same || !same_plan {
-            self.members[sender].hash = if same { roster.hash } else { 0 };
+            self.members[sender].pending_hash = if same { roster.pending_hash } else { 0 };
         }
         for (rank, entry) in
-            roster.entries.iter().enumerate().map(|(i, e)| (i + usize::from(roster.first), e))
+            roster.entries.iter().enumerate().map(|(i, e)| (i + usize::from(roster.first_rank), e))
         {
-            if rank == usize::from(self.own) {
+            if rank == usize::from(self.own_rank) {
                 self.handle_own_entry(entry, own);
             } else if rank < self.members.len() {
                 if rank == sender {
                     self.take_first_incarnation(sender, entry.incarnation, own);
                 }
-                let behind =
-                    same_plan && roster.divisions < self.divisions.len() as u8 && rank != sender;
+                let behind = same_plan
+                    && roster.division_count < self.divisions.len() as u8
+                    && rank != sender;
                 // The member may have finished its share of a division that the sender does not
                 // know; it reports that itself.
-                if !(behind && entry.status == ShareStatus::Left && self.members[rank].heard_itself)
+                if !(behind && entry.status == ShareStatus::Left && self.members[rank].heard_by_us)
                 {
                     let counts = if same { *entry } else { entry.seen_from_another_division() };
                     self.merge_entry(rank, &counts, own);
                 }
-                if same && entry.agrees && rank != sender && roster.hash != 0 {
-                    self.members[rank].hash = roster.hash;
+                if same && entry.agrees && rank != sender && roster.pending_hash != 0 {
+                    self.members[rank].pending_hash = roster.pending_hash;
                 }
             }
         }
@@ -54,9 +55,10 @@ impl<const V: usize> Fleet<V> {
     /// Notes what the vehicle of this rank reports: whether it is in flight, and hears one that is.
     fn note_flight(&mut self, rank: usize, roster: &RosterReport) {
         let bit = 1u32 << rank.min(31);
-        for (bits, set) in
-            [(&mut self.in_flight, roster.in_flight), (&mut self.hear_flight, roster.hears_flight)]
-        {
+        for (bits, set) in [
+            (&mut self.in_flight_bits, roster.in_flight),
+            (&mut self.hears_flight_bits, roster.hears_vehicle_in_flight),
+        ] {
             *bits = if set { *bits | bit } else { *bits & !bit };
         }
     }
@@ -65,7 +67,8 @@ impl<const V: usize> Fleet<V> {
     /// only a sender that has left had agreed to before it was cut off excludes nobody: the sender
     /// flew by it until its lease ended, and the others divide what they had heard of the sender.
     fn sender_status(&self, sender: usize, roster: &RosterReport) -> ShareStatus {
-        let own = sender.checked_sub(usize::from(roster.first)).and_then(|i| roster.entries.get(i));
+        let own =
+            sender.checked_sub(usize::from(roster.first_rank)).and_then(|i| roster.entries.get(i));
         let known = &self.members[sender].entry;
         own.unwrap_or(known).status
     }
@@ -75,14 +78,18 @@ impl<const V: usize> Fleet<V> {
     /// its `status`, the others may meanwhile have counted on a later hash instead.
     fn adopt_division(&mut self, roster: &RosterReport, status: ShareStatus) -> bool {
         let here = self.divisions.len() as u8;
-        if roster.divisions != here + 1 || roster.committed_hash == 0 || self.divisions.is_full() {
+        if roster.division_count != here + 1
+            || roster.committed_hash == 0
+            || self.divisions.is_full()
+        {
             return false;
         }
         let left = status == ShareStatus::Left;
-        if roster.committed_hash == self.previous_hash && (self.hash == 0 || !left) {
-            (self.division_inputs, self.hash) = (self.previous_inputs.clone(), self.previous_hash);
+        if roster.committed_hash == self.withdrawn_hash && (self.pending_hash == 0 || !left) {
+            (self.pending_inputs, self.pending_hash) =
+                (self.withdrawn_inputs.clone(), self.withdrawn_hash);
         }
-        let reported = roster.committed_hash == self.hash;
+        let reported = roster.committed_hash == self.pending_hash;
         if reported {
             self.commit_division();
         }
@@ -93,10 +100,11 @@ impl<const V: usize> Fleet<V> {
     /// just switched on, knew none, and could not tell a newer one from an older one.
     fn take_first_incarnation(&mut self, sender: usize, incarnation: u8, own: StartStatus) {
         let bit = 1 << sender.min(31);
-        if self.introduced & bit == 0 && self.members[sender].entry.incarnation != incarnation {
+        if self.introduced_bits & bit == 0 && self.members[sender].entry.incarnation != incarnation
+        {
             self.take_newer_incarnation(sender, incarnation, own);
         }
-        self.introduced |= bit;
+        self.introduced_bits |= bit;
     }
 
     /// Merges what another vehicle reports of the vehicle of this rank, as far as it counts in our
@@ -123,7 +131,7 @@ impl<const V: usize> Fleet<V> {
     fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, own: StartStatus) {
         let started = own == StartStatus::Started;
         let (takes_part, flight) =
-            (self.vehicle_takes_part(usize::from(self.own)), self.is_another_in_flight());
+            (self.vehicle_takes_part(usize::from(self.own_rank)), self.is_another_in_flight());
         if started && !takes_part && !flight && !self.airborne {
             // The flight in which this vehicle left is over, and another one begins.
             self.forget_plan();
@@ -134,14 +142,14 @@ impl<const V: usize> Fleet<V> {
         let kept =
             if takes_part && (started || flight) { kept } else { RosterReportEntry::default() };
         member.entry = RosterReportEntry { incarnation, ..kept };
-        member.hash = 0;
+        member.pending_hash = 0;
     }
 
     /// Handles the entry about this vehicle in another one's report; `start`: whether it was
     /// started.
     fn handle_own_entry(&mut self, entry: &RosterReportEntry, start: StartStatus) {
         let flies = self.is_another_in_flight();
-        let own = &mut self.members[usize::from(self.own)].entry;
+        let own = &mut self.members[usize::from(self.own_rank)].entry;
         let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
         let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.status > own.status);
         match (outlived, start) {
@@ -159,19 +167,22 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// The roster report of this vehicle, with the entries from rank `first` on.
-    pub fn roster_message(&self, first: usize) -> RosterReport {
+    pub fn roster_report(&self, first: usize) -> RosterReport {
         // A vehicle that has left computes no divisions: its hash would soon be outdated.
-        let hash = if self.vehicle_takes_part(usize::from(self.own)) { self.hash } else { 0 };
-        let entry =
-            |m: &FleetVehicle| RosterReportEntry { agrees: hash != 0 && m.hash == hash, ..m.entry };
+        let hash =
+            if self.vehicle_takes_part(usize::from(self.own_rank)) { self.pending_hash } else { 0 };
+        let entry = |m: &FleetVehicle| RosterReportEntry {
+            agrees: hash != 0 && m.pending_hash == hash,
+            ..m.entry
+        };
         RosterReport {
-            divisions: self.divisions.len() as u8,
-            first: first as u8,
-            plan: self.plan,
-            in_flight: self.in_flight & self.own_bit() != 0,
-            hears_flight: self.heard_flights() != 0,
+            division_count: self.divisions.len() as u8,
+            first_rank: first as u8,
+            plan_crc8: self.plan_crc8,
+            in_flight: self.in_flight_bits & self.own_bit() != 0,
+            hears_vehicle_in_flight: self.other_ranks_in_flight() != 0,
             committed_hash: self.committed_hash,
-            hash,
+            pending_hash: hash,
             entries: self
                 .members
                 .iter()

@@ -17,7 +17,7 @@ const STEP: Duration = Duration::from_millis(250);
 /// Length flown in a step, decimetres.
 const STEP_DM: u16 = 5;
 /// Time for which a vehicle stands ready before it takes a start, seconds: as
-/// `plans_as_others` has it, and a second more.
+/// `shares_plan_with_others` has it, and a second more.
 const READY_S: u32 = 6;
 const MOST: usize = 5;
 /// CRCs of plans; the area may be begun again by the same plan.
@@ -151,22 +151,22 @@ impl Swarm {
             heard_at: heard_at[rank],
             hears_us: hears(rank, own),
             heard_by_others: (0..count).any(|other| other != rank && hears(other, rank)),
-            hears: bits[rank],
+            heard_bits: bits[rank],
         };
         let holds_dm = v.fleet.commitment_dm();
         let report = OwnReport {
             airborne: !v.on_pad,
             status: v.status,
-            waits: v.waits,
-            division: v.division,
+            waits_for_start: v.waits,
+            path_division_count: v.division,
             progress_dm: v.progress_dm,
-            commitment_dm: Some(if v.on_pad { 0 } else { v.progress_dm + 50 }),
+            new_commitment_dm: Some(if v.on_pad { 0 } else { v.progress_dm + 50 }),
             holds: v.on_pad || holds_dm.is_some_and(|at_dm| v.progress_dm >= at_dm),
             wants_division: false,
         };
         v.fleet.step(now, &report, hearing);
-        if v.fleet.needs_division() {
-            let hash = v.fleet.division_hash();
+        if v.fleet.is_division_to_be_computed() {
+            let hash = v.fleet.division_inputs_hash();
             v.fleet.set_hash_from_plan(hash);
         }
         if v.status == ShareStatus::Alive && v.fleet.division_count() > v.division {
@@ -187,14 +187,14 @@ impl Swarm {
         let now = sender.clock(self.now);
         let heard = (0..count).filter(|rank| lately(now, sender.heard_at[*rank], 800));
         let bits = heard.fold(0u32, |bits, rank| bits | 1 << rank);
-        let roster = sender.fleet.roster_message(0);
+        let roster = sender.fleet.roster_report(0);
         for to in 0..count {
             let arrives = self.uniform() >= self.loss && self.links[to] >> own & 1 != 0;
             let to = &mut self.vehicles[to];
             if to.on && arrives {
                 (to.heard_at[own], to.heard_bits[own]) = (Some(to.clock(self.now)), bits);
                 let start = if to.waits { StartStatus::NotStarted } else { StartStatus::Started };
-                to.fleet.handle_roster(own, &roster, start);
+                to.fleet.handle_roster_report(own, &roster, start);
             }
         }
     }

@@ -17,16 +17,22 @@ pub struct FleetTimeouts {
     /// Time for which a renewed lease lasts, as [`LEASE`].
     pub lease: Duration,
     /// Greatest age of a report that renews the lease, as [`LEASE_HEARD_WITHIN`].
-    pub heard: Duration,
+    pub heard_within: Duration,
     /// Silence after which a vehicle counts as lost, as [`SILENT_AFTER`].
-    pub silent: Duration,
+    pub lost_after: Duration,
     /// Silence after which a lost vehicle is down, at whatever height it was lost.
-    pub down: Duration,
+    pub down_after: Duration,
 }
 
 impl FleetTimeouts {
-    /// Time limits of a flight in which a vehicle that no other vehicle hears is down after `down`.
-    pub const fn of_flight(down: Duration) -> Self {
-        Self { lease: LEASE, heard: LEASE_HEARD_WITHIN, silent: SILENT_AFTER, down }
+    /// Time limits of a flight in which a vehicle that no other vehicle hears is down after
+    /// `down_after`.
+    pub const fn of_flight(down_after: Duration) -> Self {
+        Self {
+            lease: LEASE,
+            heard_within: LEASE_HEARD_WITHIN,
+            lost_after: SILENT_AFTER,
+            down_after,
+        }
     }
 }

@@ -8,15 +8,15 @@ use crate::time::Duration;
 pub(crate) const MAX_HOVER_MPS: f32 = 0.3;
 /// Difference of `time_boot_ms` to that of the last position, milliseconds. A position older by
 /// less is late and is dropped; if it is older by more, its sender has restarted.
-pub(super) const RESTART_MS: u32 = 10_000;
+pub(super) const SENDER_RESTARTED_STEP_BACK_MS: u32 = 10_000;
 /// Age of its last message within which a neighbour counts as heard: four positions and intents.
 pub(super) const HEARD_WITHIN: Duration = Duration::from_millis(800);
 /// Age of a neighbour's position from which it may have fallen silent: no vehicle arms beside it,
 /// since a silent one would bar the climb.
-pub(super) const UNHEARD_BEFORE_ARMING: Duration = Duration::from_millis(600);
+pub(super) const NO_ARMING_BESIDE_SILENT_AFTER: Duration = Duration::from_millis(600);
 /// Horizontal distance from its pad beyond which a vehicle on its plan is neither on the way up
 /// from the pad nor on the way down to it, metres.
-pub(super) const OVER_PAD_M: f32 = 10.0;
+pub(super) const MAX_OVER_PAD_M: f32 = 10.0;
 /// Silence after which a neighbour counts as lost. An unheard vehicle stops within 3 s (row
 /// `NeighboursSilent`) and lands 20 s later; this leaves it 20 s to come down.
 pub(super) const LOST_AFTER: Duration = Duration::from_millis(LOST_AFTER_MS);
@@ -27,12 +27,12 @@ pub(super) const LOST_AFTER_MS: u64 = 45_000;
 pub(super) const RANGE_EDGE_SHARE: f32 = 0.7;
 /// Least share of the slowest vehicle's cruise at which an unheard vehicle makes progress: it slows
 /// in corners and where it lags.
-pub(super) const RECKONED_SPEED_SHARE: f32 = 0.4;
-/// Silence after which a vehicle's progress is assumed to grow at [`RECKONED_SPEED_SHARE`],
+pub(super) const MIN_UNHEARD_SPEED_SHARE: f32 = 0.4;
+/// Silence after which a vehicle's progress is assumed to grow at [`MIN_UNHEARD_SPEED_SHARE`],
 /// seconds.
-pub(super) const RECKONED_AFTER_S: f32 = 2.0;
+pub(super) const UNHEARD_PROGRESS_GROWS_AFTER_S: f32 = 2.0;
 /// Greatest distance before a closed gate at which an unheard vehicle stands, metres.
-pub(super) const STANDS_BEFORE_GATE_M: f32 = 0.5;
+pub(super) const MAX_STAND_BEFORE_GATE_M: f32 = 0.5;
 /// Least length of path with open gates ahead of a vehicle that falls silent for it to be assumed
 /// to fly on, metres: with less ahead it may be standing there already.
 pub(super) const MIN_OPEN_PATH_M: f32 = 0.5;
@@ -40,7 +40,7 @@ pub(super) const MIN_OPEN_PATH_M: f32 = 0.5;
 pub(super) const MAX_UNHEARD_FLIGHT_S: f32 = 75.0;
 /// Silence of a vehicle at the edge of the radio's range, with no open gates ahead, up to which it
 /// counts as out of range: it stands on its path and does not land yet.
-pub(super) const UNHEARD_WAIT: Duration = Duration::from_secs(15);
+pub(super) const MAX_OUT_OF_RANGE_WAIT: Duration = Duration::from_secs(15);
 /// Silence after which a lost vehicle is on the ground, from the highest floors too: 50 m at 1.5
 /// m/s.
 pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
@@ -48,16 +48,16 @@ pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
 /// is free again: the vehicle is down by then, whatever it flew there.
 pub(super) const COLUMN_KEPT_FOR: Duration = Duration::from_secs(600);
 /// Time by which a vehicle that still hears others notices later that it is unheard, seconds.
-pub(super) const NOTICED_LATER_S: f32 = 0.8;
+pub(super) const UNHEARD_NOTICED_LATER_S: f32 = 0.8;
 /// Share of its points that a vehicle flies at least: it may brake for their end already.
-pub(super) const LEAST_SHARE_OF_POINTS: f32 = 0.8;
+pub(super) const MIN_FLOWN_SHARE_OF_POINTS: f32 = 0.8;
 /// Distance of a point from the vehicle from which on it shows the course, metres.
 pub(super) const MIN_COURSE_M: f32 = 0.5;
 /// Least spacing of the places on the unheard stretch below which the vehicle may lie, metres.
-pub(super) const UNHEARD_STRETCH_SPACING_M: f32 = 1.0;
+pub(super) const MIN_UNHEARD_STRETCH_SPACING_M: f32 = 1.0;
 /// Silence after which a vehicle in a coverage mission may have landed further along its path than
-/// `unheard_stretch_m`: its lease, and the time that row `SwarmLinkLost` waits. No vehicle counts
-/// as out of the plan for a shorter silence.
+/// `max_unheard_travel_m`: its lease, and the time that row `SwarmLinkLost` waits. No vehicle
+/// counts as out of the plan for a shorter silence.
 pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 /// Rounding of the length of a path of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
@@ -67,7 +67,7 @@ pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
 pub(super) const MAX_STRETCH_SPACINGS: f32 = 8.0;
 /// Height of the column below a neighbour's place in which it may lie on the ground, metres; the
 /// planner shortens the column where it knows the ground.
-pub(super) const MAX_COLUMN_M: f32 = 60.0;
+pub(super) const DEFAULT_COLUMN_DEPTH_M: f32 = 60.0;
 /// Silence after which a vehicle in the air may land before it is heard again.
 pub(super) const MAY_LAND_AFTER: Duration = Duration::from_secs(3);
 /// Distance by which the wind carries a vehicle aside that falls with its motors off, for each
@@ -103,13 +103,13 @@ pub(super) const AVOIDED_WITHIN_M: f32 = 0.5;
 /// Distance beside its path at which a vehicle may come down unheard, beyond the deviation allowed
 /// beside a vehicle on the ground, metres. Its landing is guided as at its goal, so the distance is
 /// the one that the schedule keeps from landed vehicles in announced gusts of 3 m/s.
-pub(super) const UNHEARD_BESIDE_M: f32 = 0.15;
+pub(super) const MAX_UNHEARD_LANDING_OFFSET_M: f32 = 0.15;
 /// Acceleration by which the safety filter widens the set of a vehicle that is off the points that
 /// it reports, m/s², with the default `FLK_ACCEL`; with a greater one it may stop a detour.
 pub(super) const OFF_POINTS_ACCEL_MPS2: f32 = 1.5;
 /// Age of a vehicle's last position that is seldom exceeded, without the delay of its message,
 /// seconds: five are sent a second.
-pub(super) const TYPICAL_AGE_S: f32 = 0.3;
+pub(super) const MAX_USUAL_POSITION_AGE_S: f32 = 0.3;
 /// Sum of the deviations of two vehicles in the air, one of which hovers, metres.
 pub(super) const PAIR_SWAY_M: f32 = 0.1;
 /// Time for which an intent of our mission shows that the sender's positions are those of the
@@ -131,11 +131,11 @@ pub(super) const MAX_MESSAGE_DELAY_S: f32 = 1.0;
 /// has a new nearest point.
 pub(super) const MAX_PROGRESS_JUMP_M: f32 = 1.0;
 /// Longest time for which an unheard vehicle flies on beyond the top of its climb, seconds.
-pub(super) const UNHEARD_BEYOND_TOP_S: f32 = 1.2;
+pub(super) const MAX_UNHEARD_BEYOND_TOP_S: f32 = 1.2;
 /// Greatest horizontal distance of a climbing vehicle from the vertical of its climb, metres.
-pub(super) const CLIMB_BESIDE_M: f32 = 0.9;
+pub(super) const MAX_CLIMB_DRIFT_M: f32 = 0.9;
 /// A climb whose top is at most this far above the vehicle is done, metres.
-pub(super) const CLIMB_TOP_M: f32 = 0.3;
+pub(super) const CLIMB_DONE_BELOW_TOP_M: f32 = 0.3;
 /// Stands for the position of a vehicle that never reported one: further away than any vehicle.
 pub(super) const FAR_AWAY: Point = Point::new(1e6, 1e6, 1e6);
 /// Stands for no place: NaN, to which no distance is small.

@@ -1,15 +1,15 @@
 //! A neighbour as it was last heard, and where it may have got to since.
 
 use planner_core::detour::{KeepOutZone, ZoneKind};
-use planner_core::flight::PROGRESS_ERROR_M;
+use planner_core::flight::MAX_REPORTED_PROGRESS_LAG_M;
 use planner_core::track::safety::PlaceOnPoints;
 use planner_core::{Length, Point};
 
 use super::bounds::*;
 use super::entry::NeighbourEntry;
-use crate::config::Ground;
+use crate::config::UnevenGround;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, ON_DETOUR, OUT_OF_PLAN, WAITING};
-use crate::margins::{late_report_flight_s, least_unheard_rest_m};
+use crate::margins::{min_unheard_travel_m, unheard_flight_by_delay_s};
 use crate::time::{Duration, Instant};
 
 /// Where and when silent vehicles come down in a coverage mission, and by how much two in the air
@@ -17,7 +17,7 @@ use crate::time::{Duration, Instant};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AreaGround {
     /// Heights of the ground, where it is not level.
-    pub(super) ground: Option<Ground>,
+    pub(super) ground: Option<UnevenGround>,
     /// Silence after which a vehicle is on the ground.
     pub(super) down_after: Duration,
     /// Distance by which two vehicles in the air may be nearer than their estimates say, metres.
@@ -35,7 +35,7 @@ impl NeighbourEntry {
         let Some(heard_at) = self.heard_at.filter(lost) else { return false };
         let flight_ms = (1000.0 * self.unheard_flight_time_s()) as u32;
         let dead = Duration::from_millis(LOST_AFTER_MS + u64::from(flight_ms));
-        now - heard_at >= dead && self.relayed_at.is_none_or(|at| now - at >= dead)
+        now - heard_at >= dead && self.relayed_report_at.is_none_or(|at| now - at >= dead)
     }
 
     /// Whether the neighbour was last heard 3 s or more after its last valid position; false if it
@@ -50,8 +50,8 @@ impl NeighbourEntry {
     pub(super) fn unheard_flight_time_s(&self) -> f32 {
         match self.state.progress_m.filter(|_| self.flies_plan_unheard()) {
             Some(progress_m) => {
-                let fly_s = (self.gates_open_up_to_m - progress_m) / self.assumed_speed_mps
-                    + f32::from(self.unheard_delay_s);
+                let fly_s = (self.gates_open_up_to_m - progress_m) / self.min_unheard_progress_mps
+                    + f32::from(self.unheard_flight_delay_s);
                 fly_s.clamp(0.0, MAX_UNHEARD_FLIGHT_S)
             }
             None => 0.0,
@@ -79,27 +79,29 @@ impl NeighbourEntry {
         {
             return own_m;
         }
-        match (own_m, self.relayed_m) {
-            (Some(own_m), Some(relayed_m)) => Some(libm::fmaxf(own_m, relayed_m)),
-            (own_m, relayed_m) => own_m.or(relayed_m),
+        match (own_m, self.relayed_progress_m) {
+            (Some(own_m), Some(relayed_progress_m)) => Some(libm::fmaxf(own_m, relayed_progress_m)),
+            (own_m, relayed_progress_m) => own_m.or(relayed_progress_m),
         }
     }
 
     /// Progress along the shared plan that the neighbour has surely made, metres: unheard at the
     /// edge of the radio's range it is assumed to fly on as far as its gates were open.
-    pub(super) fn passed_m(&self, now: Instant) -> Option<f32> {
+    pub(super) fn min_progress_m(&self, now: Instant) -> Option<f32> {
         let known_m = self.heard_progress_m(now)?;
-        let Some(known_at) = self.intent_at.max(self.relayed_at) else { return Some(known_m) };
-        let after_s = RECKONED_AFTER_S + f32::from(self.unheard_delay_s);
+        let Some(known_at) = self.intent_at.max(self.relayed_report_at) else {
+            return Some(known_m);
+        };
+        let after_s = UNHEARD_PROGRESS_GROWS_AFTER_S + f32::from(self.unheard_flight_delay_s);
         let silent_s = (now - known_at).as_secs_f32() - after_s;
         let beyond = self.at_range_edge || self.position_at.is_none();
         if silent_s <= 0.0 || !beyond || self.reports_any(ON_DETOUR | OUT_OF_PLAN) {
             return Some(known_m);
         }
-        let reckoned_m = known_m + self.assumed_speed_mps * silent_s;
+        let reckoned_m = known_m + self.min_unheard_progress_mps * silent_s;
         Some(libm::fmaxf(
             known_m,
-            libm::fminf(reckoned_m, self.gates_open_up_to_m - PROGRESS_ERROR_M),
+            libm::fminf(reckoned_m, self.gates_open_up_to_m - MAX_REPORTED_PROGRESS_LAG_M),
         ))
     }
 
@@ -108,11 +110,11 @@ impl NeighbourEntry {
     pub(super) fn time_until_passed_s(&self, until_m: f32, now: Instant) -> Option<f32> {
         let known_m =
             self.heard_progress_m(now).filter(|_| !self.reports_any(ON_DETOUR | OUT_OF_PLAN))?;
-        let known_at = self.intent_at.max(self.relayed_at)?;
-        let fly_s = (until_m - known_m) / self.assumed_speed_mps;
-        let after_s =
-            RECKONED_AFTER_S + f32::from(self.unheard_delay_s) - (now - known_at).as_secs_f32();
-        (until_m <= self.gates_open_up_to_m - PROGRESS_ERROR_M)
+        let known_at = self.intent_at.max(self.relayed_report_at)?;
+        let fly_s = (until_m - known_m) / self.min_unheard_progress_mps;
+        let after_s = UNHEARD_PROGRESS_GROWS_AFTER_S + f32::from(self.unheard_flight_delay_s)
+            - (now - known_at).as_secs_f32();
+        (until_m <= self.gates_open_up_to_m - MAX_REPORTED_PROGRESS_LAG_M)
             .then(|| libm::fmaxf(fly_s + after_s, 0.0))
     }
 
@@ -142,7 +144,7 @@ impl NeighbourEntry {
         self.reports_any(ON_DETOUR)
             && !self.reports_any(GROUNDED)
             && self.may_come_down
-            && self.points_for_now().last().is_some_and(|low| low.z < self.state.position.z)
+            && self.points_to_stop().last().is_some_and(|low| low.z < self.state.position.z)
             && self.state.velocity.xy().norm_squared() < MAX_HOVER_MPS * MAX_HOVER_MPS
             && self.heard_within(now, HEARD_WITHIN)
     }
@@ -168,7 +170,7 @@ impl NeighbourEntry {
 
     /// Calls `visit` with the columns, of radius `apart_m`, in which the neighbour may come down;
     /// unheard, below all places up to `upto_m` along its points.
-    pub(super) fn landing_columns(
+    pub(super) fn visit_landing_columns(
         &self,
         now: Instant,
         [apart_m, upto_m]: [f32; 2],
@@ -177,7 +179,7 @@ impl NeighbourEntry {
         let here = self.state.position;
         let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
         if !self.heard_within(now, MAY_LAND_AFTER) {
-            return self.for_each_place([0.0, upto_m], &mut |place, wider_m| {
+            return self.for_each_rest_place([0.0, upto_m], &mut |place, wider_m| {
                 let radius_m = fpu::sqrtf(apart_m * apart_m + wider_m * wider_m);
                 let (from, to) =
                     (place + up(COLUMN_TOP_ABOVE_M), place - up(self.column_depth_m(&place)));
@@ -193,11 +195,11 @@ impl NeighbourEntry {
             });
         };
         let age_s = self.position_at.map_or(0.0, |at| (now - at).as_secs_f32());
-        let fallen_m = (MAX_LANDING_MPS * age_s).min(MAX_COLUMN_M);
+        let fallen_m = (MAX_LANDING_MPS * age_s).min(DEFAULT_COLUMN_DEPTH_M);
         if age_s < MAX_HEIGHT_AGE_S {
             column(
                 here,
-                (LANDING_COLUMN_DEPTH_M + fallen_m).min(MAX_COLUMN_M),
+                (LANDING_COLUMN_DEPTH_M + fallen_m).min(DEFAULT_COLUMN_DEPTH_M),
                 ZoneKind::Descending,
             );
         } else {
@@ -211,27 +213,27 @@ impl NeighbourEntry {
     pub(super) fn column_depth_m(&self, place: &Point) -> f32 {
         // NaN, a ground never reported, counts as none.
         if self.would_fly_all_points_unheard() {
-            libm::fmaxf(MAX_COLUMN_M, place.z - self.ground_m)
+            libm::fmaxf(DEFAULT_COLUMN_DEPTH_M, place.z - self.ground_m)
         } else {
-            MAX_COLUMN_M
+            DEFAULT_COLUMN_DEPTH_M
         }
     }
 
     /// Height of the top of the neighbour's climb, ENU up, metres; `None` without a climb.
     pub(super) fn climb_top_m(&self) -> Option<f32> {
-        let (top, here) = (self.points_for_now().last()?, self.state.position);
+        let (top, here) = (self.points_to_stop().last()?, self.state.position);
         let beside = (top - here).xy().norm_squared();
         let climbs = self.may_come_down
             && !self.reports_any(LANDED | OUT_OF_PLAN)
-            && beside < CLIMB_BESIDE_M * CLIMB_BESIDE_M;
-        (climbs && top.z > here.z + CLIMB_TOP_M).then_some(top.z)
+            && beside < MAX_CLIMB_DRIFT_M * MAX_CLIMB_DRIFT_M;
+        (climbs && top.z > here.z + CLIMB_DONE_BELOW_TOP_M).then_some(top.z)
     }
 
     /// Distance along its points that the neighbour may fly unheard, metres. In a coverage mission
     /// that is all of them; elsewhere the length of a stop, plus what delays add: of its own
     /// messages and of those by which it learns that no vehicle hears it.
     #[inline]
-    pub(super) fn unheard_distance_m(&self) -> f32 {
+    pub(super) fn max_unheard_distance_m(&self) -> f32 {
         // The slack keeps rounding from cutting off the last corner.
         let all_m = self.points_length_m + LEGS_ROUNDING_M;
         let stops_m = self.unheard_stopping_distance_m();
@@ -241,17 +243,17 @@ impl NeighbourEntry {
     /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
     #[inline]
     pub(super) fn unheard_stopping_distance_m(&self) -> f32 {
-        self.unheard_stretch_m
-            + self.fastest_cruise_mps * late_report_flight_s(self.message_delay.delay_s)
+        self.max_unheard_travel_m
+            + self.fastest_vehicle_mps * unheard_flight_by_delay_s(self.message_delay.delay_s)
     }
 
     /// Whether the neighbour was in the air, or about to take off, when it was last heard.
     pub(super) fn is_under_way(&self) -> bool {
-        !self.reports_any(GROUNDED | LANDED) || self.unheard_point_count > 0
+        !self.reports_any(GROUNDED | LANDED) || self.unheard_flight_point_count > 0
     }
 
     /// Whether the neighbour, silent in a coverage mission, may fly on by lease or autopilot.
-    pub(super) fn may_fly_on(&self, now: Instant) -> bool {
+    pub(super) fn may_fly_on_silent(&self, now: Instant) -> bool {
         self.would_fly_all_points_unheard()
             && self.is_under_way()
             && !self.reports_any(OUT_OF_PLAN)
@@ -261,7 +263,7 @@ impl NeighbourEntry {
     /// Where the neighbour, silent in a coverage mission, may have fallen without power: the line
     /// from its position to where its speed carried it, and the distance beside it, metres.
     #[inline(never)]
-    pub(super) fn fall(&self, now: Instant) -> Option<([Point; 2], f32)> {
+    pub(super) fn fall_line(&self, now: Instant) -> Option<([Point; 2], f32)> {
         let silent = self.would_fly_all_points_unheard()
             && self.is_under_way()
             && !self.heard_within(now, MAY_LAND_AFTER);
@@ -269,12 +271,12 @@ impl NeighbourEntry {
         let fast_mps = velocity.xy().norm().max(MAX_FALL_CARRY_MPS);
         let carried = Point::new(velocity.x, velocity.y, 0.0)
             * (FALL_CARRY_S * MAX_FALL_CARRY_MPS / fast_mps);
-        silent.then(|| ([here, here + carried], self.fall_aside_m()))
+        silent.then(|| ([here, here + carried], self.max_fall_drift_m()))
     }
 
     /// Distance by which the wind may carry the neighbour aside while it falls, metres.
     #[inline(always)]
-    pub(super) fn fall_aside_m(&self) -> f32 {
+    pub(super) fn max_fall_drift_m(&self) -> f32 {
         let high_m = self.state.position.z - self.ground_m;
         // NaN, a ground never reported, counts as none.
         if high_m > 0.0 { FALL_DRIFT_PER_HEIGHT * high_m.min(MAX_FALL_M) } else { 0.0 }
@@ -284,13 +286,13 @@ impl NeighbourEntry {
     /// through `place`. No two pads are that near to each other.
     pub(crate) fn may_return_to_pad_near(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
         let near = |pad: Point| (pad - place).xy().norm_squared() < apart_m * apart_m;
-        self.may_fly_on(now) && self.pad.is_some_and(near)
+        self.may_fly_on_silent(now) && self.pad.is_some_and(near)
     }
 
     /// The points that the neighbour flies to next from its position; its setpoint may be behind.
     fn next_points(&self) -> &[Point] {
         match self.place_on_points {
-            PlaceOnPoints::On { leg, .. } if !self.would_fly_all_points_unheard() => {
+            PlaceOnPoints::On { leg_end: leg, .. } if !self.would_fly_all_points_unheard() => {
                 self.points.get(usize::from(leg)..).unwrap_or(&self.points)
             }
             _ => &self.points,
@@ -300,7 +302,11 @@ impl NeighbourEntry {
     /// Calls `each` with the neighbour's position and each leg along its points that it may have
     /// flown unheard, `left_m` in all: both ends, and metres of the leg and of its flown part.
     #[inline(never)]
-    pub(super) fn for_each_leg(&self, mut left_m: f32, each: &mut dyn FnMut([Point; 2], [f32; 2])) {
+    pub(super) fn for_each_unheard_leg(
+        &self,
+        mut left_m: f32,
+        each: &mut dyn FnMut([Point; 2], [f32; 2]),
+    ) {
         let mut at = self.state.position;
         each([at; 2], [0.0; 2]);
         for next in self.next_points() {
@@ -317,15 +323,15 @@ impl NeighbourEntry {
     /// `from_m` to `to_m` along them, and with its greatest distance from the nearest of them,
     /// metres.
     #[inline(never)]
-    pub(super) fn for_each_place(
+    pub(super) fn for_each_rest_place(
         &self,
         [from_m, to_m]: [f32; 2],
         visit: &mut dyn FnMut(Point, f32),
     ) {
-        let step_m = libm::fmaxf(UNHEARD_STRETCH_SPACING_M, to_m / MAX_STRETCH_SPACINGS);
-        let wider_m = if step_m > UNHEARD_STRETCH_SPACING_M { 0.5 * step_m } else { 0.0 };
+        let step_m = libm::fmaxf(MIN_UNHEARD_STRETCH_SPACING_M, to_m / MAX_STRETCH_SPACINGS);
+        let wider_m = if step_m > MIN_UNHEARD_STRETCH_SPACING_M { 0.5 * step_m } else { 0.0 };
         let mut before_m = 0.0;
-        self.for_each_leg(to_m, &mut |[at, next], [leg_m, flown_m]| {
+        self.for_each_unheard_leg(to_m, &mut |[at, next], [leg_m, flown_m]| {
             let mut along_m = if from_m > before_m { from_m - before_m } else { step_m };
             while along_m < flown_m {
                 visit(at + (next - at) * (along_m / leg_m), wider_m);
@@ -345,7 +351,7 @@ impl NeighbourEntry {
     /// Least distance along its points, metres, at which the neighbour comes to rest unheard: that
     /// of its hardest stop from the speed at which it was last heard, or of a fall. 0 in a coverage
     /// mission, off its points, and where it climbs, descends or lands.
-    pub(super) fn least_rest_m(&self) -> f32 {
+    pub(super) fn min_rest_distance_m(&self) -> f32 {
         let far = |way: &Point| way.norm_squared() > MIN_COURSE_M * MIN_COURSE_M;
         let course = self.next_points().iter().map(|p| p - self.state.position).find(far);
         let flies = matches!(self.place_on_points, PlaceOnPoints::On { .. })
@@ -353,15 +359,15 @@ impl NeighbourEntry {
             && !self.has_column();
         let Some(ahead) = course.filter(|_| flies) else { return 0.0 };
         let speed_mps = libm::fmaxf(self.state.velocity.dot(&ahead) / ahead.length(), 0.0);
-        let stop_m = libm::fminf(least_unheard_rest_m(speed_mps), self.unheard_stretch_m);
+        let stop_m = libm::fminf(min_unheard_travel_m(speed_mps), self.max_unheard_travel_m);
         let (mut points_m, mut at) = (0.0, self.state.position);
         for next in self.next_points() {
             points_m += (next - core::mem::replace(&mut at, *next)).length();
-            if LEAST_SHARE_OF_POINTS * points_m >= stop_m {
+            if MIN_FLOWN_SHARE_OF_POINTS * points_m >= stop_m {
                 return stop_m;
             }
         }
-        LEAST_SHARE_OF_POINTS * points_m
+        MIN_FLOWN_SHARE_OF_POINTS * points_m
     }
 
     /// The place `least_m` along its points, with the points from the beginning of its leg on, and
@@ -377,7 +383,7 @@ impl NeighbourEntry {
             if leg_m > left_m {
                 let rest = at + (next - at) * (left_m / leg_m);
                 let from = i.saturating_sub(1);
-                let place = PlaceOnPoints::On { leg: (i - from) as u8, more_dm: 0 };
+                let place = PlaceOnPoints::On { leg_end: (i - from) as u8, uncertainty_dm: 0 };
                 return Some((rest, &self.points[from..], place));
             }
             (at, left_m) = (*next, left_m - leg_m);
@@ -387,15 +393,15 @@ impl NeighbourEntry {
 
     /// Greatest height at which the neighbour may lie after coming down from `place`, ENU up,
     /// metres: the ground that it reported, unless that is just the area's lowest. In that case the
-    /// area's highest ground; but at least half of [`Ground::height_m`] below `place` if the
-    /// neighbour was on its plan away from its pad.
+    /// area's highest ground; but at least half of [`UnevenGround::min_height_above_ground_m`]
+    /// below `place` if the neighbour was on its plan away from its pad.
     pub(super) fn max_ground_m(&self, field: AreaGround, place: &Point) -> f32 {
         let Some(ground) = field.ground.filter(|ground| self.ground_m <= ground.low_m) else {
             return self.ground_m;
         };
-        let away = self.pad.is_some_and(|pad| (pad - place).xy().length() > OVER_PAD_M);
+        let away = self.pad.is_some_and(|pad| (pad - place).xy().length() > MAX_OVER_PAD_M);
         let below_m = if away && !self.reports_any(ON_DETOUR | OUT_OF_PLAN) && !self.may_come_down {
-            ground.height_m / 2.0
+            ground.min_height_above_ground_m / 2.0
         } else {
             0.0
         };
@@ -406,7 +412,7 @@ impl NeighbourEntry {
     /// on the points that it reports, or reports none: by what it may fly aside in its messages'
     /// age. 0 on its points.
     fn off_points_reach_m(&self) -> f32 {
-        let age_s = self.message_delay.delay_s + TYPICAL_AGE_S;
+        let age_s = self.message_delay.delay_s + MAX_USUAL_POSITION_AGE_S;
         match self.place_on_points {
             PlaceOnPoints::Beside => 0.5 * OFF_POINTS_ACCEL_MPS2 * age_s * age_s,
             PlaceOnPoints::On { .. } | PlaceOnPoints::Unknown => 0.0,
@@ -415,7 +421,7 @@ impl NeighbourEntry {
 
     /// Calls `visit` with the keep-out zones, of radius `apart_m`, of all places where
     /// the neighbour may be from now on; unheard up to `upto_m` along its points.
-    pub(super) fn keep_out_zones(
+    pub(super) fn visit_keep_out_zones(
         &self,
         now: Instant,
         [apart_m, upto_m]: [f32; 2],
@@ -457,7 +463,7 @@ impl NeighbourEntry {
                 // reaches down to the reported ground at corners of its path only.
                 let low = |at: Point, height_m| Point::new(at.x, at.y, height_m);
                 let high = |at: Point| low(at, self.max_ground_m(field, &at));
-                return self.for_each_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {
+                return self.for_each_unheard_leg(upto_m, &mut |[at, next], [leg_m, flown_m]| {
                     let next =
                         if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next };
                     let (from, lies) = (high(next), place(apart_m + STALE_POSITION_ERROR_M));
@@ -468,8 +474,9 @@ impl NeighbourEntry {
                 });
             }
             let nature = if down { ZoneKind::Grounded } else { ZoneKind::Static };
-            let beside_m = if field.is_some() { STALE_POSITION_ERROR_M } else { UNHEARD_BESIDE_M };
-            self.for_each_place([self.least_rest_m(), upto_m], &mut |at, wider_m| {
+            let beside_m =
+                if field.is_some() { STALE_POSITION_ERROR_M } else { MAX_UNHEARD_LANDING_OFFSET_M };
+            self.for_each_rest_place([self.min_rest_distance_m(), upto_m], &mut |at, wider_m| {
                 let far_m = apart_m + beside_m;
                 let radius_m = fpu::sqrtf(far_m * far_m + wider_m * wider_m);
                 visit(KeepOutZone { radius_m, ..column(at, nature) });

@@ -3,7 +3,7 @@
 use super::Neighbours;
 use super::bounds::*;
 use super::entry::NeighbourEntry;
-use crate::config::Ground;
+use crate::config::UnevenGround;
 use crate::link::intent::{GROUNDED, LANDED, OUT_OF_PLAN};
 use crate::link::roster::{MAX_ENTRIES_PER_MESSAGE, RosterReport};
 use crate::swarm::fleet::{
@@ -26,7 +26,12 @@ impl<const V: usize> Neighbours<V> {
     /// `down_s`: silence after which a lost vehicle is on the ground, seconds; `ground`: heights of
     /// ground that is not level; `pair_error_m`: distance by which two vehicles may be nearer than
     /// their estimates say, metres.
-    pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, pair_error_m: f32) {
+    pub(crate) fn form_fleet(
+        &mut self,
+        down_s: f32,
+        ground: Option<UnevenGround>,
+        pair_error_m: f32,
+    ) {
         (self.ground, self.pair_position_error_m) = (ground, pair_error_m);
         self.down_after = DOWN_AFTER.max(Duration::from_millis((down_s * 1000.0) as u64));
         let down = Duration::from_millis((down_s * 1000.0) as u64);
@@ -64,7 +69,7 @@ impl<const V: usize> Neighbours<V> {
                     heard_at: entry.intent_at,
                     hears_us: entry.hears_us_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN),
                     heard_by_others: by_others & bit != 0,
-                    hears: entry.heard_bits,
+                    heard_bits: entry.heard_bits,
                 }
             })
         });
@@ -74,7 +79,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn hears_another_plan(&self, now: Instant) -> bool {
         let lately =
             |c: &NeighbourEntry| c.intent_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
-        self.entries[..self.roster_count].iter().any(|c| c.other_plan && lately(c))
+        self.entries[..self.roster_count].iter().any(|c| c.follows_other_plan && lately(c))
     }
 
     /// Whether another vehicle that takes part is in flight, heard within `missed_after`, and none
@@ -97,19 +102,19 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Handles another vehicle's roster report; `own`: whether this vehicle was started.
-    pub(crate) fn handle_roster(&mut self, id: u8, roster: &RosterReport, own: StartStatus) {
+    pub(crate) fn handle_roster_report(&mut self, id: u8, roster: &RosterReport, own: StartStatus) {
         let rank = self.roster_index(id).map(|at| usize::from(self.entries[at].rank));
         if let (Some(fleet), Some(rank)) = (&mut self.fleet, rank) {
-            fleet.handle_roster(rank, roster, own);
+            fleet.handle_roster_report(rank, roster, own);
         }
     }
 
     /// The next roster report: all vehicles, or in turn as many as one message holds.
     pub(crate) fn next_roster_report(&mut self) -> Option<RosterReport> {
         let fleet = self.fleet.as_ref()?;
-        let next = usize::from(self.roster_next);
+        let next = usize::from(self.next_reported_rank);
         let first = if next < fleet.vehicle_count() { next } else { 0 };
-        self.roster_next = (first + MAX_ENTRIES_PER_MESSAGE) as u16;
-        Some(fleet.roster_message(first))
+        self.next_reported_rank = (first + MAX_ENTRIES_PER_MESSAGE) as u16;
+        Some(fleet.roster_report(first))
     }
 }

@@ -19,17 +19,17 @@ pub(crate) struct NeighbourEntry {
     pub(super) sequence: SequenceFilter,
     pub(super) heard_at: Option<Instant>,
     pub(super) position_at: Option<Instant>,
-    pub(super) boot_ms: u32,
+    pub(super) position_boot_ms: u32,
     pub(super) flags: u8,
     /// Since when the neighbour has reported that it is out of the plan, with its position known.
-    pub(super) out_since: Option<Instant>,
+    pub(super) out_of_plan_since: Option<Instant>,
     pub(super) hears_us_at: Option<Instant>,
     /// Vehicles that the neighbour hears, a bit for each rank.
     pub(super) heard_bits: u32,
     /// The neighbour's progress along the shared plan as others relayed it, metres.
-    pub(super) relayed_m: Option<f32>,
+    pub(super) relayed_progress_m: Option<f32>,
     /// When the neighbour made the newest report that others relayed.
-    pub(super) relayed_at: Option<Instant>,
+    pub(super) relayed_report_at: Option<Instant>,
     /// Sequence number of the neighbour's last intent.
     pub(super) intent_sequence: u8,
     pub(super) message_delay: MessageDelay,
@@ -37,13 +37,13 @@ pub(crate) struct NeighbourEntry {
     pub(super) intent_at: Option<Instant>,
     pub(super) points: Vec<Point, MAX_POINTS>,
     /// Number of points, at the end of the list, to which the neighbour flies only while unheard.
-    pub(super) unheard_point_count: u8,
+    pub(super) unheard_flight_point_count: u8,
     /// Where the neighbour's position is on its reported points.
     pub(super) place_on_points: PlaceOnPoints,
     /// How far the neighbour's points, up to its stop for now, lead it.
     pub(super) reported_path_reach: ReportedPathReach,
     /// Greatest distance of the points, up to its stop for now, from the first of them, metres.
-    pub(super) extent_m: f32,
+    pub(super) points_extent_m: f32,
     /// Length of the polyline from the neighbour's position through all its points, metres: in a
     /// coverage mission it flies all of it unheard, as far as its lease allows. −1 in other
     /// missions.
@@ -56,30 +56,30 @@ pub(crate) struct NeighbourEntry {
     /// wait, metres: unheard it flies on to there.
     pub(super) gates_open_up_to_m: f32,
     /// Seconds by which gates and climb delay its unheard flight to `gates_open_up_to_m`.
-    pub(super) unheard_delay_s: u8,
+    pub(super) unheard_flight_delay_s: u8,
     /// Whether the neighbour's last position was where the radio may not reach.
     pub(super) at_range_edge: bool,
     /// Least speed at which the neighbour is assumed to make progress while unheard, m/s.
-    pub(super) assumed_speed_mps: f32,
+    pub(super) min_unheard_progress_mps: f32,
     /// Length of its points on which the neighbour comes to rest unheard, metres, where messages
     /// come at once; longer where the radio's range is known.
-    pub(super) unheard_stretch_m: f32,
+    pub(super) max_unheard_travel_m: f32,
     /// Greatest speed at which the neighbour is assumed to fly on unheard, m/s.
-    pub(super) fastest_cruise_mps: f32,
+    pub(super) fastest_vehicle_mps: f32,
     /// The neighbour's speed at its last position, m/s.
     pub(super) speed_mps: f32,
     /// Whether the neighbour's plan has our plan's CRC, whether it follows that plan or not.
     pub(super) shares_plan: bool,
     /// Whether the neighbour follows a plan of our mission with another CRC than ours.
-    pub(super) other_plan: bool,
+    pub(super) follows_other_plan: bool,
     /// When a position last showed the neighbour faster than [`MAX_HOVER_MPS`].
     pub(super) moved_at: Instant,
     /// Greatest progress that the neighbour can have made, metres along its path, and when.
-    pub(super) furthest: Option<(f32, Instant)>,
+    pub(super) max_progress: Option<(f32, Instant)>,
     /// The neighbour's place before its take-off: its autopilot may fly it back there.
     pub(super) pad: Option<Point>,
     /// Place where the neighbour rested when the present detour was planned; NaN for none.
-    pub(super) avoided_at: Point,
+    pub(super) avoided_place: Point,
     pub(super) state: Neighbour,
 }
 
@@ -90,8 +90,8 @@ impl NeighbourEntry {
     pub(super) fn unheard(
         id: u8,
         rank: u16,
-        assumed_speed_mps: f32,
-        [unheard_stretch_m, fastest_cruise_mps]: [f32; 2],
+        min_unheard_progress_mps: f32,
+        [max_unheard_travel_m, fastest_vehicle_mps]: [f32; 2],
     ) -> Self {
         let state = Neighbour {
             id,
@@ -102,7 +102,7 @@ impl NeighbourEntry {
             progress_m: None,
             grounded: false,
             out_of_plan: false,
-            detours: false,
+            on_detour: false,
         };
         Self {
             id,
@@ -110,37 +110,37 @@ impl NeighbourEntry {
             sequence: SequenceFilter::default(),
             heard_at: None,
             position_at: None,
-            boot_ms: 0,
+            position_boot_ms: 0,
             flags: 0,
-            out_since: None,
+            out_of_plan_since: None,
             hears_us_at: None,
             heard_bits: 0,
-            relayed_m: None,
-            relayed_at: None,
+            relayed_progress_m: None,
+            relayed_report_at: None,
             intent_sequence: 0,
             message_delay: MessageDelay::default(),
             intent_at: None,
             points: Vec::new(),
-            unheard_point_count: 0,
+            unheard_flight_point_count: 0,
             place_on_points: PlaceOnPoints::Unknown,
-            extent_m: 0.0,
-            reported_path_reach: ReportedPathReach::OPEN,
+            points_extent_m: 0.0,
+            reported_path_reach: ReportedPathReach::UNBOUNDED,
             points_length_m: -1.0,
             may_come_down: false,
             gates_open_up_to_m: f32::NEG_INFINITY,
-            unheard_delay_s: 0,
+            unheard_flight_delay_s: 0,
             at_range_edge: false,
-            assumed_speed_mps,
-            unheard_stretch_m,
-            fastest_cruise_mps,
+            min_unheard_progress_mps,
+            max_unheard_travel_m,
+            fastest_vehicle_mps,
             ground_m: f32::NAN,
             speed_mps: 0.0,
             shares_plan: false,
-            other_plan: false,
+            follows_other_plan: false,
             moved_at: Instant::ZERO,
-            furthest: None,
+            max_progress: None,
             pad: None,
-            avoided_at: NO_PLACE,
+            avoided_place: NO_PLACE,
             state,
         }
     }
@@ -152,8 +152,9 @@ impl NeighbourEntry {
     }
 
     /// The neighbour's points up to where it will stop for now.
-    pub(super) fn points_for_now(&self) -> &[Point] {
-        &self.points[..self.points.len().saturating_sub(usize::from(self.unheard_point_count))]
+    pub(super) fn points_to_stop(&self) -> &[Point] {
+        &self.points
+            [..self.points.len().saturating_sub(usize::from(self.unheard_flight_point_count))]
     }
 
     pub(super) fn heard_within(&self, now: Instant, span: Duration) -> bool {
@@ -180,21 +181,21 @@ impl NeighbourEntry {
         now: Instant,
     ) -> f32 {
         let furthest =
-            self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).as_secs_f32());
+            self.max_progress.map(|(at_m, at)| at_m + fastest_mps * (now - at).as_secs_f32());
         let believed_m =
             furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));
         let late_m = believed_m + fastest_mps * MAX_MESSAGE_DELAY_S + MAX_PROGRESS_JUMP_M;
-        self.furthest =
+        self.max_progress =
             Some((furthest.map_or(late_m, |furthest_m| libm::fminf(furthest_m, late_m)), now));
         believed_m
     }
 
     /// Finds where the neighbour's position is on its points; to be called when either is received.
     pub(super) fn update_place_on_points(&mut self) {
-        let (at, points) = (&self.state, self.points_for_now());
+        let (at, points) = (&self.state, self.points_to_stop());
         let place = PlaceOnPoints::find(&at.position, points, &at.velocity);
         self.reported_path_reach =
-            ReportedPathReach::new(&at.position, points, &place, self.extent_m);
+            ReportedPathReach::new(&at.position, points, &place, self.points_extent_m);
         self.place_on_points = place;
         if self.would_fly_all_points_unheard() {
             let mut at = self.state.position;

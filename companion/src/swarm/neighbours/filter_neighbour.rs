@@ -10,7 +10,7 @@ use super::Neighbours;
 use super::bounds::*;
 use super::entry::NeighbourEntry;
 use crate::link::intent::{GROUNDED, LANDED, OUT_OF_PLAN, WAITING};
-use crate::margins::LEAST_FALL_S;
+use crate::margins::MIN_FALL_TIME_S;
 use crate::time::{Duration, Instant};
 
 /// State of a neighbour that the safety filter compares: its priority, and its reachable set's
@@ -58,8 +58,8 @@ impl<'a> FilterNeighbour<'a> {
 
     /// The neighbour counts as one that stands where it was last heard.
     pub(crate) fn stop_at_last_position(&mut self) {
-        (self.motion.age_s, self.motion.speed_mps, self.motion.points) = (0.0, 0.0, &[]);
-        self.motion.reported_path_reach = ReportedPathReach::OPEN;
+        (self.motion.age_s, self.motion.speed_mps, self.motion.reported_points) = (0.0, 0.0, &[]);
+        self.motion.reported_path_reach = ReportedPathReach::UNBOUNDED;
         self.motion.rests_within_m = 0.0;
     }
 
@@ -116,14 +116,14 @@ impl NeighbourEntry {
         reach: &ReachQuery<'_>,
     ) -> Option<bool> {
         let placed_at = self.position_at?;
-        let away = reach.own.distance_from_box(&self.state.position);
+        let away = reach.own.box_distances(&self.state.position);
         let across_sq = away.x * away.x + away.y * away.y;
         let age = now - placed_at;
         if age > MAX_HEIGHT_AGE {
             let fate = SilentFate {
                 dead: self.is_lost_on_points(age, now),
                 lies: age >= down && !self.ground_m.is_nan(),
-                may_fly_on: self.may_fly_on_unheard(down, now, reach),
+                may_fly_on: self.may_fly_on_though_dead(down, now, reach),
             };
             let beyond = self.is_silent_out_of_reach(age, fate, across_sq, now, reach);
             return (!beyond).then_some(fate.dead);
@@ -135,14 +135,14 @@ impl NeighbourEntry {
             age_s: age.as_secs_f32(),
             delay_s: if reach.on_plan && self.on_plan() { 0.0 } else { self.message_delay.delay_s },
             // Not read.
-            points: &[],
+            reported_points: &[],
             place_on_points: PlaceOnPoints::Unknown,
             reported_path_reach: self.reported_path_reach,
             rests_within_m: 0.0,
             grounded: self.reports_any(GROUNDED | LANDED),
-            column_to_m: None,
+            column_bottom_z_m: None,
         };
-        let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
+        let most_m = reach.within_m + heard.max_reach_m(reach.bounds, reach.ahead_s);
         let above_m = if !heard.grounded && self.has_column() { 0.0 } else { away.z };
         let beyond = across_sq + above_m * above_m >= most_m * most_m;
         (!beyond).then_some(false)
@@ -153,7 +153,7 @@ impl NeighbourEntry {
     /// which a vehicle without a lease lands, while this vehicle holds its lease. A neighbour out
     /// of the plan needs no lease: its pilot may keep it in the air.
     #[inline(always)]
-    pub(crate) fn may_fly_on_unheard(
+    pub(crate) fn may_fly_on_though_dead(
         &self,
         down: Duration,
         now: Instant,
@@ -180,20 +180,20 @@ impl NeighbourEntry {
         let mut most_m = 0.0;
         let mut reaches = |far_m: f32| most_m = if far_m > most_m { far_m } else { most_m };
         if may_fly_on || !dead {
-            let silent_s = reach.bounds.silent_s;
+            let silent_s = reach.bounds.stopped_when_unheard_for_s;
             let age_s = if may_fly_on { silent_s } else { age.as_secs_f32().min(silent_s) };
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
         let flies_on = self.would_fly_all_points_unheard() && !(reach.on_plan && self.on_plan());
         if reach.lands && self.would_fly_all_points_unheard() {
-            reaches(FALL_CARRY_S * self.speed_mps + self.fall_aside_m());
+            reaches(FALL_CARRY_S * self.speed_mps + self.max_fall_drift_m());
         }
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
-            let beyond_m = self.reported_path_reach.beyond_m + OFF_REPORTED_PATH_M;
-            reaches(self.unheard_distance_m() + beyond_m);
+            let beyond_m = self.reported_path_reach.added_reach_m + OFF_REPORTED_PATH_M;
+            reaches(self.max_unheard_distance_m() + beyond_m);
         }
         if dead {
-            reaches(LEAST_FALL_S * self.speed_mps);
+            reaches(MIN_FALL_TIME_S * self.speed_mps);
         }
         if reach.lands || self.climb_top_m().is_some() {
             reaches(self.rest_radius_m(reach));
@@ -201,11 +201,11 @@ impl NeighbourEntry {
         let mut away_sq = across_sq;
         let reported = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
         if let Some(first) = self.points.first().filter(|_| reported) {
-            away_sq = away_sq.min(reach.own.distance_from_box(first).xy().norm_squared());
+            away_sq = away_sq.min(reach.own.box_distances(first).xy().norm_squared());
             reaches(if self.would_fly_all_points_unheard() {
-                self.unheard_distance_m()
+                self.max_unheard_distance_m()
             } else {
-                self.extent_m
+                self.points_extent_m
             });
         }
         most_m += reach.within_m;
@@ -219,10 +219,10 @@ impl NeighbourEntry {
     }
 
     /// Height of the lower end of the neighbour's column, ENU metres: the ground below it or, where
-    /// that is unknown, [`MAX_COLUMN_M`] below `height_m`.
+    /// that is unknown, [`DEFAULT_COLUMN_DEPTH_M`] below `height_m`.
     #[inline]
     fn column_bottom_m(&self, height_m: f32) -> f32 {
-        if self.ground_m.is_nan() { height_m - MAX_COLUMN_M } else { self.ground_m }
+        if self.ground_m.is_nan() { height_m - DEFAULT_COLUMN_DEPTH_M } else { self.ground_m }
     }
 
     /// Age of the neighbour's last intent, seconds, if it is fresh and reports points.
@@ -259,12 +259,12 @@ impl NeighbourEntry {
                 speed_mps: self.speed_mps,
                 age_s: self.position_age(now).as_secs_f32(),
                 delay_s: self.message_delay.delay_s,
-                points: self.points_for_now(),
+                reported_points: self.points_to_stop(),
                 place_on_points: self.place_on_points,
                 reported_path_reach: self.reported_path_reach,
                 rests_within_m: 0.0,
                 grounded,
-                column_to_m: comes_down.then(|| self.column_bottom_m(self.state.position.z)),
+                column_bottom_z_m: comes_down.then(|| self.column_bottom_m(self.state.position.z)),
             },
             before_climb: None,
         }
@@ -273,19 +273,19 @@ impl NeighbourEntry {
     /// In a coverage mission: for a neighbour silent for longer than a stop takes, replaces the
     /// ball around its last position by the part of its points that it may have flown since.
     fn limit_to_points<'a>(&'a self, heard: &mut NeighbourMotion<'a>, bounds: &MotionBounds) {
-        let stopped_s = bounds.silent_s + 2.0 * heard.delay_s;
-        let follows =
-            !heard.points.is_empty() && matches!(self.place_on_points, PlaceOnPoints::On { .. });
+        let stopped_s = bounds.stopped_when_unheard_for_s + 2.0 * heard.delay_s;
+        let follows = !heard.reported_points.is_empty()
+            && matches!(self.place_on_points, PlaceOnPoints::On { .. });
         if !follows || heard.age_s <= stopped_s || heard.grounded {
             return;
         }
         let fastest_mps = libm::fmaxf(bounds.speed_max_mps, heard.speed_mps);
-        let flown_m =
-            fastest_mps * (heard.age_s + heard.delay_s) + bounds.braking.stop_m(fastest_mps);
+        let flown_m = fastest_mps * (heard.age_s + heard.delay_s)
+            + bounds.braking.stop_distance_m(fastest_mps);
         (heard.age_s, heard.delay_s, heard.speed_mps) = (0.0, 0.0, 0.0);
-        (heard.points, heard.place_on_points) = (&self.points, self.place_on_points);
-        heard.reported_path_reach.most_m = f32::INFINITY;
-        heard.rests_within_m = libm::fminf(flown_m, self.unheard_distance_m());
+        (heard.reported_points, heard.place_on_points) = (&self.points, self.place_on_points);
+        heard.reported_path_reach.max_reach_m = f32::INFINITY;
+        heard.rests_within_m = libm::fminf(flown_m, self.max_unheard_distance_m());
     }
 
     /// Greatest extent of the neighbour's set around the place where it stopped unheard, metres.
@@ -296,15 +296,15 @@ impl NeighbourEntry {
             velocity: self.state.velocity,
             speed_mps: 0.0,
             age_s: 0.0,
-            delay_s: self.message_delay.delay_s.max(UNHEARD_BEYOND_TOP_S),
-            points: &[],
+            delay_s: self.message_delay.delay_s.max(MAX_UNHEARD_BEYOND_TOP_S),
+            reported_points: &[],
             place_on_points: PlaceOnPoints::Beside,
-            reported_path_reach: ReportedPathReach::OPEN,
+            reported_path_reach: ReportedPathReach::UNBOUNDED,
             rests_within_m: 0.0,
             grounded: false,
-            column_to_m: None,
+            column_bottom_z_m: None,
         };
-        rests.reach_m(reach.bounds, reach.ahead_s)
+        rests.max_reach_m(reach.bounds, reach.ahead_s)
     }
 
     /// Whether the neighbour follows the plan out of radio range, as others relay or by its last
@@ -312,7 +312,8 @@ impl NeighbourEntry {
     fn is_out_of_range(&self, now: Instant) -> bool {
         let silent = !self.reports_any(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
         let unheard = silent && self.at_range_edge && self.on_plan();
-        let flies_on = || self.flies_plan_unheard() || self.heard_within(now, UNHEARD_WAIT);
+        let flies_on =
+            || self.flies_plan_unheard() || self.heard_within(now, MAX_OUT_OF_RANGE_WAIT);
         self.is_reported_out_of_range(now) || (unheard && flies_on())
     }
 
@@ -332,12 +333,17 @@ impl<const V: usize> Neighbours<V> {
     /// through `pad` whose positions have been missing for 0.6 to 3 s: three or more were lost, or
     /// it has fallen silent.
     #[inline(never)]
-    pub(crate) fn missed_beside(&self, pad: &Point, apart_m: f32, now: Instant) -> Option<u8> {
+    pub(crate) fn missed_vehicle_beside(
+        &self,
+        pad: &Point,
+        apart_m: f32,
+        now: Instant,
+    ) -> Option<u8> {
         let missed = |c: &&NeighbourEntry| {
             let flies = !c.reports_any(GROUNDED | LANDED | OUT_OF_PLAN) && !c.at_range_edge;
             let beside = (c.state.position - pad).xy().norm_squared() < apart_m * apart_m;
             let lately =
-                |at: Instant| now - at > UNHEARD_BEFORE_ARMING && now - at < MAY_LAND_AFTER;
+                |at: Instant| now - at > NO_ARMING_BESIDE_SILENT_AFTER && now - at < MAY_LAND_AFTER;
             flies && beside && c.position_at.is_some_and(lately)
         };
         self.entries[..self.roster_count].iter().find(missed).map(|c| c.id)
@@ -345,7 +351,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// The first neighbour from index `from` on, inclusive, that has a position and may be within
     /// reach: its index, its entry, and whether it counts as dead.
-    pub(crate) fn next_within(
+    pub(crate) fn next_within_reach(
         &self,
         from: usize,
         now: Instant,
@@ -361,14 +367,14 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether a neighbour may fly on although it counts as dead
-    /// ([`NeighbourEntry::may_fly_on_unheard`]).
-    pub(crate) fn may_fly_on_unheard(
+    /// ([`NeighbourEntry::may_fly_on_though_dead`]).
+    pub(crate) fn may_fly_on_though_dead(
         &self,
         entry: &NeighbourEntry,
         now: Instant,
         reach: &ReachQuery<'_>,
     ) -> bool {
-        entry.may_fly_on_unheard(self.down_after, now, reach)
+        entry.may_fly_on_though_dead(self.down_after, now, reach)
     }
 
     /// Changes `met`, made by [`NeighbourEntry::filter_neighbour`], if the neighbour's position is
@@ -406,7 +412,7 @@ impl<const V: usize> Neighbours<V> {
         let down = position_age >= self.down_after
             || (entry.reports_any(GROUNDED) && entry.lacks_position());
         let lies = down && (dead || entry.reports_any(GROUNDED)) && !entry.ground_m.is_nan();
-        let least_m = if dead && !by_intent { entry.least_rest_m() } else { 0.0 };
+        let least_m = if dead && !by_intent { entry.min_rest_distance_m() } else { 0.0 };
         let rest = entry.nearest_rest_place(least_m);
         let heard = entry.points.first().filter(|_| by_intent).copied();
         motion.position = heard.or(rest.map(|(at, ..)| at)).unwrap_or(motion.position);
@@ -427,16 +433,16 @@ impl<const V: usize> Neighbours<V> {
         motion.age_s = age_s;
         if dead || top.is_some() {
             (motion.speed_mps, motion.age_s) = (0.0, 0.0);
-            motion.delay_s = if dead { 0.0 } else { UNHEARD_BEYOND_TOP_S };
+            motion.delay_s = if dead { 0.0 } else { MAX_UNHEARD_BEYOND_TOP_S };
         }
         if dead {
-            motion.points = rest.map_or(&entry.points, |(_, points, _)| points);
+            motion.reported_points = rest.map_or(&entry.points, |(_, points, _)| points);
             if top.is_none() {
-                motion.rests_within_m = entry.unheard_distance_m() - least_m;
+                motion.rests_within_m = entry.max_unheard_distance_m() - least_m;
             }
         }
         if top.is_some() || lies {
-            motion.points = &[];
+            motion.reported_points = &[];
         }
         let flies = !(by_intent || lies || top.is_some());
         let moved = match rest {
@@ -444,13 +450,13 @@ impl<const V: usize> Neighbours<V> {
             Some((.., place)) => Some(place),
             None => None,
         };
-        moved.into_iter().for_each(|place| put_on_points(motion, place, entry.extent_m));
+        moved.into_iter().for_each(|place| put_on_points(motion, place, entry.points_extent_m));
         if dead && flies {
-            motion.reported_path_reach.most_m = f32::INFINITY;
+            motion.reported_path_reach.max_reach_m = f32::INFINITY;
         }
         let column =
             (dead || entry.has_column()) && (!motion.grounded || (lies && highest_m > bottom_m));
-        motion.column_to_m = column.then_some(bottom_m);
+        motion.column_bottom_z_m = column.then_some(bottom_m);
         met.out_of_range = entry.is_out_of_range(now);
         let stands = now - entry.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S;
         met.stands = motion.grounded || stands;
@@ -462,5 +468,5 @@ impl<const V: usize> Neighbours<V> {
 fn put_on_points(motion: &mut NeighbourMotion<'_>, place: PlaceOnPoints, extent_m: f32) {
     motion.place_on_points = place;
     motion.reported_path_reach =
-        ReportedPathReach::new(&motion.position, motion.points, &place, extent_m);
+        ReportedPathReach::new(&motion.position, motion.reported_points, &place, extent_m);
 }

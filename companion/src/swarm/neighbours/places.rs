@@ -31,11 +31,11 @@ impl<const V: usize> Neighbours<V> {
     /// hears nobody, its own radio has more likely failed: then the others fly on to places unknown
     /// here, and only a stop is assumed.
     #[inline(never)]
-    fn unheard_progress_m(&self, entry: &NeighbourEntry, now: Instant) -> f32 {
+    fn max_unheard_flown_m(&self, entry: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !entry.heard_within(now, UNHEARD_LANDING_AFTER);
-        let far = lands && entry.may_fly_on(now) && !self.hears_nobody(now);
+        let far = lands && entry.may_fly_on_silent(now) && !self.hears_nobody(now);
         if far {
-            return entry.unheard_distance_m();
+            return entry.max_unheard_distance_m();
         }
         entry.unheard_stopping_distance_m()
     }
@@ -50,13 +50,13 @@ impl<const V: usize> Neighbours<V> {
         mut visit: impl FnMut(KeepOutZone),
     ) {
         let avoided =
-            |c: &NeighbourEntry| (c.avoided_at - c.state.position).length() < AVOIDED_WITHIN_M;
+            |c: &NeighbourEntry| (c.avoided_place - c.state.position).length() < AVOIDED_WITHIN_M;
         let unknown =
             |c: &&NeighbourEntry| c.position_at.is_some() && c.is_out_of_plan(now) && !avoided(c);
         if let Some(entry) = self.entries.get(i).filter(unknown) {
-            entry.keep_out_zones(
+            entry.visit_keep_out_zones(
                 now,
-                [apart_m, self.unheard_progress_m(entry, now)],
+                [apart_m, self.max_unheard_flown_m(entry, now)],
                 self.area_ground(),
                 &mut visit,
             );
@@ -65,29 +65,29 @@ impl<const V: usize> Neighbours<V> {
 
     /// Notes that a scan begun at time `at` has found no vehicle out of the plan on the path.
     pub fn mark_path_clear(&mut self, at: Instant) {
-        self.clear_at = at;
+        self.path_clear_at = at;
     }
 
     /// Whether a scan begun at `at` or later has found the path clear.
     pub fn is_path_clear_since(&self, at: Instant) -> bool {
-        self.clear_at >= at
+        self.path_clear_at >= at
     }
 
     /// Calls `visit` with the keep-out zones of the roster's other vehicles where they stand now,
     /// or rest out of the plan. `apart`: radius for one in the air, and for one on the ground,
     /// which no longer deviates.
-    pub fn for_each_place(
+    pub fn for_each_keep_out_zone(
         &self,
         now: Instant,
         apart: [f32; 2],
         mut visit: impl FnMut(KeepOutZone),
     ) {
-        (0..self.roster_count).for_each(|i| self.zones_of(i, now, apart, &mut visit));
+        (0..self.roster_count).for_each(|i| self.for_each_zone_of(i, now, apart, &mut visit));
     }
 
     /// Calls `visit` with the keep-out zones of neighbour `i` of the roster where it stands or
     /// rests: of radius `lying_m` if it is on the ground, else `apart_m`.
-    pub(crate) fn zones_of(
+    pub(crate) fn for_each_zone_of(
         &self,
         i: usize,
         now: Instant,
@@ -97,10 +97,10 @@ impl<const V: usize> Neighbours<V> {
         let rostered = self.entries[..self.roster_count].get(i);
         if let Some(entry) = rostered.filter(|c| c.position_at.is_some()) {
             let far_m = if entry.is_on_ground(now, self.down_after) { lying_m } else { apart_m };
-            let reach = [far_m, self.unheard_progress_m(entry, now)];
-            entry.keep_out_zones(now, reach, self.area_ground(), visit);
+            let reach = [far_m, self.max_unheard_flown_m(entry, now)];
+            entry.visit_keep_out_zones(now, reach, self.area_ground(), visit);
             if self.fleet.is_none() && !entry.heard_within(now, MAX_HEIGHT_AGE) {
-                self.silent_zones(entry, now, reach, visit);
+                self.visit_silent_zones(entry, now, reach, visit);
             }
         }
     }
@@ -110,7 +110,7 @@ impl<const V: usize> Neighbours<V> {
     /// filter's. Otherwise the search would find, again and again, a detour that the filter stops.
     // Not inlined, as other calls that a board seldom makes.
     #[inline(never)]
-    fn silent_zones(
+    fn visit_silent_zones(
         &self,
         entry: &NeighbourEntry,
         now: Instant,
@@ -125,7 +125,7 @@ impl<const V: usize> Neighbours<V> {
             return;
         }
         if entry.is_dead(now) {
-            entry.for_each_leg(upto_m, &mut |[from, next], [leg_m, flown_m]| {
+            entry.for_each_unheard_leg(upto_m, &mut |[from, next], [leg_m, flown_m]| {
                 let share = if flown_m < leg_m { flown_m / leg_m } else { 1.0 };
                 let to = from + (next - from) * share;
                 visit(KeepOutZone { from, to, radius_m: apart_m, kind });
@@ -133,7 +133,7 @@ impl<const V: usize> Neighbours<V> {
         } else if !self.hears_nobody(now) {
             let from = entry.state.position;
             let far_s = MAX_HEIGHT_AGE_S + 2.0 * entry.message_delay.delay_s;
-            let radius_m = apart_m + self.fastest_mps * far_s;
+            let radius_m = apart_m + self.max_progress_mps * far_s;
             visit(KeepOutZone { from, to: from, radius_m, kind });
         }
     }
@@ -146,12 +146,12 @@ impl<const V: usize> Neighbours<V> {
         apart_m: f32,
         mut visit: impl FnMut(KeepOutZone),
     ) {
-        (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut visit));
+        (0..self.len()).for_each(|i| self.visit_landing_column(i, now, apart_m, &mut visit));
     }
 
     /// Calls `visit` with the columns, of radius `apart_m`, in which neighbour `i` may come down,
     /// if it may land without avoiding others.
-    pub fn landing_column(
+    pub fn visit_landing_column(
         &self,
         i: usize,
         now: Instant,
@@ -161,7 +161,11 @@ impl<const V: usize> Neighbours<V> {
         let landing =
             |c: &&NeighbourEntry| c.position_at.is_some() && c.may_land_without_avoiding(now);
         if let Some(entry) = self.entries.get(i).filter(landing) {
-            entry.landing_columns(now, [apart_m, self.unheard_progress_m(entry, now)], &mut visit);
+            entry.visit_landing_columns(
+                now,
+                [apart_m, self.max_unheard_flown_m(entry, now)],
+                &mut visit,
+            );
         }
     }
 
@@ -187,8 +191,10 @@ impl<const V: usize> Neighbours<V> {
             let mut bar = |[a, b]: [Point; 2], wider_m: f32| {
                 zone(level(a), level(b), apart_m + self.pair_position_error_m + wider_m);
             };
-            if entry.may_fly_on(now) {
-                entry.for_each_leg(entry.unheard_distance_m(), &mut |leg, _| bar(leg, 0.0));
+            if entry.may_fly_on_silent(now) {
+                entry.for_each_unheard_leg(entry.max_unheard_distance_m(), &mut |leg, _| {
+                    bar(leg, 0.0);
+                });
             }
             // A vehicle in the air comes down at its pad; off its plan perhaps also below its
             // place, or at the end of its points.
@@ -199,7 +205,7 @@ impl<const V: usize> Neighbours<V> {
                     entry.points.last().into_iter().for_each(|end| bar([*end; 2], 0.0));
                 }
             }
-            if let Some((leg, aside_m)) = entry.fall(now) {
+            if let Some((leg, aside_m)) = entry.fall_line(now) {
                 bar(leg, aside_m);
             }
         }
@@ -207,7 +213,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Calls `visit` with the column above the last position of neighbour `i`, of radius `apart_m`:
     /// there this vehicle might come down on it.
-    pub fn column_above(&self, i: usize, apart_m: f32, mut visit: impl FnMut(KeepOutZone)) {
+    pub fn visit_column_above(&self, i: usize, apart_m: f32, mut visit: impl FnMut(KeepOutZone)) {
         if let Some(entry) = self.entries.get(i).filter(|c| c.position_at.is_some()) {
             let from = entry.state.position;
             let to = from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M);
@@ -234,14 +240,17 @@ impl<const V: usize> Neighbours<V> {
             let high = a.z > low_m || b.z > low_m;
             below |= high && (away - leg * share).norm_squared() < apart_m * apart_m;
         };
-        entry.for_each_leg(entry.unheard_distance_m(), &mut |[at, next], [leg_m, flown_m]| {
-            near(
-                at,
-                if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
-                apart_m,
-            );
-        });
-        if let Some(([from, to], aside_m)) = fallen.and_then(|now| entry.fall(now)) {
+        entry.for_each_unheard_leg(
+            entry.max_unheard_distance_m(),
+            &mut |[at, next], [leg_m, flown_m]| {
+                near(
+                    at,
+                    if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
+                    apart_m,
+                );
+            },
+        );
+        if let Some(([from, to], aside_m)) = fallen.and_then(|now| entry.fall_line(now)) {
             near(from, to, apart_m + aside_m);
         }
         below
@@ -256,16 +265,16 @@ impl<const V: usize> Neighbours<V> {
 
     /// Notes where the vehicles out of the plan rest now: the detour that begins avoids these
     /// places.
-    pub fn mark_avoided(&mut self, now: Instant) {
+    pub fn mark_out_of_plan_avoided(&mut self, now: Instant) {
         for entry in &mut self.entries {
-            entry.avoided_at =
+            entry.avoided_place =
                 if entry.is_out_of_plan(now) { entry.state.position } else { NO_PLACE };
         }
     }
 
     /// Forgets the places that a detour avoided: they may block the path again.
     pub(crate) fn forget_avoided(&mut self) {
-        self.entries.iter_mut().for_each(|entry| entry.avoided_at = NO_PLACE);
+        self.entries.iter_mut().for_each(|entry| entry.avoided_place = NO_PLACE);
     }
 }
 

@@ -7,29 +7,29 @@ use super::bounds::*;
 use super::entry::NeighbourEntry;
 use crate::config::REACHES_ALL_M;
 use crate::link::intent::{LANDED, OUT_OF_PLAN};
-use crate::margins::unheard_stretch_m;
+use crate::margins::max_unheard_travel_m;
 
 impl<const V: usize> Neighbours<V> {
     /// Sets this vehicle's position, ENU, and the range of the radio, metres.
-    pub(crate) fn set_place(&mut self, place: Point, radio_range_m: f32) {
-        let (all, known) = (radio_range_m >= REACHES_ALL_M, self.knows_range());
+    pub(crate) fn set_own_position_and_range(&mut self, place: Point, radio_range_m: f32) {
+        let (all, known) = (radio_range_m >= REACHES_ALL_M, self.knows_radio_range());
         self.range_edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
-        self.place = place;
-        if known != self.knows_range() {
-            let stretch_m = self.stretch_for_range_m();
-            self.entries.iter_mut().for_each(|entry| entry.unheard_stretch_m = stretch_m);
+        self.own_position = place;
+        if known != self.knows_radio_range() {
+            let travel_m = self.max_unheard_travel_for_range_m();
+            self.entries.iter_mut().for_each(|entry| entry.max_unheard_travel_m = travel_m);
         }
     }
 
     /// Length of its path on which an unheard vehicle comes to rest, metres. With a known range one
     /// that notices late does not fly back: it may be out of range.
-    pub(super) fn stretch_for_range_m(&self) -> f32 {
-        let later_s = if self.knows_range() { NOTICED_LATER_S } else { 0.0 };
-        unheard_stretch_m(self.fastest_cruise_mps) + later_s * self.fastest_cruise_mps
+    pub(super) fn max_unheard_travel_for_range_m(&self) -> f32 {
+        let later_s = if self.knows_radio_range() { UNHEARD_NOTICED_LATER_S } else { 0.0 };
+        max_unheard_travel_m(self.fastest_vehicle_mps) + later_s * self.fastest_vehicle_mps
     }
 
     /// Whether the operator has set the range of the radio (`FLK_RADIO_M`).
-    pub(crate) fn knows_range(&self) -> bool {
+    pub(crate) fn knows_radio_range(&self) -> bool {
         self.range_edge_m.is_finite()
     }
 
@@ -39,7 +39,7 @@ impl<const V: usize> Neighbours<V> {
         let beyond = |c: &NeighbourEntry| {
             c.at_range_edge || c.position_at.is_none() || c.reports_any(LANDED | OUT_OF_PLAN)
         };
-        self.knows_range() && self.entries[..self.roster_count].iter().all(beyond)
+        self.knows_radio_range() && self.entries[..self.roster_count].iter().all(beyond)
     }
 }
 

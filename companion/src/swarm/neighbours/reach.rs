@@ -10,12 +10,12 @@
 use planner_core::flight::Gate;
 
 use super::Neighbours;
-use super::bounds::STANDS_BEFORE_GATE_M;
+use super::bounds::MAX_STAND_BEFORE_GATE_M;
 use crate::time::Instant;
 
 /// Longest time for which an unheard vehicle waits before a gate, seconds: less than row
 /// `SwarmLinkLost` of the mission table waits.
-const UNHEARD_GATE_WAIT_S: f32 = 14.0;
+const MAX_UNHEARD_GATE_WAIT_S: f32 = 14.0;
 
 impl<const V: usize> Neighbours<V> {
     /// Place along the path of the first of `gates` before which this vehicle, unheard, would wait
@@ -31,9 +31,10 @@ impl<const V: usize> Neighbours<V> {
         let closed = gates.iter().find(|gate| {
             let Some(opens_s) = self.time_until_open_s(gate, now) else { return true };
             let ahead_m = gate.at_m - progress_m;
-            let waits = opens_s - ahead_m / self.fastest_mps > UNHEARD_GATE_WAIT_S;
+            let waits = opens_s - ahead_m / self.max_progress_mps > MAX_UNHEARD_GATE_WAIT_S;
             if !waits {
-                let late_s = opens_s - (ahead_m - STANDS_BEFORE_GATE_M) / self.assumed_speed_mps;
+                let late_s =
+                    opens_s - (ahead_m - MAX_STAND_BEFORE_GATE_M) / self.min_unheard_progress_mps;
                 delay_s = libm::fmaxf(delay_s, late_s);
             }
             waits
@@ -47,7 +48,8 @@ impl<const V: usize> Neighbours<V> {
         if self.is_open_for_good(gate, now) {
             return Some(0.0);
         }
-        self.entries[self.roster_index(gate.id)?].time_until_passed_s(gate.until_m, now)
+        self.entries[self.roster_index(gate.wait_for_id)?]
+            .time_until_passed_s(gate.open_from_progress_m, now)
     }
 }
 

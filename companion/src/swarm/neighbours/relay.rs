@@ -48,7 +48,7 @@ const RELAYED_LIFETIME: Duration = Duration::from_secs(6);
 /// Least age that each relay adds to a report, microseconds: longer than most messages take. A
 /// message that takes longer adds its own delay: otherwise a report relayed in a circle stays
 /// young.
-const HOP_AGE_US: u64 = 500_000;
+const MIN_HOP_AGE_US: u64 = 500_000;
 /// Time that each relay adds to the reported delay of a vehicle's flight, seconds: its progress is
 /// not as old as the added age says.
 const HOP_DELAY_S: u8 = 1;
@@ -60,10 +60,10 @@ const AGE_TICK_US: u64 = 100_000;
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct RelayedProgress {
     rank: u8,
-    age: u8,
+    age_ticks: u8,
     progress_m: f32,
     gates_open_up_to_m: f32,
-    unheard_delay_s: u8,
+    unheard_flight_delay_s: u8,
 }
 
 /// A relay message: the reports of several vehicles, as one vehicle sends them.
@@ -89,10 +89,10 @@ impl Relay {
         body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
         for (to, item) in body[HEADER_LEN..].chunks_exact_mut(ITEM_LEN).zip(&self.items) {
-            (to[0], to[1]) = (item.rank, item.age);
+            (to[0], to[1]) = (item.rank, item.age_ticks);
             to[2..6].copy_from_slice(&item.progress_m.to_le_bytes());
             to[6..10].copy_from_slice(&item.gates_open_up_to_m.to_le_bytes());
-            to[10] = item.unheard_delay_s;
+            to[10] = item.unheard_flight_delay_s;
         }
         TUNNEL_HEADER_LEN + len
     }
@@ -116,10 +116,10 @@ impl Relay {
             };
             let item = RelayedProgress {
                 rank: item[0],
-                age: item[1],
+                age_ticks: item[1],
                 progress_m: float(2),
                 gates_open_up_to_m: float(6),
-                unheard_delay_s: item[10],
+                unheard_flight_delay_s: item[10],
             };
             // All reports that a payload holds fit into the list.
             let finite = item.progress_m.is_finite() && item.gates_open_up_to_m.is_finite();
@@ -137,7 +137,7 @@ impl NeighbourEntry {
     pub(super) fn is_reported_out_of_range(&self, now: Instant) -> bool {
         let longer =
             |at: Instant| self.heard_at.is_none_or(|heard| at > heard + HEARD_DIRECTLY_WITHIN);
-        self.relayed_at.is_some_and(|at| now - at < RELAYED_LIFETIME && longer(at))
+        self.relayed_report_at.is_some_and(|at| now - at < RELAYED_LIFETIME && longer(at))
             && !self.heard_within(now, OUT_OF_RANGE_AFTER)
             && self.heard_progress_m(now).is_some()
     }
@@ -145,14 +145,15 @@ impl NeighbourEntry {
     /// The neighbour's report as it is to be relayed; `None` if the neighbour is off the plan.
     fn progress_to_relay(&self, now: Instant) -> Option<RelayedProgress> {
         let progress_m = self.heard_progress_m(now)?;
-        let age = (now - self.intent_at.max(self.relayed_at)?).as_micros().div_ceil(AGE_TICK_US);
-        let age = age.min(u64::from(u8::MAX)) as u8;
+        let age_ticks =
+            (now - self.intent_at.max(self.relayed_report_at)?).as_micros().div_ceil(AGE_TICK_US);
+        let age_ticks = age_ticks.min(u64::from(u8::MAX)) as u8;
         Some(RelayedProgress {
             rank: self.rank as u8,
-            age,
+            age_ticks,
             progress_m,
             gates_open_up_to_m: libm::fmaxf(self.gates_open_up_to_m, progress_m),
-            unheard_delay_s: self.unheard_delay_s,
+            unheard_flight_delay_s: self.unheard_flight_delay_s,
         })
     }
 }
@@ -168,8 +169,8 @@ impl<const V: usize> Neighbours<V> {
         let missed = |c: &NeighbourEntry| {
             speaking().any(|by| by.rank != c.rank && by.heard_bits & (1 << c.rank) == 0)
         };
-        let first = roster.partition_point(|c| c.rank < self.relay_next);
-        let mut next = self.relay_next;
+        let first = roster.partition_point(|c| c.rank < self.next_relayed_rank);
+        let mut next = self.next_relayed_rank;
         let turn = roster[first..].iter().chain(&roster[..first]);
         for entry in turn.filter(|c| c.rank < 32 && missed(c)) {
             let Some(item) = entry.progress_to_relay(now) else { continue };
@@ -178,7 +179,7 @@ impl<const V: usize> Neighbours<V> {
                 break;
             }
         }
-        self.relay_next = next;
+        self.next_relayed_rank = next;
         relay
     }
 
@@ -188,25 +189,27 @@ impl<const V: usize> Neighbours<V> {
         let hop_us = (self.entries[by].message_delay.delay_s * 1e6) as u64;
         for item in &relay.items {
             let Some(at) = self.index_of_rank(item.rank) else { continue };
-            let (fastest_mps, entry) = (self.fastest_mps, &mut self.entries[at]);
+            let (fastest_mps, entry) = (self.max_progress_mps, &mut self.entries[at]);
             if entry.heard_within(now, HEARD_DIRECTLY_WITHIN) {
                 continue;
             }
-            let known_m = entry.relayed_m.unwrap_or(f32::NEG_INFINITY);
+            let known_m = entry.relayed_progress_m.unwrap_or(f32::NEG_INFINITY);
             let newest_m =
                 libm::fmaxf(known_m, entry.state.progress_m.unwrap_or(f32::NEG_INFINITY));
             if item.progress_m > newest_m {
                 // Relayed progress is believed to grow no faster than progress that the vehicle
                 // reports itself.
                 let believed_m = entry.plausible_progress_m(item.progress_m, fastest_mps, now);
-                entry.relayed_m = Some(libm::fmaxf(believed_m, known_m));
+                entry.relayed_progress_m = Some(libm::fmaxf(believed_m, known_m));
                 // Gates and delay belong to this progress.
                 entry.gates_open_up_to_m = item.gates_open_up_to_m;
-                entry.unheard_delay_s = item.unheard_delay_s.saturating_add(HOP_DELAY_S);
+                entry.unheard_flight_delay_s =
+                    item.unheard_flight_delay_s.saturating_add(HOP_DELAY_S);
             }
-            let age_us = u64::from(item.age) * AGE_TICK_US + HOP_AGE_US.max(hop_us);
+            let age_us = u64::from(item.age_ticks) * AGE_TICK_US + MIN_HOP_AGE_US.max(hop_us);
             let then = Instant::from_micros(now.as_micros().saturating_sub(age_us));
-            entry.relayed_at = entry.relayed_at.max(Some(then).filter(|_| item.age < u8::MAX));
+            entry.relayed_report_at =
+                entry.relayed_report_at.max(Some(then).filter(|_| item.age_ticks < u8::MAX));
         }
     }
 

@@ -60,12 +60,12 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether a vehicle with a lower system id than `id` claims the turn to fly a detour.
-    pub fn is_turn_claimed_before(&self, id: u8, now: Instant) -> bool {
+    pub fn is_turn_claimed_by_lower_id(&self, id: u8, now: Instant) -> bool {
         self.entries.iter().any(|c| c.id < id && c.claims_turn(now))
     }
 
     /// Number of vehicles with a lower system id than `id` that report a blocked path.
-    pub fn blocked_count_before(&self, id: u8) -> u64 {
+    pub fn blocked_count_below_id(&self, id: u8) -> u64 {
         self.entries.iter().filter(|c| c.id < id && c.reports_any(BLOCKED)).count() as u64
     }
 

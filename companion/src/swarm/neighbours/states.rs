@@ -17,9 +17,9 @@ impl<const V: usize> Neighbours<V> {
         self.states.clear();
         self.forget_silent_strangers(now);
         for entry in &self.entries {
-            let progress_m = entry.passed_m(now);
+            let progress_m = entry.min_progress_m(now);
             let placed_at = entry.position_at;
-            let dead = entry.is_dead(self.clear_at);
+            let dead = entry.is_dead(self.path_clear_at);
             if placed_at.is_none() && progress_m.is_none() && !dead {
                 continue;
             }
@@ -30,8 +30,11 @@ impl<const V: usize> Neighbours<V> {
                 rank: entry.rank,
                 progress_m,
                 grounded: entry.state.grounded || dead,
-                out_of_plan: entry.out_since.is_some_and(|since| since <= self.clear_at) || dead,
-                detours: entry.reports_any(ON_DETOUR),
+                out_of_plan: entry
+                    .out_of_plan_since
+                    .is_some_and(|since| since <= self.path_clear_at)
+                    || dead,
+                on_detour: entry.reports_any(ON_DETOUR),
                 ..entry.state
             };
             // Cannot overflow: there are as many slots as entries.
@@ -42,12 +45,14 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether `gate` is open for good: its vehicle has passed it, or is out of the plan.
     pub(crate) fn is_open_for_good(&self, gate: &Gate, now: Instant) -> bool {
-        let entry = self.roster_index(gate.id).map(|at| &self.entries[at]);
+        let entry = self.roster_index(gate.wait_for_id).map(|at| &self.entries[at]);
         entry.is_some_and(|c| {
-            let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);
+            let passed = c
+                .min_progress_m(now)
+                .is_some_and(|progress_m| progress_m >= gate.open_from_progress_m);
             passed
-                || c.out_since.is_some_and(|since| since <= self.clear_at)
-                || c.is_dead(self.clear_at)
+                || c.out_of_plan_since.is_some_and(|since| since <= self.path_clear_at)
+                || c.is_dead(self.path_clear_at)
         })
     }
 

@@ -18,7 +18,7 @@ impl<const V: usize> Neighbours<V> {
         let added =
             Some(id).filter(|_| room).and_then(|id| self.add_entry(id, RANK_OUTSIDE_ROSTER));
         if added.is_none() {
-            self.dropped = self.dropped.wrapping_add(1);
+            self.dropped_positions = self.dropped_positions.wrapping_add(1);
         }
         added
     }

@@ -14,7 +14,7 @@ use crate::link::intent::BLOCKED;
 pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 600.0 };
 
 fn table() -> Neighbours<4> {
-    let entry = |system_id| RosterEntry { system_id, start: Point::zeros() };
+    let entry = |system_id| RosterEntry { system_id, path_start: Point::zeros() };
     Neighbours::new(&[entry(3), entry(5), entry(9)], 5, 2.0, 2.0)
 }
 
@@ -116,7 +116,7 @@ fn strangers_rank_last_are_capped_and_expire() {
     for id in [200, 201, 202] {
         table.handle_position(at(0), &ORIGIN, id, &place(0, 0));
     }
-    assert_eq!((table.states_with_age(at(0)).len(), table.dropped_count()), (2, 1));
+    assert_eq!((table.states_with_age(at(0)).len(), table.dropped_position_count()), (2, 1));
     assert!(table.states_with_age(at(0)).iter().all(|n| n.rank == u16::MAX));
     table.handle_position(at(59_000), &ORIGIN, 201, &place(59_000, 0));
     let ids = |table: &mut Neighbours<4>, ms| {
@@ -143,7 +143,7 @@ fn a_position_of_the_roster_counts_only_with_the_missions_crc() {
         "another mission's vehicle is a stranger"
     );
     assert_eq!(
-        (table.heard_bits(at(0)), table.blocked_count_before(200)),
+        (table.heard_bits(at(0)), table.blocked_count_below_id(200)),
         (0, 0),
         "nor do its flags"
     );
@@ -200,7 +200,7 @@ proptest::proptest! {
                 (own(3), own(9)),
                 (Some((0, true, false)), Some((2, true, false)))
             );
-            proptest::prop_assert_eq!(table.blocked_count_before(255), 0);
+            proptest::prop_assert_eq!(table.blocked_count_below_id(255), 0);
             proptest::prop_assert_eq!(
                 table.unlinked_duration(at(now), at(0)),
                 Duration::from_millis(now)
@@ -262,7 +262,7 @@ fn a_vehicle_silent_before_its_place_and_plan_were_heard_opens_gates_too() {
     let dead = Instant::ZERO + LOST_AFTER;
     assert!(table.states_with_age(dead).is_empty());
     table.mark_path_clear(dead);
-    let gate = Gate { at_m: 1.0, id: 9, until_m: 5.0 };
+    let gate = Gate { at_m: 1.0, wait_for_id: 9, open_from_progress_m: 5.0 };
     assert!(table.is_open_for_good(&gate, dead), "a promise may count on that");
     let state = table.states_with_age(dead)[0];
     assert!(
@@ -324,7 +324,7 @@ fn a_vehicle_is_deaf_that_hears_none_of_those_there_are() {
         !Neighbours::<4>::new(&[], 1, 2.0, 2.0).hears_nobody(at(100)),
         "alone there is nobody to hear"
     );
-    let roster = [1, 2, 9].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
+    let roster = [1, 2, 9].map(|system_id| RosterEntry { system_id, path_start: Point::zeros() });
     let mut table = Neighbours::<4>::new(&roster, 1, 2.0, 2.0);
     table.handle_intent(at(10), 0, &intent(0, 1, 2), 1, None);
     assert!(!table.hears_nobody(at(12)), "one is heard");
@@ -339,7 +339,7 @@ pub(super) fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
 #[test]
 fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
     let braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
-    let bounds = MotionBounds { braking, speed_max_mps: 2.0, silent_s: 3.0 };
+    let bounds = MotionBounds { braking, speed_max_mps: 2.0, stopped_when_unheard_for_s: 3.0 };
     let (mut beyond, mut reached, mut missed) = (0, 0, 0);
     for seed in 0..200_000 {
         let rng = &mut Pcg32::seed_from_u64(seed);
@@ -361,11 +361,11 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
         let from = entry.state.position + near(rng, beside_m);
         entry.points = (0..rng.next_u32() % 9).map(|_| from + near(rng, 3.0)).collect();
         entry.points_length_m = [0.0, -1.0][rng.next_u32() as usize % 2];
-        entry.unheard_point_count =
+        entry.unheard_flight_point_count =
             (rng.next_u32() % 9).min(entry.points.len().saturating_sub(1) as u32) as u8;
         let first = entry.points.first().copied().unwrap_or_default();
         let extent_m = |p: &Point| (p - first).norm();
-        entry.extent_m = entry.points_for_now().iter().map(extent_m).fold(0.0, f32::max);
+        entry.points_extent_m = entry.points_to_stop().iter().map(extent_m).fold(0.0, f32::max);
         entry.update_place_on_points();
         let now = Instant::from_millis(200_000);
         let ages_ms = [100, 900, 1500, 5000, 46_000, 80_000];
@@ -377,7 +377,7 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
         entry.position_at = Some(placed_at);
         entry.intent_at = Some(age(rng));
         entry.heard_at = entry.position_at.max(entry.intent_at);
-        entry.relayed_at = Some(age(rng)).filter(|_| seed % 3 == 0);
+        entry.relayed_report_at = Some(age(rng)).filter(|_| seed % 3 == 0);
         entry.moved_at = age(rng);
         let lands = seed % 2 == 0;
         let stopped = rng.next_u32().is_multiple_of(3);
@@ -404,12 +404,12 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
         }
         if met.lost && !lands && reach.hears_nobody {
             // As a vehicle that hears no other vehicle sees it.
-            (met.motion.age_s, met.motion.grounded) = (bounds.silent_s, false);
+            (met.motion.age_s, met.motion.grounded) = (bounds.stopped_when_unheard_for_s, false);
         }
         let silent = met.lost || met.motion.age_s > MAX_HEIGHT_AGE_S;
         if lands && silent {
-            (met.motion.age_s, met.motion.speed_mps, met.motion.points) = (0.0, 0.0, &[]);
-            met.motion.reported_path_reach = ReportedPathReach::OPEN;
+            (met.motion.age_s, met.motion.speed_mps, met.motion.reported_points) = (0.0, 0.0, &[]);
+            met.motion.reported_path_reach = ReportedPathReach::UNBOUNDED;
             met.motion.rests_within_m = 0.0;
         }
         let by_gates = met.on_plan && reach.on_plan;
@@ -418,14 +418,14 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             met.limit_to_points(&table.entries[1], &bounds);
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
-        let reach_m = reach.within_m + met.motion.reach_m(&bounds, ahead_s);
-        let away = reach.own.distance_from_box(&met.motion.position);
-        let above_m = if met.motion.column_to_m.is_some() { 0.0 } else { away.z };
+        let reach_m = reach.within_m + met.motion.max_reach_m(&bounds, ahead_s);
+        let away = reach.own.box_distances(&met.motion.position);
+        let above_m = if met.motion.column_bottom_z_m.is_some() { 0.0 } else { away.z };
         let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
         let below = lands
             && silent
-            && table.may_lie_below(1, &place, -MAX_COLUMN_M, reach.within_m, Some(now));
-        if table.next_within(1, now, &reach).is_none() {
+            && table.may_lie_below(1, &place, -DEFAULT_COLUMN_DEPTH_M, reach.within_m, Some(now));
+        if table.next_within_reach(1, now, &reach).is_none() {
             assert!(out_of_reach && !below, "{seed}: {met:?}, {reach:?}");
             beyond += 1;
         } else {
@@ -465,7 +465,7 @@ fn nobody_falls_up() {
             above += 1;
             // Whatever of its way is beside the column is too far below the floor.
             let (mut nearest, mut at) = (f32::INFINITY, from);
-            let mut left_m = table.entries[1].unheard_distance_m();
+            let mut left_m = table.entries[1].max_unheard_distance_m();
             for next in &points {
                 let leg_m = (next - at).norm();
                 let share = (left_m / leg_m).clamp(0.0, 1.0);

@@ -30,7 +30,10 @@ pub(crate) fn config() -> Config<4> {
 
 pub(crate) fn two_vehicles() -> Config<4> {
     let mut config = config();
-    config.roster.push(RosterEntry { system_id: 77, start: Point::new(8.0, 20.0, 1.5) }).unwrap();
+    config
+        .roster
+        .push(RosterEntry { system_id: 77, path_start: Point::new(8.0, 20.0, 1.5) })
+        .unwrap();
     config
 }
 
@@ -47,7 +50,7 @@ pub(crate) fn plan() -> Plan {
         descent_m: 3.5,
         depart_s: 0.0,
         gates,
-        plan_crc: 5,
+        swarm_plan_crc: 5,
     }
 }
 

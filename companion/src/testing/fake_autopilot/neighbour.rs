@@ -29,7 +29,7 @@ impl Bench {
             self.neighbour_echoes.and_then(|behind| sent.nth(behind)).map(|sent| IntentEcho {
                 rank: self.companion.neighbours.own_rank() as u8,
                 sequence: sent.sequence,
-                held: self.neighbour_held,
+                held_ticks: self.neighbour_held,
             });
         let intent = Intent {
             echo,

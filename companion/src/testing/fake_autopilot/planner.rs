@@ -6,8 +6,8 @@ use std::vec::Vec;
 
 use planner_core::Point;
 use planner_core::coverage::around;
-use planner_core::coverage::transit::Transit;
-use planner_core::detour::{DetourRequest, Goal, KeepOutZone};
+use planner_core::coverage::transit::TransitGraph;
+use planner_core::detour::{DetourGoal, DetourRequest, KeepOutZone};
 use planner_core::flight::{Path, VehiclePlan};
 
 use super::{Bench, GOAL, Plan, plan};
@@ -72,9 +72,9 @@ impl Bench {
         }
         let found = |()| {
             let mut path = Path::new();
-            if matches!(request.goal, Goal::Home { .. }) {
+            if matches!(request.goal, DetourGoal::Home { .. }) {
                 around::plan_detour(
-                    &Transit::<1>::empty(),
+                    &TransitGraph::<1>::empty(),
                     None,
                     request,
                     &mut obstacles,
@@ -107,16 +107,16 @@ impl Bench {
         let mut plan = plan.filter(|_| self.answer_division)?.clone();
         let fleet = self.companion.neighbours.fleet().expect("it divides an area");
         let counted = fleet.division_count() == self.companion.mission.division_count();
-        if beside && counted && !fleet.needs_division() {
+        if beside && counted && !fleet.is_division_to_be_computed() {
             return Some(Ok(plan));
         }
         let held_m = f32::from(held_dm) / 10.0;
         let mut path = Path::new();
         path.push(plan.path.point_at(held_m).expect("a path"), OPEN_FIELD_CLEARANCE_M).unwrap();
         for waypoint in plan.path.waypoints().iter().filter(|w| w.along_m > held_m) {
-            path.push(waypoint.position, waypoint.clearance_m).unwrap();
+            path.push(waypoint.position, waypoint.leg_clearance_m).unwrap();
         }
-        (plan.path, plan.climb_m, plan.plan_crc) = (path, 0.0, plan.plan_crc + 1);
+        (plan.path, plan.climb_m, plan.swarm_plan_crc) = (path, 0.0, plan.swarm_plan_crc + 1);
         Some(Ok(plan))
     }
 }

@@ -25,7 +25,7 @@
 
 use core::arch::asm;
 
-use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, WORD};
+use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, WORD_LEN};
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::flash::{Async, Flash as Device};
@@ -104,7 +104,7 @@ impl ReadFlash for Flash {
         let mut address = bank2_address(at, out.len()).ok_or(FlashFault)?;
         let mut rest = out;
         while !rest.is_empty() {
-            let (piece, after) = rest.split_at_mut(rest.len().min(WORD - address % WORD));
+            let (piece, after) = rest.split_at_mut(rest.len().min(WORD_LEN - address % WORD_LEN));
             // SAFETY: inside the bank, as `bank2_address` checked, and inside one word.
             unsafe { read_tolerating_bus_errors(address as *const u8, piece) }?;
             address += piece.len();

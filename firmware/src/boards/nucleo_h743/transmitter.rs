@@ -9,7 +9,7 @@ use embedded_io_async::{ErrorType, Write};
 /// A DMA buffer for one MAVLink frame.
 pub type Buffer = [u8; MAX_FRAME_LEN];
 /// Initial value of the DMA buffers.
-pub const EMPTY: Buffer = [0; MAX_FRAME_LEN];
+pub const ZEROED: Buffer = [0; MAX_FRAME_LEN];
 
 /// Transmits through a DMA buffer.
 pub struct Transmitter {

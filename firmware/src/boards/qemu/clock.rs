@@ -29,16 +29,16 @@ const INTERRUPT: u32 = 8;
 
 struct Clock {
     /// Number of times that timer 0 has wrapped round.
-    rounds: Mutex<Cell<u32>>,
+    timer0_wraps: Mutex<Cell<u32>>,
     queue: Mutex<RefCell<Queue>>,
     /// Counts that lock step has skipped while the processor slept; timer 0 did not count them.
-    skipped: Mutex<Cell<u64>>,
+    skipped_counts: Mutex<Cell<u64>>,
 }
 
 embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock {
-    rounds: Mutex::new(Cell::new(0)),
+    timer0_wraps: Mutex::new(Cell::new(0)),
     queue: Mutex::new(RefCell::new(Queue::new())),
-    skipped: Mutex::new(Cell::new(0)),
+    skipped_counts: Mutex::new(Cell::new(0)),
 });
 
 /// Starts both timers.
@@ -48,8 +48,8 @@ pub fn start() {
     // Timer 1 runs down from its value once: it has no reload value.
     Register::new(TIMER1, VALUE).write(u32::MAX);
     Register::new(TIMER1, CTRL).write(ENABLE | INTERRUPT);
-    interrupts::enable(Irq::Timer0, interrupts::DEVICES);
-    interrupts::enable(Irq::Timer1, interrupts::DEVICES);
+    interrupts::enable(Irq::Timer0, interrupts::DEVICES_PRIORITY);
+    interrupts::enable(Irq::Timer1, interrupts::DEVICES_PRIORITY);
 }
 
 /// Interrupt handler of timer 0, which has wrapped round: counts the round.
@@ -61,14 +61,14 @@ pub fn on_timer0() {
 pub fn on_timer1() {
     critical_section::with(|cs| {
         Register::new(TIMER1, INTSTATUS).write(1);
-        CLOCK.arm(cs);
+        CLOCK.arm_timer1(cs);
     });
 }
 
 /// Reads the clock: counts since the start. Also counts a wrap of timer 0 whose interrupt has not
 /// run yet.
 pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
-    let rounds = CLOCK.rounds.borrow(cs);
+    let rounds = CLOCK.timer0_wraps.borrow(cs);
     let before = Register::new(TIMER0, VALUE).read();
     let ended = Register::new(TIMER0, INTSTATUS).read() != 0;
     let mut value = before;
@@ -78,7 +78,8 @@ pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
         // Read again: the first value may be from before the wrap.
         value = Register::new(TIMER0, VALUE).read();
     }
-    (u64::from(rounds.get()) << 32 | u64::from(u32::MAX - value)) + CLOCK.skipped.borrow(cs).get()
+    (u64::from(rounds.get()) << 32 | u64::from(u32::MAX - value))
+        + CLOCK.skipped_counts.borrow(cs).get()
 };
 
 /// Time at which the next sleeping task is due, counts since the start; `u64::MAX` if none sleeps.
@@ -94,7 +95,7 @@ pub(super) fn next_alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
 
 /// Advances the clock by `counts` without running, in lock step.
 pub(super) fn skip_time(cs: CriticalSection<'_>, counts: u64) {
-    let skipped = CLOCK.skipped.borrow(cs);
+    let skipped = CLOCK.skipped_counts.borrow(cs);
     skipped.set(skipped.get() + counts);
 }
 
@@ -105,7 +106,7 @@ pub fn instructions() -> u64 {
 
 impl Clock {
     /// Wakes the tasks that are due, and sets timer 1 for the next one.
-    fn arm(&self, cs: CriticalSection<'_>) {
+    fn arm_timer1(&self, cs: CriticalSection<'_>) {
         let mut queue = self.queue.borrow(cs).borrow_mut();
         loop {
             let now = CLOCK_NOW(cs);
@@ -134,7 +135,7 @@ impl Driver for Clock {
         critical_section::with(|cs| {
             let changed = self.queue.borrow(cs).borrow_mut().schedule_wake(at, waker);
             if changed {
-                self.arm(cs);
+                self.arm_timer1(cs);
             }
         });
     }

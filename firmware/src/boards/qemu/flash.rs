@@ -3,7 +3,7 @@
 //! cannot be read.
 #![expect(unsafe_code, reason = "the emulated flash is memory that the linker knows nothing of")]
 
-use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, WORD};
+use companion::storage::store::{FlashFault, FlashLayout, ReadFlash, WORD_LEN};
 use embassy_time::{Duration, Timer};
 
 use super::memory::Bank2Use;
@@ -13,12 +13,12 @@ use crate::flash_lender::{FlashLender, LentFlash};
 const BANK_ADDRESS: usize = 0x6000_0000;
 /// Address of the word marks, one byte for each word: `ERASED`, `WHOLE` or `TORN`. Real flash finds
 /// a torn word by its error-correcting code.
-const WORD_MARKS: usize = 0x6020_0000;
+const WORD_MARKS_ADDRESS: usize = 0x6020_0000;
 /// Address of the word that holds `MAGIC` once bank and marks are initialized; QEMU's memory is
 /// zero at power-on.
 const BANK_INITIALISED_ADDRESS: usize = 0x6030_0000;
 const MAGIC: u32 = 0x464c_4153;
-const LEN: usize = LAYOUT.len() as usize;
+const BANK_LEN: usize = LAYOUT.len() as usize;
 const ERASED: u8 = 0;
 const WHOLE: u8 = 1;
 const TORN: u8 = 2;
@@ -41,8 +41,8 @@ impl Flash {
         // SAFETY: memory of this board that no other code uses yet.
         unsafe {
             if (BANK_INITIALISED_ADDRESS as *const u32).read_volatile() != MAGIC {
-                (BANK_ADDRESS as *mut u8).write_bytes(0xFF, LEN);
-                (WORD_MARKS as *mut u8).write_bytes(ERASED, LEN / WORD);
+                (BANK_ADDRESS as *mut u8).write_bytes(0xFF, BANK_LEN);
+                (WORD_MARKS_ADDRESS as *mut u8).write_bytes(ERASED, BANK_LEN / WORD_LEN);
                 (BANK_INITIALISED_ADDRESS as *mut u32).write_volatile(MAGIC);
             }
         }
@@ -68,8 +68,8 @@ impl Flash {
 /// of them is torn.
 fn readable_address(at: u32, len: usize) -> Option<*const u8> {
     let at = at as usize;
-    let end = at.checked_add(len).filter(|end| *end <= LEN)?;
-    let torn = (at / WORD..end.div_ceil(WORD)).any(|word| word_mark(word) == TORN);
+    let end = at.checked_add(len).filter(|end| *end <= BANK_LEN)?;
+    let torn = (at / WORD_LEN..end.div_ceil(WORD_LEN)).any(|word| word_mark(word) == TORN);
     (!torn).then_some((BANK_ADDRESS + at) as *const u8)
 }
 
@@ -77,17 +77,17 @@ impl crate::flash::Flash for Flash {
     async fn erase(&mut self, at: u32) -> Result<(), FlashFault> {
         let (allowed, at, len) =
             (self.0.allows(at, LAYOUT.sector_len), at as usize, LAYOUT.sector_len as usize);
-        if !at.is_multiple_of(len) || at + len > LEN || !allowed {
+        if !at.is_multiple_of(len) || at + len > BANK_LEN || !allowed {
             return Err(FlashFault);
         }
         // A reset during the erasure leaves all words of the sector torn.
-        for word in at / WORD..(at + len) / WORD {
+        for word in at / WORD_LEN..(at + len) / WORD_LEN {
             set_mark(word, TORN);
         }
         Timer::after(ERASE_TIME).await;
         // SAFETY: inside the bank, and no byte of this sector is lent.
         unsafe { ((BANK_ADDRESS + at) as *mut u8).write_bytes(0xFF, len) };
-        for word in at / WORD..(at + len) / WORD {
+        for word in at / WORD_LEN..(at + len) / WORD_LEN {
             set_mark(word, ERASED);
         }
         Ok(())
@@ -96,14 +96,14 @@ impl crate::flash::Flash for Flash {
     async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), FlashFault> {
         let (allowed, at) = (self.0.allows(at, bytes.len() as u32), at as usize);
         if !allowed
-            || !at.is_multiple_of(WORD)
-            || !bytes.len().is_multiple_of(WORD)
-            || at + bytes.len() > LEN
+            || !at.is_multiple_of(WORD_LEN)
+            || !bytes.len().is_multiple_of(WORD_LEN)
+            || at + bytes.len() > BANK_LEN
         {
             return Err(FlashFault);
         }
-        for (i, word) in bytes.chunks(WORD).enumerate() {
-            let place = at / WORD + i;
+        for (i, word) in bytes.chunks(WORD_LEN).enumerate() {
+            let place = at / WORD_LEN + i;
             if word_mark(place) != ERASED {
                 return Err(FlashFault);
             }
@@ -111,8 +111,8 @@ impl crate::flash::Flash for Flash {
             Timer::after(PROGRAM_TIME).await;
             // SAFETY: inside the bank, and this word is not lent.
             unsafe {
-                ((BANK_ADDRESS + place * WORD) as *mut u8)
-                    .copy_from_nonoverlapping(word.as_ptr(), WORD)
+                ((BANK_ADDRESS + place * WORD_LEN) as *mut u8)
+                    .copy_from_nonoverlapping(word.as_ptr(), WORD_LEN)
             };
             set_mark(place, WHOLE);
         }
@@ -131,10 +131,10 @@ impl ReadFlash for Flash {
 
 fn word_mark(word: usize) -> u8 {
     // SAFETY: callers pass the number of a word of the bank, and each word has a mark.
-    unsafe { ((WORD_MARKS + word) as *const u8).read_volatile() }
+    unsafe { ((WORD_MARKS_ADDRESS + word) as *const u8).read_volatile() }
 }
 
 fn set_mark(word: usize, mark: u8) {
     // SAFETY: as in `word_mark`.
-    unsafe { ((WORD_MARKS + word) as *mut u8).write_volatile(mark) }
+    unsafe { ((WORD_MARKS_ADDRESS + word) as *mut u8).write_volatile(mark) }
 }

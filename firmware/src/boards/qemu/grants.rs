@@ -20,7 +20,7 @@ use core::mem::MaybeUninit;
 use core::slice;
 
 use critical_section::{CriticalSection, Mutex};
-use lock_step::{COMMAND_LINE, FromBoard, HEAD, LONGEST, ToBoard};
+use lock_step::{COMMAND_LINE, FromBoard, HEADER_LEN, MAX_MESSAGE_LEN, ToBoard};
 use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use semihosting::sys::arm_compat::sys_get_cmdline_uninit;
@@ -45,13 +45,14 @@ const ONE_SHOT: u32 = 0b1110_0011;
 struct SimulationLink {
     input: File,
     output: File,
-    /// Length of the current message, and how many of its bytes are executed (`done`), bytes.
-    length: usize,
-    done: usize,
+    /// Length of the current message, and how many of its bytes are executed (`executed_len`),
+    /// bytes.
+    message_len: usize,
+    executed_len: usize,
     /// Bytes of queued records, which are written at the grant's end.
     queued_len: usize,
     /// Time of the message's next record, counts since the start.
-    due: u64,
+    next_record_due: u64,
     /// Gives bytes that arrive to the UART with this number.
     receive_on_port: fn(u8, &[u8]),
 }
@@ -70,17 +71,17 @@ pub fn start(take: fn(u8, &[u8])) {
         let mut host = SimulationLink {
             input,
             output,
-            length: 0,
-            done: 0,
+            message_len: 0,
+            executed_len: 0,
             queued_len: 0,
-            due: 0,
+            next_record_due: 0,
             receive_on_port: take,
         };
         host.queue_record(FromBoard::Started, &[]);
         host.flush();
         host.read_message();
         Register::new(TIMER, CONTROL).write(ONE_SHOT);
-        interrupts::enable(Irq::DualTimer, interrupts::GRANTS);
+        interrupts::enable(Irq::DualTimer, interrupts::GRANTS_PRIORITY);
         critical_section::with(|cs| {
             SIMULATION_LINK.borrow_ref_mut(cs).insert(host).run_due_work(cs)
         });
@@ -94,8 +95,8 @@ pub fn is_lock_step() -> bool {
 
 /// Time at which the message's next record is due, counts since the start; `u64::MAX` outside lock
 /// step.
-pub fn next_due(cs: CriticalSection<'_>) -> u64 {
-    SIMULATION_LINK.borrow_ref(cs).as_ref().map_or(u64::MAX, |host| host.due)
+pub fn next_record_due(cs: CriticalSection<'_>) -> u64 {
+    SIMULATION_LINK.borrow_ref(cs).as_ref().map_or(u64::MAX, |host| host.next_record_due)
 }
 
 /// Interrupt handler of the dual timer: executes the records that are due.
@@ -135,7 +136,7 @@ impl SimulationLink {
             };
             let (due, now) = (due_us * COUNTS_PER_US, CLOCK_NOW(cs));
             if due > now {
-                self.due = due;
+                self.next_record_due = due;
                 // If the record is due later than the timer can count, its interrupt comes early
                 // and this function runs again.
                 Register::new(TIMER, LOAD).write((due - now).min(u64::from(u32::MAX)) as u32);
@@ -147,21 +148,21 @@ impl SimulationLink {
 
     /// The next record of the message; `None` after the last.
     fn next_record(&self) -> Option<ToBoard> {
-        let head = self.message_bytes()[self.done..].first_chunk::<HEAD>()?;
+        let head = self.message_bytes()[self.executed_len..].first_chunk::<HEADER_LEN>()?;
         Some(ToBoard::from_bytes(head).expect("the host sends records"))
     }
 
     fn message_bytes(&self) -> &'static [u8] {
         // SAFETY: memory of this board that no other code uses; only `read_message` changes it, and
         // no slice of it is alive there.
-        unsafe { slice::from_raw_parts(MESSAGE_ADDRESS as *const u8, self.length) }
+        unsafe { slice::from_raw_parts(MESSAGE_ADDRESS as *const u8, self.message_len) }
     }
 
     /// Executes a record and moves to the next.
     fn execute_record(&mut self, record: ToBoard) {
-        let from = self.done + HEAD;
-        self.done = from + record.payload_len();
-        let bytes = &self.message_bytes()[from..self.done];
+        let from = self.executed_len + HEADER_LEN;
+        self.executed_len = from + record.payload_len();
+        let bytes = &self.message_bytes()[from..self.executed_len];
         match record {
             ToBoard::Bytes { port, .. } => (self.receive_on_port)(port, bytes),
             ToBoard::Run { .. } => {}
@@ -196,7 +197,7 @@ impl SimulationLink {
     /// Queues a record with its bytes until the grant's end; if the buffer is full, writes the
     /// queued records first.
     fn queue_record(&mut self, record: FromBoard, bytes: &[u8]) {
-        if self.queued_len + HEAD + bytes.len() > LONGEST {
+        if self.queued_len + HEADER_LEN + bytes.len() > MAX_MESSAGE_LEN {
             self.flush();
         }
         for part in [&record.to_bytes(), bytes] {
@@ -222,10 +223,11 @@ impl SimulationLink {
         if self.input.read_exact(&mut length).is_err() {
             semihosting::process::exit(0);
         }
-        (self.length, self.done) = (u32::from_le_bytes(length) as usize, 0);
-        assert!(self.length <= LONGEST, "the host sends no longer messages");
+        (self.message_len, self.executed_len) = (u32::from_le_bytes(length) as usize, 0);
+        assert!(self.message_len <= MAX_MESSAGE_LEN, "the host sends no longer messages");
         // SAFETY: memory of this board that no other code uses, and long enough.
-        let message = unsafe { slice::from_raw_parts_mut(MESSAGE_ADDRESS as *mut u8, self.length) };
+        let message =
+            unsafe { slice::from_raw_parts_mut(MESSAGE_ADDRESS as *mut u8, self.message_len) };
         self.input.read_exact(message).expect("a whole message");
     }
 }

@@ -5,13 +5,13 @@ use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
 
 /// Priority of the lock step's timer, the highest.
-pub const GRANTS: u8 = 0x20;
+pub const GRANTS_PRIORITY: u8 = 0x20;
 /// Priority of UARTs and clock timers.
-pub const DEVICES: u8 = 0x40;
+pub const DEVICES_PRIORITY: u8 = 0x40;
 /// Priority of the executor of links and setpoints, below devices.
-pub const LINKS: u8 = 0x80;
+pub const LINKS_PRIORITY: u8 = 0x80;
 /// Priority of the executor of plans and flash, the lowest.
-pub const PLANS: u8 = 0xC0;
+pub const PLANS_PRIORITY: u8 = 0xC0;
 
 /// Interrupt numbers of AN500 that this board uses.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -10,7 +10,7 @@ const MAP_ADDRESS: usize = 0x6080_0000;
 /// number of words.
 const MAP_HEADER_LEN: usize = 32;
 /// Address of memory that nothing else uses.
-const UNUSED_ADDRESS: usize = 0x6040_0000;
+const SPARE_MEMORY_ADDRESS: usize = 0x6040_0000;
 /// Address of the emulated flash bank 2.
 const BANK2_ADDRESS: usize = 0x6000_0000;
 /// Length of bank 2, bytes.
@@ -66,5 +66,5 @@ pub fn take_spare_memory() -> Option<&'static mut [u8]> {
         return None;
     }
     // SAFETY: memory of this board that nothing else uses, handed out once.
-    Some(unsafe { core::slice::from_raw_parts_mut(UNUSED_ADDRESS as *mut u8, BANK2_LEN) })
+    Some(unsafe { core::slice::from_raw_parts_mut(SPARE_MEMORY_ADDRESS as *mut u8, BANK2_LEN) })
 }

@@ -30,7 +30,7 @@ fn sleep_in_lock_step() {
         if Register::new(ICSR, 0).read() & ISRPENDING != 0 {
             return;
         }
-        let due = alarm.min(grants::next_due(cs));
+        let due = alarm.min(grants::next_record_due(cs));
         clock::skip_time(cs, watchdog::limit_skip_or_reset(cs, now, due).saturating_sub(now));
         // Both handlers set their timers again for the remaining time.
         interrupts::pend(Irq::Timer1);

@@ -22,8 +22,8 @@ const BOTH_ENABLED: u32 = 0b1111;
 /// Value of BAUDDIV: the device wants at least 16; QEMU simulates no baud rate.
 const DIVISOR: u32 = 27;
 /// Bytes of the receive buffer: a quarter of a second at 18 kB/s, the fastest that QEMU delivers.
-const RECEIVE_BUFFER: usize = 4096;
-const SEND_BUFFER: usize = 1024;
+const RECEIVE_BUFFER_LEN: usize = 4096;
+const SEND_BUFFER_LEN: usize = 1024;
 
 /// Counters of a UART's losses.
 #[derive(Debug, Default)]
@@ -39,9 +39,9 @@ pub struct Uart {
     base: usize,
     /// Number of the UART in lock step's records.
     port: u8,
-    transmits: Irq,
-    received: Pipe<CriticalSectionRawMutex, RECEIVE_BUFFER>,
-    sent: Pipe<CriticalSectionRawMutex, SEND_BUFFER>,
+    transmit_irq: Irq,
+    received: Pipe<CriticalSectionRawMutex, RECEIVE_BUFFER_LEN>,
+    sent: Pipe<CriticalSectionRawMutex, SEND_BUFFER_LEN>,
     /// Losses since the start.
     pub counters: LossCounters,
 }
@@ -57,9 +57,9 @@ pub(super) fn of_port(port: u8) -> &'static Uart {
 }
 
 impl Uart {
-    const fn new(base: usize, port: u8, transmits: Irq) -> Self {
+    const fn new(base: usize, port: u8, transmit_irq: Irq) -> Self {
         let counters = LossCounters { overruns: AtomicU32::new(0), dropped: AtomicU32::new(0) };
-        Self { base, port, transmits, received: Pipe::new(), sent: Pipe::new(), counters }
+        Self { base, port, transmit_irq, received: Pipe::new(), sent: Pipe::new(), counters }
     }
 
     fn register(&self, offset: usize) -> Register {
@@ -70,9 +70,9 @@ impl Uart {
     pub fn start(&'static self, receives: Irq) -> (Receiver, Transmitter) {
         self.register(BAUDDIV).write(DIVISOR);
         self.register(CTRL).write(BOTH_ENABLED);
-        interrupts::enable(receives, interrupts::DEVICES);
-        interrupts::enable(self.transmits, interrupts::DEVICES);
-        (Receiver { uart: self, reported: 0 }, Transmitter(self))
+        interrupts::enable(receives, interrupts::DEVICES_PRIORITY);
+        interrupts::enable(self.transmit_irq, interrupts::DEVICES_PRIORITY);
+        (Receiver { uart: self, reported_losses: 0 }, Transmitter(self))
     }
 
     /// Puts bytes that arrive in lock step into the receive buffer; bytes without room are dropped
@@ -133,7 +133,7 @@ impl embedded_io_async::Error for BytesLost {
 pub struct Receiver {
     uart: &'static Uart,
     /// Number of losses that `read` has returned as errors.
-    reported: u32,
+    reported_losses: u32,
 }
 
 /// Sending end of a UART.
@@ -148,7 +148,7 @@ impl embedded_io_async::Read for Receiver {
         let lost = [&self.uart.counters.overruns, &self.uart.counters.dropped];
         let lost =
             lost.iter().fold(0, |sum: u32, count| sum.wrapping_add(count.load(Ordering::Relaxed)));
-        if core::mem::replace(&mut self.reported, lost) != lost {
+        if core::mem::replace(&mut self.reported_losses, lost) != lost {
             return Err(BytesLost);
         }
         Ok(self.uart.received.read(buffer).await)
@@ -165,7 +165,7 @@ impl embedded_io_async::Write for Transmitter {
             return Ok(bytes.len());
         }
         let length = self.0.sent.write(bytes).await;
-        interrupts::pend(self.0.transmits);
+        interrupts::pend(self.0.transmit_irq);
         Ok(length)
     }
 

@@ -58,12 +58,12 @@ unsafe extern "C" fn plans() {
 
 /// Starts the executor of links and setpoints. To be called once.
 pub fn start_links_executor() -> SendSpawner {
-    interrupts::set_priority(Irq::Links, interrupts::LINKS);
+    interrupts::set_priority(Irq::Links, interrupts::LINKS_PRIORITY);
     executors::start_links_executor(Irq::Links)
 }
 
 /// Starts the executor of plans and flash. To be called once.
 pub fn start_plans_executor() -> SendSpawner {
-    interrupts::set_priority(Irq::Plans, interrupts::PLANS);
+    interrupts::set_priority(Irq::Plans, interrupts::PLANS_PRIORITY);
     executors::start_plans_executor(Irq::Plans)
 }

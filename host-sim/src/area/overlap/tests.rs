@@ -45,12 +45,12 @@ fn rectangles_overlap_where_a_square_metre_says_so() {
             [&outers, &holes].map(|all| all.iter().copied().map(rectangle).collect::<Vec<_>>());
         let [o, h] = [&outer_rings, &hole_rings]
             .map(|all| all.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        let found = match find_overlap(&o, &h) {
+        let found = match find_ring_fault(&o, &h) {
             None => 0,
-            Some(Overlap::Outers(..)) => 1,
-            Some(Overlap::Holes(..)) => 2,
-            Some(Overlap::HoleOut(_)) => 3,
-            Some(Overlap::NothingLeft(_)) => 4,
+            Some(RingFault::OutersOverlap(..)) => 1,
+            Some(RingFault::HolesOverlap(..)) => 2,
+            Some(RingFault::HoleNotInsideOuter(_)) => 3,
+            Some(RingFault::OuterFilledByHoles(_)) => 4,
         };
         assert_eq!(found, right, "seed {seed}: {outers:?} without {holes:?}");
         seen[found] += 1;

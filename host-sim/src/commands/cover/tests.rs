@@ -35,7 +35,7 @@ fn plans_of_an_earlier_run_are_removed_and_nothing_else() {
         fs::write(folder.path().join(name), name).unwrap();
     }
     let written: Vec<String> = kept[..2].iter().map(|name| (*name).to_owned()).collect();
-    remove_stale(folder.path(), &written).unwrap();
+    remove_stale_plan_files(folder.path(), &written).unwrap();
     let there = |name: &&str| folder.path().join(name).exists();
     assert!(kept.iter().all(&there) && !stale.iter().any(there));
 }

@@ -12,7 +12,7 @@ fn cross(a: &[f64; 2], b: &[f64; 2]) -> f64 {
 }
 
 /// Twice the area of the triangle `a b c`, positive if its corners are in counterclockwise order.
-fn turn(a: &[f64; 2], b: &[f64; 2], c: &[f64; 2]) -> f64 {
+fn twice_signed_area(a: &[f64; 2], b: &[f64; 2], c: &[f64; 2]) -> f64 {
     cross(&minus(b, a), &minus(c, a))
 }
 
@@ -24,7 +24,7 @@ pub(super) fn convex_hull(mut points: Polygon) -> Polygon {
         let mut chain = Polygon::new();
         for point in points {
             while chain.len() >= 2
-                && turn(&chain[chain.len() - 2], &chain[chain.len() - 1], point) <= 0.0
+                && twice_signed_area(&chain[chain.len() - 2], &chain[chain.len() - 1], point) <= 0.0
             {
                 chain.pop();
             }
@@ -60,7 +60,7 @@ pub(super) fn simplified_outward(mut polygon: Polygon, most: usize) -> Polygon {
             (bend > 0.0).then(|| {
                 let share = cross(&minus(&b, &a), &out) / bend;
                 let meet = [a[0] + into[0] * share, a[1] + into[1] * share];
-                (turn(&a, &meet, &b), i, meet)
+                (twice_signed_area(&a, &meet, &b), i, meet)
             })
         };
         let least = (0..n).filter_map(added).min_by(|a, b| a.0.total_cmp(&b.0));
@@ -90,7 +90,7 @@ pub(super) fn offset_outward(polygon: &Polygon, by_m: f64) -> Polygon {
 /// Whether a convex polygon contains a point.
 pub(super) fn contains(polygon: &Polygon, point: &[f64; 2]) -> bool {
     let ends = polygon.iter().zip(polygon.iter().cycle().skip(1));
-    ends.into_iter().all(|(a, b)| turn(a, b, point) >= 0.0)
+    ends.into_iter().all(|(a, b)| twice_signed_area(a, b, point) >= 0.0)
 }
 
 #[cfg(test)]

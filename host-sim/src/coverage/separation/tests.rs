@@ -4,7 +4,7 @@ use crate::coverage::flight::WaypointAction;
 fn flight(places: &[[f32; 3]]) -> (Vec<FlightPoint>, Vec<f32>) {
     let point = |p: &[f32; 3]| FlightPoint {
         position: Point::from(*p),
-        action: WaypointAction::Lane,
+        action: WaypointAction::AtLaneHeight,
         lane: None,
     };
     let points: Vec<FlightPoint> = places.iter().map(point).collect();

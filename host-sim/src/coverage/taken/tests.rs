@@ -16,7 +16,7 @@ fn counted(change: impl Fn(&mut Vec<Picture>)) -> (u64, u64) {
         vehicle: Some(1),
         t_s: 0.0,
         position: Point::new(place.x, place.y, 20.0),
-        heading: 0.0,
+        yaw_enu_rad: 0.0,
     };
     let mut pictures: Vec<Picture> = waypoints.map(picture).collect();
     change(&mut pictures);

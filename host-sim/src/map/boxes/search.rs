@@ -16,7 +16,7 @@ pub(super) const BOXES_PER_NODE: usize = 8;
 /// at least a third each, leave no part with more than a quarter of the boxes: 2³² boxes make 16
 /// levels. Depth first, at most 7 nodes of each level wait, and all 8 of the last: 16 · 7 + 8.
 const MAX_WAITING_NODES: usize = 120;
-/// Value in `child` that marks a node whose boxes are obstacles.
+/// Value in `child_offsets` that marks a node whose boxes are obstacles.
 const LEAF: u32 = 0;
 /// Coordinate of unused boxes, beyond every map, cells; its square is still finite in f32.
 const FAR_AWAY_CELLS: f32 = 1e18;
@@ -29,7 +29,7 @@ pub(super) struct Node {
     pub(super) high: [[f32; BOXES_PER_NODE]; 3],
     /// Offset in the node list from this node to the child under each box; [`LEAF`] if the boxes
     /// are obstacles.
-    pub(super) child: [u32; BOXES_PER_NODE],
+    pub(super) child_offsets: [u32; BOXES_PER_NODE],
 }
 
 impl Node {
@@ -37,30 +37,30 @@ impl Node {
     pub(super) const EMPTY: Self = Self {
         low: [[FAR_AWAY_CELLS; BOXES_PER_NODE]; 3],
         high: [[FAR_AWAY_CELLS; BOXES_PER_NODE]; 3],
-        child: [LEAF; BOXES_PER_NODE],
+        child_offsets: [LEAF; BOXES_PER_NODE],
     };
 
     fn is_leaf(&self) -> bool {
-        self.child[0] == LEAF
+        self.child_offsets[0] == LEAF
     }
 }
 
 /// A node that waits to be opened, and a lower bound of the squared distance to its boxes.
 #[derive(Clone, Copy, Default)]
 struct OpenNode {
-    square: f32,
+    min_distance_sq: f32,
     node: u32,
 }
 
 /// A search for the squared distance, cells², to the nearest obstacle; the result is at most
-/// `bound`. It stops at the first distance found that is at most `enough`. It is a type, not a
-/// closure, so that all of it is compiled for the vector instructions in use.
+/// `bound_sq`. It stops at the first distance found that is at most `enough_sq`. It is a type, not
+/// a closure, so that all of it is compiled for the vector instructions in use.
 pub(super) struct BoxSearch<'a> {
     /// All nodes of the tree; the root is the first.
     pub(super) nodes: &'a [Node],
     pub(super) segment: &'a CellSegment,
-    pub(super) bound: f32,
-    pub(super) enough: f32,
+    pub(super) bound_sq: f32,
+    pub(super) enough_sq: f32,
 }
 
 impl WithSimd for BoxSearch<'_> {
@@ -68,30 +68,30 @@ impl WithSimd for BoxSearch<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f32 {
-        let Self { nodes, segment, mut bound, enough } = self;
+        let Self { nodes, segment, mut bound_sq, enough_sq } = self;
         let mut waiting = [OpenNode::default(); MAX_WAITING_NODES];
         let mut count = 1;
-        while count > 0 && bound > enough {
+        while count > 0 && bound_sq > enough_sq {
             count -= 1;
-            let OpenNode { square, node: index } = waiting[count];
-            if square >= bound {
+            let OpenNode { min_distance_sq: square, node: index } = waiting[count];
+            if square >= bound_sq {
                 continue;
             }
             let node = &nodes[index as usize];
             let (least, most) = segment.distance_bounds_sq(simd, node);
             if !node.is_leaf() {
-                for (&square, child) in least.iter().zip(&node.child) {
-                    waiting[count] = OpenNode { square, node: index + child };
-                    count += usize::from(square < bound);
+                for (&square, child) in least.iter().zip(&node.child_offsets) {
+                    waiting[count] = OpenNode { min_distance_sq: square, node: index + child };
+                    count += usize::from(square < bound_sq);
                 }
                 continue;
             }
-            bound = bound.min(least_of(simd, &most));
-            if least_of(simd, &least) < bound {
-                bound = bound.min(least_of(simd, &segment.distances_sq_to_boxes(simd, node)));
+            bound_sq = bound_sq.min(least_of(simd, &most));
+            if least_of(simd, &least) < bound_sq {
+                bound_sq = bound_sq.min(least_of(simd, &segment.distances_sq_to_boxes(simd, node)));
             }
         }
-        bound
+        bound_sq
     }
 }
 
@@ -113,7 +113,7 @@ pub(super) struct CellSegment {
     /// 1 / d; infinite along an axis without motion.
     per_d: [f32; 3],
     /// 1 / |d|²; 0 if both ends coincide.
-    inv_square: f32,
+    inv_length_sq: f32,
 }
 
 impl CellSegment {
@@ -126,7 +126,7 @@ impl CellSegment {
             low: [0, 1, 2].map(|axis| a[axis].min(b[axis])),
             high: [0, 1, 2].map(|axis| a[axis].max(b[axis])),
             per_d: d.map(f32::recip),
-            inv_square: if square > f32::MIN_POSITIVE { 1.0 / square } else { 0.0 },
+            inv_length_sq: if square > f32::MIN_POSITIVE { 1.0 / square } else { 0.0 },
         }
     }
 
@@ -157,8 +157,8 @@ impl CellSegment {
         let [first, last] =
             [SimdLanes::splat_triple(simd, self.low), SimdLanes::splat_triple(simd, self.high)];
         let [zero, half, one] = SimdLanes::splat_triple(simd, [0.0, 0.5, 1.0]);
-        let [two, rounding, inv_square] =
-            SimdLanes::splat_triple(simd, [2.0, 2e-6, self.inv_square]);
+        let [two, rounding, inv_length_sq] =
+            SimdLanes::splat_triple(simd, [2.0, 2e-6, self.inv_length_sq]);
         let (mut least, mut most) = ([0.0; BOXES_PER_NODE], [0.0; BOXES_PER_NODE]);
         for part in 0..BOXES_PER_NODE / S::F32_LANES {
             let [low, high] = [
@@ -171,7 +171,7 @@ impl CellSegment {
                 gap_square = gap_square + gap * gap;
                 along = along + ((low[axis] + high[axis]) * half - a[axis]) * d[axis];
             }
-            let t = (along * inv_square).max(zero).min(one);
+            let t = (along * inv_length_sq).max(zero).min(one);
             let (mut square, mut rate) = (zero, zero);
             for axis in 0..3 {
                 let x = a[axis] + d[axis] * t;
@@ -206,19 +206,20 @@ impl CellSegment {
                 SimdLanes::load_part(simd, &node.low, part),
                 SimdLanes::load_part(simd, &node.high, part),
             ];
-            let mut boxes = Boxes { half: [zero; 3], start: [zero; 3], d };
+            let mut boxes = Boxes { half_sides: [zero; 3], start_from_centres: [zero; 3], d };
             for axis in 0..3 {
-                boxes.half[axis] = (high[axis] - low[axis]) * a_half;
-                boxes.start[axis] = a[axis] - low[axis] - boxes.half[axis];
+                boxes.half_sides[axis] = (high[axis] - low[axis]) * a_half;
+                boxes.start_from_centres[axis] = a[axis] - low[axis] - boxes.half_sides[axis];
             }
             let (mut from, mut to) = (zero, one);
             let (mut rate_from, mut rate_to) =
                 (boxes.distance_sq_and_half_slope(zero).1, boxes.distance_sq_and_half_slope(one).1);
             for axis in 0..3 {
-                for face in [zero - boxes.half[axis], boxes.half[axis]] {
+                for face in [zero - boxes.half_sides[axis], boxes.half_sides[axis]] {
                     // On an axis without motion `per_d` is infinite and the product may be NaN:
                     // `max` then returns `from`.
-                    let t = ((face - boxes.start[axis]) * per_d[axis]).max(from).min(to);
+                    let t =
+                        ((face - boxes.start_from_centres[axis]) * per_d[axis]).max(from).min(to);
                     let (_, rate) = boxes.distance_sq_and_half_slope(t);
                     let falls = rate.is_below(zero);
                     (from, to) = (t.select(falls, from), to.select(falls, t));
@@ -240,9 +241,9 @@ impl CellSegment {
 /// The boxes of a node relative to a segment.
 struct Boxes<S: Simd> {
     /// Half the sides of the boxes.
-    half: [SimdLanes<S>; 3],
+    half_sides: [SimdLanes<S>; 3],
     /// Start of the segment relative to the boxes' centres.
-    start: [SimdLanes<S>; 3],
+    start_from_centres: [SimdLanes<S>; 3],
     d: [SimdLanes<S>; 3],
 }
 
@@ -253,8 +254,8 @@ impl<S: Simd> Boxes<S> {
         let zero = t.zero();
         let (mut square, mut rate) = (zero, zero);
         for axis in 0..3 {
-            let x = self.start[axis] + self.d[axis] * t;
-            let off = x - x.max(zero - self.half[axis]).min(self.half[axis]);
+            let x = self.start_from_centres[axis] + self.d[axis] * t;
+            let off = x - x.max(zero - self.half_sides[axis]).min(self.half_sides[axis]);
             square = square + off * off;
             rate = rate + off * self.d[axis];
         }

@@ -47,7 +47,10 @@ fn chain(levels: usize, last: u16) -> Vec<u8> {
 #[test]
 fn the_deepest_leaf_is_read() {
     let bytes = file(HEADER, &[b"size 17\nres 0.1\ndata\n".as_slice(), &chain(15, 2)].concat());
-    assert_eq!(parse(&bytes, Path::new("deep.bt")).unwrap().at_key([0, 0, 0]), Occupancy::Occupied);
+    assert_eq!(
+        parse(&bytes, Path::new("deep.bt")).unwrap().occupancy_at_key([0, 0, 0]),
+        Occupancy::Occupied
+    );
 }
 
 #[test]

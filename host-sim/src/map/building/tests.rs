@@ -1,10 +1,10 @@
 use super::*;
 use crate::map::edt::ClearanceField;
-use crate::map::occupancy::Unknown;
+use crate::map::occupancy::UnknownSpace;
 
 /// The floors that a vehicle with 0.8 m of clearance reaches from the lobby, over cell centres.
 fn floors_reached(map: &OccupancyMap) -> Vec<u32> {
-    let voxels = map.to_voxel_map(Unknown::Blocked);
+    let voxels = map.to_voxel_map(UnknownSpace::Blocked);
     let (field, shape) = (ClearanceField::new(&voxels.grid()), voxels.shape);
     let start = shape.cell_of(&Point::new(20.0, 5.0, 1.5)).unwrap();
     let index = |[i, j, k]: [u32; 3]| ((k * shape.dims[1] + j) * shape.dims[0] + i) as usize;
@@ -15,7 +15,7 @@ fn floors_reached(map: &OccupancyMap) -> Vec<u32> {
     while let Some(cell) = queue.pop() {
         let center = shape.center(cell);
         // Counts rooms only, not the corridor or a shaft.
-        if !(CORRIDOR_M[0] - 2.0..CORRIDOR_M[1] + 2.0).contains(&center.y) {
+        if !(CORRIDOR_Y_M[0] - 2.0..CORRIDOR_Y_M[1] + 2.0).contains(&center.y) {
             rooms.insert((center.z / FLOOR_HEIGHT_M) as u32);
         }
         for (axis, step) in [(0, 1), (0, -1), (1, 1), (1, -1), (2, 1), (2, -1)] {

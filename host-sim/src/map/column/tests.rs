@@ -4,7 +4,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::*;
-use crate::map::{Occupancy, OccupancyMap, Unknown};
+use crate::map::{Occupancy, OccupancyMap, UnknownSpace};
 use planner_core::map::voxel::GridShape;
 
 fn uniform(rng: &mut Pcg32) -> f32 {
@@ -34,7 +34,7 @@ fn random_map(rng: &mut Pcg32) -> OccupancyMap {
 /// The definition, over all cells: the ground, and whether all that rises above it is far enough.
 fn brute_force(
     map: &OccupancyMap,
-    unknown: Unknown,
+    unknown: UnknownSpace,
     p: &Point,
     radius_m: f32,
     required_m: f32,
@@ -51,7 +51,7 @@ fn brute_force(
     }
     let below = (0..top).rev().find(|&k| match map.state_at([i, j, k]) {
         Occupancy::Occupied => true,
-        Occupancy::Unknown => unknown == Unknown::Blocked,
+        Occupancy::Unknown => unknown == UnknownSpace::Blocked,
         Occupancy::Free => false,
     })?;
     if map.state_at([i, j, below]) == Occupancy::Unknown {
@@ -74,7 +74,7 @@ fn brute_force(
             for i in -6..i64::from(nx) + 6 {
                 let blocked = match state([i, j, k]) {
                     Occupancy::Occupied => true,
-                    Occupancy::Unknown => unknown == Unknown::Blocked,
+                    Occupancy::Unknown => unknown == UnknownSpace::Blocked,
                     Occupancy::Free => false,
                 };
                 if blocked {
@@ -98,7 +98,7 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
     let (mut clear, mut hinted) = (0, 0);
     for _ in 0..60 {
         let map = random_map(&mut rng);
-        for unknown in [Unknown::Blocked, Unknown::Free] {
+        for unknown in [UnknownSpace::Blocked, UnknownSpace::Free] {
             let voxels = map.to_voxel_map(unknown);
             let (min, size) = (map.shape().min, map.shape().max() - map.shape().min);
             for _ in 0..40 {
@@ -107,7 +107,7 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
                         .component_mul(&size);
                 let radius_m = 0.05 + 0.2 * uniform(&mut rng);
                 let required_m = radius_m + 0.3 * uniform(&mut rng);
-                let ours = ground_below_column(&voxels, &p, radius_m, required_m);
+                let ours = ground_below_clear_column(&voxels, &p, radius_m, required_m);
                 let expected = brute_force(&map, unknown, &p, radius_m, required_m);
                 assert_eq!(
                     ours.is_ok(),
@@ -119,13 +119,14 @@ fn columns_are_clear_where_brute_force_over_all_cells_finds_nothing_near() {
                         assert!((f64::from(ground_m) - expected).abs() < 1e-5);
                         clear += 1;
                     }
-                    (Err(ColumnError::TooNear { place, distance_m, .. }), _) => {
+                    (Err(ColumnError::TooNear { obstacle_point: place, distance_m, .. }), _) => {
                         // The place in the error is as far from the segment as the error says.
                         let along = place.z.min(p.z);
                         let away = ((place.x - p.x).hypot(place.y - p.y))
                             .hypot((place.z - along).max(0.0));
                         assert!(distance_m <= required_m && away <= distance_m + 1e-5 + radius_m);
-                        if let Some(other) = nearest_column(&voxels, &p, radius_m, required_m) {
+                        if let Some(other) = nearest_clear_column(&voxels, &p, radius_m, required_m)
+                        {
                             hinted += 1;
                             assert!(
                                 brute_force(&map, unknown, &other, radius_m, required_m).is_some()
@@ -153,21 +154,27 @@ fn what_is_wrong_with_a_column_is_named() {
     map.set([22, 20, 8], Occupancy::Occupied);
     map.set([8, 8, 0], Occupancy::Unknown);
     map.set([30, 30, 0], Occupancy::Free);
-    let voxels = map.to_voxel_map(Unknown::Blocked);
+    let voxels = map.to_voxel_map(UnknownSpace::Blocked);
     let look =
-        |x: f32, y: f32, z: f32| ground_below_column(&voxels, &Point::new(x, y, z), 0.3, 0.8);
+        |x: f32, y: f32, z: f32| ground_below_clear_column(&voxels, &Point::new(x, y, z), 0.3, 0.8);
     assert_eq!(look(5.0, 2.0, 4.0), Ok(0.25));
-    let bar =
-        ColumnError::TooNear { place: Point::new(5.5, 5.1, 2.25), distance_m: 0.5, unknown: false };
+    let bar = ColumnError::TooNear {
+        obstacle_point: Point::new(5.5, 5.1, 2.25),
+        distance_m: 0.5,
+        unknown: false,
+    };
     assert_eq!(look(5.0, 5.1, 4.0), Err(bar));
     assert_eq!(look(2.1, 2.1, 4.0), Err(ColumnError::UnknownBelow { top_m: 0.25 }));
     assert_eq!(look(7.6, 7.6, 4.0), Err(ColumnError::NoGround));
     assert_eq!(look(5.0, 2.0, 0.5), Err(ColumnError::TooLow { ground_m: 0.25 }));
     assert_eq!(look(5.5, 5.1, 2.1), Err(ColumnError::NotFree));
     assert_eq!(look(11.0, 5.1, 2.1), Err(ColumnError::NotFree));
-    let face =
-        ColumnError::TooNear { place: Point::new(0.0, 5.0, 4.0), distance_m: 0.7, unknown: true };
+    let face = ColumnError::TooNear {
+        obstacle_point: Point::new(0.0, 5.0, 4.0),
+        distance_m: 0.7,
+        unknown: true,
+    };
     assert_eq!(look(0.7, 5.0, 4.0), Err(face));
-    let place = nearest_column(&voxels, &Point::new(5.0, 5.1, 4.0), 0.3, 0.85).unwrap();
+    let place = nearest_clear_column(&voxels, &Point::new(5.0, 5.1, 4.0), 0.3, 0.85).unwrap();
     assert_eq!(place, Point::new(4.6, 5.1, 4.0));
 }

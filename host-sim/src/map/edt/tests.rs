@@ -1,5 +1,5 @@
 use super::*;
-use crate::map::occupancy::{OccupancyMap, Unknown};
+use crate::map::occupancy::{OccupancyMap, UnknownSpace};
 use crate::map::octree::Occupancy;
 use proptest::prelude::*;
 
@@ -28,7 +28,7 @@ proptest! {
                 obstacles.push(cell);
             }
         }
-        let voxels = map.to_voxel_map(Unknown::Free);
+        let voxels = map.to_voxel_map(UnknownSpace::Free);
         let field = ClearanceField::new(&voxels.grid());
         for &cell in &all {
             let apart = |o: &[u32; 3]| {
@@ -51,10 +51,10 @@ fn beyond_the_faces() {
         }
         map
     };
-    let blocked = ClearanceField::new(&map.to_voxel_map(Unknown::Blocked).grid());
+    let blocked = ClearanceField::new(&map.to_voxel_map(UnknownSpace::Blocked).grid());
     assert_eq!(blocked.lower_bound_m(&Point::new(4.0, 1.5, 4.0)), 1.5);
     assert_eq!(blocked.lower_bound_m(&Point::new(-1.0, 4.0, 4.0)), 0.0);
     assert_eq!(blocked.lower_bound_m(&Point::new(f32::NAN, 4.0, 4.0)), 0.0);
-    let free = ClearanceField::new(&map.to_voxel_map(Unknown::Free).grid());
+    let free = ClearanceField::new(&map.to_voxel_map(UnknownSpace::Free).grid());
     assert_eq!(free.lower_bound_m(&Point::new(-3.0, 4.0, 12.0)), 5.0);
 }

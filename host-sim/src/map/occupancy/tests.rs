@@ -24,7 +24,7 @@ fn expected(tree: &Octree, shape: &GridShape, cell: [u32; 3]) -> Occupancy {
     let (r, res) = (f64::from(shape.resolution_m), tree.resolution_m());
     let lo = [0, 1, 2].map(|a| f64::from(shape.min[a]) + f64::from(cell[a]) * r);
     let (mut occupied, mut free) = (false, 0.0);
-    tree.for_each_leaf(|Leaf { min, size, occupied: obstacle }| {
+    tree.for_each_leaf(|Leaf { min_key: min, edge_cells: size, occupied: obstacle }| {
         let volume = (0..3)
             .map(|a| {
                 let from = (f64::from(min[a]) - f64::from(KEY_ORIGIN)) * res;
@@ -80,13 +80,13 @@ fn unknown_is_what_the_user_chose() {
     let counts = map.counts();
     let ones =
         |grid: &VoxelGrid<'_>| grid.words().iter().map(|w| u64::from(w.count_ones())).sum::<u64>();
-    let blocked = map.to_voxel_map(Unknown::Blocked);
+    let blocked = map.to_voxel_map(UnknownSpace::Blocked);
     assert_eq!(ones(&blocked.grid()), counts.occupied + counts.unknown);
     assert_eq!(ones(&blocked.never_sample_grid()), counts.occupied + counts.unknown);
-    let free = map.to_voxel_map(Unknown::Free);
+    let free = map.to_voxel_map(UnknownSpace::Free);
     assert_eq!(ones(&free.grid()), counts.occupied);
     assert_eq!(ones(&free.never_sample_grid()), counts.occupied + counts.unknown);
-    assert_eq!((blocked.outside, free.outside), (Outside::Blocked, Outside::Free));
+    assert_eq!((blocked.beyond_map, free.beyond_map), (Outside::Blocked, Outside::Free));
 }
 
 #[test]
@@ -104,12 +104,19 @@ fn the_ground_is_the_first_obstacle_below() {
         let solid = (i == 0 && (k == 0 || k == 4)) || (i == 1 && k == 7);
         map.set([i, 0, k], if solid { Occupancy::Occupied } else { Occupancy::Free });
     }
-    let blocked = map.to_voxel_map(Unknown::Blocked);
-    assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 2.4)), Some(1.5));
-    assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 0.9)), Some(-0.5));
-    assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 1.2)), Some(1.2), "inside an obstacle");
-    assert_eq!(blocked.ground_below(&Point::new(0.7, 0.2, 9.0)), Some(3.0), "above the map");
-    assert_eq!(blocked.ground_below(&Point::new(1.2, 0.2, 2.0)), Some(-1.0), "the map's floor");
-    assert_eq!(blocked.ground_below(&Point::new(9.0, 0.2, 2.0)), None);
-    assert_eq!(map.to_voxel_map(Unknown::Free).ground_below(&Point::new(1.2, 0.2, 2.0)), None);
+    let blocked = map.to_voxel_map(UnknownSpace::Blocked);
+    assert_eq!(blocked.ground_z_below_m(&Point::new(0.2, 0.2, 2.4)), Some(1.5));
+    assert_eq!(blocked.ground_z_below_m(&Point::new(0.2, 0.2, 0.9)), Some(-0.5));
+    assert_eq!(
+        blocked.ground_z_below_m(&Point::new(0.2, 0.2, 1.2)),
+        Some(1.2),
+        "inside an obstacle"
+    );
+    assert_eq!(blocked.ground_z_below_m(&Point::new(0.7, 0.2, 9.0)), Some(3.0), "above the map");
+    assert_eq!(blocked.ground_z_below_m(&Point::new(1.2, 0.2, 2.0)), Some(-1.0), "the map's floor");
+    assert_eq!(blocked.ground_z_below_m(&Point::new(9.0, 0.2, 2.0)), None);
+    assert_eq!(
+        map.to_voxel_map(UnknownSpace::Free).ground_z_below_m(&Point::new(1.2, 0.2, 2.0)),
+        None
+    );
 }

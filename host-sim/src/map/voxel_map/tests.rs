@@ -1,5 +1,5 @@
 use super::*;
-use crate::map::{Occupancy, OccupancyMap, Unknown};
+use crate::map::{Occupancy, OccupancyMap, UnknownSpace};
 
 #[test]
 fn nodes_lie_in_cells_that_are_entirely_inside_the_box() {
@@ -7,7 +7,7 @@ fn nodes_lie_in_cells_that_are_entirely_inside_the_box() {
     let mut map = OccupancyMap::all_unknown(shape, "sample").unwrap();
     map.fill([1, 0, 0], shape.dims, Occupancy::Free);
     map.set([7, 4, 3], Occupancy::Occupied);
-    for unknown in [Unknown::Blocked, Unknown::Free] {
+    for unknown in [UnknownSpace::Blocked, UnknownSpace::Free] {
         let map = map.to_voxel_map(unknown);
         let (min, max) = (map.shape.min, map.shape.max());
         let boxes = [

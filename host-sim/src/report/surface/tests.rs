@@ -70,6 +70,6 @@ fn merged_area_is_the_exposed_area_of_noise() {
 #[test]
 fn a_map_with_too_many_faces_is_drawn_coarser() {
     let checkered = surface([80, 80, 80], |[i, j, k]| (i + j + k).is_multiple_of(2));
-    assert_eq!(checkered.drawn_m, 1.0);
+    assert_eq!(checkered.drawn_cell_m, 1.0);
     assert_eq!(checkered.faces.len() / 6, 6);
 }

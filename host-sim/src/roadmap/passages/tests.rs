@@ -1,7 +1,7 @@
 //! Passages: rooms behind narrow doors are joined, by clear edges, and what is walled off stays so.
 
 use super::{ConnectedComponents, WantedConnection};
-use crate::map::occupancy::{OccupancyMap, Unknown};
+use crate::map::occupancy::{OccupancyMap, UnknownSpace};
 use crate::map::{Occupancy, VoxelMap};
 use crate::roadmap::{BuiltRoadmap, add_passages, build};
 use planner_core::Point;
@@ -32,7 +32,7 @@ fn rooms(rng: &mut Pcg32, count: u32) -> VoxelMap {
             }
         }
     }
-    map.to_voxel_map(Unknown::Blocked)
+    map.to_voxel_map(UnknownSpace::Blocked)
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn rooms_behind_narrow_doors_are_joined() {
         let map = rooms(&mut rng, count);
         let ends = [Point::new(1.0, 1.0, 1.0), Point::new(3.0 * count as f32 - 1.0, 3.0, 1.0)];
         let config = PrmConfig {
-            nodes: 60,
+            random_nodes: 60,
             edge_min_m: 0.2,
             edge_max_m: 2.5,
             clearance_m: REQUIRED_M,
@@ -59,11 +59,12 @@ fn rooms_behind_narrow_doors_are_joined() {
             parts.component_of(0) == parts.component_of(1)
         };
         missed += usize::from(!joined(&roadmap));
-        let wanted = [WantedConnection { start: 0, goal: 1, required_m: REQUIRED_M }];
+        let wanted =
+            [WantedConnection { start_node: 0, goal_node: 1, required_clearance_m: REQUIRED_M }];
         let added = add_passages(&map, &mut roadmap, &config, &wanted).unwrap();
         assert!(joined(&roadmap), "seed {seed}");
         assert_eq!(roadmap.nodes.len(), before + added);
-        assert_eq!(roadmap.heights_m.len(), roadmap.nodes.len());
+        assert_eq!(roadmap.heights_above_ground_m.len(), roadmap.nodes.len());
         for edge in &roadmap.edges {
             let (a, b) = (roadmap.nodes[usize::from(edge.a)], roadmap.nodes[usize::from(edge.b)]);
             assert!(segment_is_clear(&map.grid(), &a, &b, REQUIRED_M), "seed {seed}: {edge:?}");
@@ -79,7 +80,7 @@ fn what_is_walled_off_stays_so() {
     let map = rooms(&mut rng, 2);
     let ends = [Point::new(1.0, 1.0, 1.0), Point::new(5.0, 3.0, 1.0)];
     let config = PrmConfig {
-        nodes: 60,
+        random_nodes: 60,
         edge_min_m: 0.2,
         edge_max_m: 2.5,
         clearance_m: 0.26,
@@ -87,6 +88,6 @@ fn what_is_walled_off_stays_so() {
         sampling: Sampling::Uniform,
     };
     let (mut roadmap, _) = build(&map, &ends, &config).unwrap();
-    let wanted = [WantedConnection { start: 0, goal: 1, required_m: 0.26 }];
+    let wanted = [WantedConnection { start_node: 0, goal_node: 1, required_clearance_m: 0.26 }];
     assert_eq!(add_passages(&map, &mut roadmap, &config, &wanted).unwrap(), 0);
 }

@@ -10,17 +10,20 @@ use planner_core::coverage::pack::Heights;
 use planner_core::coverage::{Flat, area as core_area};
 use planner_core::geo::frames::{Geodetic, geodetic_to_enu};
 
-use self::errors::{area_hint, describe_area_error, faulty_ring, file_hint, overlap_error};
+use self::errors::{
+    area_hint, describe_area_error, faulty_ring, file_hint, ring_fault_text_and_hint,
+};
 use self::spacing::{read_camera, read_spacing};
 use super::checks::{VehicleSpans, check_margins};
 use super::obstacles::{FlightSettings, MapBesideArea};
 use super::terrain::UnreadTerrain;
 use super::{
-    Common, DEFAULT_ORIGIN, VEHICLES_HINT, empty_table, fence_and_ground_stations, read_common,
-    read_faults, read_geodetic, read_unsupported, read_vehicles, unsupported_error,
+    CommonSettings, DEFAULT_ORIGIN, VEHICLES_HINT, empty_table, read_common, read_faults,
+    read_fence_and_ground_stations, read_geodetic, read_unsupported, read_vehicles,
+    unsupported_error,
 };
 use crate::area::{self, AreaFormat, MAX_VERTICES, Polygons, RingXy};
-use crate::map::Unknown;
+use crate::map::UnknownSpace;
 use crate::margins;
 use crate::quote::printable_path;
 use crate::scenario::coverage::{AreaSection, CoverageMethod, HeadingRule, ORIGIN_HINT, Trigger};
@@ -38,7 +41,7 @@ const DEFAULT_AREA_TIME_LIMIT_S: f32 = 3600.0;
 /// Edge of a cell of the level ground that a coverage mission has in place of a map, metres.
 const LEVEL_GROUND_CELL_M: f32 = 1.0;
 /// Extent in metres up to which an area in "metres" is refused: its numbers must be degrees.
-const MAX_DEGREES_EXTENT_M: f64 = 0.5;
+const MAX_EXTENT_AS_DEGREES_M: f64 = 0.5;
 
 /// Whether the numbers of a polygon are degrees or metres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,7 +53,7 @@ enum Coordinates {
 /// The map of a mission without one: level ground.
 fn level_ground(origin: Geodetic) -> MapSection {
     let file = String::new();
-    MapSection { file, resolution_m: LEVEL_GROUND_CELL_M, unknown: Unknown::Free, origin }
+    MapSection { file, resolution_m: LEVEL_GROUND_CELL_M, unknown: UnknownSpace::Free, origin }
 }
 
 /// Reads the scenario of a coverage mission.
@@ -59,7 +62,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
     root: &Table<'_>,
     folder: &Path,
 ) -> Result<Scenario> {
-    let Common { seed, deconfliction, simulation, estimator_span } =
+    let CommonSettings { seed, deconfliction, simulation, estimator_span } =
         read_common(text, root, (margins::PAIR_DEVIATION_COVERAGE_M, DEFAULT_AREA_TIME_LIMIT_S))?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
     let map = MapBesideArea::from_root(root, folder)?;
@@ -81,18 +84,18 @@ pub(in crate::scenario) fn read_coverage_scenario(
     if let Some(terrain) = &terrain {
         terrain.apply_terrain(text, &mut area, &mut vehicles, &mission, &simulation)?;
     }
-    let vehicle_places = vehicles.iter().map(|(_, s)| text.file_and_line(&s.start)).collect();
+    let vehicle_file_lines = vehicles.iter().map(|(_, s)| text.file_and_line(&s.start)).collect();
     let (vehicles, spans): (Vec<VehicleSection>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
     let apart_m =
         margins::min_pad_distance_m(&simulation, deconfliction.safety_distance_m, &vehicles);
-    check_pads(text, &vehicles, &spans, apart_m)?;
-    check_heights(text, &vehicles, &spans, area.heights.mission_m)?;
+    check_pads_apart(text, &vehicles, &spans, apart_m)?;
+    check_starts_below_pictures(text, &vehicles, &spans, area.heights.max_picture_height_m)?;
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
-    area.usable = margins::with_usable_footprint(
+    area.usable_spacing = margins::with_usable_footprint(
         &area.spacing,
-        area.height_m,
+        area.picture_height_m,
         mission.cruise_mps,
         &simulation,
         &vehicles,
@@ -101,7 +104,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
         let (vehicles, spans) = (&vehicles[..], &spans[..]);
         let (simulation, deconfliction, roadmap) = (&simulation, &deconfliction, &roadmap);
         let settings = FlightSettings { vehicles, spans, simulation, deconfliction, roadmap };
-        map.apply(text, &mut area, &settings)?;
+        map.add_no_fly_zones(text, &mut area, &settings)?;
     }
     Ok(Scenario {
         path: text.file.to_owned(),
@@ -110,7 +113,7 @@ pub(in crate::scenario) fn read_coverage_scenario(
         map: level_ground(area.origin),
         roadmap,
         mission,
-        vehicle_places,
+        vehicle_file_lines,
         vehicles,
         deconfliction,
         simulation,
@@ -136,7 +139,7 @@ const GOAL_KEYS: [&str; 3] = ["objective", "goals", "goals_file"];
 const COVERAGE_VEHICLE_KEYS: [&str; 4] = ["endurance_s", "weight", "climb_mps", "descend_mps"];
 
 /// Refuses pads less than `apart_m` apart horizontally: no vehicle may climb through another one.
-fn check_pads(
+fn check_pads_apart(
     text: TomlText<'_>,
     vehicles: &[VehicleSection],
     spans: &[VehicleSpans],
@@ -159,7 +162,7 @@ fn check_pads(
 }
 
 /// Refuses a vehicle that starts at or above the height at which pictures are taken.
-fn check_heights(
+fn check_starts_below_pictures(
     text: TomlText<'_>,
     vehicles: &[VehicleSection],
     spans: &[VehicleSpans],
@@ -183,13 +186,13 @@ fn read_coverage_mission(
 ) -> Result<MissionSection> {
     table.one_of("mode", MissionMode::Coverage, &[("coverage", MissionMode::Coverage)])?;
     table.declare_keys(&GOAL_KEYS);
-    let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
+    let (geofence, ground_stations) = read_fence_and_ground_stations(table, vehicles)?;
     let mission = MissionSection {
         mode: MissionMode::Coverage,
         objective: AssignmentObjective::Makespan,
         cruise_mps: table.f32("cruise_mps", 2.0, 0.01..=100.0)?,
         goals: Vec::new(),
-        goal_places: Vec::new(),
+        goal_file_lines: Vec::new(),
         geofence,
         ground_stations,
     };
@@ -217,7 +220,7 @@ fn read_area(
     };
     let terrain = UnreadTerrain::from_table(table, folder, without_crs)?;
     if let (Some(terrain), None) = (&terrain, given) {
-        origin.alt_m = terrain.altitude_m(table.text, &origin)?;
+        origin.alt_m = terrain.origin_ground_altitude_m(table.text, &origin)?;
     }
     let (vertices, rings) =
         rings_in_mission_frame(table, &source, &polygons, coordinates, &origin)?;
@@ -226,26 +229,26 @@ fn read_area(
     let layer_m = table.f32("layer_m", 5.0, 0.1..=1000.0)?;
     let method = table.get("method").map(|v| v.one_of(&CoverageMethod::NAMES)).transpose()?;
     let area = AreaSection {
-        place: table.text.file_and_line(&source),
+        file_line: table.text.file_and_line(&source),
         vertices,
         rings,
-        given_zones: polygons.no_fly.len(),
+        given_no_fly_zones: polygons.no_fly.len(),
         origin,
         camera,
         spacing,
-        usable: spacing,
-        height_m,
-        heights: Heights { mission_m: height_m, layer_m },
+        usable_spacing: spacing,
+        picture_height_m: height_m,
+        heights: Heights { max_picture_height_m: height_m, layer_spacing_m: layer_m },
         terrain: None,
         obstacles: None,
-        angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
-        margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
-        batteries: table.boolean("batteries")?,
+        lane_angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
+        lane_overrun_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
+        allows_battery_swaps: table.boolean("batteries")?,
         method: method.unwrap_or(CoverageMethod::PowellBinpat),
         heading: table.one_of(
             "heading",
-            HeadingRule::Sweep,
-            &[("sweep", HeadingRule::Sweep), ("lane", HeadingRule::Lane)],
+            HeadingRule::SameOnAllLanes,
+            &[("sweep", HeadingRule::SameOnAllLanes), ("lane", HeadingRule::DirectionOfFlight)],
         )?,
         trigger: table.one_of(
             "trigger",
@@ -399,11 +402,11 @@ fn rings_in_mission_frame(
         let along = || polygons.outers.iter().flatten().map(|place| place[axis]);
         along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
     };
-    if coordinates == Coordinates::Metres && wide(0).max(wide(1)) < MAX_DEGREES_EXTENT_M {
+    if coordinates == Coordinates::Metres && wide(0).max(wide(1)) < MAX_EXTENT_AS_DEGREES_M {
         let why = format!("area is {:.6} by {:.6} m", wide(0), wide(1));
         return bad(why, "degrees need `coordinates = \"wgs84\"`");
     }
-    match core_area::Area::new(&vertices, &rings).map(|area| overlap_error(&area)) {
+    match core_area::Area::new(&vertices, &rings).map(|area| ring_fault_text_and_hint(&area)) {
         Ok(None) => Ok((vertices, rings)),
         Ok(Some((why, hint))) => bad(format!("{border}: {why}"), hint),
         Err(error) => {

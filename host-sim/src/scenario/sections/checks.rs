@@ -30,7 +30,8 @@ pub(super) fn check_margins(
         return Ok(());
     }
     let need = margins::required_distances(simulation, deconfliction.safety_distance_m, vehicles);
-    let margin = roadmap.map(|r| ("roadmap.safety_margin_m", r.safety_margin_m, need.margin_m));
+    let margin =
+        roadmap.map(|r| ("roadmap.safety_margin_m", r.safety_margin_m, need.wall_margin_m));
     let separation = ("deconfliction.separation_m", deconfliction.separation_m, need.separation_m);
     let missing = margin.into_iter().chain([separation]);
     let short = missing.filter(|(_, has_m, need_m)| *has_m < need_m - 1e-3);
@@ -138,7 +139,7 @@ pub(super) fn check_labelled_goals(
         return Ok(());
     }
     for (index, (vehicle, spans)) in vehicles.iter().enumerate() {
-        let Some(goal) = vehicle.goal else {
+        let Some(goal) = vehicle.goal_index else {
             let hint = "add `goal = N`, an index into mission.goals from 0";
             let why = format!("vehicle {} has no goal in a labelled mission", vehicle.id);
             return Err(text.error_with_hint(&spans.table, why, hint));
@@ -152,7 +153,7 @@ pub(super) fn check_labelled_goals(
             ));
         }
         if let Some((other, _)) =
-            vehicles[..index].iter().find(|(other, _)| other.goal == Some(goal))
+            vehicles[..index].iter().find(|(other, _)| other.goal_index == Some(goal))
         {
             return Err(text.error(
                 span,

@@ -11,8 +11,8 @@ use super::checks::{
     check_starts_apart,
 };
 use super::{
-    Common, DEFAULT_TIME_LIMIT_S, VEHICLES_HINT, check_list_len, empty_table,
-    fence_and_ground_stations, read_common, read_faults, read_map, read_place, read_roadmap,
+    CommonSettings, DEFAULT_TIME_LIMIT_S, VEHICLES_HINT, check_list_len, empty_table, read_common,
+    read_faults, read_fence_and_ground_stations, read_map, read_place, read_roadmap,
     read_unsupported, read_vehicles, unsupported_error,
 };
 use crate::capacity::VEHICLES;
@@ -30,7 +30,7 @@ pub(in crate::scenario) fn read_goals_scenario(
     folder: &Path,
 ) -> Result<Scenario> {
     let mut unsupported = Vec::new();
-    let Common { seed, deconfliction, simulation, estimator_span } =
+    let CommonSettings { seed, deconfliction, simulation, estimator_span } =
         read_common(text, root, (margins::PAIR_DEVIATION_M, DEFAULT_TIME_LIMIT_S))?;
     let map_table =
         root.required("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
@@ -55,7 +55,7 @@ pub(in crate::scenario) fn read_goals_scenario(
     check_starts_apart(text, &vehicles, deconfliction.safety_distance_m)?;
     check_labelled_goals(text, &vehicles, &mission)?;
     check_inside_geofence(&mission_table, &vehicles, &mission)?;
-    let vehicle_places =
+    let vehicle_file_lines =
         vehicles.iter().map(|(_, spans)| text.file_and_line(&spans.start)).collect();
     let vehicles: Vec<VehicleSection> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
     check_goals_apart(
@@ -76,7 +76,7 @@ pub(in crate::scenario) fn read_goals_scenario(
         roadmap,
         mission,
         vehicles,
-        vehicle_places,
+        vehicle_file_lines,
         deconfliction,
         simulation,
         faults,
@@ -132,11 +132,9 @@ fn read_mission(
             ("labeled", MissionMode::Labelled),
         ],
     )?;
-    let objective = table.one_of(
-        "objective",
-        AssignmentObjective::Total,
-        &[("total", AssignmentObjective::Total), ("makespan", AssignmentObjective::Makespan)],
-    )?;
+    let default = AssignmentObjective::TotalDistance;
+    let objectives = [("total", default), ("makespan", AssignmentObjective::Makespan)];
+    let objective = table.one_of("objective", default, &objectives)?;
     let cruise_mps = table.f32("cruise_mps", 2.0, 0.01..=100.0)?;
     let (given, file) = (table.get("goals"), table.get("goals_file"));
     let goals = match (&given, &file) {
@@ -154,7 +152,7 @@ fn read_mission(
         (None, Some(file)) => read_goals_file(file, folder)?,
         (None, None) => Vec::new(),
     };
-    let (goals, goal_places): (Vec<Point>, Vec<String>) = goals.into_iter().unzip();
+    let (goals, goal_file_lines): (Vec<Point>, Vec<String>) = goals.into_iter().unzip();
     let takes_goals = !matches!(mode, MissionMode::Coverage | MissionMode::Formation);
     if takes_goals && goals.is_empty() {
         let span = given.or(file).map_or(table.span.clone(), |v| v.span);
@@ -166,14 +164,14 @@ fn read_mission(
         let why = format!("mission.mode \"single-goal\" takes one goal, not {}", goals.len());
         return Err(table.text.error(&span, why));
     }
-    let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
+    let (geofence, ground_stations) = read_fence_and_ground_stations(table, vehicles)?;
     table.refuse_unknown_keys()?;
     let mission = MissionSection {
         mode,
         objective,
         cruise_mps,
         goals,
-        goal_places,
+        goal_file_lines,
         geofence,
         ground_stations,
     };

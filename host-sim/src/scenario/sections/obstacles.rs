@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use companion::margins::TRACKING_M;
+use companion::margins::CRUISE_TRACKING_ERROR_M;
 use planner_core::coverage::area::{self, Ring, RingKind};
 use planner_core::geo::frames::Geodetic;
 
@@ -11,7 +11,7 @@ use super::checks::VehicleSpans;
 use super::{DEFAULT_ORIGIN, read_map};
 use crate::coverage::MAX_NO_FLY_CORNERS;
 use crate::coverage::obstacles::{MapObstacles, TooManyCorners};
-use crate::map::{self, Unknown};
+use crate::map::{self, UnknownSpace};
 use crate::margins;
 use crate::scenario::coverage::AreaSection;
 use crate::scenario::reader::{Result, Table, TomlSpan, TomlText};
@@ -41,7 +41,7 @@ impl MapBesideArea {
         let table = value.table()?;
         let (mut map, has_origin) = read_map(&table, folder)?;
         if table.get("unknown").is_none() {
-            map.unknown = Unknown::Free;
+            map.unknown = UnknownSpace::Free;
         }
         let span = table.get("file").map_or(value.span, |file| file.span);
         Ok(Some(Self { map, span, has_origin }))
@@ -72,7 +72,7 @@ impl MapBesideArea {
     }
 
     /// Reads the map, and adds its obstacles to the area as no-fly zones.
-    pub(super) fn apply(
+    pub(super) fn add_no_fly_zones(
         &self,
         text: TomlText<'_>,
         area: &mut AreaSection,
@@ -94,13 +94,13 @@ impl MapBesideArea {
         drop(map);
         flown.check_climbs(text, &obstacles)?;
         let below_m = flown.clearance_below_m().max(clearance_m);
-        let floor_m = area.heights.mission_m - below_m;
+        let floor_m = area.heights.max_picture_height_m - below_m;
         // Lanes are longer by the margin, and lie up to half a picture beside the border.
-        let beyond_m = area.margin_m + area.spacing.footprint.across_m / 2.0;
+        let beyond_m = area.lane_overrun_m + area.spacing.footprint.across_m / 2.0;
         let pads = flown.vehicles.iter().map(|vehicle| vehicle.start.xy());
         let places: Vec<_> = area.vertices.iter().copied().chain(pads).collect();
         let own = area.rings_of(RingKind::NoFly).map(<[_]>::len).sum();
-        let zones = obstacles.zones(floor_m, (&places, beyond_m), own, MAX_NO_FLY_CORNERS);
+        let zones = obstacles.no_fly_zones(floor_m, (&places, beyond_m), own, MAX_NO_FLY_CORNERS);
         let zones = zones.map_err(|TooManyCorners(corners)| {
             let why = format!(
                 "map.file: no-fly zones have {corners} corners with those around the map's \
@@ -125,7 +125,8 @@ impl FlightSettings<'_> {
     /// companions let a vehicle deviate from its path over a field, at least the margin to walls.
     fn clearance_m(&self) -> f32 {
         let Deconfliction { separation_m, safety_distance_m, .. } = *self.deconfliction;
-        let walls_m = margins::required_distances(self.simulation, 0.0, self.vehicles).margin_m;
+        let walls_m =
+            margins::required_distances(self.simulation, 0.0, self.vehicles).wall_margin_m;
         let margin_m = (separation_m - safety_distance_m) / 2.0;
         self.largest_radius_m() + margin_m.max(walls_m).max(self.roadmap.safety_margin_m)
     }
@@ -136,7 +137,7 @@ impl FlightSettings<'_> {
             margins::max_height_error_m(self.simulation.estimator, vehicle.autopilot)
         };
         let lower_m = self.vehicles.iter().map(lower_m).fold(0.0, f32::max);
-        self.largest_radius_m() + TRACKING_M + lower_m
+        self.largest_radius_m() + CRUISE_TRACKING_ERROR_M + lower_m
     }
 
     fn largest_radius_m(&self) -> f32 {
@@ -148,11 +149,11 @@ impl FlightSettings<'_> {
         for (vehicle, spans) in self.vehicles.iter().zip(self.spans) {
             let mut hull = vehicle.start;
             hull.z += vehicle.radius_m;
-            let Some(near_m) = obstacles.obstacle_beside_climb_m(&hull) else { continue };
+            let Some(near_m) = obstacles.too_near_climb_obstacle_m(&hull) else { continue };
             let why = format!(
                 "vehicle {} starts {near_m:.2} m from an obstacle of the map; \
                  its climb needs {:.2} m",
-                vehicle.id, obstacles.clearance_m
+                vehicle.id, obstacles.required_clearance_m
             );
             let hint =
                 "a start further away; the map's ground must be at the height of the ground here";

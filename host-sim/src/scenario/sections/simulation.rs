@@ -6,7 +6,7 @@ use planner_core::track::deconflict::Method;
 use super::values::{MAX_VEHICLE_ID, read_point};
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{
-    Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, PositionErrors, Simulation,
+    Deconfliction, FAULT_OBSTACLE, Fault, PositionErrors, Simulation, VEHICLE_FAULT_KINDS,
 };
 
 /// Reads `[deconfliction]`. The default of `separation_m` is the safety distance plus
@@ -30,16 +30,16 @@ pub(super) fn read_deconfliction(table: &Table<'_>, pair_error_m: f32) -> Result
 /// Reads `[simulation]`; `limit_s` is the default of `time_limit_s`, seconds.
 pub(super) fn read_simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> {
     let simulation = Simulation {
-        wind_mps: table.f32("wind_mps", 0.0, 0.0..=50.0)?,
-        gust_mps: table.f32("gust_mps", 0.0, 0.0..=50.0)?,
-        position_noise_m: table.f32("position_noise_m", 0.0, 0.0..=100.0)?,
+        mean_wind_mps: table.f32("wind_mps", 0.0, 0.0..=50.0)?,
+        gust_peak_mps: table.f32("gust_mps", 0.0, 0.0..=50.0)?,
+        position_noise_sd_m: table.f32("position_noise_m", 0.0, 0.0..=100.0)?,
         estimator: table.one_of(
             "estimator",
             PositionErrors::Rtk,
             &[("rtk", PositionErrors::Rtk), ("recorded", PositionErrors::Recorded)],
         )?,
         serial_baud: table.integer_in_range("serial_baud", 921_600, 1200..=100_000_000)? as u32,
-        serial_corruption: table.f32("serial_corruption", 0.0, 0.0..=1.0)?,
+        serial_corruption_per_byte: table.f32("serial_corruption", 0.0, 0.0..=1.0)?,
         radio_loss: table.f32("radio_loss", 0.0, 0.0..=1.0)?,
         radio_delay_s: table.f32("radio_delay_s", 0.05, 0.0..=60.0)?,
         radio_range_m: table.f32("radio_range_m", 500.0, 0.0..=1e6)?,
@@ -51,7 +51,7 @@ pub(super) fn read_simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulat
 
 pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
     let words: Vec<(&str, &'static str)> =
-        FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();
+        VEHICLE_FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();
     let kind = table.required("kind", "what happens, for example \"kill\"")?.one_of(&words)?;
     let at_s = table.required("at_s", "when it strikes, in seconds")?.f64(&(0.0..=1e6))? as f32;
     let vehicle = table.get("vehicle");
@@ -69,13 +69,15 @@ pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
         duration_s: table.optional_f32("duration_s", 0.0..=1e6)?,
         vehicle,
         kind,
-        direction: direction.transpose()?.map(str::to_owned),
+        radio_cut_direction: direction.transpose()?.map(str::to_owned),
         offset_m: table.get("offset_m").map(|v| read_point(&v)).transpose()?,
-        position: table.get("position").map(|v| read_point(&v)).transpose()?,
-        radius_m: table.optional_f32("radius_m", 0.001..=1000.0)?,
+        obstacle_position: table.get("position").map(|v| read_point(&v)).transpose()?,
+        obstacle_radius_m: table.optional_f32("radius_m", 0.001..=1000.0)?,
     };
     table.refuse_unknown_keys()?;
-    if fault.kind == FAULT_OBSTACLE && (fault.position.is_none() || fault.radius_m.is_none()) {
+    if fault.kind == FAULT_OBSTACLE
+        && (fault.obstacle_position.is_none() || fault.obstacle_radius_m.is_none())
+    {
         return Err(table
             .text
             .error(&table.span, "a fault of kind \"obstacle\" needs position and radius_m"));

@@ -21,7 +21,7 @@ use crate::terrain::{
 /// Greatest difference between a start's given height and the ground below it, metres.
 const MAX_PAD_HEIGHT_ERROR_M: f32 = 5.0;
 /// How far beside lanes and around corners paths may lead, metres.
-const AROUND_LANES_M: f32 = 5.0;
+const PATHS_BESIDE_LANES_M: f32 = 5.0;
 
 /// The file of heights that `[area]` names, not yet read.
 pub(super) struct UnreadTerrain {
@@ -62,12 +62,12 @@ impl UnreadTerrain {
     fn terrain_error(&self, text: TomlText<'_>, error: &TerrainError) -> ScenarioError {
         let path = printable_path(&self.path);
         match error {
-            TerrainError::System { what, hint } => text.error_with_hint(
+            TerrainError::UnusableCrs { what, hint } => text.error_with_hint(
                 &self.span,
                 format!("area.terrain: {path} is in {what}, which cannot be used"),
                 *hint,
             ),
-            TerrainError::Nowhere(hint) => text.error_with_hint(
+            TerrainError::NoGeoreference(hint) => text.error_with_hint(
                 &self.span,
                 format!("area.terrain: {path} does not say where it is"),
                 *hint,
@@ -78,7 +78,7 @@ impl UnreadTerrain {
                     TerrainError::TooLong(_) | TerrainError::TooManyCells(_) => {
                         "cut it to the area, or make its cells larger: gdalwarp -te … -tr …"
                     }
-                    TerrainError::Elsewhere(_) => {
+                    TerrainError::NoHeightInWindow(_) => {
                         "the file must hold the area and all pads; area.origin says where they are"
                     }
                     _ => "export it again as ESRI ASCII grid, GeoTIFF, LAS or LAZ",
@@ -89,7 +89,11 @@ impl UnreadTerrain {
     }
 
     /// Height of the ground at the origin, metres above sea level.
-    pub(super) fn altitude_m(&self, text: TomlText<'_>, origin: &Geodetic) -> Result<f64> {
+    pub(super) fn origin_ground_altitude_m(
+        &self,
+        text: TomlText<'_>,
+        origin: &Geodetic,
+    ) -> Result<f64> {
         let grid = self.read(text, origin, [Flat::repeat(-1.0), Flat::repeat(1.0)])?;
         let height_m = grid.height_at(&Flat::zeros());
         let hint = "another area.origin, or a file that holds it";
@@ -118,22 +122,22 @@ impl UnreadTerrain {
             |[low, high], place| [low.inf(place), high.sup(place)],
         );
         // Lanes may begin outside the border, by the margin and half a footprint.
-        let beyond =
-            Flat::repeat(area.margin_m + area.spacing.footprint.across_m / 2.0 + AROUND_LANES_M);
-        let own: Vec<VehicleSection> =
-            vehicles.iter().map(|(vehicle, _)| vehicle.clone()).collect();
+        let half_footprint_m = area.spacing.footprint.across_m / 2.0;
+        let beyond = Flat::repeat(area.lane_overrun_m + half_footprint_m + PATHS_BESIDE_LANES_M);
+        let own: Vec<VehicleSection> = vehicles.iter().map(|(v, _)| v.clone()).collect();
         let slope = own.iter().map(|vehicle| {
             let [climb_mps, descend_mps] = vehicle.climb_and_descent_mps();
             climb_mps.min(descend_mps) / mission.cruise_mps.min(vehicle.speed_max_mps)
         });
-        let slope = slope.fold(f32::INFINITY, f32::min);
-        let reach_m = margins::required_distances(simulation, 0.0, &own).margin_m;
-        let config = FieldConfig { area: [low - beyond, high + beyond], reach_m, slope };
+        let max_slope = slope.fold(f32::INFINITY, f32::min);
+        let max_cross_track_m = margins::required_distances(simulation, 0.0, &own).wall_margin_m;
+        let area_box = [low - beyond, high + beyond];
+        let config = FieldConfig { area: area_box, max_cross_track_m, max_slope };
         let grid = self.read(text, &area.origin, config.window())?.relative_to(area.origin.alt_m);
         let field = terrain::encode_field(&grid, &config).map_err(|error| {
             let why = format!("area.terrain: {}: {error}", printable_path(&self.path));
             let hint = match error {
-                FieldError::High(_) => "area.origin needs an alt_m near the ground",
+                FieldError::HeightOutOfRange(_) => "area.origin needs an alt_m near the ground",
                 _ => "the file must hold the area, all pads and some metres around them",
             };
             text.error_with_hint(&self.span, why, hint)
@@ -156,11 +160,11 @@ impl UnreadTerrain {
         }
         let terrain = Terrain {
             grid: Arc::new(grid),
-            field: field.into(),
+            field_file: field.into(),
             tolerance_m: self.tolerance_m,
-            max_slope: slope,
+            max_slope,
         };
-        let top_m = terrain.following(area.height_m).map_or(0.0, |following| following.top_m());
+        let top_m = terrain.following(area.picture_height_m).map_or(0.0, |f| f.max_path_z_m());
         if top_m <= 0.0 {
             let hint = format!("area.origin alt_m = {:.1} is above it", area.origin.alt_m);
             return Err(text.error_with_hint(
@@ -169,7 +173,7 @@ impl UnreadTerrain {
                 hint,
             ));
         }
-        area.heights = Heights { mission_m: top_m, ..area.heights };
+        area.heights = Heights { max_picture_height_m: top_m, ..area.heights };
         area.terrain = Some(terrain);
         Ok(())
     }

@@ -1,6 +1,6 @@
 use super::*;
 
-const CONFIG: RadioConfig = RadioConfig { range_m: 10.0, loss: 0.0, delay_s: 0.05 };
+const CONFIG: RadioConfig = RadioConfig { range_m: 10.0, loss_probability: 0.0, delay_s: 0.05 };
 
 #[test]
 fn reaches_those_in_range_after_the_delay_and_not_the_sender() {
@@ -16,8 +16,8 @@ fn reaches_those_in_range_after_the_delay_and_not_the_sender() {
 fn a_cut_station_does_not_send_or_does_not_hear() {
     let places = [Point::zeros(); 3];
     let mut radio = Radio::new(CONFIG, 3, 1);
-    radio.set_outage(0, RadioOutage { tx: true, rx: false });
-    radio.set_outage(2, RadioOutage { tx: false, rx: true });
+    radio.set_outage(0, RadioOutage { tx_failed: true, rx_failed: false });
+    radio.set_outage(2, RadioOutage { tx_failed: false, rx_failed: true });
     radio.broadcast(0, Some(0), &places, b"unheard");
     assert!(radio.receive(50_000, 1).is_none());
     radio.broadcast(0, Some(1), &places, b"heard");
@@ -27,7 +27,7 @@ fn a_cut_station_does_not_send_or_does_not_hear() {
 #[test]
 fn loses_the_share_it_says() {
     let places = [Point::zeros(); 2];
-    let mut radio = Radio::new(RadioConfig { loss: 0.3, ..CONFIG }, 2, 1);
+    let mut radio = Radio::new(RadioConfig { loss_probability: 0.3, ..CONFIG }, 2, 1);
     let heard = (0..10_000)
         .filter(|&i| {
             radio.broadcast(i, Some(0), &places, &[0]);

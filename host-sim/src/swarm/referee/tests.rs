@@ -128,7 +128,7 @@ fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
         referee.observe(30.0, &on_path(2.5));
         assert_eq!(referee.deadlocks, 0);
         assert_eq!(
-            (&*referee.incidents[0].text, referee.incidents[0].ended),
+            (&*referee.incidents[0].text, referee.incidents[0].retracted),
             ("stood for 30 s", true)
         );
         for step in 301..600 {

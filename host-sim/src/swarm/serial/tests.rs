@@ -1,7 +1,11 @@
 use super::*;
 
-const CONFIG: SimulatedSerialConfig =
-    SimulatedSerialConfig { baud: 100_000, latency_s: 0.001, corruption: 0.0, buffer: 100 };
+const CONFIG: SimulatedSerialConfig = SimulatedSerialConfig {
+    baud: 100_000,
+    latency_s: 0.001,
+    corruption_per_byte: 0.0,
+    transmit_buffer_len: 100,
+};
 
 #[test]
 fn bytes_arrive_after_their_bit_times_and_in_order() {
@@ -22,12 +26,13 @@ fn a_full_buffer_loses_and_counts() {
     let mut link = SerialLink::new(CONFIG, 1, 0);
     link.write(0, &[0; 90]);
     link.write(0, &[0; 20]);
-    assert_eq!(link.overrun, 20);
+    assert_eq!(link.overrun_bytes, 20);
 }
 
 #[test]
 fn corruption_changes_the_share_of_bytes_it_says() {
-    let config = SimulatedSerialConfig { corruption: 0.1, buffer: 1 << 20, ..CONFIG };
+    let config =
+        SimulatedSerialConfig { corruption_per_byte: 0.1, transmit_buffer_len: 1 << 20, ..CONFIG };
     let mut link = SerialLink::new(config, 1, 0);
     let mut got = Vec::new();
     link.write(0, &[0; 100_000]);

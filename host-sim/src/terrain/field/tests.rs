@@ -18,7 +18,7 @@ proptest! {
             grid.raise_cell(&grid.cell_centre([index % 40, index / 40]), *height_m);
         }
         let area = [Flat::new(-30.0, -20.0), Flat::new(35.0, 28.0)];
-        let config = FieldConfig { area, reach_m, slope };
+        let config = FieldConfig { area, max_cross_track_m: reach_m, max_slope: slope };
         if config.window()[0].amin() < -75.0 || config.window()[1].amax() > 75.0 {
             return Ok(());
         }
@@ -51,8 +51,8 @@ fn holes_are_refused_by_their_place() {
         }
     }
     let area = [Flat::repeat(-20.0), Flat::repeat(20.0)];
-    let config = FieldConfig { area, reach_m: 0.5, slope: 0.5 };
-    assert!(matches!(encode_field(&grid, &config), Err(FieldError::Hole(..))));
+    let config = FieldConfig { area, max_cross_track_m: 0.5, max_slope: 0.5 };
+    assert!(matches!(encode_field(&grid, &config), Err(FieldError::NoHeightAt(..))));
     grid.raise_cell(&grid.cell_centre([22, 20]), 4000.0);
-    assert_eq!(encode_field(&grid, &config), Err(FieldError::High(4000.0)));
+    assert_eq!(encode_field(&grid, &config), Err(FieldError::HeightOutOfRange(4000.0)));
 }

@@ -29,12 +29,12 @@ fn bilbao_is_where_its_system_says() {
         // 0.9996 m.
         let on_meridian = |x: f64| {
             let origin = Geodetic { lat_deg: 43.3, lon_deg: -3.0, alt_m: 0.0 };
-            raster.crs.to_mission(&origin, [x, 4_794_000.0]).unwrap()
+            raster.crs.to_mission_frame(&origin, [x, 4_794_000.0]).unwrap()
         };
         assert!(on_meridian(500_000.0).x.abs() < 0.01, "{}", on_meridian(500_000.0));
         assert!((on_meridian(501_000.0).x - 1000.4).abs() < 0.02, "{}", on_meridian(501_000.0));
         let origin = Geodetic { lat_deg: latitude_deg(4_796_000.0), lon_deg: -3.0, alt_m: 0.0 };
-        let place = raster.crs.to_mission(&origin, [500_000.0, 4_796_000.0]).unwrap();
+        let place = raster.crs.to_mission_frame(&origin, [500_000.0, 4_796_000.0]).unwrap();
         assert!(place.norm() < 0.05, "{place}");
         let window = Some([Flat::repeat(-400.0), Flat::repeat(900.0)]);
         let grid = super::read(
@@ -43,18 +43,20 @@ fn bilbao_is_where_its_system_says() {
         )
         .unwrap();
         let highest = grid.highest_in_box(&Flat::repeat(-300.0), &Flat::repeat(800.0));
-        assert!(!highest.holes, "{name}");
+        assert!(!highest.has_holes, "{name}");
         // Compared with the file's own cells in that box, whose sides are along the file's rows
         // here.
         let cells = |from: f64, to: f64, corner: f64, side: f64| {
             ((from - corner) / side) as usize..((to - corner) / side) as usize
         };
-        let columns = cells(499_702.0, 500_798.0, raster.corner[0], raster.cell[0]);
-        let rows = cells(4_797_200.0 - 4_796_798.0, 4_797_200.0 - 4_795_702.0, 0.0, raster.cell[1]);
+        let columns =
+            cells(499_702.0, 500_798.0, raster.north_west_corner[0], raster.cell_sides[0]);
+        let rows =
+            cells(4_797_200.0 - 4_796_798.0, 4_797_200.0 - 4_795_702.0, 0.0, raster.cell_sides[1]);
         let own = rows.flat_map(|row| columns.clone().map(move |column| row * size + column));
         let own = own.map(|index| raster.heights_m[index]).fold(f32::MIN, f32::max);
         assert!(highest.highest_m.unwrap() >= own, "{name}: {highest:?}, not {own}");
-        let [low, high] = grid.range_m().unwrap();
+        let [low, high] = grid.height_range_m().unwrap();
         assert!(low >= range[0] && high <= range[1]);
     }
 }
@@ -116,7 +118,7 @@ fn autzen_is_in_feet_and_where_its_system_says() {
     );
     let origin = Geodetic { lat_deg, lon_deg, alt_m: 0.0 };
     let grid = super::read(&path, &anywhere(&origin)).unwrap();
-    let range = grid.range_m().unwrap();
+    let range = grid.height_range_m().unwrap();
     assert!(range[0] > 123.8 && (range[1] - 158.651).abs() < 0.01, "{range:?}");
     let places: Vec<(Flat, f32)> = returns
         .iter()
@@ -171,7 +173,7 @@ fn clouds_without_returns_or_a_system_are_refused_by_name() {
         &TerrainFrame { without_crs: WithoutCrs::Metres, ..anywhere(&ORIGIN) },
     )
     .unwrap();
-    let range = grid.range_m().unwrap();
+    let range = grid.height_range_m().unwrap();
     assert!(range[0] >= 406.59 && (range[1] - 586.38).abs() < 0.01, "{range:?}");
     // The file's coordinates are far from any mission.
     let window = Some([Flat::repeat(-100.0), Flat::repeat(100.0)]);

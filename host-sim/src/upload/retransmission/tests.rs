@@ -26,7 +26,7 @@ fn upload(every_ms: u64, loses: usize) -> (usize, f32) {
             next += 1;
         }
         for (piece, sent_at, repeated) in &mut under_way {
-            if retransmission.check_timeout(*sent_at, now) {
+            if retransmission.back_off_if_timed_out(*sent_at, now) {
                 (*sent_at, *repeated) = (now, true);
                 send(*piece);
             }
@@ -70,7 +70,7 @@ fn silence_doubles_the_wait_up_to_its_bound_and_an_answer_ends_that() {
         .map(|_| {
             let over = (1..)
                 .map(|ms| sent_at + Duration::from_millis(ms))
-                .find(|now| retransmission.check_timeout(sent_at, *now));
+                .find(|now| retransmission.back_off_if_timed_out(sent_at, *now));
             let wait = over.expect("some time") - sent_at;
             sent_at += wait;
             wait.as_millis()
@@ -78,5 +78,5 @@ fn silence_doubles_the_wait_up_to_its_bound_and_an_answer_ends_that() {
         .collect();
     assert_eq!(waits, [401, 801, 1601, 2001]);
     retransmission.note_round_trip(Duration::from_millis(20));
-    assert!(retransmission.check_timeout(sent_at, sent_at + Duration::from_millis(401)));
+    assert!(retransmission.back_off_if_timed_out(sent_at, sent_at + Duration::from_millis(401)));
 }

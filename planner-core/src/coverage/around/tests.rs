@@ -13,11 +13,11 @@ const LAYER_M: f32 = 40.0;
 
 fn request(here: Point) -> DetourRequest {
     DetourRequest {
-        aside: false,
+        land_aside: false,
         here,
         leg: [here, here],
         leg_clearance_m: 10.0,
-        goal: Goal::Home { over: OVER, layer_m: LAYER_M },
+        goal: DetourGoal::Home { above_pad: OVER, layer_z_m: LAYER_M },
         descent_m: 12.0,
         required_clearance_m: 1.2,
         fence: None,
@@ -60,7 +60,7 @@ fn planned(
 ) -> Option<(Way, f32)> {
     let (vertices, rings) = field(zones);
     let area = Area::new(&vertices, &rings).ok()?;
-    let mut transit = Box::new(Transit::<128>::empty());
+    let mut transit = Box::new(TransitGraph::<128>::empty());
     transit.set_area(area).unwrap();
     if area.is_in_no_fly_zone(&request.here.xy()) {
         return None;
@@ -86,7 +86,7 @@ fn planned(
             assert!(points[1..].iter().all(inside), "{points:?} leave {low:?} to {high:?}");
         }
         let end = points.last().unwrap();
-        if request.aside {
+        if request.land_aside {
             assert!(
                 (end - request.here).norm() <= MAX_SIDESTEP_RINGS as f32 + 0.01
                     && points.len() == 2
@@ -134,19 +134,21 @@ fn a_pad_below_somebody_is_no_home_and_nobody_flies_through_a_ring_of_columns() 
     let ring: StdVec<_> = (0..16).map(around).collect();
     let (way, _) = planned(&[], &request(here), &ring).unwrap();
     assert_eq!(way, Err(DetourError::Search(SearchError::NoPath)));
-    let (way, _) = planned(&[], &DetourRequest { aside: true, ..request(here) }, &ring).unwrap();
+    let (way, _) =
+        planned(&[], &DetourRequest { land_aside: true, ..request(here) }, &ring).unwrap();
     assert!(way.is_ok(), "inside the ring there is room to stand aside");
 }
 
 #[test]
 fn what_is_no_number_is_refused() {
     let here = Point::new(300.0, 200.0, 25.0);
-    let bad = [f32::NAN, f32::INFINITY].map(|layer_m| Goal::Home { over: OVER, layer_m });
+    let bad = [f32::NAN, f32::INFINITY]
+        .map(|layer_m| DetourGoal::Home { above_pad: OVER, layer_z_m: layer_m });
     for goal in bad {
         let (way, _) = planned(&[], &DetourRequest { goal, ..request(here) }, &[]).unwrap();
         assert!(matches!(way, Err(DetourError::Config(_))));
     }
-    let node = DetourRequest { goal: Goal::Node(0), ..request(here) };
+    let node = DetourRequest { goal: DetourGoal::RoadmapGoal(0), ..request(here) };
     assert!(planned(&[], &node, &[]).unwrap().0.is_err());
 }
 
@@ -167,7 +169,7 @@ proptest! {
         room_m in 0f32..40.0,
     ) {
         let here = Point::new(here.0, here.1, here.2);
-        let request = DetourRequest { aside, ..request(here) };
+        let request = DetourRequest { land_aside: aside, ..request(here) };
         let thing = |&(x, y, low_m, high_m, radius_m, lands): &(f32, f32, f32, f32, f32, bool)| {
             KeepOutZone {
                 kind: if lands { ZoneKind::Descending } else { ZoneKind::Static },

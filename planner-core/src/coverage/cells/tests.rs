@@ -6,7 +6,14 @@ use crate::coverage::Flat;
 
 fn lane(strip: u16, [from, to]: [f32; 2]) -> Lane {
     let v = 10.0 * f32::from(strip);
-    Lane { from: Flat::new(from, v), to: Flat::new(to, v), first: 0, count: 0, start_m: 0.0, strip }
+    Lane {
+        from: Flat::new(from, v),
+        to: Flat::new(to, v),
+        first_waypoint: 0,
+        waypoint_count: 0,
+        start_along_m: 0.0,
+        strip,
+    }
 }
 
 /// Lanes around a zone in strips 2 to 5, one whole strip below and three above.
@@ -21,13 +28,13 @@ fn around_a_zone() -> Vec<Lane> {
 fn a_zone_makes_four_cells() {
     let mut lanes = around_a_zone();
     group_into_cells(&mut lanes);
-    let cells: Vec<u32> = lanes.iter().map(|lane| lane.first).collect();
+    let cells: Vec<u32> = lanes.iter().map(super::super::lanes::Lane::cell).collect();
     assert_eq!(cells, [0, 0, 1, 2, 1, 2, 1, 2, 1, 2, 3, 3, 3]);
     // A strip that is left out ends a cell, and so does a lane beside one that goes on.
     let mut lanes =
         [lane(0, [0.0, 9.0]), lane(2, [0.0, 9.0]), lane(3, [0.0, 4.0]), lane(3, [5.0, 9.0])];
     group_into_cells(&mut lanes);
-    assert_eq!(lanes.map(|lane| lane.first), [0, 1, 2, 3]);
+    assert_eq!(lanes.map(|lane| lane.cell()), [0, 1, 2, 3]);
 }
 
 #[test]
@@ -35,11 +42,11 @@ fn each_cell_is_flown_back_and_forth_in_one_go() {
     let laid = around_a_zone();
     let mut lanes = laid.clone();
     group_into_cells(&mut lanes);
-    order_cells(&mut lanes, &Transit::<1>::empty());
+    order_cells(&mut lanes, &TransitGraph::<1>::empty());
     // Up on one side of the zone, down on the other, and over both.
     let strips: Vec<u16> = lanes.iter().map(|lane| lane.strip).collect();
     assert_eq!(strips, [0, 1, 2, 3, 4, 5, 6, 7, 8, 5, 4, 3, 2]);
-    for pair in lanes.windows(2).filter(|pair| pair[0].first == pair[1].first) {
+    for pair in lanes.windows(2).filter(|pair| pair[0].cell() == pair[1].cell()) {
         assert!(((pair[1].from - pair[0].to).length() - 10.0).abs() < 1e-3, "{pair:?}");
     }
     for own in &laid {

@@ -4,7 +4,7 @@
 use heapless::Vec;
 
 use super::super::Flat;
-use super::super::transit::Transit;
+use super::super::transit::TransitGraph;
 use crate::Point;
 use crate::flight::{Path, PathError};
 use crate::map::field::follow::TerrainFollowing;
@@ -16,7 +16,7 @@ pub(super) fn point_at_height(place: &Flat, height_m: f32) -> Point {
 /// A flight path that is extended leg by leg.
 pub(super) struct FlightPathBuilder<'a, const N: usize, const W: usize> {
     pub(super) path: Path<W>,
-    transit: &'a Transit<'a, N>,
+    transit: &'a TransitGraph<'a, N>,
     clearance_m: f32,
     following: Option<TerrainFollowing<'a>>,
     /// Last point of the path so far.
@@ -26,7 +26,7 @@ pub(super) struct FlightPathBuilder<'a, const N: usize, const W: usize> {
 impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     /// A path without waypoints; the caller adds the first one, above the pad.
     pub(super) const fn new(
-        transit: &'a Transit<'a, N>,
+        transit: &'a TransitGraph<'a, N>,
         clearance_m: f32,
         following: Option<TerrainFollowing<'a>>,
         here: Point,
@@ -69,12 +69,13 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     pub(super) fn descend_to_lane(
         &mut self,
         end: &Flat,
-        mission_m: f32,
+        max_picture_height_m: f32,
     ) -> Result<usize, PathError> {
         let here = self.here.xy();
-        let begin = self.following.map_or(point_at_height(&here, mission_m), |following| {
-            following.start_point(&here, end)
-        });
+        let begin =
+            self.following.map_or(point_at_height(&here, max_picture_height_m), |following| {
+                following.start_point(&here, end)
+            });
         self.add_straight_leg(begin)
     }
 
@@ -82,10 +83,10 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     pub(super) fn add_picture_leg(
         &mut self,
         to: &Flat,
-        mission_m: f32,
+        max_picture_height_m: f32,
     ) -> Result<usize, PathError> {
         let Some(following) = self.following else {
-            return self.add_straight_leg(point_at_height(to, mission_m));
+            return self.add_straight_leg(point_at_height(to, max_picture_height_m));
         };
         let here = self.here;
         following.corners_to(&here, to, |corner| self.add_straight_leg(corner).map(|_| ()))?;
@@ -96,13 +97,13 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     pub(super) fn add_picture_legs_around_zones(
         &mut self,
         to: &Flat,
-        mission_m: f32,
+        max_picture_height_m: f32,
     ) -> Result<usize, PathError> {
         let mut corners = Vec::new();
         self.find_corners_around_zones(to, &mut corners);
         for corner in &corners {
-            self.add_picture_leg(corner, mission_m)?;
+            self.add_picture_leg(corner, max_picture_height_m)?;
         }
-        self.add_picture_leg(to, mission_m)
+        self.add_picture_leg(to, max_picture_height_m)
     }
 }

@@ -13,7 +13,7 @@ const LANE_M: f32 = 7.0;
 
 fn spacing() -> Spacing {
     let footprint = Footprint { along_m: LANE_M, across_m: LANE_M };
-    Spacing { footprint, lane_m: LANE_M, waypoint_m: LANE_M }
+    Spacing { footprint, max_lane_spacing_m: LANE_M, max_waypoint_spacing_m: LANE_M }
 }
 
 #[test]
@@ -37,11 +37,15 @@ fn lanes_in_any_order_become_one_way_as_short_as_the_planners_own() {
         let zone = Ring { end: 8, kind: RingKind::NoFly };
         let rings = [Ring { end: 4, kind: RingKind::Outer }, zone];
         let area = Area::new(&vertices, &rings).expect("an area");
-        let mut transit = Transit::<8>::empty();
+        let mut transit = TransitGraph::<8>::empty();
         transit.set_area(area).expect("room");
         let angle_deg = (case % 2 == 0).then(|| 180.0 * unit());
-        let pattern =
-            LanePattern { spacing: spacing(), angle_deg, margin_m: 0.0, search_steps: 20_000 };
+        let pattern = LanePattern {
+            spacing: spacing(),
+            angle_from_east_deg: angle_deg,
+            border_overshoot_m: 0.0,
+            max_search_steps: 20_000,
+        };
         let (mut ws, mut own) = (LaneWorkspace::<16>::new(), Tracks::<256>::new());
         tracks::build_lanes(&area, &pattern, &transit, &mut ws, &mut own).expect("lanes");
 
@@ -79,7 +83,7 @@ fn lanes_in_any_order_become_one_way_as_short_as_the_planners_own() {
 
 #[test]
 fn lanes_that_are_none_are_refused() {
-    let transit = Transit::<1>::empty();
+    let transit = TransitGraph::<1>::empty();
     let mut found = Tracks::<2>::new();
     let mut order =
         |given: &[[Flat; 2]]| order_given_lanes(given, &spacing(), 100, &transit, &mut found);

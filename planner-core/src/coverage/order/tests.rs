@@ -20,12 +20,12 @@ fn back_and_forth_begins_at_the_end_that_joins_lanes_by_less() {
         let mut lane = |strip: u16| {
             let v = 10.0 * f32::from(strip);
             let (from, to) = (Flat::new(30.0 * unit(), v), Flat::new(60.0 + 30.0 * unit(), v));
-            Lane { from, to, first: 0, count: 0, start_m: 0.0, strip }
+            Lane { from, to, first_waypoint: 0, waypoint_count: 0, start_along_m: 0.0, strip }
         };
         let laid: Vec<Lane> = (0..count).map(&mut lane).collect();
         let mut sorted = laid.clone();
         let count = sorted.len();
-        order_lanes(&mut sorted, count, &Transit::<1>::empty(), 0);
+        order_lanes(&mut sorted, count, &TransitGraph::<1>::empty(), 0);
         let ways = [0, 1].map(|first| {
             let mut lanes = laid.clone();
             lanes.iter_mut().skip(first).step_by(2).for_each(Lane::reverse);
@@ -61,12 +61,19 @@ fn a_search_makes_no_way_longer_and_knows_its_length() {
             let u = if k < strips { 60.0 * (k % 2) as f32 + 30.0 * unit() } else { 100.0 * unit() };
             let (from, to) = (Flat::new(u, v), Flat::new(u + 20.0 * unit(), v));
             let strip = if k < strips { (k / 2) as u16 } else { (v / 10.0) as u16 };
-            laid.push(Lane { from, to, first: 0, count: 0, start_m: 0.0, strip });
+            laid.push(Lane {
+                from,
+                to,
+                first_waypoint: 0,
+                waypoint_count: 0,
+                start_along_m: 0.0,
+                strip,
+            });
         }
         crate::coverage::cells::group_into_cells(&mut laid[..strips]);
         let ways = [0, 300, 20_000].map(|search_steps| {
             let mut lanes = laid.clone();
-            order_lanes(&mut lanes, strips, &Transit::<1>::empty(), search_steps);
+            order_lanes(&mut lanes, strips, &TransitGraph::<1>::empty(), search_steps);
             for own in &laid {
                 let same = |lane: &&Lane| {
                     (lane.from, lane.to) == (own.from, own.to)
@@ -74,7 +81,7 @@ fn a_search_makes_no_way_longer_and_knows_its_length() {
                 };
                 assert_eq!(lanes.iter().filter(same).count(), 1, "{case}: {own:?}");
             }
-            let known: f32 = lanes.iter().map(|lane| lane.start_m).sum();
+            let known: f32 = lanes.iter().map(super::super::lanes::Lane::link_to_next_m).sum();
             assert!((known - way_m(&lanes)).abs() < 0.01, "{case}: {known} of {}", way_m(&lanes));
             way_m(&lanes)
         });

@@ -20,7 +20,7 @@ fn meets_an_edge(area: &Area<'_>, from: &Flat, to: &Flat) -> bool {
 
 /// The length of the shortest path over corners, by Bellman and Ford over all corners.
 fn shortest_m<const N: usize>(
-    transit: &Transit<'_, N>,
+    transit: &TransitGraph<'_, N>,
     area: &Area<'_>,
     from: &Flat,
     to: &Flat,
@@ -64,7 +64,7 @@ fn ways_around_zones_are_the_shortest_there_are() {
             rings.push(Ring { end: vertices.len() as u16, kind: RingKind::NoFly });
         }
         let area = Area::new(&vertices, &rings).expect("an area");
-        let mut transit = Transit::<32>::empty();
+        let mut transit = TransitGraph::<32>::empty();
         transit.set_area(area).expect("the corners fit");
         for _ in 0..60 {
             let [from, to] = [(); 2].map(|()| Flat::new(100.0 * unit(), 100.0 * unit()));

@@ -24,11 +24,17 @@ fn pictures_stand_at_both_ends_of_a_stretch_and_evenly_between() {
     let path = path();
     let mut stretches = photographs.stretches(&path);
     let first = stretches.next().unwrap();
-    assert_eq!((first.from_m, first.to_m, first.step_m, first.count), (0.0, 30.0, 7.5, 5));
+    assert_eq!(
+        (first.from_m, first.to_m, first.ground_spacing_m, first.count),
+        (0.0, 30.0, 7.5, 5)
+    );
     let second = stretches.next().unwrap();
     assert_eq!((second.from_m, second.to_m, second.picture_at_m(4)), (40.0, 70.0, 70.0));
     let third = stretches.next().unwrap();
-    assert_eq!((third.from_m, third.to_m, third.step_m, third.count), (80.0, 80.0, 0.0, 1));
+    assert_eq!(
+        (third.from_m, third.to_m, third.ground_spacing_m, third.count),
+        (80.0, 80.0, 0.0, 1)
+    );
     assert_eq!(stretches.next(), None);
     assert_eq!(photographs.planned_count(&path), 11);
     for (along_m, taken, last_m) in [
@@ -58,7 +64,7 @@ fn pictures_are_evenly_apart_over_ground_where_the_path_rises_and_falls() {
     let mut photographs = PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Waypoint);
     photographs.add_stretch(0, 3, WaypointRange { first: 0, end: 9 }).unwrap();
     let shots = photographs.stretches(&path).next().unwrap();
-    assert_eq!((shots.step_m, shots.count), (10.0, 9));
+    assert_eq!((shots.ground_spacing_m, shots.count), (10.0, 9));
     for k in 0..9 {
         let place = path.point_at(shots.picture_at_m(k)).unwrap();
         assert!((place.x - 10.0 * k as f32).abs() < 1e-3, "{place}");
@@ -74,8 +80,8 @@ fn pictures_have_the_numbers_of_their_waypoints_both_ways() {
         (WaypointOrder::Rising, [(30, 33), (30, 35)]),
         (WaypointOrder::Falling, [(32, 35), (30, 35)]),
     ] {
-        let mut photographs =
-            PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance).with_area(50, order);
+        let mut photographs = PicturePlan::new(9.0, HeadingMode::Ahead, Trigger::Distance)
+            .with_area_waypoints(50, order);
         mark_three(&mut photographs);
         let path = path();
         let shown = |first, end| -> std::vec::Vec<_> {

@@ -1,9 +1,9 @@
 //! A path with few corners at a height above the field and at most a tolerance higher, no steeper
 //! than the vehicle can climb and descend.
 //!
-//! Method: at each sample the path's height must be in the tunnel, from `height_m` to
-//! `height_m + tolerance_m` above the field. The slopes from the last corner that keep the path in
-//! the tunnel at all samples so far form a cone. Where the next sample would empty the cone, the
+//! Method: at each sample the path's height must be in the tunnel, from `min_height_m` to
+//! `min_height_m + tolerance_m` above the field. The slopes from the last corner that keep the path
+//! in the tunnel at all samples so far form a cone. Where the next sample would empty the cone, the
 //! path gets a corner at the sample before: as high as possible where the ground rises, as low as
 //! possible where it falls. Each corner lies in the tunnel and the field is nowhere steeper than
 //! the path may be, so the next sample can always be reached. Samples are half a node spacing
@@ -24,7 +24,7 @@ pub struct TerrainFollowing<'a> {
     /// The height field.
     pub field: FieldView<'a>,
     /// Least height of the path above the field, metres.
-    pub height_m: f32,
+    pub min_height_m: f32,
     /// Most metres by which the path may be higher than this least height.
     pub tolerance_m: f32,
     /// Greatest slope of the path: metres up or down per metre over ground.
@@ -33,19 +33,19 @@ pub struct TerrainFollowing<'a> {
 
 impl TerrainFollowing<'_> {
     /// The least height that a path may have at `place`, metres up in the mission frame.
-    pub fn lowest_m(&self, place: &Flat) -> f32 {
-        self.field.height_at(place) + self.height_m
+    pub fn min_path_z_m(&self, place: &Flat) -> f32 {
+        self.field.height_at(place) + self.min_height_m
     }
 
     /// The highest point of the field plus height and tolerance: z in the mission frame, metres.
-    pub fn top_m(&self) -> f32 {
-        self.field.highest_m() + self.height_m + self.tolerance_m
+    pub fn max_path_z_m(&self) -> f32 {
+        self.field.highest_m() + self.min_height_m + self.tolerance_m
     }
 
     /// Start, above `from`, of a path to `to`. Of three start heights in the tunnel (bottom,
     /// middle, top) the one whose path has the fewest corners; among equals the lowest.
     pub fn start_point(&self, from: &Flat, to: &Flat) -> Point {
-        let low_m = self.lowest_m(from);
+        let low_m = self.min_path_z_m(from);
         let mut best = (usize::MAX, low_m);
         for share in [0.0, 0.5, 1.0] {
             let height_m = low_m + share * self.tolerance_m;
@@ -89,7 +89,7 @@ impl TerrainFollowing<'_> {
         let (mut cone, mut floor_m) = ((-steep, steep), from.z);
         let mut sample = 1;
         while sample <= count {
-            let low_m = self.lowest_m(&place(sample));
+            let low_m = self.min_path_z_m(&place(sample));
             let far_m = (sample - last) as f32 * step_m;
             let own = ((low_m - z_m) / far_m, (low_m + self.tolerance_m - z_m) / far_m);
             let next = (fmaxf(cone.0, own.0), fminf(cone.1, own.1));

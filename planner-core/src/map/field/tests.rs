@@ -47,14 +47,14 @@ proptest! {
         cut in any::<prop::sample::Index>(),
         flip in 0u8..8,
     ) {
-        let shape = FieldShape { low: Flat::new(low[0], low[1]), cell_m, columns, rows };
+        let shape = FieldShape { south_west: Flat::new(low[0], low[1]), cell_m, columns, rows };
         let bytes = field(&shape, &nodes);
         let view = FieldView::parse(&bytes).unwrap();
         prop_assert_eq!(view.shape(), &shape);
         prop_assert_eq!(view.highest_m(), f32::from(*nodes.iter().max().unwrap()) * HEIGHT_STEP_M);
         let at = cut.index(nodes.len());
         let (column, row) = (at % usize::from(columns), at / usize::from(columns));
-        let place = shape.low + Flat::new(column as f32, row as f32) * cell_m;
+        let place = shape.south_west + Flat::new(column as f32, row as f32) * cell_m;
         // Places are rounded: of 1e5 m to 8 mm.
         let beside = 6554.0 * 0.05 / cell_m + 0.01;
         prop_assert!(
@@ -73,12 +73,12 @@ proptest! {
         (tolerance_m, most) in (0.5f32..6.0, 3i16..30),
     ) {
         flattened(12, &mut nodes, most);
-        let shape = FieldShape { low: Flat::zeros(), cell_m: 5.0, columns: 12, rows: 9 };
+        let shape = FieldShape { south_west: Flat::zeros(), cell_m: 5.0, columns: 12, rows: 9 };
         let bytes = field(&shape, &nodes);
         let slope = f32::from(most) * HEIGHT_STEP_M / 5.0 * core::f32::consts::SQRT_2;
         let following = TerrainFollowing {
             field: FieldView::parse(&bytes).unwrap(),
-            height_m: 30.0,
+            min_height_m: 30.0,
             tolerance_m,
             max_slope: slope,
         };
@@ -97,7 +97,7 @@ proptest! {
             let samples = (step.xy().norm() / 0.25) as usize + 1;
             for k in 0..=samples {
                 let at: Point = leg[0] + step * (k as f32 / samples as f32);
-                let low_m = following.lowest_m(&at.xy());
+                let low_m = following.min_path_z_m(&at.xy());
                 // Between two samples of the path, half a node spacing apart, the field may rise by
                 // half of what `most` allows per node.
                 let bent_m = f32::from(most) * HEIGHT_STEP_M / 2.0;
@@ -110,7 +110,7 @@ proptest! {
 
 #[test]
 fn over_level_ground_and_along_a_slope_a_path_is_straight() {
-    let shape = FieldShape { low: Flat::zeros(), cell_m: 10.0, columns: 20, rows: 2 };
+    let shape = FieldShape { south_west: Flat::zeros(), cell_m: 10.0, columns: 20, rows: 2 };
     let level = field(&shape, &[70; 40]);
     let rising: Vec<i16> = (0..40).map(|i| (i % 20) * 10).collect();
     let rising = field(&shape, &rising);
@@ -122,7 +122,7 @@ fn over_level_ground_and_along_a_slope_a_path_is_straight() {
     for (bytes, most) in [(&level, 1), (&rising, 1), (&ridge, 2)] {
         let field = FieldView::parse(bytes).unwrap();
         let following =
-            TerrainFollowing { field, height_m: 20.0, tolerance_m: 2.0, max_slope: 0.2 };
+            TerrainFollowing { field, min_height_m: 20.0, tolerance_m: 2.0, max_slope: 0.2 };
         let (from, to) = (Flat::new(3.0, 5.0), Flat::new(187.0, 5.0));
         let begin = following.start_point(&from, &to);
         let mut corners = Vec::new();
@@ -132,8 +132,8 @@ fn over_level_ground_and_along_a_slope_a_path_is_straight() {
         });
         assert!(done.is_ok() && corners.len() <= most, "{corners:?}");
         if most == 1 {
-            assert!((begin.z - following.lowest_m(&from)).abs() < 1e-4);
-            assert!((corners[0].z - following.lowest_m(&to)).abs() < 1e-3);
+            assert!((begin.z - following.min_path_z_m(&from)).abs() < 1e-4);
+            assert!((corners[0].z - following.min_path_z_m(&to)).abs() < 1e-3);
         }
     }
 }

@@ -11,7 +11,7 @@
 
 use core::ops::ControlFlow;
 
-use super::lanes::lane_mask;
+use super::lanes::brick_layer_mask;
 use super::lattice::snap;
 use super::walk::snapped_segment_touches;
 use crate::Point;
@@ -19,16 +19,16 @@ use crate::geo::distance::clamp_to;
 use crate::map::voxel::{Outside, VoxelGrid};
 
 /// Half the diagonal of a cell, in cells.
-const CELL_RADIUS: f32 = 0.866_025_5;
+const CELL_HALF_DIAGONAL: f32 = 0.866_025_5;
 /// Half the diagonal of a brick, in cells.
-const BRICK_RADIUS: f32 = 4.0 * CELL_RADIUS;
+const BRICK_HALF_DIAGONAL: f32 = 4.0 * CELL_HALF_DIAGONAL;
 
 /// A segment from `a` to `a + d`, in cells.
 struct Segment {
     a: Point,
     d: Point,
     /// 1 / |d|², or 0 where |d|² is no normal f32: then the segment is taken for the point `a`.
-    inv_square: f32,
+    inv_length_sq: f32,
 }
 
 impl Segment {
@@ -37,13 +37,13 @@ impl Segment {
         let (a, d) = (cells(a), cells(b) - cells(a));
         let square = d.norm_squared();
         // A squared length below the smallest normal f32 has no reciprocal.
-        Self { a, d, inv_square: if square > f32::MIN_POSITIVE { 1.0 / square } else { 0.0 } }
+        Self { a, d, inv_length_sq: if square > f32::MIN_POSITIVE { 1.0 / square } else { 0.0 } }
     }
 
     /// Squared distance from the segment to a point, in cells².
     fn distance_sq_to_point(&self, p: &Point) -> f32 {
         let to = p - self.a;
-        let t = (to.dot(&self.d) * self.inv_square).clamp(0.0, 1.0);
+        let t = (to.dot(&self.d) * self.inv_length_sq).clamp(0.0, 1.0);
         (to - self.d * t).norm_squared()
     }
 
@@ -110,7 +110,7 @@ impl Segment {
         let shape = grid.shape();
         let axis_u = self.d.map(f32::abs).imax();
         let [axis_v, axis_w] = [[1, 2], [0, 2], [0, 1]][axis_u];
-        let [bx, by, _] = shape.bricks().map(|n| n as usize);
+        let [bx, by, _] = shape.brick_dims().map(|n| n as usize);
         let strides = [1, bx, bx * by];
         // Per unit of the longest axis every other coordinate changes by at most 1.
         let slope = if self.d[axis_u] == 0.0 { Point::zeros() } else { self.d / self.d[axis_u] };
@@ -136,16 +136,16 @@ impl Segment {
             let (Some(v), Some(w)) = (span(axis_v), span(axis_w)) else {
                 continue;
             };
-            let mask_u = lane_mask(axis_u, lane_bits(first, last, brick_u));
+            let mask_u = brick_layer_mask(axis_u, layer_bits(first, last, brick_u));
             for brick_w in w.0 >> 2..=w.1 >> 2 {
-                let mask_w = lane_mask(axis_w, lane_bits(w.0, w.1, brick_w)) & mask_u;
+                let mask_w = brick_layer_mask(axis_w, layer_bits(w.0, w.1, brick_w)) & mask_u;
                 let row = brick_u as usize * strides[axis_u] + brick_w as usize * strides[axis_w];
                 for brick_v in v.0 >> 2..=v.1 >> 2 {
                     let word = grid.words()[row + brick_v as usize * strides[axis_v]] & mask_w;
                     if word == 0 {
                         continue;
                     }
-                    let word = word & lane_mask(axis_v, lane_bits(v.0, v.1, brick_v));
+                    let word = word & brick_layer_mask(axis_v, layer_bits(v.0, v.1, brick_v));
                     if word == 0 {
                         continue;
                     }
@@ -153,7 +153,7 @@ impl Segment {
                     corner[axis_u] = low;
                     corner[axis_v] = (brick_v * 4) as f32;
                     corner[axis_w] = (brick_w * 4) as f32;
-                    let bound = reach + BRICK_RADIUS;
+                    let bound = reach + BRICK_HALF_DIAGONAL;
                     if self.distance_sq_to_point(&corner.add_scalar(2.0))
                         > bound * bound * (1.0 + 1e-5)
                     {
@@ -179,9 +179,9 @@ fn cell_range(from: f32, to: f32, reach: f32, dim: u32) -> Option<(i32, i32)> {
     (high >= 0.0 && first <= last).then_some((first, last))
 }
 
-/// Mask of the lanes of brick `brick` that are among the cells `first..=last`. Range and brick must
-/// overlap.
-fn lane_bits(first: i32, last: i32, brick: i32) -> u32 {
+/// Mask of the layers of brick `brick` that are among the cells `first..=last`. Range and brick
+/// must overlap.
+fn layer_bits(first: i32, last: i32, brick: i32) -> u32 {
     let low = (first - brick * 4).max(0);
     let high = (last - brick * 4).min(3);
     (0b1111 << low) & (0b1111 >> (3 - high))
@@ -213,13 +213,15 @@ pub(crate) fn is_farther_than(
 ) -> bool {
     let segment = Segment::new(grid, a, b);
     let reach = clearance_m / grid.shape().resolution_m;
-    if grid.outside() == Outside::Blocked && segment.distance_to_faces(grid.shape().dims) <= reach {
+    if grid.beyond_map() == Outside::Blocked
+        && segment.distance_to_faces(grid.shape().dims) <= reach
+    {
         return false;
     }
     let square = reach * reach;
     // If the cell's centre is farther than `never`, no part of the cell is in reach; if it is
     // nearer than `always`, some part is.
-    let (never, always) = (reach + CELL_RADIUS, reach + 0.5);
+    let (never, always) = (reach + CELL_HALF_DIAGONAL, reach + 0.5);
     let (never, always) = (never * never * (1.0 + 1e-5), always * always * (1.0 - 1e-5));
     segment
         .visit_near_words(grid, known, reach, |word, brick| {
@@ -252,7 +254,7 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     }
     let segment = Segment::new(grid, a, b);
     let mut limit = max_m / shape.resolution_m;
-    if grid.outside() == Outside::Blocked {
+    if grid.beyond_map() == Outside::Blocked {
         limit = limit.min(segment.distance_to_faces(shape.dims)).max(0.0);
     }
     // No obstacle is farther from a point of the grid than the grid is long.
@@ -261,7 +263,8 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     loop {
         let tried = reach.min(limit);
         // If the cell's centre is farther than this, no part of the cell is nearer than `reach`.
-        let around = |reach: f32| (reach + CELL_RADIUS) * (reach + CELL_RADIUS) * (1.0 + 1e-5);
+        let around =
+            |reach: f32| (reach + CELL_HALF_DIAGONAL) * (reach + CELL_HALF_DIAGONAL) * (1.0 + 1e-5);
         let (mut nearest, mut bound) = (tried * tried, around(tried));
         let mut found = false;
         let _ = segment.visit_near_words(grid, 0.0, tried, |word, brick| {

@@ -1,29 +1,29 @@
-//! Masks of the cells of a brick by their index (0 to 3, the lane) along one axis.
+//! Masks of the cells of a brick by their index (0 to 3, the layer) along one axis.
 
-/// Mask of the cells of a brick whose index along `axis` is a set bit of `lanes` (bits 0 to 3).
+/// Mask of the cells of a brick whose index along `axis` is a set bit of `layers` (bits 0 to 3).
 #[inline(always)]
-pub(crate) fn lane_mask(axis: usize, lanes: u32) -> u64 {
-    const LAYER_MASKS: [[u64; 16]; 3] = lane_masks();
-    LAYER_MASKS[axis][(lanes & 15) as usize]
+pub(crate) fn brick_layer_mask(axis: usize, layers: u32) -> u64 {
+    const LAYER_MASKS: [[u64; 16]; 3] = all_brick_layer_masks();
+    LAYER_MASKS[axis][(layers & 15) as usize]
 }
 
-const fn lane_masks() -> [[u64; 16]; 3] {
+const fn all_brick_layer_masks() -> [[u64; 16]; 3] {
     let mut out = [[0; 16]; 3];
-    let mut lanes = 0;
-    while lanes < 16 {
+    let mut layers = 0;
+    while layers < 16 {
         let mut bit = 0;
         while bit < 64 {
-            let lane = [bit % 4, bit / 4 % 4, bit / 16];
+            let layer = [bit % 4, bit / 4 % 4, bit / 16];
             let mut axis = 0;
             while axis < 3 {
-                if lanes >> lane[axis] & 1 == 1 {
-                    out[axis][lanes] |= 1 << bit;
+                if layers >> layer[axis] & 1 == 1 {
+                    out[axis][layers] |= 1 << bit;
                 }
                 axis += 1;
             }
             bit += 1;
         }
-        lanes += 1;
+        layers += 1;
     }
     out
 }

@@ -36,6 +36,6 @@ pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
 /// Most cells along each axis by which [`snap`] may move a point that lies within `cells` cells of
 /// the grid's minimum corner: half a lattice unit, and half an ulp each for the subtraction and the
 /// division.
-pub fn snap_error_cells(cells: f32) -> f32 {
+pub fn max_snap_error_cells(cells: f32) -> f32 {
     0.5 / ONE_CELL as f32 + 2.0 * cells * (f32::EPSILON / 2.0)
 }

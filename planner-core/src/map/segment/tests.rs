@@ -93,7 +93,7 @@ fn brute_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, grow: f64) -> f64
     };
     let (a, b) = (cells(a), cells(b));
     let mut best = f64::INFINITY;
-    if grid.outside() == Outside::Blocked {
+    if grid.beyond_map() == Outside::Blocked {
         for i in 0..3 {
             best = best
                 .min(a[i].min(b[i]) - grow)
@@ -201,11 +201,11 @@ fn lattice_segments_agree_with_brute_force_exactly() {
 }
 
 /// 40 000 segments with any f32 ends: right wherever the true distance is not within 2e-5 cells of
-/// touching, which is [`snap_error_cells`] of a grid this small, along each of two or three axes,
-/// and the segment's shift at most.
+/// touching, which is [`max_snap_error_cells`] of a grid this small, along each of two or three
+/// axes, and the segment's shift at most.
 #[test]
 fn any_segments_agree_with_brute_force() {
-    let band = f64::from(snap_error_cells(16.0)) * 3.0_f64.sqrt();
+    let band = f64::from(max_snap_error_cells(16.0)) * 3.0_f64.sqrt();
     let (mut blocked, mut undecided) = (0, 0);
     for seed in 0..40 {
         let mut rng = Pcg32::seed_from_u64(1000 + seed);

@@ -1,7 +1,7 @@
 //! The exact check: an integer walk along the segment's longest axis over the bricks that it may
 //! touch.
 
-use super::lanes::lane_mask;
+use super::lanes::brick_layer_mask;
 use super::lattice::{FRACTION_BITS, MAX_SNAPPED, ONE_CELL, Snapped};
 use crate::map::voxel::{Outside, VoxelGrid};
 
@@ -21,7 +21,7 @@ pub(crate) fn snapped_rest_touches(
     known: f32,
 ) -> bool {
     let dims = grid.shape().dims;
-    if grid.outside() == Outside::Blocked {
+    if grid.beyond_map() == Outside::Blocked {
         let inside = |p: &Snapped| {
             (0..3).all(|axis| p[axis] > 0 && p[axis] < (dims[axis] as i32) << FRACTION_BITS)
         };
@@ -77,18 +77,18 @@ impl Span {
         }
     }
 
-    /// The cells of this range in brick `brick`, as a mask of its four lanes. Range and brick must
+    /// The cells of this range in brick `brick`, as a mask of its four layers. Range and brick must
     /// overlap.
     #[inline(always)]
-    fn lanes(self, brick: i32) -> u32 {
+    fn layer_bits(self, brick: i32) -> u32 {
         let first = (self.first - brick * 4).max(0) as u32;
         let last = (self.last - brick * 4).min(3) as u32;
         (0b1111 << first) & (0b1111 >> (3 - last))
     }
 
-    /// As [`Self::lanes`], but 0 if range and brick do not overlap.
+    /// As [`Self::layer_bits`], but 0 if range and brick do not overlap.
     #[inline(always)]
-    fn lanes_if_met(self, brick: i32) -> u32 {
+    fn layer_bits_if_overlapping(self, brick: i32) -> u32 {
         let first = (self.first - brick * 4).clamp(0, 4) as u32;
         let last = (self.last - brick * 4).clamp(-1, 3);
         (0b1111 << first) & (0b1111 >> (3 - last) as u32)
@@ -108,7 +108,7 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
         } else {
             ((*a, *b), (a[U] + skip, b[U]))
         };
-        let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
+        let [bx, by, _] = grid.shape().brick_dims().map(|n| n as i32);
         // The slope is at most 1. The quotient of two f32 errs by 2⁻²³ at most, so a coordinate
         // errs by 2⁻²² of the length, and two lattice units.
         let per_u = if d[U] == 0 { 0.0 } else { (1 << 30) as f32 / d[U] as f32 };
@@ -158,8 +158,8 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
                         continue;
                     }
                     let near = word
-                        & lane_mask(V, span_v.lanes(brick_v))
-                        & lane_mask(W, span_w.lanes(brick_w));
+                        & brick_layer_mask(V, span_v.layer_bits(brick_v))
+                        & brick_layer_mask(W, span_w.layer_bits(brick_w));
                     if near != 0 && self.brick_touches(near, brick, brick_v, brick_w) {
                         return true;
                     }
@@ -181,22 +181,26 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
             let (next_v, next_w) = (self.coordinate_at(V, to), self.coordinate_at(W, to));
             let (last_v, last_w) = (v, w);
             (v, w) = (next_v, next_w);
-            let mut cells = near & lane_mask(U, 1 << layer);
+            let mut cells = near & brick_layer_mask(U, 1 << layer);
             if cells == 0 {
                 continue;
             }
-            cells &=
-                lane_mask(V, Span::new(last_v, v, self.slack, self.dims[V]).lanes_if_met(brick_v));
-            cells &=
-                lane_mask(W, Span::new(last_w, w, self.slack, self.dims[W]).lanes_if_met(brick_w));
+            cells &= brick_layer_mask(
+                V,
+                Span::new(last_v, v, self.slack, self.dims[V]).layer_bits_if_overlapping(brick_v),
+            );
+            cells &= brick_layer_mask(
+                W,
+                Span::new(last_w, w, self.slack, self.dims[W]).layer_bits_if_overlapping(brick_w),
+            );
             while cells != 0 {
                 let bit = cells.trailing_zeros() as i32;
                 cells &= cells - 1;
-                let lane = [bit & 3, bit >> 2 & 3, bit >> 4];
+                let index = [bit & 3, bit >> 2 & 3, bit >> 4];
                 let mut cell = [0; 3];
-                cell[U] = brick_u * 4 + lane[U];
-                cell[V] = brick_v * 4 + lane[V];
-                cell[W] = brick_w * 4 + lane[W];
+                cell[U] = brick_u * 4 + index[U];
+                cell[V] = brick_v * 4 + index[V];
+                cell[W] = brick_w * 4 + index[W];
                 if cell_is_touched(&self.a, &self.b, cell) {
                     return true;
                 }

@@ -2,11 +2,11 @@
 
 /// Random points that are drawn for one free node before [`PrmError::NoFreeSpace`]. In a map with
 /// one free cell in a thousand a node is still found with a probability of 1 − e⁻¹⁰.
-pub const TRIES_PER_NODE: usize = 10_000;
+pub const MAX_TRIES_PER_NODE: usize = 10_000;
 
 /// Random pairs of points that the bridge test draws for one node before a uniform node takes its
 /// place: in a map without narrow passages no pair passes the test.
-pub const TRIES_PER_BRIDGE: usize = 1_000;
+pub const MAX_TRIES_PER_BRIDGE: usize = 1_000;
 
 /// Distribution of the random nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,7 +26,7 @@ pub enum Sampling {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PrmConfig {
     /// Number of random nodes; terminals are not counted.
-    pub nodes: usize,
+    pub random_nodes: usize,
     /// Length of the shortest edge allowed, metres (Dmin).
     pub edge_min_m: f32,
     /// Length of the longest edge allowed, metres (Dmax).
@@ -49,8 +49,8 @@ pub enum PrmError {
     TerminalBlocked(usize),
     /// More nodes than the caller's memory or 16-bit indices hold.
     TooManyNodes,
-    /// This many random nodes were found, but [`TRIES_PER_NODE`] draws found no free place for the
-    /// next one: hardly any space is free.
+    /// This many random nodes were found, but [`MAX_TRIES_PER_NODE`] draws found no free place for
+    /// the next one: hardly any space is free.
     NoFreeSpace(usize),
     /// The node with this index is not finite, or beyond 1e6 m.
     NotFinite(usize),
@@ -83,7 +83,7 @@ impl PrmConfig {
         if !good(self.clearance_m) {
             return Err(PrmError::Config("clearance_m"));
         }
-        if self.nodes > usize::from(u16::MAX) {
+        if self.random_nodes > usize::from(u16::MAX) {
             return Err(PrmError::Config("nodes"));
         }
         Ok(())
@@ -102,18 +102,18 @@ pub fn squared_length(a: [f32; 3], b: [f32; 3]) -> f32 {
 /// joined.
 #[derive(Clone, Copy)]
 pub(super) struct LengthRange {
-    min: f32,
-    max: f32,
+    min_sq: f32,
+    max_sq: f32,
 }
 
 impl LengthRange {
     pub(super) fn new(config: &PrmConfig) -> Self {
         let min = config.edge_min_m * config.edge_min_m;
-        Self { min: min.max(f32::MIN_POSITIVE), max: config.edge_max_m * config.edge_max_m }
+        Self { min_sq: min.max(f32::MIN_POSITIVE), max_sq: config.edge_max_m * config.edge_max_m }
     }
 
     #[inline(always)]
     pub(super) fn contains(self, square: f32) -> bool {
-        square >= self.min && square <= self.max
+        square >= self.min_sq && square <= self.max_sq
     }
 }

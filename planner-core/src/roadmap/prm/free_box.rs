@@ -12,8 +12,8 @@ use super::config::PrmConfig;
 use super::neighbours::NodeIndex;
 use crate::Point;
 use crate::map::segment::{
-    Snapped, TOUCH_CHECK_CLEARANCE_CELLS, is_farther_than, lane_mask, segment_is_clear, snap,
-    snapped_rest_touches,
+    Snapped, TOUCH_CHECK_CLEARANCE_CELLS, brick_layer_mask, is_farther_than, segment_is_clear,
+    snap, snapped_rest_touches,
 };
 use crate::map::voxel::VoxelGrid;
 
@@ -43,14 +43,14 @@ pub(super) struct NodeVisibility<'g, 'a> {
     clearance_cells: f32,
     cells_per_m: f32,
     /// Most cells by which a free box is grown from its node's cell in each direction.
-    reach: i32,
+    max_growth_cells: i32,
     boxes: [FreeBox; MAX_BOXES],
-    newest: usize,
+    newest_box: usize,
     here: [f32; 3],
     /// `here` in cells, relative to the grid's minimum corner.
-    at: [f32; 3],
+    here_cells: [f32; 3],
     /// `here` on the lattice of the exact check.
-    snapped: Option<Snapped>,
+    here_snapped: Option<Snapped>,
     /// The free box around `here`; `None` where the box cannot be used, and all segments go to the
     /// exact check.
     view: Option<BoxView>,
@@ -78,12 +78,14 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
             clearance_m: config.clearance_m,
             clearance_cells: config.clearance_m / resolution,
             cells_per_m: 1.0 / resolution,
-            reach: (config.edge_max_m / resolution).min(MAX_GRID_SIDE_CELLS as f32) as i32 + 1,
+            max_growth_cells: (config.edge_max_m / resolution).min(MAX_GRID_SIDE_CELLS as f32)
+                as i32
+                + 1,
             boxes: [FreeBox::default(); MAX_BOXES],
-            newest: 0,
+            newest_box: 0,
             here: [0.0; 3],
-            at: [0.0; 3],
-            snapped: None,
+            here_cells: [0.0; 3],
+            here_snapped: None,
             view: None,
         }
     }
@@ -92,12 +94,12 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     pub(super) fn set_node(&mut self, here: [f32; 3]) {
         let shape = self.grid.shape();
         self.here = here;
-        self.snapped = snap(shape, &Point::from(here));
+        self.here_snapped = snap(shape, &Point::from(here));
         self.view = None;
         if shape.dims.iter().any(|&d| d > MAX_GRID_SIDE_CELLS) {
             return;
         }
-        self.at = [0, 1, 2].map(|axis| (here[axis] - shape.min[axis]) * self.cells_per_m);
+        self.here_cells = [0, 1, 2].map(|axis| (here[axis] - shape.min[axis]) * self.cells_per_m);
         let Some(cell) = shape.cell_of(&Point::from(here)) else {
             return;
         };
@@ -105,16 +107,16 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         let around = match self.boxes.iter().find(|b| b.contains(cell)) {
             Some(around) => *around,
             None => {
-                let Some(around) = FreeBox::grow(self.grid, cell, self.reach) else {
+                let Some(around) = FreeBox::grow(self.grid, cell, self.max_growth_cells) else {
                     return;
                 };
-                self.newest = (self.newest + 1) % MAX_BOXES;
-                self.boxes[self.newest] = around;
+                self.newest_box = (self.newest_box + 1) % MAX_BOXES;
+                self.boxes[self.newest_box] = around;
                 around
             }
         };
-        let low = [0, 1, 2].map(|axis| around.low[axis] as f32 - self.at[axis]);
-        let high = [0, 1, 2].map(|axis| around.high[axis] as f32 - self.at[axis]);
+        let low = [0, 1, 2].map(|axis| around.low[axis] as f32 - self.here_cells[axis]);
+        let high = [0, 1, 2].map(|axis| around.high[axis] as f32 - self.here_cells[axis]);
         if (0..3).any(|axis| low[axis] > -ROUNDING_CELLS || high[axis] < ROUNDING_CELLS) {
             return;
         }
@@ -169,7 +171,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     #[inline]
     fn is_ray_clear(&self, there: [f32; 3], known: f32) -> bool {
         let there = Point::from(there);
-        let (Some(a), Some(b)) = (&self.snapped, snap(self.grid.shape(), &there)) else {
+        let (Some(a), Some(b)) = (&self.here_snapped, snap(self.grid.shape(), &there)) else {
             return false;
         };
         if self.clearance_cells >= TOUCH_CHECK_CLEARANCE_CELLS {
@@ -211,7 +213,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
             face / d[axis]
         });
         let t = leave[0].min(leave[1]).min(leave[2]);
-        let at = |t: f32| [0, 1, 2].map(|axis| self.at[axis] + d[axis] * t);
+        let at = |t: f32| [0, 1, 2].map(|axis| self.here_cells[axis] + d[axis] * t);
         if t < 0.999 && self.is_certainly_obstacle(at(t)) {
             return RayClass::Blocked;
         }
@@ -310,16 +312,17 @@ impl FreeBox {
     /// holds an obstacle within the box's extent on the other two axes.
     fn occupied_layers(&self, grid: &VoxelGrid<'_>, axis: usize, brick: i32) -> u32 {
         let [v, w] = [[1, 2], [0, 2], [0, 1]][axis];
-        let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
+        let [bx, by, _] = grid.shape().brick_dims().map(|n| n as i32);
         let strides = [1, bx, bx * by];
-        let lanes = |axis: usize, brick: i32| {
+        let layers = |axis: usize, brick: i32| {
             let low = (self.low[axis] - brick * 4).max(0);
             let high = (self.high[axis] - 1 - brick * 4).min(3);
             (0b1111 << low) & (0b1111 >> (3 - high))
         };
         // Along `v` only the first and the last brick may extend beyond the box, and are masked.
         let (first, last) = (self.low[v] >> 2, (self.high[v] - 1) >> 2);
-        let (first_mask, last_mask) = (lane_mask(v, lanes(v, first)), lane_mask(v, lanes(v, last)));
+        let (first_mask, last_mask) =
+            (brick_layer_mask(v, layers(v, first)), brick_layer_mask(v, layers(v, last)));
         let mut all = 0;
         for brick_w in self.low[w] >> 2..=(self.high[w] - 1) >> 2 {
             let at = |brick_v: i32| {
@@ -335,10 +338,10 @@ impl FreeBox {
                     }
                 };
             }
-            all |= row & lane_mask(w, lanes(w, brick_w));
+            all |= row & brick_layer_mask(w, layers(w, brick_w));
         }
         (0..4)
-            .filter(|&layer| all & lane_mask(axis, 1 << layer) != 0)
+            .filter(|&layer| all & brick_layer_mask(axis, 1 << layer) != 0)
             .fold(0, |bits, layer| bits | 1 << layer)
     }
 }

@@ -20,9 +20,9 @@ pub struct NodeIndex<const NODES: usize, const CUBES: usize> {
     y: [f32; NODES],
     z: [f32; NODES],
     /// Node index at each place of the sorted order.
-    node: [u16; NODES],
+    sorted_nodes: [u16; NODES],
     /// Place of the first node of each cube; the entry after the last cube is the number of nodes.
-    first: [u16; CUBES],
+    cube_starts: [u16; CUBES],
     len: usize,
     min: [f32; 3],
     cube_m: f32,
@@ -43,8 +43,8 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
             x: [0.0; NODES],
             y: [0.0; NODES],
             z: [0.0; NODES],
-            node: [0; NODES],
-            first: [0; CUBES],
+            sorted_nodes: [0; NODES],
+            cube_starts: [0; CUBES],
             len: 0,
             min: [0.0; 3],
             cube_m: 0.0,
@@ -84,25 +84,25 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
         self.choose_cubes((max - min).into(), config.edge_max_m / 2.0);
         let [nx, ny, nz] = self.dims;
         let count = nx * ny * nz;
-        self.first.fill(0);
+        self.cube_starts.fill(0);
         // `first` counts the nodes of each cube, then holds the end of each cube's run. Placing a
         // node lowers that end by one, so that finally `first` holds the run's beginning.
         for node in nodes {
-            self.first[self.cube_of(node)] += 1;
+            self.cube_starts[self.cube_of(node)] += 1;
         }
         let mut sum = 0;
-        for first in &mut self.first[..count] {
+        for first in &mut self.cube_starts[..count] {
             sum += *first;
             *first = sum;
         }
-        self.first[count] = sum;
+        self.cube_starts[count] = sum;
         // Placed from the last node on, so that the nodes of a cube keep their order.
         for (i, node) in nodes.iter().enumerate().rev() {
             let cube = self.cube_of(node);
-            self.first[cube] -= 1;
-            let place = usize::from(self.first[cube]);
+            self.cube_starts[cube] -= 1;
+            let place = usize::from(self.cube_starts[cube]);
             (self.x[place], self.y[place], self.z[place]) = (node.x, node.y, node.z);
-            self.node[place] = i as u16;
+            self.sorted_nodes[place] = i as u16;
         }
         self.len = nodes.len();
         Ok(())
@@ -135,7 +135,7 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
 
     /// Node index at a place of the sorted order.
     pub(super) fn node(&self, place: usize) -> u16 {
-        self.node[place]
+        self.sorted_nodes[place]
     }
 
     /// Position of the node at a place of the sorted order, metres.
@@ -147,7 +147,7 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
     /// Calls `visit` with the places after `place` whose nodes are within the length range of the
     /// node at `place`, up to [`CANDIDATE_LANES`] places per call.
     #[inline(always)]
-    pub(super) fn for_each_in_range<E>(
+    pub(super) fn for_each_later_in_range<E>(
         &self,
         place: usize,
         config: &PrmConfig,
@@ -170,14 +170,14 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
         for k in k0..=k_high {
             for j in (if k == k0 { j0 } else { j_low })..=j_high {
                 let row = (k * self.dims[1] + j) * self.dims[0];
-                let mut from = usize::from(self.first[row + i_low]);
-                let to = usize::from(self.first[row + i_high + 1]);
+                let mut from = usize::from(self.cube_starts[row + i_low]);
+                let to = usize::from(self.cube_starts[row + i_high + 1]);
                 if (k, j) == (k0, j0) {
                     from = from.max(place + 1);
                 }
                 while from < to {
                     let lanes = (to - from).min(CANDIDATE_LANES);
-                    let mut hits = self.in_range(here, lengths, from, lanes);
+                    let mut hits = self.in_range_mask(here, lengths, from, lanes);
                     while hits != 0 {
                         near[count] = (from + hits.trailing_zeros() as usize) as u16;
                         count += 1;
@@ -198,7 +198,13 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
     /// Bit i is set if the node at place `from + i`, i < `lanes`, is within the length range of
     /// `here`.
     #[inline(always)]
-    fn in_range(&self, here: [f32; 3], lengths: LengthRange, from: usize, lanes: usize) -> u32 {
+    fn in_range_mask(
+        &self,
+        here: [f32; 3],
+        lengths: LengthRange,
+        from: usize,
+        lanes: usize,
+    ) -> u32 {
         let mut hits = 0;
         match (
             self.x[from..].first_chunk::<CANDIDATE_LANES>(),

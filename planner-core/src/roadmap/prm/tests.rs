@@ -10,7 +10,7 @@ use crate::map::voxel::{GridShape, Outside};
 
 fn config(seed: u64) -> PrmConfig {
     PrmConfig {
-        nodes: 300,
+        random_nodes: 300,
         edge_min_m: 0.5,
         edge_max_m: 4.0,
         clearance_m: 0.0,
@@ -126,8 +126,8 @@ fn rays_that_graze_a_wall_miss_no_cell_beside_them() {
             [0.0, 1.0 / 16384.0, 1.0 / 1024.0, 1.0 / 512.0, 1.0 / 300.0, 1.0 / 64.0, 0.1, 0.5];
         let nodes: Vec<Point> = (0..240)
             .map(|_| {
-                let mut cells =
-                    uniform(&mut rng).component_mul(&Point::from(shape.dims.map(|d| d as f32)));
+                let mut cells = uniform_point(&mut rng)
+                    .component_mul(&Point::from(shape.dims.map(|d| d as f32)));
                 let (hair, draw) = (HAIRS[(rng.next_u32() % 8) as usize], rng.next_u32());
                 let face = (wall + (draw & 1)) as f32;
                 cells[axis] = if draw & 2 == 0 { face - hair } else { face + hair };
@@ -188,7 +188,8 @@ fn bridges_lie_in_doors() {
         }
         let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
         let count = |sampling| {
-            let config = PrmConfig { clearance_m: 0.3, nodes: 200, sampling, ..config(seed) };
+            let config =
+                PrmConfig { clearance_m: 0.3, random_nodes: 200, sampling, ..config(seed) };
             let mut nodes = vec![Point::zeros(); 200];
             sample_nodes(&grid, None, &[], &config, &mut nodes).unwrap();
             assert!(nodes.iter().all(|p| segment_is_clear(&grid, p, p, 0.3)));
@@ -205,7 +206,7 @@ fn never_sampled_space_stays_empty() {
     let (shape, words) = rooms(&mut Pcg32::seed_from_u64(4), 0.25);
     let grid = VoxelGrid::new(shape, Outside::Free, &words).unwrap();
     // All but the lowest bricks.
-    let [bx, by, _] = shape.bricks();
+    let [bx, by, _] = shape.brick_dims();
     let never: Vec<u64> =
         (0..words.len()).map(|i| if i < (bx * by) as usize { 0 } else { u64::MAX }).collect();
     let never = VoxelGrid::new(shape, Outside::Blocked, &never).unwrap();
@@ -228,7 +229,7 @@ fn refusals_are_named() {
         sample_nodes(&full, None, &[inside], &good, &mut nodes),
         Err(PrmError::TooManyNodes)
     );
-    let few = PrmConfig { nodes: 10, ..good };
+    let few = PrmConfig { random_nodes: 10, ..good };
     assert_eq!(
         sample_nodes(&full, None, &[inside], &few, &mut nodes),
         Err(PrmError::TerminalBlocked(0))
@@ -248,7 +249,7 @@ fn refusals_are_named() {
         (PrmConfig { edge_max_m: 0.4, ..few }, "edge_max_m"),
         (PrmConfig { edge_max_m: f32::INFINITY, ..few }, "edge_max_m"),
         (PrmConfig { clearance_m: -1.0, ..few }, "clearance_m"),
-        (PrmConfig { nodes: 70_000, ..few }, "nodes"),
+        (PrmConfig { random_nodes: 70_000, ..few }, "nodes"),
     ] {
         assert_eq!(sample_nodes(&empty, None, &[], &bad, &mut nodes), Err(PrmError::Config(name)));
     }

@@ -29,7 +29,7 @@ fn node_of(entry: u64) -> usize {
 /// Index of the least entry. Four entries are compared pairwise by selects: branches would be
 /// mispredicted.
 #[inline(always)]
-fn least_of(entries: &[u64]) -> usize {
+fn least_index(entries: &[u64]) -> usize {
     if let Ok([a, b, c, d]) = <&[u64; HEAP_ARITY]>::try_from(entries) {
         let (left, left_at) = if b < a { (b, 1) } else { (a, 0) };
         let (right, right_at) = if d < c { (d, 3) } else { (c, 2) };
@@ -109,7 +109,8 @@ impl<const N: usize> Heap<N> {
             if first >= self.len {
                 break;
             }
-            let least = first + least_of(&self.entries[first..(first + HEAP_ARITY).min(self.len)]);
+            let least =
+                first + least_index(&self.entries[first..(first + HEAP_ARITY).min(self.len)]);
             if self.entries[least] >= entry {
                 break;
             }

@@ -27,7 +27,15 @@ fn flight((from, steps): &Steps) -> List<TimedSegment> {
         let (from, from_m) = (at, along_m);
         at += way;
         along_m += way.norm();
-        TimedSegment { from, to: at, from_m, to_m: along_m, from_s: 0.0, to_s: 1.0, parked: false }
+        TimedSegment {
+            from,
+            to: at,
+            wait_at_m: from_m,
+            end_m: along_m,
+            held_from_s: 0.0,
+            held_until_s: 1.0,
+            parked: false,
+        }
     };
     steps.iter().map(segment).collect()
 }
@@ -52,7 +60,7 @@ proptest! {
         blocks.rebuild(&CFG, &own);
         let all =
             |own: &mut dyn Iterator<Item = &TimedSegment>, q: &TimedSegment| -> List<f32> {
-                own.filter(|p| is_conflict(&CFG, p, q)).map(|p| p.from_m).collect()
+                own.filter(|p| is_conflict(&CFG, p, q)).map(|p| p.wait_at_m).collect()
             };
         for some in other.chunks(SEGMENTS_PER_BLOCK) {
             let near = blocks.blocks_near(some);
@@ -72,13 +80,13 @@ fn whole(points: &[(f32, f32, f32)], descent_m: f32) -> Flight<8> {
     points.iter().for_each(|(x, y, z)| path.push(Point::new(*x, *y, *z), 1.0).unwrap());
     path.set_times_at_speed(1.5, CFG.cruise_mps);
     let mut flight = Flight {
-        id: 1,
+        vehicle_id: 1,
         task: Task::Goto(0),
         path,
         climb_m: 1.5,
         descent_m,
         depart_s: 0.0,
-        segment_m: crate::schedule::MAX_TIMED_SEGMENT_M,
+        max_segment_m: crate::schedule::DEFAULT_MAX_SEGMENT_M,
     };
     flight.choose_segment_length();
     flight

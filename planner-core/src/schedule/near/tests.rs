@@ -8,7 +8,15 @@ use proptest::prelude::*;
 fn segment((x, y, dx, dy): (f32, f32, f32, f32)) -> TimedSegment {
     let (from, to) = (Point::new(x, y, 1.0), Point::new(x + dx, y + dy, 1.0));
     let to_m = (to - from).norm();
-    TimedSegment { from, to, from_m: 0.0, to_m, from_s: 0.0, to_s: 1.0, parked: false }
+    TimedSegment {
+        from,
+        to,
+        wait_at_m: 0.0,
+        end_m: to_m,
+        held_from_s: 0.0,
+        held_until_s: 1.0,
+        parked: false,
+    }
 }
 
 fn place() -> impl Strategy<Value = (f32, f32, f32, f32)> {

@@ -36,11 +36,11 @@ pub(crate) fn fly<const W: usize>(
     for _ in 0..steps {
         for i in 0..flights.len() {
             let shut = |g: &&Gate| {
-                let other = flights.iter().position(|f| f.id == g.id).unwrap();
-                g.at_m >= along[i] - 0.01 && along[other] < g.until_m
+                let other = flights.iter().position(|f| f.vehicle_id == g.wait_for_id).unwrap();
+                g.at_m >= along[i] - 0.01 && along[other] < g.open_from_progress_m
             };
             let free = gates[i].iter().filter(shut).map(|g| g.at_m).fold(f32::INFINITY, fminf);
-            // `until_m` lies slightly beyond the end of the last timed segment.
+            // `open_from_progress_m` lies slightly beyond the end of the last timed segment.
             let goal = end(&flights[i]) + if flights[i].task.leaves_pad() { 0.02 } else { 0.0 };
             along[i] = fmaxf(along[i], fminf(fminf(along[i] + speeds[i] * 0.05, free), goal));
         }
@@ -57,6 +57,6 @@ pub(crate) fn fly<const W: usize>(
     }
     Err((0..flights.len())
         .filter(|&i| along[i] < end(&flights[i]))
-        .map(|i| flights[i].id)
+        .map(|i| flights[i].vehicle_id)
         .collect())
 }

@@ -31,7 +31,7 @@ proptest! {
         };
         prop_assume!(distance(0) > cfg.safety_distance_m);
         let contact = (0..4000).find(|&ms| distance(ms) < cfg.safety_distance_m - 0.01);
-        let apart_m = stopping_distance_apart_m(&cfg, cruise_mps);
+        let apart_m = stop_separation_m(&cfg, cruise_mps);
         let found = PathSamples::new(&cfg, &own).distance_to_conflict_m(apart_m, &own, &n);
         if let Some(ms) = contact {
             let within_m = found.expect("a contact is found");
@@ -54,7 +54,7 @@ fn neighbour(id: u8, rank: u16, position: Point) -> Neighbour {
         progress_m: None,
         grounded: false,
         out_of_plan: false,
-        detours: false,
+        on_detour: false,
     }
 }
 
@@ -66,7 +66,7 @@ fn straight() -> Path<4> {
 }
 
 fn own(path: &Path<4>) -> OwnVehicle<'_, 4> {
-    OwnVehicle { rank: 1, position: Point::zeros(), along_m: 0.0, path, detours: false }
+    OwnVehicle { rank: 1, position: Point::zeros(), along_m: 0.0, path, on_detour: false }
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn algorithm2_divides_by_the_highest_ranked_vehicle_in_range() {
         neighbour(5, 4, Point::new(0.0, 1.5, 0.0)),
     ];
     let advice = advise(&cfg(Method::Algorithm2), &own(&path), &[], &near);
-    assert_eq!((advice.speed_scale, advice.waiting_for), (1.0 / 6.0, 4));
+    assert_eq!((advice.speed_scale, advice.waiting_for_id), (1.0 / 6.0, 4));
     let advice = advise(&cfg(Method::Algorithm2), &own(&path), &[], &near[..1]);
     assert_eq!(advice, Advice::FREE, "a lower id has no priority");
 }
@@ -97,7 +97,7 @@ fn priority_passes_one_that_hovers_slowly_and_stops_before_others() {
         let own = OwnVehicle {
             along_m,
             position: Point::new(along_m, 0.0, 0.0),
-            detours: true,
+            on_detour: true,
             ..own(&path)
         };
         let other = Neighbour {
@@ -105,7 +105,7 @@ fn priority_passes_one_that_hovers_slowly_and_stops_before_others() {
             ..neighbour(2, 0, Point::new(40.0, beside_m, 0.0))
         };
         let advice = advise(&cfg, &own, &[], &[other]);
-        (advice.waiting_for, advice.speed_scale * cfg.cruise_mps)
+        (advice.waiting_for_id, advice.speed_scale * cfg.cruise_mps)
     };
     // Room for a stop from cruise speed, from the passing speed, and for neither.
     for along_m in [0.0, 20.0, 35.0, 40.0] {
@@ -125,19 +125,19 @@ fn priority_passes_one_that_hovers_slowly_and_stops_before_others() {
 fn priority_stops_at_the_first_gate_that_is_not_passed() {
     let path = straight();
     let gates = [
-        Gate { at_m: 1.0, id: 2, until_m: 5.0 },
-        Gate { at_m: 2.0, id: 2, until_m: 9.0 },
-        Gate { at_m: 2.5, id: 7, until_m: 1.0 },
-        Gate { at_m: 9.0, id: 8, until_m: 1.0 },
+        Gate { at_m: 1.0, wait_for_id: 2, open_from_progress_m: 5.0 },
+        Gate { at_m: 2.0, wait_for_id: 2, open_from_progress_m: 9.0 },
+        Gate { at_m: 2.5, wait_for_id: 7, open_from_progress_m: 1.0 },
+        Gate { at_m: 9.0, wait_for_id: 8, open_from_progress_m: 1.0 },
     ];
     let mut heard = [neighbour(2, 0, Point::new(9.0, 9.0, 9.0))];
     heard[0].progress_m = Some(5.5);
     let advice = advise(&cfg(Method::Priority), &own(&path), &gates, &heard);
-    assert_eq!((advice.stop_within_m, advice.waiting_for), (2.0, 2));
+    assert_eq!((advice.stop_within_m, advice.waiting_for_id), (2.0, 2));
     heard[0].progress_m = Some(9.0);
     let advice = advise(&cfg(Method::Priority), &own(&path), &gates, &heard);
     assert_eq!(
-        (advice.stop_within_m, advice.waiting_for),
+        (advice.stop_within_m, advice.waiting_for_id),
         (2.5, 7),
         "an unheard vehicle has not passed"
     );
@@ -155,7 +155,7 @@ fn priority_stops_before_a_vehicle_without_a_plan() {
     let path = straight();
     let ahead = [neighbour(9, 5, Point::new(5.0, 0.2, 0.0))];
     let advice = advise(&cfg(Method::Priority), &own(&path), &[], &ahead);
-    assert_eq!(advice.waiting_for, 9);
+    assert_eq!(advice.waiting_for_id, 9);
     assert!(advice.stop_within_m <= 3.5 && advice.stop_within_m > 2.5, "{}", advice.stop_within_m);
     let behind = [neighbour(9, 5, Point::new(-1.0, 0.0, 0.0))];
     assert_eq!(advise(&cfg(Method::Priority), &own(&path), &[], &behind), Advice::FREE);

@@ -9,7 +9,7 @@ use heapless::Vec;
 
 use super::set::{MAX_SET_POINTS, ReachableSet};
 use crate::Point;
-use crate::geo::distance::{point_distance_sq, segments_distance_sq};
+use crate::geo::distance::{segment_to_point_distance_sq, segments_distance_sq};
 
 /// Rounding of distances, metres: an approach by less than this does not count as one. No vehicle
 /// can get past another by coming so little nearer.
@@ -33,27 +33,32 @@ pub struct SetLeg<'a> {
     from: &'a Point,
     to: &'a Point,
     middle: Point,
-    half_m: f32,
+    half_length_bound_m: f32,
 }
 
 impl<'a> SetLeg<'a> {
     #[inline]
     fn new(from: &'a Point, to: &'a Point) -> Self {
         let half = (to - from) * 0.5;
-        Self { from, to, middle: from + half, half_m: sqrt_upper_bound(half.norm_squared()) }
+        Self {
+            from,
+            to,
+            middle: from + half,
+            half_length_bound_m: sqrt_upper_bound(half.norm_squared()),
+        }
     }
 
     /// Whether two legs are certainly at least `apart_m` from each other.
     #[inline]
     fn is_apart(&self, other: &SetLeg<'_>, apart_m: f32) -> bool {
-        let most_m = self.half_m + other.half_m + apart_m;
+        let most_m = self.half_length_bound_m + other.half_length_bound_m + apart_m;
         (self.middle - other.middle).norm_squared() >= most_m * most_m
     }
 
     /// Whether the leg may come nearer to a point than `near_m`.
     #[inline]
     fn may_come_within(&self, place: &Point, near_m: f32) -> bool {
-        let most_m = self.half_m + near_m + BOUNDS_ROUNDING_M;
+        let most_m = self.half_length_bound_m + near_m + BOUNDS_ROUNDING_M;
         (self.middle - place).norm_squared() < most_m * most_m
     }
 }
@@ -64,8 +69,8 @@ pub struct OwnSet<'a> {
     set: &'a ReachableSet,
     legs: &'a [SetLeg<'a>],
     /// Centre of the bounding box, and half of its size.
-    middle: Point,
-    half: Point,
+    box_middle: Point,
+    box_half: Point,
     /// Distance of centres at which the two hulls touch, metres: a vehicle already this near to
     /// where another one may come has no distance left to keep, and only has to leave.
     pub touching_m: f32,
@@ -88,15 +93,15 @@ impl<'a> OwnSet<'a> {
             high = select_per_axis(&high, to, |a, b| a > b);
         }
         let (middle, half) = ((low + high) * 0.5, (high - low) * 0.5);
-        Self { set, legs, middle, half, touching_m: 0.0 }
+        Self { set, legs, box_middle: middle, box_half: half, touching_m: 0.0 }
     }
 
     /// Distances from the set's bounding box to a point along each axis, metres; 0 on an axis along
     /// which the point is within the box.
     #[inline]
-    pub fn distance_from_box(&self, place: &Point) -> Point {
+    pub fn box_distances(&self, place: &Point) -> Point {
         let axis = |axis: usize| {
-            let away = (place[axis] - self.middle[axis]).abs() - self.half[axis];
+            let away = (place[axis] - self.box_middle[axis]).abs() - self.box_half[axis];
             if away > 0.0 { away } else { 0.0 }
         };
         Point::new(axis(0), axis(1), axis(2))
@@ -107,7 +112,8 @@ impl<'a> OwnSet<'a> {
     #[inline]
     fn is_outside(&self, middle: &Point, half: &Point, apart_m: f32) -> bool {
         let apart = |axis: usize| {
-            (middle[axis] - self.middle[axis]).abs() - half[axis].abs() >= self.half[axis] + apart_m
+            (middle[axis] - self.box_middle[axis]).abs() - half[axis].abs()
+                >= self.box_half[axis] + apart_m
         };
         apart(0) || apart(1) || apart(2)
     }
@@ -165,7 +171,7 @@ impl<'a> OwnSet<'a> {
         // The motion comes no nearer if the vehicle is already as near to a leg of the neighbour's
         // set, or so near that it would touch a neighbour on that leg.
         let here_m = fast_max(sqrtf(motion_sq) + APPROACH_ROUNDING_M, self.touching_m);
-        let is_here = |leg| point_distance_sq(leg, here) <= here_m * here_m;
+        let is_here = |leg| segment_to_point_distance_sq(leg, here) <= here_m * here_m;
         // Most often such a leg is the one that the motion comes nearest to, so it is checked
         // first.
         if here_m < most_m && !is_here(nearest) && !other.segments().any(is_here) {
@@ -177,7 +183,7 @@ impl<'a> OwnSet<'a> {
         let nearer_m = sqrtf(now_sq.min(4.0 * most_m * most_m)) - APPROACH_ROUNDING_M;
         let is_nearer = |leg: &SetLeg<'_>| {
             leg.may_come_within(place, nearer_m)
-                && point_distance_sq((leg.from, leg.to), place) < nearer_m * nearer_m
+                && segment_to_point_distance_sq((leg.from, leg.to), place) < nearer_m * nearer_m
         };
         nearer_m > 0.0 && self.legs.iter().any(is_nearer)
     }

@@ -13,7 +13,7 @@ pub const OFF_REPORTED_PATH_M: f32 = 0.9;
 /// Addition to [`OFF_REPORTED_PATH_M`] behind the first reported point, which is the vehicle's
 /// setpoint, for each m/s above walking speed (2 m/s), seconds: the setpoint may lead the vehicle
 /// by that much more.
-pub const OFF_REPORTED_PATH_S: f32 = LEAD_PER_SPEED_S;
+pub const OFF_REPORTED_PATH_PER_SPEED_S: f32 = LEAD_PER_SPEED_S;
 /// Greatest distance behind its first reported point, the setpoint, at which a vehicle at this
 /// speed counts as flying along its points, metres; beside the other points [`OFF_REPORTED_PATH_M`]
 /// applies.
@@ -22,7 +22,7 @@ fn off_reported_path_m(speed_mps: f32) -> f32 {
     let faster_mps = speed_mps - WALKING_SPEED_MPS;
     // False for NaN.
     if faster_mps > 0.0 {
-        OFF_REPORTED_PATH_M + OFF_REPORTED_PATH_S * faster_mps
+        OFF_REPORTED_PATH_M + OFF_REPORTED_PATH_PER_SPEED_S * faster_mps
     } else {
         OFF_REPORTED_PATH_M
     }
@@ -40,11 +40,11 @@ pub enum PlaceOnPoints {
     /// The vehicle is on its points.
     On {
         /// Index of the point that ends the first leg on which the vehicle may be.
-        leg: u8,
+        leg_end: u8,
         /// Distance along the points from the first place where the vehicle may be to the last one,
         /// decimetres, rounded up: above 0 where the points turn back and lead past the vehicle
         /// again. Two bytes, since this is stored for each neighbour.
-        more_dm: u16,
+        uncertainty_dm: u16,
     },
 }
 
@@ -93,8 +93,8 @@ impl PlaceOnPoints {
         }
         // The cast to `u16` saturates.
         found.map_or(Self::Beside, |leg| Self::On {
-            leg,
-            more_dm: libm::ceilf(10.0 * more_m) as u16,
+            leg_end: leg,
+            uncertainty_dm: libm::ceilf(10.0 * more_m) as u16,
         })
     }
 
@@ -105,7 +105,7 @@ impl PlaceOnPoints {
         position: &Point,
         points: &'a [Point],
     ) -> Option<(Point, &'a [Point])> {
-        let Self::On { leg, .. } = *self else { return None };
+        let Self::On { leg_end: leg, .. } = *self else { return None };
         let leg = usize::from(leg);
         let to = points.get(leg)?;
         // No leg ends at the first point: that point is the place itself, and would take up the
@@ -118,7 +118,11 @@ impl PlaceOnPoints {
     /// metres.
     #[inline]
     pub fn place_uncertainty_m(&self) -> f32 {
-        if let Self::On { more_dm, .. } = *self { 0.1 * f32::from(more_dm) } else { 0.0 }
+        if let Self::On { uncertainty_dm, .. } = *self {
+            0.1 * f32::from(uncertainty_dm)
+        } else {
+            0.0
+        }
     }
 }
 
@@ -138,15 +142,15 @@ fn nearest_point_on_leg(position: &Point, from: &Point, to: &Point) -> Point {
 pub struct ReportedPathReach {
     /// Addition to the distance that the neighbour flies until it has stopped, metres: from its
     /// position to its place on the points, and from the first place where it may be to the last.
-    pub beyond_m: f32,
+    pub added_reach_m: f32,
     /// Upper bound of the distance to any place on the points, metres; infinite where the neighbour
     /// may leave them.
-    pub most_m: f32,
+    pub max_reach_m: f32,
 }
 
 impl ReportedPathReach {
     /// Where a neighbour has no points, or is beside them: nothing but its motion bounds its reach.
-    pub const OPEN: Self = Self { beyond_m: 0.0, most_m: f32::INFINITY };
+    pub const UNBOUNDED: Self = Self { added_reach_m: 0.0, max_reach_m: f32::INFINITY };
 
     /// The reach from `position` along `points`, of which none is further from the first one than
     /// `extent_m`, metres. Not inlined: a board has little flash.
@@ -158,18 +162,18 @@ impl ReportedPathReach {
         extent_m: f32,
     ) -> Self {
         let away_m = |place: &Point| sqrtf((place - position).norm_squared());
-        let Some(first) = points.first() else { return Self::OPEN };
+        let Some(first) = points.first() else { return Self::UNBOUNDED };
         if *place_on_points == PlaceOnPoints::Unknown {
             // Only the points' extent bounds the place. Near the first point the vehicle is on
             // them.
             let first_m = away_m(first);
             let on = first_m < OFF_REPORTED_PATH_M;
             let most_m = if on { first_m + extent_m } else { f32::INFINITY };
-            return Self { beyond_m: first_m + extent_m, most_m };
+            return Self { added_reach_m: first_m + extent_m, max_reach_m: most_m };
         }
-        place_on_points.ahead(position, points).map_or(Self::OPEN, |(place, _)| Self {
-            beyond_m: away_m(&place) + place_on_points.place_uncertainty_m(),
-            most_m: away_m(first) + extent_m,
+        place_on_points.ahead(position, points).map_or(Self::UNBOUNDED, |(place, _)| Self {
+            added_reach_m: away_m(&place) + place_on_points.place_uncertainty_m(),
+            max_reach_m: away_m(first) + extent_m,
         })
     }
 }

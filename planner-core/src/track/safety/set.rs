@@ -15,7 +15,7 @@ pub(super) const MAX_SET_POINTS: usize = 9;
 pub struct ReachableSet {
     pub(super) points: Vec<Point, MAX_SET_POINTS>,
     /// Lower end of the column; `None` if there is no column.
-    pub(super) foot: Option<Point>,
+    pub(super) column_bottom: Option<Point>,
     /// Distance from polyline and column up to which the vehicle can be, metres.
     pub widened_by_m: f32,
 }
@@ -27,7 +27,7 @@ impl ReachableSet {
         let mut points = Vec::new();
         // Cannot overflow: it is the first of nine.
         let _ = points.push(place);
-        Self { points, foot: None, widened_by_m: 0.0 }
+        Self { points, column_bottom: None, widened_by_m: 0.0 }
     }
 
     /// Appends a straight leg to a point. Returns false, and appends nothing, if the set is full.
@@ -82,7 +82,7 @@ impl ReachableSet {
     /// `None` or not below the point.
     pub(super) fn add_column(&mut self, to_m: Option<f32>) {
         let first = self.points[0];
-        self.foot = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
+        self.column_bottom = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
     }
 
     /// Legs of the set, at least one, and the column.
@@ -93,7 +93,7 @@ impl ReachableSet {
         Segments {
             from: first,
             next: next.iter(),
-            column: self.foot.as_ref().map(|foot| (first, foot)),
+            column: self.column_bottom.as_ref().map(|foot| (first, foot)),
         }
     }
 }

@@ -10,7 +10,8 @@ use self::plain::reported_path_reach;
 use super::*;
 
 const BRAKING: Braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
-const BOUNDS: MotionBounds = MotionBounds { braking: BRAKING, speed_max_mps: 2.0, silent_s: 3.0 };
+const BOUNDS: MotionBounds =
+    MotionBounds { braking: BRAKING, speed_max_mps: 2.0, stopped_when_unheard_for_s: 3.0 };
 const APART_M: f32 = 1.5;
 
 fn point() -> impl Strategy<Value = Point> {
@@ -86,20 +87,20 @@ proptest! {
             speed_mps,
             age_s,
             delay_s: 0.0,
-            points: &path,
+            reported_points: &path,
             place_on_points: PlaceOnPoints::Unknown,
             reported_path_reach: reported_path_reach(&path[0], &path, PlaceOnPoints::Unknown),
             rests_within_m: 0.0,
             grounded: false,
-            column_to_m: None,
+            column_bottom_z_m: None,
         };
         let there = places(&heard.reachable_set(&BOUNDS, 0.0));
         // The vehicle flew on, and stops after the reaction time.
-        let flown_m = speed_mps * (age_s + goes_on_s) + BRAKING.stop_m(speed_mps);
+        let flown_m = speed_mps * (age_s + goes_on_s) + BRAKING.stop_distance_m(speed_mps);
         let set = ReachableSet::along(path[0], path.iter().copied(), flown_m);
         for place in places(&set) {
             prop_assert!(least(&[place], &there) < 0.03);
-            let reach_m = heard.reach_m(&BOUNDS, 0.0);
+            let reach_m = heard.max_reach_m(&BOUNDS, 0.0);
             prop_assert!((place - path[0]).norm() <= reach_m + 0.01);
         }
     }
@@ -122,19 +123,19 @@ proptest! {
             speed_mps,
             age_s,
             delay_s: 0.2,
-            points: &path,
+            reported_points: &path,
             place_on_points: PlaceOnPoints::Unknown,
             reported_path_reach: reported_path_reach(&position, &path, PlaceOnPoints::Unknown),
             rests_within_m: 0.0,
             grounded: false,
-            column_to_m: None,
+            column_bottom_z_m: None,
         };
         let set = heard.reachable_set(&BOUNDS, ahead_s);
-        prop_assert!(set.reach_m() <= heard.reach_m(&BOUNDS, ahead_s) + 0.01);
+        prop_assert!(set.reach_m() <= heard.max_reach_m(&BOUNDS, ahead_s) + 0.01);
         let joint = PlaceOnPoints::find(&position, &path, &heard.velocity);
         let reported_path_reach = reported_path_reach(&position, &path, joint);
         let heard = NeighbourMotion { place_on_points: joint, reported_path_reach, ..heard };
-        prop_assert!(set.reach_m() <= heard.reach_m(&BOUNDS, ahead_s) + 0.01);
+        prop_assert!(set.reach_m() <= heard.max_reach_m(&BOUNDS, ahead_s) + 0.01);
     }
 }
 
@@ -159,7 +160,7 @@ fn a_fast_vehicle_behind_its_setpoint_stays_inside_its_set_around_a_corner() {
             speed_mps,
             age_s: 0.1,
             delay_s: 0.0,
-            points: &points,
+            reported_points: &points,
             place_on_points: PlaceOnPoints::Unknown,
             reported_path_reach: reported_path_reach(
                 &Point::zeros(),
@@ -168,18 +169,18 @@ fn a_fast_vehicle_behind_its_setpoint_stays_inside_its_set_around_a_corner() {
             ),
             rests_within_m: 0.0,
             grounded: false,
-            column_to_m: None,
+            column_bottom_z_m: None,
         };
         let set = heard.reachable_set(&bounds, 0.0);
-        let flown_m = 0.1 * speed_mps + BRAKING.stop_m(speed_mps);
+        let flown_m = 0.1 * speed_mps + BRAKING.stop_distance_m(speed_mps);
         let away_m = least(&[place(flown_m)], &places(&set));
         assert!(away_m < 0.1, "{away_m} m outside at {speed_mps} m/s, corner at {corner_m} m");
         let joint = PlaceOnPoints::find(&heard.position, &points, &heard.velocity);
         let reported_path_reach = reported_path_reach(&heard.position, &points, joint);
-        let reach_m = NeighbourMotion { reported_path_reach, ..heard }.reach_m(&bounds, 0.0);
+        let reach_m = NeighbourMotion { reported_path_reach, ..heard }.max_reach_m(&bounds, 0.0);
         assert!(set.reach_m() <= reach_m + 0.01, "{} of {reach_m} m", set.reach_m());
         // The vehicle flies on beyond the last point that was heard.
-        let beyond = NeighbourMotion { points: &[place(-1.5)], ..heard };
+        let beyond = NeighbourMotion { reported_points: &[place(-1.5)], ..heard };
         let there = places(&beyond.reachable_set(&bounds, 0.0));
         assert!(least(&[Point::new(flown_m, 0.0, 0.0)], &there) < 0.1);
     }
@@ -215,7 +216,7 @@ impl Flier {
 
     fn set(&self) -> ReachableSet {
         let (place, next, _) = self.at(self.along_m);
-        let length_m = self.speed_mps * REACTION_S + BRAKING.stop_m(self.speed_mps) + 0.1;
+        let length_m = self.speed_mps * REACTION_S + BRAKING.stop_distance_m(self.speed_mps) + 0.1;
         let ahead =
             core::iter::once(place).chain(self.path[next.min(self.path.len())..].iter().copied());
         ReachableSet::along(place, ahead, length_m)
@@ -273,12 +274,12 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
                     speed_mps: velocity.norm(),
                     age_s: now_s - at_s,
                     delay_s: 0.0,
-                    points: &other.path[from..],
+                    reported_points: &other.path[from..],
                     place_on_points: PlaceOnPoints::Unknown,
-                    reported_path_reach: ReportedPathReach::OPEN,
+                    reported_path_reach: ReportedPathReach::UNBOUNDED,
                     rests_within_m: 0.0,
                     grounded: false,
-                    column_to_m: None,
+                    column_bottom_z_m: None,
                 };
                 OwnSet::new(&fliers[i].set(), &mut Legs::new()).conflicts(
                     &heard.reachable_set(&BOUNDS, 0.0),

@@ -5,7 +5,7 @@ pub(crate) const GAINS: Gains = Gains {
     velocity_p: [1.8, 4.0],
     velocity_i: [0.4, 2.0],
     velocity_d: [0.2, 0.0],
-    tilt_tan: 1.0,
+    tilt_max_tan: 1.0,
     heading_rate_max: 1.0,
 };
 const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
@@ -21,8 +21,8 @@ fn demand() -> Demand {
         speed_max: 12.0,
         climb_max: 3.0,
         descend_max: 1.5,
-        lift_off: f32::NAN,
-        thrust_min: 0.15,
+        lift_off_acceleration: f32::NAN,
+        min_thrust_per_weight: 0.15,
         height_rate_weight: 0.0,
     }
 }
@@ -30,11 +30,12 @@ fn demand() -> Demand {
 fn fly(vehicle: &mut Multicopter, demand: &Demand, wind: Point, seconds: f32) -> (f32, f32) {
     let (mut fastest, mut worst_jerk) = (0.0_f32, 0.0_f32);
     for _ in 0..(seconds / DT) as usize {
-        let (p, v, before) = (vehicle.state().position, vehicle.state().velocity, vehicle.thrust);
+        let (p, v, before) =
+            (vehicle.state().position, vehicle.state().velocity, vehicle.thrust_minus_gravity);
         vehicle.control(demand, &GAINS, &p, &v, DT);
         vehicle.advance(MotorState::Lifting, &wind, 0.0, DT);
         fastest = fastest.max(vehicle.state().velocity.norm());
-        worst_jerk = worst_jerk.max((vehicle.thrust - before).norm() / DT);
+        worst_jerk = worst_jerk.max((vehicle.thrust_minus_gravity - before).norm() / DT);
     }
     (fastest, worst_jerk)
 }

@@ -10,14 +10,19 @@ fn names_are_sorted_and_fit_the_wire() {
 fn every_parameter_that_acts_is_in_the_table() {
     // A misspelt name would read as 0; none of these defaults is 0 but the two actions.
     let t = Px4Tuning::new(&default_params(3, &AirframeParameters::default()));
-    for value in
-        [t.speed_max, t.cruise, t.land_speed, t.spool_up_s, t.offboard_loss_s, t.return_height]
-    {
+    for value in [
+        t.speed_max,
+        t.cruise_speed,
+        t.land_speed,
+        t.spool_up_s,
+        t.offboard_loss_timeout_s,
+        t.return_height,
+    ] {
         assert!(value > 0.0);
     }
     for value in [
-        t.auto_up,
-        t.auto_down,
+        t.auto_climb_max,
+        t.auto_descend_max,
         t.takeoff_speed,
         t.takeoff_ramp_s,
         t.takeoff_height,
@@ -29,10 +34,10 @@ fn every_parameter_that_acts_is_in_the_table() {
         assert!(value > 0.0);
     }
     for value in [
-        t.disarm_land_s,
+        t.disarm_after_landing_s,
         t.disarm_preflight_s,
         t.return_descend_height,
-        t.battery_low,
+        t.battery_low_share,
         t.return_cone_tan,
     ] {
         assert!(value > 0.0);

@@ -50,7 +50,7 @@ fn compare(n: usize, instances: u64, kind: Kind, ws: &mut AssignmentWorkspace<LA
             // `lapjv` sums prices in f32 and may miss the optimum by their rounding; ours must
             // never cost more.
             assert!(
-                result.total <= their_total + 1e-9 * their_total,
+                result.total_cost <= their_total + 1e-9 * their_total,
                 "seed {seed}: not the optimum"
             );
         }

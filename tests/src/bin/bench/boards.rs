@@ -4,17 +4,17 @@
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use flockmate_tests::{Guard, board, workspace};
+use flockmate_tests::{ChildGuard, board, workspace};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::{scenario, swarm};
 
 /// Number of processes that keep this machine busy during the second flight.
-const BUSY: usize = 8;
+const BUSY_PROCESSES: usize = 8;
 
 /// Flies the demo on boards twice, compares both flights and prints how long they took.
 pub fn run() -> Result<()> {
-    let Some(program) = board::program("flockmate") else { return Ok(()) };
+    let Some(program) = board::built_program("flockmate") else { return Ok(()) };
     let folder = tempfile::tempdir()?;
     let demo = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let progress = Progress::on_terminal();
@@ -25,18 +25,23 @@ pub fn run() -> Result<()> {
     let alone = fly()?;
     let busy =
         || Command::new("sh").args(["-c", "while :; do :; done"]).stdin(Stdio::null()).spawn();
-    let others: Vec<_> =
-        (0..BUSY).map(|_| busy().map(Guard)).collect::<Result<_, _>>().context("no sh")?;
+    let others: Vec<_> = (0..BUSY_PROCESSES)
+        .map(|_| busy().map(ChildGuard))
+        .collect::<Result<_, _>>()
+        .context("no sh")?;
     let beside = fly()?;
     drop(others);
     println!(
-        "{} boards, {:.0} s of flight: {:.0} s alone, {:.0} s beside {BUSY} busy processes",
+        "{} boards, {:.0} s of flight: {:.0} s alone, {:.0} s beside {BUSY_PROCESSES} busy processes",
         mission.scenario.vehicles.len(),
         alone.simulated_s,
-        alone.took_s,
-        beside.took_s
+        alone.wall_time_s,
+        beside.wall_time_s
     );
     ensure!(alone.result.complete, "the flight is not complete");
-    ensure!(board::record(&alone) == board::record(&beside), "the flights differ");
+    ensure!(
+        board::observable_text(&alone) == board::observable_text(&beside),
+        "the flights differ"
+    );
     Ok(())
 }

@@ -25,24 +25,24 @@ use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::pack::{
-    Heights, PackWorkspace, RouteDirection, RoutePlan, TrackUnit, Vehicle, Work, binpat,
+    CoverageProblem, Heights, PackWorkspace, RouteDirection, RoutePlan, TrackUnit, Vehicle, binpat,
 };
 use planner_core::coverage::powell;
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
-use planner_core::coverage::transit::Transit;
+use planner_core::coverage::transit::TransitGraph;
 use planner_core::flight::WaypointRange;
 
 use crate::row::Row;
 
 /// Number of random areas on which the methods' costs are compared.
-const AREAS: u64 = 1000;
+const RANDOM_AREAS: u64 = 1000;
 /// Runs in each round; their median counts.
 const RUNS: usize = 301;
 /// Rounds, each of our runs and then theirs; the median of the rounds counts.
 const ROUNDS: usize = 5;
 const LANES: usize = 512;
 const VEHICLES: usize = 32;
-const VERTICES: [[f32; 2]; 5] =
+const AREA_VERTICES: [[f32; 2]; 5] =
     [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
 
 /// Rows for a plan and for planning after a loss, with 3 and 10 vehicles; for POWELL with 3, beside
@@ -52,7 +52,7 @@ const VERTICES: [[f32; 2]; 5] =
 /// The C++ program cannot be built or run.
 pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
     let mut rows = Vec::new();
-    let peer = checkout.map(build).transpose()?;
+    let peer = checkout.map(build_cpp_binpat).transpose()?;
     if peer.is_none() {
         println!(
             "coverage: no --binpat DIR, a checkout of cvar-upm/multi_uav_planning_binpat; only POWELL"
@@ -62,8 +62,8 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
         let Some(peer) = &peer else { break };
         let (mut ours, mut theirs) = (Vec::new(), Vec::new());
         for _ in 0..ROUNDS {
-            ours.push(ours_us(n));
-            theirs.push(theirs_us(peer, n)?);
+            ours.push(our_times_us(n));
+            theirs.push(their_times_us(peer, n)?);
         }
         for (k, name) in ["coverage, plan", "coverage, after a loss"].into_iter().enumerate() {
             let middle = |times: &[[f64; 2]]| {
@@ -84,7 +84,7 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
             });
         }
     }
-    let ours = powell_us();
+    let ours = our_powell_time_us();
     let name = "coverage, POWELL".to_owned();
     rows.push(Row {
         name,
@@ -95,15 +95,15 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
         unit: "us",
         n: 3,
     });
-    rows.extend(costs());
+    rows.extend(cost_rows());
     Ok(rows)
 }
 
 /// Compares the greatest costs of the methods on random convex areas for 2 to 10 vehicles. Rows:
 /// the share of areas for which a relation holds, beside the share required, and POWELL's median
 /// gap to the best division, beside the gap allowed.
-fn costs() -> Vec<Row> {
-    let costs = Costs::of(0..AREAS);
+fn cost_rows() -> Vec<Row> {
+    let costs = Costs::of(0..RANDOM_AREAS);
     println!("coverage: {costs:?}");
     let share = |name: &str, but: usize, required: f64| {
         let ours = 100.0 * (1.0 - but as f64 / costs.areas as f64);
@@ -119,12 +119,12 @@ fn costs() -> Vec<Row> {
         }
     };
     // With a gap of 0 the ratio would be infinite.
-    let gap = f64::from(costs.gaps[2]).max(0.01);
+    let gap = f64::from(costs.median_gaps_percent[2]).max(0.01);
     let name = "coverage, gap of POWELL to exact, median".to_owned();
     vec![
         share("POWELL <= BINPAT", costs.powell_over_binpat, 100.0),
         share("POWELL <= SIMPLE", costs.powell_over_simple, 95.0),
-        share("exact <= all", costs.below_exact, 100.0),
+        share("exact <= all", costs.plans_below_exact, 100.0),
         Row {
             name,
             ours: gap,
@@ -138,7 +138,7 @@ fn costs() -> Vec<Row> {
 }
 
 /// Compiles `tests/peers/binpat.cpp` with the headers of the checkout; returns the program.
-fn build(checkout: &Path) -> Result<tempfile::TempPath> {
+fn build_cpp_binpat(checkout: &Path) -> Result<tempfile::TempPath> {
     let program = tempfile::NamedTempFile::new()?.into_temp_path();
     let include = checkout.join("planning_binpat/include");
     let built = Command::new("g++")
@@ -156,7 +156,7 @@ fn build(checkout: &Path) -> Result<tempfile::TempPath> {
     Ok(program)
 }
 
-fn theirs_us(program: &Path, vehicles: usize) -> Result<[f64; 2]> {
+fn their_times_us(program: &Path, vehicles: usize) -> Result<[f64; 2]> {
     let output = Command::new(program).args([vehicles.to_string(), RUNS.to_string()]).output()?;
     let text = String::from_utf8_lossy(&output.stdout);
     let times: Vec<f64> = text.split_whitespace().filter_map(|word| word.parse().ok()).collect();
@@ -180,11 +180,18 @@ impl CoverageBench {
         let vehicle = |i: usize| {
             let place = Flat::new(5.0 * i as f32, -10.0);
             let (cruise_mps, climb_mps, descend_mps) = (5.0, 3.0, 1.0);
-            Vehicle { place, home: place, cruise_mps, climb_mps, descend_mps, weight: 1.0 }
+            Vehicle {
+                transit_start: place,
+                home: place,
+                cruise_mps,
+                climb_mps,
+                descend_mps,
+                weight: 1.0,
+            }
         };
         Self {
-            vertices: VERTICES.iter().map(|[x, y]| Flat::new(*x, *y)).collect(),
-            rings: [Ring { end: VERTICES.len() as u16, kind: RingKind::Outer }],
+            vertices: AREA_VERTICES.iter().map(|[x, y]| Flat::new(*x, *y)).collect(),
+            rings: [Ring { end: AREA_VERTICES.len() as u16, kind: RingKind::Outer }],
             vehicles: (0..vehicles).map(vehicle).collect(),
             tracks: Box::default(),
             workspace: Box::default(),
@@ -197,34 +204,46 @@ impl CoverageBench {
     /// One whole plan: from the vertices to the flights as points.
     fn plan(&mut self) {
         let area = Area::new(black_box(&self.vertices), &self.rings).expect("an area");
-        let mut transit = Transit::<8>::empty();
+        let mut transit = TransitGraph::<8>::empty();
         transit.set_area(area).expect("no zones");
         let footprint = Footprint { along_m: 10.0, across_m: 10.0 };
-        let spacing = Spacing { footprint, lane_m: 10.0, waypoint_m: 10.0 };
-        let pattern = LanePattern { spacing, angle_deg: None, margin_m: 0.0, search_steps: 10_000 };
+        let spacing = Spacing { footprint, max_lane_spacing_m: 10.0, max_waypoint_spacing_m: 10.0 };
+        let pattern = LanePattern {
+            spacing,
+            angle_from_east_deg: None,
+            border_overshoot_m: 0.0,
+            max_search_steps: 10_000,
+        };
         tracks::build_lanes(&area, &pattern, &transit, &mut self.workspace, &mut self.tracks)
             .expect("lanes");
-        let work = work(&self.tracks, &transit, &self.vehicles);
+        let work = work_of_lanes(&self.tracks, &transit, &self.vehicles);
         binpat(&work, &mut self.pack, &mut self.plan).expect("routes");
-        write_out(&work, &self.plan, &mut self.points);
+        write_flights_as_points(&work, &self.plan, &mut self.points);
         black_box(&self.points);
     }
 }
 
 /// Writes every flight as points: start, up to its layer, the lanes, its layer, home.
-fn write_out(work: &Work<'_, LANES, 8>, plan: &RoutePlan<VEHICLES>, points: &mut Vec<[f32; 3]>) {
+fn write_flights_as_points(
+    work: &CoverageProblem<'_, LANES, 8>,
+    plan: &RoutePlan<VEHICLES>,
+    points: &mut Vec<[f32; 3]>,
+) {
     points.clear();
-    let Heights { mission_m, layer_m } = work.heights;
+    let Heights { max_picture_height_m: mission_m, layer_spacing_m: layer_m } = work.heights;
     for route in &plan.routes {
-        let vehicle = &work.vehicles[usize::from(route.vehicle)];
+        let vehicle = &work.vehicles[usize::from(route.vehicle_index)];
         let up_m = mission_m + layer_m * f32::from(route.layer);
         let at = |place: &Flat, height_m: f32| [place.x, place.y, height_m];
-        points.extend([at(&vehicle.place, mission_m), at(&vehicle.place, up_m)]);
-        let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
+        points.extend([at(&vehicle.transit_start, mission_m), at(&vehicle.transit_start, up_m)]);
+        let lanes = work.tracks.lane_of(route.lowest_waypoint)
+            ..=work.tracks.lane_of(route.waypoint_end - 1);
         let begins = points.len();
         for lane in &work.tracks.lanes()[lanes] {
-            let from = route.first.max(lane.first) - lane.first;
-            let to = route.end.min(lane.first + lane.count) - 1 - lane.first;
+            let from = route.lowest_waypoint.max(lane.first_waypoint) - lane.first_waypoint;
+            let to = route.waypoint_end.min(lane.first_waypoint + lane.waypoint_count)
+                - 1
+                - lane.first_waypoint;
             points.extend([from, to].map(|k| at(&lane.waypoint(k), mission_m)));
         }
         if route.direction == RouteDirection::Backward {
@@ -236,24 +255,34 @@ fn write_out(work: &Work<'_, LANES, 8>, plan: &RoutePlan<VEHICLES>, points: &mut
     }
 }
 
-fn work<'a>(
+fn work_of_lanes<'a>(
     tracks: &'a Tracks<LANES>,
-    transit: &'a Transit<'a, 8>,
+    transit: &'a TransitGraph<'a, 8>,
     vehicles: &'a [Vehicle],
-) -> Work<'a, LANES, 8> {
-    let heights = Heights { mission_m: 35.0, layer_m: 5.0 };
-    Work { tracks, transit, vehicles, heights, unit: TrackUnit::Waypoint, following: None }
+) -> CoverageProblem<'a, LANES, 8> {
+    let heights = Heights { max_picture_height_m: 35.0, layer_spacing_m: 5.0 };
+    CoverageProblem {
+        tracks,
+        transit,
+        vehicles,
+        heights,
+        unit: TrackUnit::Waypoint,
+        following: None,
+    }
 }
 
-fn ours_us(vehicles: usize) -> [f64; 2] {
+fn our_times_us(vehicles: usize) -> [f64; 2] {
     let mut bench = CoverageBench::new(vehicles);
     let plan_us = median_us(|| bench.plan());
-    let transit = Transit::<8>::empty();
+    let transit = TransitGraph::<8>::empty();
     // Each vehicle has flown ten waypoints of its route and stands at the tenth.
     let mut done = Vec::new();
     for route in &bench.plan.routes {
-        let flown = WaypointRange { first: route.first, end: (route.first + 10).min(route.end) };
-        bench.vehicles[usize::from(route.vehicle)].place =
+        let flown = WaypointRange {
+            first: route.lowest_waypoint,
+            end: (route.lowest_waypoint + 10).min(route.waypoint_end),
+        };
+        bench.vehicles[usize::from(route.vehicle_index)].transit_start =
             bench.tracks.waypoint(flown.end - 1).expect("a waypoint");
         done.push(flown);
     }
@@ -262,9 +291,9 @@ fn ours_us(vehicles: usize) -> [f64; 2] {
         divide::remaining_lanes(&bench.tracks, black_box(&done), &transit, &mut left)
             .expect("something is left");
         let rest = &bench.vehicles[1..];
-        let work = work(&left, &transit, rest);
+        let work = work_of_lanes(&left, &transit, rest);
         binpat(&work, &mut bench.pack, &mut bench.plan).expect("routes");
-        write_out(&work, &bench.plan, &mut bench.points);
+        write_flights_as_points(&work, &bench.plan, &mut bench.points);
         black_box(&bench.points);
     });
     let last = left.waypoint_count() - 1;
@@ -272,12 +301,12 @@ fn ours_us(vehicles: usize) -> [f64; 2] {
     [plan_us, update_us]
 }
 
-fn powell_us() -> f64 {
+fn our_powell_time_us() -> f64 {
     let mut bench = CoverageBench::new(3);
     bench.plan();
-    let transit = Transit::<8>::empty();
+    let transit = TransitGraph::<8>::empty();
     let mut ws: Box<powell::PowellWorkspace<VEHICLES>> = Box::default();
-    let work = work(&bench.tracks, &transit, &bench.vehicles);
+    let work = work_of_lanes(&bench.tracks, &transit, &bench.vehicles);
     median_us(|| {
         powell::powell(&work, &powell::PowellConfig::USUAL, &mut ws, &mut bench.plan)
             .expect("routes");

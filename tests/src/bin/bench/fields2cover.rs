@@ -33,21 +33,21 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
-use planner_core::coverage::transit::Transit;
+use planner_core::coverage::transit::TransitGraph;
 
-use self::routes::{Best, Obstacles, Place, wide};
+use self::routes::{BestRoute, EastNorth, Obstacles, to_f64};
 use crate::row::Row;
 
 /// Runs of each field; their median time counts.
 const RUNS: usize = 11;
-const VERTICES: usize = 1024;
+const MAX_VERTICES: usize = 1024;
 /// Least ratio of Fields2Cover's length to ours: ours may be at most 3 % longer.
 const MIN_LENGTH_RATIO: f64 = 0.971;
 /// Folders of Fields2Cover's sources that are compiled: without route planner (OR-tools) and
 /// drawing.
-const SOURCES: [&str; 5] =
+const SOURCE_FOLDERS: [&str; 5] =
     ["types", "route_planning", "swath_generator", "objectives", "decomposition"];
-const LEFT_OUT: [&str; 3] = ["route_planner_base.cpp", "Path.cpp", "pp_obj"];
+const EXCLUDED_SOURCES: [&str; 3] = ["route_planner_base.cpp", "Path.cpp", "pp_obj"];
 /// File, lane width in metres and coordinates of each field.
 const FIELDS: [(&str, f32, &str); 4] = [
     ("fields2cover_test.json", 10.0, "wgs84"),
@@ -88,7 +88,7 @@ const RING: Rings = (
     20.0,
 );
 /// Name, lane width in metres and rings of each field with obstacles.
-const WITH_OBSTACLES: [(&str, f32, Rings); 4] = [
+const FIELDS_WITH_OBSTACLES: [(&str, f32, Rings); 4] = [
     ("two squares, its lanes of 5 m", 5.0, TWO_SQUARES),
     ("two squares, its lanes of 3 m", 3.0, TWO_SQUARES),
     ("two slots", 5.0, TWO_SLOTS),
@@ -123,7 +123,7 @@ impl Field {
 
     /// The field with up to three square obstacles in a row through its middle: those that lie
     /// inside with some space around them.
-    fn with_squares(&self) -> Self {
+    fn with_square_obstacles(&self) -> Self {
         let mut field = Self { vertices: self.vertices.clone(), rings: self.rings.clone() };
         let outer = self.vertices.clone();
         let (mut low, mut high) = (outer[0], outer[0]);
@@ -142,7 +142,7 @@ impl Field {
             let edges = corners.iter().zip(corners.iter().cycle().skip(1));
             let inside = |(a, b): (&Flat, &Flat)| {
                 (0..EDGE_STEPS)
-                    .all(|k| ring_holds(&outer, &(a + (b - a) * (k as f32 / EDGE_STEPS as f32))))
+                    .all(|k| ring_contains(&outer, &(a + (b - a) * (k as f32 / EDGE_STEPS as f32))))
             };
             if edges.into_iter().all(inside) {
                 field.add_ring(square(side / 2.0).into_iter());
@@ -152,20 +152,20 @@ impl Field {
     }
 
     /// Share of the field's area that lanes sweep.
-    fn swept_share(&self, lanes: &[[Place; 2]], lane_m: f32) -> f64 {
+    fn swept_share(&self, lanes: &[[EastNorth; 2]], lane_m: f32) -> f64 {
         let outer = &self.vertices[..usize::from(self.rings[0].end)];
         let (mut low, mut high) = (outer[0], outer[0]);
         outer.iter().for_each(|at| (low, high) = (low.inf(at), high.sup(at)));
         let holds = |at: &[f64; 2]| {
             let at = Flat::new(at[0] as f32, at[1] as f32);
-            ring_holds(outer, &at) && !self.obstacles().any(|ring| ring_holds(ring, &at))
+            ring_contains(outer, &at) && !self.obstacles().any(|ring| ring_contains(ring, &at))
         };
-        let corners = [low, high].map(wide);
+        let corners = [low, high].map(to_f64);
         routes::swept_share(lanes, f64::from(lane_m), holds, corners)
     }
 
     fn convex_obstacles(&self) -> Obstacles {
-        Obstacles::new(self.obstacles().map(|ring| ring.iter().copied().map(wide).collect()))
+        Obstacles::new(self.obstacles().map(|ring| ring.iter().copied().map(to_f64).collect()))
     }
 
     /// The corners of each obstacle.
@@ -177,7 +177,7 @@ impl Field {
 }
 
 /// Whether a ring contains a point; shares no code with the planner.
-fn ring_holds(ring: &[Flat], at: &Flat) -> bool {
+fn ring_contains(ring: &[Flat], at: &Flat) -> bool {
     let mut inside = false;
     for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
         if (a.y > at.y) != (b.y > at.y) && at.x < (b.x - a.x) * (at.y - a.y) / (b.y - a.y) + a.x {
@@ -188,12 +188,12 @@ fn ring_holds(ring: &[Flat], at: &Flat) -> bool {
 }
 
 /// Our route over a field: lengths, planning time, and number of legs that cross an obstacle.
-struct Way {
+struct OurRoute {
     lanes_m: f64,
     total_m: f64,
     time_us: f64,
     crossings: usize,
-    lanes: Vec<[Place; 2]>,
+    lanes: Vec<[EastNorth; 2]>,
 }
 
 /// Rows of length and time for each field; none without a checkout.
@@ -208,17 +208,17 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
         return Ok(Vec::new());
     };
     let folder = tempfile::tempdir()?;
-    let program = build(checkout, folder.path())?;
+    let program = build_fields2cover(checkout, folder.path())?;
     let mut rows = Vec::new();
-    for (name, lane_m, rings) in WITH_OBSTACLES {
+    for (name, lane_m, rings) in FIELDS_WITH_OBSTACLES {
         rows.extend(compare(&program, name, &Field::new(rings), lane_m)?);
     }
     for (file, lane_m, coordinates) in FIELDS {
         let Some(path) = shared_data(&format!("coverage/{file}")) else { return Ok(rows) };
-        for (k, field) in fields(&path, lane_m, coordinates)?.iter().enumerate() {
+        for (k, field) in read_fields(&path, lane_m, coordinates)?.iter().enumerate() {
             let name = format!("{} {}", file.trim_end_matches(".json"), k + 1);
             rows.extend(compare(&program, &name, field, lane_m)?);
-            let with = field.with_squares();
+            let with = field.with_square_obstacles();
             if with.rings.len() > 1 {
                 let name = format!("{name} with {} squares", with.rings.len() - 1);
                 rows.extend(compare(&program, &name, &with, lane_m)?);
@@ -230,14 +230,14 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
 
 /// The rows of one field: lengths and times of our routes and of its shortest one.
 fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec<Row>> {
-    let (first, angle) = ours(field, lane_m, BOARD_SEARCH_STEPS)?;
-    let (searched, _) = ours(field, lane_m, HOST_SEARCH_STEPS)?;
+    let (first, angle) = plan_our_route(field, lane_m, BOARD_SEARCH_STEPS)?;
+    let (searched, _) = plan_our_route(field, lane_m, HOST_SEARCH_STEPS)?;
     println!(
         "{name}: ours {:.1} m ({:.1} m of lanes), {} crossings",
         first.total_m, first.lanes_m, first.crossings
     );
     ensure!(first.crossings + searched.crossings == 0, "{name}: our way crosses an obstacle");
-    let theirs = theirs(program, field, angle, lane_m)?;
+    let theirs = plan_their_routes(program, field, angle, lane_m)?;
     for best in &theirs {
         println!(
             "  theirs by {}: {:.1} m ({:.1} m of lanes), {:.0} us, {} crossings if straight, {:.2} % swept",
@@ -254,8 +254,12 @@ fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec
     let (total_m, time_us) = (shortest.total_m, shortest.time_us);
     let swept = [&first.lanes, &shortest.lanes].map(|lanes| field.swept_share(lanes, lane_m));
     let outer = &field.vertices[..usize::from(field.rings[0].end)];
-    let same_lanes_m =
-        same_lanes::way_m(outer, &field.convex_obstacles(), &shortest.lanes, lane_m)?;
+    let same_lanes_m = same_lanes::our_length_on_lanes_m(
+        outer,
+        &field.convex_obstacles(),
+        &shortest.lanes,
+        lane_m,
+    )?;
     println!("  ours with its lanes: {same_lanes_m:.1} m; swept by ours {:.2} %", 100.0 * swept[0]);
     let row = |what, ours: f64, theirs: f64, required, unit| Row {
         name: format!("{name}, {what}"),
@@ -276,7 +280,7 @@ fn compare(program: &Path, name: &str, field: &Field, lane_m: f32) -> Result<Vec
     ])
 }
 
-fn fields(path: &Path, lane_m: f32, coordinates: &str) -> Result<Vec<Field>> {
+fn read_fields(path: &Path, lane_m: f32, coordinates: &str) -> Result<Vec<Field>> {
     let text = format!(
         "[area]\nfile = {path:?}\ncoordinates = \"{coordinates}\"\nlane_m = {lane_m}\nwaypoint_m = {lane_m}\n\
          [mission]\ncruise_mps = 5.0\n[[vehicles]]\nid = 1\nstart = [0.0, 0.0, 0.0]\n"
@@ -298,13 +302,18 @@ fn fields(path: &Path, lane_m: f32, coordinates: &str) -> Result<Vec<Field>> {
 }
 
 /// Our route, and the angle of its lanes, radians counter-clockwise from east.
-fn ours(field: &Field, lane_m: f32, search_steps: u32) -> Result<(Way, f64)> {
+fn plan_our_route(field: &Field, lane_m: f32, search_steps: u32) -> Result<(OurRoute, f64)> {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
-    let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
-    let pattern = LanePattern { spacing, angle_deg: None, margin_m: 0.0, search_steps };
+    let spacing = Spacing { footprint, max_lane_spacing_m: lane_m, max_waypoint_spacing_m: lane_m };
+    let pattern = LanePattern {
+        spacing,
+        angle_from_east_deg: None,
+        border_overshoot_m: 0.0,
+        max_search_steps: search_steps,
+    };
     let mut found: Box<Tracks<MAX_LANES>> = Box::default();
-    let mut workspace: Box<tracks::LaneWorkspace<VERTICES>> = Box::default();
-    let mut transit = Box::new(Transit::<MAX_NO_FLY_CORNERS>::empty());
+    let mut workspace: Box<tracks::LaneWorkspace<MAX_VERTICES>> = Box::default();
+    let mut transit = Box::new(TransitGraph::<MAX_NO_FLY_CORNERS>::empty());
     let mut times = Vec::new();
     for _ in 0..RUNS {
         let began = Instant::now();
@@ -324,29 +333,35 @@ fn ours(field: &Field, lane_m: f32, search_steps: u32) -> Result<(Way, f64)> {
             .shortest_path(&from, &to, &mut corners)
             .map_err(|error| anyhow::anyhow!("{error:?}"))?;
         let way = [&[from], corners.as_slice(), &[to]].concat();
-        crossings += way.windows(2).filter(|leg| crosses(field, &leg[0], &leg[1])).count();
+        crossings += way.windows(2).filter(|leg| crosses_obstacle(field, &leg[0], &leg[1])).count();
     }
-    crossings += found.lanes().iter().filter(|lane| crosses(field, &lane.from, &lane.to)).count();
-    let way = Way {
+    crossings +=
+        found.lanes().iter().filter(|lane| crosses_obstacle(field, &lane.from, &lane.to)).count();
+    let way = OurRoute {
         lanes_m: found.lanes().iter().map(|lane| f64::from(lane.length_m())).sum(),
         total_m: f64::from(found.length_m()),
         time_us: times[RUNS / 2],
         crossings,
-        lanes: found.lanes().iter().map(|lane| [lane.from, lane.to].map(wide)).collect(),
+        lanes: found.lanes().iter().map(|lane| [lane.from, lane.to].map(to_f64)).collect(),
     };
     Ok((way, f64::from(found.lane_direction().y).atan2(f64::from(found.lane_direction().x))))
 }
 
 /// Whether a leg enters an obstacle; tests a point every centimetre.
-fn crosses(field: &Field, from: &Flat, to: &Flat) -> bool {
+fn crosses_obstacle(field: &Field, from: &Flat, to: &Flat) -> bool {
     let steps = ((to - from).norm() / 0.01).ceil().max(1.0) as usize;
     field.obstacles().any(|ring| {
-        (0..=steps).any(|k| ring_holds(ring, &(from + (to - from) * (k as f32 / steps as f32))))
+        (0..=steps).any(|k| ring_contains(ring, &(from + (to - from) * (k as f32 / steps as f32))))
     })
 }
 
 /// Fields2Cover's best routes: over the field as one cell, and over a decomposition into cells.
-fn theirs(program: &Path, field: &Field, angle: f64, lane_m: f32) -> Result<Vec<Best>> {
+fn plan_their_routes(
+    program: &Path,
+    field: &Field,
+    angle: f64,
+    lane_m: f32,
+) -> Result<Vec<BestRoute>> {
     let mut input = format!("{angle} {lane_m}\n");
     let mut from = 0;
     for ring in &field.rings {
@@ -365,17 +380,17 @@ fn theirs(program: &Path, field: &Field, angle: f64, lane_m: f32) -> Result<Vec<
     child.stdin.take().context("its input is piped")?.write_all(input.as_bytes())?;
     let output = child.wait_with_output()?;
     let obstacles = field.convex_obstacles();
-    let best = routes::best(&String::from_utf8_lossy(&output.stdout), &obstacles)?;
+    let best = routes::best_routes(&String::from_utf8_lossy(&output.stdout), &obstacles)?;
     ensure!(best[0].is_some(), "theirs printed nothing");
     Ok(best.into_iter().flatten().collect())
 }
 
 /// Compiles our driver with Fields2Cover's sources; returns the program's path.
-fn build(checkout: &Path, folder: &Path) -> Result<PathBuf> {
+fn build_fields2cover(checkout: &Path, folder: &Path) -> Result<PathBuf> {
     let source = checkout.join("src/fields2cover");
     let mut sources = Vec::new();
-    for part in SOURCES {
-        collect(&source.join(part), &mut sources)?;
+    for part in SOURCE_FOLDERS {
+        collect_sources(&source.join(part), &mut sources)?;
     }
     println!("fields2cover: building {} of its files, which takes minutes", sources.len());
     let program = folder.join("fields2cover");
@@ -397,17 +412,17 @@ fn build(checkout: &Path, folder: &Path) -> Result<PathBuf> {
     Ok(program)
 }
 
-fn collect(folder: &Path, sources: &mut Vec<PathBuf>) -> Result<()> {
+fn collect_sources(folder: &Path, sources: &mut Vec<PathBuf>) -> Result<()> {
     for entry in
         std::fs::read_dir(folder).with_context(|| format!("no sources in {}", folder.display()))?
     {
         let path = entry?.path();
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default().to_owned();
-        if LEFT_OUT.contains(&name.as_str()) {
+        if EXCLUDED_SOURCES.contains(&name.as_str()) {
             continue;
         }
         if path.is_dir() {
-            collect(&path, sources)?;
+            collect_sources(&path, sources)?;
         } else if name.ends_with(".cpp") {
             sources.push(path);
         }

@@ -50,7 +50,7 @@ struct Args {
 fn main() -> Result<()> {
     let args = Args::parse();
     if let Some(neighbours) = args.steps_beside {
-        steps::run(neighbours);
+        steps::run_cases(neighbours);
         return Ok(());
     }
     let mut rows = Vec::new();

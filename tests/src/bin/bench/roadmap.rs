@@ -22,7 +22,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
-use host_sim::map::{Unknown, bt, building};
+use host_sim::map::{UnknownSpace, bt, building};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::result::Timing;
@@ -32,7 +32,7 @@ use planner_core::geo::frames::Geodetic;
 use planner_core::map::voxel::VoxelGrid;
 use planner_core::roadmap::prm::{self, NodeIndex, PrmConfig, PrmEdge, Sampling, squared_length};
 use planner_core::roadmap::search::{RoadmapWithLengths, SearchWorkspace, astar, cost_matrix};
-use planner_core::roadmap::{self, LANDMARKS, RoadmapHeader, RoadmapView};
+use planner_core::roadmap::{self, LANDMARK_COUNT, RoadmapHeader, RoadmapView};
 use serde::Deserialize;
 
 use crate::row::Row;
@@ -46,11 +46,11 @@ const VEHICLES: usize = 10;
 const ROUNDS: usize = 9;
 const REPEATS: usize = 3;
 /// Workspace with the capacities of the default board.
-type BoardWorkspace = NodeIndex<4096, 4096>;
+type BoardNodeIndex = NodeIndex<4096, 4096>;
 
 /// The JSON line that the baseline program prints.
 #[derive(Deserialize)]
-struct Theirs {
+struct BaselineResult {
     nodes: usize,
     rays: usize,
     edges: usize,
@@ -69,18 +69,20 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
     let dir = tempfile::tempdir()?;
     let files = ["building.bt", "starts.txt", "goals.txt"].map(|name| dir.path().join(name));
     bt::write(&map.to_octree("builtin:building")?, &files[0])?;
-    let terminals = terminals();
+    let terminals = starts_and_goals();
     write_terminals(&files, &terminals)?;
-    let voxels = map.to_voxel_map(Unknown::Blocked);
+    let voxels = map.to_voxel_map(UnknownSpace::Blocked);
     let grid = voxels.grid();
-    let mut ours = Ours::new(&grid, &terminals);
+    let mut ours = OurBench::new(&grid, &terminals);
     let two = rayon::ThreadPoolBuilder::new().num_threads(2).build()?;
     let mut theirs = Vec::new();
     let mut times: [Vec<f64>; 4] = Default::default();
     let mut whole = Vec::new();
     for round in 0..ROUNDS {
-        theirs.push(run(peer, &files)?);
-        whole.extend(two.install(|| (0..REPEATS).map(|_| planned()).collect::<Result<Vec<_>>>())?);
+        theirs.push(run_baseline(peer, &files)?);
+        whole.extend(
+            two.install(|| (0..REPEATS).map(|_| time_host_sim_plan()).collect::<Result<Vec<_>>>())?,
+        );
         for repeat in 0..REPEATS {
             let seed = (1000 + round * REPEATS + repeat) as u64;
             let by_two = two.install(|| ours.build(seed, Threads::All))?;
@@ -99,11 +101,11 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
         }
     }
     print_sizes(&theirs, &ours);
-    print_parts(&whole);
-    let build: Value = |t| t.nodes_ms + t.edges_ms;
+    print_plan_timing(&whole);
+    let build: TimeOfBaseline = |t| t.nodes_ms + t.edges_ms;
     let [by_one, by_two, labelled, matrix] = times;
     let whole = whole.iter().map(|timing| timing.roadmap_s * 1e3).collect();
-    let all: [(&str, Value, f64, usize, Vec<f64>); 5] = [
+    let all: [(&str, TimeOfBaseline, f64, usize, Vec<f64>); 5] = [
         ("roadmap_s of plan", build, 7.0, NODES, whole),
         ("roadmap, one core", build, 8.0, NODES, by_one),
         ("roadmap, two cores", build, 14.0, NODES, by_two),
@@ -117,7 +119,7 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
 }
 
 /// Reads one time, milliseconds, from the JSON line of the baseline program.
-type Value = fn(&Theirs) -> f64;
+type TimeOfBaseline = fn(&BaselineResult) -> f64;
 
 /// A row of the bench: our `times` beside `value` of theirs, the required ratio of theirs to ours,
 /// and `n`, the number of nodes or vehicles.
@@ -125,8 +127,8 @@ fn row(
     name: &str,
     (required, n): (f64, usize),
     times: Vec<f64>,
-    theirs: &[Theirs],
-    value: Value,
+    theirs: &[BaselineResult],
+    value: TimeOfBaseline,
 ) -> Row {
     // One ratio for each round, since a slow spell of the machine slows both programs.
     let ratios =
@@ -145,13 +147,13 @@ fn row(
 
 /// Times of map and roadmap as a user of `host-sim plan` waits for them, with all parts, in the
 /// same building, for ten vehicles without a safety margin.
-fn planned() -> Result<Timing> {
+fn time_host_sim_plan() -> Result<Timing> {
     let mut text = format!(
         "[map]\nfile = \"builtin:building\"\nresolution_m = {RESOLUTION_M}\n\
          [roadmap]\nnodes = {NODES}\nedge_min_m = {EDGE_MIN_M}\nedge_max_m = {EDGE_MAX_M}\nsafety_margin_m = 0.0\n\
          [mission]\ngoals = ["
     );
-    let terminals = terminals();
+    let terminals = starts_and_goals();
     let (starts, goals) = terminals.split_at(VEHICLES);
     for (i, goal) in goals.iter().enumerate() {
         // The goals of the ninth and tenth vehicle would be above others, so they are moved aside.
@@ -172,16 +174,16 @@ fn planned() -> Result<Timing> {
 }
 
 /// Prints the median time of each part of `host-sim plan`'s map and roadmap.
-fn print_parts(whole: &[Timing]) {
+fn print_plan_timing(whole: &[Timing]) {
     let part = |value: fn(&Timing) -> f64| median(whole.iter().map(|t| value(t) * 1e3).collect());
     println!(
         "plan:   map {:.2} ms, roadmap {:.2} ms: boxes {:.2}, nodes {:.2}, edges with clearances {:.2}, file {:.2}",
         part(|t| t.map_s),
         part(|t| t.roadmap_s),
-        part(|t| t.roadmap_parts.boxes_s),
+        part(|t| t.roadmap_parts.box_tree_s),
         part(|t| t.roadmap_parts.nodes_s),
         part(|t| t.roadmap_parts.edges_s),
-        part(|t| t.roadmap_parts.file_s)
+        part(|t| t.roadmap_parts.encoding_s)
     );
 }
 
@@ -197,7 +199,7 @@ fn write_terminals(files: &[PathBuf; 3], terminals: &[Point]) -> Result<()> {
 }
 
 /// Prints the sizes of the roadmaps that both programs built last.
-fn print_sizes(theirs: &[Theirs], ours: &Ours<'_>) {
+fn print_sizes(theirs: &[BaselineResult], ours: &OurBench<'_>) {
     let Some(last) = theirs.last() else { return };
     println!(
         "theirs: {} nodes, {} rays, {} edges, {} of {VEHICLES} solved, {:.1} m",
@@ -206,7 +208,7 @@ fn print_sizes(theirs: &[Theirs], ours: &Ours<'_>) {
     println!(
         "ours:   {} nodes, {} rays, {} edges, {} of {VEHICLES} solved, {:.1} m (other random nodes)",
         ours.nodes.len(),
-        ours.rays(),
+        ours.ray_count(),
         ours.edges.len(),
         ours.solved,
         ours.labelled_m
@@ -214,7 +216,7 @@ fn print_sizes(theirs: &[Theirs], ours: &Ours<'_>) {
 }
 
 /// Ten starts in the building's lobby, then ten goals in the corridors above.
-fn terminals() -> Vec<Point> {
+fn starts_and_goals() -> Vec<Point> {
     let along = |i: usize| 8.5 + 2.5 * i as f32;
     let starts = (0..VEHICLES).map(|i| Point::new(along(i), 4.0, 1.5));
     let goals = (0..VEHICLES).map(|i| {
@@ -228,7 +230,7 @@ fn terminals() -> Vec<Point> {
     starts.chain(goals).collect()
 }
 
-fn run(peer: &Path, files: &[std::path::PathBuf]) -> Result<Theirs> {
+fn run_baseline(peer: &Path, files: &[std::path::PathBuf]) -> Result<BaselineResult> {
     let out = Command::new(peer)
         .args(files)
         .args([
@@ -253,10 +255,10 @@ enum Threads {
     One,
 }
 
-struct Ours<'a> {
+struct OurBench<'a> {
     grid: &'a VoxelGrid<'a>,
     terminals: &'a [Point],
-    workspace: Box<BoardWorkspace>,
+    workspace: Box<BoardNodeIndex>,
     search: Box<SearchWorkspace<4096>>,
     nodes: Vec<Point>,
     edges: Vec<roadmap::Edge>,
@@ -265,7 +267,7 @@ struct Ours<'a> {
     labelled_m: f64,
 }
 
-impl<'a> Ours<'a> {
+impl<'a> OurBench<'a> {
     fn new(grid: &'a VoxelGrid<'a>, terminals: &'a [Point]) -> Self {
         Self {
             grid,
@@ -283,7 +285,7 @@ impl<'a> Ours<'a> {
     /// Builds the roadmap file once; returns the milliseconds it took.
     fn build(&mut self, seed: u64, threads: Threads) -> Result<f64> {
         let config = PrmConfig {
-            nodes: NODES,
+            random_nodes: NODES,
             edge_min_m: EDGE_MIN_M,
             edge_max_m: EDGE_MAX_M,
             clearance_m: 0.0,
@@ -296,22 +298,22 @@ impl<'a> Ours<'a> {
         let start = Instant::now();
         self.nodes = vec![Point::zeros(); self.terminals.len() + NODES];
         prm::sample_nodes(self.grid, None, self.terminals, &config, &mut self.nodes)
-            .map_err(named)?;
+            .map_err(to_anyhow)?;
         let edge = |e: PrmEdge| roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
         let (grid, nodes) = (self.grid, &self.nodes);
         match threads {
             Threads::All => {
                 let edges = host_sim::roadmap::connect(grid, nodes, &config, &mut self.workspace)
-                    .map_err(named)?;
+                    .map_err(to_anyhow)?;
                 self.edges = edges.into_iter().map(edge).collect();
             }
             Threads::One => {
-                self.workspace.build_index(nodes, &config).map_err(named)?;
+                self.workspace.build_index(nodes, &config).map_err(to_anyhow)?;
                 prm::connect_range(grid, &self.workspace, &config, 0..nodes.len(), |e| {
                     self.edges.push(edge(e));
                     Ok(())
                 })
-                .map_err(named)?;
+                .map_err(to_anyhow)?;
             }
         }
         let header = RoadmapHeader {
@@ -320,10 +322,10 @@ impl<'a> Ours<'a> {
             edge_max_m: EDGE_MAX_M,
             tested_clearance_m: 0.0,
             max_clearance_m: 4.0,
-            starts: VEHICLES as u16,
-            goals: VEHICLES as u16,
+            start_count: VEHICLES as u16,
+            goal_count: VEHICLES as u16,
         };
-        let len = roadmap::encoded_len(self.nodes.len(), self.edges.len(), LANDMARKS)
+        let len = roadmap::encoded_len(self.nodes.len(), self.edges.len(), LANDMARK_COUNT)
             .context("the roadmap fits 32 bits")?;
         self.bytes = vec![0; len];
         roadmap::write_with_landmarks(
@@ -334,17 +336,17 @@ impl<'a> Ours<'a> {
             &mut self.search,
             &mut self.bytes,
         )
-        .map_err(named)?;
+        .map_err(to_anyhow)?;
         Ok(start.elapsed().as_secs_f64() * 1e3)
     }
 
     /// Computes the lengths of the edges, ten labelled A* and the cost matrix; milliseconds of
     /// each.
     fn search(&mut self) -> Result<[f64; 3]> {
-        let view = RoadmapView::parse(&self.bytes).map_err(named)?;
+        let view = RoadmapView::parse(&self.bytes).map_err(to_anyhow)?;
         let start = Instant::now();
         let mut lengths = vec![0.0; view.half_edge_count()];
-        let graph = RoadmapWithLengths::new(view, &mut lengths).map_err(named)?;
+        let graph = RoadmapWithLengths::new(view, &mut lengths).map_err(to_anyhow)?;
         let measured = start.elapsed();
         let mut path = heapless::Vec::<u16, 256>::new();
         (self.solved, self.labelled_m) = (0, 0.0);
@@ -362,14 +364,14 @@ impl<'a> Ours<'a> {
         let mut matrix = [0.0; VEHICLES * VEHICLES];
         let start = Instant::now();
         cost_matrix(&graph, &starts, &goals, |_, _| true, &mut self.search, &mut matrix)
-            .map_err(named)?;
+            .map_err(to_anyhow)?;
         std::hint::black_box(&matrix);
         Ok([measured, labelled, start.elapsed()].map(|time| time.as_secs_f64() * 1e3))
     }
 
     /// Number of node pairs within the range of edge lengths, for each of which Algorithm 1 casts a
     /// ray.
-    fn rays(&self) -> usize {
+    fn ray_count(&self) -> usize {
         let range = EDGE_MIN_M * EDGE_MIN_M..=EDGE_MAX_M * EDGE_MAX_M;
         let near = |k: usize, l: usize| {
             range.contains(&squared_length(self.nodes[k].into(), self.nodes[l].into()))
@@ -380,7 +382,7 @@ impl<'a> Ours<'a> {
     }
 }
 
-fn named(error: impl std::fmt::Debug) -> anyhow::Error {
+fn to_anyhow(error: impl std::fmt::Debug) -> anyhow::Error {
     anyhow::anyhow!("{error:?}")
 }
 

@@ -21,7 +21,7 @@ use crate::row::Row;
 
 const SEED: u64 = 1;
 /// The function whose instructions are counted, by its name in callgrind.
-const COUNTED: &str = "bench::steps::priority_step";
+const COUNTED_FUNCTION: &str = "bench::steps::priority_step";
 
 /// Rows for ten and for thirty-two neighbours, in thousands of instructions.
 pub fn rows() -> Result<Vec<Row>> {
@@ -29,7 +29,7 @@ pub fn rows() -> Result<Vec<Row>> {
 }
 
 fn row(neighbours: usize, limit: f64) -> Result<Row> {
-    let mut counts = counted(neighbours)?;
+    let mut counts = count_instructions(neighbours)?;
     ensure!(counts.len() == STEP_CASES, "{} of {STEP_CASES} cases were counted", counts.len());
     counts.sort_unstable();
     let thousands = |count: u64| count as f64 * 1e-3;
@@ -50,12 +50,15 @@ fn row(neighbours: usize, limit: f64) -> Result<Row> {
 }
 
 /// Number of instructions of each case.
-fn counted(neighbours: usize) -> Result<Vec<u64>> {
+fn count_instructions(neighbours: usize) -> Result<Vec<u64>> {
     let dir = tempfile::tempdir()?;
     let file = dir.path().join("counts");
     let status = Command::new("valgrind")
         .args(["--tool=callgrind", "--quiet", "--combine-dumps=yes"])
-        .args([format!("--toggle-collect={COUNTED}"), format!("--dump-after={COUNTED}")])
+        .args([
+            format!("--toggle-collect={COUNTED_FUNCTION}"),
+            format!("--dump-after={COUNTED_FUNCTION}"),
+        ])
         .arg(format!("--callgrind-out-file={}", file.display()))
         .arg(std::env::current_exe()?)
         .args(["--steps-beside", &neighbours.to_string()])
@@ -77,7 +80,7 @@ fn priority_step(case: &StepCase) -> Advice {
 }
 
 /// Runs every case once: what the bench runs under callgrind.
-pub fn run(neighbours: usize) {
+pub fn run_cases(neighbours: usize) {
     let mut rng = Pcg32::seed_from_u64(SEED);
     for number in 0..STEP_CASES {
         let case = StepCase::new(&mut rng, neighbours, StepKind::of_case(number));

@@ -23,18 +23,18 @@ const DEMO: &str = include_str!("../../../../host-sim/scenarios/demo.toml");
 
 /// Number of flights of the demo; the median time counts.
 const DEMO_FLIGHTS: usize = 3;
-const MANY: usize = 200;
+const LARGE_SWARM: usize = 200;
 /// Size of the ground of the large swarm, metres, and the edge of its cells.
-const GROUND_M: [f32; 3] = [120.0, 120.0, 16.0];
+const GROUND_SIZE_M: [f32; 3] = [120.0, 120.0, 16.0];
 const RESOLUTION_M: f32 = 0.5;
-/// Number of lanes side by side along y, and their spacing, metres: in each a train of [`TRAIN`]
-/// vehicles.
+/// Number of lanes side by side along y, and their spacing, metres: in each a train of
+/// [`VEHICLES_PER_LANE`] vehicles.
 const LANES: usize = 20;
-const LANE_M: f32 = 5.5;
-const TRAIN: usize = MANY / LANES;
+const LANE_SPACING_M: f32 = 5.5;
+const VEHICLES_PER_LANE: usize = LARGE_SWARM / LANES;
 /// Distance between two starts in a lane, and from each start to its goal, metres.
-const GAP_M: f32 = 8.0;
-const WAY_M: f32 = 36.0;
+const START_SPACING_M: f32 = 8.0;
+const START_TO_GOAL_M: f32 = 36.0;
 
 /// A row for the demo's ten vehicles and one for two hundred on open ground; times in seconds.
 pub fn rows() -> Result<Vec<Row>> {
@@ -45,9 +45,9 @@ pub fn rows() -> Result<Vec<Row>> {
     let ten = row("swarm of ten", took_s, simulated_s, 100.0, 10);
     let dir = tempfile::tempdir()?;
     let map = dir.path().join("ground.bt");
-    bt::write(&ground()?.to_octree("ground")?, &map)?;
-    let (took_s, simulated_s) = fly(&many(&map), "two hundred")?;
-    Ok(vec![ten, row("swarm of 200", took_s, simulated_s, 1.0, MANY)])
+    bt::write(&ground_map()?.to_octree("ground")?, &map)?;
+    let (took_s, simulated_s) = fly(&large_swarm_scenario(&map), "two hundred")?;
+    Ok(vec![ten, row("swarm of 200", took_s, simulated_s, 1.0, LARGE_SWARM)])
 }
 
 fn row(name: &str, took_s: f64, simulated_s: f64, required: f64, n: usize) -> Row {
@@ -95,14 +95,18 @@ fn fly(text: &str, name: &str) -> Result<(f64, f64)> {
 }
 
 /// Map of a floor with pillars between the lanes.
-fn ground() -> Result<OccupancyMap> {
+fn ground_map() -> Result<OccupancyMap> {
     let cells = |metres: f32| (metres / RESOLUTION_M) as u32;
-    let shape =
-        GridShape { dims: GROUND_M.map(cells), min: Point::zeros(), resolution_m: RESOLUTION_M };
+    let shape = GridShape {
+        dims: GROUND_SIZE_M.map(cells),
+        min: Point::zeros(),
+        resolution_m: RESOLUTION_M,
+    };
     let mut map = OccupancyMap::all_unknown(shape, "ground")?;
     // Pillars are one metre wide, 20 m apart, in every second gap between two lanes.
     let pillar = |x: f32, y: f32| {
-        (x % 20.0 < 1.0) && ((y - lane_m(0) + 0.5 * (LANE_M + 1.0)) % (2.0 * LANE_M) < 1.0)
+        (x % 20.0 < 1.0)
+            && ((y - lane_y_m(0) + 0.5 * (LANE_SPACING_M + 1.0)) % (2.0 * LANE_SPACING_M) < 1.0)
     };
     let [nx, ny, nz] = shape.dims;
     for k in 0..nz {
@@ -117,23 +121,27 @@ fn ground() -> Result<OccupancyMap> {
     Ok(map)
 }
 
-fn lane_m(lane: usize) -> f32 {
-    7.0 + LANE_M * lane as f32
+fn lane_y_m(lane: usize) -> f32 {
+    7.0 + LANE_SPACING_M * lane as f32
 }
 
 /// Scenario of two hundred vehicles that fly east in trains, side by side.
-fn many(map: &Path) -> String {
+fn large_swarm_scenario(map: &Path) -> String {
     let place = |i: usize, way_m: f32, z: f32| {
-        format!("[{:?}, {:?}, {z:?}]", 4.0 + GAP_M * (i % TRAIN) as f32 + way_m, lane_m(i / TRAIN))
+        format!(
+            "[{:?}, {:?}, {z:?}]",
+            4.0 + START_SPACING_M * (i % VEHICLES_PER_LANE) as f32 + way_m,
+            lane_y_m(i / VEHICLES_PER_LANE)
+        )
     };
-    let goals: Vec<_> = (0..MANY).map(|i| place(i, WAY_M, 2.5)).collect();
+    let goals: Vec<_> = (0..LARGE_SWARM).map(|i| place(i, START_TO_GOAL_M, 2.5)).collect();
     let mut text = format!(
         "[map]\nfile = {:?}\nresolution_m = {RESOLUTION_M:?}\n\n[roadmap]\nnodes = 6000\nedge_max_m = 10.0\n\n[mission]\nmode = \"labelled\"\n\
          goals = [{}]\n\n[simulation]\nradio_range_m = 500.0\ntime_limit_s = 1800.0\n\n[deconfliction]\nmethod = \"priority\"\nsafety_distance_m = 1.5\n",
         map.to_string_lossy(),
         goals.join(", ")
     );
-    for i in 0..MANY {
+    for i in 0..LARGE_SWARM {
         text += &format!(
             "\n[[vehicles]]\nid = {}\ngoal = {i}\nstart = {}\nradius_m = 0.3\n",
             i + 1,

@@ -19,19 +19,19 @@ const LIMITS: [(&str, &str, f64); 6] = [
     ("board control step, all speak", "Companion::handle_timeout, 32 speak", 75.0),
     ("board control step, most gone", "Companion::handle_timeout, most gone", 75.0),
     ("board control step, all near", "a control step, 32 near", 75.0),
-    ("board safety filter", "Companion::query_filter, 32 near", 12.0),
+    ("board safety filter", "Companion::query_filter_blocker, 32 near", 12.0),
     ("board control step, else", "Companion::handle_timeout, else", 75.0),
 ];
 
 /// Writes the table to the page; returns rows for the calls that have a limit.
 pub fn rows() -> Result<Vec<Row>> {
-    let Some(program) = board::program("calls") else { return Ok(Vec::new()) };
-    let calls = bounds::counted(&program)?;
+    let Some(program) = board::built_program("calls") else { return Ok(Vec::new()) };
+    let calls = bounds::count_calls(&program)?;
     let path = workspace().join(bounds::PAGE);
     let page =
         fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
     let [before, _, behind] = bounds::split_page(&page)?;
-    let table = bounds::table(&calls)?;
+    let table = bounds::table_text(&calls)?;
     fs::write(&path, [before, &table, behind].concat())
         .with_context(|| format!("cannot write {}", path.display()))?;
     print!("{table}");

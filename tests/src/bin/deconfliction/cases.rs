@@ -28,7 +28,7 @@ pub struct Meeting {
     pub cases: Vec<(&'static str, &'static str)>,
     /// Id of the vehicle that faults strike when it has taken off; `None`: a different vehicle for
     /// each seed, somewhere on its path.
-    struck: Option<u8>,
+    struck_vehicle: Option<u8>,
     map: PathBuf,
     vehicles: Vec<(Point, Point)>,
     resolution_m: f32,
@@ -39,16 +39,16 @@ pub struct Meeting {
     safety_distance_m: f32,
     time_limit_s: f32,
     /// Most seeds with which this meeting is flown.
-    pub seeds_most: u64,
+    pub max_seeds: u64,
     /// Whether the plan's makespan is compared with that of the best order found by a search.
-    pub has_ideal: bool,
+    pub compares_ideal_makespan: bool,
 }
 
 impl Meeting {
     /// Id of the vehicle that the faults of the cases strike, and the share of its flight after
     /// which they do.
-    pub fn strikes(&self, seed: u64) -> (u8, f32) {
-        match self.struck {
+    pub fn struck_vehicle_and_share(&self, seed: u64) -> (u8, f32) {
+        match self.struck_vehicle {
             Some(id) => (id, 0.0),
             None => {
                 ((1 + seed % self.vehicles.len() as u64) as u8, (seed * 37 % 100) as f32 * 0.01)
@@ -104,28 +104,28 @@ impl Meeting {
 }
 
 /// Disturbances of most meetings: gusts alone, gusts and radio loss, gusts and radio delay.
-const THREE: [&str; 3] =
+const GUSTS_AND_RADIO: [&str; 3] =
     [GUSTS, "gust_mps = 3.0\nradio_loss = 0.3\n", "gust_mps = 3.0\nradio_delay_s = 0.3\n"];
 
 /// Disturbances by a radio that fails for good: it only hears, only sends, or does neither.
-const FAILED: [&str; 3] = [
+const RADIO_FAILURES: [&str; 3] = [
     "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"radio-cut\"\ndirection = \"tx\"\n",
     "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"radio-cut\"\ndirection = \"rx\"\n",
     "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"radio-cut\"\n",
 ];
 /// Disturbance by a pilot, who takes over a vehicle and holds it where it is.
-const STOPPED: &str =
+const PILOT_STOPS: &str =
     "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"pilot-takeover\"\n";
 
-fn three(names: [&'static str; 3]) -> Vec<(&'static str, &'static str)> {
-    names.into_iter().zip(THREE).collect()
+fn three_cases(names: [&'static str; 3]) -> Vec<(&'static str, &'static str)> {
+    names.into_iter().zip(GUSTS_AND_RADIO).collect()
 }
 
 /// Settings that most meetings share; without a map, vehicles and cases.
-fn indoors() -> Meeting {
+fn indoor_defaults() -> Meeting {
     Meeting {
         cases: Vec::new(),
-        struck: None,
+        struck_vehicle: None,
         map: PathBuf::new(),
         vehicles: Vec::new(),
         resolution_m: RESOLUTION_M,
@@ -135,32 +135,36 @@ fn indoors() -> Meeting {
         sampling: "uniform",
         safety_distance_m: 1.5,
         time_limit_s: 400.0,
-        seeds_most: u64::MAX,
-        has_ideal: false,
+        max_seeds: u64::MAX,
+        compares_ideal_makespan: false,
     }
 }
 
 /// All meetings; their maps are written to `dir`.
-pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
+pub fn all_meetings(dir: &Path) -> Result<Vec<Meeting>> {
     let z = RESOLUTION_M + START_GOAL_HEIGHT_M;
     let ends = [Point::new(1.5, 2.0, z), Point::new(28.5, 2.0, z)];
     let corridor = Meeting {
-        cases: three([
+        cases: three_cases([
             "corridor, head-on",
             "corridor, 30 % radio loss",
             "corridor, 300 ms radio delay",
         ]),
-        map: corridor(dir)?,
+        map: corridor_map(dir)?,
         vehicles: vec![(ends[0], ends[1]), (ends[1], ends[0])],
-        ..indoors()
+        ..indoor_defaults()
     };
     let crossing = Meeting {
-        cases: three(["crossing, 8", "crossing, 30 % radio loss", "crossing, 300 ms radio delay"]),
+        cases: three_cases([
+            "crossing, 8",
+            "crossing, 30 % radio loss",
+            "crossing, 300 ms radio delay",
+        ]),
         map: crossing_map(dir, "crossing.bt", 3.5)?,
         vehicles: crossing_vehicles(z),
         nodes: 400,
-        has_ideal: true,
-        ..indoors()
+        compares_ideal_makespan: true,
+        ..indoor_defaults()
     };
     // High enough to fly over a vehicle that lies on the floor.
     let radios = Meeting {
@@ -170,12 +174,12 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
             "radio is dead, crossing",
         ]
         .into_iter()
-        .zip(FAILED)
+        .zip(RADIO_FAILURES)
         .collect(),
         map: crossing_map(dir, "high.bt", 4.5)?,
         vehicles: crossing_vehicles(z),
         nodes: 400,
-        ..indoors()
+        ..indoor_defaults()
     };
     let circle = |count: usize, radius_m: f32, middle_m: f32| {
         let place = move |i: usize| {
@@ -185,26 +189,26 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         (0..count).map(|i| (place(i), place(i + count / 2))).collect::<Vec<_>>()
     };
     let twenty = Meeting {
-        cases: three(["circle, 20", "circle, 30 % radio loss", "circle, 300 ms radio delay"]),
-        map: hall(dir, 24.0, "hall.bt")?,
+        cases: three_cases(["circle, 20", "circle, 30 % radio loss", "circle, 300 ms radio delay"]),
+        map: hall_map(dir, 24.0, "hall.bt")?,
         vehicles: circle(20, 20.0, 24.0),
         nodes: 700,
-        ..indoors()
+        ..indoor_defaults()
     };
     // The vehicles start as near to each other as the hundred below.
     let forty = Meeting {
         cases: vec![("circle, 40, 3 m apart", GUSTS)],
-        map: hall(dir, 30.0, "yard.bt")?,
+        map: hall_map(dir, 30.0, "yard.bt")?,
         vehicles: circle(40, 24.0, 30.0),
         nodes: 700,
         edge_max_m: 9.0,
         sampling: "halton",
         safety_distance_m: 3.0,
-        ..indoors()
+        ..indoor_defaults()
     };
     let hundred = Meeting {
         cases: vec![("circle, 100, 3 m apart", GUSTS)],
-        map: hall(dir, 66.0, "field.bt")?,
+        map: hall_map(dir, 66.0, "field.bt")?,
         vehicles: circle(100, 60.0, 66.0),
         nodes: 1500,
         edge_max_m: 9.0,
@@ -212,16 +216,16 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         sampling: "halton",
         safety_distance_m: 3.0,
         time_limit_s: 900.0,
-        seeds_most: 3,
-        ..indoors()
+        max_seeds: 3,
+        ..indoor_defaults()
     };
     let doorway = Meeting {
-        cases: three([
+        cases: three_cases([
             "doorway, one stands in it",
             "doorway, 30 % radio loss",
             "doorway, 300 ms radio delay",
         ]),
-        map: doorway(dir)?,
+        map: doorway_map(dir)?,
         vehicles: vec![
             (Point::new(3.0, 3.0, z), Point::new(14.0, 3.0, z)),
             (Point::new(14.0, 6.0, z), Point::new(3.0, 6.0, z)),
@@ -231,10 +235,10 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         resolution_m: DOORWAY_RESOLUTION_M,
         nodes: 600,
         safety_margin_m: 0.3,
-        ..indoors()
+        ..indoor_defaults()
     };
     let stopped = Meeting {
-        struck: Some(3),
+        struck_vehicle: Some(3),
         vehicles: vec![
             (Point::new(3.0, 3.0, z), Point::new(14.0, 3.0, z)),
             (Point::new(14.0, 6.0, z), Point::new(3.0, 6.0, z)),
@@ -242,11 +246,11 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
             (Point::new(8.4, 4.4, z), Point::new(14.0, 8.0, z)),
         ],
         map: doorway.map.clone(),
-        cases: vec![("doorway, one is stopped in it", STOPPED)],
+        cases: vec![("doorway, one is stopped in it", PILOT_STOPS)],
         resolution_m: DOORWAY_RESOLUTION_M,
         nodes: 600,
         safety_margin_m: 0.3,
-        ..indoors()
+        ..indoor_defaults()
     };
     Ok(vec![corridor, crossing, radios, doorway, stopped, twenty, forty, hundred])
 }
@@ -268,7 +272,7 @@ fn crossing_vehicles(z: f32) -> Vec<(Point, Point)> {
 
 /// Writes a map of `size` that is solid except for cells whose centre is `free`; floor and ceiling
 /// are one cell thick.
-fn carve(
+fn write_carved_map(
     dir: &Path,
     name: &str,
     resolution_m: f32,
@@ -290,8 +294,8 @@ fn carve(
 }
 
 /// Map of a corridor, 30 m × 3 m, with one side room at its middle.
-fn corridor(dir: &Path) -> Result<PathBuf> {
-    carve(dir, "corridor.bt", RESOLUTION_M, Point::new(30.5, 8.5, 3.5), |p| {
+fn corridor_map(dir: &Path) -> Result<PathBuf> {
+    write_carved_map(dir, "corridor.bt", RESOLUTION_M, Point::new(30.5, 8.5, 3.5), |p| {
         let corridor = (0.25..30.25).contains(&p.x) && (0.5..3.5).contains(&p.y);
         let room = (13.0..17.0).contains(&p.x) && (3.5..8.0).contains(&p.y);
         corridor || room
@@ -300,8 +304,8 @@ fn corridor(dir: &Path) -> Result<PathBuf> {
 
 /// Map of two rooms of 8 m × 9 m, joined by a doorway 1.6 m wide and 2.2 m high, and by a detour
 /// through a passage 3 m wide.
-fn doorway(dir: &Path) -> Result<PathBuf> {
-    carve(dir, "doorway.bt", DOORWAY_RESOLUTION_M, Point::new(17.0, 13.6, 3.6), |p| {
+fn doorway_map(dir: &Path) -> Result<PathBuf> {
+    write_carved_map(dir, "doorway.bt", DOORWAY_RESOLUTION_M, Point::new(17.0, 13.6, 3.6), |p| {
         let rooms = (0.2..16.8).contains(&p.x) && (0.2..9.2).contains(&p.y);
         let wall = (8.2..8.6).contains(&p.x) && !(3.6..5.2).contains(&p.y);
         let ends = (0.2..3.2).contains(&p.x) || (13.8..16.8).contains(&p.x);
@@ -314,7 +318,7 @@ fn doorway(dir: &Path) -> Result<PathBuf> {
 
 /// Map of two corridors 4 m wide that cross at (15, 15).
 fn crossing_map(dir: &Path, name: &str, height_m: f32) -> Result<PathBuf> {
-    carve(dir, name, RESOLUTION_M, Point::new(30.0, 30.0, height_m), |p| {
+    write_carved_map(dir, name, RESOLUTION_M, Point::new(30.0, 30.0, height_m), |p| {
         let across = |v: f32| (13.0..17.0).contains(&v);
         let along = |v: f32| (0.25..29.75).contains(&v);
         (across(p.x) && along(p.y)) || (across(p.y) && along(p.x))
@@ -322,6 +326,6 @@ fn crossing_map(dir: &Path, name: &str, height_m: f32) -> Result<PathBuf> {
 }
 
 /// Map of an open hall of side 2 · `half_m`, so low that all vehicles meet at one height.
-fn hall(dir: &Path, half_m: f32, name: &str) -> Result<PathBuf> {
-    carve(dir, name, RESOLUTION_M, Point::new(2.0 * half_m, 2.0 * half_m, 3.5), |_| true)
+fn hall_map(dir: &Path, half_m: f32, name: &str) -> Result<PathBuf> {
+    write_carved_map(dir, name, RESOLUTION_M, Point::new(2.0 * half_m, 2.0 * half_m, 3.5), |_| true)
 }

@@ -4,7 +4,7 @@
 //! The search joins points of a lattice if the map leaves the vehicle its required clearance
 //! between them (its hull where it begins), and every other vehicle is further away than the safety
 //! distance and [`DEVIATION_M`], a place where a silent one may lie than the safety distance and
-//! [`BESIDE_M`]. It uses neither the roadmap nor the companion.
+//! [`SILENT_DEVIATION_M`]. It uses neither the roadmap nor the companion.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -18,18 +18,18 @@ use serde::Serialize;
 /// Distance of neighbouring lattice points, metres.
 const LATTICE_M: f32 = 0.5;
 /// Radius of a vehicle's hull, metres.
-const HULL_M: f32 = 0.3;
+const HULL_RADIUS_M: f32 = 0.3;
 /// Distance within which both ends of the path are joined to lattice points, metres.
-const JOIN_M: f32 = 1.0;
+const JOIN_WITHIN_M: f32 = 1.0;
 /// Height above its final position from which on a vehicle counts as in the air, metres.
 const ALOFT_M: f32 = 1.0;
 /// How far along its path a vehicle whose radio fails comes to rest at most, metres.
-const STRETCH_M: f32 = 4.6;
+const MAX_REST_STRETCH_M: f32 = 4.6;
 /// Time for which such a vehicle flies on at least, seconds, its hardest stop then, m/s², and the
 /// time that a fall takes at least, seconds.
-const FLIES_ON_S: f32 = 0.3;
-const HARDEST_STOP_MPS2: f32 = 3.0;
-const LEAST_FALL_S: f32 = 0.6;
+const MIN_FLY_ON_S: f32 = 0.3;
+const MAX_STOP_MPS2: f32 = 3.0;
+const MIN_FALL_S: f32 = 0.6;
 /// Time between two of its positions, seconds: so old may be what the others heard last.
 const REPORTED_EVERY_S: f32 = 0.2;
 /// Time over which its speed is measured, seconds.
@@ -39,11 +39,11 @@ const SPEED_OVER_S: f32 = 0.5;
 const DEVIATION_M: f32 = 0.25;
 /// Distance kept from the stretch where a silent vehicle may lie, beyond the safety distance,
 /// metres.
-const BESIDE_M: f32 = 0.4;
+const SILENT_DEVIATION_M: f32 = 0.4;
 /// Spacing of the points of the path that a silent vehicle's positions are compared with, metres.
-const FINE_M: f32 = 0.05;
+const PATH_SAMPLE_M: f32 = 0.05;
 /// Spacing of the points at which a silent vehicle may lie, metres.
-const STEP_M: f32 = 0.5;
+const REST_PLACE_SPACING_M: f32 = 0.5;
 
 /// What kept a vehicle from its goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -99,7 +99,7 @@ pub struct Struck {
 }
 
 /// Why vehicle `held` landed short of its goal.
-pub fn cause(
+pub fn cause_of_short_landing(
     mission: &PreparedMission,
     plan: &HostPlan,
     flight: &SwarmFlight,
@@ -108,59 +108,61 @@ pub fn cause(
 ) -> Cause {
     let safety_m = mission.scenario.deconfliction.safety_distance_m;
     let apart_m = safety_m + DEVIATION_M;
-    let Some((left_s, from)) = gave_up(&flight.tracks[held]) else { return Cause::WayLeft };
+    let Some((left_s, from)) = start_of_last_descent(&flight.tracks[held]) else {
+        return Cause::WayLeft;
+    };
     let path = &plan.flights[held].path;
     let Some(over) = path.waypoints().last().map(|w| w.position) else { return Cause::WayLeft };
     let ground = over - Point::new(0.0, 0.0, plan.flights[held].descent_m);
     // One that never took off would have begun at the top of its climb.
-    let from = if rose(&flight.tracks[held]) { from } else { path.waypoints()[0].position };
-    let others: Vec<Ball> = (0..flight.tracks.len())
+    let from = if was_airborne(&flight.tracks[held]) { from } else { path.waypoints()[0].position };
+    let others: Vec<KeepOutBall> = (0..flight.tracks.len())
         .filter(|i| *i != held && *i != struck.index)
         .filter_map(|i| first_place_since(&flight.tracks[i], left_s))
         .map(|place| (place, apart_m))
         .collect();
     let lies = flight.tracks[struck.index].last().map(|(_, place)| (*place, apart_m));
-    let search = Search {
+    let search = PathSearch {
         mission,
         required_m: mission.tasks[held].required_clearance_m,
         from,
         over,
         ground,
     };
-    if !search.finds(&others) {
+    if !search.finds_path(&others) {
         return Cause::Others;
     }
     let known = [lies].into_iter().flatten().collect::<Vec<_>>();
-    let with = |more: &[Ball]| others.iter().chain(more).copied().collect::<Vec<_>>();
-    if search.goal_held(&known) {
+    let with = |more: &[KeepOutBall]| others.iter().chain(more).copied().collect::<Vec<_>>();
+    if search.is_goal_blocked(&known) {
         return Cause::AtGoal;
     }
-    if !search.finds(&with(&known)) {
+    if !search.finds_path(&with(&known)) {
         return Cause::OnlyRoute;
     }
     let may = if struck.silent {
-        possible_rest_places(plan, flight, struck, safety_m + BESIDE_M)
+        possible_rest_places(plan, flight, struck, safety_m + SILENT_DEVIATION_M)
     } else {
         Vec::new()
     };
-    if search.goal_held(&may) {
+    if search.is_goal_blocked(&may) {
         return Cause::MayBeAtGoal;
     }
-    if search.finds(&with(&may)) { Cause::WayLeft } else { Cause::MayBeOnRoute }
+    if search.finds_path(&with(&may)) { Cause::WayLeft } else { Cause::MayBeOnRoute }
 }
 
 /// A point, and the distance to keep from it, metres.
-type Ball = (Point, f32);
+type KeepOutBall = (Point, f32);
 
 /// Whether a vehicle was in the air at any time.
-fn rose(track: &[(f32, Point)]) -> bool {
+fn was_airborne(track: &[(f32, Point)]) -> bool {
     let lowest_m = track.iter().map(|(_, place)| place.z).fold(f32::INFINITY, f32::min);
     track.iter().any(|(_, place)| place.z > lowest_m + ALOFT_M)
 }
 
 /// When a vehicle that landed short began its last descent, and where; its last point if it never
 /// rose.
-fn gave_up(track: &[(f32, Point)]) -> Option<(f32, Point)> {
+fn start_of_last_descent(track: &[(f32, Point)]) -> Option<(f32, Point)> {
     let (_, rest) = track.last()?;
     track.iter().rev().find(|(_, place)| place.z > rest.z + ALOFT_M).or(track.last()).copied()
 }
@@ -189,10 +191,10 @@ pub fn rest_offsets_m(plan: &HostPlan, flight: &SwarmFlight, struck: Struck) -> 
     let path = &plan.flights[struck.index].path;
     let (_, rest) = track.last()?;
     let heard = first_place_since(track, struck.at_s)?;
-    let steps = (path.length_m() / FINE_M) as usize;
+    let steps = (path.length_m() / PATH_SAMPLE_M) as usize;
     let nearest = |to: &Point| {
         let away = |m: f32| Some((m, (path.point_at(m)? - to).xy().norm()));
-        let all = (0..=steps).filter_map(|i| away(i as f32 * FINE_M));
+        let all = (0..=steps).filter_map(|i| away(i as f32 * PATH_SAMPLE_M));
         all.min_by(|a, b| a.1.total_cmp(&b.1))
     };
     let (rest, heard) = (nearest(rest)?, nearest(&heard)?);
@@ -206,35 +208,35 @@ fn possible_rest_places(
     flight: &SwarmFlight,
     struck: Struck,
     radius_m: f32,
-) -> Vec<Ball> {
+) -> Vec<KeepOutBall> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;
     let heard = place_at(track, struck.at_s - REPORTED_EVERY_S);
     let (Some(heard), Some((_, rest))) = (heard, track.last()) else {
         return Vec::new();
     };
-    let steps = (path.length_m() / FINE_M) as usize;
+    let steps = (path.length_m() / PATH_SAMPLE_M) as usize;
     let nearest = (0..=steps)
-        .map(|i| i as f32 * FINE_M)
+        .map(|i| i as f32 * PATH_SAMPLE_M)
         .filter_map(|m| Some((m, (path.point_at(m)? - heard).norm())))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .map_or(0.0, |(m, _)| m);
     let before = place_at(track, struck.at_s - REPORTED_EVERY_S - SPEED_OVER_S);
     let before = before.unwrap_or(heard);
     let speed_mps = (heard - before).xy().norm() / SPEED_OVER_S;
-    let flies_s = FLIES_ON_S + speed_mps / (2.0 * HARDEST_STOP_MPS2);
-    let least_m = speed_mps * flies_s.min(LEAST_FALL_S);
-    (0..=(STRETCH_M / STEP_M) as usize)
-        .map(|i| least_m + i as f32 * STEP_M)
-        .filter(|m| *m < STRETCH_M)
-        .chain([STRETCH_M])
+    let flies_s = MIN_FLY_ON_S + speed_mps / (2.0 * MAX_STOP_MPS2);
+    let least_m = speed_mps * flies_s.min(MIN_FALL_S);
+    (0..=(MAX_REST_STRETCH_M / REST_PLACE_SPACING_M) as usize)
+        .map(|i| least_m + i as f32 * REST_PLACE_SPACING_M)
+        .filter(|m| *m < MAX_REST_STRETCH_M)
+        .chain([MAX_REST_STRETCH_M])
         .filter_map(|m| path.point_at(nearest + m))
         .map(|place| (Point::new(place.x, place.y, rest.z), radius_m))
         .collect()
 }
 
 /// A search for a path from `from` to `over`, with a descent from there to `ground`.
-struct Search<'a> {
+struct PathSearch<'a> {
     mission: &'a PreparedMission,
     required_m: f32,
     from: Point,
@@ -242,26 +244,28 @@ struct Search<'a> {
     ground: Point,
 }
 
-impl Search<'_> {
-    fn goal_held(&self, balls: &[Ball]) -> bool {
-        !apart(&self.over, &self.ground, balls)
+impl PathSearch<'_> {
+    fn is_goal_blocked(&self, balls: &[KeepOutBall]) -> bool {
+        !keeps_out_of_balls(&self.over, &self.ground, balls)
     }
 
-    fn finds(&self, balls: &[Ball]) -> bool {
-        if self.goal_held(balls) {
+    fn finds_path(&self, balls: &[KeepOutBall]) -> bool {
+        if self.is_goal_blocked(balls) {
             return false;
         }
         // From an obstacle that is too near already, the vehicle may fly away.
-        let here =
-            |&(place, radius_m): &Ball| (place, radius_m.min((place - self.from).norm() - 1e-3));
-        let balls: Vec<Ball> = balls.iter().map(here).collect();
+        let here = |&(place, radius_m): &KeepOutBall| {
+            (place, radius_m.min((place - self.from).norm() - 1e-3))
+        };
+        let balls: Vec<KeepOutBall> = balls.iter().map(here).collect();
         let grid = self.mission.map.grid();
         let free = |a: &Point, b: &Point| {
-            segment_is_clear(&grid, a, b, self.required_m) && apart(a, b, &balls)
+            segment_is_clear(&grid, a, b, self.required_m) && keeps_out_of_balls(a, b, &balls)
         };
         // A vehicle that has drifted towards a wall may fly away from it.
         let leaves = |to: &Point| {
-            segment_is_clear(&grid, &self.from, to, HULL_M) && apart(&self.from, to, &balls)
+            segment_is_clear(&grid, &self.from, to, HULL_RADIUS_M)
+                && keeps_out_of_balls(&self.from, to, &balls)
         };
         let shape = self.mission.map.shape;
         let extent = shape.max() - shape.min;
@@ -276,7 +280,9 @@ impl Search<'_> {
             for j in 0..sizes[1] {
                 for k in 0..sizes[2] {
                     let place = at([i, j, k]);
-                    if (place - self.from).norm() < JOIN_M && leaves(&place) && free(&place, &place)
+                    if (place - self.from).norm() < JOIN_WITHIN_M
+                        && leaves(&place)
+                        && free(&place, &place)
                     {
                         seen[index([i, j, k])] = true;
                         queue.push_back([i, j, k]);
@@ -286,7 +292,7 @@ impl Search<'_> {
         }
         while let Some(cell) = queue.pop_front() {
             let place = at(cell);
-            if (place - self.over).norm() < JOIN_M && free(&place, &self.over) {
+            if (place - self.over).norm() < JOIN_WITHIN_M && free(&place, &self.over) {
                 return true;
             }
             for step in 0..27_usize {
@@ -306,7 +312,7 @@ impl Search<'_> {
     }
 }
 
-fn apart(a: &Point, b: &Point, balls: &[Ball]) -> bool {
+fn keeps_out_of_balls(a: &Point, b: &Point, balls: &[KeepOutBall]) -> bool {
     let leg = b - a;
     balls.iter().all(|(place, radius_m)| {
         let share = ((place - a).dot(&leg) / leg.norm_squared().max(1e-9)).clamp(0.0, 1.0);

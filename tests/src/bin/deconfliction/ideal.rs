@@ -10,7 +10,7 @@ use host_sim::mission::{HostPlan, PreparedMission};
 use planner_core::Point;
 use planner_core::flight::{Flight, Path};
 use planner_core::map::segment::segment_is_clear;
-use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleWorkspace, earliest_departure};
+use planner_core::schedule::{DEFAULT_MAX_SEGMENT_M, ScheduleWorkspace, earliest_departure};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -19,7 +19,7 @@ const ORDERS: u64 = 152;
 
 /// When the last vehicle lands by three schedules, seconds after the start.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Landings {
+pub struct LastLandings {
     /// If each vehicle flew alone.
     pub alone_s: f32,
     /// By the mission's plan.
@@ -30,28 +30,33 @@ pub struct Landings {
 
 /// The last landing by `plan`, by `alone`, and by the best order; `None` if a flight has no path
 /// here.
-pub fn landings(mission: &PreparedMission, plan: &HostPlan, alone: &HostPlan) -> Option<Landings> {
-    let last =
-        |plan: &HostPlan| plan.flights.iter().map(|f| landed_s(mission, f)).fold(0.0, f32::max);
-    let ideal_s = ideal_s(mission, plan)?;
-    Some(Landings { alone_s: last(alone), planned_s: last(plan), ideal_s })
+pub fn last_landings(
+    mission: &PreparedMission,
+    plan: &HostPlan,
+    alone: &HostPlan,
+) -> Option<LastLandings> {
+    let last = |plan: &HostPlan| {
+        plan.flights.iter().map(|f| landing_time_s(mission, f)).fold(0.0, f32::max)
+    };
+    let ideal_s = best_last_landing_s(mission, plan)?;
+    Some(LastLandings { alone_s: last(alone), planned_s: last(plan), ideal_s })
 }
 
-fn landed_s(mission: &PreparedMission, flight: &Flight<WAYPOINTS>) -> f32 {
+fn landing_time_s(mission: &PreparedMission, flight: &Flight<WAYPOINTS>) -> f32 {
     let over_goal_s = flight.path.waypoints().last().map_or(0.0, |w| w.leave_s);
     flight.depart_s + over_goal_s + flight.descent_m / mission.schedule().vertical_mps
 }
 
 /// Possible flights of a vehicle: straight, or with one corner at right angles, where the map is
 /// clear.
-fn flights(
+fn candidate_flights(
     mission: &PreparedMission,
     flight: &Flight<WAYPOINTS>,
 ) -> Option<Vec<Flight<WAYPOINTS>>> {
     let waypoints = flight.path.waypoints();
     let (from, to) = (waypoints.first()?.position, waypoints.last()?.position);
     let (x_first, y_first) = (Point::new(to.x, from.y, from.z), Point::new(from.x, to.y, from.z));
-    let index = mission.index_of(flight.id).ok()?;
+    let index = mission.index_of(flight.vehicle_id).ok()?;
     let required_m = mission.tasks[index].required_clearance_m;
     let grid = mission.map.grid();
     let mut all = Vec::new();
@@ -65,14 +70,19 @@ fn flights(
             flight.climb_m / mission.schedule().vertical_mps,
             mission.schedule().cruise_mps,
         );
-        all.push(Flight { path, depart_s: 0.0, segment_m: MAX_TIMED_SEGMENT_M, ..flight.clone() });
+        all.push(Flight {
+            path,
+            depart_s: 0.0,
+            max_segment_m: DEFAULT_MAX_SEGMENT_M,
+            ..flight.clone()
+        });
     }
     Some(all)
 }
 
-fn ideal_s(mission: &PreparedMission, plan: &HostPlan) -> Option<f32> {
+fn best_last_landing_s(mission: &PreparedMission, plan: &HostPlan) -> Option<f32> {
     let choices: Vec<_> =
-        plan.flights.iter().map(|f| flights(mission, f)).collect::<Option<_>>()?;
+        plan.flights.iter().map(|f| candidate_flights(mission, f)).collect::<Option<_>>()?;
     let mut ws = ScheduleWorkspace::default();
     let mut rng = Pcg32::seed_from_u64(1);
     let mut order: Vec<usize> = (0..choices.len()).collect();
@@ -86,12 +96,12 @@ fn ideal_s(mission: &PreparedMission, plan: &HostPlan) -> Option<f32> {
                     earliest_departure(cfg, flight, 0.0, scheduled.iter(), &mut ws).ok()?;
                 Some(Flight { depart_s, ..flight.clone() })
             });
-            let first =
-                departs.min_by(|a, b| landed_s(mission, a).total_cmp(&landed_s(mission, b)));
+            let first = departs
+                .min_by(|a, b| landing_time_s(mission, a).total_cmp(&landing_time_s(mission, b)));
             scheduled.extend(first);
         }
         if scheduled.len() == choices.len() {
-            let last_s = scheduled.iter().map(|f| landed_s(mission, f)).fold(0.0, f32::max);
+            let last_s = scheduled.iter().map(|f| landing_time_s(mission, f)).fold(0.0, f32::max);
             best_s = best_s.min(last_s);
         }
         for i in (1..order.len()).rev() {

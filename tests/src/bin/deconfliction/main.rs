@@ -27,9 +27,9 @@ use held::{Cause, Struck};
 
 const METHODS: [&str; 2] = ["priority", "algorithm2"];
 /// A separation so small that no vehicle waits for another one, metres.
-const ALONE_M: f32 = 1e-3;
+const NO_WAIT_SEPARATION_M: f32 = 1e-3;
 /// Time from the beginning of a simulation to the first vehicle at the top of its climb, seconds.
-const STARTED_S: f32 = 8.0;
+const FIRST_CLIMB_DONE_S: f32 = 8.0;
 
 #[derive(Parser)]
 #[command(about = "Hard meetings of vehicles, flown over many seeds")]
@@ -119,14 +119,14 @@ fn main() -> Result<()> {
         "makespan"
     );
     let mut rows = Vec::new();
-    for mut meeting in cases::all(dir)? {
+    for mut meeting in cases::all_meetings(dir)? {
         meeting.keep_cases_named(&args.only);
         if meeting.cases.is_empty() || (args.small && meeting.is_large()) {
             continue;
         }
         let began = Instant::now();
         for row in fly_all(&meeting, &args, dir)?.into_iter().filter(|row| row.seeds > 0) {
-            print(&row);
+            print_row(&row);
             rows.push(row);
         }
         println!("    {:.0} s", began.elapsed().as_secs_f64());
@@ -138,7 +138,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn print(row: &Row) {
+fn print_row(row: &Row) {
     println!(
         "{:30} {:10} {:>5}/{:<3} {:>9} {:>10} {:>8} {:>9} {:>7} {:>7.2} m {:>5.0} % {:>6.0} %",
         row.name,
@@ -173,12 +173,12 @@ fn print(row: &Row) {
 
 /// Flies all cases of a meeting with both methods over all seeds; one row each.
 fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
-    let seeds: Vec<u64> = (args.first..args.first + args.seeds.min(meeting.seeds_most)).collect();
+    let seeds: Vec<u64> = (args.first..args.first + args.seeds.min(meeting.max_seeds)).collect();
     let flown: Vec<Vec<Row>> = seeds
         .into_par_iter()
         .map(|seed| fly_seed(meeting, seed, dir, &args.method))
         .collect::<Result<_>>()?;
-    let mut sums = rows(meeting);
+    let mut sums = empty_rows(meeting);
     for (sum, row) in flown.into_iter().flat_map(|rows| rows.into_iter().enumerate()) {
         let sum = &mut sums[sum];
         sum.seeds += row.seeds;
@@ -215,7 +215,7 @@ fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
 }
 
 /// Empty rows of a meeting: one for each case and method, without a seed.
-fn rows(meeting: &Meeting) -> Vec<Row> {
+fn empty_rows(meeting: &Meeting) -> Vec<Row> {
     let row = |name, method| Row {
         name,
         method,
@@ -241,10 +241,10 @@ fn rows(meeting: &Meeting) -> Vec<Row> {
 
 /// Flies all cases of a meeting with one seed.
 fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<Row>> {
-    let mut rows = rows(meeting);
+    let mut rows = empty_rows(meeting);
     rows.iter_mut().filter(|row| row.method.contains(only)).for_each(|row| row.seeds = 1);
     let mut mission = PreparedMission::prepare(
-        parsed(meeting, "off", cases::GUSTS, seed, dir)?,
+        parse_scenario(meeting, "off", cases::GUSTS, seed, dir)?,
         &Progress::hidden(),
     )?;
     let plan = match mission.plan() {
@@ -258,33 +258,36 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
         }
     };
     let apart = *mission.schedule();
-    mission.set_separation(ALONE_M, ALONE_M)?;
+    mission.set_separation(NO_WAIT_SEPARATION_M, NO_WAIT_SEPARATION_M)?;
     let shortest = mission.plan()?;
     let alone = fly(&mission, &shortest)?.result;
     mission.set_separation(apart.separation_m, apart.parked_separation_m)?;
-    let landings =
-        if meeting.has_ideal { ideal::landings(&mission, &plan, &shortest) } else { None };
+    let landings = if meeting.compares_ideal_makespan {
+        ideal::last_landings(&mission, &plan, &shortest)
+    } else {
+        None
+    };
     if let (Some(landings), Some(row)) = (landings, rows.first_mut()) {
         let extra = |last_s: f32| Some(f64::from(last_s / landings.alone_s) - 1.0);
         (row.planned_makespan, row.ideal_makespan) =
             (extra(landings.planned_s), extra(landings.ideal_s));
     }
-    let (struck, at_s) = strike(meeting, &plan, &alone, seed);
+    let (struck, at_s) = struck_vehicle_and_time(meeting, &plan, &alone, seed);
     let cases = meeting.cases.iter().flat_map(|case| METHODS.map(|method| (case, method)));
     for (row, (&(name, simulation), method)) in
         rows.iter_mut().zip(cases).filter(|(row, _)| row.seeds > 0)
     {
         let simulation = simulation.replace("AT_S", &at_s).replace("VEHICLE", &struck.to_string());
-        mission.scenario = parsed(meeting, method, &simulation, seed, dir)?;
+        mission.scenario = parse_scenario(meeting, method, &simulation, seed, dir)?;
         let flight = fly(&mission, &plan)?;
-        count(row, &flight.result, &alone);
+        fill_row(row, &flight.result, &alone);
         let is_struck = |v: &VehicleResult| simulation.contains("[[faults]]") && v.id == struck;
         row.held_up = flight.result.vehicles.iter().filter(|v| !v.reached && !is_struck(v)).count();
         if simulation.contains("[[faults]]") && method == METHODS[0] {
             // A vehicle that no other hears may lie where it was struck, or further along its path.
             let silent = simulation.contains("radio-cut") && !simulation.contains("\"rx\"");
             let struck = Struck { index: usize::from(struck) - 1, at_s: at_s.parse()?, silent };
-            explain(row, &mission, &plan, &flight, struck);
+            note_causes(row, &mission, &plan, &flight, struck);
         }
         if !flight.result.complete {
             let file = dir.join(format!("{name}, {method}, seed {seed}.toml"));
@@ -300,7 +303,7 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
 }
 
 /// Adds to a row why each vehicle landed short of its goal, and where a silent struck vehicle lies.
-fn explain(
+fn note_causes(
     row: &mut Row,
     mission: &PreparedMission,
     plan: &HostPlan,
@@ -314,7 +317,7 @@ fn explain(
     }
     let held = |(i, v): &(usize, &VehicleResult)| !v.reached && *i != struck.index;
     for (index, vehicle) in flight.result.vehicles.iter().enumerate().filter(held) {
-        let cause = held::cause(mission, plan, flight, struck, index);
+        let cause = held::cause_of_short_landing(mission, plan, flight, struck, index);
         row.held_up_by[cause as usize] += 1;
         let (seed, by) = (flight.result.seed, flight.result.vehicles[struck.index].id);
         row.incidents.push(format!("seed {seed}, vehicle {} held up by {by}: {cause}", vehicle.id));
@@ -322,15 +325,20 @@ fn explain(
 }
 
 /// Id of the vehicle that faults strike, and when, in seconds as text for the scenario.
-fn strike(meeting: &Meeting, plan: &HostPlan, alone: &MissionResult, seed: u64) -> (u8, String) {
-    let (id, share) = meeting.strikes(seed);
+fn struck_vehicle_and_time(
+    meeting: &Meeting,
+    plan: &HostPlan,
+    alone: &MissionResult,
+    seed: u64,
+) -> (u8, String) {
+    let (id, share) = meeting.struck_vehicle_and_share(seed);
     let index = usize::from(id) - 1;
     let flying_s = share * (alone.vehicles[index].flight_time_s as f32);
-    let at_s = STARTED_S + plan.flights[index].depart_s + flying_s;
+    let at_s = FIRST_CLIMB_DONE_S + plan.flights[index].depart_s + flying_s;
     (id, format!("{at_s:.1}"))
 }
 
-fn parsed(
+fn parse_scenario(
     meeting: &Meeting,
     method: &str,
     simulation: &str,
@@ -346,7 +354,7 @@ fn fly(mission: &PreparedMission, plan: &HostPlan) -> Result<swarm::SwarmFlight>
     swarm::fly(mission, plan, "fly", swarm::Pace::Fastest, &Progress::hidden())
 }
 
-fn count(row: &mut Row, result: &MissionResult, alone: &MissionResult) {
+fn fill_row(row: &mut Row, result: &MissionResult, alone: &MissionResult) {
     row.complete = u64::from(result.complete);
     row.violations = result.safety.violations;
     row.wall_contacts = result.safety.wall_contacts;

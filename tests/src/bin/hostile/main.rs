@@ -21,18 +21,18 @@ fn main() {
     let args = Args::parse();
     let began = Instant::now();
     let report = hostile::attacks(args.seed, args.n);
-    report.broken.iter().chain(&report.unfit).for_each(|what| println!("{what}"));
+    report.broken_rules.iter().chain(&report.unfit_setpoints).for_each(|what| println!("{what}"));
     println!("{}", report.setpoints);
-    println!("steps in each state: {:?}", report.states);
+    println!("steps in each state: {:?}", report.steps_in_state);
     println!(
         "{} frames in {:.1} s on {} cores; most sent in a second: {:?}; {} rules broken",
         report.frames,
         began.elapsed().as_secs_f64(),
         rayon::current_num_threads(),
-        report.most_sent,
-        report.broken.len()
+        report.max_sent_per_s,
+        report.broken_rules.len()
     );
-    if !report.broken.is_empty() || !report.unfit.is_empty() {
+    if !report.broken_rules.is_empty() || !report.unfit_setpoints.is_empty() {
         std::process::exit(1);
     }
 }

@@ -9,7 +9,7 @@ use flockmate_tests::setpoints::SetpointStats;
 use rayon::prelude::*;
 
 /// Most meetings with setpoints unfit to be flown that are listed.
-const UNFIT: usize = 10;
+const MAX_LISTED: usize = 10;
 
 #[derive(Parser)]
 #[command(about = "Random meetings of whole companions")]
@@ -37,9 +37,9 @@ struct Args {
 }
 
 /// Flies one meeting, and prints its plans and what happened.
-fn trace(scene: &scene::Scene) {
-    let scene::Scene { kind, delay_s, loss, liar, .. } = scene;
-    println!("{kind}, delay {delay_s:.2?} s, loss {loss:.2}, liar {liar:?}");
+fn fly_and_print(scene: &scene::Scene) {
+    let scene::Scene { kind, radio_delay_s, radio_loss, liar, .. } = scene;
+    println!("{kind}, delay {radio_delay_s:.2?} s, loss {radio_loss:.2}, liar {liar:?}");
     for vehicle in &scene.vehicles {
         let plan = &vehicle.plan;
         let points: Vec<_> =
@@ -55,18 +55,22 @@ fn trace(scene: &scene::Scene) {
     }
     let outcome = meeting::fly_traced(scene);
     outcome.trace.iter().for_each(|line| println!("{line}"));
-    println!("{}", meeting::line(&outcome));
-    outcome.unfit.iter().for_each(|(i, at_s, what)| println!("  {}: {at_s:.2} s: {what}", i + 1));
+    println!("{}", meeting::outcome_line(&outcome));
+    outcome
+        .unfit_setpoints
+        .iter()
+        .for_each(|(i, at_s, what)| println!("  {}: {at_s:.2} s: {what}", i + 1));
 }
 
 fn main() {
     let args = Args::parse();
     let draw = |seed| {
-        let scene = if args.passing { scene::passing(seed) } else { scene::scene(seed) };
+        let scene =
+            if args.passing { scene::passing_scene(seed) } else { scene::random_scene(seed) };
         scene::Scene { limit_s: args.limit.unwrap_or(scene.limit_s), ..scene }
     };
     if args.trace {
-        trace(&draw(args.seed));
+        fly_and_print(&draw(args.seed));
         return;
     }
     let began = Instant::now();
@@ -77,8 +81,8 @@ fn main() {
         .map(|scene| meeting::fly(&scene))
         .collect();
     let took_s = began.elapsed().as_secs_f64();
-    for outcome in outcomes.iter().filter(|outcome| outcome.is_bad()) {
-        println!("{}", meeting::line(outcome));
+    for outcome in outcomes.iter().filter(|outcome| outcome.breaks_rule()) {
+        println!("{}", meeting::outcome_line(outcome));
     }
     let sum = meeting::summary(&outcomes);
     println!("{sum}");
@@ -90,7 +94,7 @@ fn main() {
         "{stops} stops by the safety filter, the longest {longest_s:.2} s, or {unheard_s:.2} s \
          where a neighbour was silent for more than a second"
     );
-    let mut blocked: Vec<_> = outcomes.iter().map(|o| (o.most_blocked, o.seed)).collect();
+    let mut blocked: Vec<_> = outcomes.iter().map(|o| (o.max_blocked_count, o.seed)).collect();
     blocked.sort_unstable();
     println!(
         "paths found blocked at most, and seeds: {:?}",
@@ -111,12 +115,12 @@ fn main() {
     let mut setpoints = SetpointStats::default();
     outcomes.iter().for_each(|outcome| setpoints.merge(&outcome.setpoints));
     println!("{setpoints}");
-    for outcome in outcomes.iter().filter(|outcome| !outcome.unfit.is_empty()).take(UNFIT) {
-        let (vehicle, at_s, what) = &outcome.unfit[0];
+    for outcome in outcomes.iter().filter(|o| !o.unfit_setpoints.is_empty()).take(MAX_LISTED) {
+        let (vehicle, at_s, what) = &outcome.unfit_setpoints[0];
         println!("  seed {}, vehicle {}, {at_s:.2} s: {what}", outcome.seed, vehicle + 1);
     }
     println!("{took_s:.0} s, {:.1} meetings/s", outcomes.len() as f64 / took_s);
-    if sum.is_bad() {
+    if sum.breaks_rule() {
         std::process::exit(1);
     }
 }

@@ -6,7 +6,7 @@
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use flockmate_tests::edge::{Edge, Outcome};
+use flockmate_tests::edge::{Outcome, RadioEdgeMission};
 use host_sim::mission::PreparedMission;
 use host_sim::progress::Progress;
 use host_sim::report::LogEvent;
@@ -46,7 +46,7 @@ struct Args {
 fn main() -> Result<()> {
     let args = Args::parse();
     if args.strikes > 0 {
-        return strike(&args);
+        return fly_with_failures(&args);
     }
     let mut bad = false;
     for (range_m, complete_least) in RANGES {
@@ -113,13 +113,13 @@ fn print_standstills(log: &[LogEvent], flight: &str) -> usize {
 }
 
 /// Flies missions in which a vehicle fails at the edge of the radio range, judged by true motion.
-fn strike(args: &Args) -> Result<()> {
+fn fly_with_failures(args: &Args) -> Result<()> {
     let of_seed = |seed: u64| -> Result<Vec<Outcome>> {
-        let mut edge = Edge::new(seed)?;
+        let mut edge = RadioEdgeMission::new(seed)?;
         if args.heard {
-            edge.hear_all();
+            edge.let_all_hear();
         }
-        (0..args.strikes).filter_map(|_| edge.strike().transpose()).collect()
+        (0..args.strikes).filter_map(|_| edge.fly_with_fault().transpose()).collect()
     };
     let seeds = args.seed.map_or(args.from..args.from + args.seeds, |seed| seed..seed + 1);
     let flown: Vec<(u64, Result<Vec<Outcome>>)> =
@@ -128,17 +128,19 @@ fn strike(args: &Args) -> Result<()> {
     for (seed, outcomes) in flown {
         for outcome in outcomes.with_context(|| format!("seed {seed}"))? {
             flights += 1;
-            let found = [outcome.wrong.len(), outcome.near_struck.len(), outcome.aloft.len()];
-            let all = [found[0], found[1], found[2], outcome.deadlocks as usize, outcome.arrived];
+            let found =
+                [outcome.forbidden.len(), outcome.near_struck.len(), outcome.not_landed.len()];
+            let all =
+                [found[0], found[1], found[2], outcome.deadlocks as usize, outcome.arrived_count];
             counts.iter_mut().zip(all).for_each(|(sum, count)| *sum += count);
             if found != [0; 3] {
-                println!("  seed {seed}, {}, {} deadlocks", outcome.what, outcome.deadlocks);
+                println!("  seed {seed}, {}, {} deadlocks", outcome.description, outcome.deadlocks);
                 outcome
                     .log
                     .iter()
                     .filter(|_| args.seed.is_some())
                     .for_each(|line| println!("  {line}"));
-                let lines = [outcome.wrong, outcome.near_struck, outcome.aloft];
+                let lines = [outcome.forbidden, outcome.near_struck, outcome.not_landed];
                 lines.iter().flatten().for_each(|line| println!("    {line}"));
             }
         }

@@ -12,15 +12,15 @@ use super::{ARDUPILOT_LOITER, Autopilot, Catch, PX4_POSITION, STEP_S};
 const MIN_SINK_MPS: f32 = 0.275;
 /// Amplitude of the swing of a vehicle in a net, metres, and its angular speed, 1/s: up to 0.7 m/s.
 const SWING_M: f32 = 0.25;
-const SWING_PER_S: f32 = 2.8;
+const SWING_RAD_PER_S: f32 = 2.8;
 /// Speed at which the wind carries a vehicle off, m/s.
 const WIND_MPS: f32 = 0.7;
 /// Height above home to which a return climbs, metres.
-const RETURN_M: f32 = 6.0;
+const RETURN_CLIMB_M: f32 = 6.0;
 
 impl Autopilot {
     /// The acceleration that its controllers demand in the present mode.
-    fn wanted(&self, now: Instant, floor_z: f32) -> Vector3<f32> {
+    fn demanded_acceleration(&self, now: Instant, floor_z: f32) -> Vector3<f32> {
         let kind = self.kind;
         let (position_gain, velocity_gain) = match kind {
             AutopilotKind::Px4 => (Point::new(0.95, 0.95, 1.0), Point::new(1.8, 1.8, 4.0)),
@@ -32,7 +32,8 @@ impl Autopilot {
         if self.mode == kind.setpoint_mode() {
             if let Some(z) = self.takeoff_z {
                 velocity.z = (z - self.position.z).clamp(-0.5, 1.2);
-            } else if let Some(target) = self.target.filter(|_| self.age_s(now) < stale_s) {
+            } else if let Some(target) = self.target.filter(|_| self.setpoint_age_s(now) < stale_s)
+            {
                 velocity = target.velocity;
                 if let Some(place) = target.position {
                     velocity += (place - self.position).component_mul(&position_gain);
@@ -45,15 +46,15 @@ impl Autopilot {
                 velocity.z = velocity.z.min(0.4 + 0.4 * lifted_s);
             }
         } else if self.mode == kind.land_mode() {
-            velocity.z = -self.landing_mps(floor_z);
+            velocity.z = -self.landing_descent_mps(floor_z);
         } else if self.mode == px4::RTL && kind == AutopilotKind::Px4
             || self.mode == ardupilot::RTL && kind == AutopilotKind::ArduPilot
         {
             let away = self.home - self.position;
             let across = away.xy();
             if across.norm() < 0.3 {
-                velocity.z = -self.landing_mps(floor_z);
-            } else if self.position.z < self.home.z + RETURN_M - 0.3 && across.norm() > 1.0 {
+                velocity.z = -self.landing_descent_mps(floor_z);
+            } else if self.position.z < self.home.z + RETURN_CLIMB_M - 0.3 && across.norm() > 1.0 {
                 velocity.z = 1.0;
             } else {
                 let speed = across.norm().min(3.0) / across.norm();
@@ -62,7 +63,7 @@ impl Autopilot {
         } else if self.mode == PX4_POSITION && kind == AutopilotKind::Px4
             || self.mode == ARDUPILOT_LOITER && kind == AutopilotKind::ArduPilot
         {
-            velocity = self.pilot;
+            velocity = self.pilot_velocity;
             if self.position.z < floor_z + 0.6 {
                 velocity.z = velocity.z.max(0.3);
             }
@@ -90,8 +91,8 @@ impl Autopilot {
             // A vehicle that reached the ground does not swing any more.
             Catch::Net if self.grounded_since.is_some() => (self.position.x - place.x, 0.0),
             Catch::Net => (
-                SWING_M * (SWING_PER_S * t_s).sin(),
-                SWING_M * SWING_PER_S * (SWING_PER_S * t_s).cos(),
+                SWING_M * (SWING_RAD_PER_S * t_s).sin(),
+                SWING_M * SWING_RAD_PER_S * (SWING_RAD_PER_S * t_s).cos(),
             ),
             Catch::Wind => (self.position.x - place.x + WIND_MPS * STEP_S, WIND_MPS),
         };
@@ -105,14 +106,14 @@ impl Autopilot {
 
     /// Whether the land detector may detect the ground: PX4's does only while the setpoint's
     /// velocity sinks faster than 1.1 times `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`).
-    fn detects_ground(&self) -> bool {
+    fn may_detect_ground(&self) -> bool {
         self.kind != AutopilotKind::Px4
             || self.mode != self.kind.setpoint_mode()
             || self.lifted_at.is_none()
             || self.target.is_none_or(|target| target.velocity.z < -MIN_SINK_MPS)
     }
 
-    fn landing_mps(&self, floor_z: f32) -> f32 {
+    fn landing_descent_mps(&self, floor_z: f32) -> f32 {
         let height = self.position.z - floor_z;
         match self.kind {
             AutopilotKind::Px4 if height > 7.0 => 1.5,
@@ -128,7 +129,7 @@ impl Autopilot {
             (self.velocity, self.acceleration) = (Point::zeros(), Point::zeros());
             return;
         }
-        let wanted = self.wanted(now, floor_z);
+        let wanted = self.demanded_acceleration(now, floor_z);
         self.acceleration += (wanted - self.acceleration) * (STEP_S / 0.12);
         self.velocity += self.acceleration * STEP_S;
         self.position += self.velocity * STEP_S;
@@ -145,7 +146,7 @@ impl Autopilot {
             self.lifted_at = Some(now);
         }
         let rests =
-            (-0.3..0.03).contains(&height) && self.velocity.z < 0.05 && self.detects_ground();
+            (-0.3..0.03).contains(&height) && self.velocity.z < 0.05 && self.may_detect_ground();
         self.grounded_since = if rests { self.grounded_since.or(Some(now)) } else { None };
         let rested_s = self.grounded_since.map_or(0.0, |at| (now - at).as_secs_f32());
         if rested_s > 0.6 {

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::geo::frames;
 
-use super::{Autopilot, PX4_LOSS_S, Target};
+use super::{Autopilot, PX4_SETPOINT_LOSS_S, Target};
 
 impl Autopilot {
     /// Handles whole frames from the companion; answers are appended to `out`.
@@ -44,7 +44,7 @@ impl Autopilot {
                 ("MPC_Z_VEL_MAX_DN", 1.5),
                 ("MPC_JERK_AUTO", 4.0),
                 ("MPC_JERK_MAX", 8.0),
-                ("COM_OF_LOSS_T", PX4_LOSS_S),
+                ("COM_OF_LOSS_T", PX4_SETPOINT_LOSS_S),
             ],
             AutopilotKind::ArduPilot => &[
                 ("WPNAV_ACCEL", 250.0),
@@ -73,9 +73,9 @@ impl Autopilot {
 
     fn handle_setpoint(&mut self, now: Instant, data: &SET_POSITION_TARGET_LOCAL_NED_DATA) {
         if self.mode != self.kind.setpoint_mode() {
-            self.check.restart();
+            self.setpoint_check.begin_stream();
         }
-        self.check.take(now.as_micros() as f64 * 1e-6, data);
+        self.setpoint_check.check_setpoint(now.as_micros() as f64 * 1e-6, data);
         let enu = |x: f32, y: f32, z: f32| frames::swap_enu_ned(&Vector3::new(x, y, z));
         let mask = data.type_mask.bits();
         let ned = Vector3::new(f64::from(data.x), f64::from(data.y), f64::from(data.z));
@@ -93,8 +93,8 @@ impl Autopilot {
         // A setpoint ends a take-off, also before the lift-off.
         self.takeoff_z = None;
         self.target = Some(Target { at: now, position, velocity, acceleration });
-        if self.lost && self.kind == AutopilotKind::Px4 {
-            self.enter(px4::OFFBOARD);
+        if self.setpoints_lost && self.kind == AutopilotKind::Px4 {
+            self.enter_mode(px4::OFFBOARD);
         }
     }
 
@@ -137,16 +137,16 @@ impl Autopilot {
                 if mode == px4::OFFBOARD
                     && self.kind == AutopilotKind::Px4
                     && self.airborne
-                    && self.age_s(now) > 0.5
+                    && self.setpoint_age_s(now) > 0.5
                 {
                     result = MAV_RESULT_TEMPORARILY_REJECTED;
                 } else {
-                    self.enter(mode);
+                    self.enter_mode(mode);
                     self.landing_commanded = mode == self.kind.land_mode();
                 }
             }
             MavCmd::MAV_CMD_NAV_LAND => {
-                self.enter(self.kind.land_mode());
+                self.enter_mode(self.kind.land_mode());
                 self.landing_commanded = true;
             }
             MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => {

@@ -38,15 +38,16 @@ impl Autopilot {
 
     /// Sends the telemetry that is due at `now`.
     pub(super) fn report(&mut self, now: Instant, out: &mut Vec<u8>) {
-        let count = now.as_micros() / 25_000 + self.phase;
+        let count = now.as_micros() / 25_000 + self.stream_phase;
         if count.is_multiple_of(40) {
             self.report_each_second(out);
         }
         if count.is_multiple_of(8) {
-            self.report_often(out);
+            self.report_five_times_a_second(out);
         }
-        if count.is_multiple_of(2) && self.sends(32) {
-            let (ned, v) = (self.ned(&self.position), frames::swap_enu_ned(&self.velocity));
+        if count.is_multiple_of(2) && self.sends_stream(32) {
+            let (ned, v) =
+                (self.ned_from_enu(&self.position), frames::swap_enu_ned(&self.velocity));
             let data = LOCAL_POSITION_NED_DATA {
                 time_boot_ms: now.as_boot_ms(),
                 x: ned.x as f32,
@@ -60,13 +61,13 @@ impl Autopilot {
         }
     }
 
-    fn ned(&self, point: &Point) -> Vector3<f64> {
+    fn ned_from_enu(&self, point: &Point) -> Vector3<f64> {
         let place = frames::enu_to_geodetic(&self.mission_origin, point);
         frames::geodetic_to_ned(self.kind.projection(), &self.ekf_origin, &place)
     }
 
     /// Whether a stream is sent: by PX4 always, by ArduCopter only if it was requested.
-    fn sends(&self, id: u16) -> bool {
+    fn sends_stream(&self, id: u16) -> bool {
         self.kind == AutopilotKind::Px4 || self.streams.contains(&id)
     }
 
@@ -91,7 +92,7 @@ impl Autopilot {
                 AutopilotKind::Px4 => MavAutopilot::MAV_AUTOPILOT_PX4,
                 AutopilotKind::ArduPilot => MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
             },
-            system_status: match (self.critical, self.armed) {
+            system_status: match (self.in_failsafe, self.armed) {
                 (true, _) => MavState::MAV_STATE_CRITICAL,
                 (false, true) => MavState::MAV_STATE_ACTIVE,
                 (false, false) => MavState::MAV_STATE_STANDBY,
@@ -100,7 +101,7 @@ impl Autopilot {
             mavlink_version: 3,
         };
         self.send(&heartbeat, out);
-        if self.sends(1) {
+        if self.sends_stream(1) {
             self.send(&SYS_STATUS_DATA { battery_remaining: 90, ..Default::default() }, out);
         }
         if self.kind == AutopilotKind::Px4 {
@@ -114,8 +115,8 @@ impl Autopilot {
         }
     }
 
-    fn report_often(&mut self, out: &mut Vec<u8>) {
-        if self.sends(245) {
+    fn report_five_times_a_second(&mut self, out: &mut Vec<u8>) {
+        if self.sends_stream(245) {
             let landed_state = if self.airborne {
                 MavLandedState::MAV_LANDED_STATE_IN_AIR
             } else {
@@ -126,11 +127,11 @@ impl Autopilot {
         if self.kind != AutopilotKind::ArduPilot {
             return;
         }
-        if self.sends(193) {
+        if self.sends_stream(193) {
             let flags = EkfStatusFlags::from_bits_retain(0x33F);
             self.send(&EKF_STATUS_REPORT_DATA { flags, ..Default::default() }, out);
         }
-        if self.sends(33) {
+        if self.sends_stream(33) {
             let relative_alt = ((self.position.z - self.home.z) * 1e3) as i32;
             self.send(&GLOBAL_POSITION_INT_DATA { relative_alt, ..Default::default() }, out);
         }

@@ -7,7 +7,7 @@ use crate::meeting::autopilot::Failsafe;
 use crate::meeting::dice::Dice;
 
 /// The start of each vehicle, and up to three random events, by time.
-pub(super) fn happenings(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<TimedEvent> {
+pub(super) fn draw_events(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<TimedEvent> {
     let mut out = Vec::new();
     let mut ended = vec![false; vehicles.len()];
     for vehicle in 0..vehicles.len() {
@@ -58,20 +58,20 @@ pub(super) fn happenings(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<TimedEven
                 }
             }
             6 => {
-                push(at_s, MeetingEvent::Fails(how));
+                push(at_s, MeetingEvent::EntersFailsafe(how));
                 ended[vehicle] = true;
             }
             7 => {
-                push(at_s, MeetingEvent::Dies);
+                push(at_s, MeetingEvent::CompanionDies);
                 // An ArduCopter whose companion died hovers for ever, so its pilot lands it.
                 push(at_s + 20.0, MeetingEvent::PilotLands);
                 ended[vehicle] = true;
             }
             _ => {
                 let (sends, hears) = [(true, false), (false, true), (true, true)][dice.below(3)];
-                push(at_s, MeetingEvent::Cut { sends, hears });
+                push(at_s, MeetingEvent::RadioCut { sending_fails: sends, receiving_fails: hears });
                 if dice.chance(0.7) {
-                    push(at_s + dice.real(1.0, 25.0), MeetingEvent::Healed);
+                    push(at_s + dice.real(1.0, 25.0), MeetingEvent::RadioHealed);
                 }
             }
         }

@@ -4,19 +4,19 @@ use planner_core::Point;
 use planner_core::flight::Flight;
 use planner_core::schedule::{self, ScheduleWorkspace};
 
-use super::types::{LIMIT_S, MeetingEvent, SCHEDULE, START_S, Scene, TimedEvent, WAYPOINTS};
+use super::types::{MeetingEvent, SCHEDULE, START_S, Scene, TIME_LIMIT_S, TimedEvent, WAYPOINTS};
 use super::vehicles::{common_plan, vehicle};
-use super::ways::{Way, at_height, flight};
+use super::ways::{PathWithPads, at_height, flight_along};
 use crate::meeting::dice::Dice;
 
-/// Geometries of [`passing`].
+/// Geometries of [`passing_scene`].
 pub const PASSINGS: [&str; 6] =
     ["opposite", "alongside", "overhead", "climb beside", "crossing", "lane"];
 
 /// A scene of two vehicles of one plan that pass at exactly the separation of the schedule, or one
 /// after the other; nothing else happens. The radio loses 30 % of the frames and delays them by 0.3
 /// s.
-pub fn passing(seed: u64) -> Scene {
+pub fn passing_scene(seed: u64) -> Scene {
     let mut dice = Dice::new(seed ^ 0xFA15E);
     let kind = PASSINGS[seed as usize % PASSINGS.len()];
     let angle = dice.real(0.0, core::f32::consts::TAU);
@@ -59,7 +59,7 @@ pub fn passing(seed: u64) -> Scene {
         }
     };
     let mut workspace = Box::new(ScheduleWorkspace::new());
-    let flights = scheduled([first, second], &mut workspace);
+    let flights = scheduled_flights([first, second], &mut workspace);
     let vehicles = (0..2)
         .map(|i| vehicle(&flights[i], common_plan(&flights, i, &mut workspace), &mut dice))
         .collect();
@@ -68,22 +68,25 @@ pub fn passing(seed: u64) -> Scene {
         seed,
         kind,
         on_plan: true,
-        limit_s: LIMIT_S,
+        limit_s: TIME_LIMIT_S,
         vehicles,
-        happenings: vec![start(0), start(1)],
-        delay_s: (0.3, 0.3),
-        loss: 0.3,
+        events: vec![start(0), start(1)],
+        radio_delay_s: (0.3, 0.3),
+        radio_loss: 0.3,
         liar: None,
     }
 }
 
 /// The flights along these ways, the second as early as the first allows.
-fn scheduled(ways: [Vec<Point>; 2], workspace: &mut ScheduleWorkspace) -> Vec<Flight<WAYPOINTS>> {
+fn scheduled_flights(
+    ways: [Vec<Point>; 2],
+    workspace: &mut ScheduleWorkspace,
+) -> Vec<Flight<WAYPOINTS>> {
     let mut flights: Vec<Flight<WAYPOINTS>> = Vec::new();
     for (i, points) in ways.into_iter().enumerate() {
         let pad = at_height(points[0], 0.0);
-        let way = Way { pad, points, ground_z: 0.0 };
-        let mut flight = flight(i as u8 + 1, &way).expect("a short flight");
+        let way = PathWithPads { pad, points, goal_ground_z: 0.0 };
+        let mut flight = flight_along(i as u8 + 1, &way).expect("a short flight");
         let departs =
             schedule::earliest_departure(&SCHEDULE, &flight, 0.0, flights.iter(), workspace);
         flight.depart_s = departs.expect("room for two");

@@ -14,7 +14,7 @@ pub const GATES: usize = 128;
 /// Most vehicles of a meeting.
 pub const VEHICLES: usize = 8;
 /// Safety distance between two vehicles' centres, metres.
-pub const SAFETY_M: f32 = 1.5;
+pub const SAFETY_DISTANCE_M: f32 = 1.5;
 /// Nominal speed along paths, m/s.
 pub const CRUISE_MPS: f32 = 2.0;
 /// Speed of climbs, m/s.
@@ -22,13 +22,13 @@ pub const CLIMB_MPS: f32 = 1.0;
 /// When the missions are started, seconds.
 pub const START_S: f32 = 6.0;
 /// Time limit of a meeting, seconds after its start.
-pub const LIMIT_S: f32 = 180.0;
+pub const TIME_LIMIT_S: f32 = 180.0;
 /// Radius of the platform around a pad above the floor, metres.
-pub const PLATFORM_M: f32 = 0.7;
+pub const PLATFORM_RADIUS_M: f32 = 0.7;
 /// Schedule settings of the vehicles, as in a mission.
 pub const SCHEDULE: ScheduleConfig = ScheduleConfig {
-    separation_m: SAFETY_M + 0.5,
-    parked_separation_m: SAFETY_M + 0.25,
+    separation_m: SAFETY_DISTANCE_M + 0.5,
+    parked_separation_m: SAFETY_DISTANCE_M + 0.25,
     cruise_mps: 0.9 * CRUISE_MPS,
     vertical_mps: CLIMB_MPS,
 };
@@ -47,9 +47,9 @@ pub struct Vehicle {
     /// Plan that the vehicle's planner returns.
     pub plan: Plan,
     /// Shift of its telemetry streams, in steps of 25 ms.
-    pub phase: u64,
+    pub stream_phase: u64,
     /// What its autopilot does after a loss of setpoints.
-    pub on_loss: Failsafe,
+    pub on_setpoint_loss: Failsafe,
 }
 
 /// An event in a meeting.
@@ -72,18 +72,18 @@ pub enum MeetingEvent {
     /// The pilot switches to the mode of landing.
     PilotLands,
     /// The autopilot enters a failsafe.
-    Fails(Failsafe),
+    EntersFailsafe(Failsafe),
     /// The companion stops for good.
-    Dies,
+    CompanionDies,
     /// Its radio fails in one or both directions.
-    Cut {
+    RadioCut {
         /// Whether sending fails.
-        sends: bool,
+        sending_fails: bool,
         /// Whether receiving fails.
-        hears: bool,
+        receiving_fails: bool,
     },
     /// Its radio works again in both directions.
-    Healed,
+    RadioHealed,
     /// Something that is on no map holds the vehicle, or carries it off.
     Caught(Catch),
 }
@@ -128,11 +128,11 @@ pub struct Scene {
     /// Time limit, seconds after the start.
     pub limit_s: f32,
     /// Events, by rising time.
-    pub happenings: Vec<TimedEvent>,
+    pub events: Vec<TimedEvent>,
     /// Least and greatest delay of a radio frame, seconds.
-    pub delay_s: (f32, f32),
+    pub radio_delay_s: (f32, f32),
     /// Probability that a radio frame is lost.
-    pub loss: f32,
+    pub radio_loss: f32,
     /// Index of the vehicle that lies in its reports, and its lie; `None`: all are honest.
     pub liar: Option<(usize, Lie)>,
 }

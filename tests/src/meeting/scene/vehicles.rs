@@ -5,7 +5,7 @@ use planner_core::flight::Flight;
 use planner_core::schedule::{self, ScheduleWorkspace};
 
 use super::types::{Plan, SCHEDULE, Vehicle, WAYPOINTS};
-use super::ways::pads;
+use super::ways::pad_and_goal;
 use crate::meeting::autopilot::Failsafe;
 use crate::meeting::dice::Dice;
 
@@ -15,7 +15,7 @@ pub(super) fn common_plan(
     i: usize,
     workspace: &mut ScheduleWorkspace,
 ) -> Plan {
-    let mut plan = Plan { plan_crc: 5, ..own_plan(flights, i) };
+    let mut plan = Plan { swarm_plan_crc: 5, ..own_plan(flights, i) };
     schedule::gates(&SCHEDULE, flights, i, workspace, &mut plan.gates).expect("few gates");
     plan
 }
@@ -30,18 +30,18 @@ pub(super) fn own_plan(flights: &[Flight<WAYPOINTS>], i: usize) -> Plan {
         descent_m: flight.descent_m,
         depart_s: flight.depart_s,
         gates: heapless::Vec::new(),
-        plan_crc: 100 + i as u32,
+        swarm_plan_crc: 100 + i as u32,
     }
 }
 
 /// The vehicle that flies this flight by this plan.
 pub(super) fn vehicle(flight: &Flight<WAYPOINTS>, plan: Plan, dice: &mut Dice) -> Vehicle {
     Vehicle {
-        id: flight.id,
+        id: flight.vehicle_id,
         kind: if dice.chance(0.6) { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot },
-        pad: pads(flight)[0],
+        pad: pad_and_goal(flight)[0],
         plan,
-        phase: dice.bits() % 40,
-        on_loss: if dice.chance(0.5) { Failsafe::Land } else { Failsafe::Return },
+        stream_phase: dice.bits() % 40,
+        on_setpoint_loss: if dice.chance(0.5) { Failsafe::Land } else { Failsafe::Return },
     }
 }

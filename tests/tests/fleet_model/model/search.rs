@@ -23,7 +23,7 @@ impl Model for FleetModel {
                     heard_at: Some(NOW),
                     hears_us: true,
                     heard_by_others: true,
-                    hears: u32::MAX,
+                    heard_bits: u32::MAX,
                 };
                 vehicle.fleet.step(
                     NOW,

@@ -9,10 +9,9 @@ fn listing(text: &str) -> Listing {
 
 /// Name, value and unit of each constant in a file of this text.
 fn rows(text: &str) -> Vec<String> {
-    let row = |((_, name), is): ((String, String), Distance)| {
-        format!("{name} = {} {}", is.value, is.unit)
-    };
-    listing(text).found.into_iter().map(row).collect()
+    let row =
+        |((_, name), is): ((String, String), PageRow)| format!("{name} = {} {}", is.value, is.unit);
+    listing(text).rows.into_iter().map(row).collect()
 }
 
 #[test]
@@ -52,7 +51,7 @@ fn constants_of_an_impl_and_of_a_function_are_listed() {
 
 #[test]
 fn a_constant_needs_a_reason_and_a_name_of_its_own() {
-    let wrong = |text: &str| listing(text).wrong;
+    let wrong = |text: &str| listing(text).faults;
     assert!(wrong("/// Far, metres.\nconst A_M: f32 = 1.0;").is_empty());
     assert_eq!(wrong("const A_M: f32 = 1.0;"), ["a.rs: A_M has no reason"]);
     let twice = "/// One.\nconst A: Duration = B;\nimpl C {\n/// Two.\nconst A: Duration = B;\n}";

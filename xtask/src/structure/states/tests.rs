@@ -4,7 +4,7 @@ use super::*;
 fn names_set(expression: &str) -> bool {
     let file = syn::parse_file(&format!("fn f() {{ {expression} }}")).unwrap();
     let names = ["Ready", "Climb", "Done"].map(str::to_owned).into();
-    !sets_in(&file.items, &names).is_empty()
+    !lines_of_state_sets(&file.items, &names).is_empty()
 }
 
 #[test]
@@ -35,5 +35,5 @@ fn a_pattern_of_two_states_is_a_set() {
 #[test]
 fn the_states_are_those_of_the_enum() {
     let item = syn::parse_str("enum State { Ready, Done }").unwrap();
-    assert_eq!(names_of(&item), ["Done", "Ready"].map(str::to_owned).into());
+    assert_eq!(variant_names(&item), ["Done", "Ready"].map(str::to_owned).into());
 }

@@ -84,7 +84,8 @@ fn high_bench(kind: AutopilotKind, up_m: f32, error_m: f32) -> Bench {
     let mut plan = plan();
     let mut path = planner_core::flight::Path::new();
     for waypoint in plan.path.waypoints() {
-        path.push(waypoint.position + Point::new(0.0, 0.0, up_m), waypoint.clearance_m).unwrap();
+        path.push(waypoint.position + Point::new(0.0, 0.0, up_m), waypoint.leg_clearance_m)
+            .unwrap();
     }
     plan.path = path;
     (plan.climb_m, plan.descent_m) = (plan.climb_m + up_m, plan.descent_m + up_m);

@@ -67,20 +67,24 @@ impl Faller {
     /// away from the falling vehicle; a request for a detour after a random time, in a coverage
     /// mission not at all.
     fn plan_away(&mut self, b: &mut Bench) {
-        let over_area = b.companion.config.lost_vehicle_down_s.is_some();
-        let answered = |request: &DetourRequest| request.aside || !over_area;
+        let over_area = b.companion.config.lost_vehicle_down_after_s.is_some();
+        let answered = |request: &DetourRequest| request.land_aside || !over_area;
         let Some(request) = b.companion.detour_request(|_| {}).filter(answered) else {
             self.asked = None;
             return;
         };
-        let asked = self.asked.filter(|asked| asked.aside == request.aside).unwrap_or(request);
+        let asked =
+            self.asked.filter(|asked| asked.land_aside == request.land_aside).unwrap_or(request);
         self.asked = Some(asked);
-        if !self.answers || self.falls_mps <= 0.0 || (!asked.aside && self.real(0.0, 60.0) > 1.0) {
+        if !self.answers
+            || self.falls_mps <= 0.0
+            || (!asked.land_aside && self.real(0.0, 60.0) > 1.0)
+        {
             return;
         }
         let away = (asked.here - self.place).xy();
         let away = away * (3.0 / away.norm().max(0.1));
-        let beside = Point::new(away.x, away.y, 0.0) * if asked.aside { 1.0 } else { 2.0 };
+        let beside = Point::new(away.x, away.y, 0.0) * if asked.land_aside { 1.0 } else { 2.0 };
         let mut path = Path::new();
         path.push(asked.here, 1.2).unwrap();
         path.push(asked.here + beside, 1.2).unwrap();
@@ -169,7 +173,7 @@ fn holding(state: State, mission: MissionKind, faller: &mut Faller) -> Bench {
         VehiclePlan { path: path(faller.real(1.0, 6.0), 1.2), descent_m: 4.0, ..plan() };
     let flown_m = faller.real(5.0, 9.0);
     if mission == MissionKind::Area {
-        config.lost_vehicle_down_s = Some(60.0);
+        config.lost_vehicle_down_after_s = Some(60.0);
         let mut out = path(6.0, OPEN_FIELD_CLEARANCE_M);
         for point in [Point::new(8.0, 18.0, 4.0), Point::new(8.0, 12.0, 4.0), START] {
             out.push(point, OPEN_FIELD_CLEARANCE_M).unwrap();
@@ -182,11 +186,14 @@ fn holding(state: State, mission: MissionKind, faller: &mut Faller) -> Bench {
     } else {
         config
             .roster
-            .push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) })
+            .push(RosterEntry { system_id: 78, path_start: Point::new(8.0, 28.0, 1.5) })
             .unwrap();
     }
     if state == Follow {
-        wanted.gates.push(Gate { at_m: flown_m, id: 77, until_m: 6.0 }).unwrap();
+        wanted
+            .gates
+            .push(Gate { at_m: flown_m, wait_for_id: 77, open_from_progress_m: 6.0 })
+            .unwrap();
     }
     let mut b = Bench::new(config);
     b.answer_plan = Some(Ok(wanted));
@@ -199,7 +206,7 @@ fn holding(state: State, mission: MissionKind, faller: &mut Faller) -> Bench {
     assert!(faller.until(&mut b, 30.0, |b| b.state() == Follow), "{:?}", b.texts);
     let over_m = flown_m - 3.0;
     assert!(
-        faller.until(&mut b, 30.0, |b| b.companion.guidance.along_m() > over_m),
+        faller.until(&mut b, 30.0, |b| b.companion.guidance.reference_along_m() > over_m),
         "{:?}",
         b.texts
     );
@@ -306,11 +313,11 @@ fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
         // Otherwise it evaded backwards along its path.
         let aside = faller.until(&mut b, 20.0, |b| b.companion.detours.is_beside_plan());
         (b.answer_detour, b.answer_division) = (Some(Ok(())), true);
-        if !aside || !faller.until(&mut b, 120.0, |b| b.companion.detours.leads_back()) {
+        if !aside || !faller.until(&mut b, 120.0, |b| b.companion.detours.ends_on_plan_path()) {
             continue;
         }
         returns += 1;
-        let back = b.companion.detours.rejoin().expect("it comes back");
+        let back = b.companion.detours.rejoin_place().expect("it comes back");
         let left_at_m = b.companion.detours.left_at_m();
         assert!((back.along_m - left_at_m).abs() < 0.5, "{seed}: {back:?} {left_at_m}");
     }

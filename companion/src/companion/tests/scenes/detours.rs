@@ -31,7 +31,7 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
     let mut far = two_vehicles();
     far.radio_range_m = 5.0;
     let mut gated = plan();
-    gated.gates.push(Gate { at_m: 0.5, id: 77, until_m: 6.0 }).unwrap();
+    gated.gates.push(Gate { at_m: 0.5, wait_for_id: 77, open_from_progress_m: 6.0 }).unwrap();
     let gated_until = |clear_m| {
         let mut bench = Bench::new(far.clone());
         bench.answer_plan = Some(Ok(gated.clone()));

@@ -79,7 +79,7 @@ pub(super) fn is_blocked(scenes: &mut Scenes) {
 /// Another vehicle flies elsewhere, and never passes the place that opens the gate.
 pub(super) fn waits_for_nothing(scenes: &mut Scenes) {
     let mut plan = field_plan();
-    plan.gates.push(Gate { at_m: 4.0, id: 77, until_m: 60.0 }).unwrap();
+    plan.gates.push(Gate { at_m: 4.0, wait_for_id: 77, open_from_progress_m: 60.0 }).unwrap();
     let mut bench = losses::over_a_field_with(plan, Follow);
     bench.neighbour = flies(Point::new(40.0, 40.0, 9.0), ON_PLAN);
     let waits = |b: &mut Bench| {
@@ -159,7 +159,7 @@ fn a_vehicle_that_was_stopped_on_its_way_around_goes_on() {
     b.run_until(Blocked, 5.0);
     b.run_until(Follow, 30.0);
     b.run(0.5);
-    let ahead_m = b.companion.guidance.along_m() + 2.5;
+    let ahead_m = b.companion.guidance.reference_along_m() + 2.5;
     let ahead = b.companion.mission.plan().and_then(|plan| plan.path.point_at(ahead_m));
     b.answer_detour = detours::NO_WAY;
     b.neighbour = flies(ahead.unwrap(), ON_PLAN | crate::link::intent::ON_DETOUR);

@@ -21,7 +21,7 @@ pub(super) fn over_a_field_with(plan: Plan, state: State) -> Bench {
 
 /// As [`over_a_field`], with these settings and this plan.
 fn over_a_field_of(mut config: Config<4>, plan: Plan, state: State) -> Bench {
-    config.lost_vehicle_down_s = Some(60.0);
+    config.lost_vehicle_down_after_s = Some(60.0);
     let mut bench = Bench::new(config);
     bench.answer_plan = Some(Ok(plan));
     bench.neighbour = on_pad(ON_PLAN);
@@ -37,7 +37,7 @@ fn over_a_field_of(mut config: Config<4>, plan: Plan, state: State) -> Bench {
 fn three() -> Config<4> {
     let mut config = two_vehicles();
     let start = Point::new(8.0, 28.0, 1.5);
-    config.roster.push(RosterEntry { system_id: 78, start }).unwrap();
+    config.roster.push(RosterEntry { system_id: 78, path_start: start }).unwrap();
     config
 }
 
@@ -45,11 +45,11 @@ fn three() -> Config<4> {
 pub(super) fn report_status(b: &mut Bench, own: ShareStatus, other: ShareStatus) {
     let entry = |standing| RosterReportEntry { status: standing, ..RosterReportEntry::default() };
     let entries = [entry(own), entry(other)].into_iter().collect();
-    let plan = super::super::divisions::own_roster(b).plan;
+    let plan = super::super::divisions::own_roster(b).plan_crc8;
     let roster = RosterReport {
         system_id: 77,
         mission_crc: 0xC0FFEE,
-        plan,
+        plan_crc8: plan,
         entries,
         ..RosterReport::default()
     };
@@ -220,7 +220,7 @@ fn a_vehicle_in_reserve_waits_for_its_plan_of_a_division_that_counts() {
         // Once the division is computed the shell no longer answers.
         if b.answer_division {
             b.tick();
-            b.answer_division = super::super::divisions::own_roster(&b).hash == 0;
+            b.answer_division = super::super::divisions::own_roster(&b).pending_hash == 0;
         }
     }
     b.run(3.0);

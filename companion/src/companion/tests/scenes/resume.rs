@@ -61,7 +61,7 @@ fn a_vehicle_that_comes_late_takes_the_set_of_those_that_fly() {
     bench.run(1.0);
     reports(
         &mut bench,
-        &PhotographedReport { flies: true, is_left_out_by_plan: true, ..report(20) },
+        &PhotographedReport { flies: true, are_ranges_left_out_by_plan: true, ..report(20) },
     );
     bench.run(1.0);
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);

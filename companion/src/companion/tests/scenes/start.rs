@@ -14,7 +14,7 @@ fn answered(answer: Option<Result<Plan, PlanFailure>>) -> Bench {
 /// A started vehicle that waits at a gate for vehicle 77.
 fn gated() -> Bench {
     let mut gated = plan();
-    gated.gates.push(Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
+    gated.gates.push(Gate { at_m: -1.5, wait_for_id: 77, open_from_progress_m: 6.0 }).unwrap();
     let mut bench = Bench::new(two_vehicles());
     bench.answer_plan = Some(Ok(gated));
     bench.run_until(Ready, 6.0);

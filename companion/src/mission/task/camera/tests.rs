@@ -127,7 +127,7 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: f64, seed: u64) -> (Vec<f32>
         let along = PathProgress {
             progress_m: at_m.min(path.length_m()),
             reference_m: at_m.min(path.length_m()),
-            place: if held == 0 { PathRelation::OnPath } else { PathRelation::Elsewhere },
+            relation: if held == 0 { PathRelation::OnPath } else { PathRelation::Elsewhere },
         };
         camera.step(photographs, &path, along);
         camera.send_current_command(now, &mut timers, &mut links);
@@ -154,11 +154,11 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: f64, seed: u64) -> (Vec<f32>
 /// wide.
 fn widest(photographs: &PicturePlan, pictures_m: &[f32], late_m: f32) -> Result<(), (f32, f32)> {
     for shots in photographs.stretches(&path()) {
-        let mut before_m = shots.from_m - shots.step_m;
+        let mut before_m = shots.from_m - shots.ground_spacing_m;
         let inside =
             pictures_m.iter().filter(|m| **m >= shots.from_m - 0.1 && **m <= shots.to_m + late_m);
-        for &at_m in inside.chain([&(shots.to_m + shots.step_m)]) {
-            if at_m - before_m > shots.step_m + late_m {
+        for &at_m in inside.chain([&(shots.to_m + shots.ground_spacing_m)]) {
+            if at_m - before_m > shots.ground_spacing_m + late_m {
                 return Err((before_m, at_m));
             }
             before_m = at_m;
@@ -227,7 +227,7 @@ proptest! {
             }
             let flown = if step < 600 { &photographs } else { &bare };
             let place = PathRelation::OnPath;
-            let along = PathProgress { progress_m: at_m, reference_m, place };
+            let along = PathProgress { progress_m: at_m, reference_m, relation: place };
             camera.step(flown, &path, along);
             camera.send_current_command(now, &mut timers, &mut links);
             if step % looks_every == 0 {
@@ -235,7 +235,7 @@ proptest! {
             }
             deliver(&mut camera, &mut fake, &mut links, &mut framer, now, at_m);
         }
-        let near = |m: &f32| (m - hold_m).abs() <= lag_m + HELD_WITHIN_M;
+        let near = |m: &f32| (m - hold_m).abs() <= lag_m + HOLDS_AT_PICTURE_WITHIN_M;
         let near = fake.pictures_m.iter().any(near);
         prop_assert!(near, "held at {} m: {:?}", hold_m, fake.pictures_m);
         prop_assert_eq!(fake.step_m, 0.0);
@@ -265,7 +265,7 @@ proptest! {
             taken_before = if on_path { fake.pictures_m.len() } else { taken_before };
             at_m += MPS * STEP_S;
             let place = if on_path { PathRelation::OnPath } else { PathRelation::Elsewhere };
-            let along = PathProgress { progress_m: at_m, reference_m: at_m, place };
+            let along = PathProgress { progress_m: at_m, reference_m: at_m, relation: place };
             camera.step(&photographs, &path, along);
             camera.send_current_command(now, &mut timers, &mut links);
             fake.fly(at_m);
@@ -292,7 +292,7 @@ fn a_silent_autopilot_is_reported_at_any_speed() {
             now = now + Duration::from_millis(50);
             let progress_m = (mps * STEP_S * f32::from(step)).min(path.length_m());
             let place = PathRelation::OnPath;
-            let along = PathProgress { progress_m, reference_m: progress_m, place };
+            let along = PathProgress { progress_m, reference_m: progress_m, relation: place };
             camera.step(&photographs, &path, along);
             camera.send_current_command(now, &mut timers, &mut links);
             for frame in sent_frames(&mut links, &mut framer, now) {
@@ -319,7 +319,7 @@ fn a_vehicle_looks_along_the_next_lane_or_one_way() {
         (180.0, 180.0, 180.0),
         "it turns on the way to the second"
     );
-    let fixed = PicturePlan::new(8.0, HeadingMode::Fixed(1.0), Trigger::Distance);
+    let fixed = PicturePlan::new(8.0, HeadingMode::FixedEnuRad(1.0), Trigger::Distance);
     assert_eq!(heading(&fixed, &path, 75.0), Some(1.0));
     let mut point = PicturePlan::new(8.0, HeadingMode::Ahead, Trigger::Distance);
     point.add_stretch(5, 5, WaypointRange { first: 0, end: 1 }).unwrap();

@@ -12,7 +12,7 @@ use rand_pcg::Pcg32;
 use super::super::packet::{ACK, NAK, op};
 use super::super::*;
 use crate::link::frame::{self, Framer, Header};
-use crate::storage::store::MAX_READ;
+use crate::storage::store::MAX_READ_LEN;
 use crate::testing::fake_flash::{Flash, execute, started};
 
 const US: (u8, u8) = (7, crate::COMPANION_COMPONENT);
@@ -123,7 +123,7 @@ impl World {
             let frame = Framer::new().next(self.now, &mut &bytes[..length]).expect("it is whole");
             self.ftp.queue_request(LINK, self.now, &frame);
         }
-        let mut read = [0; MAX_READ];
+        let mut read = [0; MAX_READ_LEN];
         for _ in 0..2000 {
             self.ftp.continue_work(&mut self.store, self.now, self.erasing);
             self.texts.extend(self.ftp.take_text().map(|(_, text)| text));

@@ -46,19 +46,19 @@ fn mission() -> MissionHeader {
 
 fn header() -> CoverageHeader {
     CoverageHeader {
-        unit: TrackUnit::Waypoint,
-        parts: PartEligibility::Anyone,
-        heading: HeadingRule::Sweep,
+        assignment_unit: TrackUnit::Waypoint,
+        part_eligibility: PartEligibility::Anyone,
+        heading_rule: HeadingRule::SameOnAllLanes,
         trigger: Trigger::Distance,
         search_steps: 2000,
-        heights: Heights { mission_m: 25.0, layer_m: 5.0 },
+        heights: Heights { max_picture_height_m: 25.0, layer_spacing_m: 5.0 },
         spacing: Spacing {
             footprint: Footprint { along_m: 20.0, across_m: 30.0 },
-            lane_m: 12.0,
-            waypoint_m: 8.0,
+            max_lane_spacing_m: 12.0,
+            max_waypoint_spacing_m: 8.0,
         },
-        angle_deg: None,
-        margin_m: 0.0,
+        lane_angle_deg: None,
+        lane_overshoot_m: 0.0,
         ground: None,
     }
 }
@@ -78,13 +78,13 @@ fn shares() -> [VehicleShare; 2] {
 fn file() -> List<u8> {
     let vehicle = |id: u8| MissionVehicle {
         task: VehicleTask { id, required_clearance_m: 1.5, climb_m: 3.0, goal: None },
-        start: Point::new(5.0 * f32::from(id), -10.0, 3.3),
+        path_start: Point::new(5.0 * f32::from(id), -10.0, 3.3),
         radius_m: 0.3,
         speed_max_mps: 5.0,
     };
     let (shares, vertices) = (shares(), vertices());
     let parts =
-        CoverageParts { header: header(), shares: &shares, rings: &RINGS, vertices: &vertices };
+        CoverageBlock { header: header(), shares: &shares, rings: &RINGS, vertices: &vertices };
     let block = MissionBlock::Coverage(parts);
     let mut out = vec![0xAA; block.file_len(2)];
     assert_eq!(
@@ -108,7 +108,7 @@ fn forged(at: usize, bytes: &[u8]) -> List<u8> {
     sealed(file)
 }
 
-/// A file with this [`Ground`]: height, tolerance, lowest and highest ground, metres.
+/// A file with this [`UnevenGround`]: height, tolerance, lowest and highest ground, metres.
 fn above(ground: [f32; 4]) -> List<u8> {
     let bytes: List<u8> = ground.into_iter().flat_map(f32::to_le_bytes).collect();
     forged(44, &bytes)
@@ -169,7 +169,7 @@ fn what_32_vehicles_photograph_within_256_vertices_fits_into_a_board() {
     let vehicles: List<MissionVehicle> = (1..=32)
         .map(|id| MissionVehicle {
             task: VehicleTask { id, required_clearance_m: 1.5, climb_m: 3.0, goal: None },
-            start: Point::new(5.0 * f32::from(id), -10.0, 3.3),
+            path_start: Point::new(5.0 * f32::from(id), -10.0, 3.3),
             radius_m: 0.3,
             speed_max_mps: 5.0,
         })
@@ -181,7 +181,7 @@ fn what_32_vehicles_photograph_within_256_vertices_fits_into_a_board() {
         .map(|i| Ring { end: if i == 84 { 256 } else { 3 * i + 3 }, kind: kind(i) })
         .collect();
     let parts =
-        CoverageParts { header: header(), shares: &shares, rings: &rings, vertices: &vertices };
+        CoverageBlock { header: header(), shares: &shares, rings: &rings, vertices: &vertices };
     let block = MissionBlock::Coverage(parts);
     let mut out = [0; 4096];
     let length = mission_file::write_mission(&mission(), &vehicles, &block, &mut out);
@@ -196,7 +196,8 @@ fn what_32_vehicles_photograph_within_256_vertices_fits_into_a_board() {
 #[test]
 fn above_uneven_ground_only_the_field_of_the_mission_is_planned_on() {
     // A ramp of 4 m over the area.
-    let shape = FieldShape { low: Flat::new(-50.0, -50.0), cell_m: 50.0, columns: 5, rows: 4 };
+    let shape =
+        FieldShape { south_west: Flat::new(-50.0, -50.0), cell_m: 50.0, columns: 5, rows: 4 };
     let nodes: List<i16> = (0..20).map(|i| 10 * (i % 5)).collect();
     let mut field = vec![0; shape.encoded_len()];
     field::write(&shape, &nodes, &mut field).unwrap();
@@ -259,8 +260,8 @@ fn what_is_not_sound_is_refused_by_name() {
         (above([20.0, 3.0, 9.0, 4.0]), FileError::Header("ground").into()),
         (above([20.0, 3.0, 1.0, 6.0]), FileError::Header("ground").into()),
         (above([20.0, 0.0, 1.0, 4.0]), FileError::Header("ground").into()),
-        (forged(60, &nan), MissionError::Vehicle(0)),
-        (forged(72 + 4, &0.0f32.to_le_bytes()), MissionError::Vehicle(1)),
+        (forged(60, &nan), MissionError::InvalidVehicle(0)),
+        (forged(72 + 4, &0.0f32.to_le_bytes()), MissionError::InvalidVehicle(1)),
         (forged(84 + 2, &[3]), FileError::Header("rings").into()),
         (forged(92, &1e9f32.to_le_bytes()), FileError::Header("vertices").into()),
     ] {

@@ -40,7 +40,7 @@ proptest! {
 #[test]
 fn what_does_not_fit_is_told() {
     let mut window = UploadReassembly::default();
-    assert_eq!(window.insert(4000, &[0; 100], 9000), PieceOutcome::Later);
+    assert_eq!(window.insert(4000, &[0; 100], 9000), PieceOutcome::RetryLater);
     assert_eq!(window.insert(8990, &[0; 11], 9000), PieceOutcome::TooLarge);
     assert_eq!(window.insert(u32::MAX, &[0; 2], 9000), PieceOutcome::TooLarge);
     assert_eq!(window.insert(300, &[1; 10], 9000), PieceOutcome::Stored);

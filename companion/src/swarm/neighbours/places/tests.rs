@@ -6,11 +6,12 @@ use rand_pcg::Pcg32;
 
 use super::super::tests::{ORIGIN, intent, joined, place, uniform};
 use super::super::{
-    GROUNDED, MAX_STRETCH_SPACINGS, OUT_OF_PLAN, STALE_POSITION_ERROR_M, UNHEARD_STRETCH_SPACING_M,
+    GROUNDED, MAX_STRETCH_SPACINGS, MIN_UNHEARD_STRETCH_SPACING_M, OUT_OF_PLAN,
+    STALE_POSITION_ERROR_M,
 };
 use super::*;
 use crate::link::intent::{Intent, MAX_POINTS};
-use crate::margins::unheard_stretch_m;
+use crate::margins::max_unheard_travel_m;
 use crate::time::Duration;
 
 /// Wherever a vehicle in a coverage mission is on the points that it reported before it fell
@@ -39,7 +40,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
         let beyond = (rng.next_u32() % count) as u8;
         let reported = Intent {
             points: points.clone(),
-            unheard_point_count: beyond,
+            unheard_flight_point_count: beyond,
             ground_m: 0.0,
             ..intent(0, 1, 2)
         };
@@ -59,7 +60,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
             table
                 .for_each_landing_zone(now, [apart_m, place.z], |off| ends |= off.contains(&place));
             let low = place - Point::new(0.0, 0.0, 20.0);
-            table.landing_column(1, now, apart_m, |off| columns |= off.contains(&low));
+            table.visit_landing_column(1, now, apart_m, |off| columns |= off.contains(&low));
             table.for_each_unavoided_zone_of(1, now, apart_m, |off| columns |= off.contains(&low));
             assert!(
                 ends && (columns || silent_s < 40.0),
@@ -146,8 +147,8 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
         let mut table = joined(0);
         let entry = &mut table.entries[1];
         entry.message_delay.delay_s = uniform(&mut rng, 0.0, 1.0);
-        entry.fastest_cruise_mps = uniform(&mut rng, 0.5, 15.0);
-        entry.unheard_stretch_m = unheard_stretch_m(entry.fastest_cruise_mps);
+        entry.fastest_vehicle_mps = uniform(&mut rng, 0.5, 15.0);
+        entry.max_unheard_travel_m = max_unheard_travel_m(entry.fastest_vehicle_mps);
         let mut at = entry.state.position;
         entry.points = (0..1 + rng.next_u32() % 8)
             .map(|_| {
@@ -157,7 +158,7 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
             .collect();
         let upto_m = entry.unheard_stopping_distance_m();
         let mut places = std::vec::Vec::new();
-        entry.for_each_place([0.0, upto_m], &mut |place, _| places.push(place));
+        entry.for_each_rest_place([0.0, upto_m], &mut |place, _| places.push(place));
         let flown_m = upto_m * uniform(&mut rng, 0.0, 1.2).min(1.0);
         let (mut left_m, mut from) = (flown_m, entry.state.position);
         for next in &entry.points {
@@ -169,7 +170,7 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
         at_the_end += usize::from(flown_m >= upto_m && left_m <= 0.0);
         let nearest_m =
             places.iter().map(|place| (place - from).norm()).fold(f32::INFINITY, f32::min);
-        let spacing_m = UNHEARD_STRETCH_SPACING_M.max(upto_m / MAX_STRETCH_SPACINGS);
+        let spacing_m = MIN_UNHEARD_STRETCH_SPACING_M.max(upto_m / MAX_STRETCH_SPACINGS);
         assert!(nearest_m <= 0.5 * spacing_m + 0.01, "{case}: {nearest_m} m beside {places:?}");
         most = most.max(places.len());
     }
@@ -183,7 +184,7 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
 fn a_detour_keeps_as_far_from_a_vehicle_off_its_points_as_the_filter_does() {
     let mut rng = Pcg32::seed_from_u64(17);
     let braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
-    let bounds = MotionBounds { braking, speed_max_mps: 2.0, silent_s: 3.0 };
+    let bounds = MotionBounds { braking, speed_max_mps: 2.0, stopped_when_unheard_for_s: 3.0 };
     let (mut off_points, mut on_points) = (0, 0);
     for _ in 0..1000 {
         let mut table = joined(0);
@@ -202,7 +203,9 @@ fn a_detour_keeps_as_far_from_a_vehicle_off_its_points_as_the_filter_does() {
         let wider_m = entry.filter_neighbour(late).motion.reachable_set(&bounds, 0.0).widened_by_m;
         let apart_m = uniform(&mut rng, 1.0, 3.0);
         let mut radius_m = 0.0_f32;
-        table.for_each_place(late, [apart_m; 2], |zone| radius_m = radius_m.max(zone.radius_m));
+        table.for_each_keep_out_zone(late, [apart_m; 2], |zone| {
+            radius_m = radius_m.max(zone.radius_m);
+        });
         if beside {
             assert!(radius_m >= apart_m + wider_m, "{radius_m} m, {apart_m} + {wider_m} m");
         } else {
@@ -230,7 +233,7 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
         let apart_m = lying_m + uniform(&mut rng, 0.1, 1.0);
         let lies = flags & GROUNDED != 0 || (flags & OUT_OF_PLAN == 0 && silent_s >= 75.0);
         let comes_down = flags & (GROUNDED | OUT_OF_PLAN) == 0 && (45.0..75.0).contains(&silent_s);
-        table.for_each_place(now, [apart_m, lying_m], |off| {
+        table.for_each_keep_out_zone(now, [apart_m, lying_m], |off| {
             // The place of a silent vehicle is not known any better than that.
             let most_m = lying_m + STALE_POSITION_ERROR_M;
             let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };
@@ -262,7 +265,7 @@ fn a_vehicle_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             let here = table.entries[1].state.position;
             let near = here + away * (0.99 * truly_m);
             let mut free = true;
-            table.for_each_place(Instant::from_millis(100), [apart_m; 2], |off| {
+            table.for_each_keep_out_zone(Instant::from_millis(100), [apart_m; 2], |off| {
                 let down_m = (off.from.z - near.z).clamp(0.0, off.from.z - off.to.z);
                 let nearest = off.from - Point::new(0.0, 0.0, down_m);
                 free &= (near - nearest).norm() >= off.radius_m;

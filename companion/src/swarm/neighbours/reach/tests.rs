@@ -6,7 +6,7 @@ extern crate std;
 use std::vec::Vec as List;
 
 use planner_core::Point;
-use planner_core::flight::PROGRESS_ERROR_M;
+use planner_core::flight::MAX_REPORTED_PROGRESS_LAG_M;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -42,18 +42,23 @@ impl Row {
     fn new(cruise_mps: &[f32], length_m: f32, seed: u64) -> Self {
         let count = cruise_mps.len() as u8;
         let fold = |f: fn(f32, f32) -> f32| cruise_mps.iter().copied().reduce(f).expect("a row");
-        let (slowest_mps, fastest_mps) = (fold(f32::min), fold(f32::max));
-        let entry = |id: u8| RosterEntry { system_id: id, start: Point::zeros() };
+        let (slowest_vehicle_mps, fastest_vehicle_mps) = (fold(f32::min), fold(f32::max));
+        let entry = |id: u8| RosterEntry { system_id: id, path_start: Point::zeros() };
         let roster: List<_> = (1..=count).map(entry).collect();
-        let gate = |id: u8, at_m: f32| Gate { at_m, id, until_m: at_m + AHEAD_M };
+        let gate = |id: u8, at_m: f32| Gate {
+            at_m,
+            wait_for_id: id,
+            open_from_progress_m: at_m + AHEAD_M,
+        };
         let gates = |rank: u8| {
-            let most_m = if rank == 0 { 0.0 } else { length_m - AHEAD_M - PROGRESS_ERROR_M };
+            let most_m =
+                if rank == 0 { 0.0 } else { length_m - AHEAD_M - MAX_REPORTED_PROGRESS_LAG_M };
             let places = (0..100).map(|i| i as f32 * GATES_M).take_while(|at_m| *at_m < most_m);
             places.map(|at_m| gate(rank, at_m)).collect()
         };
         Self {
             tables: (1..=count)
-                .map(|id| Neighbours::new(&roster, id, slowest_mps, fastest_mps))
+                .map(|id| Neighbours::new(&roster, id, slowest_vehicle_mps, fastest_vehicle_mps))
                 .collect(),
             cruise_mps: cruise_mps.to_vec(),
             flown_m: (0..count).map(|_| 0.0).collect(),
@@ -90,7 +95,7 @@ impl Row {
             plan_crc: PLAN,
             progress_m,
             gates_open_up_to_m: closed_m.min(self.length_m),
-            unheard_delay_s: delay_s,
+            unheard_flight_delay_s: delay_s,
             heard_bits: self.tables[rank].heard_bits(self.now),
             ..Intent::default()
         }

@@ -30,10 +30,10 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
     for count in 0..=MAX_RELAYED as u8 {
         let item = |rank: u8| RelayedProgress {
             rank,
-            age: 9 * rank,
+            age_ticks: 9 * rank,
             progress_m: 0.5 * f32::from(rank) - 3.0,
             gates_open_up_to_m: 1.25 * f32::from(rank) - 3.0,
-            unheard_delay_s: rank,
+            unheard_flight_delay_s: rank,
         };
         let items = (0..count).map(item).collect();
         let relay = Relay { mission_crc: 1, plan_crc: 2, items };
@@ -47,10 +47,10 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
     }
     let sound = RelayedProgress {
         rank: 0,
-        age: 0,
+        age_ticks: 0,
         progress_m: 1.0,
         gates_open_up_to_m: 2.0,
-        unheard_delay_s: 0,
+        unheard_flight_delay_s: 0,
     };
     for item in [
         RelayedProgress { progress_m: f32::NAN, ..sound },
@@ -72,7 +72,7 @@ struct Swarm {
 
 impl Swarm {
     fn new(count: u8) -> Self {
-        let entry = |id: u8| RosterEntry { system_id: id, start: Point::zeros() };
+        let entry = |id: u8| RosterEntry { system_id: id, path_start: Point::zeros() };
         let roster: List<_> = (1..=count).map(entry).collect();
         let tables = (1..=count).map(|id| Neighbours::new(&roster, id, 2.0, 2.0)).collect();
         Self { tables, now: Instant::from_millis(1000) }
@@ -202,7 +202,7 @@ fn a_vehicle_that_fails_is_not_out_of_range_to_those_that_heard_it() {
 /// report of lower progress changes neither.
 #[test]
 fn the_delay_of_a_flight_goes_with_its_progress() {
-    let roster = [1, 2, 3].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
+    let roster = [1, 2, 3].map(|system_id| RosterEntry { system_id, path_start: Point::zeros() });
     let mut table = Neighbours::<8>::new(&roster, 3, 2.0, 2.0);
     let (first, second) = (Instant::from_millis(1000), Instant::from_millis(1100));
     let by = Intent {
@@ -213,13 +213,13 @@ fn the_delay_of_a_flight_goes_with_its_progress() {
         ..Intent::default()
     };
     table.handle_intent(first, 2, &by, MISSION, Some(PLAN));
-    let report = |progress_m, unheard_delay_s| {
+    let report = |progress_m, unheard_flight_delay_s| {
         let item = RelayedProgress {
             rank: 0,
-            age: 0,
+            age_ticks: 0,
             progress_m,
             gates_open_up_to_m: 20.0,
-            unheard_delay_s,
+            unheard_flight_delay_s,
         };
         Relay { mission_crc: MISSION, plan_crc: PLAN, items: [item].into_iter().collect() }
     };

@@ -1,7 +1,9 @@
 use super::*;
 
 fn area(polygon: &Polygon) -> f64 {
-    (1..polygon.len() - 1).map(|i| turn(&polygon[0], &polygon[i], &polygon[i + 1]) / 2.0).sum()
+    (1..polygon.len() - 1)
+        .map(|i| twice_signed_area(&polygon[0], &polygon[i], &polygon[i + 1]) / 2.0)
+        .sum()
 }
 
 #[test]

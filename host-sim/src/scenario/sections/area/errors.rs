@@ -1,25 +1,29 @@
 //! Texts about the faults of an area's rings.
 
-use planner_core::coverage::area::{self as core_area, MAX_VERTEX_M, Ring, RingKind};
+use planner_core::coverage::area::{self as core_area, MAX_VERTEX_COORDINATE_M, Ring, RingKind};
 
 use crate::area::AreaFileError;
-use crate::area::overlap::{self, Overlap};
+use crate::area::overlap::{self, RingFault};
 
 /// Reason why rings that do not cross still form no area, and a remedy; `None` if they form one.
-pub(super) fn overlap_error(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
+pub(super) fn ring_fault_text_and_hint(
+    area: &core_area::Area<'_>,
+) -> Option<(String, &'static str)> {
     let of = |kind: RingKind| {
         let indices = 0..area.rings().len();
         indices.filter(|i| area.rings()[*i].kind == kind).map(|i| area.ring(i)).collect::<Vec<_>>()
     };
-    Some(match overlap::find_overlap(&of(RingKind::Outer), &of(RingKind::Hole))? {
-        Overlap::Outers(i, j) => {
+    Some(match overlap::find_ring_fault(&of(RingKind::Outer), &of(RingKind::Hole))? {
+        RingFault::OutersOverlap(i, j) => {
             (format!("polygon {i} and polygon {j} overlap"), "draw them as one")
         }
-        Overlap::Holes(i, j) => (format!("hole {i} and hole {j} overlap"), "draw them as one"),
-        Overlap::HoleOut(i) => {
+        RingFault::HolesOverlap(i, j) => {
+            (format!("hole {i} and hole {j} overlap"), "draw them as one")
+        }
+        RingFault::HoleNotInsideOuter(i) => {
             (format!("hole {i} reaches out of its polygon"), "draw it inside the border")
         }
-        Overlap::NothingLeft(i) => {
+        RingFault::OuterFilledByHoles(i) => {
             (format!("holes leave nothing of polygon {i}"), "leave a hole out, or the polygon")
         }
     })
@@ -51,7 +55,11 @@ pub(super) fn describe_area_error(error: core_area::AreaError, rings: &[Ring]) -
         }
         E::NotFinite { vertex: v } => format!("{} is not a finite number", vertex(v)),
         E::TooFar { vertex: v } => {
-            format!("{} is more than {} km from the origin", vertex(v), MAX_VERTEX_M / 1e3)
+            format!(
+                "{} is more than {} km from the origin",
+                vertex(v),
+                MAX_VERTEX_COORDINATE_M / 1e3
+            )
         }
         E::Duplicate { vertex: v } => format!("{} repeats the one before it", vertex(v)),
         E::NoArea { ring: r } => {
@@ -89,7 +97,9 @@ pub(super) fn area_hint(error: core_area::AreaError) -> &'static str {
 pub(super) fn file_hint(error: &AreaFileError) -> &'static str {
     match error {
         AreaFileError::Read(_) => "paths are relative to the scenario's folder",
-        AreaFileError::Format => "export the area as GeoJSON, WKT, KML or a QGroundControl plan",
+        AreaFileError::UnknownFormat => {
+            "export the area as GeoJSON, WKT, KML or a QGroundControl plan"
+        }
         AreaFileError::Malformed { .. } => {
             "export it again; the ending of its name has to be that of its format"
         }

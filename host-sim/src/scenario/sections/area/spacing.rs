@@ -103,7 +103,8 @@ pub(super) fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result
         (None, Some(_)) => footprint.along_m * (1.0 - front),
         (None, None) => footprint.along_m,
     };
-    let spacing = Spacing { footprint, lane_m, waypoint_m };
+    let spacing =
+        Spacing { footprint, max_lane_spacing_m: lane_m, max_waypoint_spacing_m: waypoint_m };
     match spacing.check() {
         Ok(()) => Ok((height_m, spacing)),
         Err(CoverageError::Gaps) => {

@@ -96,12 +96,12 @@ fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> Neighbour
         speed_mps: velocity.norm(),
         age_s: uniform(rng, 0.0, 1.2),
         delay_s: uniform(rng, 0.0, 0.5),
-        points,
+        reported_points: points,
         place_on_points: PlaceOnPoints::Unknown,
         reported_path_reach: reported_path_reach(&position, points, PlaceOnPoints::Unknown),
         rests_within_m: one_of(rng, &[0.0, 0.0, 6.0]),
         grounded: rng.next_u32().is_multiple_of(16),
-        column_to_m: rng
+        column_bottom_z_m: rng
             .next_u32()
             .is_multiple_of(3)
             .then(|| position.z - uniform(rng, -1.0, 60.0)),
@@ -110,7 +110,8 @@ fn heard<'a>(rng: &mut Pcg32, position: Point, points: &'a [Point]) -> Neighbour
 
 #[test]
 fn a_prepared_set_conflicts_where_the_definition_says() {
-    let bounds = MotionBounds { braking: BRAKING, speed_max_mps: 5.0, silent_s: 3.0 };
+    let bounds =
+        MotionBounds { braking: BRAKING, speed_max_mps: 5.0, stopped_when_unheard_for_s: 3.0 };
     let (mut meets, mut passes, mut far) = (0, 0, 0);
     for seed in 0..if cfg!(debug_assertions) { 20_000 } else { 400_000 } {
         let rng = &mut Pcg32::seed_from_u64(seed);
@@ -138,13 +139,13 @@ fn a_prepared_set_conflicts_where_the_definition_says() {
             other,
             "{seed}: what is remembered is the same"
         );
-        assert!(other.reach_m() <= heard.reach_m(&bounds, ahead_s) + 0.01, "{seed}");
+        assert!(other.reach_m() <= heard.max_reach_m(&bounds, ahead_s) + 0.01, "{seed}");
         let reported_path_reach = reported_path_reach(&position, &points, joint);
         let remembered = NeighbourMotion { reported_path_reach, ..heard };
-        assert!(other.reach_m() <= remembered.reach_m(&bounds, ahead_s) + 0.01, "{seed}");
+        assert!(other.reach_m() <= remembered.max_reach_m(&bounds, ahead_s) + 0.01, "{seed}");
         let from_line_m = least_sq(&ReachableSet::at(position), &set, f32::INFINITY).sqrt();
         assert!(
-            own.distance_from_box(&position).norm() <= 1.0001 * from_line_m + 0.001,
+            own.box_distances(&position).norm() <= 1.0001 * from_line_m + 0.001,
             "{seed}: {set:?}"
         );
         let apart_m = uniform(rng, 0.5, 3.0);
@@ -215,7 +216,8 @@ fn the_nearest_place_is_among_the_remembered_ones() {
 /// it stays in its set.
 #[test]
 fn a_vehicle_stays_in_its_set_where_points_lead_back() {
-    let bounds = MotionBounds { braking: BRAKING, speed_max_mps: 5.0, silent_s: 3.0 };
+    let bounds =
+        MotionBounds { braking: BRAKING, speed_max_mps: 5.0, stopped_when_unheard_for_s: 3.0 };
     let mut back = 0;
     for seed in 0..if cfg!(debug_assertions) { 500 } else { 20_000 } {
         let rng = &mut Pcg32::seed_from_u64(seed);
@@ -243,11 +245,11 @@ fn a_vehicle_stays_in_its_set_where_points_lead_back() {
             age_s: uniform(rng, 0.0, 0.9),
             rests_within_m: 0.0,
             grounded: false,
-            column_to_m: None,
+            column_bottom_z_m: None,
             ..heard(rng, position, &points)
         };
         let set = heard.reachable_set(&bounds, 0.0);
-        let flown_m = speed_mps * heard.age_s + BRAKING.stop_m(speed_mps);
+        let flown_m = speed_mps * heard.age_s + BRAKING.stop_distance_m(speed_mps);
         let may_be = |at_m: f32| at_m >= truly_m && at_m <= truly_m + flown_m;
         for (_, place) in places.iter().filter(|(at_m, _)| may_be(*at_m)).step_by(7) {
             let away_m = least_sq(&ReachableSet::at(*place), &set, f32::INFINITY).sqrt();
