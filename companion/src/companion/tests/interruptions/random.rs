@@ -54,6 +54,7 @@ impl Watch {
             let z_m = if b.armed { b.enu.z + 0.03 } else { 0.0 };
             (self.lifted_for, b.enu.z) = (self.lifted_for - 1, z_m);
         }
+        let had_flown = b.companion.handshake.arming().has_flown();
         b.tick();
         let unheard = b.silent || b.no_heartbeat;
         let sent = b.setpoints.len() > before;
@@ -125,9 +126,9 @@ impl Watch {
                 b.enu.z,
                 self.log
             );
-            let flown = b.companion.handshake.arming().has_flown();
+            // In the step in which it rises it may still be disarmed, as high as a fall is harmless.
             assert!(
-                (command, param1) != (ARM, 0.0) || state != State::CancelStart || !flown,
+                (command, param1) != (ARM, 0.0) || state != State::CancelStart || !had_flown,
                 "disarmed after it has flown: {:#?} {:?}",
                 self.log,
                 b.texts
