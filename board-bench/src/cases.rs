@@ -280,6 +280,13 @@ impl StepCase {
             &self.neighbours,
         )
     }
+
+    /// Calls [`deconflict::has_late_neighbour`] on this case; the call whose instructions are
+    /// counted.
+    pub fn has_late_neighbour(&self) -> bool {
+        let Self { cfg, path, gates, neighbours, .. } = self;
+        deconflict::has_late_neighbour(cfg, cfg.cruise_mps, path, gates, neighbours)
+    }
 }
 
 /// A random number below `limit`.

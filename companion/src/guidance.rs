@@ -8,6 +8,7 @@
 //! set back to it, and the flight continues by a straight leg to where the phase was left.
 
 mod acknowledged_path;
+mod advice;
 pub(crate) mod evade;
 mod fence;
 pub(crate) mod filter;
@@ -28,7 +29,7 @@ mod stops;
 mod waypoints;
 
 use planner_core::flight::Path;
-use planner_core::track::deconflict::{self, Advice, DeconflictConfig, OwnVehicle};
+use planner_core::track::deconflict::{Advice, DeconflictConfig};
 use planner_core::track::{self, ReferenceState, TrackConfig};
 use planner_core::{Length, Point};
 
@@ -141,6 +142,8 @@ pub struct Guidance {
     since_sent_s: f32,
     /// The advice of the last step: speed scale, distance to the stop, vehicle waited for.
     pub advice: Advice,
+    /// How much later than by its schedule the vehicle departs.
+    departs_later_by: Duration,
     /// Number of gates of the plan, from the first on, that have opened; they stay open.
     open_gate_count: usize,
     has_begun_path: bool,
@@ -228,6 +231,7 @@ impl Guidance {
             setpoint_followed_vehicle: false,
             since_sent_s: 0.0,
             advice: NO_ADVICE_YET,
+            departs_later_by: Duration::default(),
             open_gate_count: 0,
             has_begun_path: false,
             path_begins_above_pad: false,
@@ -307,23 +311,7 @@ impl Guidance {
         let position = scene.telemetry.position;
         self.since_sent_s += dt_s;
         let advised_at_m = self.tracker.along_m;
-        let asks = state == State::Scheduled || state.follows_path_or_is_blocked();
-        if let Some(plan) = scene.plan.filter(|_| asks) {
-            let along_m = if self.has_begun_path { self.tracker.along_m } else { -plan.climb_m };
-            let own = OwnVehicle {
-                rank: scene.rank,
-                position,
-                along_m,
-                path: &plan.path,
-                on_detour: scene.is_on_detour(),
-            };
-            let others = neighbours.states_with_age(now);
-            self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, others);
-            if self.has_begun_path {
-                self.advice.stop_within_m =
-                    self.advice.stop_within_m.min((self.division_hold_m - along_m).max(0.0));
-            }
-        }
+        self.update_advice(state, scene, neighbours, now);
         if let Some(plan) = scene.plan {
             let next = plan.gates.get(self.open_gate_count);
             if next.is_some_and(|gate| neighbours.is_open_for_good(gate, now)) {

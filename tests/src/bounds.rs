@@ -70,6 +70,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("detour::KeepOutZone::contains", "constant"),
     ("deconflict::advise, priority", "g, v a gate in reach, 16 places a neighbour without plan"),
     ("deconflict::advise, algorithm2", "v"),
+    ("deconflict::has_late_neighbour", "g times log v and log w"),
     ("flight::Path::push", "constant"),
     ("flight::Path::set_times_at_speed", "w"),
     ("flight::Path::point_at", "log w"),

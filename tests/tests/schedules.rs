@@ -1,6 +1,7 @@
 //! Random swarms, planned and then flown by progress alone: a vehicle obeys its gates and nothing
 //! else. None may come nearer to another than the safety distance, none may wait forever, and a
-//! plan that is `Ok` has a part for every vehicle.
+//! plan that is `Ok` has a part for every vehicle. As companions do, a vehicle on its pad waits
+//! there while another one is late.
 //!
 //! Rooms, corridors with side rooms, shafts, and paths of up to 1.5 km; climbs and descents of 0.5
 //! m to 30 m; pads on one floor or anywhere; 2 to 32 vehicles of several sizes with the capacities
@@ -16,6 +17,7 @@ use flockmate_tests::swarms::{
 use planner_core::flight::{Flight, Gate, MAX_REPORTED_PROGRESS_LAG_M};
 use planner_core::plan::PlanError;
 use planner_core::schedule::ScheduleError;
+use planner_core::track::deconflict::{self, DeconflictConfig, Method, Neighbour};
 use rayon::prelude::*;
 
 /// Number of swarms unless `FLOCKMATE_SCHEDULES` sets another.
@@ -55,8 +57,20 @@ struct Awaited {
 }
 
 /// Flies a plan by progress; the error says which vehicles came too near, or are stuck.
-fn fly(plan: &Plan, owns: &[OwnPlan], safety_m: f32, rng: &mut Random) -> Result<f32, String> {
-    let flights = &plan.flights;
+fn fly(
+    plan: &Plan,
+    owns: &[OwnPlan],
+    swarm: &Swarm,
+    rng: &mut Random,
+) -> Result<(f32, u64), String> {
+    let (flights, safety_m) = (&plan.flights, swarm.safety_distance_m);
+    let fastest_mps = (swarm.schedule.cruise_mps / 0.9).max(swarm.schedule.vertical_mps);
+    let deconflict = DeconflictConfig {
+        method: Method::Priority,
+        safety_distance_m: safety_m,
+        cruise_mps: fastest_mps,
+        accel_mps2: 1.5,
+    };
     let count = flights.len();
     let manners: Vec<Manner> = (0..count).map(|_| Manner::random(rng)).collect();
     let step_s = STEP_M / manners.iter().map(|m| m.speed_mps).fold(0.0, f32::max);
@@ -80,7 +94,7 @@ fn fly(plan: &Plan, owns: &[OwnPlan], safety_m: f32, rng: &mut Random) -> Result
     for i in 0..count {
         next_pause_m[i] = along[i] + manners[i].pause.1;
     }
-    let (mut smallest, mut still) = (f32::INFINITY, 0);
+    let (mut smallest, mut still, mut held) = (f32::INFINITY, 0, 0_u64);
     for step in 0.. {
         let t_s = step as f32 * step_s;
         // The reported progress, too high or too low by the greatest error; on the ground it is
@@ -93,11 +107,33 @@ fn fly(plan: &Plan, owns: &[OwnPlan], safety_m: f32, rng: &mut Random) -> Result
                     .min(end_arc_length_m(&flights[i])),
             })
             .collect();
+        let states: Vec<Neighbour> = flights
+            .iter()
+            .zip(&reported)
+            .map(|(f, &m)| Neighbour {
+                id: f.vehicle_id,
+                progress_m: Some(m),
+                ..Neighbour::default()
+            })
+            .collect();
         let mut moved = false;
         for i in 0..count {
             let flight = &flights[i];
+            let on_pad = along[i] <= -flight.climb_m;
+            if on_pad
+                && deconflict::has_late_neighbour(
+                    &deconflict,
+                    fastest_mps,
+                    &owns[i].path,
+                    &owns[i].gates,
+                    &states,
+                )
+            {
+                held += 1;
+                continue;
+            }
             let earliest_s = manners[i].delay_s + if on_time { flight.depart_s } else { 0.0 };
-            let waits = along[i] <= -flight.climb_m && t_s < earliest_s;
+            let waits = on_pad && t_s < earliest_s;
             if along[i] >= next_pause_m[i] {
                 next_pause_m[i] = along[i] + manners[i].pause.1;
                 paused_s[i] = manners[i].pause.0;
@@ -133,7 +169,7 @@ fn fly(plan: &Plan, owns: &[OwnPlan], safety_m: f32, rng: &mut Random) -> Result
             }
         }
         if (0..count).all(|i| along[i] >= end_arc_length_m(&flights[i])) {
-            return Ok(smallest);
+            return Ok((smallest, held));
         }
         // The error of a report changes each step: a gate may open later.
         still = if moved { 0 } else { still + 1 };
@@ -153,6 +189,8 @@ struct Sum {
     flights: u64,
     /// Number of plans that are `Ok` although a vehicle's part did not fit.
     unfit: u64,
+    /// Number of steps in which a vehicle on its pad waited for a late one.
+    held: u64,
     refused: BTreeMap<String, u64>,
     failures: Vec<String>,
     makespan_s: f64,
@@ -199,9 +237,12 @@ fn one(seed: u64) -> Sum {
     sum.long_hovers = u64::from(plan.flights.iter().any(|f| longest_hover_s(f) > LONG_HOVER_S));
     sum.makespan_s = f64::from(plan.flights.iter().map(landed_s).fold(0.0, f32::max));
     for _ in 0..2 {
-        if let Err(error) = fly(&plan, &owns, swarm.safety_distance_m, &mut rng) {
-            sum.failures.push(format!("seed {seed}: {error}"));
-            break;
+        match fly(&plan, &owns, &swarm, &mut rng) {
+            Ok((_, held)) => sum.held += held,
+            Err(error) => {
+                sum.failures.push(format!("seed {seed}: {error}"));
+                break;
+            }
         }
     }
     sum
@@ -220,6 +261,7 @@ fn random_swarms_stay_apart_and_arrive_by_gates_alone() {
         all.planned += sum.planned;
         all.flights += sum.flights;
         all.unfit += sum.unfit;
+        all.held += sum.held;
         all.makespan_s += sum.makespan_s;
         all.long_hovers += sum.long_hovers;
         sum.refused
@@ -228,18 +270,20 @@ fn random_swarms_stay_apart_and_arrive_by_gates_alone() {
         all.failures.extend(sum.failures);
     }
     println!(
-        "{} swarms, {} planned, {} flights, {} without all plans, mean makespan {:.2} s, {} with a hover \
-         of more than {LONG_HOVER_S} s, refused {:?}",
+        "{} swarms, {} planned, {} flights, {} without all plans, {} steps held on pads, mean \
+         makespan {:.2} s, {} with a hover of more than {LONG_HOVER_S} s, refused {:?}",
         all.swarms,
         all.planned,
         all.flights,
         all.unfit,
+        all.held,
         all.makespan_s / all.planned.max(1) as f64,
         all.long_hovers,
         all.refused,
     );
     assert!(all.long_hovers * 20 < all.planned, "a vehicle hovers where another order avoids it");
     assert!(all.planned * 3 > all.swarms, "most swarms are refused: nothing is shown");
+    assert!(all.held > all.flights, "no vehicle waits on its pad for a late one");
     let shown: Vec<_> = all.failures.iter().take(20).collect();
     assert!(all.failures.is_empty(), "{} of {}: {shown:#?}", all.failures.len(), all.swarms);
 }

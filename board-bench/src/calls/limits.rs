@@ -434,6 +434,9 @@ fn call_deconfliction(to: &mut Results<'_, impl CallListener>) {
                     to.call("deconflict::advise", || deconflict::advise(&cfg, &own, &gates, &all));
                 assert!((0.0..=1.0).contains(&advice.speed_scale), "{p:?} {hard} {advice:?}");
                 to.add(advice.stop_within_m);
+                to.call("deconflict::has_late_neighbour", || {
+                    deconflict::has_late_neighbour(&cfg, hard, path, &gates, &all)
+                });
                 let bad = DeconflictConfig { accel_mps2: hard, ..cfg };
                 deconflict::advise(&bad, &own, &gates, &all);
                 let checked = to.call("deconflict::DeconflictConfig::check", || bad.check());

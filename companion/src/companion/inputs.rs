@@ -173,7 +173,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             may_take_off: self.plan_leaves_pad()
                 && self.guidance.may_depart()
                 && self.guidance.filter.column_clear()
-                && self.mission.departure_due(now)
+                && self.mission.departure_due(now, self.guidance.departs_later_by())
                 && !self.hears_another_plan()
                 && !self.mission.pending().pause
                 && is_battery_known_or_unchecked(t, self.config.battery_low_percent, now)

@@ -171,7 +171,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// (`UNKNOWN_CHARGE_REPORT_EVERY`), that the start waits for the battery's charge to be
     /// reported.
     fn update_barred_start(&mut self) {
-        let due = self.mission.departure_due(self.now) && self.guidance.may_depart();
+        let later_by = self.guidance.departs_later_by();
+        let due = self.mission.departure_due(self.now, later_by) && self.guidance.may_depart();
         let waits =
             due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
         let least = self.config.battery_low_percent;

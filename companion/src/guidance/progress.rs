@@ -31,15 +31,8 @@ const MAX_REPORTED_SHORTFALL_M: f32 = MAX_REPORTED_PROGRESS_LAG_M - MAX_STOP_BEF
 /// Distance below the ground of which a vehicle that has landed reports the progress, metres: every
 /// gate that waits for its flight opens.
 const LANDED_EXTRA_PROGRESS_M: f32 = 1.0;
-/// Distance up to a stop below which a vehicle on its pad does not depart, metres.
-const MIN_FREE_PATH_TO_DEPART_M: f32 = 0.05;
 
 impl Guidance {
-    /// Whether advice lets the vehicle fly on far enough for its departure to be worth it.
-    pub(crate) fn may_depart(&self) -> bool {
-        self.advice.stop_within_m > MIN_FREE_PATH_TO_DEPART_M
-    }
-
     /// Place along the plan's path up to which this vehicle flies while unheard, through gates that
     /// are open or open after a short wait, metres; and the seconds by which those gates delay it
     /// ([`Neighbours::own_unheard_reach`]).

@@ -112,6 +112,18 @@ impl<const W: usize> Path<W> {
         }
     }
 
+    /// Time at which the vehicle is at an arc length by the schedule, at the end of a hold there,
+    /// seconds after take-off. Before the first waypoint it is 0, beyond the last one as at the
+    /// last one.
+    pub(crate) fn scheduled_s(&self, along_m: f32) -> f32 {
+        let next = self.waypoints.partition_point(|w| w.along_m <= along_m);
+        let Some(from) = next.checked_sub(1).map(|at| &self.waypoints[at]) else { return 0.0 };
+        self.waypoints.get(next).map_or(from.leave_s, |to| {
+            let share = (along_m - from.along_m) / (to.along_m - from.along_m);
+            from.leave_s + share * (to.arrive_s - from.leave_s)
+        })
+    }
+
     /// All waypoints, in the order of flight.
     pub fn waypoints(&self) -> &[Waypoint] {
         &self.waypoints

@@ -128,6 +128,13 @@ const MAX_GATE_OVERSHOOT_M: f32 = 0.1;
 const BRAKING_OVERSHOOT_S: f32 = 0.2;
 /// Cruise speed up to which a braking vehicle does not overshoot its reference, m/s.
 const BRAKING_OVERSHOOT_ABOVE_MPS: f32 = 3.0;
+/// Time from the decision to depart until the climb begins, seconds: PX4 and ArduCopter arm and
+/// spin up the motors meanwhile.
+const DEPARTURE_S: f32 = 3.0;
+/// Hover at a gate that a wait on the pad is to avoid, seconds; shorter ones are flown.
+const MIN_AVOIDED_HOVER_S: f32 = 5.0;
+/// While all neighbours were heard within this time, a late one is waited for on the pad, seconds.
+const HEARD_LATELY_S: f32 = 2.0;
 /// Greatest speed past a neighbour that hovers nearer than a stop from cruise speed requires, m/s:
 /// a stop from this speed overshoots by 0.4 m, and detours keep 0.5 m beyond the safety distance.
 const MAX_PASSING_MPS: f32 = 5.0;
@@ -228,6 +235,37 @@ fn advise_by_priority<const W: usize>(
     let allowed_mps = sqrtf(fminf(braking(advice.stop_within_m), slow_mps_sq));
     advice.speed_scale = fminf(allowed_mps / cfg.cruise_mps, 1.0);
     advice
+}
+
+/// Whether a neighbour flies the plan so late that the own vehicle, if it departed now, would hover
+/// at a gate for it for more than 5 s (`MIN_AVOIDED_HOVER_S`) beyond the waits that the schedule
+/// has.
+///
+/// A neighbour needs at least the flight at `fastest_mps`, m/s, to where it opens the gate, and the
+/// own vehicle reaches the gate no earlier than by its schedule, 3 s (`DEPARTURE_S`) later. By the
+/// schedule the neighbour is that far when the own vehicle departs, if no vehicle is faster. So
+/// this wait leads to a deadlock no more than the gate itself does. False while any neighbour was
+/// last heard more than 2 s (`HEARD_LATELY_S`) ago or is off the plan: the late one may wait for
+/// that one. Work: the neighbours; the gates, a search among the neighbours and one along the path
+/// for each.
+pub fn has_late_neighbour<const W: usize>(
+    cfg: &DeconflictConfig,
+    fastest_mps: f32,
+    path: &Path<W>,
+    gates: &[Gate],
+    neighbours: &[Neighbour],
+) -> bool {
+    let flies_plan = |n: &Neighbour| {
+        n.progress_m.is_some() && !n.out_of_plan && !n.on_detour && n.age_s < HEARD_LATELY_S
+    };
+    let late = |gate: &Gate| {
+        let progress_m = find_neighbour(neighbours, gate.wait_for_id).and_then(|n| n.progress_m);
+        progress_m.is_some_and(|progress_m| {
+            let least_s = (gate.open_from_progress_m - progress_m) / fastest_mps;
+            least_s > path.scheduled_s(gate.at_m) + DEPARTURE_S + MIN_AVOIDED_HOVER_S
+        })
+    };
+    cfg.method == Method::Priority && neighbours.iter().all(flies_plan) && gates.iter().any(late)
 }
 
 /// The neighbour with this id. Neighbours are usually sorted by id; if not, all are searched.

@@ -378,6 +378,7 @@ fn measure_paths(meter: &mut impl Meter) {
         let step = StepCase::new(&mut rng, VEHICLES, StepKind::of_case(case));
         meter.call("deconflict::advise, priority", 0, || step.advise(Method::Priority));
         meter.call("deconflict::advise, algorithm2", 0, || step.advise(Method::Algorithm2));
+        meter.call("deconflict::has_late_neighbour", 0, || step.has_late_neighbour());
     }
 }
 

@@ -43,3 +43,18 @@ fn refuses_nan_and_overflow_by_name() {
     path.push(Point::zeros(), 1.0).unwrap();
     assert_eq!(path.push(Point::new(1.0, 0.0, 0.0), 1.0), Err(PathError::PathFull));
 }
+
+#[test]
+fn times_are_those_of_the_schedule_with_holds() {
+    let mut path = corner_path(1.0);
+    path.set_times_at_speed(2.0, 0.5);
+    let end = path.length_m();
+    assert_eq!((path.scheduled_s(-1.0), path.scheduled_s(0.0)), (0.0, 2.0));
+    assert!((path.scheduled_s(0.5) - 3.0).abs() < 1e-5);
+    let arrives_s = path.scheduled_s(end);
+    path.set_last_waypoint_times(arrives_s, arrives_s + 7.0);
+    assert_eq!(path.scheduled_s(end), arrives_s + 7.0, "the hold counts");
+    assert!(path.scheduled_s(end - 0.01) < arrives_s);
+    assert_eq!(path.scheduled_s(end + 5.0), arrives_s + 7.0);
+    assert_eq!(Path::<2>::new().scheduled_s(1.0), 0.0);
+}

@@ -160,3 +160,37 @@ fn priority_stops_before_a_vehicle_without_a_plan() {
     let behind = [neighbour(9, 5, Point::new(-1.0, 0.0, 0.0))];
     assert_eq!(advise(&cfg(Method::Priority), &own(&path), &[], &behind), Advice::FREE);
 }
+
+/// The gate is 10 m on, 5 s by the schedule after take-off, 8 s with the start. A neighbour that
+/// has 26 m to fly at 2 m/s opens it 5 s later.
+#[test]
+fn a_neighbour_is_late_where_the_own_vehicle_would_wait_for_it() {
+    let mut path = Path::<4>::new();
+    path.push(Point::zeros(), 1.0).unwrap();
+    path.push(Point::new(20.0, 0.0, 0.0), 1.0).unwrap();
+    path.set_times_at_speed(0.0, 2.0);
+    let gates = [Gate { at_m: 10.0, wait_for_id: 7, open_from_progress_m: 30.0 }];
+    let cfg = cfg(Method::Priority);
+    let comes = |progress_m: f32| Neighbour {
+        progress_m: Some(progress_m),
+        ..neighbour(7, 1, Point::new(50.0, 0.0, 0.0))
+    };
+    let with =
+        |n: Neighbour, other: Neighbour| has_late_neighbour(&cfg, 2.0, &path, &gates, &[other, n]);
+    let other = Neighbour { progress_m: Some(3.0), ..neighbour(3, 0, Point::zeros()) };
+    let late = |n: Neighbour| with(n, other);
+    assert!(late(comes(0.0)) && late(comes(3.9)));
+    assert!(!late(comes(4.1)) && !late(comes(30.0)));
+    assert!(!has_late_neighbour(&cfg, 2.0, &path, &gates, &[]));
+    // One that does not fly the plan, or is not heard, may be what the late one waits for.
+    for change in [
+        |n| Neighbour { progress_m: None, ..n },
+        |n| Neighbour { out_of_plan: true, ..n },
+        |n| Neighbour { on_detour: true, ..n },
+        |n| Neighbour { age_s: 2.1, ..n },
+    ] {
+        assert!(!late(change(comes(0.0))) && !with(comes(0.0), change(other)));
+    }
+    let algorithm2 = DeconflictConfig { method: Method::Algorithm2, ..cfg };
+    assert!(!has_late_neighbour(&algorithm2, 2.0, &path, &gates, &[comes(0.0)]));
+}

@@ -126,7 +126,7 @@ impl Watch {
                 b.enu.z,
                 self.log
             );
-            // In the step in which it rises it may still be disarmed, as high as a fall is harmless.
+            // In the step in which it rises it may still be disarmed, where a fall is harmless.
             assert!(
                 (command, param1) != (ARM, 0.0) || state != State::CancelStart || !had_flown,
                 "disarmed after it has flown: {:#?} {:?}",
