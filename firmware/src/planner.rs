@@ -24,11 +24,11 @@ pub type OwnPlanMemory = planner::OwnPlanMemory<VEHICLES, WAYPOINTS, GATES, MAX_
 
 /// Makes one vehicle's plans from the files in flash.
 pub struct Planner<'a> {
-    /// Mission to plan, and the roadmap or field that it needs.
+    /// Mission to plan, and the roadmap or height field that it needs.
     pub files: PlanFiles<'a>,
     /// System id of this vehicle.
     pub system_id: u8,
-    /// Checksum of mission and roadmap (or field), by which the crash record names them.
+    /// Checksum of mission and roadmap (or height field), by which the crash record names them.
     pub files_checksum: u32,
     /// Memory that the planner works in.
     pub memory: PlanningMemory<'a>,

@@ -30,7 +30,7 @@ use heapless::Vec;
 use libm::{fmaxf, fminf};
 
 use self::blocks::{
-    BlockSet, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, segments_in_blocks, set_bit_indices,
+    BlockSet, MAX_BLOCKS, OwnBlocks, SEGMENTS_PER_BLOCK, segments_in_blocks, set_bit_indices,
 };
 pub use self::config::{ScheduleConfig, ScheduleError};
 pub use self::timed_segments::{DEFAULT_MAX_SEGMENT_M, MAX_TIMED_SEGMENTS};
@@ -53,14 +53,14 @@ pub struct ScheduleWorkspace {
     own: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
     other: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
     /// The segments of `own`, in blocks.
-    blocks: Blocks,
+    blocks: OwnBlocks,
     forbidden: ForbiddenIntervals,
 }
 
 impl ScheduleWorkspace {
     /// Creates an empty workspace.
     pub const fn new() -> Self {
-        Self { own: Vec::new(), other: Vec::new(), blocks: Blocks::new(), forbidden: Vec::new() }
+        Self { own: Vec::new(), other: Vec::new(), blocks: OwnBlocks::new(), forbidden: Vec::new() }
     }
 }
 

@@ -377,7 +377,7 @@ impl Copter {
     fn idle_output(&self) -> FlightModeOutput {
         FlightModeOutput {
             motors: MotorState::Idle,
-            integral: IntegralAction::Clear,
+            integral: IntegralAction::SetToZero,
             demand: self.tuning.default_demand(),
         }
     }

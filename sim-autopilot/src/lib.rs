@@ -194,7 +194,7 @@ impl Autopilot {
         platform.vehicle.set_flags(AutopilotFlags { armed, landed });
         match output.integral {
             IntegralAction::Keep => {}
-            IntegralAction::Clear => platform.vehicle.reset_integral(),
+            IntegralAction::SetToZero => platform.vehicle.reset_integral(),
             IntegralAction::Match => platform.vehicle.match_integral_to_demand(),
         }
         if output.motors == MotorState::Lifting {

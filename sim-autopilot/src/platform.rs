@@ -67,7 +67,7 @@ pub enum IntegralAction {
     /// Continue integrating.
     Keep,
     /// Set it to zero, as on the ground.
-    Clear,
+    SetToZero,
     /// Set it to the demanded acceleration minus the true one, as ArduCopter does when its
     /// controller starts in flight.
     Match,

@@ -372,7 +372,7 @@ impl Commander {
             let demand = tuning.default_demand();
             return FlightModeOutput {
                 motors: MotorState::Idle,
-                integral: IntegralAction::Clear,
+                integral: IntegralAction::SetToZero,
                 demand,
             };
         }
@@ -381,7 +381,7 @@ impl Commander {
         let mut integral = IntegralAction::Keep;
         match self.phase {
             FlightPhase::Ground => {
-                integral = IntegralAction::Clear;
+                integral = IntegralAction::SetToZero;
                 if wants_up && now.saturating_sub(self.armed_us) >= micros_from_s(tuning.spool_up_s)
                 {
                     self.phase = FlightPhase::Ramp { since_us: now };

@@ -57,7 +57,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("plan::assign_goals, 10 × 10", "one assignment"),
     (
         "plan::schedule_flights, 10",
-        "146 rounds, twice for more than 12 vehicles of v vehicles, each 3 A* and `sipp::find_route` a few times; 150 000 comparisons; v `gates`",
+        "155 rounds, twice for more than 12 vehicles of v vehicles, each 3 A* and `sipp::find_route` a few times; 150 000 comparisons; v `gates`",
     ),
     ("plan::plan_swarm, 10", "the three above"),
     ("plan::vehicle_plan, past 31", "one `gates`"),

@@ -23,7 +23,7 @@ use rayon::prelude::*;
 /// Number of swarms unless `FLOCKMATE_SCHEDULES` sets another.
 const SWARMS: u64 = 200;
 /// Hover from which the planner seeks another order, seconds.
-const LONG_HOVER_S: f32 = 10.0;
+const LONG_HOVER_S: f32 = 15.0;
 /// Flight of the fastest vehicle in one step, metres.
 const STEP_M: f32 = 0.3;
 

@@ -9,8 +9,9 @@ use super::{Guidance, REFERENCE_RESET_WINDOW_M};
 /// Distance along the path by which the point nearest to the setpoint may jump in a step, metres:
 /// from one leg to the next where the setpoint rounds a corner, by 0.25 m at most.
 const MAX_CORNER_JUMP_M: f32 = 0.5;
-/// Rounding of an arc length, metres: where the setpoint stands, its place must not creep.
-const ARC_LENGTH_ROUNDING_M: f32 = 1e-3;
+/// Greatest rounding error of an arc length, metres. The search for the nearest point reaches
+/// further by it at both ends, so that the place of a setpoint that stands does not creep.
+const MAX_ARC_LENGTH_ROUNDING_ERROR_M: f32 = 1e-3;
 /// A nearest point this close to the end of the path counts as its end, metres.
 const AT_PATH_END_M: f32 = 0.02;
 
@@ -35,7 +36,8 @@ impl Guidance {
         let (from_m, along_m) = (self.setpoint_along_m, self.tracker.along_m);
         let reach_m = 0.5 * (MAX_CORNER_JUMP_M + self.track.cruise_mps * dt_s);
         let place = self.smoother.position();
-        let seen_m = path.project(&place, from_m + reach_m, reach_m + ARC_LENGTH_ROUNDING_M);
+        let seen_m =
+            path.project(&place, from_m + reach_m, reach_m + MAX_ARC_LENGTH_ROUNDING_ERROR_M);
         self.setpoint_along_m = seen_m.max(from_m).min(along_m);
     }
 

@@ -55,7 +55,7 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     imprecise_at_crawl_since: Option<Instant>,
     waits: Waits,
     task_commands: TaskCommands,
-    photographed: PhotographedWaypoints,
+    area_photographed: PhotographedWaypoints,
     /// Number of the fleet's committed divisions that the plan takes into account.
     division_count: usize,
     /// Whether the plan after the last division has come and is not flown yet.
@@ -85,7 +85,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             imprecise_at_crawl_since: None,
             waits: Waits::default(),
             task_commands: TaskCommands::default(),
-            photographed: PhotographedWaypoints::default(),
+            area_photographed: PhotographedWaypoints::default(),
             division_count: 0,
             division_plan_ready: false,
             requested_division_hash: None,
@@ -363,12 +363,12 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// The photographed waypoints of the area.
     pub(crate) fn photographed(&self) -> &PhotographedWaypoints {
-        &self.photographed
+        &self.area_photographed
     }
 
     /// The photographed waypoints of the area, to be changed.
     pub(crate) fn photographed_mut(&mut self) -> &mut PhotographedWaypoints {
-        &mut self.photographed
+        &mut self.area_photographed
     }
 
     /// Notes as photographed the pictures of the plan that the vehicle has passed, `along_m` metres
@@ -378,7 +378,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         if let Task::Photograph(photographs) = &plan.task {
             let end = photographs.certainly_taken_count(&plan.path, along_m);
             let pictures = WaypointRange { first: self.pictures_before_rejoin, end };
-            self.photographed.note_pictures(photographs, &plan.path, pictures);
+            self.area_photographed.note_pictures(photographs, &plan.path, pictures);
         }
     }
 
@@ -386,7 +386,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// plan.
     pub(crate) fn note_pad_left(&mut self) {
         if let Some(VehiclePlan { task: Task::Photograph(photographs), .. }) = &self.plan {
-            self.photographed.note_pad_left(photographs);
+            self.area_photographed.note_pad_left(photographs);
         }
     }
 

@@ -232,7 +232,7 @@ impl Detours {
             || self.is_beside_plan()
             || self.is_stopped_for_long(view, STOP_COUNTS_FOR_WHILE_BLOCKED))
             && self.keeps_to_plan_over_area(view)
-            && self.area_searches.may_seek(view.now, timers)
+            && self.area_searches.may_seek_rejoin(view.now, timers)
     }
 
     /// Ends a detour in a coverage mission: the shell has returned the vehicle's own plan again,

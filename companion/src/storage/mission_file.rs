@@ -268,7 +268,7 @@ impl<'a> MissionView<'a> {
         };
         let (vehicles, goals) = (vehicles.as_chunks().0, goals.as_chunks().0);
         let view = Self { header, crc, vehicles, goals, kind };
-        view.check_lists()?;
+        view.check_vehicles_and_goals()?;
         if u16_at(8) != VERSION_WITHOUT_GROUND_STATIONS
             && view.vehicles().any(|v| ground_stations.contains(&v.task.id))
         {
@@ -277,7 +277,7 @@ impl<'a> MissionView<'a> {
         Ok(view)
     }
 
-    fn check_lists(&self) -> Result<(), MissionError> {
+    fn check_vehicles_and_goals(&self) -> Result<(), MissionError> {
         let labelled = self.header.mode == GoalMode::Labelled;
         let inside = |place: &Point| {
             self.header.geofence.as_ref().is_none_or(|fence| box_contains(fence, place))

@@ -14,7 +14,7 @@ use super::area::RingKind;
 use super::intervals::Interval;
 use super::lanes::Tracks;
 use super::strips::{LaneIntervalSets, Strips, WIDTH_ROUNDING_SHARE};
-use super::transit::ZONE_CLEARANCE_M;
+use super::transit::LANE_AND_TURN_CLEARANCE_M;
 
 /// Number of parts into which a strip is cut.
 const STRIP_PARTS: u32 = 8;
@@ -103,7 +103,7 @@ fn overlaps_no_fly_zone(strips: &Strips<'_>, [low, high]: Interval) -> bool {
             ring.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(first, last), corner| {
                 (fminf(first, corner.y), fmaxf(last, corner.y))
             });
-        first <= high + ZONE_CLEARANCE_M && last >= low - ZONE_CLEARANCE_M
+        first <= high + LANE_AND_TURN_CLEARANCE_M && last >= low - LANE_AND_TURN_CLEARANCE_M
     })
 }
 

@@ -8,7 +8,7 @@ use super::area::{Area, RingKind, edges_of};
 use super::intervals::{Interval, Intervals};
 use super::lanes::{Lane, LanePattern, Tracks};
 use super::sweep::LaneDirection;
-use super::transit::ZONE_CLEARANCE_M;
+use super::transit::LANE_AND_TURN_CLEARANCE_M;
 use super::{CoverageError, Flat};
 use crate::geo::distance::{Length as _, clamp_to};
 use crate::sort;
@@ -177,8 +177,8 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// Sets `ws.barred` to all `u` at which the line `v` is nearer than [`ZONE_CLEARANCE_M`] to a
-    /// no-fly zone, or inside one.
+    /// Sets `ws.barred` to all `u` at which the line `v` is nearer than
+    /// [`LANE_AND_TURN_CLEARANCE_M`] to a no-fly zone, or inside one.
     fn compute_barred<const V: usize>(
         &self,
         v: f32,
@@ -350,16 +350,19 @@ fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Interval) -> Option<Inte
     Some([fminf(from, to), fmaxf(from, to)])
 }
 
-/// Range of `u` on the line `v` that is nearer than [`ZONE_CLEARANCE_M`] to an edge: within the
-/// circles around its ends and the lines beside it. `None` if there is none.
+/// Range of `u` on the line `v` that is nearer than [`LANE_AND_TURN_CLEARANCE_M`] to an edge:
+/// within the circles around its ends and the lines beside it. `None` if there is none.
 fn range_near_edge((a, b): (Flat, Flat), v: f32) -> Option<Interval> {
-    if fmaxf(a.y, b.y) < v - ZONE_CLEARANCE_M || fminf(a.y, b.y) > v + ZONE_CLEARANCE_M {
+    if fmaxf(a.y, b.y) < v - LANE_AND_TURN_CLEARANCE_M
+        || fminf(a.y, b.y) > v + LANE_AND_TURN_CLEARANCE_M
+    {
         return None;
     }
     let [mut low, mut high] = [f32::INFINITY, f32::NEG_INFINITY];
     let mut hold = |u: f32| (low, high) = (fminf(low, u), fmaxf(high, u));
     for end in [a, b] {
-        let square = ZONE_CLEARANCE_M * ZONE_CLEARANCE_M - (v - end.y) * (v - end.y);
+        let square =
+            LANE_AND_TURN_CLEARANCE_M * LANE_AND_TURN_CLEARANCE_M - (v - end.y) * (v - end.y);
         if square >= 0.0 {
             let half = fpu::sqrtf(square);
             hold(end.x - half);
@@ -367,7 +370,7 @@ fn range_near_edge((a, b): (Flat, Flat), v: f32) -> Option<Interval> {
         }
     }
     let edge = b - a;
-    let beside = Flat::new(-edge.y, edge.x) * (ZONE_CLEARANCE_M / edge.length());
+    let beside = Flat::new(-edge.y, edge.x) * (LANE_AND_TURN_CLEARANCE_M / edge.length());
     for from in [a - beside, a + beside] {
         let share = (v - from.y) / edge.y;
         if (0.0..=1.0).contains(&share) {

@@ -2,10 +2,10 @@
 //! corners of the zones.
 //!
 //! Method: a visibility graph over the zones' convex corners, each moved out by
-//! [`ZONE_CLEARANCE_M`]. The shortest paths between all pairs of corners are computed once (Floyd
-//! and Warshall, n³). A path between two points then uses the cheapest pair of corners that are
-//! visible from them: n² sums per round, and one more round for each corner that turns out to be
-//! hidden, at most 2 n; visibility of each corner is checked once. All in metres.
+//! [`LANE_AND_TURN_CLEARANCE_M`]. The shortest paths between all pairs of corners are computed once
+//! (Floyd and Warshall, n³). A path between two points then uses the cheapest pair of corners that
+//! are visible from them: n² sums per round, and one more round for each corner that turns out to
+//! be hidden, at most 2 n; visibility of each corner is checked once. All in metres.
 
 use crate::Length;
 use heapless::Vec;
@@ -17,7 +17,7 @@ use super::{CoverageError, Flat};
 /// Distance that lanes keep from no-fly zones, and that transits keep from corners at which they
 /// turn, metres: more than rounding, less than any vehicle's margin. A straight transit may pass a
 /// zone without distance: a margin for the vehicle has to be part of the zone.
-pub const ZONE_CLEARANCE_M: f32 = 0.25;
+pub const LANE_AND_TURN_CLEARANCE_M: f32 = 0.25;
 
 /// The visibility graph of an area's no-fly zones with the shortest distances between its corners.
 /// At most `N` corners; 4 · N² bytes.
@@ -57,8 +57,8 @@ impl<'a, const N: usize> TransitGraph<'a, N> {
                 let outward = (into - out).try_normalize(1e-6);
                 let Some(outward) = outward else { continue };
                 let half = fpu::sqrtf(libm::fmaxf((1.0 - into.dot(&out)) / 2.0, 0.0));
-                let far =
-                    ZONE_CLEARANCE_M * fminf(1.0 / libm::fmaxf(cos_from_sin(half), 0.25), 4.0);
+                let far = LANE_AND_TURN_CLEARANCE_M
+                    * fminf(1.0 / libm::fmaxf(cos_from_sin(half), 0.25), 4.0);
                 let place = corner + outward * far;
                 if !area.is_in_no_fly_zone(&place) {
                     self.corners.push(place).map_err(|_| CoverageError::NoFlyFull)?;

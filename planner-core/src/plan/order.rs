@@ -111,7 +111,8 @@ fn move_to_front<const W: usize>(order: &mut [u16], place: usize, flights: &[Fli
 }
 
 /// Schedules in other orders while a vehicle would hover at one place for longer than
-/// [`MAX_ACCEPTED_HOVER_S`], and keeps the order in which the longest hover is shortest.
+/// [`MAX_ACCEPTED_HOVER_S`]. An order is kept if it halves the longest hover: others wait longer on
+/// their pads for it, and the last one may land later.
 ///
 /// Such a vehicle has to leave its pad for one that was scheduled before it and lands there, but
 /// its goal, or the way there, is only free much later. In the next round it is moved to the front,
@@ -135,11 +136,15 @@ fn shorten_hovers<const N: usize, const V: usize, const W: usize, const P: usize
         move_to_front(order, place, &out.flights);
         has_best = false;
         match schedule_round(view, request, order, head_start, ws, out) {
-            Err((blocked, _)) => hovering = usize::from(order[blocked]),
+            Err((blocked, PlanError::Schedule(_, ScheduleError::Blocked))) => {
+                hovering = usize::from(order[blocked]);
+            }
+            // For want of memory, of which a board has less than a desk: both keep the same order.
+            Err(_) => break,
             Ok(()) => {
                 let (vehicle, hover_s) = longest_hover_s(out);
                 hovering = vehicle;
-                if hover_s < shortest_s {
+                if hover_s <= KEPT_HOVER_SHARE * shortest_s {
                     (shortest_s, has_best) = (hover_s, true);
                     best.clone_from(order);
                 }
@@ -158,11 +163,12 @@ fn longest_hover_s<const V: usize, const W: usize>(out: &SwarmPlan<V, W>) -> (us
     hovers.fold((0, 0.0), |longest, hover| if hover.1 > longest.1 { hover } else { longest })
 }
 
-/// Longest hover at one place for which no other order is tried, seconds: half of what counts as a
-/// standstill (20 s), since the vehicle that is waited for may be late.
-const MAX_ACCEPTED_HOVER_S: f32 = 10.0;
-/// Most other orders that are tried for shorter hovers. Of 51 random swarms with a longer hover, 20
-/// are without within 8 rounds; twice as many rounds help one or two more.
+/// Longest hover at one place for which no other order is tried, seconds: less than what counts as
+/// a standstill (20 s), since the vehicle that is waited for may be late.
+const MAX_ACCEPTED_HOVER_S: f32 = 15.0;
+/// Share of the longest hover that another order may leave.
+const KEPT_HOVER_SHARE: f32 = 0.5;
+/// Most other orders that are tried for shorter hovers. Twice as many rounds help few more.
 const MAX_HOVER_REORDERINGS: usize = 8;
 
 /// Most rounds after which a vehicle for which no times were found is moved to the front; in later

@@ -138,7 +138,7 @@ impl BoundingBox {
 /// by `conflict_distance_m`, so that a line outside a box is in no conflict with the segments in
 /// it.
 #[derive(Debug, Default)]
-pub(super) struct Blocks {
+pub(super) struct OwnBlocks {
     blocks: Vec<SegmentBlock, MAX_BLOCKS>,
     group_boxes: Vec<BoundingBox, MAX_GROUPS>,
     whole_box: BoundingBox,
@@ -146,7 +146,7 @@ pub(super) struct Blocks {
     conflict_distance_m: f32,
 }
 
-impl Blocks {
+impl OwnBlocks {
     pub(super) const fn new() -> Self {
         let whole = BoundingBox(Point::new(0.0, 0.0, 0.0), Point::new(0.0, 0.0, 0.0));
         Self {

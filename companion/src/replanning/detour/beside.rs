@@ -75,7 +75,7 @@ impl AreaDetourSearches {
 
     /// Whether a detour may be sought now: not within [`REJOIN_SEARCH_PAUSE`] of a failure, and
     /// [`MAX_DETOURS_PER_PLAN`] times at most.
-    pub(super) fn may_seek(&self, now: Instant, timers: &Timers) -> bool {
+    pub(super) fn may_seek_rejoin(&self, now: Instant, timers: &Timers) -> bool {
         self.found < MAX_DETOURS_PER_PLAN && timers.is_due(Timer::RejoinSearch, now)
     }
 }

@@ -104,11 +104,11 @@ impl Detours {
         view: &DetourView<'_, V, W, G>,
     ) -> Duration {
         let retries = |at: Instant| view.now - at >= Duration::from_secs(MAX_SEARCH_PAUSE_S);
-        let may_seek = |_: &Instant| {
+        let may_seek_aside = |_: &Instant| {
             view.guidance.is_setpoint_at_reference()
                 && self.aside_search_failed_at.is_none_or(retries)
         };
-        let trapped = view.guidance.trapped_below_since().filter(may_seek);
+        let trapped = view.guidance.trapped_below_since().filter(may_seek_aside);
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 

@@ -56,7 +56,7 @@ proptest! {
     ) {
         other.0 = (own.0.0 + apart.0, own.0.1 + apart.1);
         let (own, other) = (flight(&own), flight(&other));
-        let mut blocks = Blocks::new();
+        let mut blocks = OwnBlocks::new();
         blocks.rebuild(&CFG, &own);
         let all =
             |own: &mut dyn Iterator<Item = &TimedSegment>, q: &TimedSegment| -> List<f32> {
@@ -113,7 +113,7 @@ proptest! {
         let (mut own_segments, mut other_segments) = (Vec::new(), Vec::new());
         cut_into_segments(&CFG, &own, &mut own_segments).unwrap();
         cut_into_segments(&CFG, &other, &mut other_segments).unwrap();
-        let mut blocks = Blocks::new();
+        let mut blocks = OwnBlocks::new();
         blocks.rebuild(&CFG, &own_segments);
         let far = blocks.parts_near(&CFG, &other).next().is_none();
         let meet =
