@@ -139,7 +139,7 @@ fn shorten_hovers<const N: usize, const V: usize, const W: usize, const P: usize
             Err((blocked, PlanError::Schedule(_, ScheduleError::Blocked))) => {
                 hovering = usize::from(order[blocked]);
             }
-            // For want of memory, of which a board has less than a desk: both keep the same order.
+            // For want of memory: a board has less than a desk.
             Err(_) => break,
             Ok(()) => {
                 let (vehicle, hover_s) = longest_hover_s(out);
