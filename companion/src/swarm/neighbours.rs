@@ -17,6 +17,7 @@ mod places;
 mod range;
 mod reach;
 pub(crate) mod relay;
+mod rest_places;
 mod silence;
 mod standing;
 mod states;

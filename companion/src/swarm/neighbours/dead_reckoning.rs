@@ -9,7 +9,7 @@ use super::bounds::*;
 use super::entry::NeighbourEntry;
 use crate::config::UnevenGround;
 use crate::link::intent::{BLOCKED, GROUNDED, LANDED, ON_DETOUR, OUT_OF_PLAN, WAITING};
-use crate::margins::{min_unheard_travel_m, unheard_flight_by_delay_s};
+use crate::margins::unheard_flight_by_delay_s;
 use crate::time::{Duration, Instant};
 
 /// Where and when silent vehicles come down in a coverage mission, and by how much two in the air
@@ -287,108 +287,6 @@ impl NeighbourEntry {
     pub(crate) fn may_return_to_pad_near(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
         let near = |pad: Point| (pad - place).xy().norm_squared() < apart_m * apart_m;
         self.may_fly_on_silent(now) && self.pad.is_some_and(near)
-    }
-
-    /// The points that the neighbour flies to next from its position; its setpoint may be behind.
-    fn next_points(&self) -> &[Point] {
-        match self.place_on_points {
-            PlaceOnPoints::On { leg_end: leg, .. } if !self.would_fly_all_points_unheard() => {
-                self.points.get(usize::from(leg)..).unwrap_or(&self.points)
-            }
-            _ => &self.points,
-        }
-    }
-
-    /// Calls `each` with the neighbour's position and each leg along its points that it may have
-    /// flown unheard, `left_m` in all: both ends, and metres of the leg and of its flown part.
-    #[inline(never)]
-    pub(super) fn for_each_unheard_leg(
-        &self,
-        mut left_m: f32,
-        each: &mut dyn FnMut([Point; 2], [f32; 2]),
-    ) {
-        let mut at = self.state.position;
-        each([at; 2], [0.0; 2]);
-        for next in self.next_points() {
-            let leg_m = (next - at).length();
-            if leg_m > left_m {
-                return each([at, *next], [leg_m, left_m]);
-            }
-            left_m -= leg_m;
-            each([core::mem::replace(&mut at, *next), *next], [leg_m; 2]);
-        }
-    }
-
-    /// Calls `visit` with places along its points where the neighbour may rest unheard, from
-    /// `from_m` to `to_m` along them, and with its greatest distance from the nearest of them,
-    /// metres.
-    #[inline(never)]
-    pub(super) fn for_each_rest_place(
-        &self,
-        [from_m, to_m]: [f32; 2],
-        visit: &mut dyn FnMut(Point, f32),
-    ) {
-        let step_m = libm::fmaxf(MIN_UNHEARD_STRETCH_SPACING_M, to_m / MAX_STRETCH_SPACINGS);
-        let wider_m = if step_m > MIN_UNHEARD_STRETCH_SPACING_M { 0.5 * step_m } else { 0.0 };
-        let mut before_m = 0.0;
-        self.for_each_unheard_leg(to_m, &mut |[at, next], [leg_m, flown_m]| {
-            let mut along_m = if from_m > before_m { from_m - before_m } else { step_m };
-            while along_m < flown_m {
-                visit(at + (next - at) * (along_m / leg_m), wider_m);
-                along_m += step_m;
-            }
-            before_m += flown_m;
-            // The end of the flown part too.
-            if from_m <= before_m {
-                visit(
-                    if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next },
-                    wider_m,
-                );
-            }
-        });
-    }
-
-    /// Least distance along its points, metres, at which the neighbour comes to rest unheard: that
-    /// of its hardest stop from the speed at which it was last heard, or of a fall. 0 in a coverage
-    /// mission, off its points, and where it climbs, descends or lands.
-    pub(super) fn min_rest_distance_m(&self) -> f32 {
-        let far = |way: &Point| way.norm_squared() > MIN_COURSE_M * MIN_COURSE_M;
-        let course = self.next_points().iter().map(|p| p - self.state.position).find(far);
-        let flies = matches!(self.place_on_points, PlaceOnPoints::On { .. })
-            && !self.would_fly_all_points_unheard()
-            && !self.has_column();
-        let Some(ahead) = course.filter(|_| flies) else { return 0.0 };
-        let speed_mps = libm::fmaxf(self.state.velocity.dot(&ahead) / ahead.length(), 0.0);
-        let stop_m = libm::fminf(min_unheard_travel_m(speed_mps), self.max_unheard_travel_m);
-        let (mut points_m, mut at) = (0.0, self.state.position);
-        for next in self.next_points() {
-            points_m += (next - core::mem::replace(&mut at, *next)).length();
-            if MIN_FLOWN_SHARE_OF_POINTS * points_m >= stop_m {
-                return stop_m;
-            }
-        }
-        MIN_FLOWN_SHARE_OF_POINTS * points_m
-    }
-
-    /// The place `least_m` along its points, with the points from the beginning of its leg on, and
-    /// its place on these; `None` where that is the neighbour's own.
-    pub(super) fn nearest_rest_place(
-        &self,
-        least_m: f32,
-    ) -> Option<(Point, &[Point], PlaceOnPoints)> {
-        let (mut left_m, mut at) = (least_m, self.state.position);
-        let skipped = self.points.len() - self.next_points().len();
-        for (i, next) in self.points.iter().enumerate().skip(skipped).filter(|_| least_m > 0.0) {
-            let leg_m = (next - at).length();
-            if leg_m > left_m {
-                let rest = at + (next - at) * (left_m / leg_m);
-                let from = i.saturating_sub(1);
-                let place = PlaceOnPoints::On { leg_end: (i - from) as u8, uncertainty_dm: 0 };
-                return Some((rest, &self.points[from..], place));
-            }
-            (at, left_m) = (*next, left_m - leg_m);
-        }
-        None
     }
 
     /// Greatest height at which the neighbour may lie after coming down from `place`, ENU up,

@@ -178,6 +178,69 @@ fn the_stretch_of_an_unheard_vehicle_is_kept_off_to_its_end() {
     assert!((10..18).contains(&most), "{most}");
 }
 
+/// A gust carries a vehicle aside, but it comes to rest on its points: there the keep-out places
+/// lie, however short its points are, and one is where it rests.
+#[test]
+fn a_silent_vehicle_that_a_gust_carried_aside_is_kept_off_on_its_points() {
+    let mut rng = Pcg32::seed_from_u64(18);
+    let (mut aside, mut short) = (0, 0);
+    for case in 0..5000 {
+        let mut table = joined(0);
+        table.handle_intent(
+            Instant::ZERO,
+            1,
+            &Intent { ground_m: 0.0, ..intent(0, 1, 2) },
+            1,
+            None,
+        );
+        let entry = &mut table.entries[1];
+        entry.fastest_vehicle_mps = 2.0;
+        entry.max_unheard_travel_m = max_unheard_travel_m(2.0);
+        let mut at = entry.state.position + Point::new(0.0, 0.0, 2.0);
+        let (mut way, mut points) = (Point::new(1.0, 0.0, 0.0), [at].to_vec());
+        for _ in 0..1 + rng.next_u32() % 5 {
+            at += way * uniform(&mut rng, 0.05, 3.0);
+            points.push(at);
+            // No sharp turn: else it is not known on which leg the vehicle is.
+            let turn = Point::new(0.0, uniform(&mut rng, -0.5, 0.5), uniform(&mut rng, -0.2, 0.2));
+            way = (way + turn).normalize();
+        }
+        // The setpoint, the first point, is a little ahead of the vehicle or behind it.
+        let on = points[0] + Point::new(uniform(&mut rng, -0.3, 0.05), 0.0, 0.0);
+        let blown = Point::new(0.0, uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0));
+        let blown_m = uniform(&mut rng, 0.0, 0.24);
+        entry.state.position = on + blown.normalize() * blown_m;
+        entry.state.velocity = Point::new(uniform(&mut rng, 0.0, 2.0), 0.0, 0.0);
+        entry.points = points.iter().copied().collect();
+        entry.update_place_on_points();
+        let (least_m, upto_m) = (entry.min_rest_distance_m(), entry.unheard_stopping_distance_m());
+        let mut places = std::vec::Vec::new();
+        entry.for_each_rest_place([least_m, upto_m], &mut |place, _| places.push(place));
+        assert!(!places.is_empty(), "{case}: {least_m} m of {points:?}");
+        let mut left_m = least_m + (upto_m - least_m) * uniform(&mut rng, 0.0, 1.0);
+        let mut rest = on;
+        for next in &points {
+            let leg = next - rest;
+            let share = (left_m / leg.norm().max(1e-6)).min(1.0);
+            (rest, left_m) = (rest + leg * share, left_m - leg.norm() * share);
+        }
+        let nearest_m = places.iter().map(|p| (p - rest).norm()).fold(f32::INFINITY, f32::min);
+        assert!(nearest_m <= 0.5 * MIN_UNHEARD_STRETCH_SPACING_M + 0.06, "{case}: {nearest_m} m");
+        let off_points_m = |place: &Point| {
+            let begins = [on].into_iter().chain(points.iter().copied());
+            begins.zip(&points).fold(f32::INFINITY, |least_m, (a, b)| {
+                let (leg, away) = (b - a, place - a);
+                let share = (away.dot(&leg) / leg.norm_squared().max(1e-9)).clamp(0.0, 1.0);
+                least_m.min((away - leg * share).norm())
+            })
+        };
+        assert!(places.iter().all(|p| off_points_m(p) < 0.06), "{case}: {places:?}, {points:?}");
+        aside += usize::from(blown_m > 0.1);
+        short += usize::from(left_m > 0.0);
+    }
+    assert!(aside > 1000 && short > 300, "{aside} {short}");
+}
+
 /// Beside a vehicle that stands, but not on the points that it reports, the safety filter lets no
 /// vehicle pass as near as beside others, so no detour leads there.
 #[test]

@@ -1,0 +1,130 @@
+//! Where along the points that it reported a neighbour comes to rest that no other hears.
+
+use planner_core::track::safety::PlaceOnPoints;
+use planner_core::{Length, Point};
+
+use super::bounds::*;
+use super::entry::NeighbourEntry;
+use crate::margins::{CRUISE_TRACKING_ERROR_M, min_unheard_travel_m};
+
+impl NeighbourEntry {
+    /// The points that the neighbour flies to next from its position; its setpoint may be behind.
+    pub(super) fn next_points(&self) -> &[Point] {
+        match self.place_on_points {
+            PlaceOnPoints::On { leg_end: leg, .. } if !self.would_fly_all_points_unheard() => {
+                self.points.get(usize::from(leg)..).unwrap_or(&self.points)
+            }
+            _ => &self.points,
+        }
+    }
+
+    /// Where the points that the neighbour may fly unheard begin: its position, without the
+    /// deviation from its points by which a gust carried it aside, since it comes to rest on them.
+    /// In a coverage mission, where it climbs, descends or lands, and with a greater deviation than
+    /// that of a vehicle that flies along its points, the position itself.
+    fn start_of_unheard_stretch(&self) -> Point {
+        let (here, points) = (self.state.position, &self.points);
+        let PlaceOnPoints::On { leg_end, .. } = self.place_on_points else { return here };
+        let from = usize::from(leg_end).saturating_sub(1);
+        let Some([a, b]) = points.get(from..from + 2) else { return here };
+        let (leg, away) = (b - a, here - a);
+        let along = leg * (away.dot(&leg) / leg.norm_squared().max(1e-6));
+        let flies = !self.would_fly_all_points_unheard() && !self.has_column();
+        let deviates = (away - along).norm() <= CRUISE_TRACKING_ERROR_M;
+        if flies && deviates { a + along } else { here }
+    }
+
+    /// Calls `each` with the neighbour's position and each leg along its points that it may have
+    /// flown unheard, `left_m` in all: both ends, and metres of the leg and of its flown part.
+    #[inline(never)]
+    pub(super) fn for_each_unheard_leg(
+        &self,
+        mut left_m: f32,
+        each: &mut dyn FnMut([Point; 2], [f32; 2]),
+    ) {
+        let mut at = self.start_of_unheard_stretch();
+        each([at; 2], [0.0; 2]);
+        for next in self.next_points() {
+            let leg_m = (next - at).length();
+            if leg_m > left_m {
+                return each([at, *next], [leg_m, left_m]);
+            }
+            left_m -= leg_m;
+            each([core::mem::replace(&mut at, *next), *next], [leg_m; 2]);
+        }
+    }
+
+    /// Calls `visit` with places along its points where the neighbour may rest unheard, from
+    /// `from_m` to `to_m` along them, and with its greatest distance from the nearest of them,
+    /// metres.
+    #[inline(never)]
+    pub(super) fn for_each_rest_place(
+        &self,
+        [from_m, to_m]: [f32; 2],
+        visit: &mut dyn FnMut(Point, f32),
+    ) {
+        let step_m = libm::fmaxf(MIN_UNHEARD_STRETCH_SPACING_M, to_m / MAX_STRETCH_SPACINGS);
+        let wider_m = if step_m > MIN_UNHEARD_STRETCH_SPACING_M { 0.5 * step_m } else { 0.0 };
+        let (mut before_m, mut end) = (0.0, self.state.position);
+        self.for_each_unheard_leg(to_m, &mut |[at, next], [leg_m, flown_m]| {
+            let mut along_m = if from_m > before_m { from_m - before_m } else { step_m };
+            while along_m < flown_m {
+                visit(at + (next - at) * (along_m / leg_m), wider_m);
+                along_m += step_m;
+            }
+            before_m += flown_m;
+            // The end of the flown part too.
+            end = if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next };
+            if from_m <= before_m {
+                visit(end, wider_m);
+            }
+        });
+        // Points that end sooner: the neighbour rests at their end.
+        if before_m < from_m {
+            visit(end, wider_m);
+        }
+    }
+
+    /// Least distance along its points, metres, at which the neighbour comes to rest unheard: that
+    /// of its hardest stop from the speed at which it was last heard, or of a fall. 0 in a coverage
+    /// mission, off its points, and where it climbs, descends or lands.
+    pub(super) fn min_rest_distance_m(&self) -> f32 {
+        let far = |way: &Point| way.norm_squared() > MIN_COURSE_M * MIN_COURSE_M;
+        let course = self.next_points().iter().map(|p| p - self.state.position).find(far);
+        let flies = matches!(self.place_on_points, PlaceOnPoints::On { .. })
+            && !self.would_fly_all_points_unheard()
+            && !self.has_column();
+        let Some(ahead) = course.filter(|_| flies) else { return 0.0 };
+        let speed_mps = libm::fmaxf(self.state.velocity.dot(&ahead) / ahead.length(), 0.0);
+        let stop_m = libm::fminf(min_unheard_travel_m(speed_mps), self.max_unheard_travel_m);
+        let (mut points_m, mut at) = (0.0, self.start_of_unheard_stretch());
+        for next in self.next_points() {
+            points_m += (next - core::mem::replace(&mut at, *next)).length();
+            if MIN_FLOWN_SHARE_OF_POINTS * points_m >= stop_m {
+                return stop_m;
+            }
+        }
+        MIN_FLOWN_SHARE_OF_POINTS * points_m
+    }
+
+    /// The place `least_m` along its points, with the points from the beginning of its leg on, and
+    /// its place on these; `None` where that is the neighbour's own.
+    pub(super) fn nearest_rest_place(
+        &self,
+        least_m: f32,
+    ) -> Option<(Point, &[Point], PlaceOnPoints)> {
+        let (mut left_m, mut at) = (least_m, self.state.position);
+        let skipped = self.points.len() - self.next_points().len();
+        for (i, next) in self.points.iter().enumerate().skip(skipped).filter(|_| least_m > 0.0) {
+            let leg_m = (next - at).length();
+            if leg_m > left_m {
+                let rest = at + (next - at) * (left_m / leg_m);
+                let from = i.saturating_sub(1);
+                let place = PlaceOnPoints::On { leg_end: (i - from) as u8, uncertainty_dm: 0 };
+                return Some((rest, &self.points[from..], place));
+            }
+            (at, left_m) = (*next, left_m - leg_m);
+        }
+        None
+    }
+}
