@@ -173,9 +173,7 @@ impl Detours {
         match view.config.lost_vehicle_down_after_s {
             Some(_) if !requested.is_aside() => beside::visit_zones_of_others(view, &mut visit),
             _ => {
-                // The zone of a grounded vehicle is only as wide as what blocks a path, so that a
-                // goal planned beside it can be reached.
-                let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_BEYOND_SAFETY_DISTANCE_M];
+                let apart = self.keep_out_radii_m(requested, along_m, apart_m);
                 view.neighbours.for_each_keep_out_zone(view.now, apart, &mut visit);
             }
         }
@@ -266,6 +264,24 @@ impl Detours {
         timers.set(Timer::RejoinSearch, now + REJOIN_SEARCH_PAUSE);
     }
 
+    /// Radius of the zones of vehicles in the air, and of those on the ground, with the safety
+    /// distance `apart_m`, metres. Between two that hover, the full margin may leave no way: a
+    /// search after one that failed here keeps a smaller one from them. On the ground a zone is
+    /// only as wide as what blocks a path, so that a goal planned beside it can be reached.
+    fn keep_out_radii_m(&self, requested: DetourPurpose, along_m: f32, apart_m: f32) -> [f32; 2] {
+        let lying_m = apart_m + BLOCKED_BEYOND_SAFETY_DISTANCE_M;
+        match requested == DetourPurpose::Goal && self.has_search_failed_at(along_m) {
+            true => [lying_m; 2],
+            false => [apart_m + DETOUR_MARGIN_M, lying_m],
+        }
+    }
+
+    /// Whether the last search for a detour to the goal, other than one that failed only until a
+    /// silent vehicle has come down, failed about here.
+    fn has_search_failed_at(&self, along_m: f32) -> bool {
+        self.failed_searches_here > 0 && (along_m - self.failed_at_m).abs() <= SAME_SEARCH_PLACE_M
+    }
+
     /// Notes that the shell found no path from `along_m` metres along the path, and whether to
     /// search again.
     pub(crate) fn note_failure(
@@ -296,7 +312,7 @@ impl Detours {
                 self.failed_searches.saturating_add(1).min(MAX_FAILED_SEARCHES - 1);
             return;
         }
-        if (along_m - self.failed_at_m).abs() > SAME_SEARCH_PLACE_M {
+        if !self.has_search_failed_at(along_m) {
             (self.failed_searches_here, self.failed_at_m) = (0, along_m);
         }
         if self.failed_searches_here == 0 {

@@ -327,3 +327,50 @@ fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
         assert!((1..=MAX_FAILED_SEARCHES).contains(&asked), "{asked}");
     }
 }
+
+/// Between two that hover, the full margin may leave no way. The search after one that failed here
+/// keeps the smaller margin, but never less than what blocks a path; a search elsewhere, or for
+/// another purpose, keeps the full one.
+#[test]
+fn after_a_failed_search_the_next_one_here_passes_nearer() {
+    let mut rng = Pcg32::seed_from_u64(6);
+    let mut bench = Bench::started_with_neighbour(two_vehicles());
+    bench.run_until(State::Follow, 20.0);
+    let hovers = Point::new(14.0, 20.0, 2.0);
+    bench.neighbour = Some((hovers, FLYING | ON_PLAN | WAITING, 0.0, 5));
+    bench.run(1.0);
+    let now = bench.companion.detour_view().now;
+    let radius_m = |detours: &Detours| {
+        let mut radius_m = f32::INFINITY;
+        let request = detours.detour_request(&bench.companion.detour_view(), |zone| {
+            if zone.kind == ZoneKind::Static && (zone.from - hovers).norm() < 0.1 {
+                radius_m = radius_m.min(zone.radius_m);
+            }
+        });
+        assert!(request.is_some());
+        radius_m
+    };
+    let first = Detours { requested_purpose: Some(DetourPurpose::Goal), ..Detours::default() };
+    let full_m = radius_m(&first);
+    assert!(full_m >= bench.companion.config.safety_distance_m + 0.5);
+    let mut nearer = 0;
+    for _ in 0..500 {
+        let mut detours = Detours::default();
+        let here_m = bench.companion.guidance.reference_along_m();
+        let mut failed_here = false;
+        for _ in 0..rng.next_u32() % 3 {
+            detours.requested_purpose = Some(DetourPurpose::Goal);
+            failed_here = rng.next_u32() % 2 == 0;
+            let along_m = if failed_here { here_m + 0.5 } else { here_m + 5.0 };
+            detours.note_failure(along_m, RetryOutlook::OthersMayMove, now, &mut Timers::default());
+        }
+        let goal = rng.next_u32() % 4 > 0;
+        detours.requested_purpose =
+            Some(if goal { DetourPurpose::Goal } else { DetourPurpose::LandingAside });
+        let closer_m = full_m - radius_m(&detours);
+        let expected_m = if goal && failed_here { 0.25 } else { 0.0 };
+        assert!((closer_m - expected_m).abs() < 1e-3, "{closer_m} m nearer");
+        nearer += usize::from(goal && failed_here);
+    }
+    assert!(nearer > 100, "{nearer}");
+}
