@@ -98,7 +98,7 @@ fn visit_neighbour_zones<const V: usize, const W: usize, const G: usize>(
 ) {
     let apart_m = view.config.safety_distance_m + DETOUR_MARGIN_M;
     match index.checked_sub(view.neighbours.len()) {
-        None => view.neighbours.for_each_zone_of(index, view.now, [apart_m; 2], visit),
+        None => view.neighbours.for_each_zone_of(index, view.now, [apart_m; 3], visit),
         Some(i) => {
             let beside_m = apart_m + view.neighbours.pair_position_error_m();
             view.neighbours.visit_landing_column(i, view.now, beside_m, |column| {

@@ -264,15 +264,17 @@ impl Detours {
         timers.set(Timer::RejoinSearch, now + REJOIN_SEARCH_PAUSE);
     }
 
-    /// Radius of the zones of vehicles in the air, and of those on the ground, with the safety
-    /// distance `apart_m`, metres. Between two that hover, the full margin may leave no way: a
-    /// search after one that failed here keeps a smaller one from them. On the ground a zone is
-    /// only as wide as what blocks a path, so that a goal planned beside it can be reached.
-    fn keep_out_radii_m(&self, requested: DetourPurpose, along_m: f32, apart_m: f32) -> [f32; 2] {
-        let lying_m = apart_m + BLOCKED_BEYOND_SAFETY_DISTANCE_M;
+    /// Radius of the zones of vehicles in the air, of those among them that are heard and on plan,
+    /// and of those on the ground, with the safety distance `apart_m`, metres. Between two that
+    /// hover, the full margin may leave no way: a search after one that failed here keeps a smaller
+    /// one from them. On the ground a zone is only as wide as what blocks a path, so that a goal
+    /// planned beside it can be reached.
+    fn keep_out_radii_m(&self, requested: DetourPurpose, along_m: f32, apart_m: f32) -> [f32; 3] {
+        let [aloft_m, lying_m] =
+            [DETOUR_MARGIN_M, BLOCKED_BEYOND_SAFETY_DISTANCE_M].map(|m| apart_m + m);
         match requested == DetourPurpose::Goal && self.has_search_failed_at(along_m) {
-            true => [lying_m; 2],
-            false => [apart_m + DETOUR_MARGIN_M, lying_m],
+            true => [aloft_m, lying_m, lying_m],
+            false => [aloft_m, aloft_m, lying_m],
         }
     }
 

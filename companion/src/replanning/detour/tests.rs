@@ -141,7 +141,7 @@ fn a_vehicle_that_died_may_have_been_flown_back_to_its_pad() {
     bench
         .companion
         .neighbours
-        .for_each_keep_out_zone(bench.now, [1.5; 2], |place| reported.push(place));
+        .for_each_keep_out_zone(bench.now, [1.5; 3], |place| reported.push(place));
     assert!(
         reported.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5),
         "{reported:?}"
@@ -170,7 +170,7 @@ fn kept_off(flags: u8, positions: Positions) -> Vec<KeepOutZone> {
     bench
         .companion
         .neighbours
-        .for_each_keep_out_zone(bench.now, [1.5; 2], |place| reported.push(place));
+        .for_each_keep_out_zone(bench.now, [1.5; 3], |place| reported.push(place));
     reported
 }
 
@@ -333,12 +333,27 @@ fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
 /// another purpose, keeps the full one.
 #[test]
 fn after_a_failed_search_the_next_one_here_passes_nearer() {
+    assert_next_search_passes_nearer(FLYING | ON_PLAN | WAITING, 0.0, 0.25);
+}
+
+/// A vehicle that its pilot holds, or that is no longer heard, does not keep its place so well.
+#[test]
+fn after_a_failed_search_one_under_its_pilot_or_unheard_is_passed_no_nearer() {
+    assert_next_search_passes_nearer(FLYING | OUT_OF_PLAN, 0.0, 0.0);
+    assert_next_search_passes_nearer(FLYING | ON_PLAN | WAITING, 1.5, 0.0);
+}
+
+/// Asserts that a search for a detour to the goal which follows one that failed here passes
+/// `nearer_m` nearer to a hovering vehicle with these flags, silent for `silent_s` seconds.
+fn assert_next_search_passes_nearer(flags: u8, silent_s: f32, nearer_m: f32) {
     let mut rng = Pcg32::seed_from_u64(6);
     let mut bench = Bench::started_with_neighbour(two_vehicles());
     bench.run_until(State::Follow, 20.0);
     let hovers = Point::new(14.0, 20.0, 2.0);
-    bench.neighbour = Some((hovers, FLYING | ON_PLAN | WAITING, 0.0, 5));
+    bench.neighbour = Some((hovers, flags, 0.0, 5));
     bench.run(1.0);
+    bench.neighbour = None;
+    bench.run(silent_s);
     let now = bench.companion.detour_view().now;
     let radius_m = |detours: &Detours| {
         let mut radius_m = f32::INFINITY;
@@ -368,7 +383,7 @@ fn after_a_failed_search_the_next_one_here_passes_nearer() {
         detours.requested_purpose =
             Some(if goal { DetourPurpose::Goal } else { DetourPurpose::LandingAside });
         let closer_m = full_m - radius_m(&detours);
-        let expected_m = if goal && failed_here { 0.25 } else { 0.0 };
+        let expected_m = if goal && failed_here { nearer_m } else { 0.0 };
         assert!((closer_m - expected_m).abs() < 1e-3, "{closer_m} m nearer");
         nearer += usize::from(goal && failed_here);
     }

@@ -74,32 +74,38 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Calls `visit` with the keep-out zones of the roster's other vehicles where they stand now,
-    /// or rest out of the plan. `apart`: radius for one in the air, and for one on the ground,
-    /// which no longer deviates.
+    /// or rest out of the plan. `apart`: radius for one in the air; for one of these that is heard
+    /// and on plan, which keeps its place; and for one on the ground, which no longer deviates.
     pub fn for_each_keep_out_zone(
         &self,
         now: Instant,
-        apart: [f32; 2],
+        apart: [f32; 3],
         mut visit: impl FnMut(KeepOutZone),
     ) {
         (0..self.roster_count).for_each(|i| self.for_each_zone_of(i, now, apart, &mut visit));
     }
 
     /// Calls `visit` with the keep-out zones of neighbour `i` of the roster where it stands or
-    /// rests: of radius `lying_m` if it is on the ground, else `apart_m`.
+    /// rests: of radius `lying_m` if it is on the ground, `hovering_m` if it is heard and on plan,
+    /// else `apart_m`.
     pub(crate) fn for_each_zone_of(
         &self,
         i: usize,
         now: Instant,
-        [apart_m, lying_m]: [f32; 2],
+        [apart_m, hovering_m, lying_m]: [f32; 3],
         visit: &mut dyn FnMut(KeepOutZone),
     ) {
         let rostered = self.entries[..self.roster_count].get(i);
         if let Some(entry) = rostered.filter(|c| c.position_at.is_some()) {
-            let far_m = if entry.is_on_ground(now, self.down_after) { lying_m } else { apart_m };
+            let heard = entry.heard_within(now, MAX_HEIGHT_AGE);
+            let far_m = match (entry.is_on_ground(now, self.down_after), heard) {
+                (true, _) => lying_m,
+                (false, true) if !entry.reports_any(OUT_OF_PLAN) => hovering_m,
+                (false, _) => apart_m,
+            };
             let reach = [far_m, self.max_unheard_flown_m(entry, now)];
             entry.visit_keep_out_zones(now, reach, self.area_ground(), visit);
-            if self.fleet.is_none() && !entry.heard_within(now, MAX_HEIGHT_AGE) {
+            if self.fleet.is_none() && !heard {
                 self.visit_silent_zones(entry, now, reach, visit);
             }
         }

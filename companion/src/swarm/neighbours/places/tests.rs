@@ -266,7 +266,7 @@ fn a_detour_keeps_as_far_from_a_vehicle_off_its_points_as_the_filter_does() {
         let wider_m = entry.filter_neighbour(late).motion.reachable_set(&bounds, 0.0).widened_by_m;
         let apart_m = uniform(&mut rng, 1.0, 3.0);
         let mut radius_m = 0.0_f32;
-        table.for_each_keep_out_zone(late, [apart_m; 2], |zone| {
+        table.for_each_keep_out_zone(late, [apart_m; 3], |zone| {
             radius_m = radius_m.max(zone.radius_m);
         });
         if beside {
@@ -296,7 +296,7 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
         let apart_m = lying_m + uniform(&mut rng, 0.1, 1.0);
         let lies = flags & GROUNDED != 0 || (flags & OUT_OF_PLAN == 0 && silent_s >= 75.0);
         let comes_down = flags & (GROUNDED | OUT_OF_PLAN) == 0 && (45.0..75.0).contains(&silent_s);
-        table.for_each_keep_out_zone(now, [apart_m, lying_m], |off| {
+        table.for_each_keep_out_zone(now, [apart_m, apart_m, lying_m], |off| {
             // The place of a silent vehicle is not known any better than that.
             let most_m = lying_m + STALE_POSITION_ERROR_M;
             let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };
@@ -328,7 +328,7 @@ fn a_vehicle_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             let here = table.entries[1].state.position;
             let near = here + away * (0.99 * truly_m);
             let mut free = true;
-            table.for_each_keep_out_zone(Instant::from_millis(100), [apart_m; 2], |off| {
+            table.for_each_keep_out_zone(Instant::from_millis(100), [apart_m; 3], |off| {
                 let down_m = (off.from.z - near.z).clamp(0.0, off.from.z - off.to.z);
                 let nearest = off.from - Point::new(0.0, 0.0, down_m);
                 free &= (near - nearest).norm() >= off.radius_m;
