@@ -7,7 +7,7 @@ use planner_core::Point;
 use crate::files::ResultFiles;
 use crate::mission::{HostPlan, PreparedMission};
 use crate::report::{self, MapSurface, ReportData, ReportVehicle, RoadmapLines};
-use crate::result::{self, MissionResult, Timing};
+use crate::result::{self, MissionResult, Safety, Timing};
 use crate::say;
 use crate::scenario::Scenario;
 
@@ -91,6 +91,26 @@ pub fn print_slow_vehicles(scenario: &Scenario) {
     }
 }
 
+fn print_safety(safety: &Safety) {
+    let metres = |value: Option<f64>| value.map_or("-".to_owned(), |m| format!("{m:.2} m"));
+    let under_pilot = match safety.wall_contacts_under_pilot {
+        0 => String::new(),
+        count => format!(" ({count} under its pilot)"),
+    };
+    say!(
+        "walls      {} contacts{under_pilot}, nearest {}",
+        safety.wall_contacts,
+        metres(safety.min_clearance_m)
+    );
+    say!(
+        "vehicles   {} violations of {} m, nearest {}, {} deadlocks",
+        safety.violations,
+        safety.safety_distance_m,
+        metres(safety.min_separation_m),
+        safety.deadlocks
+    );
+}
+
 /// Prints the content of `result.json` for a person: a table of vehicles, then totals.
 pub fn print_summary(result: &MissionResult, dir: &Path) {
     say!("vehicle  goal  reached  landed   path m  flown m   time s  end");
@@ -112,21 +132,9 @@ pub fn print_summary(result: &MissionResult, dir: &Path) {
         say!("left       {reason}");
     }
     let safety = &result.safety;
-    let metres = |value: Option<f64>| value.map_or("-".to_owned(), |m| format!("{m:.2} m"));
     say!();
     say!("{}", if result.complete { "complete" } else { "NOT COMPLETE" });
-    say!(
-        "walls      {} contacts, nearest {}",
-        safety.wall_contacts,
-        metres(safety.min_clearance_m)
-    );
-    say!(
-        "vehicles   {} violations of {} m, nearest {}, {} deadlocks",
-        safety.violations,
-        safety.safety_distance_m,
-        metres(safety.min_separation_m),
-        safety.deadlocks
-    );
+    print_safety(safety);
     match &result.coverage {
         Some(coverage) if coverage.trigger == "none" => say!(
             "area       {:.2} % flown over, {} waypoints ({} flown twice, {} left); \

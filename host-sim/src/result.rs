@@ -208,6 +208,9 @@ pub struct Safety {
     /// Number of times a vehicle's body touched an obstacle, the floor in a take-off or landing not
     /// counted.
     pub wall_contacts: u32,
+    /// Number of these contacts in which its pilot flew the vehicle; left out if none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub wall_contacts_under_pilot: u32,
     /// Smallest distance from a vehicle's centre to an obstacle between take-off and landing,
     /// metres.
     pub min_clearance_m: Option<f64>,
@@ -219,6 +222,10 @@ pub struct Safety {
     pub violations: u32,
     /// Number of times a flying vehicle made no progress for 20 s with a part of its path left.
     pub deadlocks: u32,
+}
+
+fn is_zero(count: &u32) -> bool {
+    *count == 0
 }
 
 /// Numbers of nodes, edges and bytes of the roadmap that was planned on.

@@ -363,6 +363,7 @@ impl<'a> SimulationRun<'a> {
             },
             safety: Safety {
                 wall_contacts: referee.wall_contacts,
+                wall_contacts_under_pilot: referee.wall_contacts_under_pilot(),
                 min_clearance_m: finite(referee.min_clearance_m),
                 min_separation_m: finite(referee.min_separation_m),
                 safety_distance_m: rounded(scenario.deconfliction.safety_distance_m),

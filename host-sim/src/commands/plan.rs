@@ -136,6 +136,7 @@ fn planned_result(mission: &PreparedMission, plan: &HostPlan) -> MissionResult {
         },
         safety: Safety {
             wall_contacts: 0,
+            wall_contacts_under_pilot: 0,
             min_clearance_m: min_clearance_m.is_finite().then(|| rounded(min_clearance_m)),
             min_separation_m: None,
             safety_distance_m: rounded(mission.scenario.deconfliction.safety_distance_m),

@@ -55,6 +55,7 @@ pub fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> 
         },
         safety: Safety {
             wall_contacts: 0,
+            wall_contacts_under_pilot: 0,
             min_clearance_m: None,
             min_separation_m: least_m.is_finite().then(|| rounded(least_m)),
             safety_distance_m: rounded(scenario.deconfliction.safety_distance_m),

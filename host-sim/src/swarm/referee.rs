@@ -4,7 +4,8 @@
 //! A wall contact is a body (a sphere of the vehicle's radius) that reaches into an obstacle of the
 //! exact map; a contact that lasts counts once. While a vehicle takes off or lands, obstacle cells
 //! below its centre are the floor, no wall. A wreck is an obstacle too: touching it is a contact,
-//! passing near it is no violation.
+//! passing near it is no violation. Of the contacts, those of a vehicle that its pilot flies are
+//! marked: its companion sends it no setpoints.
 
 use planner_core::Point;
 use planner_core::map::segment::point_clearance;
@@ -53,6 +54,8 @@ pub struct Observation {
     pub phase: RefereePhase,
     /// Whether the vehicle stands still by command of operator or pilot.
     pub holds_by_command: bool,
+    /// Whether its pilot flies it: no setpoint of its companion counts.
+    pub flown_by_pilot: bool,
     /// Arc length along its path, metres; `None`: moving by 1 m counts as progress instead.
     pub progress_m: Option<f32>,
 }
@@ -137,11 +140,13 @@ pub struct Incident {
     pub text: String,
     /// Whether it is a standstill that ended, and no longer counts as a deadlock.
     pub retracted: bool,
+    /// Whether it is a wall contact of a vehicle that its pilot flies.
+    pub contact_under_pilot: bool,
 }
 
 impl Incident {
     fn new(t_s: f64, vehicle: usize, text: String) -> Self {
-        Self { t_s, vehicle, text, retracted: false }
+        Self { t_s, vehicle, text, retracted: false, contact_under_pilot: false }
     }
 }
 
@@ -211,6 +216,11 @@ impl<'a> Referee<'a> {
         }
     }
 
+    /// Number of the wall contacts in which its pilot flew the vehicle.
+    pub fn wall_contacts_under_pilot(&self) -> u32 {
+        self.incidents.iter().filter(|incident| incident.contact_under_pilot).count() as u32
+    }
+
     /// Length of the track that a vehicle has flown so far, metres.
     pub fn flown_m(&self, vehicle: usize) -> f64 {
         self.vehicles[vehicle].flown_m
@@ -275,11 +285,10 @@ impl<'a> Referee<'a> {
         if touches && !was_touching {
             self.wall_contacts += 1;
             let [x, y, z] = now.position.into();
-            self.incidents.push(Incident::new(
-                t_s,
-                i,
-                format!("touches an obstacle at [{x:.2}, {y:.2}, {z:.2}]"),
-            ));
+            let under = if now.flown_by_pilot { " under its pilot" } else { "" };
+            let text = format!("touches an obstacle{under} at [{x:.2}, {y:.2}, {z:.2}]");
+            let contact = Incident::new(t_s, i, text);
+            self.incidents.push(Incident { contact_under_pilot: now.flown_by_pilot, ..contact });
         }
     }
 

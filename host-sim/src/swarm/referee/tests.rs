@@ -25,6 +25,7 @@ fn at(x: f32, y: f32, z: f32, phase: RefereePhase) -> Observation {
         position: Point::new(x, y, z),
         phase,
         holds_by_command: false,
+        flown_by_pilot: false,
         progress_m: Some(x),
     }
 }
@@ -52,6 +53,23 @@ fn the_floor_is_none_while_landing_but_a_wall_is() {
         referee.observe(0.2, &[at(4.0, 2.0, 5.0, RefereePhase::Flying), far]);
         referee.observe(0.3, &[at(7.7, 2.0, 1.6, RefereePhase::TakeOffOrLanding), far]);
         assert_eq!(referee.wall_contacts, 2);
+    });
+}
+
+/// What a vehicle touches under its pilot is a contact as any other, and is counted apart too.
+#[test]
+fn contacts_under_its_pilot_are_counted_apart_too() {
+    with_monitor(|mut referee| {
+        let rests = at(5.0, 5.0, 5.0, RefereePhase::Grounded);
+        for (step, flown_by_pilot) in [false, true, true, false].into_iter().enumerate() {
+            for (tenth, x) in [(0, 7.0), (1, 7.6)] {
+                let flies = Observation { flown_by_pilot, ..at(x, 2.0, 5.0, RefereePhase::Flying) };
+                referee.observe((10 * step + tenth) as f64 * 0.1, &[flies, rests]);
+            }
+        }
+        assert_eq!((referee.wall_contacts, referee.wall_contacts_under_pilot()), (4, 2));
+        let texts: Vec<_> = referee.incidents.iter().map(|i| i.text.contains("pilot")).collect();
+        assert_eq!(texts, [false, true, true, false]);
     });
 }
 

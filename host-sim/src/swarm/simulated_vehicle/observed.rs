@@ -32,6 +32,12 @@ impl SimulatedVehicle {
             .board
             .as_ref()
             .map_or_else(|| Some(self.companion.progress_m()), RemoteCompanion::progress_m);
-        Observation { position: truth.position, phase, holds_by_command: ordered, progress_m }
+        Observation {
+            position: truth.position,
+            phase,
+            holds_by_command: ordered,
+            flown_by_pilot: state.is_left_to_pilot(),
+            progress_m,
+        }
     }
 }

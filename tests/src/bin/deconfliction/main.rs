@@ -68,7 +68,12 @@ struct Row {
     /// Number of missions for which no plan was found.
     unplanned: u64,
     violations: u32,
+    /// Number of contacts with walls, without those of a vehicle under its pilot.
     wall_contacts: u32,
+    /// Number of contacts of a vehicle under its pilot, which no companion can prevent.
+    wall_contacts_under_pilot: u32,
+    /// Number of missions that were complete and clean but for such contacts.
+    complete_but_for_pilot: u64,
     deadlocks: u32,
     /// Number of vehicles without a fault that did not reach their goals.
     held_up: usize,
@@ -97,6 +102,14 @@ struct Row {
     incidents: Vec<String>,
     #[serde(skip)]
     flights: u32,
+}
+
+impl Row {
+    /// Whether this flight was not clean, but would have been without contacts under a pilot.
+    fn is_clean_but_for_pilot(&self) -> bool {
+        let broken = self.wall_contacts + self.violations + self.deadlocks;
+        self.wall_contacts_under_pilot > 0 && broken == 0 && self.held_up == 0
+    }
 }
 
 fn main() -> Result<()> {
@@ -164,6 +177,12 @@ fn print_row(row: &Row) {
             "    silent, it lies up to {beside_m:.2} m beside its path, {along_m:.2} m further along it"
         );
     }
+    if row.wall_contacts_under_pilot > 0 {
+        println!(
+            "    under its pilot, a vehicle touched a wall {} times; but for that, {} more are complete",
+            row.wall_contacts_under_pilot, row.complete_but_for_pilot
+        );
+    }
     let causes = Cause::ALL.iter().zip(row.held_up_by).filter(|(_, count)| *count > 0);
     causes.for_each(|(cause, count)| println!("    held up: {count} x {cause}"));
     if row.method == METHODS[0] {
@@ -186,6 +205,8 @@ fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
         sum.unplanned += row.unplanned;
         sum.violations += row.violations;
         sum.wall_contacts += row.wall_contacts;
+        sum.wall_contacts_under_pilot += row.wall_contacts_under_pilot;
+        sum.complete_but_for_pilot += row.complete_but_for_pilot;
         sum.deadlocks += row.deadlocks;
         sum.held_up += row.held_up;
         sum.lies_m.iter_mut().zip(row.lies_m).for_each(|(sum, m)| *sum = sum.max(m));
@@ -224,6 +245,8 @@ fn empty_rows(meeting: &Meeting) -> Vec<Row> {
         unplanned: 0,
         violations: 0,
         wall_contacts: 0,
+        wall_contacts_under_pilot: 0,
+        complete_but_for_pilot: 0,
         deadlocks: 0,
         held_up: 0,
         held_up_by: [0; Cause::ALL.len()],
@@ -283,6 +306,7 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
         fill_row(row, &flight.result, &alone);
         let is_struck = |v: &VehicleResult| simulation.contains("[[faults]]") && v.id == struck;
         row.held_up = flight.result.vehicles.iter().filter(|v| !v.reached && !is_struck(v)).count();
+        row.complete_but_for_pilot = u64::from(row.is_clean_but_for_pilot());
         if simulation.contains("[[faults]]") && method == METHODS[0] {
             // A vehicle that no other hears may lie where it was struck, or further along its path.
             let silent = simulation.contains("radio-cut") && !simulation.contains("\"rx\"");
@@ -357,7 +381,8 @@ fn fly(mission: &PreparedMission, plan: &HostPlan) -> Result<swarm::SwarmFlight>
 fn fill_row(row: &mut Row, result: &MissionResult, alone: &MissionResult) {
     row.complete = u64::from(result.complete);
     row.violations = result.safety.violations;
-    row.wall_contacts = result.safety.wall_contacts;
+    row.wall_contacts_under_pilot = result.safety.wall_contacts_under_pilot;
+    row.wall_contacts = result.safety.wall_contacts - row.wall_contacts_under_pilot;
     row.deadlocks = result.safety.deadlocks;
     row.min_separation_m = result.safety.min_separation_m.unwrap_or(f64::INFINITY);
     row.extra_makespan = result.totals.makespan_s / alone.totals.makespan_s - 1.0;
