@@ -222,8 +222,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             RetryOutlook::SilentVehicleComesDown
         } else if failure != PlanFailure::Late && self.neighbours.are_all_out_or_down(self.now) {
             RetryOutlook::NoneWillMove
-        } else {
+        } else if failure == PlanFailure::Unreachable {
             RetryOutlook::OthersMayMove
+        } else {
+            RetryOutlook::NotSearched
         };
         let along_m = self.guidance.reference_along_m();
         self.detours.note_failure(along_m, outlook, self.now, &mut self.timers);

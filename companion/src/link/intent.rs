@@ -19,10 +19,12 @@
 //! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long the sender held it, in units of 10 ms; 0 for none |
 //! | 32 | 12 × n | points that the sender flies along next: f32 east, north, up in the mission frame. They begin at its setpoint and lead to where it will stop for now. No points while a pilot or a failsafe flies it; the setpoint alone while it holds its place. Over an area corners of its path follow, as far as it flies on if no other vehicle hears it |
 //!
-//! A receiver rejects another version, NaN, and a system id that is not the sender's.
+//! A receiver rejects another version, NaN, a point further than [`MAX_COORDINATE_M`] from the
+//! origin, and a system id that is not the sender's.
 
 use heapless::Vec;
 use planner_core::Point;
+use planner_core::roadmap::MAX_COORDINATE_M;
 
 use crate::link::echo::IntentEcho;
 
@@ -147,10 +149,12 @@ impl Intent {
         }
         let word = |at: usize| [body[at], body[at + 1], body[at + 2], body[at + 3]];
         let float = |at: usize| Some(f32::from_le_bytes(word(at))).filter(|v| v.is_finite());
+        let coordinate = |at| float(at).filter(|m| libm::fabsf(*m) <= MAX_COORDINATE_M);
         let mut points = Vec::new();
         for i in 0..count {
             let at = HEADER_LEN + 12 * i;
-            points.push(Point::new(float(at)?, float(at + 4)?, float(at + 8)?)).ok()?;
+            let [x, y, z] = [at, at + 4, at + 8].map(coordinate);
+            points.push(Point::new(x?, y?, z?)).ok()?;
         }
         Some(Self {
             system_id: sender,

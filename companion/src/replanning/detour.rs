@@ -112,6 +112,9 @@ pub(crate) struct Detours {
     /// the times of the first of them and of the last failed search anywhere.
     failed_searches_here: u8,
     failed_at_m: f32,
+    /// Where along the path, metres, the last search for a detour to the goal found none, if no
+    /// other vehicle has moved since.
+    found_none_at_m: Option<f32>,
     failed_since: Instant,
     failed_at: Instant,
     /// Number of detours in a row on which the vehicle made no progress.
@@ -374,7 +377,8 @@ impl Detours {
         }
         if !view.neighbours.are_all_standing(now) {
             // Another vehicle moved, which may have freed the path.
-            (self.all_standing_since, self.failed_searches, self.no_retry) = (None, 0, false);
+            (self.all_standing_since, self.found_none_at_m) = (None, None);
+            (self.failed_searches, self.no_retry) = (0, false);
         } else if self.all_standing_since.is_none() {
             self.all_standing_since = Some(now);
         }

@@ -37,6 +37,8 @@ pub(crate) enum RetryOutlook {
     SilentVehicleComesDown,
     /// Another vehicle may still move.
     OthersMayMove,
+    /// The search did not end, or its answer could not be used: another may find a path.
+    NotSearched,
     /// No other vehicle will move any more.
     NoneWillMove,
 }
@@ -266,22 +268,23 @@ impl Detours {
 
     /// Radius of the zones of vehicles in the air, of those among them that are heard and on plan,
     /// and of those on the ground, with the safety distance `apart_m`, metres. Between two that
-    /// hover, the full margin may leave no way: a search after one that failed here keeps a smaller
-    /// one from them. On the ground a zone is only as wide as what blocks a path, so that a goal
-    /// planned beside it can be reached.
-    fn keep_out_radii_m(&self, requested: DetourPurpose, along_m: f32, apart_m: f32) -> [f32; 3] {
+    /// hover, the full margin may leave no way: a search after one that found none here keeps a
+    /// smaller one from them until another vehicle moves. On the ground a zone is only as wide as
+    /// what blocks a path, so that a goal planned beside it can be reached.
+    pub(super) fn keep_out_radii_m(
+        &self,
+        requested: DetourPurpose,
+        along_m: f32,
+        apart_m: f32,
+    ) -> [f32; 3] {
         let [aloft_m, lying_m] =
             [DETOUR_MARGIN_M, BLOCKED_BEYOND_SAFETY_DISTANCE_M].map(|m| apart_m + m);
-        match requested == DetourPurpose::Goal && self.has_search_failed_at(along_m) {
+        let found_none_here = |at_m: &f32| (along_m - at_m).abs() <= SAME_SEARCH_PLACE_M;
+        let nearer = self.found_none_at_m.filter(found_none_here).is_some();
+        match requested == DetourPurpose::Goal && nearer {
             true => [aloft_m, lying_m, lying_m],
             false => [aloft_m, aloft_m, lying_m],
         }
-    }
-
-    /// Whether the last search for a detour to the goal, other than one that failed only until a
-    /// silent vehicle has come down, failed about here.
-    fn has_search_failed_at(&self, along_m: f32) -> bool {
-        self.failed_searches_here > 0 && (along_m - self.failed_at_m).abs() <= SAME_SEARCH_PLACE_M
     }
 
     /// Notes that the shell found no path from `along_m` metres along the path, and whether to
@@ -314,11 +317,14 @@ impl Detours {
                 self.failed_searches.saturating_add(1).min(MAX_FAILED_SEARCHES - 1);
             return;
         }
-        if !self.has_search_failed_at(along_m) {
+        if (along_m - self.failed_at_m).abs() > SAME_SEARCH_PLACE_M {
             (self.failed_searches_here, self.failed_at_m) = (0, along_m);
         }
         if self.failed_searches_here == 0 {
             self.failed_since = now;
+        }
+        if outlook == RetryOutlook::OthersMayMove {
+            self.found_none_at_m = Some(along_m);
         }
         self.failed_searches = self.failed_searches.saturating_add(1);
         self.failed_searches_here = self.failed_searches_here.saturating_add(1);

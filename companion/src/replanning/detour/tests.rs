@@ -3,6 +3,7 @@ use std::vec::Vec;
 
 use super::searches::RetryOutlook;
 use super::*;
+use crate::PlanFailure;
 use crate::link::intent::{BLOCKED, FLYING, GROUNDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
 use crate::replanning::obstacles::MAX_OBSTACLES;
 use crate::replanning::obstacles::tests::sphere;
@@ -341,6 +342,84 @@ fn after_a_failed_search_the_next_one_here_passes_nearer() {
 fn after_a_failed_search_one_under_its_pilot_or_unheard_is_passed_no_nearer() {
     assert_next_search_passes_nearer(FLYING | OUT_OF_PLAN, 0.0, 0.0);
     assert_next_search_passes_nearer(FLYING | ON_PLAN | WAITING, 1.5, 0.0);
+}
+
+/// A vehicle that stands `Blocked` before a new obstacle beside another with these flags, which
+/// hovers at the place returned; the shell answers requests for detours by `answer`.
+fn blocked_beside(flags: u8, answer: Option<Result<(), PlanFailure>>) -> (Bench, Point) {
+    let mut bench = Bench::started_with_neighbour(two_vehicles());
+    bench.run_until(State::Follow, 20.0);
+    exclude(&mut bench, &sphere(Point::new(14.0, 12.0, 1.5), 0.5));
+    let hovers = Point::new(8.0, 40.0, 9.0);
+    bench.neighbour = Some((hovers, flags, 0.0, 5));
+    bench.answer_detour = answer;
+    bench.run_until(State::Blocked, 5.0);
+    bench.run(0.5);
+    (bench, hovers)
+}
+
+/// Radius that a search for a detour to the goal would keep from the other now, metres.
+fn radius_in_search_for_goal_m(bench: &Bench, hovers: &Point) -> f32 {
+    let mut detours = bench.companion.detours.clone();
+    detours.requested_purpose = Some(DetourPurpose::Goal);
+    let mut radius_m = f32::INFINITY;
+    detours.detour_request(&bench.companion.detour_view(), |zone| {
+        if (zone.from - hovers).norm() < 0.1 {
+            radius_m = radius_m.min(zone.radius_m);
+        }
+    });
+    radius_m
+}
+
+/// Once the other has flown elsewhere, a search keeps the full margin first.
+#[test]
+fn another_vehicle_that_moved_is_passed_by_the_full_margin_first() {
+    let (mut bench, hovers) =
+        blocked_beside(FLYING | ON_PLAN | WAITING, Some(Err(PlanFailure::Unreachable)));
+    let full_m = radius_in_search_for_goal_m(&bench, &hovers);
+    while bench.companion.detours.failed_searches_here == 0 {
+        bench.tick();
+    }
+    bench.run(0.1);
+    let nearer_m = full_m - radius_in_search_for_goal_m(&bench, &hovers);
+    assert!((nearer_m - 0.25).abs() < 0.01, "{nearer_m}");
+    for i in 0..600 {
+        let place = hovers + Point::new(0.1 * i as f32, 0.0, 0.0);
+        bench.neighbour = Some((place, FLYING | ON_PLAN, 0.0, 5));
+        bench.run(0.1);
+    }
+    let there = hovers + Point::new(59.9, 0.0, 0.0);
+    bench.neighbour = Some((there, FLYING | ON_PLAN | WAITING, 0.0, 5));
+    bench.run(2.0);
+    let radius_m = radius_in_search_for_goal_m(&bench, &there);
+    assert!((radius_m - full_m).abs() < 0.01, "{radius_m} m, {full_m} m");
+}
+
+/// Only a search that found no path shows that there is none with the full margin.
+#[test]
+fn a_search_without_an_answer_leaves_the_full_margin() {
+    let (mut bench, hovers) = blocked_beside(FLYING | ON_PLAN | WAITING, None);
+    let full_m = radius_in_search_for_goal_m(&bench, &hovers);
+    bench.run_until(State::Replanning, 20.0);
+    bench.run_until(State::Blocked, 20.0);
+    assert_eq!(bench.companion.detours.failed_searches_here, 1);
+    let radius_m = radius_in_search_for_goal_m(&bench, &hovers);
+    assert!((radius_m - full_m).abs() < 0.01, "{radius_m} m, {full_m} m");
+}
+
+/// A search that fails only until a silent vehicle is down does not count, and what lies is kept
+/// off by the same distance in each search.
+#[test]
+fn only_hovering_vehicles_are_passed_nearer_after_a_search_that_counts() {
+    let now = Instant::from_millis(100_000);
+    let goal = DetourPurpose::Goal;
+    let mut detours = Detours { requested_purpose: Some(goal), ..Detours::default() };
+    for outlook in [RetryOutlook::SilentVehicleComesDown, RetryOutlook::NotSearched] {
+        detours.note_failure(0.0, outlook, now, &mut Timers::default());
+        assert_eq!(detours.keep_out_radii_m(goal, 0.0, 1.5), [2.0, 2.0, 1.75]);
+    }
+    detours.note_failure(0.0, RetryOutlook::OthersMayMove, now, &mut Timers::default());
+    assert_eq!(detours.keep_out_radii_m(goal, 0.0, 1.5), [2.0, 1.75, 1.75]);
 }
 
 /// Asserts that a search for a detour to the goal which follows one that failed here passes

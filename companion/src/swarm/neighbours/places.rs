@@ -246,7 +246,9 @@ impl<const V: usize> Neighbours<V> {
             let high = a.z > low_m || b.z > low_m;
             below |= high && (away - leg * share).norm_squared() < apart_m * apart_m;
         };
-        entry.for_each_unheard_leg(
+        // From its position, not the place on its points beside it: it may have fallen.
+        entry.for_each_unheard_leg_from(
+            entry.state.position,
             entry.max_unheard_distance_m(),
             &mut |[at, next], [leg_m, flown_m]| {
                 near(

@@ -20,29 +20,49 @@ impl NeighbourEntry {
 
     /// Where the points that the neighbour may fly unheard begin: its position, without the
     /// deviation from its points by which a gust carried it aside, since it comes to rest on them.
-    /// In a coverage mission, where it climbs, descends or lands, and with a greater deviation than
-    /// that of a vehicle that flies along its points, the position itself.
+    /// The position itself in a coverage mission, where the neighbour climbs, descends or lands,
+    /// where it may be on several legs, and with a greater deviation than that of a vehicle that
+    /// flies along its points.
     fn start_of_unheard_stretch(&self) -> Point {
         let (here, points) = (self.state.position, &self.points);
-        let PlaceOnPoints::On { leg_end, .. } = self.place_on_points else { return here };
+        let PlaceOnPoints::On { leg_end, uncertainty_dm: 0 } = self.place_on_points else {
+            return here;
+        };
         let from = usize::from(leg_end).saturating_sub(1);
-        let Some([a, b]) = points.get(from..from + 2) else { return here };
-        let (leg, away) = (b - a, here - a);
-        let along = leg * (away.dot(&leg) / leg.norm_squared().max(1e-6));
+        let on_points = match points.get(from..) {
+            Some([a, b, ..]) => {
+                let (leg, away) = (b - a, here - a);
+                a + leg * (away.dot(&leg) / leg.norm_squared().max(1e-6))
+            }
+            // It holds its place.
+            Some([only]) => *only,
+            _ => here,
+        };
         let flies = !self.would_fly_all_points_unheard() && !self.has_column();
-        let deviates = (away - along).norm() <= CRUISE_TRACKING_ERROR_M;
-        if flies && deviates { a + along } else { here }
+        let deviates = (here - on_points).norm() <= CRUISE_TRACKING_ERROR_M;
+        if flies && deviates { on_points } else { here }
     }
 
-    /// Calls `each` with the neighbour's position and each leg along its points that it may have
-    /// flown unheard, `left_m` in all: both ends, and metres of the leg and of its flown part.
-    #[inline(never)]
+    /// As [`Self::for_each_unheard_leg_from`], from where the neighbour comes to rest on its
+    /// points.
     pub(super) fn for_each_unheard_leg(
         &self,
+        left_m: f32,
+        each: &mut dyn FnMut([Point; 2], [f32; 2]),
+    ) {
+        self.for_each_unheard_leg_from(self.start_of_unheard_stretch(), left_m, each);
+    }
+
+    /// Calls `each` with the place `at` and each leg from there along the neighbour's points that
+    /// it may have flown unheard, `left_m` in all: both ends, and metres of the leg and of its
+    /// flown part.
+    #[inline(never)]
+    pub(super) fn for_each_unheard_leg_from(
+        &self,
+        mut at: Point,
         mut left_m: f32,
         each: &mut dyn FnMut([Point; 2], [f32; 2]),
     ) {
-        let mut at = self.start_of_unheard_stretch();
         each([at; 2], [0.0; 2]);
         for next in self.next_points() {
             let leg_m = (next - at).length();

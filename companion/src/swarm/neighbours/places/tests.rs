@@ -241,6 +241,110 @@ fn a_silent_vehicle_that_a_gust_carried_aside_is_kept_off_on_its_points() {
     assert!(aside > 1000 && short > 300, "{aside} {short}");
 }
 
+/// A neighbour with the hull and speeds of a 2 m/s mission, heard at `at` with these points.
+fn heard_at(points: &[Point], at: Point, velocity: Point) -> Neighbours<4> {
+    let mut table = joined(0);
+    let points = points.iter().copied().collect();
+    let reported = Intent { ground_m: 0.0, points, ..intent(0, 1, 2) };
+    table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
+    table.handle_intent(Instant::ZERO, 1, &reported, 1, Some(2));
+    let entry = &mut table.entries[1];
+    (entry.fastest_vehicle_mps, entry.max_unheard_travel_m) = (2.0, max_unheard_travel_m(2.0));
+    (entry.state.position, entry.state.velocity) = (at, velocity);
+    entry.speed_mps = velocity.norm();
+    entry.update_place_on_points();
+    table
+}
+
+fn start_of_unheard_legs(table: &Neighbours<4>) -> Point {
+    let mut start = None;
+    table.entries[1].for_each_unheard_leg(0.0, &mut |[from, _], _| {
+        start.get_or_insert(from);
+    });
+    start.unwrap()
+}
+
+/// Only what flies level along its points, or holds its place, and is little aside of them is
+/// expected on them.
+#[test]
+fn the_unheard_stretch_begins_on_the_points_only_in_level_flight_near_them() {
+    let points = [Point::new(0.0, 0.0, 2.0), Point::new(10.0, 0.0, 2.0)];
+    let (far, near) = (Point::new(1.0, 0.3, 2.0), Point::new(1.0, 0.2, 2.0));
+    let start = |points: &[Point], at| start_of_unheard_legs(&heard_at(points, at, Point::zeros()));
+    assert_eq!(start(&points, far), far);
+    assert!((start(&points, near) - Point::new(1.0, 0.0, 2.0)).norm() < 1e-5);
+    assert_eq!(start(&points[..1], Point::new(0.0, 0.2, 2.0)), points[0]);
+    let aside = Point::new(0.0, 0.3, 2.0);
+    assert_eq!(start(&points[..1], aside), aside);
+    for (points_length_m, may_come_down) in [(10.0, false), (-1.0, true)] {
+        let mut table = heard_at(&points, near, Point::zeros());
+        let entry = &mut table.entries[1];
+        (entry.points_length_m, entry.may_come_down) = (points_length_m, may_come_down);
+        assert_eq!(start_of_unheard_legs(&table), near);
+    }
+}
+
+/// Where its points lead back beside themselves, it may be on either leg: the stretch begins where
+/// it was heard, and reaches as far as from the furthest of these places.
+#[test]
+fn an_unheard_vehicle_at_a_hairpin_is_kept_off_on_both_legs() {
+    let points =
+        [[0.0, 0.0], [1.5, 0.0], [1.5, 0.2], [-10.0, 0.2]].map(|[x, y]| Point::new(x, y, 2.0));
+    let at = Point::new(0.5, 0.2, 2.0);
+    let table = heard_at(&points, at, Point::new(-2.0, 0.0, 0.0));
+    assert_eq!(start_of_unheard_legs(&table), at);
+    let entry = &table.entries[1];
+    let reach = [entry.min_rest_distance_m(), entry.unheard_stopping_distance_m()];
+    // On the way back it stops as far on as a vehicle does at most.
+    let rest = Point::new(at.x - max_unheard_travel_m(2.0), 0.2, 2.0);
+    let mut nearest_m = f32::INFINITY;
+    entry.for_each_rest_place(reach, &mut |place, wider_m| {
+        nearest_m = nearest_m.min((place - rest).norm() - wider_m);
+    });
+    assert!(nearest_m < 0.5 * MIN_UNHEARD_STRETCH_SPACING_M + 0.1, "{nearest_m} m");
+}
+
+/// A vehicle that fell lies below where it was heard, not on its points.
+#[test]
+fn a_landing_keeps_off_where_a_vehicle_may_have_fallen() {
+    let mut rng = Pcg32::seed_from_u64(19);
+    for _ in 0..2000 {
+        let points = [Point::new(0.3, 0.0, 2.0), Point::new(10.0, 0.0, 2.0)];
+        let along = uniform(&mut rng, 0.0, 3.0);
+        let at = Point::new(along, uniform(&mut rng, -0.25, 0.25), 2.0);
+        let table = heard_at(&points, at, Point::zeros());
+        let now = Some(Instant::from_millis(5_000));
+        let aside = uniform(&mut rng, -1.74, 1.74);
+        let place = at + Point::new(0.0, aside, 0.0);
+        assert!(table.may_lie_below(1, &place, 0.0, 1.75, now), "{at} {place}");
+    }
+}
+
+/// However fast a vehicle reports to be, at least one place is kept off.
+#[test]
+fn a_silent_vehicle_leaves_at_least_one_place_at_any_speed() {
+    let mut rng = Pcg32::seed_from_u64(77);
+    for _ in 0..50_000 {
+        let mut near = |m: f32| Point::from_fn(|_, _| uniform(&mut rng, -m, m));
+        let position = near(50.0);
+        let mut at = position;
+        let points: std::vec::Vec<Point> = (0..7)
+            .map(|_| {
+                at += near(1.5);
+                at
+            })
+            .collect();
+        let velocity = (points[0] - position).normalize() * 9.0;
+        let mut table = heard_at(&points, position, velocity);
+        table.entries[1].message_delay.delay_s = 0.0;
+        let entry = &table.entries[1];
+        let reach = [entry.min_rest_distance_m(), entry.unheard_stopping_distance_m()];
+        let mut count = 0;
+        entry.for_each_rest_place(reach, &mut |_, _| count += 1);
+        assert!(count > 0, "{points:?}");
+    }
+}
+
 /// Beside a vehicle that stands, but not on the points that it reports, the safety filter lets no
 /// vehicle pass as near as beside others, so no detour leads there.
 #[test]
