@@ -27,6 +27,9 @@ pub struct FlownMission {
     pub log: String,
     /// What is wrong with the ownership of waypoints ([`Owners::faults`]).
     pub ownership_faults: Vec<String>,
+    /// How long the vehicles took to agree on each division, seconds; `None` where not all that
+    /// took part at first reported it.
+    pub agreements_s: Vec<Option<f32>>,
 }
 
 /// Flies a scenario in which the vehicles `struck` are lost.
@@ -46,8 +49,11 @@ pub fn fly(text: &str, struck: &[u8]) -> Result<FlownMission, String> {
     pictures.retain(|picture| !is_beside_path(&flight.log, picture));
     let planned = CoveragePlan::plan_as_companions(&mission.scenario).map_err(said)?;
     let owned = owners.faults(&planned, &pictures, struck);
+    let agreements: BTreeMap<u8, Option<f32>> =
+        flight.divisions.iter().map(|division| (division.number, division.agreement_s)).collect();
     Ok(FlownMission {
         result: flight.result,
+        agreements_s: agreements.into_values().collect(),
         log: covered::log_lines(&flight.log),
         ownership_faults: owned,
     })

@@ -43,7 +43,7 @@ fn the_last_vehicle_photographs_all_that_is_left() {
             println!("{text}");
         }
         let lost: Vec<u8> = (2..=2 + (seed % 2) as u8).collect();
-        let FlownMission { result, log, ownership_faults: owned } =
+        let FlownMission { result, log, ownership_faults: owned, .. } =
             owners::fly(&text, &lost).ok()?;
         let (safety, coverage) = (result.safety, result.coverage.expect("it has an area"));
         let last = result.vehicles.iter().find(|vehicle| vehicle.id == 1).expect("it has one");

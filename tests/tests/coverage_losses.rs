@@ -34,6 +34,9 @@ struct Outcome {
     owned: Vec<String>,
     /// Number of vehicles that landed before the end of their part, without those that were struck.
     landed_short: usize,
+    /// Share of messages that is lost, and how long the vehicles took to agree on each division,
+    /// seconds.
+    agreements: (f32, Vec<Option<f32>>),
     /// Numbers of wall contacts, approaches below the safety distance, and deadlocks.
     broken: [u64; 3],
     /// Whether each vehicle counted in `landed_short` logged a reason, and what is missing has one
@@ -105,14 +108,19 @@ fn rough(random: &mut Pcg32, vehicles: usize, until_s: u32) -> String {
     (0..6).map(one).collect()
 }
 
+/// Share of messages that is lost in the mission of this seed. Six seeds have all kinds of fault,
+/// half of them with 50 % loss; the next six swap the losses.
+fn message_loss(seed: u64) -> f32 {
+    if (seed + seed / 6).is_multiple_of(2) { 0.5 } else { 0.1 }
+}
+
 /// The scenario, the first kind of fault, the ids of the struck vehicles, and when they are struck,
 /// seconds.
 fn drawn(draw: Draw, seed: u64) -> (String, &'static str, Vec<u8>, f32) {
     let mut random = Pcg32::seed_from_u64(seed);
-    // Six seeds have all kinds of fault, half of them with 50 % loss; the next six swap the losses.
     let kind = draw.kinds[(seed % 6) as usize];
     let count = [3, 5][(seed / 12 % 2) as usize];
-    let loss = if (seed + seed / 6).is_multiple_of(2) { 0.5 } else { 0.1 };
+    let loss = message_loss(seed);
     // For each kind of fault half of the areas are concave, or have holes and no-fly zones.
     let shape = [Shape::Convex, Shape::Any][((seed / 2 + seed / 24) % 2) as usize];
     let mut text = (draw.area)(&mut random, shape, count, loss);
@@ -166,13 +174,14 @@ fn left_unstruck(text: &str) -> u64 {
 
 fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     let (text, kind, struck, at_s) = drawn(draw, seed);
-    let FlownMission { result, log, ownership_faults: owned } = match flown(&text, &struck) {
-        Ok(flown) => flown,
-        Err(error) => {
-            assert!(NO_FLIGHT.iter().any(|why| error.contains(why)), "seed {seed}: {error}");
-            return None;
-        }
-    };
+    let FlownMission { result, log, ownership_faults: owned, agreements_s } =
+        match flown(&text, &struck) {
+            Ok(flown) => flown,
+            Err(error) => {
+                assert!(NO_FLIGHT.iter().any(|why| error.contains(why)), "seed {seed}: {error}");
+                return None;
+            }
+        };
     let MissionResult { vehicles, safety, coverage, .. } = result;
     let coverage = coverage.expect("it has an area");
     // With a wrong estimate a vehicle may land beside its pad after all of its part is flown.
@@ -210,6 +219,7 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
         twice: coverage.repeated_waypoints,
         owned,
         landed_short,
+        agreements: (message_loss(seed), agreements_s),
         broken: [safety.wall_contacts, safety.violations, safety.deadlocks]
             .map(|count| count as u64),
         explained: vehicles
@@ -372,6 +382,29 @@ const EVEN: Draw = Draw {
 /// lands.
 const TWO: Draw = Draw { struck: 2, most_in_three: 2, ..EVEN };
 
+/// Shares of messages that are lost, and the time within which vehicles that hear each other agree
+/// on a division, for 99 of 100 divisions, seconds.
+const AGREED_WITHIN_S: [(f32, f32); 2] = [(0.1, 3.0), (0.5, 5.0)];
+
+/// Prints how long vehicles took to agree on divisions, and asserts it of a hundred missions.
+fn assert_agreed_in_time(all: &[Outcome]) {
+    for (loss, most_s) in AGREED_WITHIN_S {
+        let of = all.iter().filter(|o| o.agreements.0 == loss).flat_map(|o| &o.agreements.1);
+        let mut agreed: Vec<f32> = of.clone().flatten().copied().collect();
+        agreed.sort_by(f32::total_cmp);
+        let percentile = |share: usize| agreed.get(agreed.len().saturating_sub(1) * share / 100);
+        let p99 = percentile(99);
+        println!(
+            "{loss} of messages lost: {} divisions of {} agreed by all, median {:?} s, \
+             99th percentile {p99:?} s",
+            agreed.len(),
+            of.count(),
+            percentile(50)
+        );
+        assert!(agreed.len() < 40 || p99.is_some_and(|p99| *p99 <= most_s), "{loss}: {p99:?} s");
+    }
+}
+
 fn are_whole(draw: Draw) {
     let (from, count) = (
         number_from_env("FLOCKMATE_LOSSES_FROM", 0),
@@ -405,6 +438,9 @@ fn are_whole(draw: Draw) {
         let of: Vec<&Outcome> = all.iter().filter(|o| o.kind == kind).collect();
         let whole = of.iter().filter(|o| o.covered >= 1.0).count();
         println!("{kind}: {whole} of {} whole", of.len());
+    }
+    if draw.radio == Radio::Even {
+        assert_agreed_in_time(&all);
     }
     let [wrong, short] = [all.iter().filter(wrong).count(), all.iter().filter(short).count()];
     println!("{} flown, {short} landed short or not whole, {wrong} without a reason", all.len());

@@ -35,7 +35,14 @@ pub fn flown_layers(
     let mut shown: Vec<ReportDivision> = Vec::new();
     let (mut before, mut gone, mut losses) =
         (WaypointOwners::new(), Vec::new(), Vec::<&[VehicleDivisionInput]>::new());
-    let whole = FlownDivision { t_s: 0.0, vehicle: 0, number: 0, inputs: Vec::new(), plan_crc: 0 };
+    let whole = FlownDivision {
+        t_s: 0.0,
+        vehicle: 0,
+        number: 0,
+        inputs: Vec::new(),
+        plan_crc: 0,
+        agreement_s: None,
+    };
     for division in std::iter::once(&whole).chain(&flight.divisions) {
         // Skipped: a division already shown, which another vehicle begins to fly later, or one
         // whose inputs no vehicle reported, which cannot be planned here.

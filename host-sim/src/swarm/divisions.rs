@@ -2,12 +2,12 @@
 //! messages: the plan that each vehicle flies after a division, and the inputs that the plan is
 //! computed from. The plan can be computed again from these inputs and the mission file.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::rc::Rc;
 
 use companion::link::frame::Framer;
 use companion::link::intent::Intent;
-use companion::link::roster::RosterReport;
+use companion::link::roster::{RosterReport, RosterReportEntry, ShareStatus};
 use companion::swarm::fleet::VehicleDivisionInput;
 use companion::time::Instant;
 use mavlink::MessageData;
@@ -27,6 +27,20 @@ pub struct FlownDivision {
     pub inputs: Vec<VehicleDivisionInput>,
     /// CRC of the plan that the vehicle flies after this division.
     pub plan_crc: u32,
+    /// Time from the first commitment reported for this division until all that take part had
+    /// reported that all have the same one, seconds; `None` if not all reported it.
+    pub agreement_s: Option<f32>,
+}
+
+/// When vehicles agree on a division.
+#[derive(Clone, Debug, Default)]
+struct Agreement {
+    /// When a vehicle first reported a commitment, seconds.
+    asked_s: Option<f32>,
+    /// Ids of the vehicles that reported that all have the same division.
+    agreeing: BTreeSet<u8>,
+    /// When the last of them did, seconds.
+    agreed_s: Option<f32>,
 }
 
 /// What one vehicle last reported.
@@ -46,6 +60,8 @@ pub struct DivisionLog {
     vehicles: HashMap<u8, VehicleReport>,
     /// Inputs of each division, by the hash that the vehicles reported for it.
     inputs_by_hash: HashMap<u32, Vec<VehicleDivisionInput>>,
+    /// The agreement on each division, by its number.
+    agreements: HashMap<u8, Agreement>,
     flown: Vec<FlownDivision>,
 }
 
@@ -73,6 +89,7 @@ impl DivisionLog {
         if reported.number == reported.flown_number {
             reported.flown_crc = reported.plan_crc;
         }
+        self.note_agreement(t_s, roster);
         self.log_division_once_flown(t_s, roster.system_id);
         if roster.pending_hash == 0 {
             return;
@@ -85,6 +102,23 @@ impl DivisionLog {
             inputs.resize(inputs.len().max(rank + 1), VehicleDivisionInput::default());
             if before.get(rank).is_none_or(|input| input.alive) {
                 inputs[rank] = VehicleDivisionInput::from_entry(entry);
+            }
+        }
+    }
+
+    /// Notes how far the vehicles are with the division under way. A report that holds only some of
+    /// the vehicles does not show whether all agree.
+    fn note_agreement(&mut self, t_s: f32, roster: &RosterReport) {
+        let own = |entry: &&RosterReportEntry| entry.status == ShareStatus::Alive;
+        let alive = roster.entries.iter().filter(own);
+        let agreement = self.agreements.entry(roster.division_count + 1).or_default();
+        if agreement.asked_s.is_none() && alive.clone().any(|e| e.commitment_dm.is_some()) {
+            agreement.asked_s = Some(t_s);
+        }
+        if roster.pending_hash != 0 && alive.clone().all(|entry| entry.agrees) {
+            agreement.agreeing.insert(roster.system_id);
+            if agreement.agreed_s.is_none() && agreement.agreeing.len() >= alive.count() {
+                agreement.agreed_s = Some(t_s);
             }
         }
     }
@@ -102,7 +136,10 @@ impl DivisionLog {
             (reported.flown_number, reported.flown_crc) = (reported.number, reported.plan_crc);
             let VehicleReport { number, committed_hash, plan_crc, .. } = *reported;
             let inputs = self.inputs_by_hash.get(&committed_hash).cloned().unwrap_or_default();
-            self.flown.push(FlownDivision { t_s, vehicle, number, inputs, plan_crc });
+            let agreement = self.agreements.get(&number);
+            let agreement_s = agreement.and_then(|a| Some(a.agreed_s? - a.asked_s?));
+            let division = FlownDivision { t_s, vehicle, number, inputs, plan_crc, agreement_s };
+            self.flown.push(division);
         }
     }
 
