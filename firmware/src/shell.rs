@@ -427,14 +427,14 @@ impl Default for Shell {
 }
 
 /// Number of setpoints in a flight and the longest gap between two, by the board's clock. The
-/// stream ends when [`BoardCompanion::streams_setpoints`] says so, not at a pause: else the longest
-/// gaps would not be counted.
+/// stream ends when [`BoardCompanion::streams_setpoints`] turns false, not at a pause: else the
+/// longest gaps would not be counted.
 struct SetpointGaps {
     count: AtomicU32,
-    /// Longest gap, milliseconds: between two setpoints, from the stream's begin to the first one,
+    /// Longest gap, milliseconds: between two setpoints, from the stream's start to the first one,
     /// or from the last one to the stream's end.
     longest_gap_ms: AtomicU32,
-    /// Time of the last setpoint or the stream's begin, milliseconds; 0 while no stream runs.
+    /// Time of the last setpoint or the stream's start, milliseconds; 0 while no stream runs.
     last_ms: AtomicU32,
 }
 
@@ -459,7 +459,7 @@ impl SetpointGaps {
             self.last_ms.compare_exchange(0, now_ms.max(1), Ordering::Relaxed, Ordering::Relaxed);
     }
 
-    /// Time since the last setpoint or the stream's begin, ms; `None` while no stream runs.
+    /// Time since the last setpoint or the stream's start, ms; `None` while no stream runs.
     fn since_last_ms(&self, now_ms: u32) -> Option<u32> {
         elapsed_ms(self.last_ms.load(Ordering::Relaxed), now_ms)
     }

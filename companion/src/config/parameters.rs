@@ -68,7 +68,7 @@ const SYS_ID: usize = 9;
 /// Reason why a parameter value was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterError {
-    /// No parameter has this name or index.
+    /// No parameter has this index.
     Unknown,
     /// The value is NaN, infinite, out of range, or a fraction where a whole number is required.
     Range,

@@ -78,8 +78,8 @@ const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 /// Time for which the column above the pad may be occupied after the gates have opened, before
 /// arming; then the start goes back to waiting. Meanwhile arming is not requested.
 const MAX_PAD_COLUMN_BLOCKED: Duration = Duration::from_millis(200);
-/// Time for which a vehicle may not reach its setpoint while the setpoint does not move on; then
-/// something holds the vehicle or carries it away, and it lands.
+/// Longest time for which the setpoint stands and the vehicle does not come to it; then something
+/// holds the vehicle or carries it away, and it lands.
 pub(crate) const MAX_UNFOLLOWED: Duration = secs(20);
 /// Time for which the start of a vehicle in a coverage mission may be barred; then it leaves its
 /// share to those that fly. A lost vehicle that may come down above its pad is down sooner.

@@ -295,7 +295,8 @@ fn start_inputs_crc(request: &Request<'_, '_>) -> u32 {
     digest.finalize()
 }
 
-/// CRC of the inputs of a division, and of all plans before it, whose inputs have the CRC `before`.
+/// CRC that identifies, in this board's memory, the plan after a division: of the division's inputs
+/// and of `before`, the CRC of all inputs before it.
 fn division_inputs_crc(before: u32, inputs: &[VehicleDivisionInput]) -> u32 {
     let mut digest = CRC32.digest();
     digest.update(&before.to_le_bytes());

@@ -80,7 +80,8 @@ const STOP_COUNTS_FOR_WHILE_BLOCKED: Duration = Duration::from_secs(3);
 /// Time after which a vehicle on its pad that hears no other one, or that no other one hears,
 /// reports that it waits.
 const WAITS_UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
-/// Sway, metres: a stopped vehicle this near to the end of a path aside counts as at the end.
+/// Distance from the end of a path aside within which a vehicle that has stopped, and sways, is at
+/// that end, metres.
 const ASIDE_END_TOLERANCE_M: f32 = 0.5;
 
 /// What blocks the path ahead, and the detour that is requested or flown.

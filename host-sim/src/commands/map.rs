@@ -73,8 +73,7 @@ pub struct MapInfo {
 }
 
 impl MapInfo {
-    /// Summary of an octree. `shift_m` is the offset from the position that its keys give to its
-    /// true position, metres ENU.
+    /// Summary of an octree whose true position is that of its keys plus `shift_m`, metres ENU.
     pub fn from_octree(kind: &'static str, tree: &Octree, shift_m: [f64; 3]) -> Self {
         let counts = tree.counts();
         let (lo, hi) = tree.key_bounds().unwrap_or_default();

@@ -13,7 +13,7 @@ use planner_core::map::voxel::Outside;
 
 use super::VoxelMap;
 
-/// Greatest distance at which [`nearest_clear_column`] searches, metres.
+/// Greatest offset, east and north each, that [`nearest_clear_column`] tries, metres.
 const NEAREST_COLUMN_WITHIN_M: f32 = 5.0;
 /// Most cells that [`nearest_clear_column`] reads in all, which takes a second or two.
 const MAX_NEAREST_COLUMN_CELLS: f32 = 3e8;

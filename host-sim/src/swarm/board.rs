@@ -71,7 +71,7 @@ impl RemoteCompanion {
     /// Starts a board in QEMU whose flash holds this roadmap file and this mission file.
     ///
     /// # Errors
-    /// QEMU or the program does not start; the board does not hold the files.
+    /// QEMU or the program does not start; the board's store would refuse a file.
     pub fn emulate(
         program: &Path,
         log: &Path,

@@ -208,7 +208,7 @@ fn write_header(
 
 /// Fills the compressed sparse rows, each sorted by target, with clearances limited to the header's
 /// greatest; an error if an edge occurs twice. `offsets` first counts the degrees, then holds each
-/// row's write position, then is shifted by one entry to hold each row's begin.
+/// row's write position, then is shifted by one entry to hold each row's start.
 fn write_rows(
     header: &RoadmapHeader,
     edges: &[Edge],

@@ -131,7 +131,8 @@ const BRAKING_OVERSHOOT_ABOVE_MPS: f32 = 3.0;
 /// Time from the decision to depart until the climb begins, seconds: PX4 and ArduCopter arm and
 /// spin up the motors meanwhile.
 const DEPARTURE_S: f32 = 3.0;
-/// Hover at a gate that a wait on the pad is to avoid, seconds; shorter ones are flown.
+/// Shortest hover at a gate for a late neighbour, in addition to scheduled waits, that a wait on
+/// the pad replaces, seconds.
 const MIN_AVOIDED_HOVER_S: f32 = 5.0;
 /// While all neighbours were heard within this time, a late one is waited for on the pad, seconds.
 const HEARD_LATELY_S: f32 = 2.0;

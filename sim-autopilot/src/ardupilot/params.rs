@@ -121,7 +121,7 @@ impl CopterTuning {
             acceleration: NO_DEMAND,
             heading: f32::NAN,
             heading_rate: f32::NAN,
-            // The reference keeps these limits; the controller may exceed them to correct errors.
+            // 1.5 times the limits that the reference keeps: room to correct errors.
             speed_max: 1.5 * self.speed_max,
             climb_max: 1.5 * self.climb_max,
             descend_max: 1.5 * self.descend_max.max(self.low_stick_descent_rate),

@@ -7,8 +7,7 @@ use crate::physics::shaping::JerkLimitedRate;
 
 /// Horizontal acceleration of the automatic modes, m/s² (`MPC_ACC_HOR`).
 const AUTO_ACCEL_MPS2: f32 = 3.0;
-/// Time at full speed whose distance is added to the braking distance, seconds (0.6 of
-/// `MPC_JERK_AUTO`, divided by `MPC_JERK_AUTO`).
+/// Time of flight at the speed before braking that PX4 adds to the braking distance, seconds.
 const BRAKING_DELAY_S: f32 = 0.6;
 /// Longest time step that is simulated, seconds, if the mode was not updated for longer.
 const MAX_STEP_S: f32 = 0.1;

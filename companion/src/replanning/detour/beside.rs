@@ -24,22 +24,22 @@ use crate::timers::{Timer, Timers};
 /// of the path blocks it.
 pub(super) const BLOCKED_BEYOND_SAFETY_DISTANCE_M: f32 = 0.25;
 /// Distance beyond where the vehicle can stop within which a keep-out zone blocks its path, metres.
-/// The vehicle photographs the path up to its stop, and the detour cuts off no more than this of
-/// the rest. It is the distance flown at 15 m/s while the zones of 32 vehicles are compared with
-/// the path.
+/// The vehicle photographs the path up to its stop; the detour leaves out up to this much of the
+/// path before the zone, and what the zone covers. It is the distance flown at 15 m/s while the
+/// zones of 32 vehicles are compared with the path.
 const BLOCKED_BEYOND_STOP_M: f32 = 8.0;
 /// Added to [`BLOCKED_BEYOND_STOP_M`] once the path is blocked, metres: the vehicle may have
 /// stopped a little sooner than expected.
 const BEYOND_STOP_HYSTERESIS_M: f32 = 4.0;
-/// Distance from the path within which a zone blocks it, beyond the safety distance, and distance
-/// beyond where the vehicle can stop up to which that counts, metres.
+/// What counts as a block of the path, metres: a zone this near to it, in addition to the safety
+/// distance, and no further along it from where the vehicle can stop.
 pub(super) const BLOCKED_BESIDE_AND_BEYOND_STOP_M: [f32; 2] =
     [BLOCKED_BEYOND_SAFETY_DISTANCE_M, BLOCKED_BEYOND_STOP_M];
 /// As [`BLOCKED_BESIDE_AND_BEYOND_STOP_M`], of a path that is blocked already, metres.
 pub(super) const STAYS_BLOCKED_BESIDE_AND_BEYOND_STOP_M: [f32; 2] =
     [DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + BEYOND_STOP_HYSTERESIS_M];
-/// Distance from the vehicle within which zones count, and along the path within which a block is
-/// searched, for the place where a detour returns to the path, metres.
+/// Reach of the search for the place where a detour returns to the path, metres: from the vehicle
+/// to zones that count, and along the path.
 const LOOK_AHEAD_M: f32 = 60.0;
 /// Margin beyond the safety distance on a detour, metres: a zone that deviates a little does not
 /// block the detour again.
@@ -68,8 +68,8 @@ pub(crate) struct AreaDetourSearches {
 }
 
 impl AreaDetourSearches {
-    /// Notes that a detour has come.
-    pub(super) fn note_found(&mut self) {
+    /// Counts a detour that the planner has found.
+    pub(super) fn count_found(&mut self) {
         self.found = self.found.saturating_add(1);
     }
 

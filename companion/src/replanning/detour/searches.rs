@@ -245,7 +245,7 @@ impl Detours {
         self.obstacles.mark_requested_avoided();
         let Self { mut home, area_searches: mut field_searches, .. } = *self;
         home.end();
-        field_searches.note_found();
+        field_searches.count_found();
         *self = Self {
             obstacles: core::mem::take(&mut self.obstacles),
             left_plan: self.left_plan || !purpose.returns_to_plan(),

@@ -56,7 +56,7 @@ const HOP_DELAY_S: u8 = 1;
 const AGE_TICK_US: u64 = 100_000;
 
 /// Relayed report of the vehicle of one rank: its progress, the report's age in 0.1 s, and how far
-/// the vehicle flies on unheard.
+/// and how late the vehicle flies on though no other vehicle hears it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct RelayedProgress {
     rank: u8,

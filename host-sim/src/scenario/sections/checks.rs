@@ -16,8 +16,8 @@ pub(super) struct VehicleSpans {
     pub(super) table: TomlSpan,
 }
 
-/// With `estimator = "recorded"`, refuses a separation, and a safety margin if there is a roadmap,
-/// that leave no room for the estimates' errors.
+/// With `estimator = "recorded"`, refuses a separation that is too small for the estimates' errors;
+/// if there is a roadmap, also such a safety margin.
 pub(super) fn check_margins(
     text: TomlText<'_>,
     span: &TomlSpan,

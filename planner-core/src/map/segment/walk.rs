@@ -99,8 +99,8 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     #[inline(always)]
     fn new(grid: &VoxelGrid<'g>, a: &Snapped, b: &Snapped, known: f32) -> Self {
         let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        // Skips a thousandth and one cell less than the part that is known to be free, against the
-        // rounding of `known` and of this product.
+        // Skips the part known to be free, less a thousandth of it and one cell, so that the
+        // rounding of `known` and of this product does no harm.
         let skip = ((d[U].unsigned_abs() as f32 * known * 0.999) as i32 - ONE_CELL).max(0);
         // Ends are swapped where needed, so that the walk always goes up along U.
         let ((a, b), (start, end)) = if d[U] < 0 {
