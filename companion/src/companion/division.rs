@@ -252,7 +252,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // The vehicle that it stops for may stay there: it promises no place beyond that stop.
         let clear_m = gates_m.min(along_m + self.guidance.advice.stop_within_m.max(0.0));
         let most_m = ahead_m.min(clear_m).min(self.last_descent_start_m()).max(along_m);
-        let stop_m = (self.guidance.stopping_point_m() + EXTRA_STOPPING_MARGIN_M).min(most_m);
+        let stops_m = self.guidance.stopping_point_m(&plan.path) + EXTRA_STOPPING_MARGIN_M;
+        let stop_m = stops_m.min(most_m);
         let picture_m =
             photographs.last_picture_before_m(&plan.path, most_m).filter(|at_m| *at_m >= stop_m);
         to_decimetres(picture_m.unwrap_or(stop_m)).map(|promise_dm| promise_dm.max(1))

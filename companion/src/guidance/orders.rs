@@ -13,7 +13,7 @@ use crate::config::limits::Urgency;
 use crate::time::Instant;
 use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::track::ReferenceState;
+use planner_core::track::{self, ReferenceState};
 
 impl Guidance {
     /// Holds from now on: where the setpoint comes to a stop; at `point` where there is no
@@ -152,10 +152,12 @@ impl Guidance {
         self.stopped_at_fence && self.is_setpoint_still_outside_descent()
     }
 
-    /// Nearest place along the path at which the vehicle could stop now, metres.
-    pub(crate) fn stopping_point_m(&self) -> f32 {
-        let braking_m = self.smoother.stop_distance_m(Urgency::Smooth);
-        self.tracker.along_m.max(self.setpoint_along_m + braking_m)
+    /// Nearest place along `path`, its own, at which the vehicle could stop now, metres: the
+    /// reference has to brake, and the setpoint behind it.
+    pub(crate) fn stopping_point_m<const W: usize>(&self, path: &Path<W>) -> f32 {
+        let braking_m = track::braking_distance_m(&self.track, path, &self.tracker);
+        let setpoint_braking_m = self.smoother.stop_distance_m(Urgency::Smooth);
+        (self.tracker.along_m + braking_m).max(self.setpoint_along_m + setpoint_braking_m)
     }
 
     /// Begins a landing that setpoints lead straight down from where the setpoint stands, to the

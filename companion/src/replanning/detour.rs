@@ -441,7 +441,7 @@ impl Detours {
             // counts: it goes on taking pictures until it is near the obstacle.
             |obstacle| {
                 let until_m = match view.config.lost_vehicle_down_after_s {
-                    Some(_) => view.guidance.stopping_point_m().max(0.0) + beyond_m,
+                    Some(_) => view.guidance.stopping_point_m(&plan.path).max(0.0) + beyond_m,
                     None => f32::INFINITY,
                 };
                 let (climb_m, descent_m) = (plan.climb_m, plan.descent_m);

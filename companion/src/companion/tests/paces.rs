@@ -82,6 +82,53 @@ proptest::proptest! {
     }
 }
 
+proptest::proptest! {
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 200 } else { 2000 }))]
+    /// The others divide the area by the place where a vehicle promised to hold, and its next path
+    /// begins there: it must not fly past it.
+    #[test]
+    fn a_vehicle_stops_where_it_can_promise_to_hold_at_any_speed(
+        cruise_mps in 1f32..15.0,
+        (long_m, apart_m) in (20f32..200.0, 3f32..40.0),
+        (flown, paused, flown_on) in (1u32..400, 0u32..60, 1u32..200),
+    ) {
+        let mut config = config();
+        config.cruise_mps = cruise_mps;
+        let mut bench = Bench::new(config);
+        bench.answer_plan = Some(Ok(lanes(long_m, apart_m)));
+        bench.step_m = cruise_mps * 0.06;
+        bench.run_until(State::Ready, 6.0);
+        bench.start();
+        bench.run_until(State::Follow, 20.0);
+        let order = |bench: &mut Bench, go: f32| {
+            bench.command(
+                MavCmd::MAV_CMD_DO_PAUSE_CONTINUE,
+                go,
+                SYSTEM,
+                crate::COMPANION_COMPONENT,
+            );
+        };
+        (0..flown).for_each(|_| bench.tick());
+        if paused > 0 {
+            order(&mut bench, 0.0);
+            (0..paused).for_each(|_| bench.tick());
+            order(&mut bench, 1.0);
+            (0..flown_on).for_each(|_| bench.tick());
+        }
+        proptest::prop_assume!(bench.state() == State::Follow);
+        let path = bench.companion.mission.plan().map(|plan| plan.path.clone()).unwrap();
+        let holds_m = bench.companion.guidance.stopping_point_m(&path);
+        proptest::prop_assume!(holds_m < path.length_m() - 1.0);
+        bench.companion.guidance.set_division_hold_m(holds_m);
+        (0..600).for_each(|_| bench.tick());
+        let stands_m = bench.companion.guidance.reference_along_m();
+        proptest::prop_assert!(
+            stands_m < holds_m + 0.2,
+            "{} m past it at {cruise_mps} m/s", stands_m - holds_m
+        );
+    }
+}
+
 /// The reported progress opens gates of other vehicles, and counts pictures as taken: it must not
 /// be early.
 #[test]
