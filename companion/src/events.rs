@@ -32,6 +32,7 @@ impl PlanKind {
     /// one that descends. The mission's plan comes last: a vehicle without one is on its pad.
     const BY_URGENCY: [Self; 3] = [Self::Detour, Self::Division, Self::Mission];
 
+    /// The bit of this kind in `PlanRequests::waiting_kinds`.
     const fn bit(self) -> u8 {
         1 << self as u8
     }

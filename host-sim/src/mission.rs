@@ -38,7 +38,7 @@ fn descents_m(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::R
         .iter()
         .enumerate()
         .map(|(i, goal)| {
-            // Slots around a single goal are reported under that goal's line of the scenario.
+            // An error at a slot around a single goal names that goal's line of the scenario.
             let places = &scenario.mission.goal_file_lines;
             let place = places.get(i).or(places.first());
             places::climb_height_m(scenario, map, &format!("goal {i}"), place, goal, largest_m)

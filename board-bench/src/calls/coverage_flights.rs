@@ -9,7 +9,7 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use planner_core::coverage::losses::{self, Loss, VehicleStatus};
+use planner_core::coverage::losses::{self, DivisionProblem, VehicleStatus};
 use planner_core::coverage::pack::{self, CoverageProblem, Heights, TrackUnit, Vehicle};
 use planner_core::coverage::tracks::{self, LanePattern};
 use planner_core::coverage::transit::TransitGraph;
@@ -208,10 +208,11 @@ fn measure_division(
         photographed_to_m: 0.5 * out.flights[k].path.length_m(),
     };
     let statuses: Vec<VehicleStatus, VEHICLES> = (0..case.vehicle_count).map(fate).collect();
-    let loss = Loss { problem: &work, flight_inputs: &flight_inputs, statuses: &statuses };
+    let division =
+        DivisionProblem { problem: &work, flight_inputs: &flight_inputs, statuses: &statuses };
     meter
         .call(again_name, bytes, || {
-            losses::redivide_work(&loss, losses, pack, schedule, routes, out)
+            losses::redivide_work(&division, losses, pack, schedule, routes, out)
         })
         .expect("a division");
     add_to_checksum(sum, out);

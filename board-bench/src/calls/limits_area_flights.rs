@@ -3,7 +3,7 @@
 
 use planner_core::Point;
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
-use planner_core::coverage::losses::{self, Loss, VehicleStatus};
+use planner_core::coverage::losses::{self, DivisionProblem, VehicleStatus};
 use planner_core::coverage::pack::{
     CoverageProblem, PackWorkspace, Route, RouteDirection, RoutePlan, TrackUnit, Vehicle,
 };
@@ -323,19 +323,20 @@ fn call_divisions(
                 flights::plan_flights(good, routes, &FLIGHT_INPUTS, memory.schedule, memory.out)
                     .expect("as before");
                 let mut routes = routes.clone();
-                let loss = Loss { problem: good, flight_inputs: &FLIGHT_INPUTS, statuses };
-                let divided = call_redivide(to, &loss, memory, &mut routes);
+                let division =
+                    DivisionProblem { problem: good, flight_inputs: &FLIGHT_INPUTS, statuses };
+                let divided = call_redivide(to, &division, memory, &mut routes);
                 assert!(
                     statuses.len() == VEHICLES || divided == Err(CoverageError::Vehicles.into())
                 );
                 let setting = Err(CoverageError::SettingOutOfRange("along_m").into());
                 assert!(statuses.len() != VEHICLES || hard >= 0.0 || divided == setting);
                 to.add_count(routes.routes.len());
-                // The same loss again: waypoints that are already done must not be divided again.
-                let _ = call_redivide(to, &loss, memory, &mut routes);
+                // The same division again: what is already done must not be divided again.
+                let _ = call_redivide(to, &division, memory, &mut routes);
                 if let Some(route) = routes.routes.first_mut() {
                     route.vehicle_index = u8::MAX;
-                    let unknown = call_redivide(to, &loss, memory, &mut routes);
+                    let unknown = call_redivide(to, &division, memory, &mut routes);
                     assert_eq!(unknown, Err(CoverageError::Vehicles.into()));
                 }
             }
@@ -345,15 +346,15 @@ fn call_divisions(
 
 fn call_redivide(
     to: &mut Results<'_, impl CallListener>,
-    loss: &Loss<'_, LANES, CORNERS>,
+    division: &DivisionProblem<'_, LANES, CORNERS>,
     memory: &mut BorrowedWorkspaces<'_>,
     routes: &mut RoutePlan<VEHICLES>,
 ) -> Result<(), losses::LossesError> {
     let BorrowedWorkspaces { losses, pack, schedule, out } = memory;
     let divided = to.call("losses::redivide_work", || {
-        losses::redivide_work(loss, losses, pack, schedule, routes, out)
+        losses::redivide_work(division, losses, pack, schedule, routes, out)
     });
-    assert!(divided.is_err() || has_finite_waypoints(out), "{:?}", loss.statuses);
+    assert!(divided.is_err() || has_finite_waypoints(out), "{:?}", division.statuses);
     to.add_count(usize::from(divided.is_ok()));
     divided
 }

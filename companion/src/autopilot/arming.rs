@@ -60,7 +60,8 @@ pub(crate) struct ArmingHandshake {
 impl ArmingHandshake {
     /// To be called at each change of the mission state. Clears the refusals reported in `from`.
     /// Entering `Arming` clears everything but the height with which the vehicle was last disarmed.
-    /// Then, and after `PilotReturned`, the autopilot counts as in the companion's own mode.
+    /// On entering `Arming`, and on leaving `PilotReturned`, the autopilot counts as in the
+    /// companion's own mode.
     /// Entering `CancelStart` notes whether the climb had begun.
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
         self.reported_refusals = [None; MAX_REPORTED_REFUSALS];

@@ -23,8 +23,8 @@ const MAX_LANDING_DRIFT_FROM_REST_M: f32 = 0.3;
 /// Time since the last renewal of its lease after which a vehicle in a coverage mission counts as
 /// unheard: 1 s before the lease ends. The row `NeighboursSilent` stops the vehicle 1 s later.
 const UNHEARD_AFTER: Duration = Duration::from_secs(LEASE_S - 1);
-/// Height above the pad below which a climb is not interrupted by a pause, metres: lower, an
-/// autopilot may take a hovering vehicle for landed, and disarm it.
+/// Height above the pad below which a climb is not interrupted by a pause, metres, but at most half
+/// of the climb: lower, an autopilot may take a hovering vehicle for landed, and disarm it.
 const MIN_PAUSE_HEIGHT_M: f32 = 1.0;
 /// Time without being heard after which a vehicle that has no part of the area no longer waits for
 /// one.

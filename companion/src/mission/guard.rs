@@ -154,8 +154,8 @@ pub enum Guard {
     ReturnInClimb,
     /// NAV_RETURN_TO_LAUNCH in a coverage mission, where a path home over the field can be planned.
     ReturnOverField,
-    /// In a coverage mission: the path has been blocked for the limit, and a path home can be
-    /// planned.
+    /// In a coverage mission: the path is blocked, was first found blocked here the limit ago or
+    /// earlier, and a path home may be requested.
     BlockedOverField,
     /// In a coverage mission: the path has been blocked for the limit, and the vehicle may fly
     /// around the obstacle and back to its path.

@@ -164,7 +164,7 @@ pub struct GuardInputs {
     pub path_done: bool,
     /// Whether the vehicle flies back to its start, along its path or straight home.
     pub returns_to_start: bool,
-    /// Whether the vehicle is at the goal of its plan.
+    /// Whether the reference is at the goal of the plan, and the vehicle does not fly home.
     pub reference_at_goal: bool,
     /// Whether the vehicle is near enough to its path to fly back to it, in the states that wait
     /// for that.

@@ -6,7 +6,7 @@ use core::fmt;
 use heapless::Vec;
 use planner_core::coverage::area::{Area, AreaError, Ring};
 use planner_core::coverage::flights::{self, CaptureSettings, FlightInputs, Pad};
-use planner_core::coverage::losses::{self, Loss, VehicleStatus};
+use planner_core::coverage::losses::{self, DivisionProblem, VehicleStatus};
 use planner_core::coverage::pack::{self, CoverageProblem, PackWorkspace, RoutePlan, Vehicle};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::TransitGraph;
@@ -410,8 +410,16 @@ pub fn plan_flights<
             let fate = VehicleStatus { continues: input.alive, photographed_to_m: input.along_m() };
             statuses.push(fate).map_err(|_| CoverageError::Vehicles)?;
         }
-        let loss = Loss { problem: &whole, flight_inputs: &flight_inputs, statuses: &statuses };
-        losses::redivide_work(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
+        let division =
+            DivisionProblem { problem: &whole, flight_inputs: &flight_inputs, statuses: &statuses };
+        losses::redivide_work(
+            &division,
+            &mut ws.losses,
+            &mut ws.pack,
+            schedule,
+            &mut ws.routes,
+            out,
+        )?;
     }
     ws.planned = PlanFingerprint { plan_crc: out.crc, ..wanted };
     Ok(())

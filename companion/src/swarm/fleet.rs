@@ -31,8 +31,8 @@ pub use timeouts::{FleetTimeouts, LEASE, LEASE_HEARD_WITHIN, SILENT_AFTER};
 /// picture that it takes in that time. A vehicle whose path ends before its route requests a
 /// division this long before that end.
 pub const COMMITMENT_S: f32 = 10.0;
-/// Maximum number of divisions of a mission; after the last one the waypoints that a vehicle leaves
-/// stay unphotographed.
+/// Maximum number of divisions of a mission after its first plan; after the last one the waypoints
+/// that a vehicle leaves stay unphotographed.
 pub const MAX_DIVISIONS: usize = 12;
 /// Silence after which a vehicle may be lost, and get no part in a division: the others wait above
 /// their pads until that is decided.

@@ -143,7 +143,7 @@ pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// A map as the octree of its file, or resampled onto a planning grid.
+/// A map as the octree of its file, or as a planning grid: resampled from a file, or built in.
 enum Map {
     Tree(Octree),
     Grid(OccupancyMap),

@@ -119,8 +119,8 @@ pub fn planned_pictures(planned: &CoveragePlan<'_>, flights: &[TimedFlight<'_>])
     flights.iter().flat_map(taken).collect()
 }
 
-/// Checks pictures that were taken in a flight, by the true position of the camera. [`taken`]
-/// counts waypoints without a picture and those flown twice.
+/// Checks pictures that were taken in a flight, by the true position of the camera. The findings
+/// have the numbers of waypoints without a picture and of those flown twice too ([`taken`]).
 pub fn check_pictures(planned: &CoveragePlan<'_>, pictures: Vec<Picture>) -> CoverageFindings {
     let (left, twice) = taken::count_missed_and_repeated(planned, &pictures);
     let mut findings = CoverageFindings {

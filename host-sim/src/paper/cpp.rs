@@ -182,7 +182,8 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     Ok(if tables.all_checks_passed { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// The paper's Figs. 8 to 10, 12 and 13, drawn with our plans and costs.
+/// The paper's Figs. 8 to 10, 12 and 13, drawn with our plans and costs; Figs. 12 and 13 with the
+/// paper's values beside them.
 fn paper_figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
     let convex = paper_scenario(TABLE_2_AREA, &starts_in_a_row(3), 10.0, 35.0)?;
     let compared = [

@@ -31,7 +31,7 @@ impl HeightGrid {
     /// A grid over the box from `low` to `high`, without any height.
     ///
     /// # Errors
-    /// The grid would have more than [`MAX_CELLS`] cells, or the box has no valid size.
+    /// The grid would have more than [`MAX_CELLS`] cells, or box or cells have no valid size.
     pub fn new([low, high]: [Flat; 2], cell_m: f32) -> Result<Self, TerrainError> {
         let sides = high - low;
         let sound = cell_m > 0.0 && cell_m.is_finite() && sides.x >= 0.0 && sides.y >= 0.0;

@@ -305,8 +305,9 @@ fn route_waypoints_on_lane(lane: &Lane, route: &Route) -> (u32, u32) {
     )
 }
 
-/// Heading of a vehicle on this route. A lane of one waypoint has no direction: on a route with
-/// such a lane the heading is fixed to the direction of the lanes, instead of following the path.
+/// Heading of a vehicle on this route, as set in the inputs. But if it is to follow the path, and
+/// the route has only one waypoint of a lane, which gives no direction there, the heading is fixed
+/// to the direction of the lanes.
 fn heading_mode<const L: usize, const N: usize>(
     problem: &CoverageProblem<'_, L, N>,
     route: &Route,

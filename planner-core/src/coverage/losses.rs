@@ -101,12 +101,14 @@ impl<const L: usize, const K: usize> Default for LossesWorkspace<L, K> {
     }
 }
 
-/// A loss: the plan before the loss, and the status of all vehicles.
+/// What a division of the waypoints that are left is computed from, after a loss or at the end of a
+/// path that holds only part of its route: the plan before any division, and the status of all
+/// vehicles.
 #[derive(Clone, Copy)]
-pub struct Loss<'a, const L: usize, const N: usize> {
-    /// The lanes of the whole area and all vehicles, as before any loss.
+pub struct DivisionProblem<'a, const L: usize, const N: usize> {
+    /// The lanes of the whole area and all vehicles, as before any division.
     pub problem: &'a CoverageProblem<'a, L, N>,
-    /// Pads and settings with which the flights before the loss were planned.
+    /// Pads and settings with which the flights before any division were planned.
     pub flight_inputs: &'a FlightInputs<'a>,
     /// Status of each vehicle, in the order of [`CoverageProblem::vehicles`].
     pub statuses: &'a [VehicleStatus],
@@ -149,14 +151,14 @@ pub fn redivide_work<
     const V: usize,
     const W: usize,
 >(
-    loss: &Loss<'_, L, N>,
+    division: &DivisionProblem<'_, L, N>,
     ws: &mut LossesWorkspace<L, K>,
     pack: &mut PackWorkspace<K>,
     schedule: &mut ScheduleWorkspace,
     routes: &mut RoutePlan<K>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), LossesError> {
-    let Loss { problem, flight_inputs, statuses } = *loss;
+    let DivisionProblem { problem, flight_inputs, statuses } = *division;
     let known = |route: &Route| usize::from(route.vehicle_index) < statuses.len();
     if statuses.len() != problem.vehicles.len()
         || flight_inputs.pads.len() != statuses.len()
@@ -169,7 +171,7 @@ pub fn redivide_work<
         return Err(CoverageError::SettingOutOfRange("along_m").into());
     }
     add_done_waypoints(statuses, ws, out)?;
-    set_start_places(loss, ws, out)?;
+    set_start_places(division, ws, out)?;
     for route in
         routes.routes.iter().filter(|route| !statuses[usize::from(route.vehicle_index)].continues)
     {
@@ -261,11 +263,11 @@ fn set_start_places<
     const V: usize,
     const W: usize,
 >(
-    loss: &Loss<'_, L, N>,
+    division: &DivisionProblem<'_, L, N>,
     ws: &mut LossesWorkspace<L, K>,
     before: &SwarmPlan<V, W>,
 ) -> Result<(), CoverageError> {
-    let Loss { problem, flight_inputs, statuses } = *loss;
+    let DivisionProblem { problem, flight_inputs, statuses } = *division;
     ws.vehicles.clear();
     ws.pads.clear();
     for (index, (vehicle, pad)) in problem.vehicles.iter().zip(flight_inputs.pads).enumerate() {

@@ -77,7 +77,8 @@ enum InitialOrder {
 }
 
 /// Schedules in this order. In the next round a vehicle for which no times were found is moved to
-/// the front; after [`MAX_REORDERINGS`] such rounds it is moved to the end and gets a head start.
+/// the front; after [`MAX_REORDERINGS`] such rounds, or as many as there are vehicles, it is moved
+/// to the end and gets a head start.
 fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,

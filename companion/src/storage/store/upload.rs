@@ -115,8 +115,8 @@ impl Store {
         self.slots.iter().position(|slot| *slot == AreaCondition::Open).map(FlashArea::Slot)
     }
 
-    /// Whether these first bytes are the head of a field of heights, if that is being uploaded,
-    /// else of a roadmap, of length `len`.
+    /// Whether these first bytes are the head of a file with `len` bytes: of a field of heights if
+    /// one is being uploaded, else of a roadmap.
     pub(super) fn is_file_head(&self, bytes: &[u8], len: u32) -> bool {
         let declared = match self.upload {
             Some((File::Field, _)) => {

@@ -147,7 +147,7 @@ unsafe fn read_tolerating_bus_errors(from: *const u8, out: &mut [u8]) -> Result<
     }
 }
 
-/// Clears the flash's error flags that earlier loads and operations have left.
+/// Clears the error flags of bank 2 (its index is 1) that earlier reads and operations have left.
 fn clear_errors() {
     pac::FLASH.bank(1).ccr().write(|w| {
         w.set_clr_wrperr(true);
