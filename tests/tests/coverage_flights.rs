@@ -112,12 +112,11 @@ fn track([east_m, north_m]: [u32; 2], vehicles: usize, autopilot: &str, estimato
     )
 }
 
-/// The short track by 3 and by 5 vehicles of either autopilot with either estimator;
-/// `FLOCKMATE_TRACKS=2` flies the long one as well.
+/// The short and the long track by 3 and by 5 vehicles of either autopilot with either estimator.
 #[test]
 fn the_papers_tracks_are_photographed_whole() {
     let mut cases = Vec::new();
-    for (name, sides) in &TRACKS[..number_from_env("FLOCKMATE_TRACKS", 1) as usize] {
+    for (name, sides) in &TRACKS {
         for vehicles in [3, 5] {
             for autopilot in ["px4", "ardupilot"] {
                 for estimator in ["rtk", "recorded"] {
