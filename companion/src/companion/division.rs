@@ -18,6 +18,8 @@ use crate::timers::Timer;
 
 /// Margin beyond the stopping distance at which a vehicle promises to hold at the earliest, metres.
 const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
+/// Distance by which a stop may end beyond the place promised, metres.
+const MAX_STOP_BEYOND_PROMISE_M: f32 = 0.1;
 /// A vehicle within this distance before the place where it promised to hold has reached it,
 /// metres.
 const AT_HOLD_WITHIN_M: f32 = 0.2;
@@ -233,7 +235,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Commitment that this vehicle can make now: place where it will hold, decimetres along its
     /// path, at the last picture within `COMMITMENT_S` of flight, no further than gates and other
     /// vehicles let it fly, and no nearer than it can stop. `None` where it cannot make one, or has
-    /// made one.
+    /// made one; also until a vehicle that brakes, since its path is blocked or another one has
+    /// come near, has slowed enough.
     fn possible_commitment_dm(&self) -> Option<u16> {
         let fleet = self.neighbours.fleet()?;
         if !self.mission.state().may_promise_hold()
@@ -252,8 +255,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // The vehicle that it stops for may stay there: it promises no place beyond that stop.
         let clear_m = gates_m.min(along_m + self.guidance.advice.stop_within_m.max(0.0));
         let most_m = ahead_m.min(clear_m).min(self.last_descent_start_m()).max(along_m);
-        let stops_m = self.guidance.stopping_point_m(&plan.path) + EXTRA_STOPPING_MARGIN_M;
-        let stop_m = stops_m.min(most_m);
+        let stops_m = self.guidance.stopping_point_m(&plan.path);
+        let stops_for_block =
+            self.mission.state().is_blocked() && !self.guidance.is_raw_point_at_setpoint();
+        if stops_for_block || stops_m > most_m + MAX_STOP_BEYOND_PROMISE_M {
+            return None;
+        }
+        let stop_m = (stops_m + EXTRA_STOPPING_MARGIN_M).min(most_m);
         let picture_m =
             photographs.last_picture_before_m(&plan.path, most_m).filter(|at_m| *at_m >= stop_m);
         to_decimetres(picture_m.unwrap_or(stop_m)).map(|promise_dm| promise_dm.max(1))
@@ -274,7 +282,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether this vehicle stands where it is to hold for a division.
     pub(super) fn is_holding_for_division(&self) -> bool {
         self.division_hold_m().is_some_and(|at_m| {
-            self.guidance.reference_along_m() >= at_m - AT_HOLD_WITHIN_M
+            self.guidance.setpoint_along_m() >= at_m - AT_HOLD_WITHIN_M
                 && self.guidance.is_setpoint_still_outside_descent()
         })
     }

@@ -23,6 +23,7 @@ mod estimate;
 mod hostile;
 mod interruptions;
 mod paces;
+mod promises;
 mod scenes;
 mod setpoint_place;
 mod unheard;

@@ -17,10 +17,23 @@ pub const MAX_URGENT_JERK_MPS3: f32 = 8.0;
 /// Greatest acceleration of a setpoint as a multiple of the reference's, which corners need, unless
 /// the autopilot's limit is lower.
 const MAX_SETPOINT_ACCEL_FACTOR: f32 = 1.5;
+/// Least horizontal acceleration of a setpoint as a multiple of the reference's: with less the
+/// setpoint swings about the reference. Where the autopilot's limit is lower, the reference's is
+/// lowered.
+const MIN_SETPOINT_ACCEL_FACTOR: f32 = 1.2;
+/// Ratio of the vertical to the horizontal braking of the reference above which advice may reckon
+/// with the horizontal one: its horizon is twice the braking distance.
+const MIN_VERTICAL_BRAKING_SHARE: f32 = 2.0 / 3.0;
+/// Share of the setpoint's acceleration, of what the reference's leaves of it, that a corner takes.
+const CORNER_SHARE_OF_SPARE_ACCEL: f32 = 0.53;
 
 /// Longest window of the smoother's moving averages, seconds. Where a low jerk limit would need a
 /// longer window, the acceleration is lowered.
 pub(crate) const MAX_SMOOTHING_WINDOW_S: f32 = 1.2;
+/// Shortest window of the smoother's moving averages, seconds.
+const MIN_SMOOTHING_WINDOW_S: f32 = 0.4;
+/// Factor by which the averages' jerk stays below the limit: the rest is for corners and the clock.
+const JERK_RESERVE_FACTOR: f32 = 1.12;
 /// Least time that is assumed until a vehicle that no other one hears has stopped, seconds.
 const MIN_UNHEARD_STOP_TIME_S: f32 = 3.0;
 /// Least limit of the speed on a straight leg (climb, join, descent), m/s.
@@ -71,12 +84,31 @@ impl MotionLimits {
             speed_mps: fminf(config.cruise_mps, least(&[Limit::SpeedXy])),
             climb_mps: fminf(config.climb_mps, least(&[Limit::Climb])),
             descend_mps: fminf(config.descend_mps, least(&[Limit::Descend])),
-            accel_mps2: fminf(accel_mps2, across_mps2),
+            accel_mps2: fminf(accel_mps2, across_mps2 / MIN_SETPOINT_ACCEL_FACTOR),
             accel_z_mps2: fminf(accel_mps2, vertical_mps2),
             max_setpoint_accel_mps2: [across_mps2, vertical_mps2]
                 .map(|most| fminf(MAX_SETPOINT_ACCEL_FACTOR * accel_mps2, most)),
             jerk_mps3,
         }
+    }
+
+    /// Response time that the reference assumes in a corner, seconds: longer than an autopilot's
+    /// where the change of velocity, spread over the smoother's window beside the braking before
+    /// the corner, would take more acceleration than a setpoint may have.
+    fn corner_response_s(&self) -> f32 {
+        let usual = TrackConfig::default();
+        let most_mps2 = self.max_setpoint_accel_mps2[0];
+        let spare_sq = most_mps2 * most_mps2 - self.accel_mps2 * self.accel_mps2;
+        let spare_mps2 = CORNER_SHARE_OF_SPARE_ACCEL * libm::sqrtf(fmaxf(spare_sq, 0.0));
+        let sweep_mps = spare_mps2 * self.smoothing_window_s();
+        fmaxf(usual.response_s, usual.deviation_max_m / fmaxf(sweep_mps, 1e-3))
+    }
+
+    /// Window of each of the smoother's moving averages, seconds: long enough for the limit of jerk.
+    pub(crate) fn smoothing_window_s(&self) -> f32 {
+        let jerk_mps3 = self.jerk(Urgency::Smooth);
+        let window_s = 2.0 * JERK_RESERVE_FACTOR * self.accel_mps2 / jerk_mps3;
+        window_s.clamp(MIN_SMOOTHING_WINDOW_S, MAX_SMOOTHING_WINDOW_S)
     }
 
     /// Greatest jerk of a setpoint, m/s³; higher where the safety filter stops the vehicle.
@@ -135,6 +167,7 @@ impl GuidanceLimits {
             accel_mps2: limits.accel_mps2,
             accel_z_mps2: limits.accel_z_mps2,
             radius_m: config.radius_m,
+            response_s: limits.corner_response_s(),
             ..TrackConfig::default()
         };
         let leg_track = TrackConfig {
@@ -147,7 +180,11 @@ impl GuidanceLimits {
             method: config.method,
             safety_distance_m: config.safety_distance_m,
             cruise_mps: config.cruise_mps,
-            accel_mps2: config.accel_mps2,
+            // The reference has to stop where advice says so.
+            accel_mps2: fminf(
+                config.accel_mps2,
+                fminf(limits.accel_mps2, limits.accel_z_mps2 / MIN_VERTICAL_BRAKING_SHARE),
+            ),
         };
         Self { track, leg_track, deconflict, fastest_vehicle_mps: config.fastest_vehicle_mps }
     }

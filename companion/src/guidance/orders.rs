@@ -120,6 +120,16 @@ impl Guidance {
         self.division_hold_m = along_m;
     }
 
+    /// Place along the path of the setpoint, metres.
+    pub(crate) fn setpoint_along_m(&self) -> f32 {
+        self.setpoint_along_m
+    }
+
+    /// Place along the path where the vehicle is to hold for a division, metres; ∞ for none.
+    pub(crate) fn division_hold_m(&self) -> f32 {
+        self.division_hold_m
+    }
+
     /// Whether the raw point was set back to where the setpoint stands. Only then may another path
     /// begin, even one that starts a little away from it.
     pub(crate) fn is_raw_point_at_setpoint(&self) -> bool {

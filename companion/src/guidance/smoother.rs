@@ -38,10 +38,6 @@ pub const TICK_S: f32 = 0.05;
 pub const MAX_TICKS_PER_STEP: u8 = 4;
 /// Longest window of each moving average, in ticks of [`TICK_S`].
 const MAX_WINDOW_TICKS: usize = (MAX_SMOOTHING_WINDOW_S / TICK_S + 0.5) as usize;
-/// Shortest window of each moving average, in ticks.
-const MIN_WINDOW_TICKS: usize = 8;
-/// Factor by which the averages' jerk stays below the limit: the rest is for corners and the clock.
-const JERK_RESERVE_FACTOR: f32 = 1.12;
 /// Number of raw steps that enter one value of both averages.
 const HISTORY_LEN: usize = 2 * MAX_WINDOW_TICKS - 1;
 /// Share of the jerk limit with which a stop by the clock is assumed to begin, in steps of 50 ms:
@@ -477,13 +473,10 @@ impl SetpointSmoother {
     }
 }
 
-/// Number of ticks in each average's window: long enough for the limit of jerk.
+/// Number of ticks in each average's window.
 fn ticks_per_average(limits: &MotionLimits) -> usize {
-    let n = libm::ceilf(
-        2.0 * JERK_RESERVE_FACTOR * limits.accel_mps2 / (limits.jerk(Urgency::Smooth) * TICK_S)
-            - 1e-3,
-    ) as usize;
-    n.clamp(MIN_WINDOW_TICKS, MAX_WINDOW_TICKS)
+    let n = libm::ceilf(limits.smoothing_window_s() / TICK_S - 1e-3) as usize;
+    n.clamp(1, MAX_WINDOW_TICKS)
 }
 
 #[cfg(test)]

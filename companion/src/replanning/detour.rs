@@ -27,6 +27,8 @@ mod rejoining;
 mod reported;
 pub(crate) mod searches;
 
+use core::cell::OnceCell;
+
 use planner_core::detour;
 use planner_core::geo::frames::Geodetic;
 use planner_core::{Length, Point};
@@ -426,6 +428,17 @@ impl Detours {
         };
         let apart_m = view.config.safety_distance_m + beside_m;
         let (now, neighbours) = (view.now, view.neighbours);
+        // In a coverage mission only the path up to `beyond_m` past where the vehicle can stop
+        // counts: it goes on taking pictures until it is near the obstacle. What lies beyond the
+        // place where it is to hold for a division does not count yet.
+        let known_until_m = OnceCell::new();
+        let until_m = || match view.config.lost_vehicle_down_after_s {
+            Some(_) => {
+                let stops_m = view.guidance.stopping_point_m(&plan.path).max(0.0);
+                (stops_m + beyond_m).min(view.guidance.division_hold_m().max(along_m))
+            }
+            None => f32::INFINITY,
+        };
         let new = self.obstacles.unavoided();
         self.scan.continue_scan(
             new.len() + neighbours.len(),
@@ -437,13 +450,8 @@ impl Detours {
                     neighbours.for_each_unavoided_zone_of(source - new.len(), now, apart_m, visit);
                 }
             },
-            // In a coverage mission only the path up to `beyond_m` past where the vehicle can stop
-            // counts: it goes on taking pictures until it is near the obstacle.
             |obstacle| {
-                let until_m = match view.config.lost_vehicle_down_after_s {
-                    Some(_) => view.guidance.stopping_point_m(&plan.path).max(0.0) + beyond_m,
-                    None => f32::INFINITY,
-                };
+                let until_m = *known_until_m.get_or_init(until_m);
                 let (climb_m, descent_m) = (plan.climb_m, plan.descent_m);
                 detour::is_path_blocked(
                     &plan.path,

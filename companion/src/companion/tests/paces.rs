@@ -25,7 +25,7 @@ fn lanes(long_m: f32, apart_m: f32) -> Plan {
     VehiclePlan { path, descent_m: START.z, ..plan() }
 }
 
-fn beside_m(path: &Path<WAYPOINTS>, place: &Point) -> f32 {
+pub(super) fn beside_m(path: &Path<WAYPOINTS>, place: &Point) -> f32 {
     let legs = path.waypoints().windows(2);
     let off = legs.map(|leg| {
         let along = leg[1].position - leg[0].position;

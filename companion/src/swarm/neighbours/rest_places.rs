@@ -39,8 +39,9 @@ impl NeighbourEntry {
             _ => here,
         };
         let flies = !self.would_fly_all_points_unheard() && !self.has_column();
-        let deviates = (here - on_points).norm() <= CRUISE_TRACKING_ERROR_M;
-        if flies && deviates { on_points } else { here }
+        const MOST_SQ_M2: f32 = CRUISE_TRACKING_ERROR_M * CRUISE_TRACKING_ERROR_M;
+        let near = (here - on_points).norm_squared() <= MOST_SQ_M2;
+        if flies && near { on_points } else { here }
     }
 
     /// As [`Self::for_each_unheard_leg_from`], from where the neighbour comes to rest on its
