@@ -156,6 +156,8 @@ pub struct Guidance {
     pub(crate) setpoint_along_m: f32,
     /// Arc length where the vehicle will stop by advice or braking, without the filter, metres.
     pub(crate) stops_at_m: f32,
+    /// Where along the path the reference could have stopped in the last step, metres.
+    brakes_to_m: f32,
     /// The safety filter.
     pub(crate) filter: SafetyFilter,
     /// Whether the vehicle reports that it holds its place, so that others may pass.
@@ -239,6 +241,7 @@ impl Guidance {
             max_lead_m: MAX_LEG_LEAD_M,
             setpoint_along_m: 0.0,
             stops_at_m: f32::NEG_INFINITY,
+            brakes_to_m: f32::NEG_INFINITY,
             filter: SafetyFilter::default(),
             hold: Hold::default(),
             hold_changed: false,
@@ -324,6 +327,7 @@ impl Guidance {
                 // was advised too late.
                 true => {
                     let least_m = track::braking_distance_m(&self.track, &plan.path, &self.tracker);
+                    self.brakes_to_m = along_m + least_m;
                     along_m + self.advice.stop_within_m.max(least_m)
                 }
                 false => self.setpoint_along_m + self.smoother.stop_distance_m(Urgency::Smooth),

@@ -67,22 +67,21 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let own = self.own_fleet_report();
         self.neighbours.step_fleet(&own, now);
         let Some(fleet) = self.neighbours.fleet() else { return };
-        let (home_m, around) = (self.last_descent_start_m(), self.detours.is_beside_plan());
+        let around = self.detours.is_beside_plan();
         if !fleet.is_any_missing() {
             self.timers.set(Timer::StopWaitingForMissing, now + MAX_WAIT_FOR_MISSING);
         }
         let misses =
             fleet.is_any_missing() && !self.timers.is_due(Timer::StopWaitingForMissing, now);
         // Only a vehicle that still takes part waits above its pad.
-        let waits = fleet.takes_part() && (fleet.is_dividing() || misses);
+        let waits = || fleet.takes_part() && (fleet.is_dividing() || misses);
         let halt_m = match self.division_hold_m() {
             Some(holds_at_m) => holds_at_m,
             // On a detour the end of the path is not above the pad.
-            None if waits
-                && !around
-                && self.guidance.reference_along_m() <= home_m + AT_HOLD_WITHIN_M =>
-            {
-                home_m
+            None if !around && waits() => {
+                let home_m = self.last_descent_start_m();
+                let before = self.guidance.reference_along_m() <= home_m + AT_HOLD_WITHIN_M;
+                if before { home_m } else { f32::INFINITY }
             }
             None => f32::INFINITY,
         };
@@ -240,8 +239,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn possible_commitment_dm(&self) -> Option<u16> {
         let fleet = self.neighbours.fleet()?;
         if !self.mission.state().may_promise_hold()
-            || !(fleet.is_dividing() || self.wants_division())
             || fleet.commitment_dm().is_some()
+            || !(fleet.is_dividing() || self.wants_division())
         {
             return None;
         }

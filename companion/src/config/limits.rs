@@ -104,7 +104,7 @@ impl MotionLimits {
         fmaxf(usual.response_s, usual.deviation_max_m / fmaxf(sweep_mps, 1e-3))
     }
 
-    /// Window of each of the smoother's moving averages, seconds: long enough for the limit of jerk.
+    /// Window of each of the smoother's moving averages, seconds: long enough for the jerk limit.
     pub(crate) fn smoothing_window_s(&self) -> f32 {
         let jerk_mps3 = self.jerk(Urgency::Smooth);
         let window_s = 2.0 * JERK_RESERVE_FACTOR * self.accel_mps2 / jerk_mps3;

@@ -76,7 +76,7 @@ impl Guidance {
         self.waypoints = Algorithm2Waypoints::default();
         self.ends_away_from_goal = false;
         self.guides_landing = false;
-        self.last_reported_progress_m = f32::NEG_INFINITY;
+        (self.last_reported_progress_m, self.brakes_to_m) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
         self.open_gate_count = 0;
         self.acknowledged_path = AcknowledgedPath::of_new_path(now);
         // What hindered the vehicle on the other path does not count on this one.
@@ -168,6 +168,11 @@ impl Guidance {
         let braking_m = track::braking_distance_m(&self.track, path, &self.tracker);
         let setpoint_braking_m = self.smoother.stop_distance_m(Urgency::Smooth);
         (self.tracker.along_m + braking_m).max(self.setpoint_along_m + setpoint_braking_m)
+    }
+
+    /// Where along its path the reference could have stopped in the last step, metres.
+    pub(crate) fn braking_end_m(&self) -> f32 {
+        self.brakes_to_m.max(self.tracker.along_m)
     }
 
     /// Begins a landing that setpoints lead straight down from where the setpoint stands, to the

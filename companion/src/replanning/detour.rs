@@ -434,7 +434,7 @@ impl Detours {
         let known_until_m = OnceCell::new();
         let until_m = || match view.config.lost_vehicle_down_after_s {
             Some(_) => {
-                let stops_m = view.guidance.stopping_point_m(&plan.path).max(0.0);
+                let stops_m = view.guidance.braking_end_m().max(0.0);
                 (stops_m + beyond_m).min(view.guidance.division_hold_m().max(along_m))
             }
             None => f32::INFINITY,

@@ -332,11 +332,14 @@ impl<const V: usize> Fleet<V> {
             ShareStatus::Lost | ShareStatus::Left => true,
             ShareStatus::Finished => false,
         };
-        let asked = self.members.iter().any(|m| m.has_part && asks(m));
+        self.may_divide() && self.members.iter().any(|m| m.has_part && asks(m))
+    }
+
+    /// Whether this vehicle takes part in a flight in which a division is still possible.
+    fn may_divide(&self) -> bool {
         self.vehicle_takes_part(usize::from(self.own_rank))
             && !self.idle
             && !self.divisions.is_full()
-            && asked
     }
 
     /// Whether the vehicle of this rank has a part, and was not lost, has not left or finished.
@@ -440,26 +443,6 @@ impl<const V: usize> Fleet<V> {
         let _ = self.divisions.push(inputs);
     }
 
-    /// Moves all times to a clock that shows `then` where the old one shows `now`; ages past every
-    /// limit are cut to that limit, and which others are in flight or were never heard is
-    /// forgotten: that matters only before a start. Fleets that will act alike become equal, so a
-    /// search recognises a state that it has visited.
-    pub fn normalise_for_search(&mut self, now: Instant, then: Instant) {
-        let FleetTimeouts { lease, lost_after: lost, down_after: down, .. } = self.limits;
-        let moved = |at: Instant, most: Duration| {
-            let age = (now - at).min(most);
-            Instant::from_micros(then.as_micros().saturating_sub(age.as_micros()))
-        };
-        (self.in_flight_bits, self.hears_flight_bits) = (self.in_flight_bits & self.own_bit(), 0);
-        (self.introduced_bits, self.down_at, self.any_missing) = (u32::MAX, Instant::ZERO, false);
-        self.lease_renewed_at =
-            moved(self.lease_renewed_at, Duration::from_micros(2 * lease.as_micros()));
-        for member in &mut self.members {
-            let counts = member.has_part && member.entry.status <= ShareStatus::Lost;
-            member.heard_at = if counts { moved(member.heard_at, lost.max(down)) } else { then };
-        }
-    }
-
     /// Number of vehicles in the roster.
     pub(crate) fn vehicle_count(&self) -> usize {
         self.members.len()
@@ -479,7 +462,8 @@ impl<const V: usize> Fleet<V> {
     /// This vehicle's commitment, the place where it is to hold, decimetres along its path, while a
     /// division is under way; `None` before it was reported.
     pub fn commitment_dm(&self) -> Option<u16> {
-        self.members[usize::from(self.own_rank)].entry.commitment_dm.filter(|_| self.is_dividing())
+        // An own commitment alone means that a division is under way.
+        self.members[usize::from(self.own_rank)].entry.commitment_dm.filter(|_| self.may_divide())
     }
 
     /// Where this vehicle held for the last binding division, decimetres along its path before it.

@@ -1,6 +1,6 @@
 //! Random flights at the limits of the mission and of the autopilot's parameters: a vehicle holds
-//! for a division where it promised, stops at closed gates, and keeps to its path. Vehicle 78 leaves
-//! the mission, 77 is far away unless a test says otherwise.
+//! for a division where it promised, stops at closed gates, and keeps to its path. Vehicle 78
+//! leaves the mission, 77 is far away unless a test says otherwise.
 
 use mavlink::dialects::ardupilotmega::{MavParamType, PARAM_VALUE_DATA};
 use planner_core::Length as _;
@@ -13,6 +13,7 @@ use super::*;
 use crate::link::intent::{FLYING, GROUNDED, ON_PLAN, OUT_OF_PLAN};
 use crate::link::roster::{RosterReportEntry, ShareStatus};
 use crate::planner::coverage::OPEN_FIELD_CLEARANCE_M;
+use crate::swarm::fleet::Fleet;
 use crate::{Link, RosterEntry};
 
 /// Vehicle 77 out of the way.
@@ -28,10 +29,11 @@ fn lanes(long_m: f32, apart_m: f32, count: usize) -> Plan {
     push(0.0, 0.0, 0.0);
     for lane in 0..count {
         let y = apart_m * lane as f32;
-        let xs = if lane % 2 == 0 { [10.0, long_m] } else { [long_m, 10.0] };
+        let xs = if lane.is_multiple_of(2) { [10.0, long_m] } else { [long_m, 10.0] };
         xs.into_iter().for_each(|x| push(x, y, 0.0));
     }
-    let (x, y) = (if count % 2 == 0 { 10.0 } else { long_m }, apart_m * (count - 1) as f32);
+    let (x, y) =
+        (if count.is_multiple_of(2) { 10.0 } else { long_m }, apart_m * (count - 1) as f32);
     push(x, y, 2.0);
     push(0.0, 0.0, 2.0);
     push(0.0, 0.0, 0.0);
@@ -170,7 +172,7 @@ proptest::proptest! {
         b.run(12.0);
         let off_m = hold_error_m(&mut b, 1200, |b, _| {
             let fleet = b.companion.neighbours.fleet();
-            let promise = fleet.and_then(|fleet| fleet.commitment_dm());
+            let promise = fleet.and_then(Fleet::commitment_dm);
             if let (Some(dm), true) = (promise, b.neighbour == FAR) {
                 let lies = path_of(b).point_at(f32::from(dm) / 10.0 + beyond_m).unwrap();
                 let lies = Point::new(lies.x, lies.y, 0.6);

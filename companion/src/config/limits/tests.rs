@@ -47,7 +47,7 @@ proptest::proptest! {
             (l.speed_mps, 0.1, 2.0),
             (l.climb_mps, 0.1, 1.0),
             (l.descend_mps, 0.1, 1.0),
-            (l.accel_mps2, 0.2, 1.5),
+            (l.accel_mps2, 0.2 / 1.21, 1.5),
             (l.accel_z_mps2, 0.2, 1.5),
             (l.max_setpoint_accel_mps2[0], 0.2, 2.25),
             (l.max_setpoint_accel_mps2[1], 0.2, 2.25),

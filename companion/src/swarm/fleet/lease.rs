@@ -1,6 +1,6 @@
 //! The lease of a vehicle, and what silence of the others means.
 
-use super::{Fleet, FleetVehicle, INCARNATIONS, OwnReport};
+use super::{Fleet, FleetTimeouts, FleetVehicle, INCARNATIONS, OwnReport};
 use crate::link::roster::{RosterReportEntry, ShareStatus};
 use crate::time::{Duration, Instant};
 
@@ -137,6 +137,26 @@ impl<const V: usize> Fleet<V> {
         self.prepare_division_inputs(now);
         if self.is_division_agreed(now) {
             self.commit_division();
+        }
+    }
+
+    /// Moves all times to a clock that shows `then` where the old one shows `now`; ages past every
+    /// limit are cut to that limit, and which others are in flight or were never heard is
+    /// forgotten: that matters only before a start. Fleets that will act alike become equal, so a
+    /// search recognises a state that it has visited.
+    pub fn normalise_for_search(&mut self, now: Instant, then: Instant) {
+        let FleetTimeouts { lease, lost_after: lost, down_after: down, .. } = self.limits;
+        let moved = |at: Instant, most: Duration| {
+            let age = (now - at).min(most);
+            Instant::from_micros(then.as_micros().saturating_sub(age.as_micros()))
+        };
+        (self.in_flight_bits, self.hears_flight_bits) = (self.in_flight_bits & self.own_bit(), 0);
+        (self.introduced_bits, self.down_at, self.any_missing) = (u32::MAX, Instant::ZERO, false);
+        self.lease_renewed_at =
+            moved(self.lease_renewed_at, Duration::from_micros(2 * lease.as_micros()));
+        for member in &mut self.members {
+            let counts = member.has_part && member.entry.status <= ShareStatus::Lost;
+            member.heard_at = if counts { moved(member.heard_at, lost.max(down)) } else { then };
         }
     }
 }

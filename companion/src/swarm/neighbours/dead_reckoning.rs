@@ -240,12 +240,10 @@ impl NeighbourEntry {
         if all_m > stops_m { all_m } else { stops_m }
     }
 
-    /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres, from
-    /// the first place on its points where it may be.
+    /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
     #[inline]
     pub(super) fn unheard_stopping_distance_m(&self) -> f32 {
-        self.place_on_points.place_uncertainty_m()
-            + self.max_unheard_travel_m
+        self.max_unheard_travel_m
             + self.fastest_vehicle_mps * unheard_flight_by_delay_s(self.message_delay.delay_s)
     }
 

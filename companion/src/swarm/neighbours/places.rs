@@ -27,17 +27,18 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Distance along its points that a neighbour may have flown unheard, metres. If this vehicle
-    /// hears nobody, its own radio has more likely failed: then the others fly on to places unknown
-    /// here, and only a stop is assumed.
+    /// Distance along its points that a neighbour may have flown unheard, metres, from the first
+    /// place on them where it may have been. If this vehicle hears nobody, its own radio has more
+    /// likely failed: then the others fly on to places unknown here, and only a stop is assumed.
     #[inline(never)]
     fn max_unheard_flown_m(&self, entry: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !entry.heard_within(now, UNHEARD_LANDING_AFTER);
         let far = lands && entry.may_fly_on_silent(now) && !self.hears_nobody(now);
-        if far {
-            return entry.max_unheard_distance_m();
-        }
-        entry.unheard_stopping_distance_m()
+        let flown_m = match far {
+            true => entry.max_unheard_distance_m(),
+            false => entry.unheard_stopping_distance_m(),
+        };
+        flown_m + entry.place_on_points.place_uncertainty_m()
     }
 
     /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` where it is out
@@ -249,7 +250,7 @@ impl<const V: usize> Neighbours<V> {
         // From its position, not the place on its points beside it: it may have fallen.
         entry.for_each_unheard_leg_from(
             entry.state.position,
-            entry.max_unheard_distance_m(),
+            entry.max_unheard_distance_m() + entry.place_on_points.place_uncertainty_m(),
             &mut |[at, next], [leg_m, flown_m]| {
                 near(
                     at,

@@ -25,6 +25,9 @@ impl NeighbourEntry {
     /// flies along its points.
     fn start_of_unheard_stretch(&self) -> Point {
         let (here, points) = (self.state.position, &self.points);
+        if self.would_fly_all_points_unheard() || self.has_column() {
+            return here;
+        }
         let PlaceOnPoints::On { leg_end, uncertainty_dm: 0 } = self.place_on_points else {
             return here;
         };
@@ -38,10 +41,8 @@ impl NeighbourEntry {
             Some([only]) => *only,
             _ => here,
         };
-        let flies = !self.would_fly_all_points_unheard() && !self.has_column();
         const MOST_SQ_M2: f32 = CRUISE_TRACKING_ERROR_M * CRUISE_TRACKING_ERROR_M;
-        let near = (here - on_points).norm_squared() <= MOST_SQ_M2;
-        if flies && near { on_points } else { here }
+        if (here - on_points).norm_squared() <= MOST_SQ_M2 { on_points } else { here }
     }
 
     /// As [`Self::for_each_unheard_leg_from`], from where the neighbour comes to rest on its

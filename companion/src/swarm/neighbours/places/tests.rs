@@ -294,7 +294,8 @@ fn an_unheard_vehicle_at_a_hairpin_is_kept_off_on_both_legs() {
     let table = heard_at(&points, at, Point::new(-2.0, 0.0, 0.0));
     assert_eq!(start_of_unheard_legs(&table), at);
     let entry = &table.entries[1];
-    let reach = [entry.min_rest_distance_m(), entry.unheard_stopping_distance_m()];
+    let upto_m = table.max_unheard_flown_m(entry, Instant::from_millis(80_000));
+    let reach = [entry.min_rest_distance_m(), upto_m];
     // On the way back it stops as far on as a vehicle does at most.
     let rest = Point::new(at.x - max_unheard_travel_m(2.0), 0.2, 2.0);
     let mut nearest_m = f32::INFINITY;
