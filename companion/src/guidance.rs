@@ -290,7 +290,7 @@ impl Guidance {
         self.waypoints = Algorithm2Waypoints::default();
         (self.has_begun_path, self.returning, self.ends_away_from_goal) = (false, false, false);
         self.acknowledged_path = acknowledged_path::AcknowledgedPath::of_new_path(Instant::ZERO);
-        self.last_reported_progress_m = f32::NEG_INFINITY;
+        (self.last_reported_progress_m, self.brakes_to_m) = (f32::NEG_INFINITY, f32::NEG_INFINITY);
         self.advice = NO_ADVICE_YET;
         self.open_gate_count = 0;
         self.filter.reset();

@@ -249,12 +249,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let along_m = self.guidance.reference_along_m();
         // A vehicle whose path is blocked promises to hold where it is.
         let promise_s = if self.mission.state().is_blocked() { 0.0 } else { COMMITMENT_S };
-        let ahead_m = along_m + promise_s * self.config.cruise_mps;
+        let stops_m = self.guidance.stopping_point_m(&plan.path);
+        // Slow to brake, it may take longer than that to stop.
+        let ahead_m =
+            (along_m + promise_s * self.config.cruise_mps).max(stops_m + EXTRA_STOPPING_MARGIN_M);
         let gates_m = self.guidance.gates_open_up_to_m(&self.guidance_inputs());
         // The vehicle that it stops for may stay there: it promises no place beyond that stop.
         let clear_m = gates_m.min(along_m + self.guidance.advice.stop_within_m.max(0.0));
         let most_m = ahead_m.min(clear_m).min(self.last_descent_start_m()).max(along_m);
-        let stops_m = self.guidance.stopping_point_m(&plan.path);
         let stops_for_block =
             self.mission.state().is_blocked() && !self.guidance.is_raw_point_at_setpoint();
         if stops_for_block || stops_m > most_m + MAX_STOP_BEYOND_PROMISE_M {
@@ -271,18 +273,25 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn division_hold_m(&self) -> Option<f32> {
         // A promise is a place along its own path, and binds no vehicle that is off that path. This
         // is checked here too, as the fleet learns of a landing or return only in the next step.
-        let elsewhere = self.will_land_off_plan() || self.detours.is_beside_plan();
-        let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !elsewhere)?;
+        let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part())?;
         let behind = fleet.division_count() > self.mission.division_count();
-        let held_dm = behind.then(|| fleet.held_at_dm());
-        held_dm.or(fleet.commitment_dm()).map(|dm| f32::from(dm) / 10.0)
+        let held_dm = if behind { fleet.held_at_dm() } else { fleet.commitment_dm()? };
+        let elsewhere = self.will_land_off_plan() || self.detours.is_beside_plan();
+        (!elsewhere).then_some(f32::from(held_dm) / 10.0)
     }
 
     /// Whether this vehicle stands where it is to hold for a division.
     pub(super) fn is_holding_for_division(&self) -> bool {
         self.division_hold_m().is_some_and(|at_m| {
-            self.guidance.setpoint_along_m() >= at_m - AT_HOLD_WITHIN_M
+            let along_m = self.guidance.reference_along_m();
+            along_m >= at_m - AT_HOLD_WITHIN_M
                 && self.guidance.is_setpoint_still_outside_descent()
+                && self.mission.plan().and_then(|plan| plan.path.point_at(along_m)).is_some_and(
+                    |place| {
+                        let off = self.guidance.setpoint_position() - place;
+                        off.norm_squared() <= AT_HOLD_WITHIN_M * AT_HOLD_WITHIN_M
+                    },
+                )
         })
     }
 

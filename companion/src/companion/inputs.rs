@@ -114,7 +114,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             excluded: self.is_excluded(),
             left_out_set_changed: self.mission.photographed().has_left_out_set_changed(),
             plans_differ: self.hears_another_plan(),
-            holds_to_divide: self.is_holding_for_division(),
+            holds_to_divide: self.mission.state().follows_path_or_is_blocked()
+                && self.is_holding_for_division(),
             division_plan_ready: self.mission.is_division_plan_ready(),
             division_settled: self.is_division_settled() && !self.detours.is_off_own_path(),
             plan_ready: self.mission.plan().is_some(),

@@ -120,11 +120,6 @@ impl Guidance {
         self.division_hold_m = along_m;
     }
 
-    /// Place along the path of the setpoint, metres.
-    pub(crate) fn setpoint_along_m(&self) -> f32 {
-        self.setpoint_along_m
-    }
-
     /// Place along the path where the vehicle is to hold for a division, metres; ∞ for none.
     pub(crate) fn division_hold_m(&self) -> f32 {
         self.division_hold_m

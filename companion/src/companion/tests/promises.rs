@@ -201,6 +201,40 @@ proptest::proptest! {
         proptest::prop_assert!(off_m.is_none_or(|m| m < 0.35), "{off_m:?} m at {cruise_mps} m/s");
     }
 
+    /// One that takes more than the 10 s of a commitment to stop promises where it can.
+    #[test]
+    fn a_vehicle_that_brakes_slowly_promises_to_hold_at_cruise_too(
+        cruise_mps in 2f32..12.0, accel_mps2 in 0.2f32..0.8,
+    ) {
+        let mut b = following(lanes(2000.0, 20.0, 2), [cruise_mps, accel_mps2], None);
+        b.run(2.0 * cruise_mps / accel_mps2);
+        let end_m = path_of(&b).waypoints()[2].along_m;
+        let braking_m = cruise_mps * cruise_mps / (2.0 * accel_mps2);
+        proptest::prop_assume!(
+            b.companion.guidance.reference_along_m() + 2.0 * braking_m + 100.0 < end_m
+        );
+        hold_error_m(&mut b, 20, |_, _| {});
+        let fleet = b.companion.neighbours.fleet().expect("an area");
+        proptest::prop_assert!(fleet.commitment_dm().is_some(), "{cruise_mps} {accel_mps2}");
+    }
+
+    /// Where lanes turn back on themselves, the setpoint cuts the corner.
+    #[test]
+    fn a_vehicle_holds_beyond_a_sharp_turn(
+        cruise_mps in 1f32..4.0, accel_mps2 in 1.5f32..5.0, apart_m in 0.05f32..1.0,
+        ticks in 0u32..400,
+    ) {
+        let mut b = following(lanes(22.0, apart_m, 4), [cruise_mps, accel_mps2], None);
+        (0..ticks).for_each(|_| b.tick());
+        proptest::prop_assume!(b.state() == Follow);
+        let off_m = hold_error_m(&mut b, 2000, |_, _| {});
+        let fleet = b.companion.neighbours.fleet().expect("an area");
+        let promised = fleet.commitment_dm().is_some() || off_m.is_some();
+        proptest::prop_assert!(
+            !promised || off_m.is_some_and(|m| m < 0.5), "{off_m:?} m at {cruise_mps} m/s"
+        );
+    }
+
     #[test]
     fn a_closed_gate_is_not_passed_whatever_the_limits(
         cruise_mps in 1f32..12.0, accel_mps2 in 0.5f32..5.0,

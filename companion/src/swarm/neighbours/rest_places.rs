@@ -136,13 +136,15 @@ impl NeighbourEntry {
         least_m: f32,
     ) -> Option<(Point, &[Point], PlaceOnPoints)> {
         let (mut left_m, mut at) = (least_m, self.state.position);
+        let PlaceOnPoints::On { uncertainty_dm, .. } = self.place_on_points else { return None };
         let skipped = self.points.len() - self.next_points().len();
         for (i, next) in self.points.iter().enumerate().skip(skipped).filter(|_| least_m > 0.0) {
             let leg_m = (next - at).length();
             if leg_m > left_m {
                 let rest = at + (next - at) * (left_m / leg_m);
                 let from = i.saturating_sub(1);
-                let place = PlaceOnPoints::On { leg_end: (i - from) as u8, uncertainty_dm: 0 };
+                let leg_end = (i - from) as u8;
+                let place = PlaceOnPoints::On { leg_end, uncertainty_dm };
                 return Some((rest, &self.points[from..], place));
             }
             (at, left_m) = (*next, left_m - leg_m);
