@@ -247,12 +247,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let plan = self.mission.plan()?;
         let Task::Photograph(photographs) = &plan.task else { return None };
         let along_m = self.guidance.reference_along_m();
-        // A vehicle whose path is blocked promises to hold where it is.
-        let promise_s = if self.mission.state().is_blocked() { 0.0 } else { COMMITMENT_S };
         let stops_m = self.guidance.stopping_point_m(&plan.path);
-        // Slow to brake, it may take longer than that to stop.
-        let ahead_m =
-            (along_m + promise_s * self.config.cruise_mps).max(stops_m + EXTRA_STOPPING_MARGIN_M);
+        let ahead_m = match self.mission.state().is_blocked() {
+            // A vehicle whose path is blocked promises to hold where it is.
+            true => along_m,
+            // One that is slow to brake may take longer than that to stop.
+            false => (along_m + COMMITMENT_S * self.config.cruise_mps)
+                .max(stops_m + EXTRA_STOPPING_MARGIN_M),
+        };
         let gates_m = self.guidance.gates_open_up_to_m(&self.guidance_inputs());
         // The vehicle that it stops for may stay there: it promises no place beyond that stop.
         let clear_m = gates_m.min(along_m + self.guidance.advice.stop_within_m.max(0.0));
