@@ -130,6 +130,9 @@ fn allowed_deviation_m(cfg: &TrackConfig, clearance_m: f32) -> f32 {
     fminf(fmaxf((clearance_m - cfg.radius_m) * 0.5, cfg.deviation_min_m), cfg.deviation_max_m)
 }
 
+/// Upward part of a unit vector that still counts as level.
+const LEVEL_UP: f32 = 1e-3;
+
 /// Unit vector along the path from one waypoint to the next.
 fn unit_direction(from: &Waypoint, to: &Waypoint) -> Point {
     (to.position - from.position) / (to.along_m - from.along_m)
@@ -139,14 +142,22 @@ fn unit_direction(from: &Waypoint, to: &Waypoint) -> Point {
 /// within their own limits.
 fn speed_and_accel_limits(cfg: &TrackConfig, direction: &Point) -> (f32, f32) {
     let up = direction.z;
-    if fabsf(up) < 1e-3 {
+    if fabsf(up) < LEVEL_UP {
         return (cfg.cruise_mps, cfg.accel_mps2);
     }
-    let across = sqrtf(fmaxf(1.0 - up * up, 0.0));
     let z_mps = if up > 0.0 { cfg.climb_mps } else { cfg.descend_mps };
-    let speed = fminf(cfg.cruise_mps, z_mps / fabsf(up));
+    (fminf(cfg.cruise_mps, z_mps / fabsf(up)), accel_limit(cfg, up))
+}
+
+/// Greatest acceleration along a unit vector of this upward part, with which horizontal and
+/// vertical parts stay within their own limits, m/s².
+fn accel_limit(cfg: &TrackConfig, up: f32) -> f32 {
+    if fabsf(up) < LEVEL_UP {
+        return cfg.accel_mps2;
+    }
+    let across = sqrtf(fmaxf(1.0 - up * up, 0.0));
     let accel = fminf(cfg.accel_mps2 / fmaxf(across, 1e-3), cfg.accel_z_mps2 / fabsf(up));
-    (speed, fminf(accel, fmaxf(cfg.accel_mps2, cfg.accel_z_mps2)))
+    fminf(accel, fmaxf(cfg.accel_mps2, cfg.accel_z_mps2))
 }
 
 /// Square of the greatest speed at a corner from unit direction `before` to `after`, m²/s². A
@@ -280,7 +291,11 @@ pub fn advance<const W: usize>(
     })
 }
 
-/// Distance that the reference still flies if it is to stop now, metres.
+/// Legs ahead whose own braking [`braking_distance_m`] looks at; beyond them it takes the gentlest.
+const BRAKING_LEGS: usize = 6;
+
+/// Distance that the reference still flies if it is to stop now, metres: exact if it stops within
+/// [`BRAKING_LEGS`] legs, each of which has its own acceleration limit, else an upper bound.
 pub fn braking_distance_m<const W: usize>(
     cfg: &TrackConfig,
     path: &Path<W>,
@@ -289,10 +304,24 @@ pub fn braking_distance_m<const W: usize>(
     let points = path.waypoints();
     let next = points.partition_point(|w| w.along_m <= tracker.along_m);
     let leg = next.clamp(1, max_usize(points.len(), 2) - 1);
-    let (Some(from), Some(to)) = (points.get(leg - 1), points.get(leg)) else { return 0.0 };
-    let (_, accel) = speed_and_accel_limits(cfg, &unit_direction(from, to));
     let speed_mps = fmaxf(tracker.speed_mps, 0.0);
-    speed_mps * speed_mps / (2.0 * accel)
+    let least_accel = fminf(cfg.accel_mps2, cfg.accel_z_mps2);
+    let (mut speed_sq, mut from_m, mut accel) =
+        (speed_mps * speed_mps, tracker.along_m, least_accel);
+    for (i, ends) in points.windows(2).skip(leg - 1).enumerate() {
+        let [from, to] = ends else { break };
+        if i == BRAKING_LEGS {
+            accel = least_accel;
+            break;
+        }
+        accel = accel_limit(cfg, (to.position.z - from.position.z) / (to.along_m - from.along_m));
+        let slowed_sq = speed_sq - 2.0 * accel * (to.along_m - from_m);
+        if slowed_sq <= 0.0 {
+            break;
+        }
+        (speed_sq, from_m) = (slowed_sq, to.along_m);
+    }
+    from_m - tracker.along_m + speed_sq / (2.0 * accel)
 }
 
 /// Greatest distance of the vehicle behind the reference on a leg of this clearance, at this speed

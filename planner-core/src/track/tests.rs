@@ -1,3 +1,5 @@
+use proptest::prelude::*;
+
 use super::*;
 use crate::flight::path::tests::corner_path;
 
@@ -18,6 +20,55 @@ fn a_stop_that_is_advised_too_late_is_as_long_as_flown() {
     }
     let flown_m = tracker.along_m - from_m;
     assert!(flown_m > 10.0 && (brakes_m - flown_m).abs() < 0.3, "{brakes_m} {flown_m}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    /// Legs that climb brake with less than level ones where the vertical acceleration is lower.
+    #[test]
+    fn on_slopes_a_stop_is_as_long_as_flown(
+        steps in proptest::collection::vec((0.5_f32..12.0, -8.0_f32..8.0), 2..12),
+        (accel, accel_z) in (0.3_f32..3.0, 0.3_f32..3.0),
+        (cruise_mps, stop_share) in (0.5_f32..12.0, 0.0_f32..1.0),
+    ) {
+        let mut path = Path::<16>::new();
+        let mut at = Point::zeros();
+        path.push(at, 10.0).unwrap();
+        for (forward, up) in steps {
+            at += Point::new(forward, 0.0, up);
+            path.push(at, 10.0).unwrap();
+        }
+        let cfg = TrackConfig {
+            cruise_mps,
+            climb_mps: cruise_mps,
+            descend_mps: cruise_mps,
+            accel_mps2: accel,
+            accel_z_mps2: accel_z,
+            deviation_max_m: 10.0,
+            ..TrackConfig::default()
+        };
+        let mut tracker = ReferenceState::default();
+        let stop_at_m = stop_share * path.length_m();
+        for _ in 0..20_000 {
+            if tracker.along_m >= stop_at_m {
+                break;
+            }
+            advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.01).unwrap();
+        }
+        let (from, brakes_m) = (tracker, braking_distance_m(&cfg, &path, &tracker));
+        let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for_id: 2 };
+        while tracker.speed_mps > 0.0 {
+            advance(&cfg, &path, &mut tracker, &stop, 0.001).unwrap();
+        }
+        let flown_m = tracker.along_m - from.along_m;
+        let stepped_m = 0.02 + 0.02 * brakes_m;
+        prop_assert!(flown_m < brakes_m + stepped_m, "{brakes_m} {flown_m} {from:?}");
+        let legs = |m: f32| path.waypoints().iter().filter(|w| w.along_m <= m).count();
+        if legs(from.along_m + brakes_m) - legs(from.along_m) < BRAKING_LEGS {
+            prop_assert!(brakes_m < flown_m + stepped_m, "{brakes_m} {flown_m} {from:?}");
+        }
+    }
 }
 
 #[test]
