@@ -11,7 +11,7 @@ const LINKER_CHECKS: &str = r#"
 ASSERT(__e_shell <= _stack_end - 4K, "the companion reaches into the stack's guard");
 ASSERT(SIZEOF(.data) <= 16K, "what is large has a first value that is not all zeros");
 "#;
-/// Sections that must not be empty in the H743's firmware; there no other program is built.
+/// Sections that must not be empty in the H743's firmware, the only program built for that board.
 const CHIP_SECTIONS: &str = r#"
 ASSERT(SIZEOF(.shell) > 0 && SIZEOF(.swarm_plan) > 0 && SIZEOF(.own_plan) > 0 && SIZEOF(.mission) > 0 && SIZEOF(.dma) > 0,
   "a part has lost its name, or its first value is not all zeros");

@@ -164,6 +164,7 @@ fn digest_value(digest: Digest<'_, u32, Table<1>>) -> u32 {
     digest.finalize()
 }
 
+/// Adds the advice at a random place of the path, among random neighbours, to the digest.
 fn add_advice_along_path(
     rng: &mut Pcg32,
     path: &Path<WAYPOINTS>,
@@ -184,6 +185,8 @@ fn add_advice_along_path(
     }
 }
 
+/// A neighbour of id 2 + `k` and rank 1 + `k` within `reach_m` per axis of `around`, no progress
+/// sent.
 fn random_neighbour(rng: &mut Pcg32, k: usize, around: &Point, reach_m: f32) -> Neighbour {
     Neighbour {
         id: 2 + k as u8,

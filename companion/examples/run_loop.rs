@@ -38,7 +38,7 @@ fn main() {
     println!("{sent} bytes sent");
 }
 
-/// 3. All that the companion has to say: events until `None`, frames for both links until 0.
+/// 3. Takes all that the companion has to say: events until `None`, frames of both links until 0.
 ///    Returns the number of bytes sent.
 ///
 /// A shell with a flash also drains `poll_flash`, and answers by `handle_flash`.

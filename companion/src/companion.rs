@@ -39,8 +39,8 @@ const WARNING_EVERY: Duration = Duration::from_secs(5);
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 /// Limits of the value that the companion sets for ArduCopter's `GUID_TIMEOUT`, the time without
 /// setpoints after which Guided mode stops the vehicle, seconds. Within the limits it is the time
-/// in which a vehicle at cruise speed covers the safety margin to walls. With the default of 3 s it
-/// would fly on into walls while a link stalls. The lower limit is four setpoint periods.
+/// in which a vehicle at cruise speed covers the safety margin to walls. With the default of 3 s a
+/// vehicle would fly on into walls while its link stalls. The lower limit is four setpoint periods.
 const GUID_TIMEOUT_RANGE_S: (f32, f32) = (0.2, 0.5);
 /// Maximum number of events that wait for the shell; when the queue is full a further event is
 /// dropped.
@@ -51,16 +51,20 @@ const MAX_EVENTS: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) config: Config<V>,
+    /// Time passed to the last call that takes one.
     pub(crate) now: Instant,
     pub(crate) timers: Timers,
     pub(crate) links: Links,
     pub(crate) telemetry: Telemetry,
     pub(crate) neighbours: Neighbours<V>,
     pub(crate) detours: Detours,
+    /// Requests to the autopilot, repeated until they take effect.
     pub(crate) handshake: Handshake,
     pub(crate) mission: Mission<W, G>,
     pub(crate) guidance: Guidance,
+    /// The other MAVLink services (files, parameters, TIMESYNC) and the flash store.
     pub(crate) services: Services,
+    /// Events that wait for the shell, oldest first.
     pub(crate) events: Deque<Event, MAX_EVENTS>,
 }
 
@@ -135,8 +139,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// System id of the neighbour that the safety filter stops for; if there is none, of the one
-    /// that deconfliction (`Advice`) stops for, at a gate or before a predicted conflict; 0 for
-    /// none.
+    /// that advice ([`planner_core::track::deconflict`]) stops for, at a gate or before a predicted
+    /// conflict, or by Algorithm 2 slows for; 0 for none.
     pub fn waiting_for(&self) -> u8 {
         match self.guidance.filter.blocker_id() {
             0 => self.guidance.advice.waiting_for_id,
@@ -144,7 +148,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Number of times that the safety filter stopped the vehicle.
+    /// Number of times that the safety filter stopped the vehicle since the companion's start.
     pub fn filter_stop_count(&self) -> u32 {
         self.guidance.filter.stop_count()
     }
@@ -167,9 +171,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.smoother.is_in_urgent_stop()
     }
 
-    /// Arc length that this vehicle has covered along its own path, metres; in the climb the height
-    /// still to climb, negative. On a detour the progress along it is added to the place where the
-    /// vehicle left its plan.
+    /// Arc length that this vehicle has covered along its own path, metres: before and in the climb
+    /// minus the height still to climb, in the last descent beyond the path's length. On a detour
+    /// the progress along it is added to the place where the vehicle left its plan.
     pub fn progress_m(&self) -> f32 {
         let left_at_m = if self.detours.is_on_detour() { self.detours.left_at_m() } else { 0.0 };
         self.guidance.reported_progress_m(self.mission.state(), &self.guidance_inputs())
@@ -197,8 +201,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.receive(link, bytes);
     }
 
-    /// Handles the planner's answer to a request of kind `wanted`. An answer that was not requested
-    /// is ignored.
+    /// Handles the planner's answer to a request of kind `wanted`. An answer that was not
+    /// requested, or for which the state no longer waits, is ignored.
     pub fn handle_plan(
         &mut self,
         now: Instant,
@@ -240,6 +244,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Some(self.timers.next_due())
     }
 
+    /// What guidance reads now of the plan, the telemetry and the roster.
     pub(crate) fn guidance_inputs(&self) -> GuidanceInputs<'_, W, G> {
         GuidanceInputs::new(
             self.mission.plan(),
@@ -249,8 +254,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         )
     }
 
-    /// State, climb, landing column and time limits, from which the requests to the autopilot are
-    /// made.
+    /// The state, the height of the climb, whether the column below the vehicle or above its pad is
+    /// clear, and times: from these follow the requests to the autopilot.
     fn handshake_context(&self) -> HandshakeContext {
         let time_in_state = self.mission.time_in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;
@@ -270,8 +275,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Starts requesting the telemetry streams; on the ground, disarmed, also the autopilot's
-    /// limits; guidance uses the default limits until these are read.
+    /// Starts requesting the telemetry streams; while disarmed, in a state without setpoints, also
+    /// the autopilot's limits. Guidance uses their defaults until they are read.
     fn request_streams(&mut self) {
         let situation = self.handshake_context();
         if self.handshake.begin_requesting_streams(

@@ -61,16 +61,17 @@ pub struct Config<const V: usize> {
     /// Radius plus safety margin to walls, metres: the clearance for which every edge of the
     /// roadmap was checked.
     pub required_clearance_m: f32,
-    /// Smallest distance between two vehicles' centres, metres.
+    /// Least distance that is kept between two vehicles' centres, metres.
     pub safety_distance_m: f32,
     /// Method by which the advice on speed and stops (`planner_core::track::deconflict`) keeps
     /// vehicles apart.
     pub method: Method,
-    /// Least error of the position estimate that is assumed, whatever accuracy the autopilot
-    /// reports, metres (`FLK_EST_M`): the operator vouches by it for the receiver.
+    /// Least bound of the position estimate's error that is assumed, whatever accuracy the
+    /// autopilot reports, metres (`FLK_EST_M`). By this value the operator vouches for the
+    /// receiver.
     pub min_estimate_error_m: f32,
     /// Range within which the swarm's radio surely works, metres (`FLK_RADIO_M`). A neighbour that
-    /// falls silent beyond 0.7 of this range is taken to be out of range, not failed. With
+    /// was last heard beyond 0.7 of this range is taken to be out of range, not failed. With
     /// [`REACHES_ALL_M`] the radio reaches every vehicle, so any silence is a failure.
     pub radio_range_m: f32,
     /// Greatest horizontal distance between this vehicle and its pad with which it takes off,
@@ -84,7 +85,8 @@ pub struct Config<const V: usize> {
     /// Geofence: minimum and maximum corner of the box that this vehicle may be in, ENU metres.
     pub geofence: Option<(Point, Point)>,
     /// In a coverage mission, whose area is divided again after the loss of a vehicle: the longest
-    /// time that a lost vehicle takes to come down, seconds. `None` in a mission with goals.
+    /// time from when a vehicle was last heard until it is down, seconds. `None` in a mission with
+    /// goals.
     pub lost_vehicle_down_after_s: Option<f32>,
     /// Height range of the ground below a coverage mission whose ground is not level.
     pub ground: Option<UnevenGround>,
@@ -103,6 +105,7 @@ pub const REACHES_ALL_M: f32 = 10_000.0;
 #[derive(Clone, Debug)]
 pub struct CheckedConfig<const V: usize> {
     pub(crate) config: Config<V>,
+    /// First point of the vehicle's own path, ENU metres: above its pad.
     pub(crate) path_start: Point,
 }
 
@@ -113,7 +116,8 @@ pub enum ConfigError {
     NotInRoster,
     /// The roster is not sorted by system id, or names an id twice.
     RosterOrder,
-    /// A number is NaN or infinite, or a speed, acceleration or distance is not positive.
+    /// A number is NaN or infinite, a speed, acceleration or distance is not positive, or
+    /// `swarm_hz` is 0.
     NotPositive,
     /// The mission origin is not a place on earth.
     Origin,
@@ -177,8 +181,8 @@ impl<const V: usize> Config<V> {
 pub struct UnevenGround {
     /// Least height above the ground from which pictures are taken, metres.
     pub min_height_above_ground_m: f32,
-    /// Greatest height of paths above `min_height_above_ground_m`, metres: they lie between
-    /// `min_height_above_ground_m` and `height_m` + `tolerance_m` above the ground.
+    /// Height of the band in which paths lie, metres: paths lie between `min_height_above_ground_m`
+    /// and that height plus this one above the ground.
     pub height_tolerance_m: f32,
     /// Height of the lowest ground, ENU up in the mission frame, metres.
     pub low_m: f32,
@@ -189,17 +193,19 @@ pub struct UnevenGround {
 /// Reason why the shell's planner computed no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanFailure {
-    /// The roadmap or field of heights is absent, damaged or not that of the mission.
+    /// The mission, or the roadmap or field of heights that it needs, is absent, damaged or not the
+    /// mission's.
     RoadmapUnusable,
-    /// No route leads to the goal.
+    /// No route leads to the goal, or no detour was found.
     Unreachable,
     /// No departure time keeps this vehicle clear of the other vehicles' flights.
     Blocked,
     /// The planner did not answer in time.
     Late,
-    /// The plan is larger than this board's memory.
+    /// The plan, or the list of a detour's keep-out zones, is larger than this board's memory.
     Capacity,
-    /// The plan does not begin at this vehicle's start, or holds a number that is not finite.
+    /// The plan does not begin at this vehicle's start or holds a number that is not finite, or the
+    /// mission cannot be planned as it is.
     Invalid,
 }
 

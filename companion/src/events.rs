@@ -19,8 +19,9 @@ pub enum Link {
 pub enum PlanKind {
     /// The plan of the whole mission, for the flight from the pad.
     Mission,
-    /// A detour around an obstacle, or a path home or aside: [`crate::Companion::detour_request`]
-    /// has its start, its end and its keep-out zones.
+    /// A detour around an obstacle, a path home, or a path aside, out of a descending vehicle's
+    /// column or to a place to land at: [`crate::Companion::detour_request`] has its start, its end
+    /// and its keep-out zones.
     Detour,
     /// The plan that divides the rest of an area after losses:
     /// [`crate::Companion::division_inputs`] has the state of all vehicles at each division so far.
@@ -42,6 +43,7 @@ impl PlanKind {
 /// the details only when it begins.
 #[derive(Debug, Default)]
 pub struct PlanRequests {
+    /// `PlanKind::bit` of each kind with a waiting request.
     waiting_kinds: AtomicU8,
 }
 
@@ -78,7 +80,7 @@ pub enum Event {
         from: State,
         /// State after the transition.
         to: State,
-        /// STATUSTEXT of the table's row, empty if it has none.
+        /// STATUSTEXT of the table's row, empty if the row has none.
         text: &'static str,
         /// Whether the row's text is a warning: the mission leaves its usual course.
         warning: bool,
@@ -86,7 +88,7 @@ pub enum Event {
     /// This vehicle is back on its path in a coverage mission after a detour. Waypoints that the
     /// detour passed by are not photographed; the next start of the mission flies them.
     DetourSkippedWaypoints {
-        /// Number of waypoints that are left.
+        /// Number of waypoints that the detour passed by.
         count: u32,
     },
     /// This vehicle has waited for 30 s for a vehicle that was not started; repeated every 30 s

@@ -54,9 +54,9 @@ pub use self::smoother::SetpointStats;
 /// A vehicle this near to its reference, or to the end of a climb or a path, counts as there,
 /// metres.
 const ARRIVED_WITHIN_M: f32 = 0.35;
-/// Speed below which the vehicle stands at the end of its path, m/s.
+/// Speed below which the vehicle counts as standing at the end of its path, m/s.
 const AT_REST_MPS: f32 = 0.5;
-/// Speed below which the setpoint stands, m/s.
+/// Speed below which the setpoint counts as standing, m/s.
 const STANDING_SETPOINT_MPS: f32 = 0.05;
 /// A climb is done within this vertical distance of its top, metres.
 const CLIMB_DONE_WITHIN_M: f32 = 0.12;
@@ -72,16 +72,16 @@ const MAX_LEG_LEAD_M: f32 = 1.5;
 /// Greatest speed with which the setpoint of a vehicle on its pad follows the position estimate
 /// before the take-off, m/s.
 const MAX_PAD_DRIFT_MPS: f32 = 0.2;
-/// Length of path searched, to either side, for the point nearest to a vehicle after a pilot has
-/// flown it, metres.
+/// Length of path searched, forward and back from the reference, for the point nearest to a vehicle
+/// after a pilot has flown it, metres.
 pub const REJOIN_WINDOW_M: f32 = 5.0;
-/// Length of path searched, to either side, for the point nearest to a vehicle whose position was
-/// lost, metres: it stopped within its braking distance of the reference, so a position further
-/// along the path is not believed.
+/// Length of path searched, forward and back from the reference, for the point nearest to a vehicle
+/// whose position was lost, metres: it stopped within its braking distance of the reference, so a
+/// position further along the path is not believed.
 pub const REJOIN_WINDOW_AFTER_LOSS_M: f32 = 2.5;
 /// Length of path searched ahead of a reference that stepped back for the point nearest to the
-/// setpoint, metres: at the 1.5 m/s of a step back the setpoint stands up to 2 m ahead of it.
-/// By Algorithm 2 also searched, to either side, for the point nearest to the raw point.
+/// setpoint, metres: at the 1.5 m/s of a step back the setpoint stands up to 2 m ahead of it. By
+/// Algorithm 2 also searched, forward and back, for the point nearest to the raw point.
 const REFERENCE_RESET_WINDOW_M: f32 = 3.0;
 /// A nearest point this close to an end of the searched path counts as not found, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
@@ -110,6 +110,7 @@ const NO_ADVICE_YET: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, wai
 /// State of guidance: flight phase, raw point, smoother and safety filter.
 #[derive(Clone, Debug)]
 pub struct Guidance {
+    /// Limits of the reference along the path.
     track: TrackConfig,
     /// Limits of the reference along the legs of climb, join and descent.
     leg_track: TrackConfig,
@@ -123,10 +124,12 @@ pub struct Guidance {
     /// The smoother, which makes setpoints of raw points.
     pub smoother: SetpointSmoother,
     phase: Phase,
+    /// The reference on the path: its arc length and speed.
     tracker: ReferenceState,
     /// The straight leg of a climb, a join or a descent; `None` until the next step makes it, from
     /// where the setpoint stands.
     leg: Option<Path<2>>,
+    /// The reference on `leg`.
     leg_tracker: ReferenceState,
     /// The waypoint that the vehicle flies to by Algorithm 2 of the paper.
     waypoints: Algorithm2Waypoints,
@@ -146,11 +149,13 @@ pub struct Guidance {
     departs_later_by: Duration,
     /// Number of gates of the plan, from the first on, that have opened; they stay open.
     open_gate_count: usize,
+    /// Whether the path was begun ([`Self::start_following`]): only then `tracker` counts.
     has_begun_path: bool,
     /// Whether its path begins above its pad, so that it may join it from where it took off.
     path_begins_above_pad: bool,
     /// Whether it lands where a pilot, the autopilot or a lost position left it, off its path.
     lands_off_path: bool,
+    /// Lead of the setpoint over the vehicle at which the setpoint waits, metres.
     max_lead_m: f32,
     /// Arc length of the setpoint along the path, metres.
     pub(crate) setpoint_along_m: f32,
@@ -158,7 +163,6 @@ pub struct Guidance {
     pub(crate) stops_at_m: f32,
     /// Where along the path the reference could have stopped in the last step, metres.
     brakes_to_m: f32,
-    /// The safety filter.
     pub(crate) filter: SafetyFilter,
     /// Whether the vehicle reports that it holds its place, so that others may pass.
     pub(crate) hold: Hold,
@@ -170,11 +174,15 @@ pub struct Guidance {
     guides_landing: bool,
     /// Whether the raw point stops because the path ahead leaves the geofence.
     stopped_at_fence: bool,
+    /// Arc length at which the reference last made progress along the path, metres.
     last_progress_m: f32,
+    /// When the reference last made progress, along the path or in a descent.
     last_progress_at: Instant,
-    /// When the vehicle was last at its setpoint, or that last advanced; and where that was then.
+    /// When the vehicle was last at its setpoint, or the setpoint last advanced.
     followed_or_advanced_at: Instant,
+    /// Place of the setpoint at `followed_or_advanced_at`.
     setpoint_when_followed: Point,
+    /// Progress last reported to neighbours on this path, metres; −∞ for none.
     last_reported_progress_m: f32,
     /// Whether the vehicle flies back along its path, to the path's start.
     pub returning: bool,
@@ -190,8 +198,7 @@ pub struct Guidance {
     stop_ahead_m: f32,
     /// Place along the path where the vehicle holds for a division, metres; ∞ for none.
     division_hold_m: f32,
-    /// Place along the path to which the vehicle steps back from below one that descends, metres;
-    /// `None` if it does not step back.
+    /// Place along the path to which the vehicle steps back to evade, metres; `None` for none.
     step_back_to_m: Option<f32>,
     /// Whether no place back along the path is outside the columns of vehicles that descend.
     no_evade_place: bool,
@@ -202,14 +209,14 @@ pub struct Guidance {
     /// Height above the ground from which a guided descent is slow, or an autopilot that is not led
     /// to the ground lands by itself, metres.
     final_descent_height_m: f32,
-    /// Height of the lowest ground between pads, ENU up, metres; ∞ where only the pads' heights are
-    /// known.
+    /// Height of the lowest ground between pads, ENU up, metres; ∞ if only that of pads is known.
     lowest_ground_m: f32,
     /// Acceleration sent last: the setpoint's plus the correction towards it, with limited jerk.
     sent_acceleration: Point,
 }
 
 impl Guidance {
+    /// Guidance before any plan, with the limits of the settings and of the autopilot.
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let smoother = SetpointSmoother::new(MotionLimits::new(config, autopilot), config.geofence);
         let GuidanceLimits { track, leg_track, deconflict, fastest_vehicle_mps } =
@@ -302,7 +309,7 @@ impl Guidance {
     }
 
     /// One step of `dt_s` seconds: advice, safety filter, raw points, setpoint. Returns false where
-    /// a raw point was not sound, so that the smoother held instead of following it.
+    /// a raw point was not sound, so that the smoother held.
     pub fn step<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -323,8 +330,8 @@ impl Guidance {
             self.update_setpoint_along_m(&plan.path, dt_s);
             let along_m = if self.has_begun_path { self.tracker.along_m } else { -plan.climb_m };
             self.stops_at_m = match state.follows_path_or_is_blocked() {
-                // Also while the vehicle is stopped: the filter checks up to the stop even if that
-                // was advised too late.
+                // Never less than the braking distance, even if a nearer stop is advised: the
+                // filter checks up to where the vehicle really stops.
                 true => {
                     let least_m = track::braking_distance_m(&self.track, &plan.path, &self.tracker);
                     self.brakes_to_m = along_m + least_m;

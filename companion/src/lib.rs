@@ -46,7 +46,8 @@
 //!
 //! The mission is the transition table of [`mission`], the same for every autopilot. Mode numbers,
 //! type masks and stream rates of PX4 and ArduPilot are in [`autopilot::px4`] and
-//! [`autopilot::ardupilot`]; [`autopilot::AutopilotKind`] chooses between them by the HEARTBEAT.
+//! [`autopilot::ardupilot`]; [`autopilot::AutopilotKind`], known from the autopilot's first
+//! HEARTBEAT, chooses between them.
 #![no_std]
 #![forbid(unsafe_code)]
 

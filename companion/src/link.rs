@@ -63,6 +63,7 @@ pub(crate) struct Links {
     outboxes: [Outbox; 2],
     /// For each link, the [`OnDemandMessage`]s that are due: bit n for the n-th variant.
     due_bits: [u16; 2],
+    /// Limits the bytes that are sent to the radio beside the state messages.
     radio: RadioTokenBucket,
     sent_intents: SentIntents,
     answer_buckets: AnswerTokenBuckets,
@@ -70,8 +71,8 @@ pub(crate) struct Links {
 }
 
 impl Links {
-    /// Takes bytes off the front of `input`, received by `now`, up to the end of the next frame;
-    /// `None` once they hold no further whole frame.
+    /// Takes bytes off the front of `input`, received by `now`, up to the end of the next frame,
+    /// and returns that frame; `None` once they hold no further whole frame.
     pub(crate) fn receive(&mut self, link: Link, now: Instant, input: &mut &[u8]) -> Option<Frame> {
         self.framers[link as usize].next(now, input)
     }
@@ -81,7 +82,7 @@ impl Links {
         self.framers[link as usize].counters()
     }
 
-    /// Messages dropped because a link's queue was full.
+    /// Number of messages dropped because a link's queue was full.
     pub(crate) fn dropped_messages(&self, link: Link) -> u32 {
         self.outboxes[link as usize].dropped()
     }
@@ -180,8 +181,8 @@ impl Links {
         }
     }
 
-    /// Queues a text about something that a sender did, with its system and component id as
-    /// numbers.
+    /// Queues on both links, with a rate limit, a text about something that a sender did; the
+    /// sender's system and component id replace the text's two `#`.
     pub(crate) fn send_text_with_sender(
         &mut self,
         now: Instant,
@@ -203,13 +204,15 @@ impl Links {
         self.send_text_with_sender(now, sender, command.log_text(), command.from);
     }
 
-    /// The answer given lately to the same command frame, of which this is a duplicate;
-    /// `Some(None)` if it got none; `None` for a frame that is no duplicate.
+    /// The `MAV_RESULT` with which an identical command frame was answered in the last 5 s;
+    /// `Some(None)` if it was not answered; `None` if none was received, so that this frame is no
+    /// duplicate.
     pub(crate) fn previous_answer(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
         self.command_history.previous_answer(frame, now)
     }
 
-    /// Remembers a command frame and its answer, so that a duplicate of it gets the same answer.
+    /// Remembers a command frame and the `MAV_RESULT` of its answer, so that a duplicate of the
+    /// frame gets the same answer.
     pub(crate) fn remember_answer(&mut self, frame: &Frame, result: Option<u8>, now: Instant) {
         self.command_history.remember(frame, result, now);
     }

@@ -4,7 +4,7 @@
 //! | what | value | unit | reason |
 //! |---|---|---|---|
 //! | hull | mission file | m | radius of the vehicle |
-//! | clearance | mission file | m | radius and safety margin: what every edge of the roadmap was tested at |
+//! | clearance | mission file | m | required clearance, radius + safety margin: every edge of the roadmap was tested to be this far from obstacles |
 //! | tracking, at cruise | [`CRUISE_TRACKING_ERROR_M`] | m | how far beside its path the vehicle flies, by its own estimate |
 //! | tracking, at a crawl | [`CRAWL_TRACKING_ERROR_M`] | m | the same, at a speed at which the vehicle could as well hover |
 //! | estimate | [`ACCURACY_FACTOR`] × the reported accuracy, at least `FLK_EST_M` | m | how far the estimate is from the truth |
@@ -15,7 +15,7 @@
 //! estimate's error. A bound above the part left at cruise refuses the start and slows the vehicle
 //! in flight; one above the part left at a crawl stops it. A bound of at most
 //! [`MIN_ESTIMATE_ERROR_BOUND_M`] refuses nothing: no receiver does better, and the operator chose
-//! the margin. A margin below that flies at the operator's risk.
+//! the margin. A mission whose margin is below that flies at the operator's risk.
 //!
 //! **What this cannot see.** The bound is only as honest as the estimator. In the recorded flights
 //! PX4's SIH reported 0.25 m while the estimate was 0.7 m off: a receiver's bias and a barometer's
@@ -26,30 +26,30 @@
 
 use crate::time::Duration;
 
-/// Time for which a vehicle of a coverage mission photographs on after a majority last reported
-/// that they hear it, seconds.
+/// Time for which a vehicle of a coverage mission photographs on after a majority of the vehicles
+/// that take part, or were lost, last reported that they hear it, seconds.
 pub(crate) const LEASE_S: u64 = 20;
-/// Time after which a vehicle notices that it is unheard, seconds: the greatest age of the report
-/// that renewed its lease.
+/// Longest time from when a vehicle was last heard until it notices that it is unheard, seconds:
+/// others report for 0.8 s more that they hear it, and such a report counts for 1 s.
 pub(crate) const UNHEARD_NOTICED_AFTER_S: f32 = 1.8;
 /// Part of [`max_unheard_travel_m`] for drift, and for the last centimetres of a stop, metres.
 pub(crate) const UNHEARD_TRAVEL_RESERVE_M: f32 = 0.67;
-/// Time for which an unheard vehicle flies on beyond where it was last heard, seconds: after 1 s
-/// without any message it stops. One that still hears others notices later, and flies back if it
-/// came further, where its way back is free.
+/// Time for which an unheard vehicle flies on at its speed from where it was last heard until it
+/// brakes, seconds: after 1 s without any message it stops. A vehicle that still hears others
+/// notices later; it flies back if it came further and its way back is free.
 const UNHEARD_FLIGHT_S: f32 = 1.3;
-/// Part of a message's delay for which it waits for the receiver's next step, seconds: it is in
-/// [`UNHEARD_FLIGHT_S`] already.
+/// Part of a message's delay, seconds: its wait for the receiver's next step. [`UNHEARD_FLIGHT_S`]
+/// contains this part already.
 const RECEIVER_STEP_DELAY_S: f32 = 0.05;
-/// Braking of an unheard vehicle, m/s².
+/// Deceleration with which an unheard vehicle is assumed to stop, m/s².
 const UNHEARD_BRAKING_MPS2: f32 = 1.5;
-/// Hardest stop of a vehicle that falls silent, m/s²: the braking of PX4's own modes.
+/// Deceleration of the hardest stop of a vehicle that falls silent, m/s²: that of PX4's own modes.
 const HARDEST_STOP_MPS2: f32 = 3.0;
 /// Time for which a vehicle flies on before its hardest stop, seconds.
 const DELAY_BEFORE_HARDEST_STOP_S: f32 = 0.3;
-/// Time in which a vehicle without power comes down at least, seconds: it flies on meanwhile.
+/// Least time that a vehicle without power takes to come down, seconds: it moves on meanwhile.
 pub(crate) const MIN_FALL_TIME_S: f32 = 0.6;
-/// Delay of the messages by which a lease is renewed, seconds.
+/// Delay that is allowed for the messages by which a lease is renewed, seconds.
 pub(crate) const LEASE_RENEWAL_DELAY_S: f32 = 2.0;
 /// Time under a pilot's control after which a vehicle counts as having left the plan and the
 /// mission: others fly around it and take over its part.
@@ -117,9 +117,10 @@ pub fn speed_share_for_error_bound(bound_m: f32, clearance_m: f32, radius_m: f32
 /// Least share of the cruise speed at which a vehicle is flown; slower it stops.
 const MIN_SPEED_SHARE: f32 = 0.1;
 
-/// Length of its path on which an unheard vehicle comes to rest, metres beyond where it was last
-/// heard, in a mission whose fastest vehicle flies at this speed: it notices, stops, and flies back
-/// if it came further. In a coverage mission it flies on as long as its lease allows.
+/// Greatest distance along its path, metres, from where an unheard vehicle was last heard to where
+/// it comes to rest, in a mission whose fastest vehicle flies at `fastest_mps`: it notices, stops,
+/// and flies back if it came further. Not in a coverage mission: there it flies on as long as its
+/// lease allows.
 pub(crate) fn max_unheard_travel_m(fastest_mps: f32) -> f32 {
     let stop_m = fastest_mps * fastest_mps / (2.0 * UNHEARD_BRAKING_MPS2);
     fastest_mps * UNHEARD_FLIGHT_S + stop_m + UNHEARD_TRAVEL_RESERVE_M
@@ -127,14 +128,14 @@ pub(crate) fn max_unheard_travel_m(fastest_mps: f32) -> f32 {
 
 /// Time, seconds, for which an unheard vehicle flies on beyond [`max_unheard_travel_m`] where
 /// messages take `delay_s`: those that it sent, and the reports that it is heard, are each late by
-/// that.
+/// `delay_s`.
 #[inline]
 pub(crate) fn unheard_flight_by_delay_s(delay_s: f32) -> f32 {
     if delay_s > RECEIVER_STEP_DELAY_S { 2.0 * (delay_s - RECEIVER_STEP_DELAY_S) } else { 0.0 }
 }
 
-/// Distance that a vehicle flies on at least, metres, once it was last heard at this speed: that of
-/// its hardest stop, or of a fall.
+/// Least distance that a vehicle flies on, metres, from where it was last heard at this speed: the
+/// shorter of its hardest stop and of a fall.
 pub(crate) fn min_unheard_travel_m(speed_mps: f32) -> f32 {
     let flies_for_s = DELAY_BEFORE_HARDEST_STOP_S + speed_mps / (2.0 * HARDEST_STOP_MPS2);
     speed_mps * libm::fminf(flies_for_s, MIN_FALL_TIME_S)

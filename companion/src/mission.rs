@@ -1,9 +1,9 @@
 //! The mission as an ordered transition table and a pure update function.
 //!
 //! [`first_applicable_row`] goes through [`TABLE`] from the top and takes the first row whose
-//! `from` holds the state and whose guard has held for the row's limit. Earlier rows have priority:
-//! those of the pilot and the failsafe come first. `docs/table.md` prints the same table, and a
-//! test compares the two.
+//! `from` contains the state and whose guard has been met for the row's limit. Earlier rows have
+//! priority: those of the pilot and the failsafe come first. `docs/table.md` prints the same table,
+//! and a test compares the two.
 
 pub(crate) mod course;
 mod guard;
@@ -25,8 +25,8 @@ pub use self::row::{Action, TransitionRow};
 pub use crate::state::State;
 pub use crate::state::interruption::{InterruptedStates, TargetState};
 
-/// Whether the table has a row from `state` with this guard. A command whose guard has none there
-/// is refused.
+/// Whether the table has a row from `state` with this guard. A command whose guard has no row from
+/// the state is refused.
 pub fn has_row_for(state: State, guard: Guard) -> bool {
     TABLE.iter().any(|row| row.guard == guard && row.from_mask & state_mask(&[state]) != 0)
 }

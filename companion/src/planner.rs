@@ -37,7 +37,8 @@ pub enum PlanStep {
 }
 
 /// Makes the plan that the companion of vehicle `system_id` has requested, with what it knows for
-/// this plan in `memory.own.inputs`: its part of the swarm's plan, or the given `detour`.
+/// this plan in `memory.own.inputs`: its part of the swarm's plan, or the detour that `requested`
+/// holds.
 ///
 /// # Errors
 /// [`PlanFailure`]: the reason why there is no plan.
@@ -132,7 +133,7 @@ fn plan_area<
     take_own_plan(swarm, index, &request.mission.header().schedule, schedule, out)
 }
 
-/// Plans a detour of a coverage mission: home above the area, or out of another vehicle's column.
+/// Plans a detour of a coverage mission: home above the area, aside, or back to the vehicle's path.
 /// Not inlined, for the reason at [`plan_area`].
 #[inline(never)]
 fn plan_area_detour<

@@ -30,6 +30,7 @@ pub(crate) struct ReceivedFrame<'a> {
     pub(crate) link: Link,
     pub(crate) sender: SenderKind,
     pub(crate) frame: &'a Frame,
+    /// When the frame was received.
     pub(crate) now: Instant,
     /// System id of this vehicle.
     pub(crate) own_system_id: u8,
@@ -70,6 +71,7 @@ impl ReceivedFrame<'_> {
 /// The MAVLink services, with the flash that keeps files and parameters.
 #[derive(Clone, Debug)]
 pub(crate) struct Services {
+    /// The flash store; `None` without a flash.
     store: Option<Store>,
     /// The parameters, where there is no flash to keep them.
     parameters: Parameters,
@@ -151,7 +153,7 @@ impl Services {
 
     /// Handles FILE_TRANSFER_PROTOCOL.
     pub(crate) fn handle_ftp(&mut self, heard: &ReceivedFrame<'_>, links: &mut Links) {
-        // An FTP request of another sender gets no answer: there are few sessions.
+        // An FTP request of another sender gets no answer: there is only one session.
         if self.store.is_none() || heard.sender != SenderKind::GroundStation {
             return;
         }
@@ -167,6 +169,7 @@ impl Services {
         (0..parameters::PARAMETER_COUNT).for_each(|index| self.send_parameter(heard, index, links));
     }
 
+    /// The values of the parameters, as stored in flash if there is one.
     pub(crate) fn parameters(&self) -> &Parameters {
         self.store.as_ref().map_or(&self.parameters, Store::parameters)
     }
@@ -248,6 +251,7 @@ impl Services {
     }
 }
 
+/// Answers with PARAM_ERROR; `index` is the one requested, −1 if the request had a name.
 fn refuse_parameter(
     heard: &ReceivedFrame<'_>,
     index: i16,

@@ -5,23 +5,24 @@ pub(crate) mod interruption;
 /// State of one vehicle's mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum State {
-    /// No HEARTBEAT of an autopilot was received yet.
+    /// No HEARTBEAT of an autopilot was received yet, or, before take-off is prepared, none for 3
+    /// s.
     #[default]
     WaitAutopilot,
-    /// Connected to the autopilot; its position or its EKF origin is not known yet.
+    /// Connected to the autopilot; its position or its EKF origin is not known.
     WaitPosition,
     /// The shell was asked for the vehicle's plan.
     Planning,
     /// The plan has come; waits for MISSION_START.
     Ready,
-    /// Started; waits on the pad, disarmed, for departure time and gates (PX4 would disarm after 10
-    /// s on the ground).
+    /// Started; waits on the pad for departure time and gates, or in reserve for a part of the
+    /// area. Waits disarmed, since PX4 would disarm after 10 s on the ground.
     Scheduled,
     /// Sends setpoints at the current position, before Offboard or Guided is requested.
     Streaming,
     /// Offboard or Guided was requested.
     Engaging,
-    /// Arming was requested.
+    /// Arming is requested, as soon as the column above the pad is free.
     Arming,
     /// NAV_TAKEOFF was requested from an autopilot that takes off by command only; with another
     /// autopilot the state is left at once.
@@ -34,7 +35,7 @@ pub enum State {
     Paused,
     /// Stands on the path, since no neighbour hears this vehicle or none is heard.
     SwarmLinkLost,
-    /// HEARTBEAT is missing in flight; the setpoint stops on the path.
+    /// HEARTBEAT is missing in flight; the setpoint stops on the path or in the climb.
     AutopilotSilent,
     /// The position is missing in flight, or jumped; the setpoint stops.
     PositionLost,
@@ -45,16 +46,19 @@ pub enum State {
     /// A pilot set a mode that the companion did not request; setpoints sent are the current
     /// position.
     PilotControl,
-    /// The autopilot's own failsafe acts: no setpoints are sent until it has landed.
+    /// The autopilot's own failsafe acts, or the companion was started in flight: no setpoints are
+    /// sent.
     Failsafe,
-    /// Landed and disarmed.
+    /// Landed at the goal and disarmed, or started without a goal or part to fly.
     Done,
     /// The mission was given up; MISSION_START plans again.
     Aborted,
-    /// Stands on the path, since a vehicle that left the plan, or an obstacle, blocks it; waits
-    /// until all others stand.
+    /// Stands on the path, which a vehicle that left the plan or an obstacle blocks; waits until
+    /// the path is free or a detour may be requested. In a coverage mission also: stops to request
+    /// a path home.
     Blocked,
-    /// Holds its place; the shell was asked for a detour, a path home or a place to land.
+    /// Holds its place; the shell was asked for a detour, a path home, a path aside or a place to
+    /// land.
     Replanning,
     /// Waits on the pad, disarmed; the shell was asked for a detour.
     PadReplanning,
@@ -70,7 +74,7 @@ pub enum State {
     /// column below is free.
     LandingHeld,
     /// Holds on its path, in a coverage mission, until the rest of the area is divided among the
-    /// vehicles again.
+    /// vehicles again, or, after a detour, until the rest of its own plan has come.
     Dividing,
 }
 
@@ -136,8 +140,9 @@ impl State {
         )
     }
 
-    /// Whether a vehicle in this state flies on along its coverage path while its lease lasts, even
-    /// if no other vehicle hears it, or is about to: it prepares its take-off or climbs.
+    /// Whether a vehicle in this state is on its coverage path, or is about to be: it prepares its
+    /// take-off or climbs. While its lease lasts it flies on along that path even if no other
+    /// vehicle hears it.
     pub(crate) fn may_fly_on_lease(self) -> bool {
         self.is_on_path() || self.prepares_take_off() || self.takes_off()
     }
@@ -287,7 +292,7 @@ impl State {
             || self == Self::Failsafe
     }
 
-    /// Whether the vehicle is on the ground after its flight.
+    /// Whether the vehicle is on the ground after its flight, or had none to make.
     pub(crate) fn has_landed(self) -> bool {
         matches!(self, Self::Disarm | Self::Done)
     }
@@ -297,7 +302,7 @@ impl State {
         matches!(self, Self::Done | Self::Aborted)
     }
 
-    /// Whether the companion has given up: the mission was, or the autopilot's own failsafe acts.
+    /// Whether the mission was given up, or the autopilot's own failsafe acts.
     pub fn has_given_up(self) -> bool {
         matches!(self, Self::Aborted | Self::Failsafe)
     }
@@ -377,15 +382,15 @@ impl State {
         }
     }
 
-    /// Whether a vehicle in this state is on its path, flying or holding: once it holds, only its
-    /// own mission moves it on.
+    /// Whether a vehicle in this state is on its path under this companion's control, flying or
+    /// holding.
     pub(crate) fn is_on_path(self) -> bool {
         use State::*;
         matches!(self, Follow | Paused | SwarmLinkLost | Blocked | Replanning | Dividing)
     }
 
     /// Whether a vehicle in a coverage mission is on its path and does not hold for a division yet,
-    /// so that it may promise where it will.
+    /// so that it may promise where it will hold.
     pub(crate) fn may_promise_hold(self) -> bool {
         self.is_on_path() && self != Self::Dividing
     }
@@ -395,8 +400,8 @@ impl State {
         self.is_on_path() || self == Self::Stopping
     }
 
-    /// Whether a landing that is requested in this state begins at the reference. In others the
-    /// vehicle is off its path, and the reference may be behind a wall.
+    /// Whether a landing that is requested in this state begins at the reference. In other states
+    /// the vehicle is off its path, and the reference may be behind a wall.
     pub(crate) fn lands_at_reference(self) -> bool {
         self.is_on_path_or_stopping() || matches!(self, Self::Land | Self::Disarm)
     }

@@ -1,5 +1,6 @@
-//! The table of all timers: for each action the time at which it is due. How old an event is that a
-//! guard reads (when a vehicle was heard, since when a state lasts) the part knows that saw it.
+//! The table of all timers: for each action the time at which it is due. Times of past events that
+//! guards read (when a vehicle was heard, when a state was entered) are not here: the part that saw
+//! the event keeps its time.
 //!
 //! Three timers wake the shell ([`Timers::next_due`]): the control step, the heartbeats, and the
 //! position and intent to the swarm. The others do not: their action runs in a later call, at or
@@ -7,7 +8,8 @@
 
 use crate::time::{Duration, Instant};
 
-/// Periodic actions, and actions that a delay or a rate limit holds back.
+/// Periodic actions, and actions that a delay or a rate limit holds back. "From then on" below is
+/// from the time at which the timer is due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Timer {
     /// A step of the control loop: guidance, mission table, setpoint.
@@ -61,7 +63,7 @@ pub(crate) enum Timer {
     ChargeReport,
 }
 
-/// Number of timers: the last one's place and one.
+/// Number of timers: the last variant's index plus one.
 const TIMER_COUNT: usize = Timer::ChargeReport as usize + 1;
 /// Timers that wake the shell.
 const WAKING_TIMERS: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
@@ -70,6 +72,7 @@ const WAKING_TIMERS: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Timers {
     due_at: [Instant; TIMER_COUNT],
+    /// When [`Self::step_s`] was last called.
     stepped_at: Instant,
 }
 

@@ -8,7 +8,7 @@ const fn halved_on_small_board(of: usize) -> usize {
     if cfg!(feature = "pico2") { of / 2 } else { of }
 }
 
-/// Most nodes of a roadmap, terminals included: 70 bytes each in the planning workspace.
+/// Most nodes of a roadmap, starts and goals included: 70 bytes each in the planning workspace.
 pub const ROADMAP_NODES: usize = halved_on_small_board(4096);
 /// Most half-edges of a roadmap (two per edge): 4 bytes each in flash, and 8 bytes for each edge
 /// while a roadmap is built on board.

@@ -40,7 +40,7 @@ enum RunEnd {
     Runs = 0x464c_4b22,
     /// The program ended by a panic or a fault.
     Crashed = 0x464c_4b21,
-    /// An operator requested the restart.
+    /// The restart was requested, by an operator or by the shell.
     RestartRequested = 0x464c_4b23,
 }
 
@@ -59,13 +59,15 @@ pub enum FileWork {
     Plan = 3,
 }
 
-/// A kind of work, and the checksum of the files it works on.
+/// A kind of work that runs, and the checksum of the files that it works on.
 type RunningWork = (FileWork, u32);
 
 /// The record that is kept over a warm reset.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CrashRecord {
+    /// How the run ended; `Runs` until it ends.
     end: RunEnd,
+    /// STATUSTEXT about a crash.
     text: String<MAX_TEXT_LEN>,
     /// File work that runs now; `FileWork::None` while none runs.
     running: RunningWork,
@@ -127,7 +129,7 @@ impl CrashRecord {
         self.end == RunEnd::Crashed
     }
 
-    /// Notes that an operator requested the restart.
+    /// Notes that the restart was requested, by an operator or by the shell.
     pub fn note_requested_restart(&mut self) {
         self.end = RunEnd::RestartRequested;
     }

@@ -2,7 +2,7 @@
 
 use companion::storage::store::{FlashFault, ReadFlash};
 
-/// A board's flash for files and parameters; offsets count from the first byte of its storage part.
+/// A board's flash for files and parameters; offsets count from the first byte of its storage bank.
 pub trait Flash: ReadFlash {
     /// Erases the sector that begins at offset `at`.
     fn erase(&mut self, at: u32) -> impl Future<Output = Result<(), FlashFault>>;

@@ -19,11 +19,12 @@ impl Deref for LentFlash {
 /// Keeps track of the lent range of a flash; at most one range is lent at a time.
 #[derive(Debug, Default)]
 pub struct FlashLender {
+    /// Offsets of the lent bytes in the flash.
     lent: Option<Range<u32>>,
 }
 
 impl FlashLender {
-    /// A lender of which nothing is lent.
+    /// A lender that has lent nothing.
     pub const fn new() -> Self {
         Self { lent: None }
     }

@@ -95,6 +95,7 @@ type UartEnds = (Receiver, Transmitter);
 
 /// Messages about the start, sent to the operator by STATUSTEXT.
 struct StartReport {
+    /// Text about the last run's end; `None` if there is nothing to report.
     crashed: Option<String<50>>,
     warnings: Vec<&'static str, MAX_WARNINGS>,
 }

@@ -38,9 +38,7 @@ const UART_REPORT_EVERY: Duration = Duration::from_secs(10);
 /// STATUSTEXT of each link: errors of its UART, and frames with a bad CRC or cut short.
 const UART_ERROR_TEXTS: [&str; 2] =
     ["Autopilot line: # errors, # damaged frames", "Radio line: # errors, # damaged frames"];
-
-/// Time from the request of a restart to the restart, milliseconds, in which queued messages are
-/// sent.
+/// Time from the request of a restart to the restart, milliseconds: queued messages are sent in it.
 const FLUSH_BEFORE_RESTART_MS: u32 = 200;
 
 type TaskSignal<T> = Signal<CriticalSectionRawMutex, T>;
@@ -127,7 +125,6 @@ impl AutopilotListener {
             let beats = frame.message_id == HEARTBEAT;
             match self.heard.iter_mut().find(|(id, ..)| *id == frame.system) {
                 Some((_, frames, beat)) => (*frames, *beat) = (*frames + 1, *beat || beats),
-                // No room for a further autopilot: its frames are not counted.
                 None => _ = self.heard.push((frame.system, 1, beats)),
             }
         }
@@ -153,8 +150,10 @@ pub enum OnAutopilot {
 /// autopilot. Until then the watchdog is fed although no task checks in.
 pub const START_TIMEOUT_MS: u32 = 20_000;
 
+/// Message id of HEARTBEAT.
 const HEARTBEAT: u32 = 0;
 const TASK_COUNT: usize = 5;
+/// Index of the timer task in [`Shell::checked_in_ms`].
 const TIMER_TASK: usize = 4;
 
 /// Time since the board's start, in the companion's type.
@@ -162,6 +161,7 @@ pub fn now() -> companion::Instant {
     companion::Instant::from_micros(Instant::now().as_micros())
 }
 
+/// Time since the board's start, milliseconds; wraps after 49 days.
 fn now_ms() -> u32 {
     Instant::now().as_millis() as u32
 }
@@ -427,8 +427,8 @@ impl Default for Shell {
 }
 
 /// Number of setpoints in a flight and the longest gap between two, by the board's clock. The
-/// stream ends when [`BoardCompanion::streams_setpoints`] turns false, not at a pause: else the
-/// longest gaps would not be counted.
+/// stream ends when [`BoardCompanion::streams_setpoints`] turns false, not when no setpoint comes
+/// for a while: else the longest gaps would not be counted.
 struct SetpointGaps {
     count: AtomicU32,
     /// Longest gap, milliseconds: between two setpoints, from the stream's start to the first one,
@@ -469,6 +469,7 @@ impl SetpointGaps {
         self.set_last(now_ms, 0);
     }
 
+    /// Counts the gap from the last setpoint, or the stream's start, to now; then sets `last_ms`.
     fn set_last(&self, now_ms: u32, next_ms: u32) {
         if let Some(gap_ms) = elapsed_ms(self.last_ms.swap(next_ms, Ordering::Relaxed), now_ms) {
             self.longest_gap_ms.fetch_max(gap_ms, Ordering::Relaxed);

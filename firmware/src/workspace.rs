@@ -28,9 +28,11 @@ pub type CoveragePlanWorkspace = AreaWorkspace<AREA_VERTICES, LANES, VEHICLES, N
 /// The memory for all three uses, as large as the largest; a board has one.
 pub struct WorkspaceOverlay {
     memory: Memory,
+    /// Present use of the memory.
     used: OverlayUse,
 }
 
+/// Use of the overlay's memory.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum OverlayUse {
     RoadmapPlan,
@@ -56,8 +58,8 @@ const ALL_ZEROS: (PlannerWorkspace, RoadmapBuilder, CoveragePlanWorkspace) = {
 };
 
 impl WorkspaceOverlay {
-    /// Empty, in use for planning; its bytes are all zeros, so a static of it lies in .bss and
-    /// takes no flash.
+    /// Empty, in use for planning on a roadmap; its bytes are all zeros, so a static of it lies in
+    /// .bss and takes no flash.
     pub const fn new() -> Self {
         Self {
             memory: Memory { plan: ManuallyDrop::new(PlannerWorkspace::new()) },

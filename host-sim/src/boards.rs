@@ -47,7 +47,8 @@ pub struct PortBytes {
 pub struct GrantResult {
     /// The board's time at the end of the grant, microseconds since its start.
     pub now_us: u64,
-    /// Whether the board reset instead of finishing the grant: its time then begins at zero.
+    /// Whether the board started or reset instead of finishing the grant: its time then begins at
+    /// zero, and `sent` is empty.
     pub restarted: bool,
     /// Bytes that the board sent during the grant, in order.
     pub sent: Vec<PortBytes>,
@@ -59,7 +60,9 @@ pub struct GrantResult {
 #[derive(Debug)]
 pub struct EmulatedBoard {
     qemu: Child,
+    /// QEMU's standard input, by which the host sends messages.
     input: ChildStdin,
+    /// The board's answers, which a thread reads from QEMU's file descriptor 3.
     answers: Receiver<anyhow::Result<GrantResult>>,
     now_us: u64,
 }
@@ -114,12 +117,12 @@ impl EmulatedBoard {
         self.now_us
     }
 
-    /// Grants the board time until `until_us`, and hands over the bytes that its ports receive
-    /// until then, sorted by time. The caller has to call
+    /// Grants the board time until `until_us`, and hands over `pieces`: the bytes that its ports
+    /// receive until then, sorted by time. The caller has to call
     /// [`wait_for_grant_end`](Self::wait_for_grant_end) next.
     ///
     /// # Errors
-    /// The QEMU process has ended.
+    /// The QEMU process has ended, or the bytes are too many for one message.
     pub fn begin_grant(&mut self, until_us: u64, pieces: &[PortBytes]) -> anyhow::Result<()> {
         let mut message = Vec::new();
         for PortBytes { port, at_us, bytes } in pieces {
@@ -172,6 +175,7 @@ impl EmulatedBoard {
         self.wait_for_grant_end()
     }
 
+    /// Sends a message to the board, with its length before it.
     fn send(&mut self, message: &[u8]) -> anyhow::Result<()> {
         ensure!(
             message.len() <= MAX_MESSAGE_LEN,

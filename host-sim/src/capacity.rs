@@ -61,9 +61,10 @@ pub struct BoardCapacity {
     pub lanes: usize,
 }
 
-/// Most convex corners of an area's no-fly zones; the same on every board.
+/// Most convex corners of all no-fly zones of an area together; the same on every board.
 pub const BOARD_NO_FLY_CORNERS: usize = 32;
 
+/// Most bytes of a roadmap file that a slot of this flash holds.
 const fn max_roadmap_file_len(layout: &FlashLayout) -> usize {
     (layout.slot_len - DATA_OFFSET) as usize
 }
@@ -93,7 +94,7 @@ pub const PICO2: BoardCapacity = BoardCapacity {
     ..NUCLEO_H743
 };
 
-/// All boards; the first has the greatest capacities.
+/// All boards; no other exceeds a capacity of the first.
 pub const BOARDS: [BoardCapacity; 3] =
     [NUCLEO_H743, BoardCapacity { name: "qemu", ..NUCLEO_H743 }, PICO2];
 
@@ -137,6 +138,8 @@ impl BoardCapacity {
         self.first_excess(&[("gates of one vehicle", gates, self.gates)])
     }
 
+    /// Text about the first of `limits` that is exceeded: what is counted, its count, and the most
+    /// that the board holds.
     fn first_excess(&self, limits: &[(&str, usize, usize)]) -> Option<String> {
         let over = limits.iter().find(|(_, count, most)| count > most);
         over.map(|(what, count, most)| format!("{count} {what}, {} holds {most}", self.name))

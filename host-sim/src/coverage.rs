@@ -368,8 +368,8 @@ fn check_starts_outside_zones(
     Ok(())
 }
 
-/// Index of the first no-fly zone that holds a place, among the area's no-fly zones; `None` if none
-/// does.
+/// Index of the first no-fly zone that contains a place, among the area's no-fly zones; `None` if
+/// none does.
 fn no_fly_zone_at(area: &Area<'_>, place: &Flat) -> Option<usize> {
     let zones = area.rings().iter().enumerate().filter(|(_, ring)| ring.kind == RingKind::NoFly);
     let holds = |(index, _): (usize, &Ring)| {
@@ -445,8 +445,8 @@ fn imitate_exact_plan<const L: usize, const N: usize, const K: usize>(
     let mut packed_m = 0.0;
     for (share, route) in shares.iter_mut().zip(&exact.routes) {
         let end_m = work.tracks.distance_to_waypoint_m(route.waypoint_end - 1);
-        // A share of length 0 would get no waypoint, but the path's first waypoint alone has
-        // length 0.
+        // A share of length 0 would get no waypoint, but a route of the path's first waypoint alone
+        // has length 0.
         *share = (end_m - packed_m).max(MIN_SHARE_M);
         packed_m = end_m;
     }

@@ -2,8 +2,8 @@
 //!
 //! Only regular files are read: a FIFO without a writer, a terminal or `/dev/zero` would never end.
 //! Before a command computes anything it checks that its results can be written. Each result is
-//! written to a temporary file beside its target; all are renamed to their targets at the end, once
-//! every one is complete.
+//! written to a temporary file in the results' directory; all are renamed to their targets at the
+//! end, once every one is complete.
 
 use std::fs;
 use std::io::{self, Read as _, Write as _};
@@ -62,6 +62,7 @@ pub struct ResultFiles {
     /// Directories that were created for the results, the innermost first; removed unless
     /// committed.
     created_dirs: Vec<PathBuf>,
+    /// The results so far: temporary file and target of each.
     files: Vec<(NamedTempFile, PathBuf)>,
 }
 
@@ -117,6 +118,7 @@ impl ResultFiles {
         }
     }
 
+    /// A new empty file in the directory, with a temporary name.
     fn temporary_file(&self) -> anyhow::Result<NamedTempFile> {
         let mut builder = tempfile::Builder::new();
         builder.prefix(".flockmate-");

@@ -82,6 +82,7 @@ impl HostFlash {
         self.bytes
     }
 
+    /// Changes `len` bytes from offset `at` of the bank on, in memory and in the file.
     fn modify_range(
         &mut self,
         at: u32,

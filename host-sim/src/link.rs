@@ -131,7 +131,8 @@ impl LinkUrl {
         })
     }
 
-    /// This URL with the port that the system chose for port 0; unchanged for other kinds of links.
+    /// For a link that listens, this URL with the address to which `link` is bound: it has the port
+    /// that the system chose for port 0. For other kinds of links, this URL unchanged.
     pub fn with_bound_port(&self, link: &dyn ByteLink) -> Self {
         match (self, link.local_address()) {
             (Self::TcpListen(_), Some(at)) => Self::TcpListen(at.to_string()),
@@ -140,6 +141,7 @@ impl LinkUrl {
         }
     }
 
+    /// Opens the link without reconnecting later; waits at most `timeout` for a TCP connection.
     fn open_once(&self, timeout: Duration) -> Result<Box<dyn ByteLink>, LinkError> {
         let failed = |why| LinkError::Open { url: self.clone(), why };
         match self {

@@ -42,7 +42,7 @@ enum HostSimCommand {
     Radio(commands::radio::Args),
 }
 
-/// Exit code for bad input; a mission that was run and failed exits with 1.
+/// Exit code for bad input and every other error; a mission that was run and failed exits with 1.
 const BAD_INPUT: u8 = 2;
 
 fn main() -> ExitCode {
@@ -102,7 +102,7 @@ fn print_help_or_argument_error(error: &clap::Error) -> anyhow::Result<ExitCode>
     let text = quote::with_printable_arguments(&error.to_string(), arguments.into_iter().skip(1));
     let mut lines = text.lines().map(str::trim);
     let what: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
-    // clap's tip how to pass `-x` as a value is dropped: that is never what was meant.
+    // Clap's tip on how to pass `-x` as a value is dropped: hardly anyone means `-x` as a value.
     let tips = lines
         .filter_map(|line| line.strip_prefix("tip: "))
         .filter(|tip| !tip.starts_with("to pass"));

@@ -54,9 +54,9 @@ const MAX_VEHICLES_WITHOUT_EXTRA: usize = 12;
 /// Distance that has to remain between pads and goals beyond the separation from a parked vehicle,
 /// metres.
 const MIN_REMAINING_PAD_GAP_M: f32 = 0.1;
-/// Further deviation of one vehicle per m/s of peak gust, seconds. Gusts do not push two vehicles
-/// towards each other at the same time, so it is added only for one vehicle beside a parked one or
-/// a wall.
+/// Further deviation of one vehicle from its path, metres per m/s of peak gust, that is seconds.
+/// Gusts do not push two vehicles towards each other at the same time, so it is added only for one
+/// vehicle beside a parked one or a wall.
 pub const DEVIATION_PER_GUST_S: f32 = 0.05;
 
 /// Greatest horizontal distance of a position estimate from the truth, beyond the part that the
@@ -103,8 +103,8 @@ pub fn required_distances(
 /// of the command, and one check of the autopilot.
 pub const TRIGGER_DELAY_S: f32 = 0.15;
 
-/// Least distance between two pads, metres: one vehicle lands beside another that has landed, and
-/// both touch down off their pads.
+/// Least distance between two pads, centre to centre, metres: one vehicle lands beside another that
+/// has landed, and both touch down off their pads.
 pub fn min_pad_distance_m(
     simulation: &Simulation,
     safety_distance_m: f32,
@@ -128,7 +128,7 @@ fn touchdown_extra_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
     }
 }
 
-/// Greatest height of a vehicle's estimate above its true height, metres.
+/// Greatest amount by which a vehicle's estimated height exceeds its true height, metres.
 pub fn max_height_error_m(estimator: PositionErrors, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
         (PositionErrors::Perfect | PositionErrors::Rtk, _) => 0.15,
@@ -181,7 +181,8 @@ pub fn extra_beside_parked_m(parked_m: f32, pads: &[Point], landed: &[Point]) ->
     (apart_m - MIN_REMAINING_PAD_GAP_M - parked_m).clamp(0.0, MAX_EXTRA_BESIDE_PARKED_M)
 }
 
-/// Distance between a flight path and a vehicle parked on the ground, metres.
+/// Least distance between a flight path and a vehicle parked on the ground, centre to centre,
+/// metres.
 pub fn parked_separation_m(
     simulation: &Simulation,
     safety_distance_m: f32,

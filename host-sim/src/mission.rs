@@ -242,8 +242,8 @@ impl PreparedMission {
     /// for a coverage mission.
     pub fn unserved(&self, plan: &HostPlan) -> Unserved {
         if self.scenario.covers_area() {
-            // In a coverage plan a vehicle that stays on its pad is no shortage: it would not
-            // shorten the mission.
+            // In a coverage plan a vehicle that stays on its pad is no shortage: its flight would
+            // not shorten the mission.
             return Unserved::default();
         }
         let flown = |goal: &u16| plan.flights.iter().any(|f| f.task == Task::Goto(*goal));

@@ -11,7 +11,7 @@ use crate::result::{self, MissionResult, Safety, Timing};
 use crate::say;
 use crate::scenario::Scenario;
 
-/// Report page of a plan that was not flown: map, roadmap and planned paths.
+/// Report page of a plan: map, roadmap and planned paths; nothing that was flown.
 pub fn planned_page(
     mission: &PreparedMission,
     plan: &HostPlan,

@@ -35,6 +35,7 @@ pub fn page(data: &ReportData) -> anyhow::Result<String> {
     page::html(data)
 }
 
+/// Refuses inconsistent data.
 fn check(data: &ReportData) -> anyhow::Result<()> {
     if let Some(roadmap) = &data.roadmap {
         let nodes = roadmap.nodes.len();

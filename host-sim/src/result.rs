@@ -18,7 +18,8 @@ pub struct MissionResult {
     /// The seed used.
     pub seed: u64,
     /// Whether there was no contact, violation or deadlock, as many goals were served as vehicles
-    /// and goals allow, and every vehicle that no fault disabled did its task and landed.
+    /// and goals allow, and every vehicle that no fault disabled did its task and landed. A plan
+    /// has only to serve the goals; pictures have to show the whole area.
     pub complete: bool,
     /// One entry per vehicle.
     pub vehicles: Vec<VehicleResult>,
@@ -72,7 +73,8 @@ pub struct CoverageResult {
     pub gap_to_lower_bound: f64,
     /// What triggers the camera: `distance`, `waypoint` or `none`.
     pub trigger: &'static str,
-    /// Number of pictures that companions requested.
+    /// Number of pictures planned or, after a flight, taken, those of earlier flights that it
+    /// continued included; 0 with `trigger` `none`.
     pub photos: u64,
     /// Number of waypoints photographed (with `trigger` `none`: flown) more than once.
     #[serde(rename = "twice")]
@@ -185,10 +187,11 @@ pub struct VehicleResult {
     pub path_m: f64,
     /// Length of the track that the vehicle flew, metres.
     pub flown_m: f64,
-    /// Time from take-off to landing, seconds.
+    /// Time from take-off to landing, seconds; in a plan, by nominal speeds.
     pub flight_time_s: f64,
     /// How the flight ended: the last state of the companion's mission, and, if a warning row of
-    /// the mission table led there, that row's text.
+    /// the mission table led there, that row's text. `no goal` if there was no flight to make;
+    /// `planned` for a flight of a plan.
     pub end: String,
 }
 
@@ -197,22 +200,22 @@ pub struct VehicleResult {
 pub struct Totals {
     /// Sum of all path lengths, metres.
     pub path_m: f64,
-    /// Time from the start command to the last landing, seconds; in a plan, the longest nominal
-    /// flight.
+    /// Time from the start command to the last landing, seconds; in a plan, the latest landing by
+    /// planned departures and nominal speeds.
     pub makespan_s: f64,
 }
 
 /// Smallest distances in the flight, and how often a limit was broken.
 #[derive(Clone, Debug, Serialize)]
 pub struct Safety {
-    /// Number of times a vehicle's body touched an obstacle, the floor in a take-off or landing not
-    /// counted.
+    /// Number of times a vehicle's body touched an obstacle, a falling vehicle or a wreck, the
+    /// floor in a take-off or landing not counted.
     pub wall_contacts: u32,
     /// Number of these contacts in which its pilot flew the vehicle; left out if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub wall_contacts_under_pilot: u32,
     /// Smallest distance from a vehicle's centre to an obstacle between take-off and landing,
-    /// metres.
+    /// metres; in a plan, from the planned paths. `None` if there is no such distance.
     pub min_clearance_m: Option<f64>,
     /// Smallest distance between the centres of two vehicles, at least one of them flying, metres.
     pub min_separation_m: Option<f64>,
@@ -250,9 +253,10 @@ pub struct Timing {
     pub roadmap_s: f64,
     /// Time of each part of the roadmap's construction.
     pub roadmap_parts: BuildTimes,
-    /// Searching the shortest paths that give the cost of each goal for each vehicle.
+    /// Searching the shortest paths that give the cost of each goal for each vehicle; in `cover`,
+    /// computing lanes and the paths around no-fly zones.
     pub search_s: f64,
-    /// Assigning goals to vehicles.
+    /// Assigning goals to vehicles; in `cover`, computing the routes.
     pub assignment_s: f64,
     /// The whole plan: search, assignment, schedule.
     pub plan_s: f64,

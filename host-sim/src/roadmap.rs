@@ -134,7 +134,8 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     (done, begun.elapsed().as_secs_f64())
 }
 
-/// The nodes of a roadmap: the terminals, then `config.nodes` random free ones.
+/// The nodes of a roadmap: the terminals (starts and goals), then `config.random_nodes` random free
+/// ones.
 pub fn sample(
     map: &VoxelMap,
     terminals: &[Point],

@@ -1,7 +1,8 @@
 //! Reads a scenario: everything a run depends on, in one TOML file.
 //!
-//! Every key has a default except the map, the vehicles and the goals. An unknown key, a value out
-//! of range, and two values that contradict each other are errors that name file, line and column.
+//! Every key has a default except the vehicles and the map with the goals, or the area in their
+//! place. An unknown key, a value out of range, and two values that contradict each other are
+//! errors that name file, line and column.
 //! Lengths are metres in the mission's ENU frame. Keys of features that are not built yet are read
 //! and then refused by name: see [`Scenario::check_supported`].
 

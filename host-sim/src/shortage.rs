@@ -20,7 +20,7 @@ use crate::mission::{HostPlan, PreparedMission};
 const WIDTH_STEP_M: f32 = 0.05;
 /// Largest map that is flooded, cells: the queues take up to 12 bytes a cell.
 const MAX_FLOODED_CELLS: usize = 1 << 25;
-/// Most goals that get a line of their own; `and N more` counts the rest.
+/// Most goals and vehicles together that get a line of their own; `and N more` counts the rest.
 const MAX_SHORTAGE_LINES: usize = 8;
 
 /// One line for each goal without a vehicle and each vehicle without a goal: its position, the
@@ -59,6 +59,7 @@ struct ShortageFindings<'a> {
     widest_clearances_m: BTreeMap<usize, Option<Vec<f32>>>,
 }
 
+/// The line about a goal that no vehicle flies to.
 fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
     let (mission, reach) = (asked.mission, &asked.reachability);
     let (at, vehicles) = (&mission.goals[goal], mission.tasks.len());
@@ -96,13 +97,15 @@ fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
     format!("{what}{place}: {why}")
 }
 
-/// Whether a goal's line has named a remedy: then no vehicle's line names one.
+/// Whether goals have lines, which name a remedy where the roadmap has no path: then vehicles'
+/// lines do not repeat it.
 #[derive(Clone, Copy)]
 enum RemedyStatus {
     Named,
     Unnamed,
 }
 
+/// The line about a vehicle that stays on its pad.
 fn vehicle_line(asked: &mut ShortageFindings<'_>, id: u8, remedy: RemedyStatus) -> String {
     let (mission, reach) = (asked.mission, &asked.reachability);
     let vehicle = mission.tasks.iter().position(|task| task.id == id).unwrap_or_default();

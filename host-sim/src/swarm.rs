@@ -134,11 +134,14 @@ struct SimulationRun<'a> {
     log: Vec<report::LogEvent>,
     photographed_before: Vec<WaypointRange>,
     true_positions: Vec<Point>,
+    /// Smallest distance of each vehicle from its goal so far; in a coverage mission horizontally
+    /// from its pad since it last came back there. Metres.
     nearest_to_end_m: Vec<f32>,
     /// Simulated time so far, seconds.
     t_s: f64,
     /// When some vehicle was last seen armed, or the start or a fault was still awaited, seconds.
     last_active_s: f64,
+    /// When the simulation ends, seconds; infinite until that is known.
     ends_at_s: f64,
 }
 
@@ -260,6 +263,7 @@ impl<'a> SimulationRun<'a> {
         })
     }
 
+    /// One step of 4 ms, from 0; `now_us` is the time at its end.
     fn step(&mut self, step: u64, now_us: u64) -> anyhow::Result<()> {
         let Self { mission, plan, planner, members, radio, true_positions: places, log, .. } = self;
         self.t_s = now_us as f64 * 1e-6;

@@ -2,7 +2,7 @@
 //!
 //! Source: MAVLink guide, "File Transfer Protocol". Several WRITE requests are under way at once. A
 //! request without an answer is sent again with the same sequence number. The timeout and the
-//! number of requests under way follow the link (`retransmission`).
+//! number of requests under way adapt to the link (`retransmission`).
 
 mod retransmission;
 
@@ -29,11 +29,17 @@ const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
 /// Period of HEARTBEAT, by which autopilots know that they have to forward messages to the client.
 const CLIENT_HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
 
+/// FTP opcode TerminateSession, which ends the upload.
 const TERMINATE: u8 = 1;
+/// FTP opcode ResetSessions.
 const RESET: u8 = 2;
+/// FTP opcode CreateFile.
 const CREATE: u8 = 6;
+/// FTP opcode WriteFile.
 const WRITE: u8 = 7;
+/// FTP opcode CalcFileCRC32.
 const CRC32: u8 = 14;
+/// FTP opcode of an answer that is no NAK.
 const ACK: u8 = 128;
 
 /// An FTP client on a link to a companion.
@@ -42,10 +48,13 @@ pub struct FtpClient {
     framer: Framer,
     began: Clock,
     next_heartbeat_at: Clock,
+    /// Sequence number of the next MAVLink frame.
     frame_sequence: u8,
     own_system: u8,
     target_system: Option<u8>,
+    /// FTP sequence number of the next request, and of the answer to the last one.
     sequence: u16,
+    /// FTP session of the upload.
     session: u8,
     retransmission: Retransmission,
 }
@@ -55,9 +64,11 @@ struct PendingWrite {
     request: [u8; PAYLOAD_LEN],
     data_len: usize,
     sent_at: Clock,
+    /// Whether the request was sent more than once.
     repeated: bool,
 }
 
+/// An answer of the companion: ACK or NAK.
 struct FtpReply {
     sequence: u16,
     session: u8,
@@ -156,6 +167,7 @@ impl FtpClient {
         )
     }
 
+    /// Payload of a request with the next sequence number; does not send it.
     fn request_payload(&mut self, opcode: u8, offset: u32, data: &[u8]) -> [u8; PAYLOAD_LEN] {
         let mut payload = [0; PAYLOAD_LEN];
         (payload[1], payload[2]) = (self.target_system.unwrap_or(0), COMPANION_COMPONENT);
@@ -174,6 +186,7 @@ impl FtpClient {
         self.send_frame(&out[..length])
     }
 
+    /// The FTP answers to this client that have arrived; waits a moment if no bytes have arrived.
     fn receive_answers(&mut self) -> anyhow::Result<Vec<FtpReply>> {
         let (us, frames) = ((self.own_system, COMPONENT_ID), self.receive_frames()?);
         let for_us = frames
@@ -311,6 +324,7 @@ pub fn ftp_crc32(bytes: &[u8]) -> u32 {
     crc::Crc::<u32>::new(&FTP).checksum(bytes)
 }
 
+/// Text about the error that the data of a NAK names.
 fn nak_reason(data: &[u8]) -> String {
     let known = match data {
         [2, 5, ..] => {

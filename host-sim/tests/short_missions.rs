@@ -33,7 +33,7 @@ fn too_few_nodes_and_too_wide_a_margin_are_distinguished() {
     );
     assert_eq!(reasons("[roadmap]\nnodes = 2300"), [""; 0]);
     assert_eq!(reasons("[roadmap]\nnodes = 10\npassages = true"), [""; 0]);
-    // No door of the demo's rooms leaves 1.5 m.
+    // No door of the demo's rooms leaves a clearance of 1.5 m.
     let margin = DEMO.replace("safety_margin_m = 0.5", "safety_margin_m = 1.2");
     assert!(margin.contains("safety_margin_m = 1.2"));
     let mut mission = PreparedMission::prepare(

@@ -28,7 +28,8 @@ fn file(nodes: usize, next: usize) -> Vec<u8> {
     bytes
 }
 
-/// Uploads it to a vehicle that says nothing; what the command says. Nothing may arrive.
+/// Uploads a file to a vehicle that does not answer, and checks that nothing arrives there; returns
+/// the command's error message.
 fn refused(file: &[u8], board: Option<&str>) -> String {
     let folder = tempfile::tempdir().expect("a temporary directory");
     let path = folder.path().join("roadmap.bin");

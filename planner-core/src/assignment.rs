@@ -8,10 +8,11 @@
 //!
 //! Beyond the paper: matrices that are not square, and pairs that are impossible (`f32::INFINITY`).
 //! The result has the largest possible number of pairs and, among those, the least total cost. No
-//! large number stands in for infinity. Jonker–Volgenant suffices if every row of the shorter side
-//! can be matched. If a row cannot, the matching starts again, with shortest augmenting paths from
-//! all free rows at once. After each path the matching is the cheapest of its size, so when no path
-//! is left it is the largest, and the cheapest of that size.
+//! large number stands in for infinity. A matrix with more rows than columns is transposed.
+//! Jonker–Volgenant suffices if every row can then be matched. If a row cannot, the matching starts
+//! again, with shortest augmenting paths from all free rows at once. After each path the matching
+//! is the cheapest of its size, so when no path is left it is the largest, and the cheapest of that
+//! size.
 //!
 //! Costs are f32 in any unit (metres, seconds), sums and dual prices f64.
 
@@ -33,22 +34,33 @@ pub struct Assignment {
     pub pair_count: usize,
     /// Sum of the pairs' costs.
     pub total_cost: f64,
-    /// The largest cost of a pair; minus infinity if there is none.
+    /// The largest cost of a pair; minus infinity if there are no pairs.
     pub largest_cost: f32,
 }
 
-/// Memory for matrices of up to `N` rows and `N` columns: 46 · `N` bytes. All-zero when new.
+/// Memory for matrices of up to `N` rows and `N` columns: 46 · `N` bytes. All-zero when new. Rows
+/// and columns are those after a transposition.
 pub struct AssignmentWorkspace<const N: usize> {
-    /// Dual price of each column. A free column's stays 0 unless the matrix is square.
+    /// Dual price of each column. The price of a column without a row stays 0 unless the matrix is
+    /// square.
     price: [f64; N],
+    /// Memory of a search: length of the shortest path found to each column, in reduced costs.
     distance: [f64; N],
+    /// Memory of a search: price of each settled column.
     settled_price: [f64; N],
+    /// Memory of a search: distance of each settled column.
     settled_distance: [f64; N],
+    /// Buffer for a copy of one row of costs.
     row_buffer: [f32; N],
+    /// Memory of a search: row from which it reached each column.
     predecessor_row: [u16; N],
+    /// Memory of a search: settled columns in the order in which they were settled.
     settled_cols: [u16; N],
+    /// Row that each column is matched to.
     row_of_col: [u16; N],
+    /// Column that each row is matched to.
     col_of_row: [u16; N],
+    /// Rows that are not matched yet.
     free_rows: [u16; N],
 }
 
@@ -70,6 +82,8 @@ impl<const N: usize> AssignmentWorkspace<N> {
         }
     }
 
+    /// Lends the workspace, cut to `rows` and `cols`, as the matching and as the memory of a
+    /// search. `rows` is at most `cols`.
     fn split_borrows(
         &mut self,
         rows: usize,
@@ -120,9 +134,10 @@ pub fn assign<const N: usize>(
 /// least total cost (mission objective "makespan"). Arguments as for [`assign`].
 ///
 /// The least largest cost is found by augmenting paths that minimise their largest edge, from all
-/// free rows at once. A larger matching needs an edge that leaves the columns reached within the
-/// present bound, so the bound is raised no further than necessary (O. Gross, "The bottleneck
-/// assignment problem", 1959).
+/// free rows at once. The bound is the largest cost of an edge used so far. If no augmenting path
+/// keeps within the bound, every larger matching needs a costlier edge, from a row that the search
+/// reached to a column that it did not reach. The search takes the cheapest of these, so it raises
+/// the bound no further than necessary (O. Gross, "The bottleneck assignment problem", 1959).
 pub fn assign_bottleneck<const N: usize>(
     costs: &[f32],
     rows: usize,
@@ -142,6 +157,7 @@ pub fn assign_bottleneck<const N: usize>(
     Ok(write_assignment(&costs, &ws.col_of_row, out))
 }
 
+/// Checks sizes and costs, and transposes the matrix if it has more rows than columns.
 fn check_inputs<'a>(
     costs: &'a [f32],
     rows: usize,
@@ -158,6 +174,7 @@ fn check_inputs<'a>(
     CostMatrix::new(costs, rows, cols)
 }
 
+/// Computes the assignment of least total cost; leaves the matching in `ws.col_of_row`.
 fn solve<const N: usize>(costs: &CostMatrix<'_>, ws: &mut AssignmentWorkspace<N>) {
     let (mut state, mut paths) = ws.split_borrows(costs.rows, costs.cols);
     state.reset();
@@ -170,6 +187,7 @@ fn solve<const N: usize>(costs: &CostMatrix<'_>, ws: &mut AssignmentWorkspace<N>
     }
 }
 
+/// Writes the matching to `out` in the caller's rows and columns, and returns its figures.
 fn write_assignment(
     costs: &CostMatrix<'_>,
     col_of_row: &[u16],

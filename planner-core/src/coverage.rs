@@ -9,7 +9,7 @@
 //! | `area.rs` | checked polygons: the area and its no-fly zones |
 //! | `sweep.rs` | the direction of the lanes: least width, rotating calipers |
 //! | `tracks.rs` | back-and-forth lanes, also over concave areas, holes and no-fly zones |
-//! | `strips.rs`, `lanes.rs` | the lanes of one direction are laid; the memory that holds lanes |
+//! | `strips.rs`, `lanes.rs` | the area cut into strips, with a lane along each; lanes as a path |
 //! | `patches.rs` | extra lanes for ground that a no-fly zone keeps the lanes from photographing |
 //! | `cells.rs` | lanes grouped into cells that are flown back and forth: an initial order |
 //! | `order.rs` | the order and the directions in which lanes are flown |
@@ -21,8 +21,8 @@
 //! | `exact.rs` | the division into contiguous routes whose largest cost is least |
 //! | `bound.rs` | a lower bound on that cost |
 //! | `flights.rs` | routes as flights of the swarm: paths, pictures, order |
-//! | `divide.rs` | the lanes left after the loss of a vehicle, as a path of its own |
-//! | `losses.rs` | these lanes divided among the remaining vehicles, from where they hold |
+//! | `divide.rs` | the lanes left after the loss of a vehicle, as a path of their own |
+//! | `losses.rs` | these lanes divided among the remaining vehicles, each from where it holds |
 //!
 //! Points are metres east and north in the mission frame: [`Flat`]. A lane is two points; its
 //! waypoints are computed from lane and index, not stored.
@@ -60,17 +60,20 @@ pub enum CoverageError {
     /// Lanes are further apart than an image is wide, or waypoints further than an image is long,
     /// so that ground between images is missed.
     Gaps,
-    /// The path has more lanes, or one lane is cut into more parts, than the memory holds.
+    /// There are more lanes or strips, more intervals along one line, or more ranges of
+    /// photographed waypoints than the memory holds.
     LanesFull,
     /// The no-fly zones have more convex corners than the memory holds.
     NoFlyFull,
-    /// No lane is left: the no-fly zones cover the whole area.
+    /// There is no lane: the no-fly zones cover the whole area, no waypoint is left to photograph,
+    /// or no given lane has a length.
     NothingToCover,
     /// The vehicle with this index is inside a no-fly zone.
     InsideNoFly(u8),
-    /// No path around the no-fly zones leads to a lane.
+    /// No path around the no-fly zones leads to some lane, or home from it.
     Unreachable,
-    /// The fleet has no vehicles, or more than the memory holds.
+    /// The fleet has no vehicles, or more than the memory holds; or routes, pads or statuses do not
+    /// match the vehicles.
     Vehicles,
     /// The workspace that the caller lends is too small.
     WorkspaceTooSmall,

@@ -6,11 +6,11 @@
 //! that), so times do not matter. It is the shortest roadmap path from where the vehicle hovers to
 //! its goal that keeps out of every [`KeepOutZone`]. It begins with the rest of the current leg,
 //! forward or back, which is known to be clear of walls. A vehicle that is inside a zone already
-//! only must not fly deeper into it. The column below a vehicle ends at the ground if the roadmap
-//! has the ground's height there.
+//! may fly on, but not deeper into the zone. The column below a vehicle ends at the ground if the
+//! roadmap has the ground's height there.
 //!
-//! ENU metres. Cost: two A*, with each edge checked against every [`KeepOutZone`], and each zone
-//! checked against every node.
+//! ENU metres. Cost: two A* (to land aside: two Dijkstra searches), with each edge checked against
+//! every [`KeepOutZone`]; and for each zone one pass over all nodes, for the ground's height.
 
 use core::ops::Range;
 
@@ -27,7 +27,7 @@ use crate::{Length, Point, SettingError};
 /// Sway of a hovering vehicle, metres: flying deeper into a zone by less than this is allowed.
 const HOVER_SWAY_M: f32 = 0.05;
 /// Rounding of a planned path, metres: flying deeper into a zone by less than this is allowed. The
-/// safety filter allows no more.
+/// safety filter ignores an approach of up to 0.003 m (`APPROACH_ROUNDING_M`).
 const PATH_APPROACH_ROUNDING_M: f32 = 0.002;
 
 /// Distance of centres at which two vehicles of 0.3 m radius touch, metres: a vehicle this near to
@@ -56,8 +56,9 @@ pub struct KeepOutZone {
 pub enum ZoneKind {
     /// Another vehicle may be anywhere along the axis: all of the zone is kept clear.
     Static,
-    /// A vehicle at `from` that descends to `to`: a detour may cross below that vehicle, but
-    /// neither rest there nor climb towards it.
+    /// A vehicle at `from` that descends to `to`: a detour may cross the zone well below that
+    /// vehicle, but may neither climb towards the vehicle nor land aside in the zone. Also a column
+    /// above a vehicle, in which a detour must not land aside.
     Descending,
     /// A vehicle on the ground below `from`: where the roadmap has the ground's height, only a
     /// column from the ground to the vehicle that lies on it is kept clear.
@@ -73,8 +74,9 @@ impl KeepOutZone {
         check_not_negative("radius_m", self.radius_m)
     }
 
-    /// The zone with its radius reduced to the distance of `here` from the axis less `nearer_m`, if
-    /// `here` is inside the zone: a vehicle that is too near already may still fly away.
+    /// If `here` is inside the zone, or outside by less than `nearer_m`: the zone with its radius
+    /// reduced to the distance of `here` from the axis less `nearer_m`. So a vehicle that is too
+    /// near already may still fly away.
     fn shrunk_to(&self, here: &Point, nearer_m: f32) -> Self {
         let now_sq = segments_distance_sq((here, here), (&self.from, &self.to));
         let far_m = self.radius_m + nearer_m;
@@ -85,9 +87,9 @@ impl KeepOutZone {
         Self { radius_m: fminf(self.radius_m, fmaxf(now_m - nearer_m, 0.0)), ..*self }
     }
 
-    /// The zone, ended at the ground below it if the roadmap has the ground's height: a vehicle
-    /// does not fall through a floor. For [`ZoneKind::Grounded`] its top is moved down to a vehicle
-    /// that lies there, too.
+    /// The zone, ended at the ground if its axis leads down and the roadmap has the ground's
+    /// height: a vehicle does not fall through a floor. For [`ZoneKind::Grounded`] the top of the
+    /// axis is also moved down, to the highest position of a vehicle that lies on that ground.
     fn clipped_to_ground(&self, view: &RoadmapView<'_>) -> Self {
         let falls = self.to.z < self.from.z;
         let Some((low_m, high_m)) = view.ground_z_range_near(&self.from).filter(|_| falls) else {
@@ -101,10 +103,11 @@ impl KeepOutZone {
         Self { from, to, ..*self }
     }
 
-    /// The part of the zone that may not be flown through. A descending vehicle and one that climbs
-    /// as fast may meet half way, so only the lower third of the space between `here` and the
-    /// vehicle above may be crossed. If that vehicle is within the radius already, the part is
-    /// empty.
+    /// The part of the zone that may not be flown through: all of it, unless the zone is
+    /// [`ZoneKind::Descending`]. A descending vehicle and one that climbs as fast may meet half
+    /// way, so only the lower third of the space between `here` and the zone around the vehicle
+    /// above may be crossed. If that vehicle is higher than `here` by no more than the radius, the
+    /// part is empty.
     pub(crate) fn impassable_part(&self, here: &Point) -> Self {
         if self.kind != ZoneKind::Descending {
             return *self;
@@ -123,6 +126,7 @@ impl KeepOutZone {
         self.intersects(place, place)
     }
 
+    /// Whether the segment from `a` to `b` comes nearer to the zone's axis than the radius.
     pub(crate) fn intersects(&self, a: &Point, b: &Point) -> bool {
         // Most legs are apart from the zone along one axis alone, which is cheaper to check than a
         // distance.
@@ -135,6 +139,7 @@ impl KeepOutZone {
         !(0..3).any(beside) && self.is_within_radius(a, b)
     }
 
+    /// As [`Self::intersects`], without the quick check along the axes.
     fn is_within_radius(&self, a: &Point, b: &Point) -> bool {
         segments_distance_sq((a, b), (&self.from, &self.to)) < self.radius_m * self.radius_m
     }
@@ -216,8 +221,8 @@ pub fn is_path_blocked<const W: usize>(
     false
 }
 
-/// Number of segments that [`is_path_blocked`] checks: the legs ahead of an arc length, the climb
-/// and the descent.
+/// Most segments that [`is_path_blocked`] checks: the legs ahead of an arc length, the climb and
+/// the descent.
 pub fn count_segments_ahead<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
     path.waypoints().len() - count_waypoints_up_to(path, along_m) + 2
 }
@@ -230,11 +235,13 @@ fn count_waypoints_up_to<const W: usize>(path: &Path<W>, along_m: f32) -> usize 
 /// Target of a detour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum DetourGoal {
-    /// A goal of the roadmap, by its index among the goals.
+    /// A goal of the roadmap, by its index among the goals (not its node index).
     RoadmapGoal(u16),
-    /// Over a height field, without a roadmap: the vehicle's own pad.
+    /// In a coverage mission, without a roadmap: the vehicle's own pad, or the place where the
+    /// vehicle rejoins its path.
     Home {
-        /// Point above the pad at which the detour ends, ENU metres in the mission frame.
+        /// Point at which the detour ends, above the pad or on the path, ENU metres in the mission
+        /// frame.
         above_pad: Point,
         /// Height of the layer in which the vehicle crosses the field, metres up in the mission
         /// frame.
@@ -248,12 +255,12 @@ pub struct DetourRequest {
     /// Whether the target is not `goal` but the nearest roadmap node (without a roadmap: free
     /// point) outside all zones, to land below it.
     pub land_aside: bool,
-    /// Position where the vehicle hovers, on the leg `leg`.
+    /// Position where the vehicle hovers, on the leg `leg` or a little beside it.
     pub here: Point,
     /// Ends of the leg on which the vehicle hovers: roadmap nodes, except that one end may be where
     /// an earlier detour began.
     pub leg: [Point; 2],
-    /// Distance from `leg` to the nearest obstacle, metres.
+    /// Clearance of the straight flight from `here` to either end of the leg, metres.
     pub leg_clearance_m: f32,
     /// Target of the detour.
     pub goal: DetourGoal,
@@ -267,7 +274,7 @@ pub struct DetourRequest {
 }
 
 impl DetourRequest {
-    /// Whether a place is inside the fence or on one of its faces.
+    /// Whether a place is inside the fence or on one of its faces; true without a fence.
     pub(crate) fn is_inside_fence(&self, place: &Point) -> bool {
         self.fence
             .is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
@@ -293,10 +300,12 @@ impl DetourRequest {
     }
 }
 
+/// Refuses a position that is not finite, by the given name.
 fn check_finite(name: &'static str, place: &Point) -> Result<(), SettingError> {
     if place.iter().all(|c| c.is_finite()) { Ok(()) } else { Err(SettingError(name)) }
 }
 
+/// Refuses a number that is negative, NaN or infinite, by the given name.
 fn check_not_negative(name: &'static str, number: f32) -> Result<(), SettingError> {
     if number >= 0.0 && number.is_finite() { Ok(()) } else { Err(SettingError(name)) }
 }
@@ -310,17 +319,17 @@ pub enum DetourError {
     Search(SearchError),
     /// The path has too many waypoints, or a coordinate that is not finite.
     Path(PathError),
-    /// The goal, or the column below it, is inside a keep-out zone.
+    /// The goal, or the column below it, enters the impassable part of a keep-out zone.
     GoalBlocked,
 }
 
-/// Greatest length of a path to a landing place aside, which also bounds that place's distance,
-/// metres.
+/// Greatest length of the roadmap path from the end of the current leg to a landing place aside,
+/// metres. Nodes at this straight distance from the vehicle, or further, are not flown to either.
 const MAX_SIDESTEP_M: f32 = 20.0;
 
 /// Writes the shortest path to the goal, or to a node aside, that keeps out of all `obstacles` to
 /// `out`. Changes `obstacles`: zones end at the ground, and a zone that contains the vehicle is
-/// shrunk. `nodes` is scratch memory.
+/// shrunk unless it is [`ZoneKind::Descending`]. `nodes` is scratch memory.
 pub fn plan_detour<const N: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
@@ -391,8 +400,8 @@ pub fn plan_detour<const N: usize, const W: usize>(
     failed
 }
 
-/// Of the nodes outside all `obstacles` that the search reached within [`MAX_SIDESTEP_M`], the one
-/// with the shortest path.
+/// Of the nodes outside all `obstacles` that the search in `ws` reached by a path shorter than
+/// [`MAX_SIDESTEP_M`], the one with the shortest path.
 fn nearest_place_aside<const N: usize>(
     view: &RoadmapView<'_>,
     obstacles: &[KeepOutZone],
@@ -404,23 +413,23 @@ fn nearest_place_aside<const N: usize>(
     reached.filter(rest).min_by(|&a, &b| ws.distance_m(a).total_cmp(&ws.distance_m(b)))
 }
 
-/// Shrinks each zone that contains the vehicle, so that the vehicle is on the zone's border; zones
-/// of descending vehicles are not changed.
+/// Shrinks each zone that contains the vehicle, so that the vehicle is just outside; zones of
+/// descending vehicles are not changed.
 pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.kind != ZoneKind::Descending) {
         let shrunk = obstacle.shrunk_to(here, PATH_APPROACH_ROUNDING_M);
         let is_inside = shrunk.radius_m < obstacle.radius_m;
         *obstacle = shrunk;
         if is_inside && obstacle.kind == ZoneKind::Static && obstacle.radius_m < TOUCHING_M {
-            // The vehicle is almost on the axis, as below a vehicle that comes down: every path out
-            // may first lead nearer to the axis.
+            // The vehicle is almost on the axis, as it is below another one that comes down: every
+            // path out may first lead nearer to the axis.
             obstacle.radius_m = 0.0;
         }
     }
 }
 
-/// As [`plan_detour`], written as a vehicle's plan: without gates, since all other vehicles stand
-/// while the detour is flown.
+/// As [`plan_detour`], written as a vehicle's plan: with plan CRC 0 and without gates, since all
+/// other vehicles stand while the detour is flown.
 pub fn plan_detour_for_vehicle<const N: usize, const W: usize, const G: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
@@ -440,6 +449,8 @@ pub fn plan_detour_for_vehicle<const N: usize, const W: usize, const G: usize>(
     Ok(())
 }
 
+/// Writes the path from the vehicle along `nodes`. The first leg has the clearance of the leg on
+/// which the vehicle hovers, each other one that of its edge.
 fn write_path<const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,

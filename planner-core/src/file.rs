@@ -6,7 +6,7 @@ use core::fmt;
 use crc::{CRC_32_ISO_HDLC, Crc};
 
 /// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final
-/// xor 0xFFFFFFFF. All users of a CRC-32 share this one instance, so its tables exist once.
+/// xor 0xFFFFFFFF. All file formats and plans share this one instance, so its tables exist once.
 pub static CRC32: Crc<u32, CrcTable> = Crc::<u32, CrcTable>::new(&CRC_32_ISO_HDLC);
 
 /// Lookup tables of [`CRC32`]: one table (1 kB) on a board, sixteen (16 kB) on a desktop, with

@@ -28,7 +28,8 @@ pub enum Task {
     /// The vehicle stays on its pad.
     #[default]
     Stay,
-    /// The vehicle flies to the goal with this index, and lands below it.
+    /// The vehicle flies to the goal with this index among the roadmap's goals, and lands below
+    /// that goal.
     Goto(u16),
     /// The vehicle takes pictures along lanes, and lands at the end of its path.
     Photograph(PicturePlan),
@@ -40,8 +41,8 @@ impl Task {
         *self != Self::Stay
     }
 
-    /// Index of the goal; `None` for a vehicle that stays, or that photographs and lands on its own
-    /// pad.
+    /// Index of the goal among the roadmap's goals; `None` for a vehicle that stays, or that
+    /// photographs and lands on its own pad.
     pub fn goal(&self) -> Option<u16> {
         match self {
             Self::Goto(goal) => Some(*goal),
@@ -71,10 +72,12 @@ pub struct Flight<const W: usize> {
     pub climb_m: f32,
     /// Height of the path's last waypoint above the ground below it, metres.
     pub descent_m: f32,
-    /// Scheduled take-off, seconds after the mission's start at nominal speeds.
+    /// Scheduled take-off, seconds after the mission's start, if all vehicles fly at nominal
+    /// speeds.
     pub depart_s: f32,
-    /// Length of the flight's longest timed segment, metres:
-    /// [`crate::schedule::DEFAULT_MAX_SEGMENT_M`], or a multiple of it on a long flight.
+    /// Greatest length that a timed segment of the flight may have, metres:
+    /// [`crate::schedule::DEFAULT_MAX_SEGMENT_M`], or on a long flight that length doubled once or
+    /// more.
     pub max_segment_m: f32,
 }
 
@@ -82,18 +85,19 @@ pub struct Flight<const W: usize> {
 /// reported progress of at least `open_from_progress_m`."
 ///
 /// Reported progress opens gates, so vehicles report it by these rules:
-/// - On its pad a vehicle reports −climb, in its climb minus the height that is left; in its
-///   descent it reports the path's length plus the height that it has come down.
+/// - On its pad a vehicle reports −`climb_m`; in its climb it reports the negative of the height
+///   that is left to climb; in its descent it reports the path's length plus the height that it has
+///   come down.
 /// - It reports no more than the arc length that its reference has reached, and at most
 ///   [`MAX_REPORTED_PROGRESS_LAG_M`] less once it stands.
 /// - It reports more than the path's length plus the descent only when it stands on the ground,
 ///   disarmed.
 ///
-/// So a vehicle that waits at a gate of its own has reported enough progress to open every gate
-/// that waits for it to leave the part behind it.
+/// So a vehicle A that waits at a gate has reported enough progress to open every gate at which
+/// another vehicle waits until A has left a stretch that A has flown already.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
-    /// Arc length on the own path before which the vehicle waits, metres; −climb is on the pad.
+    /// Arc length on the own path before which the vehicle waits, metres; −`climb_m` is on the pad.
     pub at_m: f32,
     /// Id of the vehicle to wait for.
     pub wait_for_id: u8,

@@ -26,7 +26,7 @@
 //! # Ok::<(), planner_core::map::voxel::GridError>(())
 //! ```
 //!
-//! `examples/ten_uavs.rs` continues from this map: roadmap, assignment, paths, schedule and gates
+//! `examples/ten_uavs.rs` continues from such a map: roadmap, assignment, paths, schedule and gates
 //! of ten UAVs.
 #![no_std]
 #![forbid(unsafe_code)]

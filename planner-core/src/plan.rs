@@ -4,8 +4,9 @@
 //! Every companion computes this plan, from the mission's starts and goals and never from live
 //! positions, so all get the same plan; they compare its CRC. As in paper P3D §3.3 there is one
 //! roadmap, and either a shortest path per vehicle (labelled) or the assignment of least total
-//! length over all pairs (unlabelled). The paper leaves out the order at shared stretches, which
-//! [`crate::schedule`] decides.
+//! length over all pairs (unlabelled). [`Objective::Makespan`], the least longest path, is not in
+//! the paper. The paper leaves out the order at shared stretches, which [`crate::schedule`]
+//! decides.
 //!
 //! Cost: one search per vehicle, one assignment, then at most 2 · (min(vehicles, 64) + 9) rounds,
 //! and 9 more where a vehicle would hover for long. In a round each vehicle takes one to three A*,
@@ -45,7 +46,8 @@ pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize
     schedule_flights(view, request, &goals, ws, out)
 }
 
-/// The goal of each vehicle of a request, `None` for one that stays on its pad.
+/// The goal of each vehicle of a request, as an index among the roadmap's goals; `None` for a
+/// vehicle that stays on its pad.
 pub type AssignedGoals<const V: usize> = Vec<Option<u16>, V>;
 
 /// First step: writes the length of the shortest path from every start to every goal into the
@@ -183,16 +185,16 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
 /// Time from when a vehicle has left a place until the schedule lets another one be there, seconds:
 /// the time that a vehicle waiting for the place takes until it flies in at full speed. The waiting
 /// vehicle is up to a second behind the reference that stops it at gates, progress is reported five
-/// times a second, and a vehicle that has to stop brakes before. Without this time each vehicle is
-/// later than the one before it, and vehicles that leave their pads on time wait in the air. Gates
-/// do not depend on this time.
+/// times a second, and a vehicle that has to stop brakes before. Without this time each vehicle
+/// falls further behind the schedule than the one before it, and vehicles that leave their pads on
+/// time wait in the air. Gates do not depend on this time.
 const HANDOVER_S: f32 = 2.0;
 /// Swarms of up to this many vehicles are planned without [`HANDOVER_S`]: in them no vehicle waits
-/// for many that wait themselves, and without the handover all land earlier.
+/// behind a long chain of vehicles that wait, and without the handover the swarm lands earlier.
 const MAX_VEHICLES_WITHOUT_HANDOVER: usize = 12;
 
-/// Plans paths and their order, then checks that the gates of each vehicle fit. The schedule lets a
-/// vehicle be at a place `handover_s` after another one has left it.
+/// Plans paths and their order, then checks that each vehicle has at most `request.max_gates`
+/// gates. The schedule lets a vehicle be at a place `handover_s` after another one has left it.
 #[inline(never)]
 fn schedule_with_handover<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
@@ -242,7 +244,7 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
     }
 }
 
-/// CRC-32 over everything that determines the gates.
+/// CRC-32 over ids, goals, and all numbers of settings and flights that determine the gates.
 fn crc<const V: usize, const W: usize>(cfg: &ScheduleConfig, plan: &SwarmPlan<V, W>) -> u32 {
     let mut digest = CRC32.digest();
     let mut numbers =

@@ -4,7 +4,7 @@
 //! Nodes are points of the mission frame. Each edge is stored once from each end (two half-edges)
 //! in compressed sparse rows, targets in ascending order. A half-edge takes four bytes: its length
 //! is computed from the nodes, its clearance is stored in whole millimetres, rounded down. So 4096
-//! nodes and 65536 half-edges take 320 kB, 32 kB more with landmarks. Because each edge carries its
+//! nodes and 65536 half-edges take 328 kB, 33 kB more with landmarks. Because each edge carries its
 //! own clearance, one roadmap built for a small required clearance serves vehicles of any size
 //! (paper P3D Table 1 from a single build).
 //!

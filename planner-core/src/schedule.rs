@@ -1,11 +1,11 @@
 //! Conflict-free schedules: which vehicle flies first where two paths come close.
 //!
-//! A flight is cut into timed segments of at most [`DEFAULT_MAX_SEGMENT_M`] metres, from the pad
-//! along the path to the ground below the goal. Vehicles are scheduled one after the other
-//! (prioritised planning, Erdmann and Lozano-Pérez 1987). Each waits on its pad for the shortest
-//! time after which its segments are never too near to those that vehicles scheduled before it hold
-//! at the same time. Waiting on the pad always suffices if each path keeps away from the pads and
-//! landing places of the others (a "well-formed" problem, Čáp et al. 2015).
+//! A flight is cut into timed segments of at most [`DEFAULT_MAX_SEGMENT_M`] metres (more on a long
+//! flight), from the pad along the path to the ground below the goal. Vehicles are scheduled one
+//! after the other (prioritised planning, Erdmann and Lozano-Pérez 1987). Each waits on its pad for
+//! the shortest time after which its segments are never too near to those that vehicles scheduled
+//! before it hold at the same time. Waiting on the pad always suffices if each path keeps away from
+//! the pads and landing places of the others (a "well-formed" problem, Čáp et al. 2015).
 //!
 //! In flight only the *order* of the schedule counts. For each pair of conflicting segments the
 //! later vehicle gets a [`Gate`]: it enters its segment only when the earlier vehicle has left its
@@ -50,10 +50,13 @@ const BEYOND_DESCENT_END_M: f32 = 0.01;
 /// Memory of [`earliest_departure`] and [`gates`].
 #[derive(Debug, Default)]
 pub struct ScheduleWorkspace {
+    /// Timed segments of the flight that is scheduled, or whose gates are sought.
     own: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
+    /// Timed segments of one other flight.
     other: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
     /// The segments of `own`, in blocks.
     blocks: OwnBlocks,
+    /// Take-off times at which the flight would be in conflict.
     forbidden: ForbiddenIntervals,
 }
 
@@ -67,6 +70,7 @@ impl ScheduleWorkspace {
 /// Forbidden intervals of take-off times, seconds, which do not overlap.
 type ForbiddenIntervals = Vec<(f32, f32), MAX_INTERVALS>;
 
+/// Adds the interval from `low` to `high`, seconds.
 fn add_forbidden_interval(forbidden: &mut ForbiddenIntervals, mut low: f32, mut high: f32) {
     // The new interval is merged with all that overlap it; if there is no room, with the nearest as
     // well.
@@ -139,8 +143,9 @@ pub(crate) fn departure_with_conflict_counts<const W: usize>(
                     let mut meets = false;
                     let near = near_own.iter().map(|&i| (usize::from(i), &own[usize::from(i)]));
                     for (i, p) in near.filter(|(_, p)| is_conflict(cfg, p, q)) {
-                        // Both segments are held at once iff p.from + d < q.to and q.from < p.to +
-                        // d, for a take-off at d.
+                        // For a take-off at `d` both segments are held at once iff p.held_from + d
+                        // < q.held_until and q.held_from < p.held_until + d, with the times of `q`
+                        // after the mission's start.
                         let from_s = other.depart_s + q.held_from_s - handover_s - p.held_until_s;
                         let to_s = other.depart_s + q.held_until_s + handover_s - p.held_from_s;
                         add_forbidden_interval(forbidden, from_s, to_s);
@@ -225,9 +230,9 @@ fn last_allowed_departure(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
 /// At the segment's end the vehicle may have to wait at a gate for another one, which itself waits
 /// until this segment is left. So [`MAX_REPORTED_PROGRESS_LAG_M`], by which a standing vehicle may
 /// report too little, is subtracted. The next segment begins at that end: either it is in conflict
-/// too and counts by itself, or it is clear, and then so is the end. A vehicle has left its pad
-/// when it is [`OFF_PAD_HEIGHT_M`] above the pad, however low its climb ends, and its descent when
-/// it stands on the ground.
+/// too and counts by itself, or it is clear, and then so is the end. A vehicle has left its pad no
+/// earlier than [`OFF_PAD_HEIGHT_M`] above the pad, even where the subtracted lag would give less.
+/// It has left its descent when it stands on the ground.
 fn progress_when_left_m<const W: usize>(q: &TimedSegment, flight: &Flight<W>) -> f32 {
     if q.end_m < flight.path.length_m() + flight.descent_m {
         fmaxf(q.end_m - MAX_REPORTED_PROGRESS_LAG_M, OFF_PAD_HEIGHT_M - flight.climb_m)
@@ -301,7 +306,8 @@ fn conflicting_blocks(ws: &ScheduleWorkspace) -> Option<[BlockSet; MAX_BLOCKS]> 
 }
 
 /// Passes the gates of flight `index`, whose segments are in `ws.own`, to `found`, one other
-/// vehicle after the other.
+/// vehicle after the other. Gates for one vehicle are merged within `merged_m` along the path, as
+/// [`gates`] describes.
 fn for_each_gate<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],

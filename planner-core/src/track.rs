@@ -121,7 +121,8 @@ const MIN_LEAD_LIMIT_M: f32 = 0.4;
 pub(crate) const LEAD_PER_SPEED_S: f32 = 0.8;
 /// Walking speed, m/s: at this speed [`MIN_LEAD_LIMIT_M`] covers an autopilot's lag.
 pub(crate) const WALKING_SPEED_MPS: f32 = 2.0;
-/// Distance from the end of the path at which the path counts as flown, metres.
+/// Distance from the end of the path within which a reference that has almost stopped counts as at
+/// the end, metres.
 const PATH_END_TOLERANCE_M: f32 = 0.01;
 
 /// Deviation from the path that a leg of this clearance allows: half of what the clearance leaves
@@ -177,9 +178,11 @@ fn max_stoppable_speed(accel: f32, twice_accel_distance: f32, later_s: f32) -> f
 
 /// The part of the path ahead of the reference.
 struct PathAhead<'a> {
+    /// All waypoints of the path, also those behind the reference.
     waypoints: &'a [Waypoint],
     /// Index of the next waypoint ahead.
     next_waypoint: usize,
+    /// Arc length of the reference, metres.
     along_m: f32,
     /// Distance from the reference within which it has to stop, metres.
     stop_within_m: f32,
@@ -228,8 +231,8 @@ impl PathAhead<'_> {
     }
 }
 
-/// Moves the reference by one step of `dt_s` (usually 0.01 to 0.2 s) and returns it; `None` if the
-/// path is empty.
+/// Moves the reference by one step of `dt_s` (usually 0.01 to 0.2 s; more than 1 s counts as 1 s)
+/// and returns it; `None` if the path is empty.
 ///
 /// `advice` limits speed and distance because of neighbours. The speed changes by no more than the
 /// leg's acceleration limit allows: a stop that is advised too late is overrun. Work: one pass over

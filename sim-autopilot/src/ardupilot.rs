@@ -7,7 +7,7 @@
 //! | armed, on the ground | NAV_TAKEOFF in Guided; `DISARM_DELAY` disarms. Setpoints do not lift the vehicle |
 //! | take-off | lifts off 2.07 s after the command (at the earliest 3.05 s after arming) and climbs; a setpoint ends it (before lift-off: stays on the ground) |
 //! | flying | on the ground for 1.6 s without a demand to climb: landed |
-//! | landed | in LAND and RTL disarms 0.4 s later, else after `DISARM_DELAY` |
+//! | landed | in LAND, RTL and a landing in AUTO disarms 0.4 s later, else after `DISARM_DELAY` |
 //!
 //! In Guided a velocity is held for `GUID_TIMEOUT` after the last setpoint, a position for ever.
 //! Times are arguments, in microseconds since boot; no clock is read.
@@ -97,8 +97,11 @@ pub const STREAMS: [(u32, u32); 25] = [
 /// Which failsafe is active.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Failsafe {
+    /// The ground station is silent: RTL.
     GroundStation,
+    /// There is no position: LAND.
     Estimator,
+    /// The battery is low: LAND or RTL.
     Battery,
 }
 
@@ -109,6 +112,7 @@ struct TakeOff {
     up: f32,
 }
 
+/// Leg of a return; `up` is its height, ENU metres (NaN: not computed yet).
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum RtlLeg {
     Climb { up: f32 },
@@ -122,8 +126,10 @@ enum RtlLeg {
 struct PhaseStartTimes {
     armed_us: u64,
     lifted_us: u64,
+    /// Since when the vehicle has stood armed on the ground without a take-off.
     idle_us: u64,
     landed_us: u64,
+    /// Since when the vehicle has touched the ground in flight without a demand to climb.
     touching_us: Option<u64>,
 }
 
@@ -134,8 +140,12 @@ pub struct Copter {
     pub params: Params,
     /// Values of the parameters that have an effect.
     pub tuning: CopterTuning,
+    /// Time from which on the estimator has a position while GPS has a fix, microseconds since
+    /// boot.
     position_ready_us: u64,
+    /// Whether the messages at the estimator's origin and at its first position have been sent.
     reported_origin_and_position: [bool; 2],
+    /// Time at which STAT_RUNTIME was last sent, microseconds since boot.
     runtime_sent_us: u64,
     armed: bool,
     since: PhaseStartTimes,
@@ -146,12 +156,15 @@ pub struct Copter {
     mode: CopterMode,
     failsafe: Option<Failsafe>,
     has_gps_fix: bool,
+    /// When the loss of the position was noticed in a mode that needs one, microseconds since boot.
     position_lost_us: Option<u64>,
     last_gcs_heartbeat_us: Option<u64>,
     takeoff: Option<TakeOff>,
+    /// Goal of Guided; other modes compute theirs in each step.
     goal: GuidedGoal,
     goal_set_us: u64,
     reference: CopterReference,
+    /// Horizontal speed limit by DO_CHANGE_SPEED, m/s; `None`: `WPNAV_SPEED`.
     commanded_speed: Option<f32>,
     rtl_leg: RtlLeg,
     auto: Auto,
@@ -206,6 +219,7 @@ impl Copter {
         self.has_gps_fix = fix == GpsFix::Held;
     }
 
+    /// Whether the estimator has a position.
     fn position_known(&self, now_us: u64) -> bool {
         self.has_gps_fix && now_us >= self.position_ready_us
     }
@@ -250,6 +264,7 @@ impl Copter {
         }
     }
 
+    /// Whether the estimator has an origin.
     fn origin_known(&self, now_us: u64) -> bool {
         now_us as f32 >= BOOT_TO_ORIGIN_SHARE * self.position_ready_us as f32
     }

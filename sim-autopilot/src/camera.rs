@@ -6,7 +6,7 @@
 //! another whenever the distance from the last picture is reached. ArduPilot's `AP_Camera` runs
 //! every 20 ms: it measures from where triggering is switched on or from the last picture, and
 //! takes a requested picture immediately. Both measure horizontally, on the estimated position. So
-//! pictures are farther apart than the distance, by what is flown between two checks. Each picture
+//! pictures are farther apart than commanded, by what is flown between two checks. Each picture
 //! is announced on every port, with the estimated position, by CAMERA_IMAGE_CAPTURED (263, PX4,
 //! counted from 0) or CAMERA_FEEDBACK (180, ArduPilot, counted from 1). Source:
 //! `camera_trigger.cpp`, `AP_Camera_Backend.cpp`.
@@ -47,9 +47,11 @@ pub struct CameraTrigger {
     measured_from: Option<[f32; 2]>,
     /// Whether a single picture was requested.
     picture_requested: bool,
+    /// Time of the next trigger check, microseconds since boot.
     next_poll_us: u64,
     /// Number of pictures since boot.
     pictures_taken: u32,
+    /// Photos that the referee has not fetched yet.
     photos: Vec<Photo>,
 }
 
@@ -97,16 +99,16 @@ impl CameraTrigger {
         estimate: Option<Point>,
     ) -> Option<u32> {
         let px4 = autopilot == SimulatedKind::Px4;
-        let looks = truth.time_us >= self.next_poll_us;
-        if looks {
+        let check_due = truth.time_us >= self.next_poll_us;
+        if check_due {
             self.next_poll_us += TRIGGER_CHECK_EVERY_US[usize::from(!px4)];
         }
-        let mut shoot = (looks || !px4) && core::mem::take(&mut self.picture_requested);
+        let mut shoot = (check_due || !px4) && core::mem::take(&mut self.picture_requested);
         if shoot {
             self.measured_from = estimate.map(|at| [at.x, at.y]);
         }
         if let (Some(distance_m), Some(at)) = (self.trigger_distance_m, estimate)
-            && looks
+            && check_due
         {
             let far = self
                 .measured_from

@@ -15,6 +15,7 @@ use crate::services::params::Encoding;
 use crate::{Autopilot, telemetry};
 
 impl Autopilot {
+    /// Handles a message that arrived at `port`, and queues its answer.
     pub(super) fn handle_frame(&mut self, port: usize, frame: &CheckedFrame) {
         let fields = PayloadReader::new(frame);
         let system_id = self.platform.config.system_id;
@@ -92,6 +93,7 @@ impl Autopilot {
         }
     }
 
+    /// Handles PARAM_REQUEST_READ: by index, or by name if the index is negative.
     fn handle_param_read(&mut self, port: usize, fields: &PayloadReader<'_>) {
         let index = fields.u16(0) as i16;
         match usize::try_from(index) {
@@ -109,8 +111,8 @@ impl Autopilot {
         self.send_named_param(port, name);
     }
 
-    /// Sends a parameter by its name; an unknown name gets no answer. ArduPilot answers a request
-    /// by name with 65535 instead of the index.
+    /// Sends a parameter by its name; an unknown name gets no answer. ArduPilot then reports 65535
+    /// instead of the index.
     fn send_named_param(&mut self, port: usize, name: Option<&str>) {
         let params = self.firmware.params();
         if let Some(index) = name.and_then(|name| params.index(name)) {
@@ -120,6 +122,7 @@ impl Autopilot {
         }
     }
 
+    /// Queues PARAM_VALUE of the parameter at `index`, with `reported` as its `param_index`.
     pub(super) fn send_param(&mut self, port: usize, index: usize, reported: u16) {
         let params = self.firmware.params();
         let Some((name, value)) = params.get(index) else { return };

@@ -25,7 +25,7 @@ pub enum EstimatorErrors {
 /// Whether the GPS receiver has a fix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GpsFix {
-    /// No fix: no mode can control the position.
+    /// No fix: the autopilot counts as without a position, so by default its failsafe lands.
     Lost,
     /// A fix.
     Held,

@@ -68,6 +68,7 @@ use self::telemetry::snapshot::Snapshot;
 pub struct Autopilot {
     platform: Platform,
     firmware: Firmware,
+    /// Buffer for the message ids that are due at one port in one step; empty between steps.
     due_messages: Vec<u32>,
 }
 
@@ -89,8 +90,8 @@ impl Autopilot {
         self.platform.vehicle.state()
     }
 
-    /// Every picture taken since the last call, with the true position and heading at that time.
-    /// The camera is fixed to the body and looks straight down.
+    /// Every picture taken since the last call (at most 100 000), with the true position and
+    /// heading at which it was taken. The camera is fixed to the body and looks straight down.
     pub fn drain_photos(&mut self) -> Vec<Photo> {
         self.platform.camera.drain_photos()
     }
@@ -148,8 +149,8 @@ impl Autopilot {
         }
     }
 
-    /// Moves bytes to be sent from port 0 into `out`, whole frames only, and returns their number.
-    /// 280 bytes hold any frame.
+    /// Moves bytes to be sent from port 0 into `out`, whole frames only, and returns the number of
+    /// bytes. 280 bytes hold any frame.
     pub fn poll_transmit(&mut self, out: &mut [u8]) -> usize {
         self.poll_transmit_from(0, out)
     }
@@ -159,8 +160,8 @@ impl Autopilot {
         self.platform.ports.get_mut(port).map_or(0, |port| port.poll_transmit(out))
     }
 
-    /// Adds a port for a ground station, with its stream rates, as the last port. A reboot keeps
-    /// it.
+    /// Adds a port with a ground station's stream rates as the last port, unless there is one. A
+    /// reboot keeps that port.
     pub fn add_ground_port(&mut self) {
         let config = &mut self.platform.config;
         if !config.ground_port {
@@ -213,6 +214,8 @@ impl Autopilot {
         }
     }
 
+    /// Queues what is due at each port: messages requested once, COMMAND_ACKs, the next parameter
+    /// of a list, streams.
     fn transmit(&mut self) {
         let now_us = self.platform.time_us;
         let mut snapshot = None;
@@ -250,6 +253,7 @@ impl Autopilot {
         }
     }
 
+    /// The state for the telemetry messages of this step.
     fn snapshot(&mut self) -> Snapshot {
         let sensors = self.platform.sensors();
         let status = self.firmware.status(&self.platform, &sensors);

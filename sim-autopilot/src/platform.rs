@@ -35,9 +35,9 @@ pub struct SensorReadings {
     pub velocity: Point,
     /// Rate of change of the estimated height, m/s, errors included.
     pub height_rate: f32,
-    /// Measured acceleration, ENU m/s².
+    /// True acceleration (0 at rest, so not the specific force), ENU m/s².
     pub acceleration: Point,
-    /// Heading, radians clockwise from north.
+    /// True heading, radians clockwise from north.
     pub heading: f32,
     /// Whether the body touches the ground.
     pub touching: bool,
@@ -68,8 +68,8 @@ pub enum IntegralAction {
     Keep,
     /// Set it to zero, as on the ground.
     SetToZero,
-    /// Set it to the demanded acceleration minus the true one, as ArduCopter does when its
-    /// controller starts in flight.
+    /// Set it to the acceleration commanded in the last step minus the true one, as ArduCopter does
+    /// when its controller starts in flight.
     Match,
 }
 
@@ -78,22 +78,33 @@ pub enum IntegralAction {
 #[derive(Clone, Debug)]
 pub struct Platform {
     pub(super) config: AutopilotConfig,
+    /// Time since boot, microseconds.
     pub(super) time_us: u64,
+    /// Time at which `disturbance` and `errors` change next, microseconds since boot.
     next_noise_us: u64,
     pub(super) vehicle: Multicopter,
+    /// Wind, and the errors of `position_noise_m`.
     pub(super) disturbance: Disturbance,
+    /// Errors by the estimator's model ([`crate::EstimatorErrors`]).
     pub(super) errors: EstimateErrorState,
+    /// Error of the position estimate (estimated minus true) that a replay or fault imposes, ENU
+    /// metres.
     pub(super) imposed_position_error: Point,
     /// Error of the velocity estimate (estimated minus true) that a replay imposes, ENU m/s.
     pub(super) imposed_velocity_error: Point,
     /// Rate of change of the height estimate's error that a replay imposes, m/s.
     pub(super) imposed_height_error_rate: f32,
+    /// Whether GPS has a fix.
     pub(super) gps_ok: bool,
     pub(super) frame: LocalFrame,
     pub(super) home: Geodetic,
+    /// Home position, ENU metres in the mission frame.
     pub(super) home_enu: Point,
+    /// Whether a command or the configuration set home, so that arming does not move it.
     home_fixed: bool,
+    /// True height of the body above where it would rest on the ground, metres.
     pub(super) height_above_ground: f32,
+    /// Demand of the last step; `None` while disarmed.
     pub(super) last_demand: Option<Demand>,
     pub(super) ports: Vec<Port>,
     pub(super) missions: Missions,
@@ -188,6 +199,7 @@ impl Platform {
         self.disturbance.position_error + self.errors.position + self.imposed_position_error
     }
 
+    /// Sets home for good (arming does not move it), and queues HOME_POSITION.
     pub(super) fn set_fixed_home(&mut self, home: Geodetic) {
         self.home = home;
         self.home_enu = frames::geodetic_to_enu(&self.config.world_origin, &home);
@@ -249,11 +261,13 @@ impl Platform {
         self.reboot_us = Some(self.time_us + REBOOT_DELAY_US);
     }
 
+    /// Queues GPS_GLOBAL_ORIGIN on every port.
     pub(super) fn announce_origin(&mut self) {
         self.send_on_all_ports(GPS_GLOBAL_ORIGIN);
     }
 
-    /// Queues message `id` once on every port for the next step.
+    /// Queues message `id` on every port, once, to be sent at the end of the step that runs or else
+    /// comes next.
     pub(super) fn send_on_all_ports(&mut self, id: u32) {
         for port in &mut self.ports {
             if !port.requested_once.contains(&id) {
@@ -272,6 +286,7 @@ impl Platform {
         self.missions.handle_message(self.time_us, &mut self.ports[from.port], from, id, fields);
     }
 
+    /// Queues a COMMAND_ACK to the command's sender, due after [`ANSWER_DELAY_US`].
     pub(super) fn acknowledge(&mut self, from: Sender, command: u16, result: u8) {
         let ack = PendingAck { command, result, to: from.system_and_component() };
         self.ports[from.port].pending_acks.push((self.time_us + ANSWER_DELAY_US, ack));

@@ -2,7 +2,7 @@
 //!
 //! | state | left by |
 //! |---|---|
-//! | disarmed | arm command, unless the mode cannot run (Offboard without a stream, Land, Return) |
+//! | disarmed | arm command, unless the mode cannot run (such as Offboard without a stream, Land) |
 //! | armed, on the ground | a demand to climb, `COM_SPOOLUP_TIME` after arming; `COM_DISARM_PRFLT` disarms |
 //! | ramp | thrust rises over `MPC_TKO_RAMP_T`, whatever is demanded; in-air is reported early |
 //! | flying | on the ground for `LNDMC_TRIG_TIME` with a demand to descend: landed |
@@ -54,6 +54,7 @@ const LAND_FILTER_S: f32 = 0.5;
 /// recordings, with `COM_DISARM_LAND` 2.0.
 const DISARM_REACTION_S: f32 = 0.25;
 
+/// Phase of an armed flight, as the module's table lists them; `Ground` includes landed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum FlightPhase {
     Ground,
@@ -61,6 +62,7 @@ enum FlightPhase {
     Flying,
 }
 
+/// Leg of a return; `up` is its height, ENU metres (NaN: not computed yet).
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum ReturnLeg {
     Climb { up: f32 },
@@ -85,20 +87,26 @@ struct MissionFlight {
 pub struct Commander {
     armed: bool,
     landed: bool,
+    /// Whether the vehicle has been in the air since it was armed.
     flown_since_arming: bool,
     intended_mode: Px4Mode,
+    /// Mode that replaces Return, Takeoff or Land when the vehicle is disarmed.
     mode_after_disarm: Px4Mode,
+    /// Mode that the active failsafe flies.
     failsafe: Option<Px4Mode>,
     phase: FlightPhase,
     armed_us: u64,
     landed_us: u64,
+    /// Since when the vehicle has touched the ground with a demand to descend.
     touching_us: Option<u64>,
     setpoint: Option<OffboardSetpoint>,
     setpoint_us: u64,
+    /// Where the automatic modes hold, or where they fly to, ENU metres.
     hold_point: Point,
     /// Smoothed path to `hold_point`.
     approach: SmoothedApproach,
     hold_heading: f32,
+    /// Target height of Takeoff, ENU metres; NaN: `MIS_TAKEOFF_ALT` above home.
     takeoff_up: f32,
     commanded_cruise_speed: Option<f32>,
     return_leg: ReturnLeg,
@@ -363,8 +371,7 @@ impl Commander {
             self.disarm_if_due(sensors, tuning);
         }
         if !self.armed {
-            // A vehicle that is disarmed in the air falls; it has landed when it touches the
-            // ground.
+            // A vehicle disarmed in the air falls; it has landed when it touches the ground.
             if !self.landed && sensors.touching {
                 self.landed = true;
                 self.landed_us = now;
@@ -470,7 +477,7 @@ impl Commander {
     }
 
     fn detect_landing(&mut self, sensors: &SensorReadings, demand: &Demand, tuning: &Px4Tuning) {
-        // Outside Offboard the crawl is simulated slower than PX4 commands it (`CRAWL_FACTOR`).
+        // Outside Offboard the crawl is slower than PX4's (`CRAWL_FACTOR`), so a lower rate counts.
         let share = if self.mode() == Px4Mode::Offboard { 1.0 } else { CRAWL_FACTOR };
         let wants_down = -demand.velocity.z >= share * LAND_DETECTOR_DESCENT_MPS;
         if !sensors.touching || !wants_down {

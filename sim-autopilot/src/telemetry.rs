@@ -43,7 +43,7 @@ pub const PX4_STREAMS: [(u32, u32); 32] = [
     (245, 200_000),   // EXTENDED_SYS_STATE
     (331, 33_333),    // ODOMETRY
     (380, 2_000_000), // TIME_ESTIMATE_TO_TARGET
-    (410, 5_000_000), // EVENT: one of those seen, again and again
+    (410, 5_000_000), // EVENT: the same recorded event each time
     (411, 3_000_000), // CURRENT_EVENT_SEQUENCE
     (436, 2_000_000), // CURRENT_MODE
     (441, 1_000_000), // GNSS_INTEGRITY

@@ -13,11 +13,13 @@ use companion::time::Instant;
 use crate::*;
 
 const DT: f32 = 0.004;
+// Modes of PX4, by `custom_mode`.
 const HOLD: u32 = 0x0304_0000;
 const TAKEOFF: u32 = 0x0204_0000;
 const RETURN: u32 = 0x0504_0000;
 const LAND: u32 = 0x0604_0000;
 const OFFBOARD: u32 = 0x0006_0000;
+// Type masks of setpoints with only a position or only a velocity.
 const POSITION: u16 = 0xDF8;
 const VELOCITY: u16 = 0xDC7;
 
@@ -28,6 +30,7 @@ struct Bench {
     framer: Framer,
     sequence: u8,
     received: Vec<(f64, Frame)>,
+    /// Height of the ground, ENU metres.
     ground: f32,
     /// Period in steps, and payload, of the setpoint message that is sent repeatedly.
     stream: Option<(usize, Vec<u8>)>,
@@ -107,10 +110,12 @@ impl Bench {
         self.now() - start
     }
 
+    /// The received messages with this id, each with its time, seconds since boot.
     fn of(&self, id: u32) -> impl Iterator<Item = &(f64, Frame)> {
         self.received.iter().filter(move |(_, frame)| frame.message_id == id)
     }
 
+    /// Sends a COMMAND_LONG; returns the results of its COMMAND_ACKs within 16 ms.
     fn command(&mut self, id: u16, params: [f32; 7]) -> Vec<u8> {
         let before = self.received.len();
         let mut payload = [0; 33];

@@ -167,8 +167,8 @@ pub fn lossy_radio_scenario_of(
     text + &format!("radio_loss = {loss}\n")
 }
 
-/// The scenario `text` without a camera: lanes as wide as a picture, and pictures that overlap
-/// along the lanes little or not at all.
+/// The scenario `text` without a camera: one picture is as wide as a lane and as long as the
+/// distance of waypoints, so pictures do not overlap. Half of the scenarios have square pictures.
 pub fn without_overlap(random: &mut impl Rng, text: &str) -> String {
     let lane_m = between(random, 4.0, 20.0);
     let share = if random.next_u32().is_multiple_of(2) { 1.0 } else { between(random, 0.4, 1.0) };

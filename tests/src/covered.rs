@@ -11,8 +11,8 @@ use host_sim::result::MissionResult;
 use host_sim::swarm::SwarmFlight;
 use host_sim::{scenario, swarm};
 
-/// Log texts that explain why a vehicle without a fault lands before its part is done: it was not
-/// heard by a majority, or a failed vehicle hovers on its path.
+/// Log texts that explain why a vehicle without a fault leaves its part undone: for example no
+/// majority hears it, or a failed vehicle hovers on its path.
 pub const EARLY_LANDING_TEXTS: [&str; 11] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
@@ -63,7 +63,8 @@ pub fn fly(mission: &mut PreparedMission) -> anyhow::Result<(MissionResult, Vec<
     fly_adding_pictures(mission, &mut Vec::new())
 }
 
-/// As [`fly`], judged by `pictures` of earlier flights too, to which it adds this flight's.
+/// As [`fly`], judged by `pictures` of earlier flights too (it sets their times to 0), to which it
+/// adds this flight's.
 ///
 /// # Errors
 /// As [`fly`].

@@ -53,7 +53,7 @@ pub struct Outcome {
     pub forbidden: Vec<String>,
     /// Log lines of vehicles nearer than the safety distance to the struck one, or hit by it.
     pub near_struck: Vec<String>,
-    /// Vehicles without a fault that had not landed at the end.
+    /// Vehicles without a fault that at the end neither had landed nor stood on their pads.
     pub not_landed: Vec<String>,
     /// Number of deadlocks that the referee counted (no progress for 20 s).
     pub deadlocks: u32,
@@ -143,6 +143,7 @@ fn range_exits(flight: &SwarmFlight, range_m: f32) -> Vec<(f32, usize)> {
     leaves
 }
 
+/// Sorts a flight's log by whether the struck vehicle took part in what happened.
 fn judge_flight(flight: &SwarmFlight, struck: u8) -> Outcome {
     let mut outcome = Outcome { deadlocks: flight.result.safety.deadlocks, ..Outcome::default() };
     for e in &flight.log {

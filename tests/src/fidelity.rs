@@ -68,8 +68,8 @@ pub enum Correction {
 }
 
 /// Allowed RMS difference of a flight's replay, metres, under the recorded errors and with the
-/// setpoints as they were sent; `None` for a flight in which a person or a failsafe took the
-/// vehicle.
+/// setpoints as they were sent; `None` for a flight that is not judged, such as one in which a
+/// person or a failsafe took the vehicle.
 pub fn allowed_rms_m(recording: &Recording) -> Option<f64> {
     match recording.run.as_str() {
         "a_demo" => Some(0.45),

@@ -59,7 +59,7 @@ impl Hills {
         Self { cell_m, cells_per_side: side, heights_m }
     }
 
-    /// Height at a place, metres above sea level.
+    /// Height at a place (metres east and north of the origin), metres above sea level.
     pub fn height_at(&self, x: f64, y: f64) -> f64 {
         let [column, row] = [x, y].map(|at| ((at + HALF_SIDE_M) / self.cell_m) as usize);
         self.heights_m[row * self.cells_per_side + column]
@@ -80,8 +80,8 @@ impl Hills {
         text
     }
 
-    /// The scenario `text` with these hills, written to `path`, as its terrain, and its vehicles on
-    /// them.
+    /// Writes these hills to `path`. Returns the scenario `text` with that file as its terrain and
+    /// its vehicles' starts on that ground.
     pub fn put_under_scenario(&self, text: &str, path: &Path, tolerance_m: f64) -> String {
         std::fs::write(path, self.to_ascii_grid()).expect("there is room");
         let terrain = format!(

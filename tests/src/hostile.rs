@@ -105,8 +105,11 @@ pub struct AttackedFlight {
     started: bool,
     framers: [Framer; 2],
     setpoint_check: SetpointCheck,
+    /// Bytes that the autopilot sends to the companion in the next step.
     bytes: Vec<u8>,
+    /// Sequence number of the ground station's next command.
     command_sequence: u8,
+    /// Sequence number of the honest neighbour's next frame.
     sequence: u8,
     sent_in_second: [u32; 2],
     second_began: Instant,
@@ -144,7 +147,8 @@ fn victim_plan(mission: Mission) -> Plan16 {
 
 type Plan16 = planner_core::flight::VehiclePlan<16, 8>;
 
-/// Number of phases of a mission in which the companion is attacked.
+/// Number of phases of a mission in which the companion is attacked: on the pad, 6 s after the
+/// start, 14 s after it, and under the pilot, each with PX4 and with ArduPilot.
 pub const PHASE_COUNT: usize = 8;
 
 impl AttackedFlight {

@@ -57,9 +57,9 @@ pub fn python() -> Option<String> {
     python
 }
 
-/// Path of `host-sim`, in the profile of the test that asks. It is built first, because cargo
-/// gives tests no path to another package's binaries, unless `FLOCKMATE_BUILT` says that it was
-/// built with the tests.
+/// Path of `host-sim`, in the profile of the test that calls this. `host-sim` is built first,
+/// because cargo gives tests no path to another package's binaries, unless `FLOCKMATE_BUILT` says
+/// that it was built with the tests.
 pub fn host_sim_path() -> PathBuf {
     let test = std::env::current_exe().expect("a test knows its own path");
     // TARGET/PROFILE/deps/TEST-HASH
@@ -75,7 +75,7 @@ pub fn host_sim_path() -> PathBuf {
     built.join("host-sim")
 }
 
-/// A child process that is killed when this is dropped, also by a test that panics.
+/// A child process that is killed when this guard is dropped, also by a test that panics.
 pub struct ChildGuard(pub Child);
 
 impl ChildGuard {

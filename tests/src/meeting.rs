@@ -44,8 +44,10 @@ const OFF_PATH_M: f32 = 1.2;
 const STILL_WHERE_LEFT_M: f32 = 1.0;
 /// Step in which the distance from the path is computed, metres.
 const PATH_STEP_M: f32 = 0.1;
+/// [`STEP_S`] in milliseconds.
 const STEP_TIME_MS: u64 = 25;
 
+/// A meeting that is being simulated.
 struct World<'a> {
     scene: &'a Scene,
     vehicles: Vec<MeetingVehicle>,
@@ -300,6 +302,7 @@ impl<'a> World<'a> {
         }
     }
 
+    /// Sends a vehicle's frame to all others, each with its own loss and delay; a liar's is forged.
     fn broadcast(&mut self, from: usize, bytes: &[u8]) {
         let now = self.now;
         let mut input = bytes;
@@ -343,6 +346,7 @@ impl<'a> World<'a> {
         }
     }
 
+    /// Answers a companion's request by the scene's plan, or by a detour if it requests one.
     fn answer_plan_request(&mut self, i: usize) {
         let own = &self.scene.vehicles[i].plan;
         let mut keep = Vec::new();

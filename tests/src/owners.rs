@@ -156,6 +156,8 @@ impl Owners {
         Ok(owners)
     }
 
+    /// Notes the vehicles that these inputs count as lost or gone. `ids` and `inputs` are in the
+    /// order of ids.
     fn note_gone(&mut self, ids: &[u8], inputs: &[VehicleDivisionInput]) {
         let left = |input: &VehicleDivisionInput| {
             !input.alive && input.along_dm != VehicleDivisionInput::WHOLE_PATH
@@ -163,6 +165,7 @@ impl Owners {
         self.gone.extend(ids.iter().zip(inputs).filter(|(_, own)| left(own)).map(|(id, _)| *id));
     }
 
+    /// Adds the owners of waypoints by a plan, and the waypoints that it gives to two vehicles.
     fn add(&mut self, plan: &HostPlan) {
         let mut owned = Owned::new();
         let mut all = BTreeMap::new();
@@ -185,6 +188,7 @@ impl Owners {
         self.plans.push(owned);
     }
 
+    /// Whether a plan that the vehicle flew gives it this waypoint.
     fn has_owned(&self, vehicle: u8, number: u32) -> bool {
         let owns = |at: &usize| self.plans[*at].get(&vehicle).is_some_and(|o| o.contains(&number));
         owns(&0) || self.reported_plans.get(&vehicle).is_some_and(|plans| plans.iter().any(owns))

@@ -29,6 +29,8 @@ pub fn divide_waypoints<const V: usize>(
         let mut done = Vec::new();
         for (rank, input) in inputs.iter().enumerate() {
             let taken = usize::from(input.along_dm / WAYPOINT_DM).min(parts[rank].len());
+            // Of a vehicle that is gone the last waypoint passed counts as not done, unless it
+            // flew its whole path.
             let sure = input.alive || input.along_dm == VehicleDivisionInput::WHOLE_PATH;
             done.extend(&parts[rank][..if sure { taken } else { taken.saturating_sub(1) }]);
             living[rank] = input.alive;

@@ -110,7 +110,7 @@ impl std::fmt::Display for SetpointStats {
 #[derive(Clone, Copy, Debug)]
 struct LastSetpoint {
     at_s: f64,
-    /// Time from the setpoint before to this one, and from the one before that, seconds.
+    /// Time from the setpoint before to this one, and the time between the two before, seconds.
     dt_s: [f32; 2],
     position: Vector3<f32>,
     velocity: Option<Vector3<f32>>,
@@ -118,6 +118,7 @@ struct LastSetpoint {
     jerk_mps3: f32,
     /// Number of setpoints since the last one in a stop by the safety filter; 0 in the stop.
     since_urgent: u8,
+    /// Greatest rounding error of the position, metres.
     rounded_m: f32,
 }
 

@@ -133,6 +133,7 @@ impl Space {
         self.boxes.iter().any(inside)
     }
 
+    /// Whether the straight line between two points stays in the space, tested each half metre.
     fn sees_straight(&self, a: &Point, b: &Point) -> bool {
         let steps = ((b - a).norm() / 0.5).ceil() as usize;
         (1..steps).all(|i| self.contains(&(a + (b - a) * (i as f32 / steps as f32))))
@@ -145,6 +146,7 @@ pub struct Swarm {
     roadmap: Vec<u8>,
     /// Tasks of its vehicles.
     pub tasks: Vec<VehicleTask>,
+    /// Height of each goal above the ground below it, metres.
     descents_m: Vec<f32>,
     mode: GoalMode,
     /// Separation and speeds of the schedule.

@@ -228,8 +228,11 @@ fn uncut(board: &Shared, autopilot: Autopilot) -> FtpClient {
 /// Where cuts fell, and what the board held afterwards.
 #[derive(Debug, Default)]
 struct Tally {
+    /// The board held the old file afterwards, or (`replaced`) the new one.
     kept: usize,
     replaced: usize,
+    /// The cut left torn words: in a sector that was being erased, in the data, before the data
+    /// (`torn_mark`), or in the seal.
     torn_sector: usize,
     torn_data: usize,
     torn_mark: usize,

@@ -56,7 +56,7 @@ fn paths_stay_short(name: &str, all: &RoadmapView<'_>, kept: &RoadmapView<'_>) {
     for required_m in CLEARANCES_M {
         let mut ratios = Vec::new();
         for i in 0..SOURCES {
-            // None of the nodes whose paths decide which edges are kept.
+            // A node other than those whose paths decide which edges are kept.
             let from =
                 (u32::from(2 * i + 1) * all.node_count() as u32 / u32::from(2 * SOURCES)) as u16;
             let before = ways(all, from, required_m, &mut workspace);

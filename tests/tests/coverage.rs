@@ -114,7 +114,7 @@ fn powell_is_no_worse_than_binpat_and_exact_is_the_best() {
     );
 }
 
-/// `[area]` for a real file: one picture shows about 15 by 10 lanes' units.
+/// A scenario without vehicles whose area is a real file, with the keys `area` besides.
 fn real(file: &std::path::Path, area: &str) -> String {
     format!("[area]\nfile = '{}'\n{area}\n[mission]\ncruise_mps = 5.0\n", file.display())
 }

@@ -18,7 +18,7 @@ use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-/// Whether a flight covers the first lanes of its route only: the next division gives the others.
+/// Whether a flight covers the first lanes of its route only: the next division gives the rest.
 fn is_first_part(flight: &Flight<WAYPOINTS>) -> bool {
     matches!(&flight.task, Task::Photograph(photographs) if photographs.is_first_part)
 }
@@ -38,6 +38,7 @@ fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
 /// by the vehicle that kept it, or by the one that has it now.
 #[test]
 fn divisions_leave_nothing_out_and_give_nothing_twice() {
+    // Number of divisions, and 1 if vehicles cannot pass each other in a further one.
     let one = |seed: u64| -> [usize; 2] {
         let mut random = Pcg32::seed_from_u64(seed);
         let vehicles = 2 + (random.next_u32() % 5) as usize;

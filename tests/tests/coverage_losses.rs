@@ -23,12 +23,15 @@ const MISSIONS: u64 = 6;
 struct Outcome {
     seed: u64,
     kind: &'static str,
+    /// Share of the area that is photographed.
     covered: f64,
+    /// Number of waypoints without a picture.
     left: u64,
     /// Number of waypoints that vehicles reported to have left out on detours.
     reported: u64,
     /// Whether more waypoints are left than explained, although a majority lived to the end.
     left_out: bool,
+    /// Number of waypoints photographed more than once.
     twice: u64,
     /// Faults of ownership, as a waypoint with two owners.
     owned: Vec<String>,
@@ -439,7 +442,7 @@ fn are_whole(draw: Draw) {
         let whole = of.iter().filter(|o| o.covered >= 1.0).count();
         println!("{kind}: {whole} of {} whole", of.len());
     }
-    // Those that still climb cannot commit themselves yet.
+    // Vehicles that still climb cannot commit themselves yet, so their agreements take longer.
     if draw.radio == Radio::Even && draw.until_s >= EVEN.until_s {
         assert_agreed_in_time(&all);
     }

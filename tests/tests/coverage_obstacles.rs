@@ -76,7 +76,7 @@ fn random_boxes(random: &mut Pcg32, cell_m: f64, height_m: f64) -> Vec<Block> {
 fn wrong(scenario: &Scenario, planned: &CoveragePlan<'_>, boxes: &[Block]) -> Option<String> {
     let area = scenario.area.as_ref().expect("an area");
     let obstacles = area.obstacles.as_ref().expect("a map");
-    // Default clearance: 0.3 m and half of 2.4 m.
+    // By default the radius, 0.3 m, and half of the 2.4 m between separation and safety distance.
     if (obstacles.required_clearance_m - 1.5).abs() > 1e-5 {
         return Some(format!("the clearance is {} m", obstacles.required_clearance_m));
     }

@@ -57,8 +57,8 @@ fn hard_meetings_end_without_a_touch_or_a_standstill() {
 }
 
 /// Three of the seeds 101 to 400 in which a vehicle once came too near to a silent one on the
-/// ground. That lay at the end of the stretch that others keep clear of (123, 160), or where it had
-/// flown through gates that opened after it was last heard (360).
+/// ground. The silent one lay at the end of the stretch that others keep clear of (123, 160), or
+/// where it had flown through gates that opened after it was last heard (360).
 #[test]
 fn a_vehicle_that_only_hears_lies_where_others_look_for_it() {
     for seed in ["123", "160", "360"] {

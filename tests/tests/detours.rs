@@ -27,12 +27,14 @@ const HULL_M: f32 = 0.3;
 const TOO_NEAR_PERCENT: usize = 2;
 /// Rounding of distances, metres.
 const ROUNDING_M: f32 = 0.01;
+/// Number of detours compared on each map.
 const CASES: usize = 400;
+/// Number of places on each map at which ground heights are compared.
 const PLACES: usize = 20_000;
 /// Distance that a companion keeps from the place where an unheard vehicle may lie, metres.
 const KEPT_M: f32 = 2.5;
-/// Least distance permitted in this test, metres: two hulls touch there. A vehicle that is nearer
-/// to where another may lie than it should be has to come no nearer.
+/// Least distance permitted in this test, metres: two hulls touch there. It is less than
+/// [`KEPT_M`], since a vehicle that is nearer than that at first only must not come nearer.
 const NEAREST_M: f32 = 0.6;
 /// Least share of detours that are the same with the roadmap's ground as with the map, percent.
 const SAME_PERCENT: usize = 85;
@@ -199,8 +201,8 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
          ground of the roadmap, {found_by_old} without; the nearest passes what lies there at \
          {nearest_m:.2} m, {too_near} nearer than {KEPT_M} m"
     );
-    // A vehicle that is nearer to where something may lie than it should be has to come no nearer,
-    // so it may pass nearer than KEPT_M.
+    // A vehicle that is nearer than KEPT_M to the zone at first only must not come nearer, so it
+    // may pass nearer than KEPT_M.
     assert!(nearest_m > NEAREST_M, "{name}: {nearest_m}");
     assert!(
         too_near * 100 <= found_by_board * TOO_NEAR_PERCENT,

@@ -6,8 +6,7 @@ use flockmate_tests::fidelity::{
 };
 use sim_autopilot::SimulatedKind;
 
-/// The recorded flights that no pilot or failsafe interrupted, with their allowed difference,
-/// metres.
+/// The recorded flights that [`allowed_rms_m`] judges, with their allowed difference, metres.
 fn plain() -> impl Iterator<Item = (Recording, f64)> {
     RECORDED_RUNS
         .iter()
@@ -57,7 +56,7 @@ fn setpoints_as_they_were_sent_are_flown_as_recorded_under_the_recorded_errors()
 
 #[test]
 fn interrupted_px4s_stop_as_far_on_as_they_did() {
-    // A failsafe lands it from 1.85 m/s, a pilot takes Hold from 1.4 and 1.9.
+    // A failsafe lands the first at 1.85 m/s; a pilot switches the others to Hold at 1.4 and 1.9.
     let runs = ["px4_c1_demo", "x_drift_demo", "x_drift_demo_1"];
     for recording in runs.iter().flat_map(|run| recordings(run)) {
         let c = recording.compare(EstimateErrors::Recorded, Correction::Recorded);

@@ -31,7 +31,7 @@ const LOSSES: [f32; 3] = [0.0, 0.1, 0.5];
 /// fleets, for each of [`LOSSES`], seconds.
 const AGREED_WITHIN_S: [f32; 3] = [3.0, 3.0, 5.0];
 const STEP_S: f32 = 0.25;
-/// Waypoints per second.
+/// Waypoints that a vehicle flies per second.
 const PER_S: f32 = 0.5;
 /// Duration of a stop, seconds.
 const STOP_S: f32 = 3.0;
@@ -59,10 +59,14 @@ struct Vehicle {
     home_s: f32,
     /// Stopped for good: on the ground, or without power.
     down: bool,
+    /// Without power: it sends and handles nothing.
     dead: bool,
     heard_at: Vec<Option<Instant>>,
+    /// For each other vehicle a bit mask of the ranks that it last reported to hear.
     heard_bits: Vec<u32>,
+    /// Messages under way: time of arrival (seconds), sender, ranks that the sender hears, report.
     inbox: VecDeque<(f32, usize, u32, Option<RosterReport>)>,
+    /// Whether it has left its part, lands and reports that.
     left_by: bool,
 }
 
@@ -72,7 +76,7 @@ impl Vehicle {
         (&self.part[..self.part.len().min(self.most)], self.part.len() > self.most)
     }
 
-    /// Whether a vehicle that has photographed its part has no other one to expect.
+    /// Whether a vehicle that has photographed its part has no further part to expect.
     fn may_fly_home(&self) -> bool {
         !self.fleet.is_dividing() && self.fleet.division_count() == self.division
     }
@@ -93,7 +97,9 @@ struct Outcome {
     /// division, seconds. `None` unless exactly one is lost and links fail at random only.
     agreed_s: Option<f32>,
     loss: f32,
+    /// Number of waypoints without a picture.
     left_out: usize,
+    /// Whether some vehicle is still up at the end; without a majority all land.
     majority: bool,
     /// Text about a division without a lost vehicle, or about a vehicle whose part others took
     /// although it was heard all the time.
@@ -125,6 +131,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
         let from_s = 300.0 * uniform(&mut random);
         (from_s, from_s + 120.0 * uniform(&mut random), random.next_u32())
     });
+    // In every second fleet messages are lost one by one only.
     let clean = seed.is_multiple_of(2);
     let (delay_s, apart) = if clean { (0.05, None) } else { (delay_s, apart) };
     let losses: Vec<(f32, usize, bool)> = (0..random.next_u32() % 3)

@@ -23,9 +23,12 @@ struct Pair {
     now_us: u64,
     /// Whether the companion is stalled: bytes for it wait.
     stalled: bool,
+    /// Bytes from the autopilot that the companion has not received yet.
     waiting: Vec<u8>,
     framer: Framer,
+    /// Frames that the companion sent to the autopilot, each with its time, microseconds.
     said: Vec<(u64, Frame)>,
+    /// States that the companion entered, each with its time, microseconds.
     states: Vec<(u64, State)>,
     sequence: u8,
 }

@@ -15,7 +15,7 @@ const MEETINGS: u64 = 200;
 const PASSINGS: u64 = 60;
 /// Greatest acceleration that setpoints may demand, m/s².
 const ACCEL_MPS2: f32 = 3.5;
-/// Time up to which a stop does not count as one, seconds.
+/// Longest stop for a neighbour that was heard, seconds: so short a one counts as none.
 const STOP_S: f32 = 0.5;
 /// Longest stop for a neighbour that was silent for more than a second, seconds.
 const UNHEARD_STOP_S: f32 = 1.5;
@@ -94,7 +94,7 @@ fn a_vehicle_that_something_catches_lands_and_the_others_go_on() {
     assert!(bad.is_empty(), "{bad:#?}");
 }
 
-/// Seeds of meetings in which a vehicle was once not on the ground after 180 s, or never. It
+/// Seeds of meetings in which, in earlier versions, a vehicle landed after 180 s or never. It
 /// relayed too small an age of a dead vehicle's message (9037, 10847), got a plan that the safety
 /// filter did not let it fly (1990, 9937, 15531, 16491, 18737, 18921, 19058), hovered above a place
 /// where an unheard vehicle may lie (3949, 10013), or searched a path in vain for too long (4512,

@@ -73,7 +73,7 @@ impl Story {
 }
 
 /// Sends a simulated autopilot the messages that were sent to the real one, which had booted
-/// `booted_s` before the recording. Returns both stories.
+/// `booted_s` seconds before the recording. Returns the real story and the simulated one.
 fn replay(recorded: &[Recorded], config: &AutopilotConfig, booted_s: f64) -> (Story, Story) {
     let mut autopilot = Autopilot::new(config).unwrap();
     let (mut framer, mut buffer) = (Framer::new(), [0; 2048]);
@@ -139,7 +139,7 @@ fn the_simulated_arducopter_answers_as_the_recorded_one_did() {
         estimator_ready_s: 41.6,
         ..AutopilotConfig::default()
     };
-    // TIMESYNC: 10.002 s after boot came 7.648 s into the recording.
+    // The TIMESYNC of 10.002 s after boot is 7.648 s into the recording.
     let (real, simulated) = replay(&recording(&path), &config, 2.353);
     assert_same_acks(&real, &simulated);
     assert_eq!(real.modes, simulated.modes);
@@ -171,9 +171,10 @@ struct Seen {
     frames: u32,
 }
 
-/// Plays the autopilot's messages to a companion whose mission origin is `origin`. Where a global
-/// position was sent, the companion's own one, computed from local metres by that autopilot's
-/// projection, must be the same place.
+/// Plays the autopilot's messages to a companion whose mission origin is `origin`; after twenty
+/// frames `announced` is sent too. Where a global position was sent, the companion's own one,
+/// computed from local metres by that autopilot's projection, must be the same place. Returns what
+/// was recorded, and what the companion saw.
 fn play(
     recorded: &[Recorded],
     origin: Geodetic,

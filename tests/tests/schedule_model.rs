@@ -42,6 +42,7 @@ const ROUNDING_M: f32 = 1e-4;
 /// The stretch of a vehicle that has left the plan.
 const OUT: u8 = u8::MAX;
 
+/// The stretch that each vehicle is on.
 type State = [u8; 4];
 
 /// One vehicle's flight in stretches: the first is its pad, the last the ground below its goal.

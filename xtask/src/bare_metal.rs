@@ -116,7 +116,7 @@ impl Board {
         }
     }
 
-    /// The packages that have these programs.
+    /// The packages that define the board's programs.
     fn packages(self) -> &'static [&'static str] {
         match self {
             Self::Qemu => &["firmware", "board-bench"],
@@ -167,8 +167,8 @@ pub fn build(board: Board) -> Result<BuiltPrograms> {
         cargo
     };
     flags += &format!("-Ctarget-cpu={}", board.cpu());
-    // Else LLVM aligns every loop of a Cortex-M7 to 8 bytes, by `nop`s that are executed on the way
-    // in: 3.3 kB of flash. Without, a control step takes 0.1 % fewer instructions.
+    // Else LLVM aligns every loop of a Cortex-M7 to 8 bytes by `nop`s before it, which are executed
+    // on the way in: 3.3 kB of flash. Without them a control step takes 0.1 % fewer instructions.
     flags += " -Cllvm-args=-max-bytes-for-alignment=1";
     // The linker keeps one of functions with the same code, such as those of a generic function for
     // types of the same layout: 3.1 kB of flash. No code relies on two functions' addresses to
@@ -184,8 +184,8 @@ pub fn build(board: Board) -> Result<BuiltPrograms> {
     building.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
     building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info");
     // A tenth less code than opt-level 3, and a control step takes no more instructions. The
-    // level's own threshold of inlining is kept: with 260 a step takes 0.3 % fewer and the flash
-    // 10.8 kB more.
+    // level's own threshold of inlining is kept: with 260 a step would take 0.3 % fewer
+    // instructions, but the program 10.8 kB more flash.
     building.args(["--config", "profile.release.opt-level=2"]);
     building.args(["--config", "profile.release.package.planner-core.opt-level=3"]);
     // With several units the functions that share a unit, and so what is inlined, depend on the

@@ -38,8 +38,8 @@ pub struct Args {
     n: Option<u64>,
 }
 
-/// Runs the chosen bench, or all. Where the C++ baseline cannot be built, its rows are skipped and
-/// a line gives the reason.
+/// Runs the groups or the suite that `only` names, else all groups. If the C++ baseline cannot be
+/// built, the rows that compare with it are skipped, and a line gives the reason.
 pub fn run_bench(args: &Args) -> Result<()> {
     if args.only.as_deref() == Some("profiles") {
         return compare_profiles();

@@ -38,7 +38,7 @@ pub struct Args {
 }
 
 impl Default for Args {
-    /// The flight that CI runs, by the `host-sim` that its tests were built with, if they were.
+    /// The flight that CI runs, by the `host-sim` of the tests' build (debug) if it is there.
     fn default() -> Self {
         let target = target_dir();
         let host_sim = Some(target.join("debug/host-sim")).filter(|built| built.is_file());

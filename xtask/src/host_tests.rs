@@ -149,8 +149,8 @@ pub fn run(
         programs.into_iter().partition(belongs(&NEED_BOARDS_OR_CLIENTS));
     // One more than there are cores: some wait for processes or clients that keep real time.
     let at_once = 1 + std::thread::available_parallelism().map_or(2, usize::from);
-    // With these variables a test that needs a board, browser or client fails; without them it
-    // would be skipped.
+    // Given these paths, where nothing is, a test that needs a board, browser or client fails;
+    // without the variables it would be skipped.
     let absent = || BOARD_AND_CLIENT_VARIABLES.map(|name| (name, "/not/built/yet".into())).into();
     let mut failed = run_all_and_name_failed(
         free,

@@ -10,6 +10,7 @@ use spdx::{Expression, LicenseReq, ParseMode};
 
 use crate::shell::cargo;
 
+/// What is read of `deny.toml`.
 #[derive(Deserialize)]
 struct Deny {
     graph: Graph,
@@ -35,6 +36,7 @@ struct Exception {
     allow: Vec<String>,
 }
 
+/// What is read of the answer of `cargo metadata`.
 #[derive(Deserialize)]
 struct Metadata {
     packages: Vec<Package>,

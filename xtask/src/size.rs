@@ -1,8 +1,8 @@
 //! `cargo xtask size`: how much of a board's memory the firmware takes, part by part.
 //!
 //! Flash and statics are read from the linked program. The deepest stack is measured in emulation:
-//! the start fills the stack with a pattern, and words that lost it were used. The other boards run
-//! the same code on similar cores, so the figure is used for them too.
+//! at its start the firmware fills the stack with a pattern, and words that no longer have it were
+//! used. The other boards run the same code on similar cores, so this depth is used for them too.
 
 use std::path::{Path, PathBuf};
 
@@ -42,7 +42,7 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// A row: name, bytes taken, bytes available or budgeted.
+/// A row: name, bytes taken, budget in bytes.
 pub type Row = (&'static str, usize, usize);
 
 /// Prints and returns the rows of a board. An error if a part takes more than its budget.

@@ -100,6 +100,7 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
+/// Runs a step and prints its name, and the time that it took if it passed.
 fn run_step<T>(name: &str, work: impl FnOnce() -> Result<T>) -> Result<T> {
     println!("== {name}");
     let begun = Instant::now();

@@ -98,6 +98,7 @@ fn work_of_lanes<'a, const L: usize, const N: usize>(
     }
 }
 
+/// Equal vehicles whose pads are 5 m apart, south of the area.
 fn vehicles(count: usize) -> Vec<Vehicle, VEHICLES> {
     let vehicle = |i: usize| {
         let place = Flat::new(5.0 * i as f32, -10.0);
@@ -114,6 +115,7 @@ fn vehicles(count: usize) -> Vec<Vehicle, VEHICLES> {
     (0..count).map(vehicle).collect()
 }
 
+/// Lanes, and waypoints on them, `lane_m` apart; `angle_deg` from east, `None` for the planner's.
 fn pattern(angle_deg: Option<f32>, lane_m: f32) -> LanePattern {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
     let spacing = Spacing { footprint, max_lane_spacing_m: lane_m, max_waypoint_spacing_m: lane_m };
@@ -186,6 +188,7 @@ fn measure_plans(
     sum.add_plan(plan);
 }
 
+/// The `count` lowest waypoint numbers of each route, in ascending order.
 fn flown_ranges(plan: &RoutePlan<VEHICLES>, count: u32) -> Vec<WaypointRange, VEHICLES> {
     let mut done: Vec<WaypointRange, VEHICLES> = plan
         .routes
@@ -199,7 +202,7 @@ fn flown_ranges(plan: &RoutePlan<VEHICLES>, count: u32) -> Vec<WaypointRange, VE
     done
 }
 
-/// The lanes of the first ten waypoints of each route.
+/// The lanes of the ten lowest waypoint numbers of each route.
 fn flown_lanes(tracks: &Tracks<LANES>, plan: &RoutePlan<VEHICLES>) -> Vec<WaypointRange, VEHICLES> {
     // Widened to whole lanes: no lane is cut in two, so the rest fits the capacity.
     let whole = |range: WaypointRange| {

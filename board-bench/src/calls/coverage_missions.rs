@@ -32,10 +32,15 @@ const MAX_DIVISIONS: usize = 3;
 
 /// A coverage mission, and the names of its calls' rows in `docs/worst-case.md`.
 struct Mission<'a> {
+    /// Vertices of the area, metres east and north.
     outline: &'a [[f32; 2]],
+    /// Vertices of each no-fly zone, metres east and north.
     zones: &'a [[[f32; 2]; 4]],
+    /// Direction of the lanes, degrees from east; `None` for the planner's choice.
     angle_deg: Option<f32>,
+    /// Distance between lanes, and between waypoints, metres.
     lane_m: f32,
+    /// Separation of flights in the schedule, metres.
     separation_m: f32,
     vehicle_count: usize,
     /// Row of the plan before take-off.
@@ -47,6 +52,7 @@ struct Mission<'a> {
     whole_division_row: &'static str,
 }
 
+/// Three vehicles over an area without no-fly zones.
 const PLAIN: Mission<'static> = Mission {
     outline: &FIVE_VERTICES,
     zones: &[],
@@ -162,7 +168,9 @@ struct Board<'a> {
     mission: &'a Mission<'a>,
     view: MissionView<'a>,
     lent: &'a mut CoveragePlanWorkspace,
+    /// All vehicles' flights of the last plan.
     out: &'a mut Flights,
+    /// Checksum of the plans so far.
     sum: &'a mut u32,
 }
 

@@ -40,7 +40,7 @@ pub const AREA_STEP_ROW: &str = "a control step, coverage, 32 near";
 pub const FILTER_ROW: &str = "Companion::query_filter_blocker, 32 near";
 /// Row of the table: any other control step.
 pub const OTHER_STEP_ROW: &str = "Companion::handle_timeout, else";
-/// Least distance of a neighbour beside this vehicle, metres.
+/// Least distance of the neighbours from this vehicle where none is to be on the path, metres.
 const MIN_BESIDE_M: f32 = 4.0;
 /// Least distance by which a silent neighbour is moved away in a flight of [`has_silent_far_away`],
 /// metres.
@@ -56,7 +56,6 @@ const STEP_TIME: Duration = Duration::from_millis(50);
 const AGEING_STEP_TIME: Duration = Duration::from_millis(900);
 /// Number of steps of 50 ms within which the vehicle must be on its path.
 const MAX_TAKE_OFF_STEPS: usize = 400;
-
 const HEARTBEAT: u32 = 0;
 const SYS_STATUS: u32 = 1;
 const ESTIMATOR_STATUS: u32 = 230;
@@ -71,7 +70,6 @@ const DO_SET_MODE: u16 = 176;
 const MISSION_START: u16 = 300;
 const ARM_DISARM: u16 = 400;
 const REQUEST_MESSAGE: u16 = 512;
-
 struct SimulatedNeighbour {
     enu_m: Point,
     flags: u8,
@@ -84,7 +82,9 @@ pub struct BenchFlight<'a, M> {
     companion: &'a mut BoardCompanion,
     meter: &'a mut M,
     now: Instant,
+    /// This vehicle's position, ENU.
     enu_m: Point,
+    /// The last setpoint, ENU.
     target: Option<Point>,
     mode: u32,
     armed: bool,
@@ -104,8 +104,8 @@ fn has_silent_far_away(seed: u64) -> bool {
     seed % 8 == 2
 }
 
-/// Random vector from this vehicle to a neighbour. In half of the flights that are made to be hard
-/// it is at least 4 m long: no neighbour is on the path, so the filter checks it to its end.
+/// Random vector from this vehicle to a neighbour. In half of the hard flights the vector is at
+/// least 4 m long: no neighbour is on the path, so the filter checks the path to its end.
 fn offset_to_neighbour(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
     let at = random_point(rng, reach_m);
     if seed.is_multiple_of(4) { at + at * (MIN_BESIDE_M / at.norm().max(0.1)) } else { at }
@@ -222,6 +222,7 @@ fn far_offset() -> Point {
 const FILTER_ROUNDS: usize = 40;
 const NEAR_FLAGS: [u8; 4] =
     [AIR, AIR | intent::ON_DETOUR, intent::FLYING, intent::FLYING | intent::OUT_OF_PLAN];
+/// Flags of an intent: in the air and on the plan.
 const AIR: u8 = intent::FLYING | intent::ON_PLAN;
 /// Pairs of which each neighbour gets one at random: its intent's flags, and whether it falls
 /// silent.
@@ -426,7 +427,7 @@ impl<'a, M: Meter> BenchFlight<'a, M> {
     }
 
     /// Takes the companion's frames and events: executes commands to the autopilot, answers plan
-    /// requests with the plan. Detours are unreachable.
+    /// requests with the plan. Requests for a detour are answered as unreachable.
     fn drain_outputs(&mut self) {
         for link in [Link::Autopilot, Link::Swarm] {
             loop {

@@ -57,6 +57,7 @@ pub(super) const FLEET: [Vehicle; VEHICLES] = [
     Vehicle { transit_start: Flat::new(5.0, -5.0), home: Flat::new(5.0, -5.0), ..VEHICLE },
     Vehicle { transit_start: Flat::new(15.0, -5.0), home: Flat::new(15.0, -5.0), ..VEHICLE },
 ];
+/// Equal shares of the path for all vehicles.
 const SHARES: [f32; VEHICLES] = [1.0; VEHICLES];
 
 pub(super) type Lanes = Tracks<LANES>;

@@ -12,9 +12,10 @@ const ROWS: u16 = 2;
 const NODE_HEIGHTS: [i16; 6] = [0, i16::MAX, i16::MIN, -1, 100, 7];
 const FILE_BYTES: usize = 64;
 
+/// East coordinates of the paths' ends, metres.
 const END_COORDINATES: [f32; 3] = [0.0, 7.5, -1.0];
-/// Coordinates so far away that a path to them has tens of thousands of samples: to save time each
-/// is tried with one slope only.
+/// East coordinates so far away that a path to them has tens of thousands of samples: to save time
+/// each is tried with one slope only.
 const FAR_COORDINATES: [f32; 3] = [-1e19, f32::INFINITY, f32::NAN];
 
 pub(super) fn call_fields(to: &mut Results<'_, impl CallListener>) {

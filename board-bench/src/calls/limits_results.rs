@@ -55,6 +55,7 @@ impl<'a, L: CallListener> Results<'a, L> {
         answer.iter().for_each(|&c| self.add(c));
     }
 
+    /// Adds a whole number to the checksum: a count, an index, a CRC, or 1 for success.
     pub(super) fn add_count(&mut self, answer: usize) {
         self.sum = self.sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ answer as u32;
     }

@@ -10,8 +10,9 @@ const ARMING_RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// Longest time from the COMMAND_ACK that accepts arming to the first HEARTBEAT (1 Hz) with the
 /// armed bit; also the time to wait for a COMMAND_ACK before arming is requested again.
 const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
-/// Rise of the estimated height by which the landing detector's report of the ground still counts
-/// more while the motors spin up, metres.
+/// Rise of the estimated height since the last HEARTBEAT that counts as drift of the estimate, not
+/// as flight, while the motors spin up and the landing detector reports the ground, metres;
+/// `RISEN_M` comes on top.
 const MAX_SPIN_UP_DRIFT_M: f32 = 0.6;
 /// Age of the position up to which a vehicle whose climb had not begun is taken to stand on its
 /// pad: a pilot needs longer to take over and take off.
@@ -51,7 +52,8 @@ pub(crate) struct ArmingHandshake {
     flown: bool,
     /// Whether a start that was cancelled had begun its climb: unseen, the vehicle may rise.
     climb_begun: bool,
-    /// Estimated height with which the vehicle was last disarmed, metres.
+    /// Estimated height in the mission frame at which the vehicle was last known to be disarmed,
+    /// metres.
     disarmed_z_m: f32,
     /// Refusals reported in this state: `MAV_CMD` and `MAV_RESULT`.
     reported_refusals: [Option<(u16, u8)>; MAX_REPORTED_REFUSALS],
@@ -59,10 +61,9 @@ pub(crate) struct ArmingHandshake {
 
 impl ArmingHandshake {
     /// To be called at each change of the mission state. Clears the refusals reported in `from`.
-    /// Entering `Arming` clears everything but the height with which the vehicle was last disarmed.
-    /// On entering `Arming`, and on leaving `PilotReturned`, the autopilot counts as in the
-    /// companion's own mode.
-    /// Entering `CancelStart` notes whether the climb had begun.
+    /// Entering `Arming` clears everything but the height at which the vehicle was last known to be
+    /// disarmed. On entering `Arming`, and on leaving `PilotReturned`, the autopilot counts as in
+    /// the companion's own mode. Entering `CancelStart` notes whether the climb had begun.
     pub(crate) fn reset_for_state(&mut self, from: State, to: State) {
         self.reported_refusals = [None; MAX_REPORTED_REFUSALS];
         if to == State::Arming {
@@ -154,9 +155,9 @@ impl ArmingHandshake {
         self.flown
     }
 
-    /// Whether a vehicle whose start is cancelled may be disarmed: it has not risen, and its
-    /// position is new. If its climb had not begun, the position may be 5 s old; later its pilot
-    /// may have taken off with it, unseen.
+    /// Whether a vehicle whose start is cancelled may be disarmed: it has not flown, and its
+    /// position is less than 0.15 s old. If its climb had not begun, the position may be up to 5 s
+    /// old: with an older one its pilot may have taken off unseen.
     pub(crate) fn may_disarm_on_pad(&self, now: Instant, telemetry: &Telemetry) -> bool {
         let seen = match self.climb_begun {
             true => telemetry.position_age(now) < MAX_POSITION_AGE_ON_PAD,

@@ -14,8 +14,8 @@ use crate::state::State;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
-/// Time between two requests for the EKF origin while the autopilot has reported another one in
-/// flight.
+/// Time between two requests for the EKF origin after another origin than the one flown with was
+/// received while armed.
 pub(crate) const ORIGIN_RETRY_EVERY: Duration = Duration::from_millis(200);
 /// Time from entering the state `Disarm` to the first request to disarm, and between two such
 /// requests. Autopilots disarm by themselves within 3 s. The report of the ground may be false up
@@ -32,24 +32,26 @@ const REQUEST_RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// s).
 const TAKE_OFF_RETRY_EVERY: Duration = Duration::from_millis(4000);
 /// Age of the position, while HEARTBEAT still arrives, after which all streams are requested again:
-/// the autopilot has rebooted and forgotten them.
+/// the autopilot may have rebooted and forgotten them.
 const POSITION_STREAM_TIMEOUT: Duration = Duration::from_millis(1500);
 /// Least time between two requests for all streams.
 const STREAMS_RETRY_EVERY: Duration = Duration::from_millis(2000);
 /// Most streams requested in one step while connecting.
 const STREAM_REQUESTS_PER_STEP: usize = 5;
 const GPS_GLOBAL_ORIGIN: u16 = 49;
-/// Most PARAM_REQUEST_READ that are sent for all limit parameters together, on one connecting.
+/// Most PARAM_REQUEST_READ that are sent for all limit parameters together after one call of
+/// [`Handshake::begin_requesting_streams`].
 const MAX_LIMIT_REQUESTS: u8 = 80;
 /// Time between two PARAM_REQUEST_READ for limit parameters.
 const LIMIT_REQUEST_EVERY: Duration = Duration::from_millis(150);
 /// `MAV_PARAM_TYPE_REAL32`.
 const PARAM_TYPE_REAL32: u8 = 9;
-/// Age of a stream's last message after which that stream is requested again; the slowest stream,
-/// SYS_STATUS, has a period of 1 s.
+/// Age of a stream's last message after which that stream is requested again; the slowest streams
+/// have a period of 1 s.
 const STREAM_LOST_AFTER: Duration = Duration::from_millis(4000);
-/// Times from one request for a mode to the next while HEARTBEAT is silent, seconds: after the last
-/// none is made, since a pilot may fly the vehicle by now. At 50 % loss one in 16 loses them all.
+/// Times from each of the first three requests for a mode to the next one while HEARTBEAT is
+/// silent, seconds. After the fourth request none is made, since a pilot may fly the vehicle by
+/// then. At 50 % loss all four are lost in one case of 16.
 const MODE_RETRY_WHILE_SILENT_S: [u64; 3] = [1, 5, 20];
 /// Greatest age of the reported battery charge with which a vehicle takes off.
 const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
@@ -79,11 +81,12 @@ pub(crate) struct Handshake {
     arming: ArmingHandshake,
     /// The limits that the autopilot's parameters set; its kind's defaults where none was read.
     limits: AutopilotLimits,
-    /// Which of the limit parameters were read, a bit each (`limits_read`); `limit_requests_left`
-    /// counts the requests for them that may still be sent.
+    /// Which limit parameters were read: bit i for the i-th of [`AutopilotKind::limit_parameters`].
     limits_read: u16,
+    /// Number of requests for limit parameters that may still be sent.
     limit_requests_left: u8,
-    /// Index of the next of the kind's streams to be requested.
+    /// Index in [`AutopilotKind::streams`] of the stream to be requested next; past the end where
+    /// none is.
     next_stream: usize,
     /// Number of changes of mode requested since HEARTBEAT fell silent.
     mode_requests_while_silent: u8,
@@ -124,9 +127,9 @@ impl Handshake {
         self.arming.update_mode_and_landed(state, t, now);
     }
 
-    /// Requests all streams from the first on, in the following steps. With motors off it also sets
-    /// the limits to their defaults, to be read from the autopilot again, and returns true.
-    /// ArduPilot's `GUID_TIMEOUT` is set too.
+    /// Requests all streams from the first on, in the following steps. With the motors off, in a
+    /// state that streams no setpoints, it also sets the limits to their defaults, to be read from
+    /// the autopilot again, and returns true. ArduPilot's `GUID_TIMEOUT` is set too.
     pub(crate) fn begin_requesting_streams(
         &mut self,
         telemetry: &Telemetry,
@@ -176,8 +179,7 @@ impl Handshake {
     }
 
     /// Handles the autopilot's PARAM_VALUE; while armed it is ignored. Returns whether a limit
-    /// changed. It is decoded field by field: a `MAV_PARAM_TYPE` newer than the crate's must not
-    /// hide the value.
+    /// changed. Only a value of type REAL32 counts. The message is decoded field by field.
     pub(crate) fn handle_param_value(&mut self, telemetry: &Telemetry, frame: &Frame) -> bool {
         const ID: core::ops::Range<usize> = 8..24;
         let p = frame.padded_payload();
@@ -194,7 +196,7 @@ impl Handshake {
     }
 
     /// Sends the requests that are due by time and mission state. Returns whether the limits were
-    /// set to their defaults, so that the caller must use the new ones.
+    /// set to their defaults, so that the caller must pass them on to guidance.
     pub(crate) fn send_due_requests(
         &mut self,
         telemetry: &Telemetry,
@@ -210,7 +212,7 @@ impl Handshake {
             timers.set(Timer::UnheardMode, now);
         }
         if silent && s.state == State::Disarm {
-            // Reports from before the silence no longer count.
+            // Reports of the ground from before the silence no longer count: the wait begins again.
             timers.set(Timer::Request, now + DISARM_EVERY);
         }
         if heard {
@@ -251,9 +253,9 @@ impl Handshake {
         limits_reset
     }
 
-    /// Requests the change of mode, take-off or disarming that the mission state waits for. In a
-    /// landing, also one that is held, no more than a few requests for the mode are sent while
-    /// HEARTBEAT is silent: a pilot may fly the vehicle.
+    /// Requests the change of mode, take-off or disarming that the mission state waits for. In
+    /// `Land` and `LandingHeld`, at most four requests for the mode are sent while HEARTBEAT is
+    /// silent: a pilot may fly the vehicle.
     fn request_for_state(
         &mut self,
         telemetry: &Telemetry,
@@ -261,8 +263,8 @@ impl Handshake {
         timers: &mut Timers,
         links: &mut Links,
     ) {
-        let looks = s.state == State::Land && !s.may_request_land_mode;
-        if looks || !timers.take_due(Timer::Request, s.now, REQUEST_RETRY_EVERY) {
+        let waits = s.state == State::Land && !s.may_request_land_mode;
+        if waits || !timers.take_due(Timer::Request, s.now, REQUEST_RETRY_EVERY) {
             return;
         }
         let (kind, mode) = (telemetry.kind(), telemetry.custom_mode);
@@ -306,8 +308,8 @@ impl Handshake {
         }
     }
 
-    /// Requests the mode of a landing, or of one that is held, a few times while HEARTBEAT is
-    /// silent.
+    /// Requests, in `Land`, the landing mode or, in `LandingHeld`, the mode that follows setpoints:
+    /// at most four times while HEARTBEAT is silent.
     fn request_mode_while_silent(
         &mut self,
         kind: AutopilotKind,

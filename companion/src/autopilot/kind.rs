@@ -56,7 +56,7 @@ impl AutopilotKind {
         }
     }
 
-    /// Parameters 2 and 3 of DO_SET_MODE that switch it to the mode `custom_mode`.
+    /// Parameters 2 and 3 of DO_SET_MODE that switch the autopilot to the mode `custom_mode`.
     pub fn mode_params(self, custom_mode: u32) -> (f32, f32) {
         match self {
             Self::Px4 => px4::mode_params(custom_mode),
@@ -65,7 +65,7 @@ impl AutopilotKind {
     }
 
     /// `type_mask` of a SET_POSITION_TARGET_LOCAL_NED that moves the vehicle: its position and
-    /// feed-forward count, its yaw is ignored unless the sender clears that bit for a heading.
+    /// feed-forward count, its yaw is ignored unless the sender clears the yaw bit for a heading.
     pub fn move_type_mask(self) -> u16 {
         match self {
             Self::Px4 => px4::MASK_POSITION_VELOCITY_ACCELERATION,

@@ -3,15 +3,17 @@
 
 use crate::time::{Duration, Instant};
 
-/// Estimated height above the pad from which the vehicle counts as risen, whatever the landing
-/// detector reports, metres; an error of the estimate that was there before arming cancels out.
+/// Rise of the estimated height, since the vehicle was last known to be on the ground, from which
+/// it counts as risen, whatever the landing detector reports, metres. An error that both heights
+/// share cancels out.
 pub(super) const RISEN_M: f32 = 0.25;
 /// Age up to which a report of the ground holds whatever the position: reports come at 5 Hz.
 const SURELY_VALID_FOR: Duration = Duration::from_millis(400);
 /// Age up to which a report of the ground holds while the vehicle has not risen since.
 const VALID_UNLESS_RISEN_FOR: Duration = Duration::from_millis(3000);
 
-/// Age of the last report of a stream at 1 Hz, the default of PX4 where a request for 5 Hz is lost.
+/// Greatest age of the last report of a stream at 1 Hz, the default of PX4 where a request for 5 Hz
+/// is lost.
 const MAX_SLOW_STREAM_REPORT_AGE: Duration = Duration::from_millis(1200);
 
 /// What the landing detector reported.
@@ -21,7 +23,7 @@ pub(super) struct LandedReport {
     pub(super) on_ground: bool,
     /// When the report was received.
     pub(super) received_at: Instant,
-    /// Estimated height then, metres.
+    /// Estimated height in the mission frame at that time, metres.
     pub(super) z_m: f32,
 }
 
@@ -32,8 +34,9 @@ impl LandedReport {
         self.on_ground && now - self.received_at <= MAX_SLOW_STREAM_REPORT_AGE
     }
 
-    /// Whether the report says that the vehicle is on the ground, and still holds: it is new, or
-    /// the vehicle, at the estimated height `z_m` now, has not risen since. NaN: unknown height.
+    /// Whether the report says that the vehicle is on the ground, and still holds: it is at most
+    /// 0.4 s old, or at most 3 s old and the vehicle, at the estimated height `z_m` now, has not
+    /// risen since. NaN is an unknown height and counts as risen.
     pub(super) fn still_says_ground(&self, z_m: f32, now: Instant) -> bool {
         let rests = z_m < self.z_m + RISEN_M;
         self.on_ground

@@ -56,6 +56,7 @@ pub struct LimitParameter {
 /// The limits that the autopilot's parameters set, in metres and seconds.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AutopilotLimits {
+    /// By [`Limit`] as index.
     values: [f32; LIMIT_KINDS],
 }
 

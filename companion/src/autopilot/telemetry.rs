@@ -9,9 +9,9 @@
 //!
 //! While the motors are armed, setpoints are computed with one EKF origin, whatever is received: a
 //! GPS_GLOBAL_ORIGIN that an autopilot forwards from its radio looks like its own. When another
-//! origin is received, the autopilot is asked for its origin again. If it reports no other than the
-//! new one for 0.8 s (`ORIGIN_DOUBT_TIME`), the origin has moved, and the mission lands. An origin
-//! further than 30 km (`MAX_ORIGIN_DISTANCE_M`) from the mission's counts as unknown.
+//! origin is received, the autopilot is asked for its origin again. If only others than the one
+//! flown with come for 0.8 s (`ORIGIN_DOUBT_TIME`), the origin has moved, and the mission lands. An
+//! origin further than 30 km (`MAX_ORIGIN_DISTANCE_M`) from the mission's counts as unknown.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -33,7 +33,7 @@ use crate::time::{Duration, Instant};
 /// Age of the last HEARTBEAT from which the autopilot counts as silent: HEARTBEAT comes at 1 Hz,
 /// and a late one is not yet silence.
 pub(crate) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
-/// Gap between two HEARTBEATs that counts as a silence of the autopilot.
+/// Longest gap between HEARTBEATs that [`Telemetry::heartbeats_heard_for`] ignores.
 const MAX_HEARTBEAT_GAP: Duration = Duration::from_millis(4500);
 /// Age of a position from which a vehicle may have risen unseen: positions come at 30 Hz.
 pub(crate) const MAX_POSITION_AGE_ON_PAD: Duration = Duration::from_millis(150);
@@ -44,15 +44,13 @@ const EXTENDED_SYS_STATE: u32 = 245;
 const FLAG_ARMED: u8 = 0x80;
 const STATE_CRITICAL: u8 = 5;
 const LANDED_STATE_ON_GROUND: u8 = 1;
-/// Distance between the reported position and the predicted one (the last position and velocity
-/// extrapolated) beyond which the position has jumped, metres; [`POSITION_JUMP_MPS`] × time is
-/// added.
+/// Distance of the reported position from the one extrapolated from the last beyond which the
+/// position has jumped, metres; [`POSITION_JUMP_MPS`] × time is added.
 const POSITION_JUMP_M: f32 = 1.0;
 /// Change of velocity between two reported positions that no vehicle has exceeded so far, m/s.
 const POSITION_JUMP_MPS: f32 = 5.0;
 /// Greatest distance from the mission's origin to the EKF origin, metres. The autopilot's local
-/// frame is f32: it rounds a setpoint by up to 1.4 mm at this distance, by metres on the other side
-/// of the earth.
+/// frame, in f32, rounds a setpoint by up to 1.4 mm at this distance.
 const MAX_ORIGIN_DISTANCE_M: f32 = 30_000.0;
 /// Longest time between two positions over which the jump test extrapolates, seconds: after a
 /// longer silence of the autopilot the mission has ended.
@@ -113,9 +111,9 @@ pub struct Telemetry {
     pub kind: Option<AutopilotKind>,
     /// When the last HEARTBEAT was received.
     pub heartbeat_at: Option<Instant>,
-    /// When the first HEARTBEAT since the last silence was received.
+    /// When the first HEARTBEAT after the last gap of more than 4.5 s was received.
     heartbeats_since: Instant,
-    /// Estimated height at the last HEARTBEAT, metres.
+    /// Estimated height in the mission frame at the last HEARTBEAT, metres.
     pub(super) heartbeat_z_m: f32,
     /// Flight mode in the autopilot's own numbering.
     pub custom_mode: u32,
@@ -143,12 +141,12 @@ pub struct Telemetry {
     origin_doubtful_since: Option<Instant>,
     /// Whether the EKF origin moved while armed.
     pub(crate) origin_moved: bool,
-    /// Error of the position that the estimator last reported, metres, and when; infinite for an
-    /// unsound estimate.
+    /// Accuracy of the position (one standard deviation, metres) that the estimator last reported,
+    /// and when; infinite for an unsound estimate. ArduPilot's sound estimate counts as 0.
     position_accuracy: Option<(f32, Instant)>,
     /// When the last usable position was received; `None` while the position is unknown.
     pub position_at: Option<Instant>,
-    /// The same, kept while the position is unknown.
+    /// When the last usable position was received; kept while the position is unknown.
     pub(super) last_position_at: Option<Instant>,
     /// Position in the mission frame, ENU metres.
     pub position: Point,
@@ -159,15 +157,18 @@ pub struct Telemetry {
     /// When each stream of [`AutopilotKind::streams`] that is on was last received, in that order;
     /// `Instant::ZERO` for never.
     stream_received_at: [Instant; MAX_STREAMS],
+    /// Autopilot's time (`time_boot_ms`) of the newest position received, milliseconds.
     last_boot_ms: u32,
     /// Autopilot's time (`time_boot_ms`) of the last position that passed the jump test,
     /// milliseconds.
     position_boot_ms: u32,
     /// When a position last passed the jump test, whether or not it was usable.
     position_accepted_at: Option<Instant>,
+    /// Until when positions are not used after a jump or a change of the EKF origin.
     settling_until: Instant,
     /// From when on positions are usable after a gap.
     positions_valid_from: Instant,
+    /// ArduPilot: whether the flags of the last EKF_STATUS_REPORT allow arming and Guided.
     estimator_ready: bool,
 }
 
@@ -220,14 +221,13 @@ impl Telemetry {
         self.origin_doubtful_since.is_some()
     }
 
-    /// Whether the position jumped, or the EKF origin changed, within the last second
-    /// (`POSITION_SETTLE_TIME`).
+    /// Whether the position jumped, or the EKF origin changed or was refused, within the last
+    /// second (`POSITION_SETTLE_TIME`).
     pub fn is_position_settling(&self, now: Instant) -> bool {
         now < self.settling_until
     }
 
-    /// Updates the telemetry from a frame of the autopilot's link; `mission_origin` is the origin
-    /// of the mission frame.
+    /// Updates the telemetry from an autopilot's frame, for a mission frame about `mission_origin`.
     pub fn handle_frame(
         &mut self,
         now: Instant,
@@ -423,6 +423,7 @@ impl Telemetry {
         (self.armed_origin, self.origin_doubtful_since, self.origin_moved) = (None, None, false);
     }
 
+    /// Takes over a position in local NED, unless it is late, jumps or cannot be converted.
     fn handle_position(
         &mut self,
         now: Instant,
@@ -472,6 +473,7 @@ impl Telemetry {
         TelemetryChange::Updated
     }
 
+    /// Forgets the EKF origin and the position after a jump or a restart of the autopilot.
     fn lose_origin(&mut self, now: Instant) -> TelemetryChange {
         self.ekf_origin = None;
         self.position_at = None;

@@ -10,11 +10,13 @@ use crate::mission::{self, Action, State, TransitionRow};
 use crate::replanning::detour::path_kind::DetourPurpose;
 use crate::timers::Timer;
 
-/// Maximum number of transitions of the mission table that one step makes. More would mean that the
-/// table has a cycle.
+/// Maximum number of transitions that one evaluation of the mission table makes. More would mean
+/// that the table has a cycle.
 const MAX_TRANSITIONS_PER_STEP: usize = 4;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Takes rows of the mission table until none applies, or `MAX_TRANSITIONS_PER_STEP` were
+    /// taken.
     pub(super) fn run_mission_table(&mut self) {
         for _ in 0..MAX_TRANSITIONS_PER_STEP {
             let inputs = self.guard_inputs();
@@ -25,9 +27,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
+    /// Takes a row: changes the state, runs the row's action, and reports the change by text and
+    /// event.
     pub(super) fn apply_row(&mut self, row: &'static TransitionRow) {
         let now = self.now;
-        // After an interruption, a vehicle that sought a landing place resumes with a landing.
+        // The state that is resumed if this row interrupts a search for a path: the landing if the
+        // search is for a landing place, unless the vehicle flies back or home.
         let lands = self.detours.seeks_landing_aside()
             && !self.guidance.returning
             && !self.detours.is_homeward();
@@ -49,7 +54,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if let Some(text) = self.mission.interruption_text(from, to) {
             self.links.send_text(Severity::Info, text);
         }
-        // The queue is full only if the shell does not drain: then this event is lost.
+        // The queue is full only if the shell does not drain it: then this event is lost.
         let warning = row.severity == Severity::Warning;
         let changed = Event::StateChanged { from, to, text: row.text, warning };
         let _ = self.events.push_back(changed);
@@ -59,6 +64,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
+    /// Runs the action of a row that leads from state `from` to `to`; the state is `to` already.
     pub(super) fn run_action(&mut self, from: State, to: State, row: &TransitionRow) {
         let now = self.now;
         self.update_place_before_jump(to);
@@ -79,8 +85,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 if let Some(fleet) = self.neighbours.fleet_mut() {
                     if fleet.has_reported_leaving() {
-                        // The vehicle takes part again: it leaves its share at the earliest after
-                        // this time, since others have to hear it first.
+                        // The vehicle takes part again. Others have to hear it first, so it keeps
+                        // its share for at least this time though it cannot make a commitment yet.
                         self.timers.set(
                             Timer::LeaveWithoutCommitment,
                             now + LEAVE_WITHOUT_COMMITMENT_AFTER,
@@ -143,12 +149,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
+    /// Begins the landing of a vehicle that was in state `from`: by setpoints that lead straight
+    /// down, or by a request for the landing mode.
     pub(super) fn request_landing(&mut self, from: State) {
         use State::*;
         self.timers.set(Timer::Request, self.now);
         let position = self.telemetry.position;
         // Others avoid the place where an unheard vehicle may be on the ground, so setpoints guide
-        // it straight down. A held landing continues as it began: by setpoints or the autopilot.
+        // the vehicle straight down to that place. A held landing continues as it began: by
+        // setpoints or the autopilot.
         if from == SwarmLinkLost || (from == LandingHeld && self.guidance.is_guiding_landing()) {
             return self.guidance.begin_guided_landing(self.now);
         }
@@ -175,7 +184,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     None => {}
                 }
                 if to == State::Blocked {
-                    // Counts as blocked until the next scan has checked the path.
+                    // The path counts as blocked until the next scan has checked it.
                     self.detours.assume_blocked();
                 }
                 if !to.setpoint_advances() {

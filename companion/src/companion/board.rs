@@ -12,8 +12,9 @@ use crate::time::{Duration, Instant};
 const ERASE_WITHOUT_AUTOPILOT_AFTER: Duration = Duration::from_secs(10);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Attaches a flash that keeps files and parameters, and applies the parameters stored there.
-    /// Without a flash there is no FTP, and parameters are lost at a restart.
+    /// Attaches a flash that keeps files, parameters and photographed waypoints, and takes over the
+    /// parameters and waypoints stored there. Without a flash there is no FTP, and parameters are
+    /// lost at a restart.
     pub fn attach_store(&mut self, store: Store) {
         self.services.attach_store(store);
         let Self { services, mission, config, .. } = self;
@@ -28,8 +29,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// The next flash operation for the shell; `None` where there is none. Each is returned once;
-    /// its outcome goes to [`Self::handle_flash`]. To be called until `None`, like the other
-    /// `poll_*`. An operation may take long: setpoints do not wait for it.
+    /// its outcome goes to [`Self::handle_flash`]. To be called until it returns `None`, as
+    /// [`Self::poll_event`]. An operation may take long: setpoints do not wait for it.
     pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
         let erasing = self.erase_permission();
         self.services.poll_flash(self.now, erasing, &mut self.links)
@@ -57,8 +58,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// PREFLIGHT_REBOOT_SHUTDOWN: requests a restart of this companion from the shell, unless the
-    /// vehicle is armed.
+    /// Handles PREFLIGHT_REBOOT_SHUTDOWN: requests a restart of this companion from the shell,
+    /// unless the vehicle is armed. Denies it unless it restarts the onboard computer (`param2` 1),
+    /// or names this component with `param1` 1. Returns the MAV_RESULT.
     pub(crate) fn handle_restart_command(&mut self, command: &Command) -> u8 {
         let asked = command.param2 == 1.0 || (command.to_our_component && command.param1 == 1.0);
         if !asked {

@@ -32,8 +32,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// To be called on entering state `to`. `PositionLost` because of a jump: keeps the reference's
-    /// place on the path as the place to report. A state that trusts the position again forgets it.
+    /// To be called on entering state `to`. On entering `PositionLost` because of a jump, the
+    /// reference's place on the path is kept as the place to report to others; on entering a state
+    /// that trusts the position again, it is forgotten.
     pub(super) fn update_place_before_jump(&mut self, to: State) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
         let own = (neighbours.own_rank(), config.system_id);
@@ -51,7 +52,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         detours.update_place_before_jump(to, &view);
     }
 
-    /// Continues the scan of the path for obstacles, and checks whether the other vehicles stand.
+    /// Continues the scan of the path for obstacles and for vehicles out of the plan, and decides
+    /// whether the vehicle is blocked and whether it claims the turn to fly a detour.
     pub(super) fn scan_for_obstacles(&mut self) {
         let Self { now, config, mission, guidance, telemetry, neighbours, detours, timers, .. } =
             self;
@@ -77,25 +79,26 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.detours.note_request(aim);
         self.guidance.reset_trap_timer();
         self.mission.forget_plan_failure();
-        // The queue is full only if the shell does not drain the events; then the request is made
-        // again.
+        // The queue is full only if the shell does not drain the events; then the mission table
+        // makes the request again later.
         let _ = self.events.push_back(Event::PlanRequested(PlanKind::Detour));
     }
 
-    /// Requests a path aside, out of the column under a vehicle that descends. Over an area a
-    /// second path leads back from there.
+    /// Requests a path aside, out of the column under a vehicle that descends; `from`: the state
+    /// before. In a coverage mission a path requested later leads back from there.
     pub(super) fn request_detour_aside(&mut self, from: State) {
-        // A vehicle that flies back, or to a landing place aside, seeks another landing place.
+        // A vehicle that flies back, or to a landing place aside, seeks a place aside to land at.
         if self.guidance.returning || self.detours.lands_at_end() {
             return self.request_detour(DetourPurpose::LandingAside);
         }
         self.request_detour(DetourPurpose::Aside(self.rejoin_after_aside(from)));
     }
 
-    /// Over an area, two places on its path to which a vehicle that goes aside may come back. The
-    /// first is where it left its path on an earlier detour, holds for a division or stands now.
-    /// The second is the first free place beyond what blocks the path; there is none if the
-    /// vehicle promised to hold short of it. `None` for a vehicle that does not come back.
+    /// In a coverage mission, two places on its path to which a vehicle that goes aside may come
+    /// back. On a detour these are the places of that detour. Otherwise the first is where the
+    /// vehicle holds for a division, or else its reference; the second is the first free place
+    /// beyond what blocks the path, or equal to the first if there is none or the vehicle has
+    /// promised to hold for a division. `None` for a vehicle that does not come back.
     fn rejoin_after_aside(&self, from: State) -> Option<RejoinPlaces> {
         if !self.detours.keeps_to_plan_over_area(&self.detour_view()) {
             return None;
@@ -119,6 +122,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.detours.first_rejoin_m(&self.detour_view()).and_then(|at_m| self.place_on_path(at_m))
     }
 
+    /// The place `along_m` metres along the path that is flown now; `None` without a path.
     #[inline(never)]
     fn place_on_path(&self, along_m: f32) -> Option<RejoinPlace> {
         let position = self.mission.plan()?.path.point_at(along_m)?;
@@ -151,8 +155,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if replans { self.detours.detour_request(&self.detour_view(), visit) } else { None }
     }
 
-    /// Switches to the detour that the shell has planned, or refuses it where it starts or ends
-    /// elsewhere.
+    /// Switches to the detour that the shell has planned, or refuses it if it starts or ends
+    /// elsewhere than requested, or promises made since forbid it.
     pub(super) fn adopt_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let here = self.detours.start_of_detour(&self.detour_view());
         let begins = here.is_some_and(|here| self.mission.is_plan_valid_from(detour, &here));
@@ -186,7 +190,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         purpose: DetourPurpose,
         ends: Option<Point>,
     ) -> Option<DetourPurpose> {
-        // Where the vehicle promised since then to hold for a division, along its own path.
+        // Where along its own path the vehicle has promised, perhaps since the request, to hold for
+        // a division.
         let promised_m = self.division_hold_m();
         match purpose {
             DetourPurpose::Rejoin(back) => {
@@ -214,8 +219,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Handles that the shell has found no detour: decides whether and when another search makes
-    /// sense.
+    /// Handles that the shell has found no detour, none in time, or none that can be flown: decides
+    /// whether and when another search makes sense.
     pub(super) fn handle_detour_failure(&mut self, failure: PlanFailure) {
         self.mission.set_plan_failure(failure);
         let outlook = if self.neighbours.any_comes_down_unheard(self.now) {

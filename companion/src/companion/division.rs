@@ -21,36 +21,39 @@ const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
 /// Distance by which a stop may end beyond the place promised, metres.
 const MAX_STOP_BEYOND_PROMISE_M: f32 = 0.1;
 /// A vehicle within this distance before the place where it promised to hold has reached it,
-/// metres.
+/// metres. Places that are nearer to each other than this count as the same.
 const AT_HOLD_WITHIN_M: f32 = 0.2;
-/// Time for which a vehicle on the ground that cannot make a commitment keeps its share while
-/// another one flies.
+/// Time for which a vehicle on the ground that cannot make a commitment keeps its share; then it
+/// leaves the share to the others.
 pub(super) const LEAVE_WITHOUT_COMMITMENT_AFTER: Duration = Duration::from_secs(60);
-/// Time for which a vehicle waits above its pad for missing vehicles: twice the time after which a
-/// missing one counts as lost, or leaves for want of a lease. A false report keeps no vehicle in
-/// the air for longer.
+/// Time for which a vehicle waits above its pad for missing vehicles: more than twice the time
+/// after which a missing one counts as lost, or leaves for want of a lease. A false report keeps no
+/// vehicle in the air for longer.
 const MAX_WAIT_FOR_MISSING: Duration = Duration::from_secs(180);
-/// Time after the last lost vehicle is down within which a division must become binding.
+/// Time after the last lost vehicle must be down within which a division must become binding; later
+/// it is overdue.
 const DIVISION_DUE_AFTER_LAST_DOWN: Duration = Duration::from_secs(60);
 /// Used in place of the plan's CRC where the planner cannot divide the rest of the area.
 const IMPOSSIBLE_DIVISION_CRC: u32 = u32::MAX;
 /// Time after which an unanswered request for a division is sent to the shell again.
 const DIVISION_RETRY_EVERY: Duration = Duration::from_secs(30);
 
+/// An arc length in decimetres, rounded up; `None` if it is negative or does not fit.
 fn to_decimetres(along_m: f32) -> Option<u16> {
     let dm = libm::ceilf(along_m * 10.0);
     (0.0..=f32::from(u16::MAX)).contains(&dm).then_some(dm as u16)
 }
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// The input of the plan requested by [`PlanKind::Division`]: for each division so far, in
-    /// order, the input of every vehicle by rank.
+    /// The inputs of the plan requested by [`PlanKind::Division`]: for each binding division, and
+    /// for the one under way if it is to be computed, oldest first, the input of every vehicle by
+    /// rank.
     pub fn division_inputs(&self) -> impl Iterator<Item = &[VehicleDivisionInput]> + Clone {
         self.neighbours.fleet().into_iter().flat_map(Fleet::inputs_of_divisions)
     }
 
     /// Updates the fleet's state and where this vehicle holds, and requests a division's plan if
-    /// one is to be computed or flown.
+    /// one is to be computed or flown, or the vehicle's own plan again after a detour.
     pub(super) fn step_division(&mut self) {
         let now = self.now;
         if self.neighbours.fleet().is_none() {
@@ -77,7 +80,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let waits = || fleet.takes_part() && (fleet.is_dividing() || misses);
         let halt_m = match self.division_hold_m() {
             Some(holds_at_m) => holds_at_m,
-            // On a detour the end of the path is not above the pad.
+            // On a detour back to its path a vehicle waits for no missing one: that detour does not
+            // end above the pad.
             None if !around && waits() => {
                 let home_m = self.last_descent_start_m();
                 let before = self.guidance.reference_along_m() <= home_m + AT_HOLD_WITHIN_M;
@@ -101,7 +105,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// This vehicle's report of itself to the fleet.
+    /// This vehicle's report of itself to the fleet (`Fleet::step`).
     fn own_fleet_report(&self) -> OwnReport {
         let state = self.mission.state();
         let off_plan = self.guidance.returning
@@ -169,8 +173,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether this vehicle, on the ground, cannot make a commitment, so that vehicles in flight
     /// could not divide the area. Either it is ready or started and no majority hears it; or
-    /// another vehicle takes part, and this one has no autopilot, position or plan, is away from
-    /// its pad, or hears another plan.
+    /// another vehicle that takes part is in flight, and this one has no autopilot, position or
+    /// plan, is away from its pad, or hears another plan.
     fn cannot_commit_on_ground(&self) -> bool {
         let Some(fleet) = self.neighbours.fleet() else { return false };
         let lacks = match self.mission.state() {
@@ -182,7 +186,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         lacks && self.neighbours.is_another_in_flight(self.now, LEASE)
     }
 
-    /// Whether this vehicle is on its pad and was not started: it may take part as a new vehicle.
+    /// Whether this vehicle was not started: it may take part as a new vehicle.
     pub(super) fn is_not_started(&self) -> bool {
         self.mission.state().is_before_start()
     }
@@ -199,7 +203,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && self.neighbours.fleet().is_some_and(Fleet::has_reported_leaving)
     }
 
-    /// Whether this vehicle was started after it reported that it leaves, and another one flies.
+    /// Whether this vehicle was started after it reported that it leaves, and still counts as
+    /// having left although a majority hears it: it would take part again unless another one were
+    /// in flight.
     fn starts_after_leaving(&self) -> bool {
         self.mission.state().is_started_before_arming()
             && self
@@ -208,7 +214,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 .is_some_and(|fleet| fleet.has_reported_leaving() && fleet.has_lease(self.now))
     }
 
-    /// Whether this vehicle flies home, back along its path, or aside, and lands at the end.
+    /// Whether this vehicle flies home, back along its path, or aside without a way back, or seeks
+    /// such a path: it lands at the end.
     fn will_land_off_plan(&self) -> bool {
         let home = self.guidance.returning || self.detours.is_homeward();
         home || (self.guidance.ends_away_from_goal && !self.detours.is_beside_plan())
@@ -216,8 +223,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.seeks_landing_aside()
     }
 
-    /// Whether this vehicle must not fly its part any more: the others have divided that part, or
-    /// count it as lost.
+    /// Whether this vehicle must not fly its part any more: the others have divided that part or
+    /// count this vehicle as lost, or it flies or starts after it reported that it leaves.
     pub(super) fn is_excluded(&self) -> bool {
         let excluded = self.neighbours.fleet().is_some_and(Fleet::is_excluded);
         (excluded && !self.will_land_off_plan())
@@ -225,7 +232,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.starts_after_leaving()
     }
 
-    /// Place along its path where its last descent begins, above its pad, metres.
+    /// Place along its path, metres, where the last leg begins, which descends above the pad; −∞
+    /// without a path.
     fn last_descent_start_m(&self) -> f32 {
         let waypoints = self.mission.plan().map_or(&[][..], |plan| plan.path.waypoints());
         waypoints.iter().nth_back(1).map_or(f32::NEG_INFINITY, |home| home.along_m)
@@ -251,12 +259,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ahead_m = match self.mission.state().is_blocked() {
             // A vehicle whose path is blocked promises to hold where it is.
             true => along_m,
-            // One that is slow to brake may take longer than that to stop.
+            // One that is slow to brake may take longer than `COMMITMENT_S` to stop.
             false => (along_m + COMMITMENT_S * self.config.cruise_mps)
                 .max(stops_m + EXTRA_STOPPING_MARGIN_M),
         };
         let gates_m = self.guidance.gates_open_up_to_m(&self.guidance_inputs());
-        // The vehicle that it stops for may stay there: it promises no place beyond that stop.
+        // The neighbour for which advice stops this vehicle may stay there: this vehicle promises
+        // no place beyond the advised stop.
         let clear_m = gates_m.min(along_m + self.guidance.advice.stop_within_m.max(0.0));
         let most_m = ahead_m.min(clear_m).min(self.last_descent_start_m()).max(along_m);
         let stops_for_block =
@@ -282,7 +291,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         (!elsewhere).then_some(f32::from(held_dm) / 10.0)
     }
 
-    /// Whether this vehicle stands where it is to hold for a division.
+    /// Whether this vehicle's setpoint stands where the vehicle is to hold for a division.
     pub(super) fn is_holding_for_division(&self) -> bool {
         self.division_hold_m().is_some_and(|at_m| {
             let along_m = self.guidance.reference_along_m();
@@ -297,7 +306,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         })
     }
 
-    /// Whether no division is under way, and this vehicle flies by the last binding one.
+    /// Whether no division is under way, and this vehicle flies by the last binding one; true in a
+    /// mission without an area.
     pub(super) fn is_division_settled(&self) -> bool {
         self.neighbours.fleet().is_none_or(|fleet| {
             let flown = fleet.division_count() == self.mission.division_count()
@@ -315,7 +325,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Takes up its own plan again beyond the obstacle that it flew around.
+    /// Takes up its own plan, which the shell has returned again as `plan`, beyond the obstacle
+    /// that it flew around; gives the plan up if its path does not pass the end of the detour.
     fn resume_plan_beyond_detour(&mut self, plan: &VehiclePlan<W, G>) {
         let Some(RejoinPlace { along_m: back_m, position }) = self.detours.rejoin_place() else {
             return;
@@ -333,7 +344,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     "Flown around: # waypoints are left",
                     [left, 0],
                 );
-                // The queue is full only if the shell does not drain the events; then this one is
+                // The queue is full only if the shell does not drain the events; then this event is
                 // lost.
                 let _ = self.events.push_back(Event::DetourSkippedWaypoints { count: left });
             }

@@ -86,8 +86,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Handles a command of anybody, and answers it. Returns whether the mission table has to be
-    /// evaluated now.
+    /// Handles a command from any sender, and answers it. A command that changes something counts
+    /// only from a ground station of the mission. A duplicate gets the former answer and does not
+    /// act again. Returns whether the mission table has to be evaluated now.
     fn handle_command_frame(&mut self, heard: &ReceivedFrame<'_>, command: &Command) -> bool {
         let ReceivedFrame { link, sender, frame, now, .. } = *heard;
         if sender != SenderKind::GroundStation && command.needs_authority() {
@@ -109,12 +110,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         relevant
     }
 
+    /// Whether this vehicle's autopilot sent the frame: its system id, component 1, on its link.
     fn is_from_autopilot(&self, heard: &ReceivedFrame<'_>) -> bool {
         heard.link == Link::Autopilot
             && heard.sender_ids() == (heard.own_system_id, AUTOPILOT_COMPONENT)
     }
 
-    /// Handles a parameter of this vehicle's autopilot: its limits may follow from it.
+    /// Handles a parameter of this vehicle's autopilot: limits of guidance may follow from it,
+    /// unless setpoints are sent now.
     fn handle_autopilot_parameter(&mut self, frame: &Frame) {
         let changed = self.handshake.handle_param_value(&self.telemetry, frame);
         if changed && !self.mission.state().streams_setpoints() {
@@ -169,7 +172,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if id == self.config.system_id || id == 0 || frame.component != COMPANION_COMPONENT {
             return;
         }
-        // Only a frame that decodes updates the sender's sequence number.
+        // Only an intent that decodes and is of this mission updates the sender's sequence number.
         if frame.message_id == TUNNEL_DATA::ID {
             self.handle_tunnel(frame);
         } else if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
@@ -232,7 +235,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.neighbours.handle_numbered_intent(self.now, sequence, intent, mission_crc, plan_crc);
     }
 
-    /// Denies a command from a sender that is no ground station of the mission.
+    /// Denies a command from a sender that is no ground station of the mission, and reports it by a
+    /// text.
     pub(super) fn reject_command(&mut self, link: Link, sender: SenderKind, command: &Command) {
         if command.to_our_system {
             let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };
@@ -276,7 +280,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             {
                 self.handle_restart_command(command)
             }
-            // An unknown command to all components is meant for another one.
+            // An unknown command to all components is meant for another component.
             None if !command.to_our_component => return None,
             None => UNSUPPORTED,
         };
@@ -287,6 +291,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         command.to_our_system.then_some(result)
     }
 
+    /// Handles REQUEST_MESSAGE: makes the message with the id `message` due on the same link, if
+    /// the companion has such a message and the rate limits allow. Returns the MAV_RESULT.
     pub(super) fn handle_message_request(
         &mut self,
         link: Link,

@@ -15,7 +15,7 @@ use crate::time::{Duration, Instant};
 use crate::timers::Timer;
 
 /// Greatest horizontal distance from the place where landing was commanded in flight to the
-/// touchdown, metres: the stopping distance from cruise.
+/// touchdown, metres: the vehicle may have to stop first.
 const MAX_LANDING_DRIFT_M: f32 = 1.0;
 /// Greatest horizontal distance from the place where landing was commanded to the touchdown, for a
 /// vehicle that stood still then, metres.
@@ -26,24 +26,25 @@ const UNHEARD_AFTER: Duration = Duration::from_secs(LEASE_S - 1);
 /// Height above the pad below which a climb is not interrupted by a pause, metres, but at most half
 /// of the climb: lower, an autopilot may take a hovering vehicle for landed, and disarm it.
 const MIN_PAUSE_HEIGHT_M: f32 = 1.0;
-/// Time without being heard after which a vehicle that has no part of the area no longer waits for
-/// one.
+/// Time without being heard by a majority after which a vehicle that has no part of the area no
+/// longer waits for a part.
 const MAX_RESERVE_UNHEARD: Duration = Duration::from_secs(300);
 /// Time, in addition to [`MAX_UNFOLLOWED`], for which a vehicle in a coverage mission may be away
-/// from a setpoint that stands; then it lands. Gusts push it further there than walls would allow
-/// indoors.
+/// from a setpoint that stands; then it lands. Outdoors gusts push it further than walls would
+/// allow indoors.
 const EXTRA_UNFOLLOWED_IN_SWAY: Duration = Duration::from_secs(60);
-/// Greatest distance from its setpoint at which that additional time applies, metres.
+/// Greatest distance from its setpoint at which [`EXTRA_UNFOLLOWED_IN_SWAY`] applies, metres.
 const MAX_SWAY_M: f32 = 2.0;
 /// An unheard vehicle stops if its next closed gate is less than this ahead, metres.
 const MIN_CLOSED_GATE_AHEAD_M: f32 = 0.2;
-/// Time that a climb is assumed to take at most beyond 1 s for each metre of height, seconds:
-/// idling motors, and the stop at the top.
+/// Greatest time that a climb is assumed to take in addition to its height at the climb speed,
+/// seconds: idling motors, and the stop at the top.
 const ASSUMED_CLIMB_OVERHEAD_S: f32 = 8.0;
 /// Vertical speed above which a vehicle does not rest on the ground, m/s.
 const MAX_RESTING_VERTICAL_MPS: f32 = 0.5;
 
-/// Time after an unheard descent within which it makes room for a vehicle that waited for it.
+/// Time since the safety filter last stopped this vehicle for one that comes down unheard, within
+/// which that descent is expected to leave room: until then only this time counts as hindrance.
 const DESCENT_LEAVES_ROOM_WITHIN: Duration = Duration::from_secs(30);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -87,7 +88,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // A vehicle that something holds, or whose EKF origin moved, cannot fly home or aside: it
         // can only land.
         let can_leave = unfollowed_for < MAX_UNFOLLOWED && !t.origin_moved;
-        // A landing that is held began on the path, or where something else moved the vehicle.
+        // From a held landing the vehicle turns back only if the way to its path is free: the
+        // landing may have begun where a pilot or the wind had moved the vehicle.
         let joins =
             self.mission.state() != State::LandingHeld || self.guidance.can_join_path(scene);
         GuardInputs {
@@ -219,7 +221,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             pad_blocked_for: self.pad_blocked_for(),
             way_back_blocked_for_good_for: self.way_back_blocked_for_good_for(),
             join_barred: follow && self.guidance.is_join_barred(scene),
-            // Over an area the search checks the way from where the vehicle is.
+            // In a coverage mission the search for a place aside checks the way from where the
+            // vehicle is.
             may_seek_landing_aside: can_leave
                 && (joins || area)
                 && self.detours.may_seek_landing_aside(&view),
@@ -250,11 +253,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         !self.plan_leaves_pad() && self.neighbours.fleet().is_some_and(needed)
     }
 
+    /// Whether there is a plan, and its task makes the vehicle leave its pad.
     pub(super) fn plan_leaves_pad(&self) -> bool {
         self.mission.plan().is_some_and(|plan| plan.task.leaves_pad())
     }
 
-    /// Whether this vehicle is at its start, within the tolerances.
+    /// Whether the estimated position is at the pad: horizontally within `start_tolerance_m`, in
+    /// height also within [`MAX_HEIGHT_ERROR_ON_GROUND_M`].
     pub(super) fn is_at_pad(&self) -> bool {
         let pad = self.mission.path_start() - Point::new(0.0, 0.0, self.mission.climb_m());
         let away = self.telemetry.position - pad;
@@ -263,8 +268,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Time for which this vehicle has heard no other one, or none has reported that it hears this
-    /// vehicle, whichever is longer; zero while it may fly on so. In a coverage mission: time since
-    /// the last renewal of its lease, counted from 1 s before the lease ends.
+    /// vehicle, whichever is longer; counted from the entry into the state unless the vehicle is
+    /// paused or its autopilot silent. Zero while it may fly on unheard, or flies back or aside to
+    /// land. In a coverage mission: time since the last renewal of its lease, counted from 1 s
+    /// before the lease ends.
     fn unlinked_for(&self) -> Duration {
         let (now, state) = (self.now, self.mission.state());
         if let Some(fleet) = self.neighbours.fleet() {
@@ -275,8 +282,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return if on_pad { age.min(self.mission.time_in_state(now)) } else { age };
         }
         // A vehicle that flies back, or aside to land, does not stop because no other vehicle hears
-        // it: it is about to land anyway. A vehicle that stands does: others assume after a while
-        // that it is down.
+        // it: it is about to land anyway. For a vehicle that stands the time counts all the same:
+        // others assume after a while that it is down, so it has to land.
         let stands = state.stands_until_resumed();
         let is_landing = self.guidance.returning
             || self.detours.lands_at_end()
@@ -297,7 +304,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if since < DESCENT_LEAVES_ROOM_WITHIN { hindered_for.min(since) } else { hindered_for }
     }
 
-    /// Time for which other vehicles have barred the descent to its pad, or the path there.
+    /// On the way home, time for which any vehicle has barred the descent to the pad, or one that
+    /// rests for good the path there; at the end of a coverage path, time for which one that rests
+    /// for good has barred the descent. Else zero.
     fn pad_blocked_for(&self) -> Duration {
         let follow = self.mission.state() == State::Follow;
         let homeward = self.returns_to_start();
@@ -312,7 +321,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Time for which a vehicle that rests for good has barred the way back to its pad.
+    /// Time for which a vehicle that rests for good has barred the way back to its pad; zero in a
+    /// coverage mission.
     fn way_back_blocked_for_good_for(&self) -> Duration {
         match self.mission.state() == State::Follow && self.returns_to_start() {
             true if self.config.lost_vehicle_down_after_s.is_none() => {
@@ -322,12 +332,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
+    /// Whether the vehicle flies back along its path, flies straight home, or seeks the way home.
     fn returns_to_start(&self) -> bool {
         self.guidance.returning || self.detours.is_homeward()
     }
 
-    /// Whether this vehicle lately heard others and they heard it (within 1 s); in a coverage
-    /// mission, whether a majority of those that take part reported that they hear it.
+    /// Whether within 1 s this vehicle heard another one, and one reported that it hears this
+    /// vehicle; in a coverage mission, whether a majority of those that take part reported that
+    /// they hear it.
     fn is_linked(&self) -> bool {
         match self.neighbours.fleet() {
             Some(fleet) => fleet.unheard_for(self.now) < HEARTBEAT_EVERY,
@@ -336,7 +348,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether a vehicle in this state may continue its plan while no other vehicle hears it: only
-    /// where the radio's range is known.
+    /// on its plan, unblocked and no slower than others expect, where the radio's range is known,
+    /// and not in a coverage mission.
     pub(super) fn may_fly_unheard(&self) -> bool {
         let follows = self.mission.state().may_continue_unheard();
         let left = self.detours.is_blocked()
@@ -344,7 +357,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.is_on_detour();
         let ranged = self.config.radio_range_m < REACHES_ALL_M;
         // A vehicle slowed by a parameter or by its autopilot is not where the others predict it to
-        // be. In a coverage mission this rule does not apply: the lease limits how long it flies.
+        // be. In a coverage mission no vehicle flies on by this rule: there the lease limits how
+        // long it does.
         let keeps_pace = self.guidance.cruise_mps() >= self.config.slowest_vehicle_mps;
         ranged
             && keeps_pace
@@ -368,7 +382,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Place along its path up to which this vehicle flies while it is unheard, metres, and the
     /// seconds by which its gates and its climb delay it, compared with a flight from `progress_m`
-    /// at 0.4 of the nominal speed; (−1e6, 0) where it does not fly on.
+    /// at 0.4 of the slowest vehicle's cruise speed; (−1e6, 0) where it does not fly on.
     pub(super) fn unheard_end_m_and_delay_s(&self, progress_m: f32) -> (f32, u8) {
         match self.may_fly_unheard() {
             true => {
@@ -393,8 +407,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether this vehicle lands whatever is below: the battery is nearly empty, or its position
-    /// is unknown or in another frame, so that it cannot hold.
+    /// Whether this vehicle lands whatever is below: the charge is below half of the configured
+    /// limit, or its position is unknown or the EKF origin has moved, so that it cannot hold.
     pub(crate) fn must_land(&self) -> bool {
         let t = &self.telemetry;
         t.is_battery_below(self.config.battery_low_percent / 2)

@@ -14,8 +14,8 @@ use crate::swarm::fleet::Fleet;
 use crate::time::Duration;
 use crate::timers::Timer;
 
-/// Period at which the photographed waypoints are noted and stored, and their number is sent on
-/// both links.
+/// Period at which the photographed waypoints are noted, stored if enough are new, and their number
+/// is sent on both links.
 const NOTE_PHOTOGRAPHED_EVERY: Duration = Duration::from_millis(1000);
 /// Time within which each vehicle on the ground has heard the reports of the others: they come each
 /// second, and half of the messages may be lost.
@@ -34,8 +34,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.neighbours.fleet().is_some()
     }
 
-    /// Whether this vehicle stands on its pad before its take-off, where it has to compute the same
-    /// plan as the others.
+    /// Whether this vehicle was not started yet, or waits on its pad for its departure
+    /// (`Scheduled`): until then its plan may still be replaced by one that fits the others'.
     fn is_unstarted_or_scheduled(&self) -> bool {
         self.is_not_started() || self.mission.state() == State::Scheduled
     }
@@ -67,7 +67,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Stores and reports the photographed waypoints.
+    /// Stores the photographed waypoints in flash if enough are new, and makes the messages that
+    /// report them due.
     pub(super) fn store_and_report_photographed(&mut self) {
         let (crc, stage) = (self.config.mission_crc, self.flight_stage());
         if let Some(kept) = self.mission.photographed_mut().record_to_store(crc, stage) {
@@ -104,7 +105,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let under_way = || self.neighbours.fleet().is_some_and(Fleet::has_others_flight_begun);
             let planning = match self.mission.state() {
                 _ if !self.is_unstarted_or_scheduled() => PlanningPartners::Nobody,
-                // Once started, it keeps its part of a flight in which others fly or have flown.
+                // Once started in a flight that others have begun, this vehicle keeps its plan
+                // whatever vehicles on the ground report.
                 State::Scheduled if under_way() => PlanningPartners::ThoseInFlight,
                 _ => PlanningPartners::All,
             };

@@ -6,9 +6,9 @@ use crate::planner::{PlanInputs, RequestedPlan};
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Copies what [`crate::planner::answer_plan_request`] needs for the requested plan to `into`:
-    /// photographed waypoints, lost vehicles for a division, keep-out zones for a detour. Returns
-    /// the plan to make; `None` if the companion no longer wants a detour, or none can be planned:
-    /// then the answer is [`crate::PlanFailure::Unreachable`].
+    /// photographed waypoints, the inputs of the divisions for a division, keep-out zones for a
+    /// detour. Returns the plan to make; `None` if the companion no longer wants a detour, or none
+    /// can be planned: then the shell is to answer [`crate::PlanFailure::Unreachable`].
     pub fn read_plan_inputs<const Z: usize>(
         &mut self,
         wanted: PlanKind,

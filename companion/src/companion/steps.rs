@@ -1,4 +1,4 @@
-//! What is done in time: the control step, and the messages that are sent periodically.
+//! What is done as time passes: the control step, and the messages that are sent periodically.
 
 use super::{Companion, HEARTBEAT_EVERY, WARNING_EVERY};
 use crate::autopilot::handshake::is_battery_known_or_unchecked;
@@ -13,13 +13,13 @@ use crate::storage::store::ErasePermission;
 use crate::time::{Duration, Instant};
 use crate::timers::Timer;
 
-/// Period of setpoints and of control steps in flight: 20 Hz, twice the least rate that PX4 needs
-/// in practice.
+/// Period of setpoints, and of control steps while setpoints are sent: 20 Hz, twice the least rate
+/// that PX4 needs in practice.
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
-/// Time after a start at which it is reported that it waits for the battery's charge: an autopilot
-/// that was just found reports it within a second.
+/// Time in `Scheduled` after which the companion reports that the start waits for the battery's
+/// charge to be known: an autopilot that was just found reports the charge within a second.
 const UNKNOWN_CHARGE_REPORT_AFTER: Duration = Duration::from_secs(5);
-/// Period of that report.
+/// Period of the report that the start waits for the battery's charge.
 const UNKNOWN_CHARGE_REPORT_EVERY: Duration = Duration::from_secs(30);
 /// Period of steps in the states that stream no setpoints: before and after a flight, in a take-off
 /// by command, and in a failsafe.
@@ -69,7 +69,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.set_position_due();
             self.links.set_due(Link::Swarm, OnDemandMessage::Intent);
         }
-        // The roster message has a period of its own, no multiple of the intent's or of the step's.
+        // The roster message has a period of its own, which does not follow `swarm_hz`.
         if let Some(fleet) = self.neighbours.fleet()
             && self.timers.is_due(Timer::Roster, now)
         {
@@ -79,8 +79,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// One step of the control loop: guidance, division, scan of the path, mission table, requests
-    /// to the autopilot.
+    /// One step of the control loop: guidance, division, scan of the path, mission table, the
+    /// task's commands, requests to the autopilot.
     fn step(&mut self) {
         let now = self.now;
         if self.services.has_unapplied_parameters()
@@ -132,7 +132,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.timers.schedule_next(Timer::Step, now, every);
     }
 
-    /// Sends the commands of the task (pictures, camera) that are due at the vehicle's place.
+    /// Sends the commands of the task (pictures, camera) that are due at the vehicle's place;
+    /// notes, stores and reports what is photographed.
     fn step_task(&mut self) {
         let state = self.mission.state();
         let off_plan = self.guidance.returning
@@ -141,7 +142,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let along = PathProgress {
             progress_m: self.guidance.reported_progress_m(state, &self.guidance_inputs()),
             reference_m: self.guidance.reference_along_m(),
-            // A vehicle that brakes along its path still takes the pictures that it passes.
+            // A vehicle that brakes along its path in order to hold there still takes the pictures
+            // that it passes.
             relation: match state.is_on_path() {
                 true if self.detours.is_beside_plan() && !self.guidance.returning => {
                     PathRelation::Beside
@@ -152,7 +154,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let leaves_path =
             self.mission.step_task(along, self.now, &mut self.timers, &mut self.links);
-        // Braking to land, the vehicle goes on along its path, and takes no pictures.
+        // A vehicle that brakes to land goes on along its path but takes no pictures there. The
+        // pictures that it passed before are noted as it leaves the path, or at the path's end.
         let photographs = along.relation == PathRelation::OnPath
             || (!off_plan
                 && (leaves_path || self.guidance.is_reference_at_end(&self.guidance_inputs())));
@@ -208,7 +211,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Sets the share of the cruise speed at which the error bound of the position estimate fits
-    /// into the margin to walls, and reports a change.
+    /// into the margin to walls, and reports a change between nominal, slower and stopped while
+    /// setpoints are sent.
     pub(super) fn update_estimate_speed_share(&mut self) {
         let (now, config) = (self.now, &self.config);
         let bound_m = self.telemetry.estimate_error_bound_m(now, config.min_estimate_error_m);

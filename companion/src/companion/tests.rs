@@ -46,6 +46,7 @@ pub(super) fn assert_no_gap(bench: &Bench) {
     }
 }
 
+/// The states that the mission has entered so far, in order.
 fn states(bench: &Bench) -> Vec<State> {
     let to = |e: &Event| match e {
         Event::StateChanged { to, .. } => Some(*to),
@@ -73,7 +74,7 @@ fn flies_the_mission_and_lands_at_the_goal() {
     assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
     assert!(!bench.armed);
     assert_no_gap(&bench);
-    // DO_SET_MODE requests Offboard.
+    // Command 176, DO_SET_MODE, requests Offboard.
     let engaged = bench.commands.iter().position(|c| c.0 == 176).unwrap();
     assert_eq!(bench.commands[engaged], (176, 1.0, 6.0, 0.0));
     // The setpoints stay within a tube around the path, though the EKF origin is 300 m away.

@@ -102,7 +102,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.links.may_send_by_radio(self.now, rate)
     }
 
-    /// Makes the message with this vehicle's position due, as far as the position is known.
+    /// Makes the message with this vehicle's position due if the position is known.
     pub(super) fn set_position_due(&mut self) {
         match self.telemetry.position_at {
             Some(_) => self.links.set_due(Link::Swarm, OnDemandMessage::Position),
@@ -132,7 +132,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Writes AUTOPILOT_VERSION if requested, else the link's first queued message, else an FTP
-    /// reply; 0 for none.
+    /// reply. Returns its length, 0 for none.
     fn transmit_answer(&mut self, link: Link, out: &mut [u8]) -> usize {
         let system = self.config.system_id;
         if self.links.take_due(link, OnDemandMessage::Version) {
@@ -167,6 +167,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.links.send_text_with_numbers(severity, text, numbers);
     }
 
+    /// The setpoint in NED about the autopilot's EKF origin; while that origin is unknown, a stop.
+    /// `None` if none is to be sent.
     fn setpoint_message(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
         let still = Point::zeros();
         let kind = self.autopilot_kind();
@@ -215,6 +217,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         })
     }
 
+    /// The companion's HEARTBEAT; its `custom_mode` is the number of the mission state.
     fn heartbeat_message(&self) -> HEARTBEAT_DATA {
         let system_status = match self.mission.state().system_status() {
             SystemStatus::Boot => MavState::MAV_STATE_BOOT,
@@ -232,6 +235,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
+    /// This vehicle's position and velocity for the swarm; `relative_alt` is the height above the
+    /// origin of the mission frame.
     fn global_position_message(&self) -> GLOBAL_POSITION_INT_DATA {
         let reported = self.detours.reported_place(&self.telemetry, self.now);
         let place = frames::enu_to_geodetic(&self.config.origin, &reported.position);
@@ -285,8 +290,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether this companion flies the vehicle off its plan, on a detour or to evade, or will.
-    /// False while a pilot or a failsafe flies it: nothing then keeps it from coming down on
-    /// others.
+    /// False while a pilot or a failsafe flies it, and in `Aborted`: nothing then keeps it from
+    /// coming down on others.
     fn is_detouring_or_evading(&self) -> bool {
         let state = self.mission.state();
         !(state.is_left_to_pilot_or_failsafe() || state == State::Aborted)
@@ -295,6 +300,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 || self.guidance.evading)
     }
 
+    /// This vehicle's intent, as it is reported to the swarm now.
     pub(super) fn own_intent(&self) -> Intent {
         let plan = self.mission.plan();
         let along_m =
@@ -327,8 +333,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Appends, in a coverage mission, the corners of the path beyond the points ahead, along which
-    /// this vehicle flies if no other vehicle hears it: as far as its lease takes it, or to the end
-    /// where it has left the mission and needs no lease.
+    /// this vehicle flies if no other vehicle hears it: as far as its lease takes it, or to the
+    /// path's end if it takes no part any more and needs no lease.
     fn add_unheard_points(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
         let flies = self.mission.state().may_fly_on_lease();
         let descends = self.guidance.reference_along_m() >= 0.0 && self.guidance.is_in_descent();
@@ -376,8 +382,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Points along which this vehicle flies next, from its setpoint to where it will stop for now;
-    /// and whether it may come down from where it is (it climbs, descends, lands, or does not
-    /// stream setpoints).
+    /// and whether it may come down from where it is: false only while it holds, flies or brakes on
+    /// its path and does not descend.
     fn points_to_stop_and_may_come_down(
         &self,
     ) -> (heapless::Vec<Point, { intent::MAX_POINTS }>, bool) {

@@ -21,10 +21,12 @@ const MAX_SETPOINT_ACCEL_FACTOR: f32 = 1.5;
 /// setpoint swings about the reference. Where the autopilot's limit is lower, the reference's is
 /// lowered.
 const MIN_SETPOINT_ACCEL_FACTOR: f32 = 1.2;
-/// Ratio of the vertical to the horizontal braking of the reference above which advice may reckon
-/// with the horizontal one: its horizon is twice the braking distance.
+/// Least ratio of the reference's vertical to its horizontal braking with which advice assumes the
+/// horizontal braking everywhere; with weaker vertical braking, advice assumes less. Advice looks
+/// ahead for twice the braking distance, which covers a stop with two thirds of the braking.
 const MIN_VERTICAL_BRAKING_SHARE: f32 = 2.0 / 3.0;
-/// Share of the setpoint's acceleration, of what the reference's leaves of it, that a corner takes.
+/// Share that a corner takes of the acceleration that a setpoint may have across the reference's
+/// own.
 const CORNER_SHARE_OF_SPARE_ACCEL: f32 = 0.53;
 
 /// Longest window of the smoother's moving averages, seconds. Where a low jerk limit would need a
@@ -32,11 +34,13 @@ const CORNER_SHARE_OF_SPARE_ACCEL: f32 = 0.53;
 pub(crate) const MAX_SMOOTHING_WINDOW_S: f32 = 1.2;
 /// Shortest window of the smoother's moving averages, seconds.
 const MIN_SMOOTHING_WINDOW_S: f32 = 0.4;
-/// Factor by which the averages' jerk stays below the limit: the rest is for corners and the clock.
+/// Factor by which the jerk of the smoother's averages stays below the limit: the rest is for
+/// corners and for the smoother's clock, which may run slower.
 const JERK_RESERVE_FACTOR: f32 = 1.12;
-/// Least time that is assumed until a vehicle that no other one hears has stopped, seconds.
+/// Least time that is assumed from when a vehicle was last heard until it has stopped, seconds.
 const MIN_UNHEARD_STOP_TIME_S: f32 = 3.0;
-/// Least limit of the speed on a straight leg (climb, join, descent), m/s.
+/// Least value of the limit of the speed on a straight leg (climb, way to the path, descent), m/s:
+/// a higher climb speed is the limit instead. A vehicle whose speeds are all lower flies slower.
 pub(crate) const MIN_LEG_SPEED_LIMIT_MPS: f32 = 1.0;
 
 /// With how much jerk a setpoint may brake.
@@ -75,7 +79,8 @@ impl MotionLimits {
             of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)))
         };
         let jerk_mps3 = fminf(MAX_JERK_MPS3, least(&[Limit::JerkXy, Limit::JerkZ]));
-        // Acceleration whose sudden change the longest average spreads to that jerk.
+        // A change from this acceleration to its opposite, spread over the longest average's
+        // window, has that jerk.
         let smooth_mps2 = 0.5 * jerk_mps3 * MAX_SMOOTHING_WINDOW_S;
         let accel_mps2 = fminf(config.accel_mps2, smooth_mps2);
         let (across_mps2, vertical_mps2) =
@@ -146,11 +151,11 @@ impl MotionLimits {
 /// Limits that guidance passes to the calls of planner-core.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct GuidanceLimits {
-    /// For the reference along the path.
+    /// Limits of the reference along the path.
     pub(crate) track: TrackConfig,
-    /// For the reference along a straight leg: climb, join or descent.
+    /// Limits of the reference along a straight leg: climb, way to the path, or descent.
     pub(crate) leg_track: TrackConfig,
-    /// For advice.
+    /// Settings of the advice on speed and stops for neighbours.
     pub(crate) deconflict: DeconflictConfig,
     /// Speed that neighbours are assumed to fly at most, m/s.
     pub(crate) fastest_vehicle_mps: f32,
@@ -199,14 +204,14 @@ impl GuidanceLimits {
 }
 
 /// Limits within which neighbours are expected to fly and stop: the speed of the mission's fastest
-/// vehicle, which may be another, and the braking of this one.
+/// vehicle, which may be another vehicle, and the braking of this vehicle.
 pub(crate) fn neighbour_motion_bounds(
     track: &TrackConfig,
     fastest_vehicle_mps: f32,
 ) -> MotionBounds {
     let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: MAX_URGENT_JERK_MPS3 };
     let speed_max_mps = fmaxf(track.cruise_mps, fastest_vehicle_mps);
-    // Distance that an unheard vehicle flies until it has stopped, expressed as time at full speed.
+    // Distance that an unheard vehicle flies until it has stopped, divided by its full speed.
     let stopped_s =
         UNHEARD_NOTICED_AFTER_S + braking.stop_distance_m(speed_max_mps) / speed_max_mps;
     MotionBounds {

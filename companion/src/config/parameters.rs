@@ -54,6 +54,7 @@ pub const TABLE: [Parameter; PARAMETER_COUNT] = [
     whole_parameter("FLK_SYS_ID", 0.0, 250.0, 0.0),
 ];
 
+// Indices in `TABLE`, by the parameters' names without `FLK_`.
 const ACCEL: usize = 0;
 const BATT_LOW: usize = 1;
 const CLIMB_MAX: usize = 2;
@@ -145,7 +146,7 @@ impl Parameters {
     }
 
     /// Restores one parameter from flash. A firmware with other names or ranges may have written
-    /// it: one that is unknown or out of range here keeps its value.
+    /// the entry: an unknown name or a value that is out of range here changes nothing.
     pub fn restore(&mut self, entry: &[u8; ENTRY_LEN]) {
         let name = entry[..NAME_LEN].split(|b| *b == 0).next().unwrap_or_default();
         let value = f32::from_le_bytes([entry[16], entry[17], entry[18], entry[19]]);

@@ -1,26 +1,30 @@
-//! What other vehicles know of this vehicle's way along its path: once no vehicle hears it, it
-//! lands where they expect it, though gates may have let it fly further.
+//! What other vehicles know of this vehicle's way along its path. Once no vehicle hears it, it
+//! lands where the others expect it, though gates may have let it fly further.
 
 use crate::margins::{UNHEARD_TRAVEL_RESERVE_M, max_unheard_travel_m, min_unheard_travel_m};
 use crate::time::{Duration, Instant};
 
 /// Age below which another vehicle's report that it hears this one counts as new: two steps.
 pub(super) const MAX_NEW_REPORT_AGE: Duration = Duration::from_millis(100);
-/// A vehicle this little beyond the part of its path that others know does not fly back, metres.
+/// A vehicle no further than this beyond the part of its path that others know does not fly back,
+/// metres.
 pub(super) const MAX_BEYOND_KNOWN_M: f32 = 0.3;
 /// Time by which a vehicle follows behind its reference, seconds.
 const LAG_BEHIND_REFERENCE_S: f32 = 0.5;
-/// Distance before the end of the stretch on which others expect an unheard vehicle, to which it
-/// flies back, metres: it does not from [`MAX_BEYOND_KNOWN_M`] further on, and may drift.
+/// An unheard vehicle flies back to this distance before the end of the stretch on which others
+/// expect it, metres. Up to [`MAX_BEYOND_KNOWN_M`] beyond that place it does not fly back, and it
+/// may drift.
 const FLY_BACK_BEFORE_TRAVEL_END_M: f32 = UNHEARD_TRAVEL_RESERVE_M + 0.33;
-/// Time after the last report that another vehicle hears this one from which no echo can come that
-/// acknowledges a later intent: an intent is echoed within 2.54 s.
+/// Time after the last report that another vehicle hears this one, after which no further echo can
+/// come of an intent that has arrived: an intent is echoed within 2.54 s.
 const ECHOED_WITHIN: Duration = Duration::from_secs(3);
-/// Time from a vehicle's last intent that arrives until the last report that it is heard, seconds,
-/// without the delay of messages: others report so for 0.8 s, and both are sent each 0.2 s.
+/// Longest time from the sending of a vehicle's last intent that arrives to the last report that it
+/// is heard, seconds, without the delay of messages: others report for 0.8 s that they hear it, and
+/// all send intents, which carry the reports, each 0.2 s.
 const HEARD_REPORTED_FOR_S: f32 = 1.2;
 /// Longest delay of messages with which a vehicle knows which of its intents arrived last, seconds:
-/// longer, an echo that comes seldom may be of one that is seconds older.
+/// with a longer delay the last echo may be of an intent that was sent seconds before the last that
+/// arrived.
 const MAX_DELAY_TO_KNOW_LAST_ARRIVAL_S: f32 = 0.5;
 
 /// Part of a vehicle's path that others know by the intents that they acknowledged, and by their
@@ -28,7 +32,7 @@ const MAX_DELAY_TO_KNOW_LAST_ARRIVAL_S: f32 = 0.5;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AcknowledgedPath {
     /// The first place where others may expect the vehicle: where it was at their last report that
-    /// they hear it, and the least distance that it flies on from there. `None` where no vehicle
+    /// they hear it, plus the least distance that it flies on from there. `None` where no vehicle
     /// has heard it on this path.
     expected_from_m: Option<f32>,
     /// Place where the vehicle was when it sent the last acknowledged intent; ∞ where none was
@@ -87,8 +91,8 @@ impl AcknowledgedPath {
     ///
     /// Others report for a while longer that they hear it than they do, so the first place is one
     /// that it has passed if they heard it until then. A vehicle that hears others, by messages
-    /// that take up to `delay_s`, knows after a while which of its intents arrived last, and then
-    /// the last place counts.
+    /// that take up to `delay_s`, knows after a while which of its intents arrived last. Then the
+    /// last place takes precedence where it lies before the first; until then the first does.
     pub fn expected_first_and_last_m(
         &self,
         fastest_mps: f32,
@@ -99,7 +103,8 @@ impl AcknowledgedPath {
             self.sent_from_m + max_unheard_travel_m(fastest_mps) - FLY_BACK_BEFORE_TRAVEL_END_M;
         let Some(first_m) = self.expected_from_m else { return [f32::INFINITY, stretch_ends_m] };
         let last_m = self.points_end_m.min(stretch_ends_m);
-        // The last acknowledged intent is the last that arrived if reports of that ended with it.
+        // The last acknowledged intent is the last that arrived if the reports that others hear
+        // this vehicle ended soon after it.
         let knows = self.sent_from_m.is_finite()
             && now - self.reported_heard_at > ECHOED_WITHIN
             && delay_s.is_some_and(|delay_s| {

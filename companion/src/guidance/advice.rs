@@ -7,7 +7,7 @@ use crate::state::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 
-/// Distance up to a stop below which a vehicle on its pad does not depart, metres.
+/// Distance to the advised stop below which a vehicle on its pad does not depart, metres.
 const MIN_FREE_PATH_TO_DEPART_M: f32 = 0.05;
 /// Longest time for which a vehicle waits on its pad for a late one, beyond its departure by the
 /// schedule: the late one may wait for something else than a gate, and others hover until this
@@ -44,7 +44,8 @@ impl Guidance {
             path: &plan.path,
             on_detour: scene.is_on_detour(),
         };
-        // Over an area the vehicles may climb at different speeds, by which they come earlier.
+        // In a coverage mission the vehicles may climb at different speeds, and so come earlier:
+        // there none waits on its pad for a late one.
         let to_goals = neighbours.fleet().is_none();
         let others = neighbours.states_with_age(now);
         self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, others);

@@ -2,12 +2,12 @@
 //! its path until it is beside the column.
 //!
 //! A vehicle that left the plan and is still in the air is landed by its autopilot, which does not
-//! avoid others. No vehicle waits within [`EVADE_MARGIN_M`] beyond the safety distance of the
+//! avoid others. No vehicle waits nearer than the safety distance plus [`EVADE_MARGIN_M`] to the
 //! column in which such a vehicle may come down (`Neighbours::visit_landing_column`). A vehicle
 //! that is to wait at a place in the column waits at the nearest free place before that place on
 //! its path; one that holds there already flies back. It came along that path, so the path is free
-//! of walls. It comes no nearer to a vehicle behind it than [`TRAILING_VEHICLE_MARGIN_M`] beyond
-//! the safety distance.
+//! of walls. It comes no nearer to a vehicle behind it than the safety distance plus
+//! [`TRAILING_VEHICLE_MARGIN_M`].
 //!
 //! ENU metres. Cost: [`MAX_SEARCH_COST`] a control step. A search takes one control step for the
 //! column of one neighbour and a dozen for the most columns that there can be; in theory six for
@@ -34,6 +34,7 @@ const MAX_PLACES: u16 = 48;
 /// Greatest cost of a search in one step: 1 for each neighbour and for each column, and
 /// [`PLACE_COST`] for each place.
 const MAX_SEARCH_COST: u16 = 96;
+/// Cost in a search of comparing one place with the columns, the columns not counted.
 const PLACE_COST: u16 = 4;
 /// Greatest speed backward along a straight segment of the own path, m/s.
 const MAX_EVADE_MPS: f32 = 1.5;
@@ -70,9 +71,9 @@ pub enum StepBack {
 #[derive(Clone, Debug, Default)]
 pub struct EvadeSearch {
     scan: IncrementalScan,
-    /// Place along the path where the search began, metres, and the number of places from there
-    /// back that were found inside a column.
+    /// Place along the path where the search under way began, metres; `None` if there is none.
     search_from_m: Option<f32>,
+    /// Number of places from `search_from_m` back that were found inside a column.
     places_inside_columns: u16,
     /// Result of the last search that has finished.
     pub last_target: EvadeTarget,
@@ -170,6 +171,7 @@ pub fn step_back<const W: usize>(
     point_at(path, tracker)
 }
 
+/// The point of the path at which the reference is.
 fn point_at<const W: usize>(path: &Path<W>, tracker: &ReferenceState) -> Option<Point> {
     path.point_at(tracker.along_m)
 }

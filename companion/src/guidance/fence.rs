@@ -108,8 +108,8 @@ impl Fence {
                     continue;
                 }
                 (brakes[axis], changed) = (true, true);
-                // Jerk away from the wall ahead: the acceleration that braking may use, if one step
-                // reaches it.
+                // The hardest jerk away from the wall ahead: it reaches the greatest acceleration
+                // that braking may use, if one step can; else it is the greatest jerk of an axis.
                 let (ahead, pace, push) = next(jerk[axis]);
                 let away = if walls.can_stop_below_high(ahead, pace, push) { 1.0 } else { -1.0 };
                 let part = BRAKE_PLAN_JERK_SHARES[0] * most_mps3;
@@ -161,11 +161,13 @@ struct AxisBounds {
 }
 
 impl AxisBounds {
+    /// Whether a motion along the axis can still stop between `low` and `high`.
     fn can_stop_between(&self, place: f32, speed: f32, accel: f32) -> bool {
         self.can_stop_below_high(place, speed, accel)
             && place - stop_distance_m(-speed, -accel, self.brake) >= self.low
     }
 
+    /// Whether a motion along the axis can still stop at `high` or lower.
     fn can_stop_below_high(&self, place: f32, speed: f32, accel: f32) -> bool {
         place + stop_distance_m(speed, accel, self.brake) <= self.high
     }

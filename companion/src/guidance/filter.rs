@@ -49,8 +49,12 @@ const ABORT_DESCENT_AFTER: Duration = Duration::from_secs(1);
 /// A neighbour that may come nearer to this vehicle than the distance to be kept from it.
 struct FilterConflict {
     id: u8,
+    /// Whether this vehicle yields to the neighbour.
     own_yields: bool,
+    /// Whether the roster does not name the neighbour.
     stranger: bool,
+    /// Whether the neighbour is on the ground, or has been silent for so long that it counts as
+    /// lost.
     is_grounded_or_lost: bool,
 }
 
@@ -67,23 +71,27 @@ pub(crate) struct SafetyFilter {
     yields_to_blocker: bool,
     /// Whether the neighbour that the filter stops for is on the ground, or lost.
     blocker_is_grounded_or_lost: bool,
+    /// Whether the neighbour that the filter stops for is a stranger.
     blocker_is_stranger: bool,
     /// Whether this vehicle's reachable set conflicted with that of a neighbour in the last step.
     sets_intersect: bool,
     /// Whether the filter checked the path backwards in the last step: the vehicle flies back or is
     /// about to.
     scanned_backwards: bool,
-    /// Whether no other vehicle may be in the column to the ground, or to the top of the climb.
+    /// Whether no other vehicle may be in the column to the ground, or before take-off to the top
+    /// of the climb; true where no column is checked.
     column_clear: bool,
     /// Since when `column_clear` has had its value.
     column_clear_changed_at: Option<Instant>,
-    /// Since when a vehicle that is on the ground, or lost, has been in the landing column.
+    /// Since when a vehicle that is on the ground, or lost, has been in that column.
     column_blocked_for_good_since: Option<Instant>,
-    /// Since when a landing has been waiting for a free column; short gaps do not end the wait.
+    /// Since when this landing has been waiting for a free column; times at which the column was
+    /// free do not end the wait.
     landing_held_since: Option<Instant>,
-    /// Since when the filter has kept the vehicle from continuing, and when it last did; gaps
-    /// shorter than [`UNHINDERED_AFTER`] count as part of it.
+    /// Since when the filter has kept the vehicle from continuing; gaps shorter than
+    /// [`UNHINDERED_AFTER`] count as part of that time.
     hindered_since: Instant,
+    /// When the filter last kept the vehicle from continuing.
     last_hindered_at: Instant,
     /// Whether this vehicle was to yield when the filter last kept it from continuing.
     yielded_when_hindered: bool,
@@ -115,6 +123,7 @@ impl SafetyFilter {
         self.stopped_since.map_or(Duration::default(), |at| now - at)
     }
 
+    /// Whether the filter keeps the vehicle stopped, or lets it only pass a stranger slowly.
     pub(crate) fn is_stopped(&self) -> bool {
         self.stopped_since.is_some()
     }
@@ -163,26 +172,30 @@ impl SafetyFilter {
         self.stop_count
     }
 
-    /// Time for which another vehicle may have been in the landing column.
+    /// Time for which another vehicle may have been in the column to the ground, or before take-off
+    /// to the top of the climb.
     pub(crate) fn column_blocked_for(&self, now: Instant) -> Duration {
         self.column_clear_changed_at
             .filter(|_| !self.column_clear)
             .map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time for which a vehicle that is on the ground, or lost, has been in the landing column.
+    /// Time for which a vehicle that is on the ground, or lost, has been in the column to the
+    /// ground, or before take-off to the top of the climb.
     pub(crate) fn column_blocked_for_good_for(&self, now: Instant) -> Duration {
         self.column_blocked_for_good_since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time for which the landing column has been free.
+    /// Time for which the column to the ground, or before take-off to the top of the climb, has
+    /// been free of other vehicles.
     pub(crate) fn column_clear_for(&self, now: Instant) -> Duration {
         self.column_clear_changed_at
             .filter(|_| self.column_clear)
             .map_or(Duration::default(), |at| now - at)
     }
 
-    /// Time since a landing first had to wait for a free column; short gaps do not end the wait.
+    /// Time since this landing first had to wait for a free column; times at which the column was
+    /// free do not end the wait.
     fn landing_held_for(&self, now: Instant) -> Duration {
         self.landing_held_since.map_or(Duration::default(), |at| now - at)
     }
@@ -200,11 +213,13 @@ impl SafetyFilter {
         now - self.blocked_by_unheard_descent_at
     }
 
-    /// Whether no other vehicle could be in the landing column in the last step.
+    /// Whether in the last step no other vehicle could be in the column to the ground, or before
+    /// take-off to the top of the climb; true where no column is checked.
     pub(crate) fn column_clear(&self) -> bool {
         self.column_clear
     }
 
+    /// Forgets all but the number of stops.
     pub(super) fn reset(&mut self) {
         *self = Self { stop_count: self.stop_count, ..Self::default() };
     }
@@ -223,6 +238,7 @@ impl SafetyFilter {
         if self.passes_stranger(now) { PASS_STRANGER_SPEED_SHARE } else { 1.0 }
     }
 
+    /// Whether the vehicle, stopped for a stranger for long enough, flies slowly past it.
     fn passes_stranger(&self, now: Instant) -> bool {
         self.blocker_is_stranger && self.stopped_for(now) >= PASS_STRANGER_AFTER
     }
@@ -234,7 +250,8 @@ impl SafetyFilter {
 }
 
 impl SafetyFilter {
-    /// Notes that a neighbour keeps the vehicle from continuing, to which it yields or not.
+    /// Notes that a neighbour keeps the vehicle from continuing, and whether the vehicle yields to
+    /// it (`yields_to_blocker`).
     fn note_hindered(&mut self, now: Instant) {
         if now - self.last_hindered_at > UNHINDERED_AFTER {
             self.hindered_since = now;
@@ -242,6 +259,8 @@ impl SafetyFilter {
         (self.last_hindered_at, self.yielded_when_hindered) = (now, self.yields_to_blocker);
     }
 
+    /// Updates since when the column has been free or occupied; `found`: a neighbour that may be in
+    /// it.
     fn update_column(&mut self, found: Option<&FilterConflict>, now: Instant) {
         let clear = found.is_none();
         let rests = found.is_some_and(|found| found.is_grounded_or_lost);
@@ -255,6 +274,7 @@ impl SafetyFilter {
         }
     }
 
+    /// Ends the stop; the times of hindrances stay.
     fn reset_stop(&mut self) {
         (self.stopped_since, self.path_clear_since) = (None, None);
         (self.yields_to_blocker, self.blocker_is_stranger, self.blocker_is_grounded_or_lost) =

@@ -19,27 +19,31 @@ pub(super) const HOLD_AFTER_IF_YIELDING: Duration = Duration::from_millis(300);
 /// others to stop.
 pub(super) const HOLD_AFTER_IF_FIRST: Duration = Duration::from_secs(4);
 
-/// Whether the vehicle reports that it holds, and when it last did.
+/// Whether the vehicle reports that it holds its place, and when it last reported that.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Hold {
+    /// Since when the vehicle has been standing, not to move; `None` while it moves.
     standing_since: Option<Instant>,
+    /// Whether the hold has begun: from then on the vehicle's intents report it.
     active: bool,
-    /// When the hold was last sent in an intent, and the delay with which others hear it.
+    /// When the hold was last sent in an intent.
     reported_at: Option<Instant>,
+    /// Delay with which others hear an intent.
     message_delay: Duration,
 }
 
 impl Hold {
-    /// One step in which the vehicle stands and is not to move; after `patience` the hold begins.
-    /// `late_s`: delay of messages, seconds. Returns whether it begins.
-    pub(super) fn note_standing(&mut self, patience: Duration, late_s: f32, now: Instant) -> bool {
-        self.message_delay = Duration::from_micros((late_s * 1e6) as u64);
+    /// One step in which the vehicle stands and is not to move; after `patience` of standing the
+    /// hold begins. `delay_s`: delay of messages, seconds. Returns whether the hold begins.
+    pub(super) fn note_standing(&mut self, patience: Duration, delay_s: f32, now: Instant) -> bool {
+        self.message_delay = Duration::from_micros((delay_s * 1e6) as u64);
         let since = *self.standing_since.get_or_insert(now);
         let on = now - since >= patience || self.active;
         core::mem::replace(&mut self.active, on) != on
     }
 
-    /// Ends the hold: the vehicle moves, or guidance no longer moves it. Returns whether it was on.
+    /// Ends the hold: the vehicle moves, or guidance no longer moves it. Returns whether it had
+    /// begun.
     pub(super) fn end(&mut self) -> bool {
         self.standing_since = None;
         core::mem::take(&mut self.active)

@@ -1,4 +1,5 @@
-//! The setpoint waits for a vehicle that lags behind it; how long it has waited in vain.
+//! The setpoint waits for a vehicle that lags behind it; how long the vehicle has not come to its
+//! setpoint.
 
 use super::{ARRIVED_WITHIN_M, Guidance};
 use crate::autopilot::telemetry::Telemetry;
@@ -7,7 +8,8 @@ use planner_core::Length;
 
 impl Guidance {
     /// Share of the nominal speed at which the setpoint advances: 1 while its lead over the vehicle
-    /// is at most half of the greatest lead, 0 at the greatest lead. To be called each step.
+    /// is at most half of the greatest lead, 0 at the greatest lead (`max_lead_m`); never more than
+    /// `estimate_speed_share`. To be called each step.
     pub(super) fn lag_speed_share(&mut self, telemetry: &Telemetry, now: Instant) -> f32 {
         let place = self.smoother.position();
         let lead_m = self.distance_to_setpoint_m(telemetry);
@@ -21,8 +23,9 @@ impl Guidance {
         share.min(self.estimate_speed_share)
     }
 
-    /// Share of the nominal speed at which the setpoint advances while the vehicle is not to fly
-    /// on: at rest it holds; before the take-off it follows the position estimate.
+    /// Share of full speed at which the smoother's clock runs while the vehicle is not to fly on: 0
+    /// until the raw point was set back to the setpoint, so that the setpoint brakes; then 1, so
+    /// that it holds its place, or before the take-off follows the position estimate.
     pub(super) fn standing_speed_share(&self) -> f32 {
         if self.raw_point_at_setpoint { 1.0 } else { 0.0 }
     }

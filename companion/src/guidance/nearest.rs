@@ -6,8 +6,8 @@ use planner_core::flight::Path;
 
 use super::{Guidance, REFERENCE_RESET_WINDOW_M};
 
-/// Distance along the path by which the point nearest to the setpoint may jump in a step, metres:
-/// from one leg to the next where the setpoint rounds a corner, by 0.25 m at most.
+/// Length of path searched for a jump, in one step, of the point nearest to the setpoint, metres.
+/// Where the setpoint rounds a corner, the point jumps from one leg to the next, by 0.25 m at most.
 const MAX_CORNER_JUMP_M: f32 = 0.5;
 /// Greatest rounding error of an arc length, metres. The search for the nearest point reaches
 /// further by it at both ends, so that the place of a setpoint that stands does not creep.

@@ -68,7 +68,8 @@ impl Guidance {
 
     /// Begins another path at its start; the setpoint stands there, or near it.
     pub fn begin_path(&mut self, now: Instant) {
-        // A path that begins before the first one is joined begins at the same place.
+        // If the reference has not moved along the path before, this path begins at the same place
+        // as that one.
         self.path_begins_above_pad &= self.tracker.along_m <= 0.0;
         (self.tracker, self.setpoint_along_m) = (ReferenceState::default(), 0.0);
         self.phase = Phase::Path;
@@ -157,8 +158,8 @@ impl Guidance {
         self.stopped_at_fence && self.is_setpoint_still_outside_descent()
     }
 
-    /// Nearest place along `path`, its own, at which the vehicle could stop now, metres: the
-    /// reference has to brake, and the setpoint behind it.
+    /// Nearest place along `path`, the path that is flown, at which the vehicle could stop now,
+    /// metres: both the reference and the setpoint behind it have to brake.
     pub(crate) fn stopping_point_m<const W: usize>(&self, path: &Path<W>) -> f32 {
         let braking_m = track::braking_distance_m(&self.track, path, &self.tracker);
         let setpoint_braking_m = self.smoother.stop_distance_m(Urgency::Smooth);
@@ -222,7 +223,8 @@ impl Guidance {
             let along_m = self.tracker.along_m;
             self.tracker.along_m = nearest_arc_length_m(path, &place, along_m, REJOIN_WINDOW_M);
             if self.join_target(path, place).is_none() {
-                // On its way from its pad, or up its column, to a place that is not the nearest.
+                // The nearest point cannot be joined: the vehicle was on its way, from its pad or
+                // back up its column, to the place where the reference was before.
                 self.tracker.along_m = along_m;
             }
             self.setpoint_along_m = self.tracker.along_m;
@@ -230,9 +232,9 @@ impl Guidance {
         self.start_following(now);
     }
 
-    /// Replaces the path by the way back to its first point, each leg with its clearance. The raw
-    /// point may still move forward: the new path begins where it can have braked, and the raw
-    /// point at first moves backwards on the new path.
+    /// Replaces `path`, the path that is flown, by the way back to its first point, each leg with
+    /// its clearance. The raw point may still move forward: the new path begins where it can have
+    /// braked, and the raw point at first moves backwards on the new path.
     pub fn reverse_path<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
@@ -278,8 +280,8 @@ impl Guidance {
         }
     }
 
-    /// Forgets the straight leg: the raw point is where the setpoint stands, and the next leg
-    /// begins there.
+    /// Forgets the straight leg, and stops the reference: the raw point is where the setpoint
+    /// stands, and the next leg begins there.
     pub(super) fn forget_leg(&mut self) {
         self.raw_point_at_setpoint = true;
         self.leg = None;

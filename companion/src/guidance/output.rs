@@ -35,7 +35,8 @@ impl Guidance {
             return Setpoint::None;
         }
         // Setpoints to ArduCopter carry no acceleration (`MASK_POSITION_VELOCITY`). Instead their
-        // velocity is that of the setpoint `lead_s` ahead, limited to the raw setpoint's speed.
+        // velocity is that of the setpoint `lead_s` ahead, no faster than the setpoint or the raw
+        // point, whichever is faster.
         let lead_s = scene.telemetry.kind.map_or(0.0, AutopilotKind::velocity_lead_s);
         let velocity = smoother.velocity() + smoother.acceleration() * lead_s;
         let most = smoother.velocity().length().max(smoother.raw_speed_mps());
@@ -46,7 +47,8 @@ impl Guidance {
         Setpoint::Move(smoother.position(), velocity, self.sent_acceleration, heading)
     }
 
-    /// Ends a step whose setpoint, if there is one, carries a place: that is remembered as sent.
+    /// Ends a step whose setpoint, if there is one, carries a place: the place is remembered as
+    /// sent.
     pub(super) fn note_place_sent(&mut self) {
         if self.smoother.has_setpoint() {
             self.smoother.mark_sent();

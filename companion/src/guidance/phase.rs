@@ -3,7 +3,7 @@
 /// Phase of a flight; the phases follow in this order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Phase {
-    /// Before the climb: the raw point stays where it is.
+    /// Before the climb: no leg and no path moves the raw point.
     Hold,
     /// Straight up to the height of the path's start.
     Climb,

@@ -28,8 +28,8 @@ const MAX_STOP_BEFORE_GATE_M: f32 = 0.05;
 /// short of the reference, metres: less than gates allow ([`MAX_REPORTED_PROGRESS_LAG_M`]), since a
 /// vehicle stops a little short of a gate.
 const MAX_REPORTED_SHORTFALL_M: f32 = MAX_REPORTED_PROGRESS_LAG_M - MAX_STOP_BEFORE_GATE_M;
-/// Distance below the ground of which a vehicle that has landed reports the progress, metres: every
-/// gate that waits for its flight opens.
+/// A vehicle that has landed reports progress to this far below the planned ground, metres, so that
+/// every gate that waits for it opens.
 const LANDED_EXTRA_PROGRESS_M: f32 = 1.0;
 
 impl Guidance {
@@ -54,8 +54,8 @@ impl Guidance {
         self.track.cruise_mps
     }
 
-    /// Place along the plan's path up to which all gates are open, metres; −∞ on the way back or on
-    /// a detour.
+    /// Place along the plan's path up to which all gates are open, metres; −∞ on the way back, on a
+    /// detour and without a path.
     pub(crate) fn gates_open_up_to_m<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -67,14 +67,15 @@ impl Guidance {
         gate_m.min(plan.path.length_m())
     }
 
-    /// When the reference last advanced along the path by 0.25 m.
+    /// When the reference last made progress: it advanced by 0.25 m along the path
+    /// (`MIN_PROGRESS_M`), began to follow it, or moved in a descent.
     pub fn last_progress_at(&self) -> Instant {
         self.last_progress_at
     }
 
     /// Arc length reported to neighbours, for their gates, metres: before and in the climb minus
     /// the height still to climb, in the descent beyond the path's length. On one path it never
-    /// falls.
+    /// falls, except while the vehicle flies back in `SwarmLinkLost`.
     pub fn reported_progress_m<const W: usize, const G: usize>(
         &self,
         state: State,
@@ -83,8 +84,9 @@ impl Guidance {
         self.measured_progress_m(state, scene).max(self.last_reported_progress_m)
     }
 
-    /// Notes the progress that this vehicle reports. Nobody heard of the way that it flies back in
-    /// `SwarmLinkLost`, and has to fly again.
+    /// Notes the progress that this vehicle reports. While the vehicle flies back in
+    /// `SwarmLinkLost` its progress falls: no other vehicle has heard the higher one, and the way
+    /// has to be flown again.
     pub(super) fn note_reported_progress<const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -97,6 +99,8 @@ impl Guidance {
             };
     }
 
+    /// Progress by the position estimate, metres, counted as [`Self::reported_progress_m`]; it may
+    /// fall.
     pub(crate) fn measured_progress_m<const W: usize, const G: usize>(
         &self,
         state: State,
@@ -163,6 +167,7 @@ impl Guidance {
         scene.plan.is_some_and(|plan| self.is_reference_at_end_of(&plan.path))
     }
 
+    /// Whether the reference has reached the end of this path; false before the path was begun.
     pub(super) fn is_reference_at_end_of<const W: usize>(&self, path: &Path<W>) -> bool {
         self.has_begun_path && self.tracker.along_m >= path.length_m()
     }
@@ -185,6 +190,7 @@ impl Guidance {
         }
     }
 
+    /// Whether the climb is done: the setpoint stands at its top, and the vehicle is there.
     pub fn is_climb_done<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -254,9 +260,9 @@ impl Guidance {
             && (self.advice.stop_within_m > plan.descent_m || self.returning)
     }
 
-    /// Whether the vehicle is near enough to its place along the path to resume it: the nearest
-    /// point is within `window_m`, and the straight way there stays inside the clearance of the
-    /// path's leg.
+    /// Whether the vehicle is near enough to the path to resume it: in its descent it is in the
+    /// column below the path's end; else the nearest point is less than `window_m` along the path
+    /// from the reference, and the straight way there stays inside the clearance of the path's leg.
     pub fn is_near_path<const W: usize, const G: usize>(
         &self,
         scene: &GuidanceInputs<'_, W, G>,
@@ -306,14 +312,16 @@ impl Guidance {
         })
     }
 
+    /// Whether a vehicle this far from its start is horizontally within the start tolerance plus
+    /// [`ARRIVED_WITHIN_M`].
     fn is_within_start_tolerance(&self, away: &Point) -> bool {
         away.xy().length() < self.start_tolerance_m + ARRIVED_WITHIN_M
     }
 
     /// Where the straight leg by which the vehicle joins its path leads from `place`: to its place
     /// along the path, or first straight up, from above its pad or from the column in which it came
-    /// down. `None` if the way to the path is not known to be free of walls; by Algorithm 2 it is
-    /// never checked.
+    /// down. `None` if the way to the path is not known to be free of walls; by Algorithm 2 the way
+    /// is never checked.
     // Not inlined: it has two callers, and in each it would take a board's flash.
     #[inline(never)]
     pub(super) fn join_target<const W: usize>(

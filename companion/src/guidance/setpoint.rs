@@ -20,7 +20,7 @@ const MAX_CORRECTION_MPS2: f32 = 1.5;
 pub enum Setpoint {
     /// No setpoint is sent in this state.
     None,
-    /// Position, velocity and acceleration: metres, m/s, m/s². And the heading, radians
+    /// Position, velocity and acceleration, metres, m/s, m/s²; and the heading, radians
     /// counter-clockwise from east, where the task sets one.
     Move(Point, Point, Point, Option<f32>),
     /// A velocity alone, to brake with: the position is unknown.

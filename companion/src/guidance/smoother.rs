@@ -34,19 +34,20 @@ use crate::config::limits::{MAX_SMOOTHING_WINDOW_S, MotionLimits, Urgency};
 
 /// Time between two raw points, seconds: the period of the setpoints.
 pub const TICK_S: f32 = 0.05;
-/// Maximum number of raw points taken in one step: a later step moves the setpoint no further.
+/// Maximum number of raw points taken in one step: a step that comes later moves the setpoint no
+/// further.
 pub const MAX_TICKS_PER_STEP: u8 = 4;
 /// Longest window of each moving average, in ticks of [`TICK_S`].
 const MAX_WINDOW_TICKS: usize = (MAX_SMOOTHING_WINDOW_S / TICK_S + 0.5) as usize;
 /// Number of raw steps that enter one value of both averages.
 const HISTORY_LEN: usize = 2 * MAX_WINDOW_TICKS - 1;
-/// Share of the jerk limit with which a stop by the clock is assumed to begin, in steps of 50 ms:
-/// the curve may need the rest.
+/// Share of the jerk limit with which a stop by the clock is assumed to begin: the curve may need
+/// the rest.
 const STOP_BEGIN_JERK_SHARE: f32 = 0.7;
 /// Share of the jerk limit with which the end of a change of speed is planned: the curve may need
 /// the rest.
 const END_JERK_SHARE: f32 = 0.4;
-/// A setpoint slower than this stands, m/s.
+/// A setpoint slower than this counts as standing, m/s.
 const FULL_STOP_MPS: f32 = 0.01;
 /// Rate of decay at the end of a stop, 1/s: the deceleration is at most this times the speed that
 /// is left.
@@ -102,19 +103,22 @@ pub struct SetpointStats {
 pub struct SetpointSmoother {
     limits: MotionLimits,
     fence: Option<Fence>,
+    /// Window of each of the two averages, ticks.
     average_ticks: usize,
     /// Newest raw point.
     newest_raw_point: Point,
     /// The last differences between raw points, a ring; `newest_step_index` is the newest.
     raw_steps: [Point; HISTORY_LEN],
     newest_step_index: usize,
-    /// Newest value of the averages, and its last three steps, oldest first.
+    /// Newest value of the averages.
     averaged_point: Point,
+    /// The last three steps of the averages, oldest first.
     average_steps: [Point; 3],
     /// Time since the last tick, as a share of a tick.
     tick_fraction: f32,
-    /// Speed of the clock, 1 for real time, and its change each second.
+    /// Speed of the clock, 1 for real time.
     clock_speed: f32,
+    /// Change of `clock_speed` each second.
     clock_acceleration: f32,
     /// Whether there is a setpoint, from which the next one continues.
     has_setpoint: bool,
@@ -124,10 +128,11 @@ pub struct SetpointSmoother {
     resumes_after_gap: bool,
     /// Velocity with which setpoints follow a vehicle that its pilot or autopilot flies.
     followed_velocity: Point,
-    /// Of the step under way: its length, whether the safety filter stops, whether all raw points
-    /// were sound.
+    /// Length of the step under way, seconds.
     dt_s: f32,
+    /// Whether the step under way brakes for the safety filter.
     urgency: Urgency,
+    /// Whether all raw points of the step under way were sound.
     raw_points_valid: bool,
     /// Acceleration of the curve at the last setpoint.
     curve_acceleration: Point,
@@ -176,7 +181,8 @@ impl SetpointSmoother {
         self.has_setpoint
     }
 
-    /// Ends the setpoint stream: the next setpoint begins at a place of its own.
+    /// Ends the setpoint stream: the next setpoint begins at the place given then, unless it
+    /// follows after a short gap ([`Self::resume_at`]).
     pub(crate) fn end_stream(&mut self) {
         self.has_setpoint = false;
     }
@@ -201,7 +207,7 @@ impl SetpointSmoother {
         self.newest_raw_point
     }
 
-    /// Speed of the newest raw step, m/s: the setpoint has it T later, if the clock runs on.
+    /// Speed of the newest raw step at the speed of the clock, m/s: the setpoint has it T later.
     pub(crate) fn raw_speed_mps(&self) -> f32 {
         self.raw_steps[self.newest_step_index].length() / TICK_S * self.clock_speed
     }
@@ -222,7 +228,7 @@ impl SetpointSmoother {
         (self.curve_motion().0 - self.motion.position).length()
     }
 
-    /// Whether the setpoint stands.
+    /// Whether the setpoint stands: it is slower than 0.01 m/s (`FULL_STOP_MPS`).
     pub(crate) fn is_standing(&self) -> bool {
         self.velocity().norm_squared() < FULL_STOP_MPS * FULL_STOP_MPS
     }

@@ -1,5 +1,6 @@
 //! Moves the place where a vehicle waits back along its path: out of the column below a vehicle
-//! that descends, and in `SwarmLinkLost` to where others expect it. Notes when it is trapped there.
+//! that descends, and in `SwarmLinkLost` to where others expect it. Notes when it is trapped below
+//! a vehicle that descends.
 
 use planner_core::flight::Path;
 use planner_core::track::deconflict::Advice;
@@ -27,7 +28,8 @@ impl Guidance {
         self.acknowledged_path.note_acknowledged(sent_at, at_m, to_m);
     }
 
-    /// Ends an evasion, so that the setpoint stops where it is: the next state does not fly on.
+    /// Ends the search for a place to evade to: the next state does not fly on, and the setpoint
+    /// stops where it is.
     pub fn cancel_evasion(&mut self) {
         self.evade_search.reset();
     }
@@ -136,7 +138,8 @@ impl Guidance {
     }
 
     /// Notes whether the vehicle is trapped below one that descends: no place back along the path
-    /// is better, or the way back is barred. `step_back`: that of this step's raw points.
+    /// is better, or the way back is barred. `step_back`: whether a step back of this control
+    /// step's raw points was barred.
     pub(super) fn update_trapped(&mut self, step_back: StepBack, now: Instant) {
         let barred = step_back == StepBack::Barred
             || (self.filter.scans_backwards() && self.filter.is_stopped());

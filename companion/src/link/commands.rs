@@ -140,6 +140,7 @@ struct AnsweredCommand {
     sequence: u8,
     message: u32,
     payload: [u8; COMPARED_LEN],
+    /// `None`: the command was not answered.
     result: Option<u8>,
     at: Instant,
 }
@@ -149,6 +150,7 @@ struct AnsweredCommand {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CommandHistory {
     seen: [Option<AnsweredCommand>; 4],
+    /// Index in `seen` of the entry that the next frame replaces, the oldest.
     next: usize,
 }
 

@@ -33,7 +33,9 @@ pub(crate) const RANGE_LEN: usize = 6;
 pub(crate) const PERIOD_ON_GROUND: Duration = Duration::from_millis(1000);
 /// Period of the report while the vehicle flies.
 pub(crate) const PERIOD_IN_FLIGHT: Duration = Duration::from_millis(5000);
+/// Bytes of TUNNEL's own fields before the payload: type, target, length.
 const TUNNEL_HEADER_LEN: usize = 5;
+/// Bytes of the payload before its ranges.
 const HEADER_LEN: usize = 10;
 /// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
 pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_RANGES * RANGE_LEN;

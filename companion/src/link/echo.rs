@@ -46,7 +46,7 @@ impl IntentEcho {
 /// The part of its path that a vehicle reports in an intent, metres along the path.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReportedPath {
-    /// Where the vehicle is.
+    /// Where the vehicle was when it sent the intent.
     pub(crate) along_m: f32,
     /// Where the intent's points end.
     pub(crate) points_end_m: f32,
@@ -106,6 +106,7 @@ impl SentIntents {
 pub(crate) struct MessageDelay {
     /// The estimate, seconds.
     pub(crate) delay_s: f32,
+    /// Whether `delay_s` was measured; before, it is [`ASSUMED_DELAY_S`].
     measured: bool,
 }
 
@@ -116,6 +117,7 @@ impl Default for MessageDelay {
 }
 
 impl MessageDelay {
+    /// Updates the estimate from a newly measured one-way delay.
     pub(crate) fn update(&mut self, delay_s: f32) {
         let share = if self.measured && delay_s < self.delay_s { FALLING_DELAY_GAIN } else { 1.0 };
         self.delay_s += (delay_s - self.delay_s) * share;

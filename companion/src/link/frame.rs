@@ -27,7 +27,7 @@ use self::encode::{V2_START, calculate_crc};
 pub use self::received::Frame;
 use crate::time::{Duration, Instant};
 
-/// Our component id, `MAV_COMP_ID_ONBOARD_COMPUTER`.
+/// The companion's component id, `MAV_COMP_ID_ONBOARD_COMPUTER`.
 pub const COMPANION_COMPONENT: u8 = 191;
 /// The autopilot's component id, `MAV_COMP_ID_AUTOPILOT1`.
 pub const AUTOPILOT_COMPONENT: u8 = 1;
@@ -185,6 +185,7 @@ impl Framer {
         }
     }
 
+    /// What the bytes at the front of the buffer are.
     fn parse_front(&self) -> ParseStatus {
         let b = &self.buf[..self.len];
         let (header, crc_at, signature, id) = match b {

@@ -13,7 +13,7 @@
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 | f32 | progress along the sender's own path, metres; negative while climbing |
 //! | 16 | f32 | place along the sender's path up to which its gates are open or will be, metres: it flies on to there though no other vehicle hears it; −1e6 if it may stop at once |
-//! | 20 | u32 | vehicles that the sender heard in the last seconds: bit i for the vehicle of rank i, 0…31, in the roster sorted by system id |
+//! | 20 | u32 | vehicles that the sender heard in the last 0.8 s: bit i for the vehicle of rank i, 0…31, in the roster sorted by system id |
 //! | 24 | f32 | height of the ground below the sender, as far as it knows, metres up in the mission frame |
 //! | 28 | u8 | bit 0: the sender climbs, descends or lands, or a pilot or a failsafe flies it, so that it may come down from where it is; bits 1–7: greatest delay, seconds, of the flight to the place at byte 16, by its gates and its climb, compared with a flight from its progress at 0.4 of the nominal speed |
 //! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long the sender held it, in units of 10 ms; 0 for none |
@@ -34,7 +34,9 @@ pub const PAYLOAD_TYPE: u16 = 0xF10C;
 pub const MAX_POINTS: usize = 8;
 /// Version of the payload's layout.
 pub const VERSION: u8 = 6;
+/// Bytes of the payload before its path points.
 const HEADER_LEN: usize = 32;
+/// Bytes of TUNNEL's own fields before the payload: type, target, length.
 const TUNNEL_HEADER_LEN: usize = 5;
 
 /// Flag: the sender stands on the ground.
@@ -51,11 +53,12 @@ pub const ON_PLAN: u8 = 8;
 pub const OUT_OF_PLAN: u8 = 16;
 /// Flag: the sender stands, and will stand until another vehicle moves.
 pub const WAITING: u8 = 32;
-/// Flag: the sender's path is blocked; it waits until all other vehicles stand, then flies a
-/// detour.
+/// Flag: an obstacle, or a vehicle that left the plan, blocks the sender's path, or the sender
+/// seeks a path home. In a mission with goals it then waits until all other vehicles stand, and
+/// flies a detour.
 pub const BLOCKED: u8 = 64;
-/// Flag: the sender flies a detour, or will; its reported progress is then the place along its path
-/// where it left the plan.
+/// Flag: the sender flies a detour or another path off the plan, or evades, or will. On a detour
+/// its reported progress is the place along its plan's path where it left that path.
 pub const ON_DETOUR: u8 = 128;
 
 /// The intent of one vehicle, the sender.
@@ -68,7 +71,7 @@ pub struct Intent {
     pub flags: u8,
     /// CRC-32 of the mission file.
     pub mission_crc: u32,
-    /// CRC-32 of the swarm's plan.
+    /// CRC-32 of the swarm's plan; 0 while the sender has no plan.
     pub plan_crc: u32,
     /// Progress along the sender's own path, metres; negative while it climbs.
     pub progress_m: f32,
@@ -78,7 +81,8 @@ pub struct Intent {
     /// Greatest delay of the flight to `gates_open_up_to_m`, seconds, by gates and climb, compared
     /// with a flight at 0.4 of the nominal speed; at most 127.
     pub unheard_flight_delay_s: u8,
-    /// Vehicles that the sender heard in the last seconds: bit i for rank i in the roster.
+    /// Vehicles that the sender heard in the last 0.8 s: bit i for rank i in the roster, sorted by
+    /// system id.
     pub heard_bits: u32,
     /// Height of the ground below the sender, as far as it knows, metres up in the mission frame.
     pub ground_m: f32,
@@ -91,7 +95,8 @@ pub struct Intent {
     /// for now, then as far as it flies on if no other vehicle hears it. Empty while a pilot or a
     /// failsafe flies it.
     pub points: Vec<Point, MAX_POINTS>,
-    /// How many of the last of these points lie beyond where it will stop for now.
+    /// How many of the last of `points` lie beyond where the sender will stop for now: the sender
+    /// flies to them only if no other vehicle hears it.
     pub unheard_flight_point_count: u8,
 }
 

@@ -24,7 +24,8 @@ pub enum Outgoing {
     SetMessageInterval(u16, f32),
     /// REQUEST_MESSAGE to the autopilot: message id.
     RequestMessage(u16),
-    /// DO_SET_MODE to the autopilot: parameters 2 and 3.
+    /// DO_SET_MODE to the autopilot: parameters 2 and 3, as
+    /// [`crate::autopilot::AutopilotKind::mode_params`] gives them.
     SetMode(f32, f32),
     /// NAV_TAKEOFF to the autopilot: target height above home, metres.
     TakeOff(f32),

@@ -41,6 +41,7 @@ pub const fn state_bytes_per_s(swarm_hz: u8) -> u32 {
 /// some.
 #[derive(Clone, Debug)]
 pub(crate) struct RadioTokenBucket {
+    /// Millionths of a byte; negative after a frame that took more than there were.
     tokens: i64,
     filled_at: Instant,
 }

@@ -26,12 +26,16 @@ pub const PAYLOAD_TYPE: u16 = 0xF10E;
 pub const VERSION: u8 = 2;
 /// Most vehicles in one message.
 pub const MAX_ENTRIES_PER_MESSAGE: usize = 22;
+/// Bytes of TUNNEL's own fields before the payload: type, target, length.
 const TUNNEL_HEADER_LEN: usize = 5;
+/// Bytes of the payload before its vehicles.
 const HEADER_LEN: usize = 18;
 const ENTRY_LEN: usize = 5;
-/// Bits of the number of committed divisions.
+/// Bits of byte 2 with the number of committed divisions.
 const DIVISIONS_MASK: u8 = 15;
+/// Bit of byte 2: the sender hears a vehicle that sets [`IN_FLIGHT`].
 const HEARS_VEHICLE_IN_FLIGHT: u8 = 1 << 6;
+/// Bit of byte 2: the sender was started and takes part; it may still be on its pad.
 const IN_FLIGHT: u8 = 1 << 7;
 /// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
 pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_ENTRIES_PER_MESSAGE * ENTRY_LEN;
@@ -54,6 +58,7 @@ pub enum ShareStatus {
 }
 
 impl ShareStatus {
+    /// Every status, in the order of its number in the report.
     const ALL: [Self; 4] = [Self::Alive, Self::Lost, Self::Left, Self::Finished];
 
     /// The status that counts in another plan or division than the one that it was reported of. A
@@ -83,7 +88,8 @@ pub struct RosterReportEntry {
 }
 
 impl RosterReportEntry {
-    /// The entry without what depends on the plan and division: places along the path.
+    /// The entry without what depends on the plan and division: places along the path, hold and
+    /// agreement.
     pub(crate) fn without_places(&self) -> Self {
         Self { incarnation: self.incarnation, status: self.status, ..Self::default() }
     }
@@ -102,7 +108,7 @@ pub struct RosterReport {
     /// Number of committed divisions, on whose hash all that take part agreed, as the sender knows;
     /// at most 15.
     pub division_count: u8,
-    /// Whether the sender was started and takes part.
+    /// Whether the sender was started and takes part; it may still be on its pad.
     pub in_flight: bool,
     /// Whether the sender hears another vehicle that was started and takes part.
     pub hears_vehicle_in_flight: bool,

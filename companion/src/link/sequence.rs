@@ -9,6 +9,7 @@ const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
 /// for 1 s after it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SequenceFilter {
+    /// Sequence number of the last accepted frame, and when it was received.
     last: Option<(u8, Instant)>,
 }
 

@@ -28,17 +28,21 @@ const REJOIN_PICTURE_WINDOW_M: f32 = 0.05;
 #[derive(Clone, Debug)]
 pub(crate) struct Mission<const W: usize, const G: usize> {
     state: State,
+    /// When `state` was entered.
     entered_at: Instant,
-    /// When MISSION_START was accepted: the schedule's times count from there.
+    /// When MISSION_START took effect (`Ready` to `Scheduled`): the schedule's times count from
+    /// then.
     started_at: Instant,
-    /// When a pilot last took the vehicle over.
+    /// When a pilot last took the vehicle over; again from `PilotReturned` does not count.
     pilot_took_over_at: Instant,
+    /// The states that a pause and a loss interrupted.
     interrupted: InterruptedStates,
     pending: PendingCommands,
     /// The autopilot's `custom_mode` when the mission was started.
     mode_at_start: u32,
     /// First point of the vehicle's path, above its pad.
     path_start: Point,
+    /// The vehicle's plan, with the path that it flies now, which may be a detour or the way back.
     plan: Option<VehiclePlan<W, G>>,
     /// Once the vehicle has left the path of its plan: whether it had taken all pictures of its
     /// share before. `None` while it is on that path.
@@ -49,6 +53,8 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     /// Where the vehicle's plan ends: the place above the pad, the height of the path that leads
     /// there, and the length of the descent there, metres.
     home: (Point, f32, f32),
+    /// Why the shell did not return the last plan or detour requested; `None` if it has, or has not
+    /// answered yet.
     plan_failure: Option<PlanFailure>,
     /// Since when the estimate's error bound has exceeded what the margin leaves for it even at
     /// crawl speed; `None` while it fits.
@@ -107,7 +113,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         now - self.entered_at
     }
 
-    /// When MISSION_START was accepted.
+    /// When MISSION_START took effect (`Ready` to `Scheduled`).
     pub(crate) fn started_at(&self) -> Instant {
         self.started_at
     }
@@ -148,7 +154,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.path_start - Point::new(0.0, 0.0, self.climb_m())
     }
 
-    /// The vehicle's plan; `None` until the shell has returned one.
+    /// The vehicle's plan; `None` until the shell has returned one. Its path is the one flown now:
+    /// a detour, or the way back, replaces the plan's own path there.
     pub(crate) fn plan(&self) -> Option<&VehiclePlan<W, G>> {
         self.plan.as_ref()
     }
@@ -266,6 +273,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
+    /// Takes over a valid plan in place of the former one.
     // Not inlined: each copy would take a kilobyte of flash.
     #[inline(never)]
     fn begin_plan(&mut self, plan: &VehiclePlan<W, G>) {
@@ -313,8 +321,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Closes the open request for a division. Returns whether it was for the one with this hash.
-    pub(crate) fn close_division_request(&mut self, fingerprint: u32) -> bool {
-        self.requested_division_hash.take().is_some_and(|of| of == fingerprint)
+    pub(crate) fn close_division_request(&mut self, hash: u32) -> bool {
+        self.requested_division_hash.take().is_some_and(|requested| requested == hash)
     }
 
     /// Number of the fleet's committed divisions that the plan takes into account.
@@ -401,7 +409,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Whether all pictures of the vehicle's share are taken: `along_m` metres along its path, or
-    /// before it left that path. False where the path is only a stretch of its route.
+    /// before it left that path. False where the path is only the first part of its route; true for
+    /// a task without pictures.
     pub(crate) fn has_all_pictures(&self, along_m: f32) -> bool {
         self.left_with_all_pictures.unwrap_or_else(|| {
             match self.plan.as_ref().map(|plan| (&plan.task, &plan.path)) {
@@ -426,7 +435,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// Puts the detour `way` in place of the plan's path, which the vehicle leaves `along_m` metres
     /// along it. Gates and departure time are cleared. The climb becomes the height of the detour's
-    /// start above the ground, which is at `ground_m`.
+    /// start above the ground at `ground_m` (up in the mission frame), if that is given.
     pub(crate) fn switch_to_detour(
         &mut self,
         way: &VehiclePlan<W, G>,
@@ -474,8 +483,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Whether the plan's numbers are finite and its path begins at `place`; a plan that does not
-    /// leave the pad needs no path.
+    /// Whether the plan's numbers are finite and not negative, and its path begins at `place`; a
+    /// plan that does not leave the pad needs no path.
     pub(crate) fn is_plan_valid_from(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
         let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
         let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)

@@ -5,8 +5,8 @@ use crate::autopilot::telemetry::{MAX_HEARTBEAT_AGE, MAX_POSITION_AGE};
 use crate::margins::MAX_HEIGHT_ERROR_ON_GROUND_M;
 use crate::time::Duration;
 
-/// Time without progress after which a vehicle at the geofence no longer waits for room below: its
-/// landing is held then, and it flies back.
+/// Time without progress after which a vehicle at the geofence begins to land even if a neighbour
+/// is below: in `Land` the landing is held then, and the vehicle flies back.
 const MAX_WAIT_AT_FENCE: Duration = Duration::from_secs(30);
 
 /// Condition of a row: a field of [`GuardInputs`], or a comparison of fields. "Limit" is the row's
@@ -31,7 +31,8 @@ pub enum Guard {
     PlanReady,
     /// The shell has answered that there is no plan.
     PlanFailed,
-    /// The shell has no plan, since the roadmap is missing or not the mission's.
+    /// The shell has no plan, since the mission, or the roadmap or field of heights that it needs,
+    /// is missing, damaged or not the mission's.
     RoadmapBad,
     /// MISSION_START, the plan leaves the pad, and the estimate's error bound fits into the margin
     /// at cruise speed.
@@ -43,7 +44,8 @@ pub enum Guard {
     /// MISSION_START, but the plan does not leave the pad, and no vehicle will leave a part to this
     /// one; in a coverage mission all others heard have the same plan.
     StartWithoutGoal,
-    /// As `StartWithoutGoal`, in a coverage mission: others may leave a part to this vehicle.
+    /// MISSION_START in a coverage mission, but the plan does not leave the pad: others may leave a
+    /// part to this vehicle. All others heard have the same plan.
     StartInReserve,
     /// MISSION_START, but the vehicle is not at its pad.
     StartElsewhere,
@@ -67,17 +69,18 @@ pub enum Guard {
     EstimateImprecise,
     /// The EKF origin moved while the motors were armed.
     OriginMoved,
-    /// The vehicle may take off: departure is due, and advice and safety filter leave it room.
+    /// The vehicle may take off ([`GuardInputs::may_take_off`]): departure is due, and gates,
+    /// safety filter, battery and radio allow the take-off.
     GatesOpen,
     /// The state has lasted for the limit.
     Elapsed,
     /// The autopilot's mode is the one that follows setpoints: Offboard (PX4) or Guided
     /// (ArduCopter).
     Offboard,
-    /// The autopilot's mode is neither the one before the start nor one that the companion set, and
-    /// the autopilot reports no failsafe: the pilot changed it.
+    /// The pilot changed the autopilot's mode: it is foreign ([`GuardInputs::mode_foreign`]), and
+    /// the autopilot reports no failsafe.
     ModeTaken,
-    /// The autopilot's mode is not one that the companion set, and HEARTBEAT reports
+    /// The autopilot's mode is foreign ([`GuardInputs::mode_foreign`]), and HEARTBEAT reports
     /// `MAV_STATE_CRITICAL` or worse.
     FailsafeActs,
     /// As [`Guard::ModeTaken`], with the motors armed.
@@ -102,13 +105,15 @@ pub enum Guard {
     ArmedUnseen,
     /// As [`Guard::ColumnBlocked`], and arming was not requested yet.
     ArmingHeld,
-    /// Arming was requested as often as allowed, and the autopilot did not answer.
+    /// Arming has failed for want of an answer: no COMMAND_ACK came within 2.5 s of the last
+    /// request, and two requests were sent or HEARTBEAT was missing meanwhile.
     ArmingUnanswered,
-    /// The motors are armed, and the vehicle is in flight, moves up or down, or is by its estimate
-    /// more than 2 m above the plan's ground.
+    /// The motors are armed, and the landing detector reports flight, or the vehicle moves up or
+    /// down, or by its estimate it is more than 2 m above the plan's ground.
     InAir,
-    /// As [`Guard::InAir`], in the Offboard or Guided that the companion entered, in a state
-    /// that sends no setpoints.
+    /// As [`Guard::InAir`], while the autopilot is still in the Offboard or Guided that the
+    /// companion entered, and HEARTBEAT is younger than 1.5 s. Its row is of states that send no
+    /// setpoints.
     Unattended,
     /// The autopilot is not in its landing mode.
     LandingModeLeft,
@@ -121,7 +126,8 @@ pub enum Guard {
     BackAtStart,
     /// The vehicle is at the end of its path and may land there.
     PathDone,
-    /// The vehicle has made no progress along its path for the limit.
+    /// The vehicle has made no progress along its path for the limit
+    /// ([`GuardInputs::stalled_for`]).
     Stalled,
     /// For the limit the vehicle has not reached its setpoint, nor has the setpoint moved on:
     /// something holds the vehicle, or carries it away.
@@ -129,7 +135,7 @@ pub enum Guard {
     /// The vehicle is off its path, no way to it is known to be free of walls, and the state has
     /// lasted for the limit.
     PathBarred,
-    /// DO_PAUSE_CONTINUE 0 (pause).
+    /// DO_PAUSE_CONTINUE 0 (pause), but not in a climb that has only begun.
     PauseCommanded,
     /// DO_PAUSE_CONTINUE 1 (resume).
     ResumeCommanded,
@@ -152,7 +158,8 @@ pub enum Guard {
     ReturnCommanded,
     /// NAV_RETURN_TO_LAUNCH before the climb is done.
     ReturnInClimb,
-    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where a path home over the field can be planned.
+    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where a path home over the field may be
+    /// requested.
     ReturnOverField,
     /// In a coverage mission: the path is blocked, was first found blocked here the limit ago or
     /// earlier, and a path home may be requested.
@@ -162,18 +169,19 @@ pub enum Guard {
     MayDetourOverField,
     /// The vehicle stands at the end of its detour, back on its path.
     DetourFlown,
-    /// As [`Guard::DetourFlown`], and the rest of the vehicle's own plan has come.
+    /// The vehicle is back on its path after a detour, and the rest of its own plan has come.
     OwnPlanReady,
-    /// As [`Guard::DetourFlown`], but the rest of the vehicle's own plan could not be planned.
-    OwnPlanLost,
-    /// In a coverage mission: the safety filter has made the vehicle yield for the limit, and a
-    /// path home can be planned.
-    YieldedOverField,
-    /// In a coverage mission: the safety filter has kept the vehicle from moving on for the limit,
-    /// and a path home can be planned.
-    HinderedOverField,
-    /// In a coverage mission: no progress along the path for the limit, and a path home can be
+    /// The vehicle is back on its path after a detour, but the rest of its own plan could not be
     /// planned.
+    OwnPlanLost,
+    /// In a coverage mission, before the last descent: the safety filter has made the vehicle yield
+    /// for the limit, and a path home may be requested.
+    YieldedOverField,
+    /// In a coverage mission, before the last descent: the safety filter has kept the vehicle from
+    /// moving on for the limit, and a path home may be requested.
+    HinderedOverField,
+    /// In a coverage mission: no progress along the path for the limit, and a path home may be
+    /// requested.
     StalledOverField,
     /// The vehicle seeks a path home, stands, and may request it from the shell.
     StandsToReturn,
@@ -186,8 +194,8 @@ pub enum Guard {
     LandingBlocked,
     /// The column below has been free of other vehicles for the limit.
     LandingClear,
-    /// The column below was occupied for the limit (5 s by a vehicle that rests for good), and the
-    /// vehicle can turn back along its path to the pad.
+    /// In Offboard or Guided: the column below has been occupied for the limit (5 s by a vehicle
+    /// that is on the ground or lost), and the vehicle can turn back along its path to the pad.
     NoRoomToLand,
     /// Before take-off: the column above the pad has been occupied for the limit.
     ColumnBlocked,
@@ -203,11 +211,12 @@ pub enum Guard {
     /// The safety filter has kept this vehicle from moving on for the limit, and the vehicle seeks
     /// no path home.
     Hindered,
-    /// The column below was occupied for the limit (5 s by a vehicle that rests for good), and a
-    /// place aside to land at may be sought.
+    /// In Offboard or Guided: the column below has been occupied for the limit (5 s by a vehicle
+    /// that is on the ground or lost), and a place aside to land at may be sought.
     NoRoomHere,
-    /// For the limit any vehicle has blocked the descent to the pad on the way home, or one that
-    /// rests for good has blocked the way home or the descent at the end of a coverage path.
+    /// For the limit any vehicle has blocked the descent to the pad on the way home, or one that is
+    /// on the ground or lost has blocked the way home or the descent at the end of a coverage path.
+    /// On the way home of a mission with goals, 5 s of the latter are enough.
     PadTaken,
     /// A place aside to land at was sought, but none exists, or the shell has not answered within
     /// the limit.
@@ -219,28 +228,31 @@ pub enum Guard {
     /// The battery's charge is below the configured limit, no neighbour is below, and the vehicle
     /// neither seeks nor flies to a place aside to land at.
     BatteryLow,
-    /// The vehicle is outside the geofence or stands at it, and no neighbour is below, or it has
-    /// made no progress for 30 s (`MAX_WAIT_AT_FENCE`).
+    /// The vehicle is outside the geofence or stands at it, and either no neighbour is below or the
+    /// vehicle has made no progress for 30 s (`MAX_WAIT_AT_FENCE`).
     OutsideGeofence,
     /// For longer than the limit no neighbour that flies was heard, or none reported that it hears
-    /// this vehicle.
+    /// this vehicle. In a coverage mission as [`Guard::LeaseLost`].
     NeighboursSilent,
-    /// The vehicle may fly on unheard: its next gate is open, or none is left.
+    /// The vehicle may fly on unheard: all others are out of radio range, and its next gate is open
+    /// or none is left.
     MayFlyUnheard,
     /// All others were last heard near the edge of the radio range, and the state has lasted for
     /// the limit.
     OutOfRange,
-    /// In the last second a neighbour was heard, and one reported that it hears this vehicle.
+    /// In the last second a neighbour was heard, and one reported that it hears this vehicle; in a
+    /// coverage mission a majority reported that.
     NeighbourHeard,
-    /// The landing detector reports ground in the landing mode, the estimated height is within 1.5
-    /// m of the plan's ground, and the vehicle does not move up or down.
+    /// The landing detector reports ground in the landing mode, the estimated height is less than
+    /// 1.5 m above the plan's ground, and the vehicle does not move up or down.
     OnGround,
     /// An obstacle, or a vehicle that left the plan, is on the path ahead, or this vehicle seeks a
     /// path home.
     PathBlocked,
     /// No obstacle or vehicle that left the plan is on the path ahead any more.
     PathClear,
-    /// The path is blocked, all others stand, and it is this vehicle's turn to fly a detour.
+    /// In a mission with goals: the path is blocked, all others stand and wait, and it is this
+    /// vehicle's turn to fly a detour.
     OurTurn,
     /// The shell has returned the requested detour.
     DetourReady,
@@ -262,8 +274,8 @@ pub enum Guard {
     LeftOutSetChanged,
     /// In a coverage mission: the limit has passed since 1 s before the end of the lease.
     LeaseLost,
-    /// The division has not become binding within the limit, nor within a minute after the last
-    /// lost vehicle must be down.
+    /// The state has lasted for the limit without a committed division, and the last lost vehicle
+    /// must have been down for a minute.
     NotDivided,
     /// A pause is commanded in a climb that has not left the ground: the landing detector has not
     /// reported flight, and the vehicle has not risen. Later a report of ground may be false, and
@@ -279,7 +291,8 @@ pub enum Guard {
     HoldsToDivide,
     /// The division is committed, and this vehicle's plan after it has come.
     DivisionReady,
-    /// No division is under way or outstanding any more.
+    /// No division is under way or outstanding any more, nor the rest of the vehicle's own plan
+    /// after a detour.
     NothingToDivide,
 }
 

@@ -19,9 +19,11 @@ pub struct GuardInputs {
     /// Whether the position jumped, or the EKF origin changed, within the last second.
     pub position_jumped: bool,
     /// Time since this vehicle last made progress along its path; zero in states other than
-    /// `Follow` and `Blocked`.
+    /// `Follow` and `Blocked`. In `Blocked` at least `path_blocked_for`, and exactly that while a
+    /// path home may still be sought.
     pub stalled_for: Duration,
-    /// Time for which this vehicle has not reached its setpoint, nor its setpoint moved on.
+    /// Time for which this vehicle has not reached its setpoint, nor its setpoint moved on. In a
+    /// coverage mission 60 s less while the vehicle is within 2 m of its setpoint.
     pub unfollowed_for: Duration,
     /// Time since this vehicle's path was first found blocked about where it was last found
     /// blocked, even if it was clear meanwhile.
@@ -36,7 +38,8 @@ pub struct GuardInputs {
     /// Whether this vehicle may fly on unheard: all others are out of radio range, and its next
     /// gate is open or none is left.
     pub may_fly_on_unheard: bool,
-    /// Whether all other vehicles that still fly were last heard near the edge of the radio range.
+    /// Whether all other vehicles that still fly were last heard near the edge of the radio range
+    /// or beyond it, or never. False where that range is not set.
     pub others_out_of_range: bool,
     /// Whether in the last second a neighbour was heard, and one reported that it hears this
     /// vehicle; in a coverage mission, whether a majority reported that.
@@ -60,7 +63,8 @@ pub struct GuardInputs {
     pub plan_ready: bool,
     /// Whether the shell answered the request for a plan or detour with a failure.
     pub plan_failed: bool,
-    /// Whether the shell has no plan because the roadmap is missing or not the mission's.
+    /// Whether the shell has no plan because the mission, or the roadmap or field of heights that
+    /// it needs, is missing, damaged or not the mission's.
     pub roadmap_unusable: bool,
     /// Whether the plan makes this vehicle leave its pad.
     pub plan_leaves_pad: bool,
@@ -70,7 +74,8 @@ pub struct GuardInputs {
     /// In a coverage mission: whether all neighbours heard have this vehicle's plan, after time
     /// enough to report another one. True in other missions.
     pub shares_plan_with_others: bool,
-    /// Whether the position is within the start tolerance of the pad, horizontally and in height.
+    /// Whether the position is within the start tolerance of the pad, horizontally and in height;
+    /// in height also within 1.5 m.
     pub at_pad: bool,
     /// Whether, in `Ready`, the position estimate's error bound exceeds what the margin leaves for
     /// it at cruise speed.
@@ -133,8 +138,9 @@ pub struct GuardInputs {
     pub in_land_mode: bool,
     /// Whether the autopilot's mode is Offboard or Guided.
     pub in_setpoint_mode: bool,
-    /// Whether the autopilot's mode is neither the one before the start nor one that the companion
-    /// set, so that a pilot or a failsafe has changed it.
+    /// Whether a pilot or a failsafe has changed the autopilot's mode: it is not Offboard or
+    /// Guided, nor, before arming, the mode at the start, nor, in a landing, the landing mode.
+    /// False after a landing once the motors are off.
     pub mode_foreign: bool,
     /// Whether HEARTBEAT reports `MAV_STATE_CRITICAL` or worse.
     pub autopilot_critical: bool,
@@ -143,8 +149,8 @@ pub struct GuardInputs {
     /// Estimated height above the ground as far as the plan says, metres; NaN while unknown, and
     /// where the landing detector last reported flight.
     pub height_if_ground_reported_m: f32,
-    /// Whether the landing detector has reported flight, or the vehicle has risen, since arming was
-    /// requested.
+    /// Whether the landing detector has reported flight while armed, or the vehicle has risen,
+    /// since the state `Arming` was entered.
     pub has_flown: bool,
     /// Whether the vehicle moves up or down by more than 0.5 m/s.
     pub moves_vertically: bool,
@@ -153,8 +159,10 @@ pub struct GuardInputs {
     /// Whether the landing detector reports flight; always true for an autopilot that takes off
     /// without a command.
     pub take_off_command_done: bool,
-    /// Whether the vehicle may take off: its departure is due, gates and safety filter let it go,
-    /// the battery's charge is known, and another vehicle hears it.
+    /// Whether the vehicle may take off: its departure is due, it is not paused, gates and safety
+    /// filter let it go, its path is not blocked, the battery's charge is known, no other plan is
+    /// heard, and another vehicle hears it. In a mission with goals no other vehicle has to hear it
+    /// once all others have landed or left the plan.
     pub may_take_off: bool,
     /// Whether, in the state `Climb`, setpoint and vehicle are at the start of the path; false in
     /// all other states.
@@ -172,7 +180,7 @@ pub struct GuardInputs {
     /// Time for which the column below the vehicle, before take-off the column above its pad, has
     /// not been free of other vehicles.
     pub column_blocked_for: Duration,
-    /// Time for which a vehicle that rests for good, or is lost, has been in the column below this
+    /// Time for which a vehicle that is on the ground, or lost, has been in the column below this
     /// vehicle, or before take-off above its pad.
     pub column_blocked_for_good_for: Duration,
     /// Time for which another vehicle in the column above its pad, or an obstacle on its path, has
@@ -185,15 +193,15 @@ pub struct GuardInputs {
     /// free of other vehicles.
     pub column_clear_for: Duration,
     /// Whether the vehicle can turn back along the path flown so far: it is on that path, or the
-    /// way there is known to be free of walls, and it does not fly back yet. In a coverage mission
-    /// only while it seeks a path home.
+    /// way there is known to be free of walls; it does not fly back yet, follows its setpoints, and
+    /// hears another vehicle. In a coverage mission only while it seeks a path home.
     pub can_turn_back: bool,
     /// Time for which the last leg of this vehicle has been blocked: on its way home the descent to
     /// its pad by any vehicle; the way home before that, and the descent at the end of a coverage
-    /// path, by a vehicle that rests for good.
+    /// path, by a vehicle that is on the ground or lost.
     pub pad_blocked_for: Duration,
-    /// Time for which a vehicle that rests for good has barred the way back to its pad; over an
-    /// area, where that one may only be silent, zero.
+    /// Time for which a vehicle that is on the ground or lost has barred this vehicle's way back to
+    /// its pad. Zero in a coverage mission, where that vehicle may only be silent.
     pub way_back_blocked_for_good_for: Duration,
     /// Whether the vehicle is to join its path, but no way there is known to be free of walls.
     pub join_barred: bool,
@@ -205,12 +213,14 @@ pub struct GuardInputs {
     pub lands_aside: bool,
     /// Whether the vehicle stands at the end of its path to a place aside where it is to land.
     pub landing_place_reached: bool,
-    /// Whether the vehicle must land whatever is below it: the battery is nearly empty, or the
-    /// position is not known.
+    /// Whether the vehicle must land whatever is below it: the battery is nearly empty, the
+    /// position is not known, or the EKF origin moved.
     pub must_land: bool,
-    /// Time for which the safety filter has made this vehicle yield to another.
+    /// Time for which the safety filter has kept this vehicle from moving on so that another one
+    /// goes first. Waits for a vehicle that comes down unheard do not count at first.
     pub yielded_for: Duration,
-    /// Time for which the safety filter has kept this vehicle from moving on.
+    /// Time for which the safety filter has kept this vehicle from moving on, whatever goes first.
+    /// Waits for a vehicle that comes down unheard do not count at first.
     pub hindered_for: Duration,
     /// Whether the battery's charge is below the configured limit.
     pub battery_low: bool,
@@ -223,7 +233,8 @@ pub struct GuardInputs {
     /// Whether an obstacle, or a vehicle that left the plan, is on the path ahead, or this vehicle
     /// seeks its path home.
     pub path_blocked: bool,
-    /// Whether all others stand and it is this vehicle's turn to fly a detour.
+    /// Whether, in a mission with goals, all others stand and wait, and it is this vehicle's turn
+    /// to fly a detour.
     pub our_turn_to_detour: bool,
     /// Whether the requested detour has come.
     pub detour_ready: bool,
@@ -236,14 +247,14 @@ pub struct GuardInputs {
     pub standing: bool,
 }
 
-/// Longest time that a vehicle waits above one that rests for good, or on its way back before one:
-/// that one will not leave.
+/// Longest time that a vehicle waits above another that is on the ground or lost, or, on its way
+/// back, before such a vehicle: it will not leave.
 const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 
 /// Height above [`MAX_HEIGHT_ERROR_ON_GROUND_M`] from which an estimate shows that the vehicle is
-/// in the air, metres: an estimate at that bound does not alternate.
+/// in the air, metres: an estimate near that bound does not switch between ground and air.
 const IN_AIR_HYSTERESIS_M: f32 = 0.5;
-/// Estimated height from which a vehicle is in the air, metres.
+/// Estimated height above the plan's ground from which a vehicle is in the air, metres.
 const SURELY_IN_AIR_M: f32 = MAX_HEIGHT_ERROR_ON_GROUND_M + IN_AIR_HYSTERESIS_M;
 
 impl GuardInputs {
@@ -253,7 +264,8 @@ impl GuardInputs {
     }
 
     /// Whether the vehicle surely has not left the ground: its position is new, the landing
-    /// detector has not reported flight, and the vehicle does not rise.
+    /// detector reports the ground, and since `Arming` it has not reported flight, nor has the
+    /// vehicle risen.
     pub(super) fn is_before_lift_off(&self) -> bool {
         self.position_age < MAX_POSITION_AGE_ON_PAD
             && self.on_ground
@@ -269,15 +281,15 @@ impl GuardInputs {
                 || self.height_if_ground_reported_m > SURELY_IN_AIR_M)
     }
 
-    /// Whether the column below has not been free for `limit`, or a vehicle that rests for good has
-    /// been in it for 5 s (`MAX_WAIT_ABOVE_RESTING`).
+    /// Whether the column below has not been free for `limit`, or a vehicle that is on the ground
+    /// or lost has been in it for 5 s (`MAX_WAIT_ABOVE_RESTING`).
     pub(super) fn is_landing_blocked_for(&self, limit: Duration) -> bool {
         self.column_blocked_for >= limit
             || self.column_blocked_for_good_for >= MAX_WAIT_ABOVE_RESTING
     }
 
     /// Whether the way to its pad has been barred for `limit`, or for 5 s
-    /// (`MAX_WAIT_ABOVE_RESTING`) by a vehicle that rests for good.
+    /// (`MAX_WAIT_ABOVE_RESTING`) by a vehicle that is on the ground or lost.
     pub(super) fn is_pad_blocked_for(&self, limit: Duration) -> bool {
         self.pad_blocked_for >= limit
             || self.way_back_blocked_for_good_for >= MAX_WAIT_ABOVE_RESTING

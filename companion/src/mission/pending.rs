@@ -10,7 +10,7 @@ use crate::mission::{Action, Guard, GuardInputs, State, TransitionRow, has_row_f
 /// Commands of the operator that the mission table has not carried out yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct PendingCommands {
-    /// MISSION_START, until the mission ends.
+    /// MISSION_START, until the mission ends or its start is given up.
     pub(crate) start: bool,
     /// DO_PAUSE_CONTINUE 0, until the operator resumes or turns the vehicle back, it lands, or its
     /// mission or start ends. On the pad it prevents the take-off.

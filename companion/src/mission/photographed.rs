@@ -17,7 +17,8 @@ use crate::time::{Duration, Instant};
 /// Most ranges of waypoints known to be photographed; a waypoint that fits into none is
 /// photographed again.
 pub const MAX_PHOTOGRAPHED_RANGES: usize = 40;
-/// Number of newly photographed waypoints after which the ranges are written to flash again.
+/// Number of newly photographed waypoints after which the ranges are written to flash again in
+/// flight.
 const STORE_EVERY_WAYPOINTS: u32 = 10;
 /// Time for which a set reported by vehicles in flight, as what their plans leave out, has priority
 /// over reports from vehicles on the ground. Vehicles in flight report more often than this.
@@ -29,9 +30,11 @@ const _: () = assert!(HEADER_LEN + MAX_PHOTOGRAPHED_RANGES * RANGE_LEN <= MAX_PR
 /// How far the flight of this vehicle is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FlightStage {
-    /// On its pad before its take-off, where it has to compute the same plan as the others.
+    /// On its pad before it prepares its take-off, where it has to compute the same plan as the
+    /// others.
     OnPad,
-    /// It has taken off and not finished, so it may photograph further waypoints.
+    /// It prepares its take-off or has taken off, and has not finished: it may photograph further
+    /// waypoints.
     UnderWay,
     /// Finished or given up.
     Over,
@@ -67,7 +70,7 @@ pub(crate) struct PhotographedWaypoints {
     has_left_pad: bool,
     /// When a vehicle in flight last reported what its plan leaves out.
     flight_report_at: Option<Instant>,
-    /// Index of the first range of the next report.
+    /// Index of the first range of the next report, in the set that is reported.
     next_range: usize,
     /// Whether the last report was of the waypoints that the plan leaves out.
     last_report_was_left_out: bool,
@@ -129,6 +132,7 @@ impl PhotographedWaypoints {
         self.note_plan_requested();
     }
 
+    /// Notes that a plan of the present round is requested, for a flight from the pad.
     fn note_plan_requested(&mut self) {
         (self.planned_round, self.has_left_pad, self.left_out_set_changed) =
             (self.round, false, false);
@@ -228,9 +232,9 @@ impl PhotographedWaypoints {
         }
     }
 
-    /// This vehicle's next report: 19 ranges (`MAX_RANGES`) of the known waypoints in turn. In
-    /// flight every other report has the waypoints that the plan leaves out, if they fit into one
-    /// report.
+    /// This vehicle's next report: 19 ranges (`MAX_RANGES`) of the known waypoints in turn; on the
+    /// pad, of the waypoints that the plan leaves out. In flight every other report has the
+    /// waypoints that the plan leaves out, if they fit into one report.
     pub(crate) fn next_report(&mut self, stage: FlightStage) -> PhotographedReport {
         let flies = stage == FlightStage::UnderWay;
         let plan = flies

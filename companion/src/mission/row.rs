@@ -91,7 +91,7 @@ pub struct TransitionRow {
     pub severity: Severity,
 }
 
-/// Least time in a state of a row that acts in the first step in which its guard holds.
+/// `min_duration` of a row that is taken in the first step in which its guard is met.
 pub(crate) const AT_ONCE: Duration = Duration::from_millis(0);
 
 /// Bit mask with one bit for each of these states.

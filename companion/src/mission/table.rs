@@ -12,6 +12,7 @@ pub(crate) const fn secs(secs: u64) -> Duration {
     Duration::from_secs(secs)
 }
 
+/// Row whose text has the severity INFO.
 pub(crate) const fn info_row(
     from: &'static [State],
     guard: Guard,
@@ -32,6 +33,7 @@ pub(crate) const fn info_row(
     }
 }
 
+/// Row whose text is a warning: the mission leaves its usual course.
 pub(crate) const fn warning_row(
     from: &'static [State],
     guard: Guard,
@@ -72,7 +74,8 @@ pub(crate) const fn resume_row(
     }
 }
 
-/// Twice the time by which HEARTBEAT's armed bit lags behind the COMMAND_ACK of arming.
+/// Least time in `CancelStart` after which a HEARTBEAT without the armed bit is believed: about
+/// twice the time by which that bit lags behind the COMMAND_ACK of arming.
 const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 
 /// Time for which the column above the pad may be occupied after the gates have opened, before

@@ -47,7 +47,7 @@ fn printed() -> String {
 /// Sets the inputs that an interruption changes.
 type Shows = fn(&mut GuardInputs);
 
-/// The interruptions: name, and change of the inputs.
+/// The interruptions: the name of each, and its change of the inputs.
 const INTERRUPTIONS: &[(&str, Shows)] = &[
     ("pause", |i| i.pause_pending = true),
     ("resume", |i| i.resume_pending = true),
@@ -346,8 +346,8 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
     for row in TABLE {
         for from in row.from {
             let mut inputs = inputs_for(row.guard);
-            // Where a known position or an autopilot that is heard would take another row, they are
-            // not known yet.
+            // Where a known position, or an autopilot that is heard, would let another row be
+            // taken, the position is unknown, or the autopilot silent.
             match (from, row.guard) {
                 (PositionLost, G::BackOnPath | G::BackOffPath)
                 | (AutopilotSilent, G::AutopilotHeard) => {}

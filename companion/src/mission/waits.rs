@@ -10,7 +10,8 @@ use crate::timers::{Timer, Timers};
 /// two reports.
 const REPORT_WAIT_AFTER: Duration = Duration::from_secs(30);
 
-/// Time without an obstacle after which the start counts as no longer barred.
+/// Time without a vehicle or an obstacle that bars the start after which the start counts as no
+/// longer barred.
 const UNBARRED_AFTER: Duration = Duration::from_secs(5);
 
 /// The waits of a mission.
@@ -45,7 +46,9 @@ impl WaitReport {
 /// (`UNBARRED_AFTER`) do not interrupt it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct BarredStart {
+    /// When the start was first barred, short gaps included; `None` if it is not barred.
     since: Option<Instant>,
+    /// When the start was last barred.
     barred_at: Instant,
 }
 

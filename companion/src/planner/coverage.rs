@@ -52,7 +52,7 @@ struct PlanFingerprint {
     plan_count: u32,
     /// CRC of the inputs of all these plans.
     inputs_crc: u32,
-    /// CRC of its flights.
+    /// CRC of the plan's flights.
     plan_crc: u32,
 }
 
@@ -227,8 +227,8 @@ fn read_area<'a, const X: usize>(
 }
 
 /// Plans one vehicle's detour over the area: its way home, aside, or back to its path. The detour
-/// keeps clear of all `obstacles`, stays above the field of heights and out of no-fly zones, which
-/// may have `C` corners.
+/// keeps clear of all `obstacles`, stays above the field of heights, where the ground is uneven,
+/// and out of no-fly zones, which may have `C` convex corners.
 ///
 /// # Errors
 /// [`PlanFailure`] says why there is no detour.
@@ -307,8 +307,8 @@ fn division_inputs_crc(before: u32, inputs: &[VehicleDivisionInput]) -> u32 {
     digest.finalize()
 }
 
-/// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` has for each
-/// division so far the inputs of all vehicles, by the rank of their system ids.
+/// Plans the flights of all vehicles; no-fly zones may have `C` convex corners. `losses` has for
+/// each division so far the inputs of all vehicles, by the rank of their system ids.
 ///
 /// Where `ws` and `out` still hold the plan after the first few of these divisions, only the later
 /// ones are computed; the result is the same.

@@ -23,7 +23,7 @@ pub struct PlanFiles<'a> {
     pub mission: Option<MissionView<'a>>,
     /// Roadmap on which the routes of a mission with goals are searched.
     pub roadmap: Option<RoadmapView<'a>>,
-    /// Height field that a coverage mission's flights keep above.
+    /// Field of heights that a coverage mission's flights keep above.
     pub field: Option<FieldView<'a>>,
 }
 
@@ -69,13 +69,13 @@ pub trait LendWorkspace<
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RequestedPlan {
     /// The vehicle's part of the swarm's plan. Over an area, that is the plan without the
-    /// photographed waypoints of the [`PlanInputs`], and after their losses.
+    /// photographed waypoints of the [`PlanInputs`], and after the divisions there.
     Flight,
     /// A detour around the keep-out zones of the [`PlanInputs`].
     Detour(DetourRequest),
 }
 
-/// What a companion knows for the plan that it requests:
+/// What a companion contributes to the plan that it requests:
 /// [`read_plan_inputs`](crate::Companion::read_plan_inputs) fills it, for at most `V` vehicles and
 /// `Z` keep-out zones.
 #[derive(Default)]
@@ -86,7 +86,8 @@ pub struct PlanInputs<const V: usize, const Z: usize> {
     too_many_zones: bool,
     /// Waypoints that were photographed before this flight.
     pub(super) photographed: Vec<WaypointRange, MAX_PHOTOGRAPHED_RANGES>,
-    /// The inputs of each division so far; empty unless a division's plan is requested.
+    /// For each division so far the inputs of all vehicles; empty unless a division's plan is
+    /// requested.
     pub(super) divisions: Vec<DivisionInputs<V>, MAX_DIVISIONS>,
 }
 

@@ -31,8 +31,9 @@ const STARTS: [Point; 2] = [Point::new(0.0, 0.0, 2.0), Point::new(0.0, 8.0, 2.0)
 const GOALS: [Point; 2] = [Point::new(20.0, 0.0, 2.0), Point::new(20.0, 8.0, 2.0)];
 /// A node of the roadmap on the way around what lies between the first start and the first goal.
 const BESIDE: Point = Point::new(10.0, 4.0, 2.0);
-/// Most gates and keep-out zones.
+/// Most gates.
 const G: usize = 16;
+/// Most keep-out zones.
 const Z: usize = 2;
 
 /// Workspaces for 8 nodes, 4 vehicles, 64 timed segments, 64 vertices, 128 lanes, 16 corners.
@@ -167,7 +168,8 @@ fn over_area(ground: Option<UnevenGround>) -> Box<Bench> {
     Box::new(Bench { mission, ..Bench::default() })
 }
 
-/// A detour of vehicle 3 from `here`, 2 m on its leg to `goal`.
+/// A request for a detour of vehicle 3 to `goal`, from a place 2 m from its start on the way to its
+/// own goal.
 fn detour(goal: DetourGoal) -> RequestedPlan {
     RequestedPlan::Detour(DetourRequest {
         land_aside: false,
@@ -181,11 +183,12 @@ fn detour(goal: DetourGoal) -> RequestedPlan {
     })
 }
 
+/// A static keep-out zone: a sphere of 1.5 m about this place.
 fn zone(place: Point) -> KeepOutZone {
     KeepOutZone { from: place, to: place, radius_m: 1.5, kind: ZoneKind::Static }
 }
 
-/// Pictures that vehicle 3 takes.
+/// Number of pictures that this plan takes.
 fn pictures(plan: &VehiclePlan<64, G>) -> u32 {
     match &plan.task {
         Task::Photograph(photographs) => photographs.planned_count(&plan.path),

@@ -13,9 +13,8 @@
 //! is blocked and no longer that it waits. It begins only if all others wait then; a vehicle that
 //! hears a lower system id claim waits again.
 //!
-//! The place of a vehicle that is out of the plan is compared with the whole path before its gates
-//! open, and from then on twice a second, with [`MAX_SEGMENT_CHECKS_PER_STEP`] stretches of the
-//! path a step, so a scan with many vehicles takes several steps.
+//! The place of a vehicle out of the plan is compared with the whole path before its gates open,
+//! and from then on twice a second; with many vehicles such a scan takes several steps.
 //!
 //! In a coverage mission there is no roadmap and no turn: a stopped vehicle flies around the
 //! obstacle and back to its path ([`beside`]), or home ([`homeward`]). ENU metres.
@@ -64,8 +63,8 @@ const MAX_SEARCH_PAUSE_S: u64 = 10;
 /// Time for which a vehicle waits while all others stand, after which it counts as blocked: the
 /// vehicle that it waits for has found no detour.
 const DEAD_END_AFTER: Duration = Duration::from_secs(15);
-/// Number of failed searches, and detours without progress, after which a vehicle seeks no further
-/// detour; one search fewer is enough if they failed in one place over [`EARLY_GIVE_UP_AFTER_S`].
+/// Number of failed searches and detours without progress, together, after which a vehicle seeks no
+/// detour; one fewer is enough if searches failed in one place over [`EARLY_GIVE_UP_AFTER_S`].
 const MAX_FAILED_SEARCHES: u8 = 3;
 /// Time since the first failed search in one place after which one search fewer is enough, s.
 const EARLY_GIVE_UP_AFTER_S: u64 = 50;
@@ -73,17 +72,15 @@ const EARLY_GIVE_UP_AFTER_S: u64 = 50;
 const STUCK_AFTER: Duration = Duration::from_secs(20);
 /// Progress since the last block after which a further block counts as a new one, metres.
 const BLOCKED_AGAIN_M: f32 = 2.0;
-/// Time since the safety filter last stopped the vehicle within which it still counts as stopped;
-/// for a blocked vehicle it is [`STOP_COUNTS_FOR_WHILE_BLOCKED`], so that a neighbour that sways at
-/// the edge of the path does not make the block begin again and again.
+/// Time since the safety filter last stopped the vehicle within which it counts as stopped.
 const STOP_COUNTS_FOR: Duration = Duration::from_millis(500);
-/// Time without a stop by the safety filter after which a blocked vehicle counts as free.
+/// Time since the last stop by the safety filter within which a blocked vehicle counts as stopped:
+/// a neighbour that sways at the edge of the path must not make the block begin again and again.
 const STOP_COUNTS_FOR_WHILE_BLOCKED: Duration = Duration::from_secs(3);
 /// Time after which a vehicle on its pad that hears no other one, or that no other one hears,
 /// reports that it waits.
 const WAITS_UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
-/// Distance from the end of a path aside within which a vehicle that has stopped, and sways, is at
-/// that end, metres.
+/// A stopped vehicle this near to the end of a path aside is at that end, though it sways, metres.
 const ASIDE_END_TOLERANCE_M: f32 = 0.5;
 
 /// What blocks the path ahead, and the detour that is requested or flown.
@@ -111,13 +108,14 @@ pub(crate) struct Detours {
     /// Whether a further search is useless: no other vehicle will move any more, or searches from
     /// this place have failed for [`EARLY_GIVE_UP_AFTER_S`].
     no_retry: bool,
-    /// Number of failed searches from about the same place; that place along the path, metres; and
-    /// the times of the first of them and of the last failed search anywhere.
+    /// Number of failed searches from about the same place.
     failed_searches_here: u8,
+    /// Place along the path of `failed_searches_here`, metres.
     failed_at_m: f32,
     /// Where along the path, metres, the last search for a detour to the goal found none, if no
     /// other vehicle has moved since.
     found_none_at_m: Option<f32>,
+    /// When the first of `failed_searches_here` failed, and the last search for a detour anywhere.
     failed_since: Instant,
     failed_at: Instant,
     /// Number of detours in a row on which the vehicle made no progress.
@@ -126,6 +124,7 @@ pub(crate) struct Detours {
     aside_search_failed_at: Option<Instant>,
     /// Place from before a jump of the position, and the time of the jump; `None` without a jump.
     place_before_jump: Option<(Point, Instant)>,
+    /// Since when all other vehicles have been standing, by `Neighbours::are_all_standing`.
     all_standing_since: Option<Instant>,
     /// Since when this vehicle claims the turn to fly a detour.
     claimed_since: Option<Instant>,
@@ -155,8 +154,7 @@ impl Detours {
         self.obstacles.forget_avoided();
     }
 
-    /// Begins a new flight in a coverage mission: the vehicle no longer counts as having left the
-    /// plan.
+    /// Begins a new flight in a coverage mission: the vehicle counts as on its plan again.
     pub(crate) fn begin_flight(&mut self) {
         self.left_plan = false;
     }
@@ -192,7 +190,7 @@ impl Detours {
         self.blocked || self.home.is_seeking()
     }
 
-    /// Time since the vehicle was first blocked about here, free times in between included; else 0.
+    /// Time since the vehicle was first blocked about here, free times in between included, or 0.
     pub(crate) fn blocked_for(&self, now: Instant) -> Duration {
         self.blocked_here.map_or(Duration::default(), |(_, since)| now - since)
     }
@@ -268,6 +266,7 @@ impl Detours {
         self.is_stopped_by_others(view) && self.claimed_since.is_none()
     }
 
+    /// Whether this vehicle stands, on its pad or in the air, until another one moves.
     fn is_stopped_by_others<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -390,8 +389,9 @@ impl Detours {
         self.claimed_since = self.claimed_since.or(Some(now)).filter(|_| claims);
     }
 
-    /// Whether the safety filter has kept the vehicle from flying on for 20 s although it goes
-    /// first; in a coverage mission also if it yields to a neighbour off the plan.
+    /// Whether the safety filter has kept the vehicle from flying on for 20 s although the vehicle
+    /// goes first; in a coverage mission also if it yields to a neighbour off the plan. `free`:
+    /// time for which a stop counts after its end.
     fn is_stopped_for_long<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,

@@ -11,8 +11,8 @@ use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
 pub(crate) const MAX_OBSTACLES: usize = 16;
 /// Greatest radius of a reported obstacle, metres: a wrong digit must not close a whole building.
 pub(crate) const MAX_OBSTACLE_RADIUS_M: f32 = 20.0;
-/// Centres nearer than this to each other are of the same obstacle, reported or revoked again,
-/// metres.
+/// An obstacle whose centre is nearer than this to that of a known one is the same, reported again
+/// or revoked, metres.
 const SAME_OBSTACLE_M: f32 = 0.1;
 
 /// Reported obstacles; the first `avoided_count` of them are avoided by the detour that is flown.

@@ -50,10 +50,10 @@ impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
     }
 }
 
-/// Position and velocity that this vehicle reports to the others.
+/// Position and velocity that this vehicle reports to the others, ENU metres and m/s.
 pub(crate) struct ReportedPlace {
     pub(crate) position: Point,
     pub(crate) velocity: Point,
-    /// When the position was measured, or last known before a jump.
+    /// When the position was measured; after a jump, when the state `PositionLost` was entered.
     pub(crate) measured_at: Instant,
 }

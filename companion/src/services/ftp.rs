@@ -8,7 +8,7 @@
 //!
 //! Requests may be lost, repeated and overtaken. Requests that may safely be executed twice (read,
 //! list, write of the same bytes at the same offset) are. The others (open, close, remove, reset)
-//! are remembered, and a repetition only gets the same answer (`ftp/memory.rs`). A client that
+//! are remembered, and a repetition only gets the same answer (`ftp/duplicates.rs`). A client that
 //! opens its session again before it wrote keeps that session. A request that cannot be executed
 //! now is not answered: the client repeats it. There is one session at a time, and one request at a
 //! time; others wait in a short queue. A reply that needs the flash is sent when the flash is done.
@@ -49,8 +49,10 @@ const MAX_QUEUED_REQUESTS: usize = 6;
 /// Time without a request after which another client may take over the session.
 const SESSION_IDLE_AFTER: Duration = Duration::from_secs(10);
 
+/// A reply that waits to be sent.
 #[derive(Clone, Copy, Debug)]
 struct Reply {
+    /// Index of the link on which the request came.
     link: usize,
     to: (u8, u8),
     packet: [u8; HEADER_LEN + MAX_DATA],
@@ -63,6 +65,7 @@ enum Access {
     Write,
 }
 
+/// The open session: one file, used by one client.
 #[derive(Clone, Copy, Debug)]
 struct Session {
     id: u8,
@@ -71,6 +74,7 @@ struct Session {
     access: Access,
     /// Whether no byte was written to the file yet.
     nothing_written: bool,
+    /// The request that opened the session.
     opened_by: FtpRequest,
     last_used_at: Instant,
 }
@@ -82,7 +86,9 @@ enum FtpOperation {
     Nothing,
     Read(FtpRequest, bool),
     Crc(FtpRequest, bool),
+    /// Waits until the store has opened an upload.
     Open(FtpRequest),
+    /// Waits until the store has ended the upload.
     Close(FtpRequest),
 }
 
@@ -242,6 +248,8 @@ impl Ftp {
         }
     }
 
+    /// Ends the operation and the session of an upload, answers its request, and keeps a text for
+    /// the operator.
     fn end_upload(&mut self, request: &FtpRequest, result: Result<(), UploadError>) {
         self.operation = FtpOperation::Nothing;
         if let Some(session) = self.session.take() {
@@ -250,6 +258,8 @@ impl Ftp {
         self.reply_and_remember(request, result.map_err(NakError::from));
     }
 
+    /// Answers a request, or begins the operation that answers it; a repetition gets the old
+    /// answer.
     fn begin_request(&mut self, request: &FtpRequest, store: &mut Store, erasing: ErasePermission) {
         if let Some(done) = self.duplicates.previous_outcome(request, self.now) {
             if !opens_session(request) || done.is_err() {
@@ -469,6 +479,7 @@ impl Ftp {
         true
     }
 
+    /// Ends the session without an answer; an unfinished upload is given up.
     fn drop_session(&mut self, store: &mut Store) {
         if self.session.take().is_some_and(|session| session.access == Access::Write) {
             store.abandon_upload();

@@ -16,6 +16,7 @@ use crate::storage::store::MAX_READ_LEN;
 use crate::testing::fake_autopilot::*;
 use crate::testing::fake_flash::{Flash, execute, started};
 
+/// A ground station, and a companion with a flash.
 struct Ground {
     bench: Bench,
     flash: Flash,
@@ -164,7 +165,7 @@ fn a_restart_is_asked_of_the_shell_unless_armed() {
         (reboot(0.0, 1.0, crate::COMPANION_COMPONENT), Some(MavResult::MAV_RESULT_ACCEPTED), 1),
         (reboot(0.0, 1.0, 0), Some(MavResult::MAV_RESULT_ACCEPTED), 1),
         (reboot(2.0, 0.0, crate::COMPANION_COMPONENT), Some(MavResult::MAV_RESULT_DENIED), 0),
-        // This command is for the autopilot.
+        // With `param1` and all components as the target this command is for the autopilot.
         (reboot(1.0, 0.0, 0), None, 0),
     ] {
         let heard = ground.ask(Link::Autopilot, &message);

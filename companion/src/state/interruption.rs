@@ -35,11 +35,13 @@ impl InterruptedStates {
     }
 
     /// Stores the state that a change from `from` to `to` interrupts. `after_search`: the state
-    /// that is resumed after a search under way, the landing if it is for a place to land.
+    /// that is resumed where `from` is a search for a path; it is the landing if the search is for
+    /// a place to land.
     pub(crate) fn record_interruption(&mut self, from: State, to: State, after_search: State) {
         use State::*;
-        // These states cannot be resumed half-way: a search begins again in the state before it, a
-        // disarming in the landing, and so does a start that ended with the motors armed.
+        // These states cannot be resumed half-way. A search for a path begins again from
+        // `after_search`. A disarming, a held landing, and a start that ended with the motors armed
+        // resume as a landing.
         let kept = match from {
             Replanning => after_search,
             Arming | CancelStart | Disarm | LandingHeld => Land,

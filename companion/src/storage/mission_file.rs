@@ -71,6 +71,7 @@ pub enum MissionBlock<'a> {
 }
 
 impl MissionBlock<'_> {
+    /// The goals; none in a coverage mission.
     fn goals(&self) -> &[MissionGoal] {
         match self {
             Self::Goals(goals) => goals,
@@ -189,6 +190,7 @@ fn write_header(
 #[derive(Clone, Copy, Debug)]
 pub struct MissionView<'a> {
     header: MissionHeader,
+    /// The CRC-32 at the end of the file.
     crc: u32,
     vehicles: &'a [[u8; VEHICLE_LEN]],
     goals: &'a [[u8; GOAL_LEN]],
@@ -277,6 +279,8 @@ impl<'a> MissionView<'a> {
         Ok(view)
     }
 
+    /// Checks ids, numbers and goals of the vehicles, and that starts and goals are in the
+    /// geofence.
     fn check_vehicles_and_goals(&self) -> Result<(), MissionError> {
         let labelled = self.header.mode == GoalMode::Labelled;
         let inside = |place: &Point| {

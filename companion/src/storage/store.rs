@@ -48,24 +48,33 @@ pub(crate) type PhotographedRecord = heapless::Vec<u8, MAX_PROGRAM_LEN>;
 #[derive(Clone, Debug)]
 pub struct Store {
     layout: FlashLayout,
+    /// Condition of each slot.
     slots: [AreaCondition; 2],
+    /// Slot whose roadmap or field has been used since this start; `None` if there was none.
     slot_in_use: Option<usize>,
     journal: Journal,
     parameters: Parameters,
     /// Slots sealed with this sequence number or a lower one hold a removed file.
     removed_up_to_sequence: u32,
+    /// Whether the parameters' record is still to be written.
     parameters_unsaved: bool,
     photographed: PhotographedRecord,
+    /// Whether the photographed waypoints' record is still to be written.
     photographed_unsaved: bool,
     reassembly: UploadReassembly,
+    /// The last upload, under way or ended.
     upload: Option<(File, UploadState)>,
+    /// The job under way.
     job: FlashJob,
     /// An erasure interrupted between two sectors, so that a read comes first.
     paused_erasure: FlashJob,
     /// Whether the shell executes a request whose outcome has not come yet.
     request_pending: bool,
+    /// Data of a record, or the next bytes of a file to be programmed.
     buffer: [u8; MAX_PROGRAM_LEN],
+    /// Mark, seal or record head to be programmed.
     program_word: [u8; WORD_LEN],
+    /// Whether an erasure failed: nothing is erased until the next upload of a roadmap or field.
     erasure_failed: bool,
 }
 
@@ -203,6 +212,7 @@ impl Store {
         self.start_read(FlashJob::Crc { at: extent.start, end: extent.end, sum: state })
     }
 
+    /// Starts a job that reads; an erasure pauses for it. False while any other job is under way.
     fn start_read(&mut self, job: FlashJob) -> bool {
         match self.job {
             FlashJob::None => {}
@@ -229,6 +239,7 @@ impl Store {
         (seal.is_height_field == (file == File::Field)).then_some((slot, seal))
     }
 
+    /// Range of a file in the storage bank; `None` if there is no such file.
     fn file_range(&self, file: File) -> Option<Range<u32>> {
         match file {
             File::Roadmap | File::Field => {

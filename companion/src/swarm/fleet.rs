@@ -2,8 +2,8 @@
 //! left among them, agreed on without a leader.
 //!
 //! Each vehicle keeps an entry for every vehicle of the roster. Entries only grow and are merged by
-//! maximum, so lost, repeated and reordered messages do no harm. Where a vehicle is lost or leaves,
-//! each of the others reports once its commitment: the place along its path up to which it still
+//! maximum, so lost, repeated and reordered messages do no harm. When a vehicle is lost or leaves,
+//! each of the others reports its commitment once: the place along its path up to which it still
 //! flies, and where it then holds. From the entries all compute the same division, and report its
 //! hash. Once all that live have reported the same hash and hold, the division is binding, and all
 //! fly on ([`Fleet::step`]). A vehicle photographs only while it has its lease: within [`LEASE`] a
@@ -34,10 +34,11 @@ pub const COMMITMENT_S: f32 = 10.0;
 /// Maximum number of divisions of a mission after its first plan; after the last one the waypoints
 /// that a vehicle leaves stay unphotographed.
 pub const MAX_DIVISIONS: usize = 12;
-/// Silence after which a vehicle may be lost, and get no part in a division: the others wait above
-/// their pads until that is decided.
+/// Silence after which a vehicle may be lost, and may get no part in a division: the others wait
+/// above their pads until it is heard again or counts as lost.
 pub(crate) const MISSED_AFTER: Duration = Duration::from_secs(3);
-/// Silence of a vehicle that was in flight after which it has landed, however it flew on.
+/// Silence after which a vehicle that was in flight has landed, however it flew on: its battery is
+/// empty.
 const LANDED_AFTER_SILENCE: Duration = Duration::from_secs(1800);
 /// Number of distinct incarnations, the counts of a vehicle's flights: 3 bits.
 const INCARNATIONS: u8 = 8;
@@ -60,7 +61,8 @@ pub struct OwnReport {
     pub waits_for_start: bool,
     /// Whether this vehicle is in the air.
     pub airborne: bool,
-    /// Number of divisions from which its path follows: the fields below are along that path.
+    /// Number of binding divisions from which its present path follows; the progress and the
+    /// commitment below are along that path.
     pub path_division_count: usize,
     /// Progress along its path, decimetres.
     pub progress_dm: u16,
@@ -69,8 +71,8 @@ pub struct OwnReport {
     pub new_commitment_dm: Option<u16>,
     /// Whether this vehicle holds at its commitment.
     pub holds: bool,
-    /// Whether this vehicle's path, the first part of its route, ends soon, so that all are to
-    /// divide.
+    /// Whether this vehicle requests a division: its path, only the first part of its route, ends
+    /// soon.
     pub wants_division: bool,
 }
 
@@ -87,20 +89,24 @@ pub struct VehicleReception {
     pub heard_bits: u32,
 }
 
+/// What this vehicle knows of one vehicle of the roster.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 struct FleetVehicle {
+    /// What is known of the vehicle, as roster reports state it.
     entry: RosterReportEntry,
-    /// Whether the member has a part: it was alive when the last division became binding.
+    /// Whether the vehicle has a part of the area: all have one at first, those alive when a
+    /// division becomes binding keep one.
     has_part: bool,
-    /// When the member was last heard, by this vehicle or by one that this vehicle hears.
+    /// When the vehicle was last heard, by this one or by one that this one hears.
     heard_at: Instant,
-    /// Whether this vehicle itself lately heard the member.
+    /// Whether this vehicle itself lately heard that one.
     heard_by_us: bool,
-    /// Hash of the division under way that the member has computed; 0 for none.
+    /// Hash of the division under way that the vehicle has computed; 0 for none.
     pending_hash: u32,
 }
 
 impl FleetVehicle {
+    /// Whether the vehicle has a part, and is neither lost nor has left or finished.
     fn takes_part(&self) -> bool {
         self.has_part && self.entry.status == ShareStatus::Alive
     }
@@ -110,17 +116,23 @@ impl FleetVehicle {
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Fleet<const V: usize> {
     own_rank: u8,
+    /// All vehicles of the roster by rank, this one included.
     members: Vec<FleetVehicle, V>,
     /// Inputs of the binding divisions, oldest first.
     divisions: Vec<DivisionInputs<V>, MAX_DIVISIONS>,
+    /// Hash of the last binding division; 0 before the first.
     committed_hash: u32,
     /// Inputs of the division under way; empty until all of them are known.
     pending_inputs: DivisionInputs<V>,
+    /// Hash of the division under way, as this vehicle computed it; 0 before.
     pending_hash: u32,
-    /// Inputs of the division that this vehicle reported last and withdrew since.
+    /// Inputs of the division whose hash this vehicle reported last and withdrew since.
     withdrawn_inputs: DivisionInputs<V>,
+    /// Hash of that withdrawn division; 0 for none.
     withdrawn_hash: u32,
+    /// When a majority last reported that they hear this vehicle.
     lease_renewed_at: Instant,
+    /// Whether the others count this vehicle as lost, or have divided its part.
     excluded: bool,
     /// 8 bits of the CRC of the plan that this flight began with; 0 while there is none.
     plan_crc8: u8,
@@ -137,7 +149,7 @@ pub struct Fleet<const V: usize> {
     airborne: bool,
     /// When the last of the vehicles that may be lost is down; 0 if there is none.
     down_at: Instant,
-    /// Whether one that takes part was not heard for [`MISSED_AFTER`], or hears no majority.
+    /// Whether a vehicle that takes part was not heard for [`MISSED_AFTER`], or hears no majority.
     any_missing: bool,
     limits: FleetTimeouts,
 }
@@ -170,8 +182,8 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// Begins a flight, or a new plan: all silence before, and what was flown of the plan before,
-    /// is forgotten. A vehicle that was lost, has left or flew a division takes part again under a
-    /// new incarnation number.
+    /// is forgotten. A vehicle that was lost, excluded, has left, finished or flew a division takes
+    /// part again under a new incarnation number.
     pub fn begin_flight(&mut self, now: Instant) {
         let entry = self.members[usize::from(self.own_rank)].entry;
         if entry.status != ShareStatus::Alive || self.excluded || !self.divisions.is_empty() {
@@ -262,13 +274,12 @@ impl<const V: usize> Fleet<V> {
                 let down_at = member.heard_at + self.limits.down_after;
                 self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
             }
-            // A vehicle that hears no majority is to land, and leaves its part, as its lease ends.
+            // A vehicle that hears no majority is to land, and leaves its part when its lease ends.
             let cut_off = lately && !Self::is_majority_of(heard.heard_bits | bit, counted);
             self.any_missing |= (silence >= MISSED_AFTER || cut_off) && member.takes_part();
             if silence >= self.limits.lost_after {
                 self.hears_flight_bits &= !bit;
-                // A majority has counted the vehicle as lost, so it has landed; or its battery is
-                // empty.
+                // The vehicle counts as lost and has landed by now; or its battery is empty.
                 let lost = member.entry.status == ShareStatus::Lost;
                 if (lost && silence >= self.limits.down_after) || silence >= LANDED_AFTER_SILENCE {
                     self.in_flight_bits &= !bit;
@@ -284,7 +295,7 @@ impl<const V: usize> Fleet<V> {
             self.forget_earlier_flight(now);
         }
         self.rejoin_if_ready(now, own.status);
-        // One that has left may have been deaf meanwhile: whom it does not hear others may hear.
+        // A vehicle that has left may be deaf: the others may hear those that it does not.
         if self.has_lease(now) && self.vehicle_takes_part(usize::from(self.own_rank)) {
             self.count_silent_as_lost(now);
         }
@@ -347,8 +358,9 @@ impl<const V: usize> Fleet<V> {
         self.members[rank].takes_part()
     }
 
-    /// Computes the inputs of the division, once all vehicles that live have reported commitments,
-    /// and this vehicle has not heard the lost ones for [`SILENT_AFTER`] either.
+    /// Computes the inputs of the division under way, once all vehicles that live have reported
+    /// commitments, and this vehicle has not heard the lost ones for [`SILENT_AFTER`] either;
+    /// without its lease this vehicle computes none.
     fn prepare_division_inputs(&mut self, now: Instant) {
         let known = |m: &FleetVehicle| match m.entry.status {
             ShareStatus::Alive => m.entry.commitment_dm.is_some(),
@@ -411,6 +423,8 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
+    /// Whether the division under way is to become binding: all that take part have reported the
+    /// hash that this vehicle computed, and hold; they are a majority; the lost ones are down.
     fn is_division_agreed(&self, now: Instant) -> bool {
         let agrees = |rank: usize| {
             let member = &self.members[rank];
@@ -425,7 +439,8 @@ impl<const V: usize> Fleet<V> {
             && self.is_majority(|rank, _| self.vehicle_takes_part(rank))
     }
 
-    /// Makes the division under way binding: vehicles without a part in it leave the fleet.
+    /// Makes the division under way binding: vehicles that were not alive in it have no part any
+    /// more.
     fn commit_division(&mut self) {
         let inputs = core::mem::take(&mut self.pending_inputs);
         self.committed_hash = self.pending_hash;
@@ -466,7 +481,8 @@ impl<const V: usize> Fleet<V> {
         self.members[usize::from(self.own_rank)].entry.commitment_dm.filter(|_| self.may_divide())
     }
 
-    /// Where this vehicle held for the last binding division, decimetres along its path before it.
+    /// Where this vehicle held for the last binding division, decimetres along the path that it
+    /// flew before that division; 0 before the first.
     pub fn held_at_dm(&self) -> u16 {
         let inputs = self.divisions.last().and_then(|all| all.get(usize::from(self.own_rank)));
         inputs.map_or(0, |input| input.along_dm)

@@ -11,8 +11,9 @@ use planner_core::detour::KeepOutZone;
 /// Progress of a scan over the keep-out zones of several sources.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct IncrementalScan {
-    /// The source whose zones are tested now, and the number of sources.
+    /// Index of the source whose zones are tested now.
     source: u16,
+    /// Number of sources at the last call.
     source_count: u16,
     /// Number of sources of which all zones were tested.
     sources_checked: u16,
@@ -21,16 +22,16 @@ pub struct IncrementalScan {
 }
 
 impl IncrementalScan {
-    /// Continues the scan. `visit` calls back with each zone of a source; a zone costs `each` of
-    /// `budget`, a source 1. Returns `Some(true)` at the first zone for which `meets_condition`
-    /// holds, `Some(false)` when it holds for no zone of all `sources`; the next call begins a new
-    /// scan. Returns `None` when the budget, of at least `each`, is spent. The scan restarts where
-    /// the number of sources changes.
+    /// Continues the scan. `visit` calls back with each zone of the source of an index; a zone
+    /// costs `zone_cost` of `budget`, a source 1. Returns `Some(true)` at the first zone for which
+    /// `meets_condition` holds, `Some(false)` when it holds for no zone of all `sources`; after
+    /// either the next call begins a new scan. Returns `None` when less than `zone_cost` of the
+    /// budget is left for the next zone. The scan restarts when the number of sources changes.
     pub fn continue_scan(
         &mut self,
         sources: usize,
         budget: &mut u16,
-        each: u16,
+        zone_cost: u16,
         visit: impl Fn(usize, &mut dyn FnMut(KeepOutZone)),
         meets_condition: impl Fn(&KeepOutZone) -> bool,
     ) -> Option<bool> {
@@ -40,13 +41,13 @@ impl IncrementalScan {
             self.restart();
         }
         while self.sources_checked < sources {
-            let (mut visited, mut things, mut found) = (0, self.zones_checked, false);
+            let (mut visited, mut tested, mut found) = (0, self.zones_checked, false);
             self.source %= sources;
-            visit(usize::from(self.source), &mut |keep_off| {
-                if visited == things && !found && *budget >= each {
-                    *budget -= each;
-                    things += 1;
-                    found = meets_condition(&keep_off);
+            visit(usize::from(self.source), &mut |zone| {
+                if visited == tested && !found && *budget >= zone_cost {
+                    *budget -= zone_cost;
+                    tested += 1;
+                    found = meets_condition(&zone);
                 }
                 visited += 1;
             });
@@ -54,8 +55,8 @@ impl IncrementalScan {
                 self.restart();
                 return Some(true);
             }
-            if things < visited {
-                self.zones_checked = things;
+            if tested < visited {
+                self.zones_checked = tested;
                 return None;
             }
             *budget = budget.saturating_sub(1);

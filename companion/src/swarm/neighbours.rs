@@ -1,5 +1,5 @@
-//! The neighbours as last heard on the swarm link, one entry for each system id, in the mission
-//! frame.
+//! The neighbours as last heard on the swarm link, one entry for each system id. Places are
+//! in the mission frame. A vehicle is *unheard* while no other vehicle hears it.
 //!
 //! Data flow from received bytes to the speed scale: GLOBAL_POSITION_INT →
 //! [`Neighbours::handle_position`] → ENU in [`Neighbour::position`]; TUNNEL →
@@ -43,10 +43,13 @@ use crate::time::{Duration, Instant};
 /// kept, in entries that the roster leaves free, until they are silent for a minute.
 #[derive(Clone, Debug)]
 pub struct Neighbours<const V: usize> {
+    /// The roster's other vehicles, sorted by id; behind them the strangers.
     entries: Vec<NeighbourEntry, V>,
+    /// Result of the last call of [`Self::states_with_age`].
     states: Vec<Neighbour, V>,
-    /// Number of roster vehicles in `entries`, sorted by id; behind them are the strangers.
+    /// Number of roster vehicles in `entries`.
     roster_count: usize,
+    /// Number of positions dropped because the table had no room for their sender.
     dropped_positions: u16,
     /// When a vehicle of the roster last reported that it hears this one.
     reported_heard_at: Option<Instant>,
@@ -54,7 +57,7 @@ pub struct Neighbours<const V: usize> {
     path_clear_at: Instant,
     /// Greatest speed at which a reported progress is believed to grow, m/s.
     max_progress_mps: f32,
-    /// Least speed at which an unheard vehicle is assumed to make progress, m/s.
+    /// Least speed at which a vehicle that none hears is assumed to make progress, m/s.
     min_unheard_progress_mps: f32,
     /// Distance from which on the radio may not reach, metres; ∞ where it reaches every vehicle.
     range_edge_m: f32,
@@ -66,7 +69,8 @@ pub struct Neighbours<const V: usize> {
     next_relayed_rank: u16,
     /// Rank of this vehicle in the roster.
     own_rank: u16,
-    /// The fleet, by which vehicles of a coverage mission agree; `None` in other missions.
+    /// State by which the vehicles of a coverage mission agree how to divide what a vehicle leaves;
+    /// `None` in other missions.
     fleet: Option<Fleet<V>>,
     /// Heights of the ground of an area that is not level.
     ground: Option<UnevenGround>,
@@ -82,7 +86,8 @@ pub struct Neighbours<const V: usize> {
 impl<const V: usize> Neighbours<V> {
     /// A table of the vehicles of `roster`, which is sorted by id, without this one; none of them
     /// was heard yet. Their progress is believed to grow no faster than `fastest_vehicle_mps` or
-    /// the speed of a landing, and, while unheard, no slower than a share of `slowest_vehicle_mps`.
+    /// the speed of a landing, whichever is greater, and, while none hears them, no slower than a
+    /// share of `slowest_vehicle_mps`.
     /// Both are speeds of the whole mission, so that all vehicles judge a report alike.
     pub fn new(
         roster: &[RosterEntry],
@@ -127,6 +132,7 @@ impl<const V: usize> Neighbours<V> {
         self.dropped_positions
     }
 
+    /// Adds the entry of a vehicle not heard yet. Returns its index; `None` if the table is full.
     fn add_entry(&mut self, id: u8, rank: u16) -> Option<usize> {
         let entry = NeighbourEntry::unheard(
             id,
@@ -138,7 +144,8 @@ impl<const V: usize> Neighbours<V> {
         Some(self.entries.len() - 1)
     }
 
-    /// Index of a vehicle of the roster that has lately sent an intent of our mission.
+    /// Index into `entries` of the roster's vehicle `id`, if an intent of our mission was heard
+    /// from it within [`MEMBERSHIP_LIFETIME`].
     fn active_roster_index(&self, id: u8, now: Instant) -> Option<usize> {
         let at = self.roster_index(id)?;
         self.entries[at]
@@ -147,13 +154,15 @@ impl<const V: usize> Neighbours<V> {
             .then_some(at)
     }
 
+    /// Index into `entries` of another vehicle of the roster; `None` for any other id.
     fn roster_index(&self, id: u8) -> Option<usize> {
         self.entries[..self.roster_count].binary_search_by_key(&id, |c| c.id).ok()
     }
 
     /// Handles a neighbour's intent with the sequence number of its frame: only one newer than the
     /// last counts. To be called only for an intent of our mission: a message that anybody can send
-    /// must not make the next genuine one look late. Positions are ordered by their time instead.
+    /// must not make the next genuine one look late. Positions are ordered by `time_boot_ms`
+    /// instead.
     pub fn handle_numbered_intent(
         &mut self,
         now: Instant,
@@ -208,7 +217,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Handles a neighbour's intent. It counts only from a vehicle of the roster with our mission's
-    /// CRC, its progress only with our plan's CRC. `rank` is this vehicle's.
+    /// CRC, its progress only if it follows the plan of our plan's CRC. `rank` is this vehicle's.
     pub fn handle_intent(
         &mut self,
         now: Instant,
@@ -222,7 +231,7 @@ impl<const V: usize> Neighbours<V> {
         else {
             return;
         };
-        // A vehicle of the roster is no stranger.
+        // Before its first intent the vehicle may have been taken for a stranger.
         self.retain_strangers(|c| c.id != intent.system_id);
         let entry = &mut self.entries[at];
         entry.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
@@ -274,8 +283,8 @@ impl<const V: usize> Neighbours<V> {
         self.entries.is_empty()
     }
 
-    /// Forgets what holds only for an older plan: the scan's result, avoided places, relayed
-    /// progress and open gates.
+    /// Forgets what holds only for an older plan: when a scan found the path clear, avoided places,
+    /// relayed progress, the bound of believed progress, and open gates.
     pub fn forget_plan(&mut self) {
         self.path_clear_at = Instant::ZERO;
         for entry in &mut self.entries {

@@ -46,14 +46,20 @@ pub struct Bench {
     pub took_off: bool,
     /// ArduCopter: time from NAV_TAKEOFF to the lift-off, while the motors spin up.
     pub spool: Duration,
+    /// ArduCopter: when the vehicle lifts off after NAV_TAKEOFF.
     lifts_at: Instant,
+    /// TIMESYNC answers of the companion on the autopilot's link: `tc1` and `ts1`.
     pub timesyncs: Vec<(i64, i64)>,
     pub companion: BenchCompanion,
     pub now: Instant,
+    /// True position of the vehicle in the mission frame, ENU metres.
     pub enu: Point,
+    /// The autopilot's `custom_mode`.
     pub mode: u32,
     pub armed: bool,
+    /// From 5 on HEARTBEAT reports `MAV_STATE_CRITICAL`, below 5 `MAV_STATE_ACTIVE`.
     pub status: u8,
+    /// Battery charge, percent.
     pub battery: i8,
     /// Commands that the autopilot refuses: `MAV_CMD` numbers.
     pub refused: Vec<u16>,
@@ -67,16 +73,19 @@ pub struct Bench {
     pub height_error_m: f32,
     /// Vertical speed that the autopilot reports, m/s upwards.
     pub climbs_mps: f32,
+    /// Whether the autopilot sends nothing and obeys no command.
     pub silent: bool,
     /// Whether HEARTBEAT alone is lost.
     pub no_heartbeat: bool,
     /// Whether EXTENDED_SYS_STATE alone is lost.
     pub no_landed_state: bool,
+    /// Whether LOCAL_POSITION_NED alone is lost.
     pub no_position: bool,
     /// Horizontal accuracy that ESTIMATOR_STATUS reports, metres; `None`: the message is not sent.
     pub accuracy_m: Option<f32>,
     /// ArduCopter: `pos_horiz_variance` that EKF_STATUS_REPORT reports.
     pub pos_horiz_variance: f32,
+    /// Whether the autopilot does not disarm by itself.
     pub stays_armed: bool,
     /// Whether the autopilot accepts arming, but its pilot disarms before a HEARTBEAT shows the
     /// armed bit.
@@ -87,25 +96,35 @@ pub struct Bench {
     pub undividable: bool,
     /// Distance that the vehicle moves in one tick of 50 ms, metres.
     pub step_m: f32,
+    /// Whether the vehicle does not come down in the landing mode.
     pub never_lands: bool,
     pub events: Vec<Event>,
+    /// Setpoints received: when, place in the true mission frame (ENU metres), `type_mask`.
     pub setpoints: Vec<(Instant, Point, u16)>,
     /// Heading in each setpoint received, radians from east, counter-clockwise; `None` if its mask
     /// ignores the heading.
     pub headings: Vec<Option<f32>>,
+    /// Commands to the autopilot: `MAV_CMD`, parameters 1 to 3.
     pub commands: Vec<(u16, f32, f32, f32)>,
     pub texts: Vec<std::string::String>,
+    /// Frames sent to the radio.
     pub swarm: Vec<Frame>,
+    /// COMMAND_ACKs of the companion: command, result, target system and component.
     pub acks: Vec<(u16, u8, u8, u8)>,
     /// ArduCopter: height above home that NAV_TAKEOFF requested, metres.
     pub takeoff_m: f32,
+    /// Where the vehicle flies to in the setpoint mode, true ENU metres.
     target: Option<Point>,
     framers: [Framer; 2],
     sequence: u8,
     gcs_sequence: u8,
+    /// When the vehicle touched down in the landing mode.
     landed_at: Option<Instant>,
+    /// Since when the vehicle has stood armed on the ground without a take-off.
     idle_since: Option<Instant>,
+    /// The autopilot's EKF origin.
     pub origin: Geodetic,
+    /// Answer of the shell to a request for the mission's plan; `None`: no answer.
     pub answer_plan: Option<Result<Plan, crate::PlanFailure>>,
     /// Answer of the shell to a request for a detour: with `Ok` a fixed path by y = 16 m, or a
     /// planned one if the detour leads home; `None`: no answer.
@@ -130,7 +149,7 @@ pub struct Bench {
     /// Ranks of the vehicles that the neighbour reports to hear, as bits.
     pub neighbour_hears: u32,
     /// How many intents of this vehicle are newer than the one that the neighbour echoes; `None`:
-    /// it echoes none.
+    /// the neighbour echoes none.
     pub neighbour_echoes: Option<usize>,
     /// How long ago the neighbour received the intent that it echoes, in units of 10 ms.
     pub neighbour_held: u8,
@@ -209,6 +228,7 @@ impl Bench {
         self.companion.state()
     }
 
+    /// Estimated position in NED metres about the autopilot's EKF origin.
     pub fn ned(&self) -> Vector3<f64> {
         let place = frames::enu_to_geodetic(&ORIGIN, &(self.enu + self.height_error()));
         frames::geodetic_to_ned(self.kind.projection(), &self.origin, &place)

@@ -38,11 +38,13 @@ pub struct PowerLoss;
 
 pub struct Flash {
     pub bytes: Vec<u8>,
+    /// Indices of the words that are unreadable.
     pub torn: HashSet<u32>,
     pub rng: Pcg32,
-    /// Number of words that can still be programmed or erased before the power is lost; `None` for
-    /// any number.
+    /// Number of words programmed and sectors erased until the power is lost; `None`: it is not
+    /// lost.
     pub power: Option<u32>,
+    /// Number of words programmed and sectors erased so far.
     pub programmed: u32,
 }
 
@@ -55,7 +57,8 @@ impl Flash {
         Self { bytes, torn, rng, power: None, programmed: 0 }
     }
 
-    /// Counts a word that is programmed or erased. Returns whether the power is lost at it.
+    /// Counts a word that is programmed, or a sector that is erased. Returns whether the power is
+    /// lost then.
     pub fn loses_power(&mut self) -> bool {
         self.programmed += 1;
         match &mut self.power {

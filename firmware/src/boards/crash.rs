@@ -13,6 +13,7 @@ use super::{chosen, stack};
 use crate::chips::{ResetCause, fault};
 use crate::crash_record::{CrashRecord, FileWork, MAX_TEXT_LEN, RECORD_WORDS};
 
+/// The crash record's words; after power-on they hold any values.
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<[u32; RECORD_WORDS]> = MaybeUninit::uninit();
 

@@ -4,7 +4,9 @@
 use cortex_m::interrupt::InterruptNumber;
 use embassy_executor::{InterruptExecutor, SendSpawner};
 
+/// Executor of links and setpoints.
 static LINKS: InterruptExecutor = InterruptExecutor::new();
+/// Executor of plans and flash.
 static PLANS: InterruptExecutor = InterruptExecutor::new();
 
 /// Starts the executor of links and setpoints in the interrupt `irq`, which no device uses and

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | GP0 / GP1 | UART0 TX / RX, the autopilot's TELEM2, 921 600 baud |
 //! | GP4 / GP5 | UART1 TX / RX, the swarm's radio, 460 800 baud |
-//! | GP25 | the light |
+//! | GP25 | the LED, which toggles each time the watchdog is fed |
 //!
 //! Code runs from the flash that also holds the files, so it stops while that flash erases or
 //! programs: no setpoint is sent, and received bytes may be lost. So the flash is changed only
@@ -43,6 +43,7 @@ const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
 /// Bytes of a UART's ring buffer: 22 ms at the autopilot's baud rate.
 const UART_RING_LEN: usize = 2048;
+/// Ring buffers of a UART: of bytes to send, of received bytes.
 type Rings = [[u8; UART_RING_LEN]; 2];
 static AUTOPILOT_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING_LEN]; 2]);
 static RADIO_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING_LEN]; 2]);
@@ -88,7 +89,7 @@ pub fn reset_cause() -> ResetCause {
 /// Does nothing: this board's `memory.x` places no static outside `.bss` but the crash record.
 ///
 /// # Safety
-/// None; `unsafe` because it is on boards whose statics it zeroes.
+/// None; `unsafe` as the function of this name on boards where it zeroes statics.
 pub unsafe fn zero_sections() {}
 
 /// Restarts the board at once, by triggering the watchdog.

@@ -6,6 +6,7 @@
 use core::ptr::addr_of_mut;
 
 unsafe extern "C" {
+    // Start and end of each section, by the linker script.
     static mut __s_shell: u32;
     static mut __e_shell: u32;
     static mut __s_swarm_plan: u32;

@@ -7,9 +7,11 @@ use core::ptr::addr_of;
 
 use super::limits::GUARD_LEN;
 
+/// Word with which cortex-m-rt fills the stack.
 const PAINT: u32 = 0xcccc_cccc;
 
 unsafe extern "C" {
+    // The linker's addresses: the stack grows from `_stack_start` down to `_stack_end`.
     static _stack_start: u32;
     static _stack_end: u32;
 }

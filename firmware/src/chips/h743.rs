@@ -75,6 +75,7 @@ pub const RMVF: u32 = 1 << 16;
 /// resets but a wake-up set the pin's flag too, and power-on sets the brown-out flag: so the flags
 /// are tested in this order.
 pub const fn reset_cause(rsr: u32) -> ResetCause {
+    // Brown-out, reset pin, power-on.
     const BOR: u32 = 1 << 21;
     const PIN: u32 = 1 << 22;
     const POR: u32 = 1 << 23;

@@ -18,12 +18,14 @@ pub const RX_QUARTER: u8 = 0b001;
 /// Reset cause by POWMAN_CHIP_RESET and WATCHDOG_REASON (data sheet, "Chip level resets" and
 /// "Watchdog", registers).
 pub const fn reset_cause(chip_reset: u32, watchdog_reason: u32) -> ResetCause {
+    // Bits of CHIP_RESET.
     const POWER: u32 = 1 << 16;
     const BROWN_OUT: u32 = 1 << 17;
     const RUN_PIN: u32 = 1 << 18;
     const GLITCH: u32 = 1 << 26;
     /// Three reset sources of a debugger: its request, its rescue reset, its hazard reset.
     const DEBUGGER: u32 = 1 << 19 | 1 << 21 | 1 << 27;
+    // Bits of WATCHDOG_REASON: not fed in time; triggered by the program.
     const TIMED_OUT: u32 = 1 << 0;
     const FORCED: u32 = 1 << 1;
     // CHIP_RESET holds the cause of the last reset of the whole chip; a watchdog reset may have

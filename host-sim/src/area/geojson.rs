@@ -21,6 +21,7 @@ pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     Ok(polygons)
 }
 
+/// Adds the polygons of a geometry and of all geometries in it.
 fn add(geometry: &Geometry, polygons: &mut Polygons) -> Result<(), AreaFileError> {
     match &geometry.value {
         GeometryValue::Polygon { coordinates } => polygons.add(rings(coordinates)?),
@@ -37,6 +38,7 @@ fn add(geometry: &Geometry, polygons: &mut Polygons) -> Result<(), AreaFileError
     Ok(())
 }
 
+/// The outer ring of a polygon, then its holes.
 fn rings(polygon: &geojson::PolygonType) -> Result<Vec<RingXy>, AreaFileError> {
     let place = |position: &geojson::Position| match position.as_slice() {
         [x, y, ..] => Ok([*x, *y]),

@@ -25,6 +25,7 @@ pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     Ok(polygons)
 }
 
+/// Adds the polygons of an element and of all elements in it.
 fn add(element: &Kml<f64>, polygons: &mut Polygons) {
     match element {
         Kml::KmlDocument(document) => document.elements.iter().for_each(|e| add(e, polygons)),
@@ -39,6 +40,7 @@ fn add(element: &Kml<f64>, polygons: &mut Polygons) {
     }
 }
 
+/// Adds the polygons of a geometry and of all geometries in it.
 fn add_geometry(geometry: &Geometry<f64>, polygons: &mut Polygons) {
     match geometry {
         Geometry::Polygon(polygon) => polygons.add(rings(polygon)),
@@ -49,6 +51,7 @@ fn add_geometry(geometry: &Geometry<f64>, polygons: &mut Polygons) {
     }
 }
 
+/// The outer ring of a polygon, then its holes.
 fn rings(polygon: &Polygon<f64>) -> Vec<RingXy> {
     let ring = |ring: &LinearRing<f64>| ring.coords.iter().map(|c| [c.x, c.y]).collect();
     std::iter::once(&polygon.outer).chain(&polygon.inner).map(ring).collect()

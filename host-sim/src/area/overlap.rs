@@ -1,6 +1,6 @@
 //! Finds rings that overlap although their edges do not cross: one inside another, the same ring
 //! twice, or two whose edges lie on each other. A point inside an odd number of rings is
-//! photographed (even-odd rule), so two holes over each other would be photographed.
+//! photographed (even-odd rule), so ground that lies in two holes at once would be photographed.
 //!
 //! Each edge is split where the other ring meets it. The midpoint of each part lies inside the
 //! other ring, outside it or on its border. Computed in f64, metres. Cost: n · m for two rings of n
@@ -64,7 +64,7 @@ fn first_overlapping_pair(rings: &[RingF64]) -> Option<(usize, usize)> {
     })
 }
 
-/// A ring in f64, and the corners of its bounding box.
+/// A ring in f64, and the least (`low`) and greatest (`high`) corner of its bounding box.
 struct RingF64 {
     ring: Vec<[f64; 2]>,
     low: [f64; 2],
@@ -114,7 +114,8 @@ impl RingF64 {
         self.edges().map(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1])).sum()
     }
 
-    /// Where the edges of this ring lie relative to `other`; parts on its border count as neither.
+    /// Where the edges of this ring lie relative to `other`; parts on the border of `other` count
+    /// as neither inside nor outside.
     fn relation_to(&self, other: &Self) -> RingRelation {
         let mut sides = RingRelation::default();
         for (a, b) in self.edges() {
@@ -161,6 +162,7 @@ impl RingF64 {
         shares
     }
 
+    /// Whether a point lies on this ring's border, within [`BORDER_TOLERANCE_M`].
     fn has_on_border(&self, place: [f64; 2]) -> bool {
         self.edges().any(|(a, b)| {
             let (along, to) = ([b[0] - a[0], b[1] - a[1]], [place[0] - a[0], place[1] - a[1]]);

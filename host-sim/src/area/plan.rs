@@ -33,6 +33,7 @@ struct PlanMission {
 #[serde(rename_all = "camelCase")]
 struct PlanItem {
     complex_item_type: Option<String>,
+    /// Latitude and longitude of each vertex, degrees.
     polygon: Option<Vec<[f64; 2]>>,
 }
 
@@ -46,7 +47,9 @@ struct PlanGeofence {
 
 #[derive(Deserialize)]
 struct FencePolygon {
+    /// Whether vehicles have to stay inside; else they have to stay outside.
     inclusion: bool,
+    /// Latitude and longitude of each vertex, degrees.
     polygon: Vec<[f64; 2]>,
 }
 
@@ -58,7 +61,9 @@ struct FenceCircle {
 
 #[derive(Deserialize)]
 struct Circle {
+    /// Latitude and longitude, degrees.
     center: [f64; 2],
+    /// Metres.
     radius: f64,
 }
 
@@ -96,12 +101,13 @@ pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     Ok(polygons)
 }
 
+/// A ring of latitudes and longitudes as one of longitudes and latitudes.
 fn longitude_first(ring: &[[f64; 2]]) -> RingXy {
     ring.iter().map(|&[lat, lon]| [lon, lat]).collect()
 }
 
-/// The polygon of a circular fence: inscribed in an inclusion fence, circumscribed about an
-/// exclusion fence, so that the polygon is never less strict than the circle.
+/// The polygon of a circular fence: inscribed in the circle of an inclusion fence, circumscribed
+/// about that of an exclusion fence, so that the polygon is never less strict than the circle.
 fn circle_polygon(fence: &FenceCircle) -> RingXy {
     let circle = &fence.circle;
     let [lat, lon] = circle.center;

@@ -31,6 +31,7 @@ pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     Ok(polygons)
 }
 
+/// Adds the polygons of a geometry and of all geometries in it.
 fn add(geometry: &Wkt<f64>, polygons: &mut Polygons) {
     match geometry {
         Wkt::Polygon(polygon) => polygons.add(rings(polygon)),
@@ -44,6 +45,7 @@ fn add(geometry: &Wkt<f64>, polygons: &mut Polygons) {
     }
 }
 
+/// The outer ring of a polygon, then its holes.
 fn rings(polygon: &Polygon<f64>) -> Vec<RingXy> {
     let ring = |line: &LineString<f64>| line.coords().iter().map(|c| [c.x, c.y]).collect();
     polygon.rings().iter().map(ring).collect()

@@ -14,15 +14,18 @@ pub const FLASH_BANK2_ADDRESS: u32 = 0x6000_0000;
 /// Address of the word marks, one byte for each flash word: [`ERASED`], [`PROGRAMMED`], or [`TORN`]
 /// while the word is being programmed or erased.
 pub const WORD_MARKS_ADDRESS: u32 = 0x6020_0000;
+/// Mark of a flash word that is erased.
 pub const ERASED: u8 = 0;
+/// Mark of a flash word that is programmed.
 pub const PROGRAMMED: u8 = 1;
+/// Mark of a flash word whose programming or erasure has begun and not ended.
 pub const TORN: u8 = 2;
 /// Address and value of a word in memory by which the board's firmware knows that the bank holds an
 /// image.
 pub const BANK_IMAGE_MARK: (u32, u32) = (0x6030_0000, 0x464c_4153);
 
-/// Image of a flash bank after the store accepted an upload of these files into an empty bank. The
-/// other slot of each file is erased.
+/// Image of a flash bank after the store accepted an upload of these files into an empty bank;
+/// `roadmap` may also be a field file. Each file has two slots, of which the other is erased.
 ///
 /// # Errors
 /// The store refuses a file.

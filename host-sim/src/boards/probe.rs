@@ -68,8 +68,8 @@ impl EmulatedBoard {
         self.wait_for_grant_end_within(timeout)
     }
 
-    /// Writes the image `bank` into the board's flash bank, with the mark of each word: erased or
-    /// programmed.
+    /// Writes the image `bank` into the board's flash bank, marks each word as erased or
+    /// programmed, and sets the mark by which the firmware knows that the bank holds an image.
     ///
     /// # Errors
     /// The QEMU process has ended, or the image has not the length of a bank.

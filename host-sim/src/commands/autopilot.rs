@@ -1,9 +1,9 @@
 //! `host-sim autopilot`: one simulated autopilot in real time, over flat ground at its home's
 //! altitude.
 //!
-//! The simulation makes each step of 4 ms once the clock has passed it, and sleeps until then. If
-//! the machine falls more than a second behind, simulated time lags behind the clock: the missed
-//! steps are not made up.
+//! The simulation makes one step of 4 ms every 4 ms of the clock, and sleeps in between. If it
+//! falls more than a second behind, it skips the missed steps: simulated time then stays behind
+//! the clock.
 
 use std::process::ExitCode;
 use std::str::FromStr;
@@ -25,7 +25,7 @@ const PHYSICS_STEP: Duration = Duration::from_millis(4);
 /// Greatest time by which the simulation may be behind the wall clock and still catches up. If it
 /// is further behind, it skips the missed steps.
 const MAX_PHYSICS_LAG: Duration = Duration::from_secs(1);
-/// Longest datagram that is sent, bytes: fits the MTU of any network.
+/// Longest datagram that is sent, bytes: fits Ethernet's MTU of 1500.
 const MAX_DATAGRAM: usize = 1400;
 
 /// Arguments of `host-sim autopilot`.

@@ -56,7 +56,8 @@ const REPORT_END_FOR: Duration = Duration::from_secs(2);
 /// Silence of the autopilot after which this command no longer waits for the vehicle's landing.
 const MAX_AUTOPILOT_SILENCE: companion::Duration = companion::Duration::from_secs(5);
 
-/// Runs the companion until its mission ends. Exit code 0 if the mission was flown to its end.
+/// Runs the companion until its mission ends. Exit code 0 if the mission was flown to its end, and
+/// the plan did not leave this vehicle without a goal although a goal is unserved.
 ///
 /// # Errors
 /// Bad input, or a link that fails permanently; the error names it.

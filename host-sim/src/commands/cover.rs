@@ -75,7 +75,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// Names of the files that are written in addition to [`output::RESULT_FILES`].
+/// Names of the files that are written in addition to [`output::RESULT_FILES`] if each vehicle
+/// flies one sortie.
 fn extra_file_names(scenario: &Scenario) -> Vec<String> {
     let own = |id: u8| [format!("vehicle-{id}.plan"), format!("vehicle-{id}.waypoints")];
     let shared = ["waypoints.csv", "area.geojson"].map(str::to_owned);
@@ -111,8 +112,8 @@ fn add_flight_files(
     Ok(written)
 }
 
-/// Removes plan files in the directory that an earlier run wrote and this one did not, so that none
-/// of them is uploaded together with the new ones.
+/// Removes the files in the directory that have the name of a plan file and are not among
+/// `written`, so that no plan of an earlier run is uploaded together with the new ones.
 fn remove_stale_plan_files(dir: &Path, written: &[String]) -> anyhow::Result<()> {
     let number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let is_plan = |name: &str| {
@@ -223,7 +224,7 @@ fn print_origin(planned: &CoveragePlan<'_>) {
 }
 
 /// Prints the longest flight of the vehicles without `endurance_s`, for which nothing can check
-/// whether a battery lasts.
+/// whether a battery lasts; prints nothing if batteries may be swapped.
 fn print_unchecked_batteries(planned: &CoveragePlan<'_>) {
     let unknown = planned.sorties.iter().filter(|sortie| {
         planned.scenario.vehicles[usize::from(sortie.route.vehicle_index)]

@@ -28,7 +28,7 @@ use crate::swarm::{self, Pace, SwarmFlight};
 /// The demo's scenario, compiled into the program so that no file is needed.
 const DEMO_SCENARIO: &str = include_str!("../../scenarios/demo.toml");
 
-/// The board that QEMU emulates.
+/// Name of the board that QEMU emulates.
 const EMULATED_BOARD: &str = "qemu";
 
 /// Arguments of `host-sim fly`.
@@ -75,7 +75,7 @@ pub struct FlyArgs {
     boards: Option<usize>,
 }
 
-/// How a running flight is shown: paced by the clock, and to which ground station.
+/// How a running flight is shown: at what pace, and to which ground station.
 #[derive(Default)]
 struct FlightDisplay<'a> {
     pace: Pace,
@@ -108,8 +108,8 @@ pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
     plan_fly_and_report(scenario, "fly", &args.out, &shown, args.flash.as_deref())
 }
 
-/// Makes the scenario's first vehicles use companions elsewhere: the n-th vehicle uses the n-th
-/// link of `companions`, and of `radios` if there are as many.
+/// Makes the scenario's first vehicles use companions on boards or in other processes: the n-th
+/// vehicle uses the n-th link of `companions`, and of `radios` if there are as many.
 fn set_board_links(
     scenario: &mut Scenario,
     companions: &[LinkUrl],
@@ -212,8 +212,9 @@ fn print_errors_and_speed(flight: &SwarmFlight, limit_s: f32) {
     );
 }
 
-/// Adds the pictures of earlier flights if this flight continued them. It continued them unless the
-/// companions knew no waypoint, or every waypoint, as photographed: then they began the area again.
+/// Adds the pictures of earlier flights if this flight continued them. It continued them unless, at
+/// its start, the companions knew no waypoint, or every waypoint, as photographed: then they began
+/// the area again.
 fn add_earlier_pictures_if_continued(
     kept: &PictureStore,
     mission: &PreparedMission,
@@ -227,6 +228,8 @@ fn add_earlier_pictures_if_continued(
     Ok(())
 }
 
+/// Plans and flies a mission, judges its pictures, and writes results and report. `flashes` is the
+/// directory in which companions keep their flash files.
 fn plan_fly_and_report(
     scenario: Scenario,
     command: &'static str,

@@ -150,7 +150,7 @@ enum Map {
 }
 
 /// Loads a map: the octree of a `.bt` file, or, with a resolution given or for a built-in map, the
-/// grid that missions are planned on.
+/// grid that missions are planned on. Also returns its kind, `octomap` or `builtin`.
 fn read(file: &str, resolution_m: Option<f32>) -> Result<(&'static str, Map), MapError> {
     match (MapSource::parse(file)?, resolution_m) {
         (MapSource::Building(seed), _) => {

@@ -98,6 +98,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
+/// `result.json` of a plan, with nothing flown.
 fn planned_result(mission: &PreparedMission, plan: &HostPlan) -> MissionResult {
     let schedule = mission.schedule();
     let nominal_s = |f: &planner_core::flight::Flight<WAYPOINTS>| {

@@ -35,6 +35,7 @@ pub struct Args {
 /// Sleep between two polls of the simulated radio.
 const RADIO_POLL_SLEEP: Duration = Duration::from_millis(1);
 
+/// Parses a number from 0 to `most`.
 fn parse_number(text: &str, most: f64) -> Result<f64, String> {
     let sound = text.parse().ok().filter(|value| (0.0..=most).contains(value));
     sound.ok_or_else(|| format!("expected a number from 0 to {most}"))

@@ -41,10 +41,11 @@ pub struct CoverageFindings {
     pub broken_routes: u64,
     /// Number of legs that enter a no-fly zone.
     pub legs_in_no_fly_zones: u64,
-    /// Heights of lanes above terrain; `None` over level ground, and for pictures.
+    /// Heights of lanes above terrain; `None` over level ground, and where pictures that were taken
+    /// in a flight are checked instead of planned flights.
     pub heights: Option<HeightFindings>,
-    /// For each picture, by rising time: its time, seconds, and the number of cells that it is the
-    /// first to complete.
+    /// For each picture, by rising time: its time, seconds after the mission's start, and the
+    /// number of cells that are photographed with this picture and were not before.
     pub new_cells_over_time: Vec<(f32, u64)>,
 }
 
@@ -145,6 +146,7 @@ pub fn footprints(planned: &CoveragePlan<'_>, pictures: &[Picture]) -> Vec<[[f32
     pictures.iter().map(|picture| cells.footprint_corners(planned, picture)).collect()
 }
 
+/// Counts pictures, missed and repeated waypoints, and broken routes of planned flights.
 fn count_waypoint_faults(
     planned: &CoveragePlan<'_>,
     flights: &[TimedFlight<'_>],
@@ -203,8 +205,11 @@ fn ring_contains(ring: &[[f64; 2]], place: [f64; 2]) -> bool {
 
 /// A grid of square cells over the area, with axes along and across the lanes.
 struct CoverageCells {
+    /// Unit vector along the lanes, east and north.
     lane_direction: [f64; 2],
+    /// Least corner of the grid, metres along and across the lanes from the mission's origin.
     low_corner: [f64; 2],
+    /// Side of a cell, metres.
     side_m: f64,
     column_row_counts: [usize; 2],
 }
@@ -236,11 +241,13 @@ impl CoverageCells {
     }
 
     /// A grid whose cells are halved until at least one of them counts, so that an area narrower
-    /// than a cell is checked too; stops at [`MAX_CHECKED_CELLS`].
+    /// than a cell is checked too; never more than [`MAX_CHECKED_CELLS`] by halving.
     fn refined_until_a_cell_counts(planned: &CoveragePlan<'_>) -> Self {
         Self::new(planned).halved_until_one_counts(planned, MAX_CHECKED_CELLS)
     }
 
+    /// The grid with its cells halved until one counts, or halving would give more than `most`
+    /// cells.
     fn halved_until_one_counts(mut self, planned: &CoveragePlan<'_>, most: f64) -> Self {
         let fits = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= most;
         while !self.points_inside_area(planned, self.column_row_counts, 0.5).contains(&true)
@@ -252,6 +259,7 @@ impl CoverageCells {
         self
     }
 
+    /// Coordinates of a place along and across the lanes, metres from the mission's origin.
     fn to_lane_frame(&self, place: &Flat) -> [f64; 2] {
         let (x, y) = (f64::from(place.x), f64::from(place.y));
         [
@@ -350,6 +358,7 @@ impl CoverageCells {
         })
     }
 
+    /// Writes to `findings` which cells count, how many of these the pictures show, and when.
     fn count_photographed_cells(
         &self,
         planned: &CoveragePlan<'_>,
@@ -358,8 +367,8 @@ impl CoverageCells {
     ) {
         let spacing = planned.area_settings.spacing;
         let counted = self.points_inside_area(planned, self.column_row_counts, 0.5);
-        // Neighbouring pictures overlap by a cell or more, so one picture must show all corners of
-        // a cell.
+        // Whether neighbouring pictures overlap by a cell or more: then one picture must show all
+        // corners of a cell.
         let whole = f64::from(spacing.footprint.across_m - spacing.max_lane_spacing_m)
             .min(f64::from(spacing.footprint.along_m - spacing.max_waypoint_spacing_m))
             >= self.side_m;

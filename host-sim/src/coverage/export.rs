@@ -4,8 +4,8 @@
 //! A flight consists of NAV_DELAY (93) if the vehicle departs later than others, NAV_TAKEOFF (22),
 //! DO_CHANGE_SPEED (178), NAV_WAYPOINT (16) with the camera's trigger, and NAV_RETURN_TO_LAUNCH
 //! (20) above the pad. Altitudes are relative to the vehicle's home (frame 3), so that errors of
-//! maps and geoid cancel; over terrain too, since the height map holds home and ground alike. With
-//! trigger by distance only the two ends of a lane become waypoints.
+//! maps and geoid cancel; over terrain too, since home and ground have heights of the same map.
+//! With trigger by distance only the two ends of a lane become waypoints.
 
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
@@ -41,12 +41,13 @@ pub struct ExportedItem {
     /// Parameters 1 to 4. `None` becomes null (NaN: the current value) in `.plan`, and 0 in
     /// `.waypoints`.
     pub params_1_to_4: [Option<f64>; 4],
-    /// Latitude and longitude, degrees, and metres above home. Zeros if the item has no position,
-    /// except that the first may hold parameter 5 of the command.
+    /// Latitude and longitude, degrees, and metres above home. If the item has no position: zeros,
+    /// but the first number may be another parameter 5 of the command.
     pub params_5_to_7: [f64; 3],
 }
 
 impl ExportedItem {
+    /// An item without a position; `params` are parameters 1 to 4.
     fn from_command(command: u16, params: [f64; 4]) -> Self {
         Self {
             command,
@@ -143,7 +144,7 @@ pub fn flight_items(
             (WaypointAction::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));
                 items.push(ExportedItem::from_command(DO_DIGICAM_CONTROL, [0.0; 4]));
-                // Parameter 5 of DO_DIGICAM_CONTROL, 1, takes a picture; its slot is `place[0]`.
+                // Parameter 5 of DO_DIGICAM_CONTROL is 1: take a picture.
                 if let Some(last) = items.last_mut() {
                     last.params_5_to_7[0] = 1.0;
                 }
@@ -182,6 +183,7 @@ pub fn flight_items(
     items
 }
 
+/// Rounds to the nearest multiple of 1 / `by`.
 fn round_to_parts(value: f64, by: f64) -> f64 {
     (value * by).round() / by
 }

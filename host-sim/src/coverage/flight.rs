@@ -2,8 +2,8 @@
 //! lanes, up, home in its layer, down.
 //!
 //! Metres, ENU in the mission frame. Over level ground all pictures are at one height above the
-//! mission's origin. Over terrain, lanes and the ways between them have corners where they rise and
-//! fall.
+//! mission's origin. Over terrain, lanes and the paths between them have corners where they rise
+//! and fall.
 
 use std::convert::Infallible;
 
@@ -89,7 +89,7 @@ pub fn flight_points(planned: &CoveragePlan<'_>, route: &Route) -> Vec<FlightPoi
     points
 }
 
-/// Appends the points on the lanes of a route and on the ways between them.
+/// Appends the points on the lanes of a route and on the paths between them.
 fn add_lane_points(planned: &CoveragePlan<'_>, route: &Route, points: &mut Vec<FlightPoint>) {
     let numbers: Vec<u32> = route.waypoints().collect();
     let mut here: Option<Point> = None;
@@ -110,6 +110,7 @@ fn add_lane_points(planned: &CoveragePlan<'_>, route: &Route, points: &mut Vec<F
                     between.extend(leg_corners(planned, &from, corner));
                     from = between.last().copied().unwrap_or(from);
                 }
+                // The last point is the lane's first waypoint, which is added with the lane.
                 between.pop();
                 let point = |position: Point| FlightPoint {
                     position,
@@ -153,8 +154,8 @@ fn leg_corners(planned: &CoveragePlan<'_>, from: &Point, to: &Flat) -> Vec<Point
     }
 }
 
-/// Appends the points along one lane: its pictures, and corners of `path` (over terrain) between
-/// them.
+/// Appends the points along one lane: the pictures at `places` (waypoint number and place), and
+/// between them the corners of `path`, which there are over terrain.
 fn add_picture_points(
     planned: &CoveragePlan<'_>,
     path: &[Point],
@@ -192,15 +193,15 @@ fn add_picture_points(
     }
 }
 
-/// Corners of the shortest way around no-fly zones between two points; empty for a straight way.
+/// Corners of the shortest path around no-fly zones between two points; empty for a straight path.
 fn corners_around_no_fly_zones(
     planned: &CoveragePlan<'_>,
     from: &Flat,
     to: &Flat,
 ) -> Fixed<Flat, MAX_NO_FLY_CORNERS> {
     let mut corners = Fixed::new();
-    // The planner found a finite length of the way between any two points of a plan, so this never
-    // fails.
+    // The planner found a finite length of the path between any two points of a plan, so this
+    // never fails.
     if planned.transit.shortest_path(from, to, &mut corners).is_err() {
         corners.clear();
     }

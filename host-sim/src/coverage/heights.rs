@@ -15,22 +15,23 @@ const HEIGHT_ROUNDING_M: f32 = 0.02;
 /// Heights and slopes of flights above terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightFindings {
-    /// Least height of lanes and of the ways between them above the ground, metres.
+    /// Least height of lanes and of the paths between them above the ground, metres.
     pub min_above_ground_m: f32,
-    /// Greatest height of lanes and of the ways between them above the ground, metres.
+    /// Greatest height of lanes and of the paths between them above the ground, metres.
     pub max_above_ground_m: f32,
-    /// Steepest lane or way between lanes, metres of height per metre over ground.
+    /// Slope of the steepest leg on lanes and on the paths between them, metres of height per metre
+    /// over ground; legs of at most 1 m over ground are left out.
     pub steepest_slope: f32,
     /// Number of legs, transits in layers included, that are lower above the ground than the height
     /// of the pictures; vertical legs above pads are left out.
     pub legs_too_low: u64,
-    /// Number of lanes and ways between them that are steeper than their vehicle climbs or descends
-    /// at cruise speed.
+    /// Number of legs on lanes and on the paths between them that are steeper than their vehicle
+    /// climbs or descends at cruise speed.
     pub legs_too_steep: u64,
 }
 
 impl HeightFindings {
-    /// Whether no leg is too low and no lane or way between lanes is too steep.
+    /// Whether no leg is too low and none is too steep.
     pub fn is_clean(&self) -> bool {
         self.legs_too_low + self.legs_too_steep == 0
     }
@@ -95,7 +96,7 @@ fn height_range_above_ground(
     heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], h| [least.min(h), most.max(h)])
 }
 
-/// Whether a point is at the height of the lanes: on a lane or on the way from one lane to the
+/// Whether a point is at the height of the lanes: on a lane or on the path from one lane to the
 /// next, not on a transit in a layer.
 pub fn is_at_lane_height(point: &FlightPoint) -> bool {
     matches!(point.action, WaypointAction::Photo(_) | WaypointAction::AtLaneHeight)

@@ -20,7 +20,7 @@ use self::polygon::{
 use crate::capacity::BOARD_NO_FLY_CORNERS;
 use crate::map::{ClearanceField, OccupancyMap, UnknownSpace, VoxelMap};
 
-/// Height above the ground up to which the map's cells count as ground, metres.
+/// Greatest z, in the mission frame, of the top of a map cell that counts as ground, metres.
 const MAX_GROUND_CELL_TOP_M: f32 = 0.5;
 /// Added to the clearance of zones against rounding, metres.
 const ZONE_ROUNDING_M: f64 = 0.01;
@@ -60,6 +60,7 @@ pub struct MapObstacles {
     pub map: VoxelMap,
     /// Horizontal distance that paths keep from obstacles at their height, metres.
     pub required_clearance_m: f32,
+    /// Computed at the first call of [`Self::clearance_field`].
     field: OnceLock<ClearanceField>,
 }
 
@@ -105,7 +106,7 @@ impl MapObstacles {
         (nearest_m < self.required_clearance_m).then_some(nearest_m)
     }
 
-    /// Zones around the obstacles that reach above `floor_m` and are near `places` (the area's
+    /// Zones around the obstacles that reach above z = `floor_m` and are near `places` (the area's
     /// vertices and the pads). Lanes extend `beyond_m` beyond these places. `own` is the number of
     /// corners of all other no-fly zones. Uses the first way to draw zones with which a board can
     /// plan, else the first within `most` corners.
@@ -185,7 +186,9 @@ fn near_zones(mut zones: Vec<Vec<Flat>>, places: &[Flat], near_m: f32) -> Vec<Ve
 
 /// The columns of a map, with further columns around the map for the clearance.
 struct Columns {
+    /// Numbers of columns to the east and to the north.
     size: [usize; 2],
+    /// South-western corner of the first column, metres.
     low: [f64; 2],
     cell_m: f64,
     clearance_m: f64,
@@ -217,6 +220,7 @@ impl Columns {
         columns
     }
 
+    /// Index of a column in `blocked` and `inflated`.
     fn index(&self, [i, j]: Column) -> usize {
         j * self.size[0] + i
     }
@@ -280,7 +284,7 @@ impl Columns {
         parts
     }
 
-    /// Zones that together hold these columns and the clearance around them.
+    /// Zones that together contain these columns and the clearance around them.
     fn zones_around(&self, part: &[Column], style: &ZoneStyle) -> Vec<Polygon> {
         let place = |[i, j]: [usize; 2]| {
             [self.low[0] + i as f64 * self.cell_m, self.low[1] + j as f64 * self.cell_m]

@@ -56,7 +56,7 @@ pub struct CoveragePlan<'a> {
     pub vehicles: Vec<Vehicle>,
     /// All lanes, in the order of the path.
     pub tracks: Box<Tracks<MAX_LANES>>,
-    /// Shortest ways around no-fly zones.
+    /// Shortest paths around no-fly zones.
     pub transit: Box<TransitGraph<'a, MAX_NO_FLY_CORNERS>>,
     /// Routes of the vehicles that fly, in the order of the path.
     pub plan: RoutePlan<MAX_VEHICLES>,
@@ -65,10 +65,12 @@ pub struct CoveragePlan<'a> {
     pub binpat_shares: Option<Vec<f32>>,
     /// Lower bound on the largest cost of any division of this path, seconds.
     pub lower_bound_s: f32,
-    /// All sorties, by round: one for each battery; without `batteries` one for each route.
+    /// All sorties, by round: one for each battery; without the key `area.batteries` one for each
+    /// route.
     pub sorties: Vec<Sortie>,
-    /// Least planned distance between two vehicles, metres; infinite for a single vehicle.
+    /// Least planned distance between two vehicles in one round, metres; infinite for a single
+    /// vehicle.
     pub closest_approach_m: f32,
-    /// Computing times of lanes, of ways around no-fly zones, and of routes, seconds.
+    /// Computing times of lanes, of paths around no-fly zones, and of routes, seconds.
     pub computing_s: [f64; 3],
 }

@@ -23,7 +23,7 @@ pub struct CoverResult {
     pub seed: u64,
     /// Name of the method that divided the area.
     pub method: &'static str,
-    /// Whether the check of the pictures found no fault.
+    /// Whether the check of the plan found no fault.
     pub complete: bool,
     /// A row for each vehicle of the scenario.
     pub vehicles: Vec<VehicleResult>,

@@ -4,8 +4,8 @@
 //! flights that are already timed.
 //!
 //! Planned positions are compared every `COMPARISON_STEP_S`, at cruise speed without braking at
-//! corners. Real flights deviate from that: on board the safety filter keeps vehicles apart, and
-//! these departures only make it seldom necessary.
+//! corners. Real flights deviate from that: on board the safety filter keeps vehicles apart. These
+//! departures only see to it that the filter seldom has to act.
 
 use planner_core::Point;
 
@@ -17,7 +17,7 @@ const COMPARISON_STEP_S: f32 = 0.25;
 const DEPARTURE_STEP_S: f32 = 2.0;
 /// A vehicle within this horizontal distance of its pad is over its pad, metres.
 const ABOVE_PAD_WITHIN_M: f32 = 0.01;
-/// Latest departure that is tried, seconds.
+/// Latest departure that is tried, seconds after the round begins.
 const MAX_GROUND_WAIT_S: f32 = 900.0;
 
 /// One planned flight; its times count from its own departure.
@@ -28,9 +28,10 @@ pub struct DepartureFlight<'a> {
     pub times_s: &'a [f32],
 }
 
-/// Departure time of each flight, seconds, and the least distance between any two vehicles of which
-/// at least one has departed and not landed, metres; infinite for one vehicle. `None` if some
-/// flight has no departure within `MAX_GROUND_WAIT_S` that keeps the separation.
+/// Departure time of each flight, seconds after the round begins, and the least distance between
+/// any two vehicles from the first departure to the last landing of both, metres; infinite for one
+/// vehicle. `None` if some flight has no departure within `MAX_GROUND_WAIT_S` that keeps the
+/// separation.
 pub fn plan_departures(
     flights: &[DepartureFlight<'_>],
     separation_m: f32,
@@ -67,7 +68,7 @@ pub fn plan_departures(
     ))
 }
 
-/// Positions of a vehicle every [`COMPARISON_STEP_S`] of its flight.
+/// Positions of a vehicle every [`COMPARISON_STEP_S`] of its flight, from its departure on.
 fn sample_positions(flight: &DepartureFlight<'_>) -> Vec<Point> {
     let end_s = flight.times_s.last().copied().unwrap_or(0.0);
     let mut next = 1;
@@ -84,10 +85,10 @@ fn sample_positions(flight: &DepartureFlight<'_>) -> Vec<Point> {
 }
 
 /// Least distance between two flights, each given by its positions and departure delay in steps of
-/// [`COMPARISON_STEP_S`], from the first departure to the last landing, metres. `None` if it is
-/// less than the separation. Pads may be nearer to each other than the separation: while both
-/// vehicles are over their pads, or one stands on its pad, only the distance of the pads is
-/// required.
+/// [`COMPARISON_STEP_S`], from the first departure to the last landing, metres. `None` if the
+/// vehicles come nearer than the separation. Pads may be nearer to each other than the separation:
+/// while both vehicles are over their pads, or one stands on its pad, no more than the horizontal
+/// distance of the pads is required.
 fn min_distance_if_separated_m(
     a: (&[Point], usize),
     b: (&[Point], usize),

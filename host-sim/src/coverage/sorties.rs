@@ -2,9 +2,9 @@
 //! flies from the pad and back to it, in the route's layer.
 //!
 //! Of all cuts with the fewest sorties, dynamic programming over the lanes finds the one with the
-//! least total time. Adding a lane never shortens a sortie, since its ways are shortest ways. So
-//! the search backwards for a sortie's first lane ends at the first lane that is too far back. That
-//! takes n · m steps for n lanes of which at most m fit into a sortie.
+//! least total time. Adding a lane never shortens a sortie, since its transits are shortest paths.
+//! So the search backwards for a sortie's first lane ends at the first lane that is too far back.
+//! That takes n · m steps for n lanes of which at most m fit into a sortie.
 //!
 //! Sorties are flown in rounds: the k-th sorties of all vehicles form a round, which begins
 //! [`BATTERY_SWAP_S`] after the last vehicle of the round before has landed. So departures keep
@@ -80,7 +80,7 @@ fn stops_extra_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
         .map(|number| planned.tracks.lane_of(number));
     let lanes = (to - from + 1) as f32;
     let stop_s = cruise_mps / PLANNED_ACCEL_MPS2;
-    // The way from one lane to the next may be too short to reach cruise speed.
+    // The path from one lane to the next may be too short to reach cruise speed.
     let step_m = planned.area_settings.spacing.max_lane_spacing_m.min(cruise_mps * stop_s);
     let step_s = 2.0 * (step_m / PLANNED_ACCEL_MPS2).sqrt() - step_m / cruise_mps;
     (lanes + 2.0) * stop_s + (lanes - 1.0) * step_s
@@ -110,8 +110,8 @@ pub fn cut_route(
     }
     let lanes = RouteLanes::new(planned, route);
     let count = lanes.pad_distances_m.len();
-    // For each number of lanes: fewest sorties that fly them, their total time, seconds, and index
-    // of the first lane of the last of these sorties.
+    // For each number of lanes, counted from the route's first lane: fewest sorties that fly them,
+    // their total time, seconds, and index of the first lane of the last of these sorties.
     let mut best = vec![(0u32, 0.0f64, 0usize)];
     for end in 1..=count {
         let parts = (0..end)
@@ -146,7 +146,8 @@ struct RouteLanes<'a> {
     route: &'a Route,
     /// First waypoint of each lane within the route, and the end of the route (exclusive).
     waypoint_bounds: Vec<u32>,
-    /// For each lane: distance from the pad to its first waypoint and to its last, metres.
+    /// For each lane: length of the path around no-fly zones from the pad to the lane's first
+    /// waypoint within the route, and to its last, metres.
     pad_distances_m: Vec<[f32; 2]>,
 }
 

@@ -9,7 +9,7 @@
 //! - if a picture was taken within half a spacing of it along its lane, or within
 //!   [`PictureTolerance::max_along_m`] where that is more;
 //! - or if the last picture before it and the first one after it on its lane are no further apart
-//!   than the spacing plus `max_along_m`: one of them is then as far off as a picture may be.
+//!   than the spacing plus `max_along_m`: no picture is then missing between them.
 //!
 //! A picture belongs to a lane if it is within half a lane spacing of it, or within
 //! [`PictureTolerance::cross_track_m`] where that is more. A missing picture leaves a gap of two
@@ -38,7 +38,7 @@ pub struct Picture {
     pub t_s: f32,
     /// Position of the camera, metres ENU; it looks straight down.
     pub position: Point,
-    /// Direction of the picture's upper edge, radians counterclockwise from east.
+    /// Direction from the picture's centre to its upper edge, radians counterclockwise from east.
     pub yaw_enu_rad: f32,
 }
 
@@ -46,9 +46,10 @@ pub struct Picture {
 /// planned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PictureTolerance {
-    /// Distance beside the path from tracking, estimate and gusts, metres.
+    /// Distance beside the path that errors of tracking and position estimate, and gusts cause,
+    /// metres.
     pub cross_track_m: f32,
-    /// Distance flown at cruise speed between the due place of a picture and its true place,
+    /// Distance along the path from where a picture is due to where it is taken, at cruise speed,
     /// metres.
     pub trigger_delay_m: f32,
 }
@@ -92,6 +93,7 @@ fn along_and_cross_track(lane: &Lane, place: &Flat) -> (f32, f32) {
     }
 }
 
+/// Number of waypoints of a lane that have no picture.
 fn count_missed_on_lane(
     planned: &CoveragePlan<'_>,
     lane: &Lane,
@@ -129,6 +131,7 @@ fn nearest_waypoint(lanes: &[Lane], place: &Flat) -> Option<u32> {
     lanes.iter().map(nearest).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(number, _)| number)
 }
 
+/// Number of waypoints that were flown more than once.
 fn count_repeated(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
     let mut passes = vec![0_u32; waypoints as usize];
     let mut vehicles: Vec<Option<u8>> = pictures.iter().map(|picture| picture.vehicle).collect();
@@ -138,8 +141,8 @@ fn count_repeated(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
         let own = pictures.iter().filter(|picture| picture.vehicle == vehicle);
         let mut flown: Vec<u32> =
             own.filter_map(|p| nearest_waypoint(lanes, &p.position.xy())).collect();
-        // Which vehicle took a picture of earlier flights is unknown, nor the order: repeats of a
-        // waypoint count once.
+        // Of pictures of earlier flights neither vehicle nor order is known: all those at one
+        // waypoint count as one pass.
         if vehicle.is_none() {
             flown.sort_unstable();
         }

@@ -44,8 +44,9 @@ pub fn flown_layers(
         agreement_s: None,
     };
     for division in std::iter::once(&whole).chain(&flight.divisions) {
-        // Skipped: a division already shown, which another vehicle begins to fly later, or one
-        // whose inputs no vehicle reported, which cannot be planned here.
+        // Skipped: a division already shown, which another vehicle begins to fly later; and a
+        // division whose inputs no vehicle reported, with all that follow, since they cannot be
+        // planned here.
         if usize::from(division.number) != shown.len()
             || (division.number > 0 && division.inputs.is_empty())
         {
@@ -79,6 +80,7 @@ pub fn flown_layers(
     Ok(parts::coverage_layers(planned, shown, pictures))
 }
 
+/// The path of a flight, and what it photographs.
 fn report_part(flight: &Flight<WAYPOINTS>) -> ReportPart {
     let path = &flight.path;
     let (mut lanes, mut waypoints) = (Vec::<Point>::new(), 0);
@@ -97,6 +99,7 @@ fn report_part(flight: &Flight<WAYPOINTS>) -> ReportPart {
     }
 }
 
+/// Which vehicle photographs each waypoint by the plan of these flights.
 fn waypoint_owners(flights: &[Flight<WAYPOINTS>]) -> WaypointOwners {
     let mut owners = WaypointOwners::new();
     for flight in flights {

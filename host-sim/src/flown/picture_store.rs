@@ -13,7 +13,8 @@ use crate::quote::printable_path;
 /// Name of the file with the pictures taken so far.
 const FILE_NAME: &str = "pictures.json";
 
-/// Time, seconds; east, north and up, metres; heading, radians: one picture in the file.
+/// One picture in the file: time in its flight, seconds, which readers ignore; east, north and up,
+/// metres; heading, radians counterclockwise from east.
 type PictureRow = [f32; 5];
 
 /// The file of pictures, and the pictures that earlier flights left in it.

@@ -24,8 +24,8 @@ pub struct FlightFindings {
 }
 
 /// Every track point at the height of the lanes, as a picture taken there whose heading is the
-/// lanes' direction. `None` if companions trigger the camera: then there are real pictures to
-/// judge.
+/// lanes' direction. `None` without an area, or if companions trigger the camera: then there are
+/// real pictures to judge.
 ///
 /// # Errors
 /// As [`CoveragePlan::new`].

@@ -18,7 +18,9 @@ pub struct ReconnectingLink {
     /// URL of the link, for messages.
     name: String,
     open: OpenLink,
+    /// The open link; `None` while it is lost.
     link: Option<Box<dyn ByteLink>>,
+    /// When the next attempt to open a lost link is due.
     retry_at: Instant,
 }
 
@@ -28,6 +30,7 @@ impl ReconnectingLink {
         Self { name, open, link: Some(link), retry_at: Instant::now() }
     }
 
+    /// The open link; if it is lost and an attempt is due, tries to open it first.
     fn reopen(&mut self) -> Option<&mut Box<dyn ByteLink>> {
         if self.link.is_none() && Instant::now() >= self.retry_at {
             self.link = (self.open)();

@@ -17,6 +17,7 @@ const WRITE_CHUNK: usize = 256;
 /// An open serial port.
 pub struct OpenSerialPort {
     device: Box<dyn SerialPort>,
+    /// Bytes that the device has not accepted yet.
     queue: Vec<u8>,
 }
 

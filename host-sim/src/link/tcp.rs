@@ -10,8 +10,10 @@ use super::transport::{ByteLink, is_transient};
 /// Most bytes that wait for a peer: about ten seconds of all that a PX4 streams.
 const MAX_QUEUED_BYTES: usize = 256 * 1024;
 
+/// A TCP connection, of a client or of the server.
 struct Connection {
     stream: TcpStream,
+    /// Bytes that the peer has not accepted yet.
     queue: Vec<u8>,
 }
 
@@ -92,6 +94,7 @@ impl Server {
         Ok(Self { listener, client: None })
     }
 
+    /// Accepts a client that waits, if any; it replaces the current one.
     fn accept(&mut self) {
         // A failed accept (the client has already closed) leaves the current client connected.
         if let Ok((stream, _)) = self.listener.accept()

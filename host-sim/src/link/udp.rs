@@ -11,6 +11,7 @@ const PEER_TIMEOUT: Duration = Duration::from_secs(60);
 /// Most peers of one hub; a further one replaces the peer that was heard longest ago.
 const MAX_PEERS: usize = 16;
 
+/// Sends a datagram; one that nobody can receive now is dropped without an error.
 fn transmit(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) -> io::Result<()> {
     match socket.send_to(bytes, to) {
         Err(error) if !is_transient(&error) => Err(error),
@@ -64,6 +65,7 @@ impl ByteLink for UdpPeer {
 /// A bound UDP socket that sends to every peer from which it has received lately.
 pub struct UdpHub {
     socket: UdpSocket,
+    /// Each peer, and when it was last heard.
     clients: Vec<(SocketAddr, Instant)>,
 }
 
@@ -75,6 +77,7 @@ impl UdpHub {
         Ok(Self { socket, clients: Vec::new() })
     }
 
+    /// Notes that this peer was heard now.
     fn remember_peer(&mut self, from: SocketAddr) {
         let now = Instant::now();
         if let Some(client) = self.clients.iter_mut().find(|client| client.0 == from) {

@@ -20,11 +20,13 @@ use search::{BOXES_PER_NODE, BoxSearch, CellSegment, Node};
 mod lanes;
 mod search;
 
-/// Most boxes whose subtree one thread builds alone; larger subtrees are built on several threads.
+/// Largest number of boxes whose subtree one thread builds alone; subtrees over more boxes are
+/// built on several threads.
 const MAX_BOXES_PER_THREAD: usize = 512;
-/// Number of bins along an axis at whose borders boxes may be split.
+/// Number of bins along an axis into which boxes are sorted; a group of boxes is split at the
+/// border of two bins.
 const SPLIT_BINS: usize = 16;
-/// Distance from a segment within which nodes are assumed to be opened when the tree is built,
+/// Building the tree assumes that a search opens the nodes within this distance of its segment,
 /// metres: the clearance of most edges is less.
 const ASSUMED_CLEARANCE_M: f32 = 0.6;
 
@@ -41,6 +43,7 @@ impl CellBox {
         u32::from(self.low[axis]) + u32::from(self.high[axis])
     }
 
+    /// The smallest box around both.
     fn union(&self, other: &Self) -> Self {
         Self {
             low: [0, 1, 2].map(|a| self.low[a].min(other.low[a])),
@@ -127,6 +130,7 @@ fn boxes_of_map(grid: &VoxelGrid<'_>) -> Vec<CellBox> {
 #[derive(Debug)]
 pub struct BoxTree {
     shape: GridShape,
+    /// Whether the space beyond the map's faces is an obstacle.
     beyond_map: Outside,
     /// The root is the first node.
     nodes: Vec<Node>,
@@ -143,9 +147,10 @@ impl BoxTree {
     }
 
     /// Distance from the segment `a`–`b` to the nearest obstacle, metres, at most `max_m`. The
-    /// search stops as soon as it has found a distance of at most `enough_m`, and returns that. For
-    /// a segment that touches an obstacle, rounding may give slightly more than zero; the result is
-    /// 0 if a coordinate is not finite.
+    /// search stops as soon as it has found a distance of at most `enough_m`, and returns that.
+    /// The map's faces count as obstacles if the space beyond them is blocked. For a segment that
+    /// touches an obstacle, rounding may give slightly more than zero; the result is 0 if a
+    /// coordinate is not finite.
     pub fn clearance_m(&self, a: &Point, b: &Point, max_m: f32, enough_m: f32) -> f32 {
         let resolution_m = self.shape.resolution_m;
         let cells =
@@ -214,9 +219,9 @@ fn build_nodes(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
     std::iter::once(node).chain(below.into_iter().flatten()).collect()
 }
 
-/// Splits two or more boxes into two groups so that few segments have to open both, by the surface
+/// Splits two or more boxes into two groups so that few searches have to open both, by the surface
 /// area heuristic (MacDonald and Booth 1990) in bins (Wald 2007), for segments that pass within
-/// `near` cells. With this heuristic each group gets at least a third of the boxes. Cost: O(boxes).
+/// `near` cells. Each group gets at least a third of the boxes. Cost: O(boxes).
 fn split_boxes(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) {
     let mut best = (f32::INFINITY, 0, 0);
     for axis in 0..3 {

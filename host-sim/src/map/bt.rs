@@ -17,6 +17,7 @@ use crate::files;
 
 /// Accepted values of the header's `id`; the colours of a ColorOcTree are ignored.
 const ACCEPTED_IDS: [&str; 2] = ["OcTree", "ColorOcTree"];
+/// How the first line of a file begins.
 const MAGIC: &str = "# Octomap OcTree binary file";
 /// Longest file that is read, bytes: in memory it takes four times as much. The largest public
 /// scans are a tenth of it.
@@ -51,17 +52,24 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Octree, MapError> {
     Ok(Octree::from_parts(header.resolution_m, reader.inner))
 }
 
+/// The values of a header.
 struct BtHeader {
+    /// Value of `size`: the number of all nodes, leaves included.
     nodes: u64,
+    /// Offset of that number in the file, bytes.
     nodes_offset: usize,
     resolution_m: f64,
 }
 
+/// Reads the bytes of a file from front to back.
 struct Reader<'a> {
     bytes: &'a [u8],
+    /// Offset of the next byte to read.
     at: usize,
     path: &'a Path,
+    /// Inner nodes read so far; the inner children of one node follow each other.
     inner: Vec<InnerNode>,
+    /// Number of nodes read so far, leaves included.
     nodes_read: u64,
 }
 
@@ -97,6 +105,7 @@ impl<'a> Reader<'a> {
         }
     }
 
+    /// Reads the header, its last line `data` included.
     fn header(&mut self) -> Result<BtHeader, MapError> {
         let expected = format!("`{MAGIC}`");
         let (first, at) = self.header_line(&expected)?;
@@ -217,6 +226,7 @@ pub fn to_bytes(tree: &Octree) -> Vec<u8> {
     bytes
 }
 
+/// Appends the words of an inner node and of all inner nodes below it, depth first.
 fn push_node(tree: &Octree, node: InnerNode, bytes: &mut Vec<u8>) {
     bytes.extend_from_slice(&node.child_codes.to_le_bytes());
     for index in (0..8).filter(|&i| node.child_code(i) == INNER) {

@@ -85,6 +85,7 @@ fn building_blocks(seed: u64) -> Vec<Block> {
     plan.blocks
 }
 
+/// The boxes made so far, and the source of the random numbers for further ones.
 struct BlockList {
     blocks: Vec<Block>,
     rng: Pcg32,
@@ -104,6 +105,7 @@ impl BlockList {
         from + (to - from) * (self.rng.next_u32() >> 8) as f32 / 16_777_216.0
     }
 
+    /// Adds one floor with its walls, doors and windows; `floor` counts from 0, the ground floor.
     fn add_storey(&mut self, floor: u32) {
         let [length, width, _] = SIZE_M;
         let slab = floor as f32 * FLOOR_HEIGHT_M;
@@ -175,6 +177,8 @@ impl BlockList {
         self.add_opening([at, wall, z], [at + width, wall + WALL_THICKNESS_M, z + height]);
     }
 
+    /// Adds a window to the room between x = `west` and x = `east`, in the outer wall whose south
+    /// face is at y = `wall`, above the floor at `z`.
     fn add_window(&mut self, west: f32, east: f32, wall: f32, z: f32) {
         let at = self.uniform(west + 1.0, (west + east) / 2.0);
         self.add_opening(

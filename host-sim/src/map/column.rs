@@ -85,8 +85,9 @@ pub fn ground_below_clear_column(
 }
 
 /// Obstacle nearest to the vertical segment from `low_m` up to `point`: its nearest point, its
-/// distance, and whether it is unknown. Obstacles are the blocked cells above layer `ground` within
-/// `reach_m`, and, where the outside is blocked, the faces of the map but the lowest.
+/// distance, and whether it is unknown space or a face. Obstacles are the blocked cells that are
+/// above cell layer `ground` and within `reach_m` of the segment, and, where the outside is
+/// blocked, the faces of the map but the lowest.
 fn obstacle_nearest_to_column(
     map: &VoxelMap,
     point: &Point,

@@ -83,7 +83,9 @@ impl ClearanceField {
 
 /// Buffers for the transform along one line of cells.
 struct LineTransform {
+    /// Values of the cells before the transform.
     line: Vec<u16>,
+    /// Values of the cells after the transform.
     out: Vec<u16>,
     /// Parabolas of the lower envelope, from left to right.
     envelope: Vec<Parabola>,
@@ -93,6 +95,7 @@ struct LineTransform {
 /// `height + (x − site)²`. A side has at most 2¹⁵ cells, so squares fit into i32.
 #[derive(Clone, Copy, Debug)]
 struct Parabola {
+    /// The x at which the parabola is lowest.
     site: i32,
     /// Value of the parabola at x = 0.
     at_zero: i32,
@@ -100,6 +103,7 @@ struct Parabola {
     lowest_from: i32,
 }
 
+/// Replaces a vector's content in the memory that it has.
 trait CopyFrom {
     fn copy_from(&mut self, values: impl Iterator<Item = u16>);
 }

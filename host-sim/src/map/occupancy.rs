@@ -35,7 +35,9 @@ pub enum UnknownSpace {
 #[derive(Clone, Debug, PartialEq)]
 pub struct OccupancyMap {
     shape: GridShape,
+    /// Bits of the occupied cells.
     occupied: Vec<u64>,
+    /// Bits of the free cells; a cell in neither list is unknown.
     free: Vec<u64>,
 }
 
@@ -209,6 +211,7 @@ impl OccupancyMap {
         self.set_bits(word, mask, state);
     }
 
+    /// Sets the state of the cells in `mask` of brick number `word`.
     fn set_bits(&mut self, word: usize, mask: u64, state: Occupancy) {
         self.occupied[word] &= !mask;
         self.free[word] &= !mask;

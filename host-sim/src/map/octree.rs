@@ -24,10 +24,13 @@ pub enum Occupancy {
     Occupied,
 }
 
-/// Codes of a child in a `.bt` file.
+/// Code in a `.bt` file of a child that does not exist: unknown space.
 pub(super) const UNKNOWN: u16 = 0;
+/// Code of a child that is a free leaf.
 pub(super) const FREE: u16 = 1;
+/// Code of a child that is an occupied leaf.
 pub(super) const OCCUPIED: u16 = 2;
+/// Code of a child that is an inner node.
 pub(super) const INNER: u16 = 3;
 
 /// An inner node: two bits for each child, and the index of its first inner child; the others
@@ -39,6 +42,7 @@ pub(super) struct InnerNode {
 }
 
 impl InnerNode {
+    /// Code of the child in octant `index`.
     pub(super) fn child_code(self, index: u32) -> u16 {
         self.child_codes >> (2 * index) & 3
     }
@@ -82,7 +86,7 @@ pub struct OctreeCounts {
 #[derive(Clone, Debug)]
 pub struct Octree {
     resolution_m: f64,
-    /// InnerNode nodes; the root is the last. An empty octree has none.
+    /// Inner nodes; the root is the last. An empty octree has none.
     pub(super) inner: Vec<InnerNode>,
 }
 
@@ -132,6 +136,8 @@ impl Octree {
         }
     }
 
+    /// Calls `visit` for every leaf below `node`, whose lowest key is `min`; `size` is the edge of
+    /// its octants, smallest cells.
     fn walk(&self, node: InnerNode, min: [u32; 3], size: u32, visit: &mut impl FnMut(Leaf)) {
         for index in 0..8 {
             let child_min = octant_corner(min, size, index);
@@ -177,7 +183,7 @@ impl Octree {
         }
     }
 
-    /// OctreeCounts nodes and leaves, and sums up volumes.
+    /// Counts nodes and leaves, and sums up volumes.
     pub fn counts(&self) -> OctreeCounts {
         let mut counts =
             OctreeCounts { nodes: usize::from(!self.inner.is_empty()), ..OctreeCounts::default() };
@@ -224,19 +230,25 @@ fn octant_corner(min: [u32; 3], size: u32, index: u32) -> [u32; 3] {
     [0, 1, 2].map(|axis| min[axis] + (index >> axis & 1) * size)
 }
 
+/// An octant: a leaf or unknown space by its code, or an inner node.
 enum Child {
     Leaf(u16),
     Inner(InnerNode),
 }
 
+/// Builds an octree from the states of the cells in a box.
 struct Builder<'a, F> {
     inner: Vec<InnerNode>,
+    /// Lowest keys of the box.
     min: [u32; 3],
+    /// Keys at which the box ends, exclusive.
     end: [u32; 3],
+    /// Returns the state of a cell by its index in the box.
     cell: &'a mut F,
 }
 
 impl<F: FnMut([u32; 3]) -> Occupancy> Builder<'_, F> {
+    /// Builds the octant with the lowest key `corner` and an edge of `size` smallest cells.
     fn build(&mut self, corner: [u32; 3], size: u32) -> Child {
         let misses = |a: usize| corner[a] >= self.end[a] || corner[a] + size <= self.min[a];
         if (0..3).any(misses) {

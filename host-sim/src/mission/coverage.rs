@@ -71,8 +71,8 @@ pub(super) fn prepare(
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
     }
-    // Over fields vehicles have to keep clear only of each other: each may deviate from its path by
-    // half of what the separation leaves beyond the safety distance.
+    // In a coverage mission vehicles have to keep clear only of each other: each may deviate from
+    // its path by half of what the separation leaves beyond the safety distance.
     let margin_m = scenario.deconfliction.separation_m - scenario.deconfliction.safety_distance_m;
     let tasks = scenario
         .vehicles
@@ -256,7 +256,8 @@ impl PreparedMission {
     }
 
     /// Plans the flights of all vehicles as every companion does, without the waypoints `done`,
-    /// after the divisions `losses`; `ws` keeps the lanes and routes.
+    /// after the divisions `losses`, each with one input per vehicle; `ws` keeps the lanes and
+    /// routes.
     fn plan_area<'l>(
         &self,
         done: &[WaypointRange],

@@ -22,6 +22,7 @@ const SLOT_GRID_M: f32 = 0.25;
 /// Height of a start or goal above the hull centre of a vehicle of `radius_m` that stands on the
 /// ground below it, metres. Fails if the vertical flight between the two is nearer to an obstacle
 /// than the required clearance; the error then suggests the nearest place that has the clearance.
+/// Errors call the start or goal `what`, and name its `place` in the scenario, `FILE:LINE`.
 pub(super) fn climb_height_m(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -81,6 +82,7 @@ pub(super) fn climb_height_m(
     }
 }
 
+/// The task of each vehicle, in the scenario's order. Fails as [`climb_height_m`] does for a start.
 pub(super) fn vehicle_tasks(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -114,8 +116,8 @@ pub(super) fn goal_points(
         (scenario.largest_radius_m(), scenario.max_required_clearance_m());
     // A vehicle that has landed in one slot must not keep another from landing in the next.
     let apart_m = schedule.separation_m.max(schedule.parked_separation_m);
-    // Half the side of the square that is searched, metres: it fits that many slots, with room to
-    // spare for walls.
+    // Half the side of the square that is searched, metres: the square fits the slots wanted, with
+    // room to spare for walls.
     let reach_m = apart_m * (2.0 + (wanted as f32).sqrt() * 2.0);
     let steps = (reach_m / SLOT_GRID_M) as i32;
     let mut offsets: Vec<(i32, i32)> =
@@ -179,6 +181,8 @@ fn wanted_connections(scenario: &Scenario, goals: usize) -> Vec<WantedConnection
     pairs.collect()
 }
 
+/// Builds the roadmap between starts and goals; also returns the header of its file, and how long
+/// each part of the construction took.
 pub(super) fn build_roadmap(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -191,8 +195,8 @@ pub(super) fn build_roadmap(
     // edges whose stored clearance is too small for it.
     let smallest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(f32::INFINITY, f32::min);
     let (edge_min_m, edge_max_m) = edge_length_limits_m(scenario, map)?;
-    // Nodes keep `safety_margin_m` from the geofence: a vehicle beyond it lands. The fence is a
-    // box, so an edge between two nodes inside lies inside.
+    // Nodes keep `safety_margin_m` from the geofence: a vehicle beyond the fence lands. The fence
+    // is a box, so an edge between two nodes inside lies inside.
     let room = Point::repeat(settings.safety_margin_m);
     let fence = scenario.mission.geofence.as_ref();
     let fenced = fence.map(|f| map.with_nodes_inside(&(f.min + room), &(f.max - room)));
@@ -206,6 +210,7 @@ pub(super) fn build_roadmap(
         sampling: settings.sampling,
     };
     let (mut roadmap, mut parts) = roadmap::build(map, &terminals, &config)?;
+    // Removes the edges that join two terminals, if the scenario forbids them.
     let keep_apart = |roadmap: &mut BuiltRoadmap| {
         if settings.terminal_edges == TerminalEdges::Forbidden {
             let is_terminal = |node: u16| usize::from(node) < terminals.len();

@@ -57,14 +57,16 @@ pub struct HostPlanner<'a> {
     initial_plan: &'a HostPlan,
     files: PlanFiles<'a>,
     workspaces: HostWorkspaces,
+    /// Memory for the swarm's plan while a request is answered.
     swarm_plan: Box<HostPlan>,
+    /// Memory for the requesting vehicle's inputs and plan.
     own: Box<OwnPlanMemory<VEHICLES, WAYPOINTS, GATES, ZONES>>,
 }
 
 impl<'a> HostPlanner<'a> {
     /// A planner for a mission whose plan before the first take-off is `plan`.
     pub fn new(mission: &'a PreparedMission, plan: &'a HostPlan) -> Self {
-        // The file is one of the two, or empty over level ground.
+        // The file is a roadmap, or a field over terrain, or empty over level ground.
         let file = &mission.roadmap_or_field_file;
         let files = PlanFiles {
             mission: Some(mission.mission_view()),

@@ -28,7 +28,7 @@ pub type HostPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
 /// One vehicle's part of the swarm's plan, with its gates.
 pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
 
-/// Nominal speed of take-off and landing in a plan, m/s.
+/// Nominal speed of take-off and landing in the plan of a mission with goals, m/s.
 pub const VERTICAL_MPS: f32 = 1.0;
 /// Mean speed along a path that the schedule assumes, as a share of cruise speed: corners, braking
 /// and gusts take the rest.
@@ -44,8 +44,8 @@ pub struct PreparedMission {
     pub goals: Vec<Point>,
     /// The roadmap of a mission with goals; empty for an area.
     pub roadmap: BuiltRoadmap,
-    /// Bytes of the roadmap file for a board; over terrain those of the field file; empty over
-    /// level ground.
+    /// Bytes of the roadmap file for a board; in a coverage mission those of the field file, empty
+    /// over level ground.
     pub roadmap_or_field_file: Vec<u8>,
     /// Bytes of the mission file for a board.
     pub mission_file: Vec<u8>,
@@ -128,7 +128,8 @@ impl PreparedMission {
         Ok(own)
     }
 
-    /// The roadmap file, parsed as on a board: each call checks the whole file.
+    /// The roadmap file, parsed as on a board: each call checks the whole file. Panics in a
+    /// coverage mission, which has none.
     pub fn roadmap_view(&self) -> RoadmapView<'_> {
         parse_roadmap(&self.roadmap_or_field_file)
     }
@@ -178,6 +179,7 @@ impl PreparedMission {
         MissionView::parse(&self.mission_file).expect("we wrote it ourselves")
     }
 
+    /// Encodes the mission file; `block` is its part about goals or about an area.
     pub(super) fn encode(&self, block: &MissionBlock<'_>) -> anyhow::Result<Vec<u8>> {
         let scenario = &self.scenario;
         let header = MissionHeader {

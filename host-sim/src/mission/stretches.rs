@@ -1,5 +1,6 @@
-//! Routes with more lanes than one path holds are flown in stretches, with a division of the
-//! remaining area between them. Counts the divisions that a mission takes if no vehicle is lost.
+//! Routes with more lanes than one path holds are flown in stretches; after each stretch the
+//! remaining area is divided again. Counts the divisions that a mission takes if no vehicle is
+//! lost.
 
 use anyhow::bail;
 use companion::swarm::fleet::{COMMITMENT_S, MAX_DIVISIONS, VehicleDivisionInput};

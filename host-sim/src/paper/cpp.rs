@@ -43,6 +43,7 @@ const FIG_9_AREAS: [&str; 2] = [
 const TABLE_4_AREA: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
 /// Starts of the three UAVs of Table 4, east and north in metres: the first is far away.
 const TABLE_4_STARTS: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
+/// The paper's methods, in the order of its tables.
 const METHODS: [CoverageMethod; 3] =
     [CoverageMethod::SimpleBinpat, CoverageMethod::Binpat, CoverageMethod::PowellBinpat];
 /// Number of plans timed for each method and fleet size; Table 3 gets the median time.
@@ -71,6 +72,8 @@ fn paper_scenario(
     Ok(scenario::parse(&text, "paper cpp")?)
 }
 
+/// Starts of `count` vehicles 5 m apart in a row 20 m south of the origin, east and north in
+/// metres.
 fn starts_in_a_row(count: usize) -> Vec<[f64; 2]> {
     (0..count).map(|i| [5.0 * i as f64, -20.0]).collect()
 }
@@ -110,6 +113,8 @@ impl Tables {
         Ok(costs)
     }
 
+    /// Adds a row. `spacing` is lane spacing and height, metres; `both` has our values, then
+    /// theirs.
     fn add_row(
         &mut self,
         table: &str,
@@ -196,6 +201,7 @@ fn paper_figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
     Ok(vec![fig_8, fig_9, fig_10, fig_12, fig_13])
 }
 
+/// Table 2: distance costs of three vehicles, by method.
 fn table_2(tables: &mut Tables) -> anyhow::Result<()> {
     let scenario = paper_scenario(TABLE_2_AREA, &starts_in_a_row(3), 10.0, 35.0)?;
     for (method, theirs) in METHODS.into_iter().zip(TABLE_2_COSTS_M) {
@@ -239,6 +245,7 @@ fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Tables A1 to A12; also Table 5, the means of the largest times in them.
 fn flight_times_tables(tables: &mut Tables) -> anyhow::Result<()> {
     let mut mean_max = [[0.0; 3]; 2];
     for table in &FLIGHT_TIMES_TABLES {
@@ -272,6 +279,7 @@ fn flight_times_tables(tables: &mut Tables) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Table 6: times of three vehicles, by method; the paper's were flown by real vehicles.
 fn table_6(tables: &mut Tables) -> anyhow::Result<()> {
     let scenario = paper_scenario(SHORT_TRACK_POLYGON, &starts_in_a_row(3), 10.0, 20.0)?;
     for (method, theirs) in METHODS.into_iter().zip(REAL_FLIGHT_TIMES_S) {

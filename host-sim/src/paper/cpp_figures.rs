@@ -139,6 +139,7 @@ enum ValueSource {
 }
 
 impl ValueSource {
+    /// Both sources, each with its name in a panel's title.
     const BOTH: [(Self, &'static str); 2] =
         [(Self::Ours, "ours, planned"), (Self::Theirs, "theirs, flown in Gazebo")];
 
@@ -192,7 +193,8 @@ pub(super) fn spread_figures(rows: &[TableRow]) -> [Figure; 2] {
 }
 
 /// A chart of rows: one series a method (and number of UAVs, if the rows differ in it), one case a
-/// pair of spacing and height (and track, if the rows differ in it).
+/// pair of spacing and height (and track, if the rows differ in it). Charts with the same `scale`
+/// have the same largest value on their axes.
 fn chart(
     title: String,
     (unit, scale): (&str, &'static str),

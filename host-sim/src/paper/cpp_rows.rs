@@ -7,15 +7,21 @@ use crate::result::rounded;
 /// One line of a table.
 #[derive(Debug, Serialize)]
 pub(super) struct TableRow {
+    /// Number of the table; for Table 5 also its track.
     pub(super) table: String,
     /// `short` or `long` in a row of Tables A1 to A12, `None` in any other.
     #[serde(skip)]
     pub(super) track: Option<&'static str>,
     pub(super) method: &'static str,
+    /// Distance between lanes, metres; 0 in Table 5.
     pub(super) lane_m: f64,
+    /// Height of the pictures, metres; 0 in Table 5.
     pub(super) height_m: f64,
+    /// Unit of the values.
     pub(super) unit: &'static str,
+    /// Our values: one for each vehicle, in Table 3 for each fleet size, in Table 5 one.
     pub(super) ours: Vec<f64>,
+    /// The paper's values, alike.
     pub(super) theirs: Vec<f64>,
     pub(super) ours_summary: Option<ValueSummary>,
     pub(super) theirs_summary: Option<ValueSummary>,

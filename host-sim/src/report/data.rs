@@ -14,7 +14,7 @@ use super::track::TrackPoint;
 pub struct ReportData {
     /// Heading of the page, such as the scenario's name.
     pub title: String,
-    /// The command that made the page: `plan`, `fly`, `demo`.
+    /// The command that made the page, such as `plan` or `fly`.
     pub command: String,
     /// Program and version, such as `host-sim 0.1.0`.
     pub generated_by: String,

@@ -33,9 +33,9 @@ pub struct MapSurface {
     /// Edge of a cell as drawn, metres: the resolution times a power of two.
     #[serde(rename = "drawn_m")]
     pub drawn_cell_m: f32,
-    /// Rectangles, six numbers each: `2 · axis + (1 if it faces up the axis)`, layer, least `u` and
-    /// `v`, extent along `u` and `v`; in drawn cells, with `u` and `v` the two axes after `axis` in
-    /// the cycle east, north, up.
+    /// Rectangles, six numbers each: `2 · axis + (1 if it faces up the axis)`, position of its
+    /// plane along the axis, least `u` and `v`, extent along `u` and `v`; in drawn cells from
+    /// `min`, with `u` and `v` the two axes after `axis` in the cycle east, north, up.
     #[serde(serialize_with = "pack::words")]
     pub faces: Vec<u16>,
     /// Crease lines, five numbers each, in drawn cells: axis the line runs along, `u`, `v`, start,
@@ -82,7 +82,9 @@ impl MapSurface {
 /// Occupancy of the drawn cells, one byte each, with one empty layer around the map, so that a
 /// cell's neighbours need no range check.
 struct DrawnCells {
+    /// Numbers of drawn cells along each axis, without the empty layer.
     dims: [usize; 3],
+    /// Distance in `filled` from a cell to the next one along each axis.
     stride: [usize; 3],
     filled: Vec<bool>,
 }
@@ -108,6 +110,7 @@ impl DrawnCells {
         cells
     }
 
+    /// Rectangles in the form of [`MapSurface::faces`].
     fn faces(&self) -> Vec<u16> {
         let mut out = Vec::new();
         for axis in 0..3 {
@@ -133,6 +136,7 @@ impl DrawnCells {
         out
     }
 
+    /// Crease lines in the form of [`MapSurface::creases`].
     fn creases(&self) -> Vec<u16> {
         let mut out = Vec::new();
         for axis in 0..3 {

@@ -33,7 +33,8 @@ pub const CLEARANCE_CLASSES_M: [f32; 3] = [0.3, 0.8, 1.2];
 const NEAREST_EDGE_SHARE: f32 = 0.65;
 /// Number of nodes from which shortest paths are counted.
 const PATH_SOURCES: usize = 64;
-/// Rounds in which the far edges are chosen; a third would gain a tenth of what the second does.
+/// Rounds in which the far edges are chosen; a third round would gain a tenth of what the second
+/// does.
 const FAR_EDGE_ROUNDS: usize = 2;
 /// Longest detour around an edge, as a multiple of the edge's length; a longer detour counts as
 /// this long.
@@ -74,6 +75,7 @@ struct OutgoingEdge {
     /// How many of [`CLEARANCE_CLASSES_M`] the edge's clearance exceeds.
     clearance_class: u8,
     length_m: f32,
+    /// Index of the edge.
     edge: u32,
 }
 

@@ -93,6 +93,7 @@ impl ConnectedComponents {
         parts
     }
 
+    /// The root of a node's component.
     pub(super) fn component_of(&mut self, mut node: usize) -> usize {
         while self.0[node] != node {
             self.0[node] = self.0[self.0[node]];
@@ -101,6 +102,7 @@ impl ConnectedComponents {
         node
     }
 
+    /// Joins the components of two nodes.
     fn union(&mut self, a: usize, b: usize) {
         let (a, b) = (self.component_of(a), self.component_of(b));
         self.0[a.max(b)] = a.min(b);
@@ -129,6 +131,7 @@ impl<'a> CellSearch<'a> {
         (cells <= MAX_SEARCHED_CELLS).then_some(Self { shape: &map.shape, map, tree, required_m })
     }
 
+    /// Number of a cell in the map, x fastest; [`Self::cell`] is the inverse.
     fn index(&self, [i, j, k]: [u32; 3]) -> usize {
         let [nx, ny, _] = self.shape.dims.map(|d| d as usize);
         (k as usize * ny + j as usize) * nx + i as usize

@@ -49,7 +49,7 @@ impl TomlText<'_> {
     }
 }
 
-/// A TOML value, with its name and place for errors.
+/// A TOML value, with its place and its name for errors, such as `mission.goals[2]`.
 #[derive(Clone)]
 pub(super) struct TomlValue<'a> {
     pub(super) text: TomlText<'a>,
@@ -63,10 +63,12 @@ impl<'a> TomlValue<'a> {
         Self { text, name, span: value.span(), value: value.get_ref() }
     }
 
+    /// An error at the value: its name, then `why`.
     pub(super) fn error(&self, why: &str) -> ScenarioError {
         self.text.error(&self.span, format!("{} {why}", self.name))
     }
 
+    /// An error about the value's type: it must be `what`.
     fn expected_error(&self, what: &str) -> ScenarioError {
         self.error(&format!("must be {what}, not a value of type {}", self.value.type_str()))
     }
@@ -130,6 +132,7 @@ impl<'a> TomlValue<'a> {
         })
     }
 
+    /// The items of a list; a value that is no list is an error.
     pub(super) fn items(&self) -> Result<Vec<TomlValue<'a>>> {
         let array = self.value.as_array().ok_or_else(|| {
             let error = self.expected_error("a list");
@@ -176,6 +179,7 @@ pub(super) struct Table<'a> {
     pub(super) span: TomlSpan,
     name: String,
     table: &'a DeTable<'a>,
+    /// Keys that were read or declared so far, given in the file or not.
     requested_keys: RefCell<Vec<&'static str>>,
 }
 
@@ -189,10 +193,12 @@ impl<'a> Table<'a> {
         Self { text, span, name: name.into(), table, requested_keys: RefCell::default() }
     }
 
+    /// Name of a key of this table for errors, such as `mission.goals`.
     fn path(&self, key: &str) -> String {
         if self.name.is_empty() { key.into() } else { format!("{}.{key}", self.name) }
     }
 
+    /// The value of `key`, if it is given; from now on the key is known.
     pub(super) fn get(&self, key: &'static str) -> Option<TomlValue<'a>> {
         self.requested_keys.borrow_mut().push(key);
         self.table.get(key).map(|value| TomlValue::new(self.text, self.path(key), value))
@@ -236,6 +242,7 @@ impl<'a> Table<'a> {
         self.requested_keys.borrow_mut().extend(keys);
     }
 
+    /// The number of `key` inside a range; `default` if the key is missing.
     pub(super) fn f32(
         &self,
         key: &'static str,
@@ -262,6 +269,7 @@ impl<'a> Table<'a> {
         self.get(key).map_or(Ok(default), |v| v.integer_in_range(range))
     }
 
+    /// The value of `key`; false if the key is missing.
     pub(super) fn boolean(&self, key: &'static str) -> Result<bool> {
         self.get(key).map_or(Ok(false), |v| v.boolean())
     }

@@ -132,6 +132,7 @@ fn unsupported_error(text: TomlText<'_>, span: &TomlSpan, what: &str) -> Scenari
     text.error(span, format!("not available yet: {what}"))
 }
 
+/// Reads a table that no code uses yet; if the scenario has it, adds the error that refuses it.
 fn read_unsupported(
     root: &Table<'_>,
     key: &'static str,
@@ -313,6 +314,8 @@ fn read_geofence(value: &TomlValue<'_>) -> Result<Geofence> {
 /// What a scenario without vehicles lacks.
 const VEHICLES_HINT: &str = "add a `[[vehicles]]` with `id` and `start` for each";
 
+/// Reads `[[vehicles]]`. Places in degrees need `origin`; each key that missions with goals do not
+/// support adds an error to `unsupported`.
 fn read_vehicles(
     value: &TomlValue<'_>,
     origin: Option<&Geodetic>,

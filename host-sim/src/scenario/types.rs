@@ -169,7 +169,8 @@ impl Geofence {
 pub struct VehicleSection {
     /// MAVLink system id, 1 to 250.
     pub id: u8,
-    /// Where the vehicle's path begins, ENU metres.
+    /// Where the vehicle's path begins, ENU metres; in a coverage mission, as read, its pad on the
+    /// ground.
     pub start: Point,
     /// Index (from 0) into [`MissionSection::goals`], for labelled missions.
     pub goal_index: Option<usize>,

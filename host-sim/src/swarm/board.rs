@@ -68,7 +68,7 @@ struct LockStep {
 }
 
 impl RemoteCompanion {
-    /// Starts a board in QEMU whose flash holds this roadmap file and this mission file.
+    /// Starts a board in QEMU whose flash holds this roadmap or field file and this mission file.
     ///
     /// # Errors
     /// QEMU or the program does not start; the board's store would refuse a file.

@@ -28,7 +28,7 @@ pub struct FlownDivision {
     /// CRC of the plan that the vehicle flies after this division.
     pub plan_crc: u32,
     /// Time from the first commitment reported for this division until all that take part had
-    /// reported that all have the same one, seconds; `None` if not all reported it.
+    /// reported that all agree on it, seconds; `None` if not all reported that.
     pub agreement_s: Option<f32>,
 }
 
@@ -46,8 +46,11 @@ struct Agreement {
 /// What one vehicle last reported.
 #[derive(Clone, Copy, Debug, Default)]
 struct VehicleReport {
+    /// CRC of the plan in its last intent.
     plan_crc: u32,
+    /// Number of divisions agreed on, in its last roster report.
     number: u8,
+    /// Hash of the inputs of the last division agreed on.
     committed_hash: u32,
     /// Number of the division whose plan the vehicle flies; `flown_crc` is the CRC of that plan.
     flown_number: u8,
@@ -66,8 +69,8 @@ pub struct DivisionLog {
 }
 
 impl DivisionLog {
-    /// Reads the TUNNEL messages, roster reports and intents, among packets that stations sent at
-    /// `t_s`.
+    /// Reads the roster reports and intents, both of them TUNNEL messages, among packets that
+    /// stations sent at `t_s`.
     pub fn handle_packets(&mut self, t_s: f32, packets: &[Rc<[u8]>]) {
         for packet in packets {
             let mut input = &packet[..];
@@ -83,6 +86,8 @@ impl DivisionLog {
         }
     }
 
+    /// Notes how many divisions the report's sender counts, and the inputs of the division under
+    /// way that the report has.
     fn handle_roster(&mut self, t_s: f32, roster: &RosterReport) {
         let reported = self.vehicles.entry(roster.system_id).or_default();
         (reported.number, reported.committed_hash) = (roster.division_count, roster.committed_hash);
@@ -106,8 +111,8 @@ impl DivisionLog {
         }
     }
 
-    /// Notes how far the vehicles are with the division under way. A report that holds only some of
-    /// the vehicles does not show whether all agree.
+    /// Notes when a commitment to the division under way is first reported, and when all vehicles
+    /// agree on it. Where a report holds only some of the vehicles, only their agreement is seen.
     fn note_agreement(&mut self, t_s: f32, roster: &RosterReport) {
         let own = |entry: &&RosterReportEntry| entry.status == ShareStatus::Alive;
         let alive = roster.entries.iter().filter(own);
@@ -123,6 +128,7 @@ impl DivisionLog {
         }
     }
 
+    /// Notes the plan that the intent's sender flies.
     fn handle_intent(&mut self, t_s: f32, intent: &Intent) {
         self.vehicles.entry(intent.system_id).or_default().plan_crc = intent.plan_crc;
         self.log_division_once_flown(t_s, intent.system_id);

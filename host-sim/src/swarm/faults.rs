@@ -46,8 +46,9 @@ const DEFAULT_ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
 /// Duration of a serial stall or an autopilot's boot if the fault has no `duration_s`, seconds.
 const DEFAULT_STALL_OR_BOOT_S: f32 = 3.0;
 
-/// Refuses faults that the simulation cannot play: resetting a companion needs it in this process,
-/// disturbing its planner too; a radio cut needs the simulated radio, a damaged roadmap a file.
+/// Refuses faults that the simulation cannot play: to reset a companion or disturb its planner, the
+/// companion has to run in this process; a radio cut needs the simulated radio, a damaged roadmap a
+/// roadmap or field file.
 ///
 /// # Errors
 /// Names the fault, and the vehicle that it cannot strike.
@@ -90,6 +91,7 @@ pub struct FaultTargets<'a> {
     pub obstacles: &'a mut Vec<(Point, f32)>,
 }
 
+/// Whether a fault has begun, and whether it is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum FaultStage {
     Pending,
@@ -100,7 +102,9 @@ enum FaultStage {
 /// The scenario's faults, which of them act or are over, and which vehicles they have struck.
 pub struct FaultScript<'a> {
     scenario: &'a Scenario,
+    /// Stage of each fault.
     stages: Vec<FaultStage>,
+    /// Whether each vehicle was struck by a fault so far.
     struck: Vec<bool>,
 }
 
@@ -186,6 +190,7 @@ impl<'a> FaultScript<'a> {
     }
 }
 
+/// Begins a fault on vehicle `i`.
 fn begin_fault(
     fault: &Fault,
     i: usize,
@@ -193,7 +198,7 @@ fn begin_fault(
     world: &mut FaultTargets<'_>,
 ) -> anyhow::Result<()> {
     let member = &mut world.members[i];
-    let spell_us = now_us + (fault.duration_s.unwrap_or(DEFAULT_STALL_OR_BOOT_S) * 1e6) as u64;
+    let until_us = now_us + (fault.duration_s.unwrap_or(DEFAULT_STALL_OR_BOOT_S) * 1e6) as u64;
     match fault.kind {
         "kill" => {
             world.radio.set_outage(i, RadioOutage { tx_failed: true, rx_failed: true });
@@ -205,7 +210,7 @@ fn begin_fault(
                 .radio
                 .set_outage(i, RadioOutage { tx_failed: way != "rx", rx_failed: way != "tx" });
         }
-        "serial-stall" => member.stall_serial(spell_us),
+        "serial-stall" => member.stall_serial(until_us),
         "serial-corrupt" => member.set_serial_corruption(CORRUPTED_SHARE),
         "position-jump" => {
             member
@@ -219,7 +224,7 @@ fn begin_fault(
         "battery-low" => member.autopilot.set_battery(BATTERY_LEFT_SHARE),
         "pilot-takeover" => member.autopilot.take_over_by_pilot(),
         "pilot-return" => return_from_pilot(i, now_us, world),
-        "autopilot-reboot" => member.reboot_autopilot(spell_us),
+        "autopilot-reboot" => member.reboot_autopilot(until_us),
         "companion-reset" => member.reset_companion(now_us)?,
         "late-plan" => member.plan_answer = PlanAnswer::Withheld,
         "bad-roadmap" => member.plan_answer = PlanAnswer::BadRoadmap,
@@ -231,6 +236,7 @@ fn begin_fault(
     Ok(())
 }
 
+/// Ends a fault on vehicle `i`; `corruption` is the scenario's share of corrupted serial bytes.
 fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>, corruption: f64) {
     let member = &mut world.members[i];
     match fault.kind {
@@ -253,6 +259,7 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
     }
 }
 
+/// The pilot gives vehicle `i` back, and the ground station commands its companion to continue.
 fn return_from_pilot(i: usize, now_us: u64, world: &mut FaultTargets<'_>) {
     world.members[i].autopilot.return_from_pilot();
     world.ground_station.set_command(now_us, i, OperatorCommand::Resume);

@@ -3,9 +3,9 @@
 //!
 //! Each autopilot has one more port for the ground station, with a ground station's stream rates
 //! ([`sim_autopilot::link::port::GROUND_STREAMS`]). Of the packets that companions broadcast,
-//! heartbeats, texts and command acknowledgements go to it too. What the ground station sends goes
-//! to every autopilot and by radio to every companion; each obeys what is addressed to it, as
-//! behind a real telemetry radio.
+//! heartbeats, texts and command acknowledgements go to the ground station too. What the ground
+//! station sends goes to every autopilot and by radio to every companion; each obeys what is
+//! addressed to it, as behind a real telemetry radio.
 
 use std::io;
 use std::rc::Rc;

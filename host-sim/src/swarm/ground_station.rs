@@ -37,16 +37,18 @@ pub enum OperatorCommand {
 }
 
 impl OperatorCommand {
-    /// Whether a vehicle in this state has not obeyed the command yet.
+    /// Whether a vehicle in this state may not have obeyed the command yet; the state does not show
+    /// whether a return or landing was obeyed.
     fn is_still_needed(self, state: State) -> bool {
         match self {
-            // A vehicle before its start needs it too: a pause holds it on its pad.
+            // A vehicle before its start may need a resume too: a pause holds it on its pad.
             Self::Resume => state.may_need_resume(),
             Self::Pause => state != State::Paused,
             Self::Return | Self::Land => true,
         }
     }
 
+    /// The MAVLink command to the vehicle with this id.
     fn command(self, id: u8) -> COMMAND_LONG_DATA {
         match self {
             Self::Resume => command_long(PAUSE_CONTINUE, id, 1.0),
@@ -62,8 +64,10 @@ impl OperatorCommand {
 pub struct GroundStation {
     system_id: u8,
     sequence: u8,
+    /// When a vehicle was first ready.
     first_ready_us: Option<u64>,
     start_commanded_us: Option<u64>,
+    /// When frames were last due, the start's first one or a repetition.
     last_sent_us: u64,
     /// Commands to single vehicles: vehicle's index, command, and until when it is repeated.
     orders: Vec<(usize, OperatorCommand, u64)>,
@@ -106,8 +110,8 @@ impl GroundStation {
         self.obstacles.push((centre, radius_m));
     }
 
-    /// Sends what is due: the start once all are ready, then each second the start, commands and
-    /// obstacles to vehicles that need them.
+    /// Sends what is due: the start once all are ready, or 90 s after the first; then each second
+    /// obstacles to all vehicles, and the start and commands to vehicles that need them.
     pub fn step(
         &mut self,
         now_us: u64,

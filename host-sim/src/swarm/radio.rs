@@ -34,6 +34,7 @@ pub struct Radio {
     config: RadioConfig,
     rng: Pcg32,
     outages: Vec<RadioOutage>,
+    /// Packets on their way to each station, with the time of reception, microseconds.
     queues: Vec<VecDeque<(u64, Rc<[u8]>)>>,
     /// Packets that stations sent since the last [`Self::take_recorded`]; `None`: not recorded.
     recorded: Option<Vec<Rc<[u8]>>>,

@@ -1,5 +1,5 @@
 //! The referee of a simulation: sees the true motion at every physics step, and nothing of what
-//! companions estimate or report but their progress.
+//! companions estimate or report but their state and progress.
 //!
 //! A wall contact is a body (a sphere of the vehicle's radius) that reaches into an obstacle of the
 //! exact map; a contact that lasts counts once. While a vehicle takes off or lands, obstacle cells
@@ -19,8 +19,8 @@ use crate::terrain::HeightGrid;
 const CONTACT_ROUNDING_M: f32 = 1e-3;
 /// Time without progress in flight that counts as a deadlock, seconds.
 const DEADLOCK_S: f64 = 20.0;
-/// Longest wait for a vehicle out of radio range, seconds: 45 until it counts as lost, and some for
-/// those in between.
+/// Longest wait for a vehicle out of radio range, seconds: 45 until it counts as lost, and a
+/// reserve.
 const MAX_OUT_OF_RANGE_WAIT_S: f64 = 60.0;
 /// Least increase of arc length along the path that counts as progress, metres.
 const MIN_COUNTED_PROGRESS_M: f32 = 0.1;
@@ -65,13 +65,14 @@ pub struct Observation {
 pub struct DistanceSample {
     /// Seconds since the start of the simulation.
     pub t_s: f32,
-    /// Smallest distance between two centres, not both on the ground, metres; infinite if no such
-    /// pair.
+    /// Smallest distance between two centres, not both on the ground and neither of a falling
+    /// vehicle or a wreck, metres; infinite if no such pair.
     pub min_separation_m: f32,
     /// Smallest distance of a flying centre to an obstacle, metres; infinite if none was near.
     pub min_clearance_m: f32,
 }
 
+/// What the referee remembers of one vehicle.
 #[derive(Clone, Debug)]
 struct WatchedVehicle {
     id: u8,
@@ -82,9 +83,13 @@ struct WatchedVehicle {
     /// Where the vehicle's distance to the nearest obstacle was last measured, and that distance,
     /// metres.
     measured_clearance: Option<(Point, f32)>,
+    /// Greatest arc length along its present path so far, metres.
     best_progress_m: f32,
+    /// Where the vehicle last made progress, or did not have to.
     progress_position: Point,
+    /// When that was, seconds.
     last_progress_s: f64,
+    /// Whether its present standstill was counted as a deadlock.
     in_deadlock: bool,
     track: Vec<(f32, Point)>,
 }
@@ -100,9 +105,13 @@ pub struct Referee<'a> {
     pub area_obstacles: Option<&'a MapObstacles>,
     safety_distance_m: f32,
     vehicles: Vec<WatchedVehicle>,
+    /// By pair, at `i * n + j` for vehicles `j < i`: whether they are nearer than the safety
+    /// distance; if one falls or is a wreck, whether they touch.
     too_near: Vec<bool>,
+    /// By pair as above: whether they touch, if neither falls or is a wreck.
     touching: Vec<bool>,
     last_recorded_s: f64,
+    /// Smallest distances since the last sample.
     sample_so_far: DistanceSample,
     /// Whether a deadlock that ends no longer counts: where faults strike, vehicles wait until it
     /// is known what became of the struck vehicle, and for their turn to fly around it.
@@ -112,7 +121,7 @@ pub struct Referee<'a> {
     pub retracts_out_of_range_waits: bool,
     /// Spherical obstacles that are in no map: centre and radius, metres.
     pub sphere_obstacles: Vec<(Point, f32)>,
-    /// Number of times that a body began to touch an obstacle.
+    /// Number of times that a body began to touch an obstacle, a falling vehicle or a wreck.
     pub wall_contacts: u32,
     /// Number of times that a pair came nearer than the safety distance.
     pub violations: u32,
@@ -121,7 +130,8 @@ pub struct Referee<'a> {
     pub deadlocks: u32,
     /// Smallest distance of a flying centre to an obstacle in the whole flight, metres.
     pub min_clearance_m: f32,
-    /// Smallest distance between two centres, not both on the ground, in the whole flight, metres.
+    /// Smallest distance between two centres, not both on the ground and neither of a falling
+    /// vehicle or a wreck, in the whole flight, metres.
     pub min_separation_m: f32,
     /// Smallest distances over time, one sample each 0.2 s.
     pub samples: Vec<DistanceSample>,
@@ -132,7 +142,7 @@ pub struct Referee<'a> {
 /// What the referee saw.
 #[derive(Clone, Debug)]
 pub struct Incident {
-    /// When it began, or counted, seconds.
+    /// When it began; for a deadlock, when it counted as one. Seconds.
     pub t_s: f64,
     /// Index of the vehicle.
     pub vehicle: usize,
@@ -242,6 +252,7 @@ impl<'a> Referee<'a> {
         above_m < radius_m - CONTACT_ROUNDING_M
     }
 
+    /// Measures vehicle `i`'s distance to obstacles, and counts contacts that begin.
     fn watch_walls(&mut self, i: usize, t_s: f64, now: &Observation) {
         if matches!(now.phase, RefereePhase::Grounded | RefereePhase::Falling | RefereePhase::Wreck)
         {
@@ -314,6 +325,7 @@ impl<'a> Referee<'a> {
         grids.any(|grid| touches_cell_beside(grid, position, radius_m))
     }
 
+    /// Measures the distances between vehicles, and counts violations that begin.
     fn watch_pairs(&mut self, t_s: f64, seen: &[Observation]) {
         let n = seen.len();
         for i in 0..n {
@@ -383,6 +395,7 @@ impl<'a> Referee<'a> {
         ));
     }
 
+    /// Counts vehicle `i`'s standstill as a deadlock once it has lasted too long.
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
         // Progress decreases only if it is now counted along another path.

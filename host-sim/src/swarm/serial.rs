@@ -31,7 +31,9 @@ const BAUDS: [u64; 8] = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800
 pub struct SerialLink {
     config: SimulatedSerialConfig,
     rng: Pcg32,
+    /// When the last bit of all writes so far leaves the transmitter.
     busy_until_us: u64,
+    /// Bytes of all writes under way.
     bytes: VecDeque<u8>,
     /// Time of arrival (microseconds) and length of each write under way.
     writes: VecDeque<(u64, usize)>,

@@ -49,7 +49,7 @@ pub struct SimulatedVehicle {
     plan_requests: PlanRequests,
     /// How a plan request is answered.
     pub plan_answer: PlanAnswer,
-    /// Text of the last warning of the mission table since the vehicle last followed its path.
+    /// Last warning text of the mission table since `Follow` was entered or `Aborted` was left.
     pub last_warning: Option<&'static str>,
     /// When the vehicle first left the ground, seconds.
     pub took_off_s: Option<f64>,
@@ -63,6 +63,7 @@ pub struct SimulatedVehicle {
     config: Config<VEHICLES>,
     to_companion: SerialLink,
     to_autopilot: SerialLink,
+    /// Height of ground or obstacle below the vehicle, metres ENU, as last measured.
     ground_m: f32,
     received_bytes: Vec<u8>,
     /// When the companion last started, microseconds of simulation time.
@@ -376,8 +377,7 @@ impl SimulatedVehicle {
             .or_else(|| self.to_autopilot.describe_fault(lasted_s))
     }
 
-    /// Gives a ground station's frame to a board whose radio is not simulated, by the autopilot's
-    /// serial link, as an autopilot forwards it.
+    /// Sends a ground station's frame by the serial link to a board without simulated radio.
     pub fn forward_to_board(&mut self, now_us: u64, frame: &[u8]) {
         if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_offline(now_us) {
             self.to_companion.write(now_us, frame);
@@ -494,7 +494,7 @@ pub fn is_started(state: State) -> bool {
     !state.is_before_start()
 }
 
-/// Whether a vehicle in this state does not move any more: its mission is done or aborted.
+/// Whether the mission of a vehicle in this state is over: done or aborted.
 pub fn is_finished(state: State) -> bool {
     state.is_over()
 }

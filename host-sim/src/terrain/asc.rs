@@ -10,6 +10,7 @@ use super::limits::{MAX_BYTES, MAX_CELLS};
 use super::raster::Raster;
 use crate::files;
 
+/// Name of the format in errors.
 const FORMAT: &str = "an ESRI grid";
 
 pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
@@ -27,6 +28,7 @@ pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     parse(&text, crs)
 }
 
+/// The coordinate system of a `.prj` file; units other than metres and degrees are refused.
 fn parse_coordinate_system(text: &str) -> Result<Crs, TerrainError> {
     let system = CoordinateSystem::wkt(text.trim())?;
     if system.unit_m.is_some_and(|unit_m| unit_m != 1.0) {
@@ -43,18 +45,21 @@ fn parse_coordinate_system(text: &str) -> Result<Crs, TerrainError> {
 struct GridHeader {
     /// Columns and rows.
     size: [usize; 2],
-    /// The south-western corner.
+    /// Outer corner of the south-western cell, in the file's coordinates.
     south_west_corner: [f64; 2],
+    /// Sides of a cell, in x and in y, in the file's units.
     cell_sides: [f64; 2],
     /// The number that stands for no height.
     missing_value: f64,
 }
 
 impl GridHeader {
+    /// Reads the header; the next of `words` is then the first height.
     fn read<'a>(words: &mut Peekable<impl Iterator<Item = &'a str>>) -> Result<Self, TerrainError> {
         let bad = |why: &str| TerrainError::malformed(FORMAT, &why);
         let (mut size, mut corner, mut middle) = ([None; 2], [None; 2], [false; 2]);
         let (mut cell, mut missing) = ([None; 2], -9999.0);
+        // Of words that begin with n only these are keys: others may be the height `nan`.
         while let Some(key) = words.next_if(|word| {
             word.starts_with(|c: char| c.is_ascii_alphabetic() && c != 'n' && c != 'N')
                 || ["ncols", "nrows", "nodata_value"].contains(&word.to_ascii_lowercase().as_str())

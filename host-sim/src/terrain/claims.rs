@@ -73,6 +73,7 @@ impl<R: Read + Seek> NumberReader<'_, R> {
     }
 }
 
+/// As [`check_declared_sizes`], for a file of `length` bytes; leaves it anywhere.
 fn check_sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(), &'static str>> {
     let mut numbers = NumberReader { file, length };
     let (minor, returns_at, format) =

@@ -1,8 +1,8 @@
 //! Reads point clouds (LAS, LAZ): each cell of the grid gets the highest return in it.
 //!
 //! Cells are so large that they hold four returns on average, so that few are empty; an empty cell
-//! between others gets the highest height near it. Returns classified as noise do not count, nor
-//! do those flagged as withheld: their producer deleted them.
+//! between cells with heights gets the highest height near it. Returns classified as noise do not
+//! count, nor do those flagged as withheld: their producer deleted them.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
@@ -21,12 +21,14 @@ use super::limits::MAX_BYTES;
 use super::{claims, guard};
 use crate::files;
 
+/// Name of the format in errors.
 const FORMAT: &str = "a point cloud";
 /// Mean number of returns in a cell, from which the cell's side follows.
 const RETURNS_PER_CELL: f64 = 4.0;
 /// Least side of a cell of the grid, metres.
 const MIN_CLOUD_CELL_M: f64 = 0.5;
-/// An empty cell is filled if cells on both sides, at most this many cells away, have heights.
+/// An empty cell is filled if cells on both sides in its row or column, at most this many cells
+/// away, have heights.
 const MAX_BRIDGED_CELLS: usize = 3;
 /// Number of returns decoded at a time.
 const RETURNS_PER_BATCH: u64 = 4096;
@@ -54,6 +56,7 @@ where
     decoded.unwrap_or_else(|| Err(malformed(&"its returns are damaged")))
 }
 
+/// Puts the returns of a cloud into a grid; the decoder may panic.
 fn grid_of_returns<R>(file: R, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError>
 where
     R: Read + Seek + Send + Sync + 'static,

@@ -54,6 +54,7 @@ impl CoordinateSystem {
         Self::proj(&proj, &name)
     }
 
+    /// The system that a PROJ definition describes; `name` is for the error.
     fn proj(definition: &str, name: &str) -> Result<Self, TerrainError> {
         let unusable = || TerrainError::unusable_crs(name);
         // The library would silently leave out a datum shift by a grid file that it does not have.
@@ -74,6 +75,8 @@ impl CoordinateSystem {
         Ok(Self { proj, wgs84, unit_m })
     }
 
+    /// Longitude and latitude, WGS84 degrees, of a place in the file's coordinates; `None` outside
+    /// the system's domain.
     pub(super) fn to_wgs84_degrees(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
         let mut place = match self.unit_m {
             Some(_) => (x, y, 0.0),
@@ -84,6 +87,8 @@ impl CoordinateSystem {
         found.iter().all(|degrees| degrees.is_finite()).then_some(found)
     }
 
+    /// The file's coordinates of a place given by longitude and latitude, WGS84 degrees; `None`
+    /// outside the system's domain.
     fn wgs84_degrees_to_crs(&self, [lon, lat]: [f64; 2]) -> Option<[f64; 2]> {
         let mut place = (lon.to_radians(), lat.to_radians(), 0.0);
         transform(&self.wgs84, &self.proj, &mut place).ok()?;
@@ -96,7 +101,8 @@ impl CoordinateSystem {
 }
 
 impl Crs {
-    /// Refuses a file without a coordinate system, unless its coordinates are then metres.
+    /// Refuses a file without a coordinate system, unless `without_crs` takes its coordinates as
+    /// metres.
     pub(super) fn check_usable(&self, without_crs: WithoutCrs) -> Result<(), TerrainError> {
         match self {
             Self::Unstated if without_crs == WithoutCrs::Refused => {

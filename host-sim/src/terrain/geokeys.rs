@@ -3,22 +3,30 @@
 use super::crs::{CoordinateSystem, Crs, epsg_unit_m};
 use super::error::{TerrainError, WARP_HINT};
 
+/// Id of the key for the kind of system: 1 projected, 2 geographic, 3 geocentric.
 const MODEL: u16 = 1024;
+/// Id of the key that is 2 if coordinates are those of the cells' centres.
 const RASTER: u16 = 1025;
+/// Id of the key for the EPSG code of a geographic system.
 const GEOGRAPHIC: u16 = 2048;
+/// Id of the key for the EPSG code of a projected system.
 const PROJECTED: u16 = 3072;
+/// Id of the key for the EPSG code of the unit of projected coordinates.
 const LENGTH_UNIT: u16 = 3076;
+/// Id of the key for the EPSG code of the vertical system.
 const VERTICAL: u16 = 4096;
+/// Id of the key for the EPSG code of the unit of heights.
 const HEIGHT_UNIT: u16 = 4099;
-/// Value of a key whose system is user-defined, by other keys.
+/// Value, instead of an EPSG code, of a key whose system or unit other keys define.
 const USER_DEFINED: u16 = 32767;
 /// EPSG codes of vertical systems, national and global, with heights above sea level in metres.
 const METRE_HEIGHT_SYSTEMS: [u16; 18] = [
     3855, 5701, 5702, 5703, 5705, 5709, 5711, 5714, 5720, 5728, 5730, 5773, 5776, 5782, 5783, 6647,
     7837, 9274,
 ];
-/// EPSG codes of vertical systems in feet: international here, US survey below.
+/// EPSG codes of vertical systems with heights in international feet.
 const FOOT_HEIGHT_SYSTEMS: [u16; 1] = [8228];
+/// EPSG codes of vertical systems with heights in US survey feet.
 const US_FOOT_HEIGHT_SYSTEMS: [u16; 1] = [6360];
 
 /// The GeoKeys of a file: id and value.

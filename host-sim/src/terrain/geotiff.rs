@@ -15,6 +15,7 @@ use super::limits::{MAX_BYTES, MAX_CELLS};
 use super::raster::Raster;
 use crate::files;
 
+/// Name of the format in errors.
 const FORMAT: &str = "a GeoTIFF";
 /// Longest strip or tile that is decoded, bytes.
 const MAX_CHUNK_BYTES: usize = 1 << 27;
@@ -31,6 +32,7 @@ fn bad_file(why: &impl ToString) -> TerrainError {
     TerrainError::malformed(FORMAT, why)
 }
 
+/// An error of the decoder: one of reading the file, or else the file is malformed.
 fn tiff_error(error: TiffError) -> TerrainError {
     match error {
         TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => {
@@ -123,7 +125,8 @@ fn is_missing_value(value: f64, missing: f64) -> bool {
     value == missing || value as f32 == missing as f32
 }
 
-/// Coordinates of the first cell's outer corner, and the sides of cells, in the file's units.
+/// Coordinates of the first cell's outer (north-western) corner, and the sides of cells, in the
+/// file's units.
 fn georeference<R: Read + Seek>(
     decoder: &mut Decoder<R>,
     keys: &GeoKeys,

@@ -8,8 +8,10 @@ use super::limits::MAX_CELLS;
 /// Heights of the ground in the mission frame. Cell (0, 0) is the south-western one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightGrid {
+    /// South-western corner of the grid, metres east and north.
     low: Flat,
     cell_m: f32,
+    /// Numbers of columns and of rows.
     size: [usize; 2],
     /// Height of each cell, metres, row by row from the south; NaN: no height.
     heights_m: Vec<f32>,
@@ -138,7 +140,8 @@ impl HeightGrid {
         found
     }
 
-    /// The grid with heights above `zero_m`, a height above the present zero, metres.
+    /// The grid with its heights measured from a new zero, which is `zero_m` metres above the old
+    /// one.
     pub fn relative_to(mut self, zero_m: f64) -> Self {
         for height_m in self.heights_m.iter_mut().chain(&mut self.centre_heights_m) {
             *height_m = (f64::from(*height_m) - zero_m) as f32;
@@ -146,6 +149,7 @@ impl HeightGrid {
         self
     }
 
+    /// Column and row of the cell that contains a place; `None` outside the grid.
     fn cell_of(&self, place: &Flat) -> Option<[usize; 2]> {
         let cell = (place - self.low) / self.cell_m;
         let inside = (0..2).all(|axis| cell[axis] >= 0.0 && cell[axis] < self.size[axis] as f32);
@@ -161,8 +165,8 @@ impl HeightGrid {
         true
     }
 
-    /// Fills each hole that has cells with heights on both sides, at most `reach` cells away, with
-    /// the greatest height within that reach.
+    /// Fills each cell without height that has cells with heights on both sides in its row or
+    /// column, at most `reach` cells away, with the greatest height in the square of that reach.
     pub(super) fn fill_holes(&mut self, reach: usize) {
         let before = self.clone();
         let [columns, rows] = self.size;

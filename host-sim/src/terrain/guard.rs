@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
 use std::sync::Once;
 
 thread_local! {
+    /// Whether a panic of this thread prints no message.
     static SUPPRESSES_PANIC_MESSAGE: Cell<bool> = const { Cell::new(false) };
 }
 

@@ -36,6 +36,7 @@ impl Raster {
         ]
     }
 
+    /// The inverse of [`Self::file_coordinates`].
     fn cell_coordinates(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [
             (x - self.north_west_corner[0]) / self.cell_sides[0],
@@ -104,8 +105,8 @@ impl Raster {
         (!height_m.is_nan()).then_some(height_m)
     }
 
-    /// Moves the box's least corner to a corner of the file's cells, so that the cells of both
-    /// grids are the same where these are parallel.
+    /// Moves the box's least corner to a corner of the file's cells, so that the cells of file and
+    /// grid are the same where both have parallel sides.
     fn align_box(&self, origin: &Geodetic, [low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
         let corner =
             self.crs.to_mission_frame(origin, self.file_coordinates(0.0, self.rows as f64));
@@ -159,7 +160,7 @@ impl Raster {
         Some([range(0, self.columns)?, range(1, self.rows)?])
     }
 
-    /// The shorter side of a cell of the file, metres in the mission frame.
+    /// The shorter side, in metres, of a cell of the file at this column and row.
     fn cell_m(&self, origin: &Geodetic, [column, row]: [f64; 2]) -> Option<f32> {
         let at = |column: f64, row: f64| {
             self.crs.to_mission_frame(origin, self.file_coordinates(column, row))

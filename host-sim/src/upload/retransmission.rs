@@ -15,10 +15,11 @@ const MIN_TIMEOUT_S: f32 = 0.4;
 /// Longest timeout, seconds: MAVLink FTP servers recognise a repeated request for a few seconds,
 /// the companion's for at least three.
 const MAX_TIMEOUT_S: f32 = 2.0;
-/// Weights of a new round trip time and of its deviation, and number of deviations added to the
-/// timeout (RFC 6298, section 2).
+/// Weight of a new round trip time in the smoothed one (RFC 6298, section 2).
 const ROUND_TRIP_GAIN: f32 = 0.125;
+/// Weight of a new round trip's deviation in the smoothed deviation.
 const DEVIATION_GAIN: f32 = 0.25;
+/// Number of smoothed deviations that the timeout is longer than the smoothed round trip.
 const TIMEOUT_DEVIATIONS: f32 = 4.0;
 /// Most requests under way at once: the companion queues six.
 const MAX_UNDER_WAY: usize = 4;

@@ -41,7 +41,7 @@ pub fn good() -> String {
 }
 
 pub fn add(cases: &mut Cases) {
-    // Or all that is made of it would be refused for the same reason.
+    // If the right area were refused, all cases made from it would be, for the same reason.
     let (file, out) = (cases.file("toml", good().as_bytes()), cases.path("good-area"));
     let status = std::process::Command::new(env!("CARGO_BIN_EXE_host-sim"))
         .args(["cover", &file, "--out", &out])
@@ -68,7 +68,7 @@ pub fn add(cases: &mut Cases) {
     add_files(cases);
 }
 
-/// Values of the lists of wrong ones that are right here.
+/// Whether a value from the lists of wrong ones is right for this key.
 fn is_right(key: &str, value: &str) -> bool {
     matches!(key, "holes" | "no_fly") && value == "[]"
 }
@@ -78,7 +78,8 @@ fn cover(cases: &mut Cases, name: &str, text: &str) {
     cases.push(format!("cover, {name}"), &["cover", &file, "--out", &out]);
 }
 
-/// Files that are none, and right ones cut short and changed.
+/// Area and terrain files that are no regular files or no such files, and right ones cut short or
+/// changed.
 fn add_files(cases: &mut Cases) {
     let border = "[[[-3.7,40.3],[-3.698,40.3],[-3.698,40.301],[-3.7,40.301],[-3.7,40.3]]]";
     let geojson = format!("{{\"type\":\"Polygon\",\"coordinates\":{border}}}");
@@ -105,7 +106,7 @@ fn add_files(cases: &mut Cases) {
             ["missing", "dir", "fifo", "zero", "loop", "empty", "huge", "text", "random", "null"]
         {
             let path = cases.path(kind);
-            // Its ending says what it should be.
+            // The link's ending names the format that the file should have.
             let link = cases.path(&format!("{kind}-area.{end}"));
             let _ = std::os::unix::fs::symlink(path + ".txt", &link);
             cover(cases, &format!("{kind} as .{end}"), &text(&link));

@@ -47,7 +47,7 @@ pub fn add(cases: &mut Cases) {
         add(cases, "an endless option", &[&format!("--{}", "x".repeat(100_000))]);
         add(cases, "codes in an option", &["--\u{1b}[2J\u{202e}"]);
         add(cases, "an argument too many", &["one", "two", "three"]);
-        // All but the last argument; `demo` and `autopilot` need none or have a value missing then.
+        // Without the last argument: a required one is missing, or the value of an option.
         if given.len() > 2 || given[0] != "demo" {
             cases.push(format!("{number} {name}, cut"), &given[..given.len() - 1]);
         }
@@ -131,7 +131,7 @@ fn add_values(cases: &mut Cases, scenario: &str) {
     option("companion --id", &board, &["0", "3", "256", "x", ""]);
 }
 
-/// Results and lines that nobody takes.
+/// Results that cannot be written, and lines that cannot be printed.
 fn add_outputs(cases: &mut Cases, scenario: &str) {
     let taken = cases.file("txt", b"a file\n");
     let folder = cases.path("taken");

@@ -41,7 +41,7 @@ pub fn add(cases: &mut Cases) {
         cases.scenario(format!("goals from {kind}"), &text);
         let map = format!("\"{}\"", cases.path(&format!("{kind}.bt")));
         cases.scenario(format!("map from {kind}"), &scenarios::with("[map]", "file", &map));
-        // An empty flash and one that is missing are made.
+        // An empty flash file and a missing one are no errors: the companion makes them.
         if kind != "missing" && kind != "empty" {
             let flash = cases.path(&format!("{kind}.bin"));
             let args = [
@@ -61,7 +61,7 @@ pub fn add(cases: &mut Cases) {
     add_roadmaps(cases);
 }
 
-/// One file of each kind that is no good.
+/// Makes one file with this ending of each kind that no command can read.
 fn make(cases: &Cases, end: &str) {
     use std::os::unix::fs::symlink;
     let path = |kind: &str| cases.path(&format!("{kind}.{end}"));

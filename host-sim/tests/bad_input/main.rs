@@ -20,12 +20,13 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// What an input may take.
+/// Longest time that a command may take to refuse an input.
 const TIME: Duration = Duration::from_secs(10);
+/// Address space that a command gets, kB.
 const MEMORY_KB: u32 = 1_000_000;
 /// At least so many inputs are tried.
 const LEAST: usize = 375;
-/// Longest first line, characters: what is said around a quotation of 200.
+/// Longest line of an error message, characters: quotations of 200 and the words around them.
 const LINE: usize = 600;
 
 /// Where standard output goes.
@@ -89,7 +90,7 @@ impl Cases {
     }
 }
 
-/// What is wrong with what a program did, if anything.
+/// Runs the program with a wrong input; returns the time it took, or how it behaved wrongly.
 fn judge(case: &Case, folder: &Path, number: usize) -> Result<Duration, String> {
     let err = folder.join(format!("{number}.err"));
     let began = Instant::now();
@@ -101,7 +102,7 @@ fn judge(case: &Case, folder: &Path, number: usize) -> Result<Duration, String> 
         env!("CARGO_BIN_EXE_host-sim"),
     ]);
     child.args(&case.args).stdin(Stdio::null()).stderr(std::fs::File::create(&err).unwrap());
-    // Of address space, which every thread reserves for itself.
+    // Every thread reserves address space for itself, and that is what `ulimit` limits.
     child.env("RAYON_NUM_THREADS", "2").env("MALLOC_ARENA_MAX", "2");
     child.stdout(match case.output {
         Output::Full | Output::AllFull => {
@@ -148,7 +149,7 @@ fn judge(case: &Case, folder: &Path, number: usize) -> Result<Duration, String> 
     if errors != 1 || !lines[0].starts_with("error: ") {
         return fail("not one error");
     }
-    // The line of a scenario that is meant, marked, and hints.
+    // Further lines may only show the scenario's faulty line, mark its place, and give hints.
     let about = |line: &&&str| line.starts_with("hint: ") || line.contains(" |");
     if lines.len() > 6 || lines[1..].iter().filter(about).count() != lines.len() - 1 {
         return fail("more than one line, what it is about and hints");

@@ -159,7 +159,7 @@ pub fn add(cases: &mut Cases) {
     add_syntax(cases);
 }
 
-/// Values that are right each by itself.
+/// Values that are right each by itself, but not beside the others.
 fn add_contradictions(cases: &mut Cases) {
     let many: String = (0..40_000).map(|i| format!("[{i}, 0, 0], ")).collect();
     let endless = format!("\"{}\"", "x".repeat(300_000));

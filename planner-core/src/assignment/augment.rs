@@ -1,15 +1,15 @@
 //! Shortest augmenting paths: Dijkstra over the columns of a dense matrix, vectorised over all
 //! columns.
 //!
-//! A settled column is excluded by setting its price to minus infinity and its distance to
-//! infinity. Its reduced costs are then infinite, so the inner loop needs no test for it. Price and
-//! distance are saved, and restored at the end of the search.
+//! In the shortest-path search a settled column is excluded by setting its price to minus infinity
+//! and its distance to infinity. Its reduced costs are then infinite, so the inner loop needs no
+//! test for it. Price and distance are saved, and restored at the end of the search.
 
 use super::costs::CostMatrix;
 use super::state::{AugmentingPaths, MatchingState, SIMD_LANES, UNASSIGNED};
 
-/// Augments the matching by the shortest path from free row `k`. Returns false if no path leads to
-/// a free column.
+/// Augments the matching by the shortest path from the row `state.free_rows[k]`. Returns false if
+/// no path leads to a free column.
 pub(super) fn augment_from_row(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
@@ -39,15 +39,16 @@ pub(super) fn augment_from_free_rows(
 }
 
 /// Settles columns in the order of their distances until a free column is nearest; then updates the
-/// prices and flips the path to it. Returns false if no free column can be reached.
+/// prices and flips the path to it. `least` is the least distance of a column when the search
+/// begins. Returns false if no free column can be reached.
 fn augment_shortest_path(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
     paths: &mut AugmentingPaths<'_>,
     mut least: f64,
 ) -> bool {
-    // Columns at the same distance are settled together and wait in `settled[done..queued]`: with
-    // integer costs there are many.
+    // Columns at the same distance are settled together and wait in `settled_cols[done..queued]`:
+    // with integer costs many columns are at the same distance.
     let (mut done, mut queued) = (0, 0);
     let mut next = least;
     let end = loop {
@@ -138,6 +139,7 @@ fn relax_columns(
     least.into_iter().fold(f64::INFINITY, |a, b| if b < a { b } else { a })
 }
 
+/// Result of [`nearest_columns`].
 enum NearestColumns {
     /// A free column at the least distance: the end of an augmenting path.
     Free(u16),
@@ -247,6 +249,9 @@ pub(super) fn augment_bottleneck(
     }
 }
 
+/// As [`relax_columns`] for the bottleneck: sets `distance = min(distance, max(cost, so_far))` for
+/// all columns that are not `done`, with `row` as predecessor where that is less. `so_far` is the
+/// largest cost on the path to `row`.
 fn relax_by_largest_cost(
     line: &[f32],
     so_far: f64,
@@ -257,7 +262,7 @@ fn relax_by_largest_cost(
 ) {
     let columns = line.iter().zip(done).zip(distance).zip(previous);
     for (((&cost, &done), distance), previous) in columns {
-        // Not `max`: which zero it returns, if one is negative, depends on the processor.
+        // Not `max`: whether `max` of 0 and −0 returns 0 or −0 depends on the processor.
         let cost = f64::from(cost);
         let through = if cost > so_far { cost } else { so_far };
         if done == 0.0 && through < *distance {

@@ -30,10 +30,15 @@ pub enum AssignmentError {
 /// A checked cost matrix, transposed where necessary so that `rows <= cols`. Costs above `max_cost`
 /// count as infinite.
 pub(super) struct CostMatrix<'a> {
+    /// The caller's matrix, row-major, not transposed.
     pub(super) costs: &'a [f32],
+    /// Number of rows, after the transposition.
     pub(super) rows: usize,
+    /// Number of columns, after the transposition.
     pub(super) cols: usize,
+    /// Whether rows and columns are those of `costs` swapped.
     pub(super) transposed: bool,
+    /// Limit above which a cost counts as infinite; infinite if there is no limit.
     pub(super) max_cost: f32,
 }
 
@@ -62,6 +67,7 @@ impl<'a> CostMatrix<'a> {
         Ok(Self { costs: data, rows, cols, transposed, max_cost: f32::INFINITY })
     }
 
+    /// The cost of a row and a column, as they are after the transposition.
     #[inline]
     pub(super) fn cost_at(&self, row: u16, col: u16) -> f32 {
         let (row, col) = (usize::from(row), usize::from(col));
@@ -81,6 +87,7 @@ impl<'a> CostMatrix<'a> {
         self.copy_row(row, buffer)
     }
 
+    /// Copies one row of costs to `buffer`, with costs above `max_cost` as infinity.
     #[cold]
     fn copy_row<'b>(&self, row: usize, buffer: &'b mut [f32]) -> &'b [f32] {
         let (first, stride) = if self.transposed { (row, self.rows) } else { (row * self.cols, 1) };

@@ -9,8 +9,9 @@ const BLOCK_COLUMNS: usize = 64;
 
 /// Column reduction, then two rounds of augmenting row reduction. Column reduction is for square
 /// matrices only: it changes the price of every column, and a column that stays free must keep
-/// price 0. Returns the number of rows left in `state.free_rows`. `None` if a row or, in a square
-/// matrix, a column has no finite cost, so that not every row can be matched.
+/// price 0. Returns the number of rows that are left free, which are the first in
+/// `state.free_rows`. `None` if a row or, in a square matrix, a column has no finite cost, so that
+/// not every row can be matched.
 pub(super) fn reduce_to_free_rows(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
@@ -34,14 +35,15 @@ pub(super) fn reduce_to_free_rows(
 
 /// Sets each column's price to its least cost and matches it to the row with that cost, if the row
 /// is free. Then, for a row that is the cheapest of exactly one column, lowers that column's price
-/// by the row's slack (reduction transfer).
+/// by the row's slack (reduction transfer). Returns the number of rows left free, as
+/// [`reduce_to_free_rows`] does.
 fn reduce_columns(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
     paths: &mut AugmentingPaths<'_>,
 ) -> Option<usize> {
     // Many columns per pass, the last pass overlapping the one before: fewer passes over the rows
-    // of a large matrix mean fewer cache misses. A small matrix has fewer columns than that.
+    // of a large matrix mean fewer cache misses. A small matrix has fewer columns than a block.
     match costs.cols {
         0..SIMD_LANES => cheapest_rows_by::<1>(costs, state.price, paths.predecessor_row),
         SIMD_LANES..BLOCK_COLUMNS => {
@@ -52,7 +54,8 @@ fn reduce_columns(
     if state.price.contains(&f64::INFINITY) {
         return None;
     }
-    // Here `settled` counts the columns of which a row is the cheapest.
+    // Here `settled_cols` holds, for each row, the number of columns of which that row is the
+    // cheapest.
     paths.settled_cols.fill(0);
     for col in (0..costs.cols as u16).rev() {
         let row = paths.predecessor_row[usize::from(col)];
@@ -70,8 +73,8 @@ fn reduce_columns(
             }
             1 => {
                 let own = usize::from(state.col_of_row[usize::from(row)]);
-                // With its price at minus infinity the row's own column cannot be the least of the
-                // others.
+                // With its price at minus infinity the row's own column has an infinite reduced
+                // cost, so the least is that of the other columns.
                 let price = core::mem::replace(&mut state.price[own], f64::NEG_INFINITY);
                 let slack = least_reduced_cost(costs.row_costs(row, state.row_buffer), state.price);
                 state.price[own] = if slack < f64::INFINITY { price - slack } else { price };
@@ -82,6 +85,7 @@ fn reduce_columns(
     Some(left)
 }
 
+/// Calls [`cheapest_rows`] for all columns, `K` at a time.
 fn cheapest_rows_by<const K: usize>(
     costs: &CostMatrix<'_>,
     price: &mut [f64],
@@ -117,6 +121,7 @@ fn cheapest_rows<const K: usize>(
     }
 }
 
+/// The least of cost minus price over all columns of a row.
 fn least_reduced_cost(line: &[f32], price: &[f64]) -> f64 {
     let (lines, line_rest) = line.as_chunks::<SIMD_LANES>();
     let (prices, price_rest) = price.as_chunks::<SIMD_LANES>();
@@ -131,9 +136,11 @@ fn least_reduced_cost(line: &[f32], price: &[f64]) -> f64 {
     rest.chain(least).fold(f64::INFINITY, |a, b| if b < a { b } else { a })
 }
 
-/// Matches every free row to its cheapest column and lowers that column's price until the second
-/// cheapest column is as good. The row that had the column is matched next, or left for an
-/// augmenting path if no price fell. Returns the number of rows left free.
+/// Matches each of the first `rows_in` free rows to its cheapest column, and lowers that column's
+/// price until the row's second cheapest column is as good. The row that had the column is matched
+/// next, or left for an augmenting path if the price could not be lowered. A row with one possible
+/// column is left free as well. Returns the number of rows left free; `None` if a row has no
+/// possible column.
 fn reduce_rows(
     costs: &CostMatrix<'_>,
     state: &mut MatchingState<'_>,
@@ -158,7 +165,7 @@ fn reduce_rows(
         }
         let mut col = two.col;
         let price = state.price[usize::from(col)] - (two.second - two.least);
-        // Compared after rounding: a fall that f32 or f64 cannot represent would repeat forever.
+        // Compared after rounding: a fall too small to change the f64 price would repeat forever.
         let falls = price < state.price[usize::from(col)] && budget > 0;
         if falls {
             state.price[usize::from(col)] = price;
@@ -184,9 +191,13 @@ fn reduce_rows(
 
 /// The two columns of a row with the least reduced costs (cost minus price).
 struct TwoCheapestColumns {
+    /// Least reduced cost of the row.
     least: f64,
+    /// Second least reduced cost.
     second: f64,
+    /// Column with the least reduced cost.
     col: u16,
+    /// Column with the second least reduced cost.
     second_col: u16,
 }
 
@@ -218,6 +229,8 @@ impl TwoCheapestColumns {
         two
     }
 
+    /// Takes the columns from `first` on into account, whose costs and prices are `line` and
+    /// `price`.
     #[inline]
     fn update_cheapest(&mut self, first: usize, line: &[f32], price: &[f64]) {
         for (k, (&cost, &price)) in line.iter().zip(price).enumerate() {

@@ -9,12 +9,16 @@ pub(super) const SIMD_LANES: usize = 8;
 /// Dual prices and the matching so far. Rows and columns are those of [`super::costs::CostMatrix`],
 /// never more rows than columns.
 pub(super) struct MatchingState<'w> {
+    /// Dual price of each column.
     pub(super) price: &'w mut [f64],
+    /// Row that each column is matched to, or [`UNASSIGNED`].
     pub(super) row_of_col: &'w mut [u16],
+    /// Column that each row is matched to, or [`UNASSIGNED`].
     pub(super) col_of_row: &'w mut [u16],
     /// Buffer for a copy of one row of costs.
     pub(super) row_buffer: &'w mut [f32],
-    /// Rows without a column, in the order in which they are matched.
+    /// Rows without a column, in the order in which they are to be matched. Only the first entries
+    /// are in use; the phases pass on their number.
     pub(super) free_rows: &'w mut [u16],
 }
 
@@ -33,10 +37,16 @@ impl MatchingState<'_> {
 
 /// Memory of one search for an augmenting path, one entry per column.
 pub(super) struct AugmentingPaths<'w> {
+    /// Length of the shortest path found to each column, in reduced costs; in the bottleneck search
+    /// the least possible largest cost of such a path.
     pub(super) distance: &'w mut [f64],
+    /// Row from which the search reached each column; in column reduction the cheapest row of each
+    /// column.
     pub(super) predecessor_row: &'w mut [u16],
-    /// Settled columns in the order in which they were settled, with their price and distance.
+    /// Settled columns in the order in which they were settled.
     pub(super) settled_cols: &'w mut [u16],
+    /// Price of each column of `settled_cols`, saved before the search changes it.
     pub(super) settled_price: &'w mut [f64],
+    /// Distance of each column of `settled_cols`, saved as well.
     pub(super) settled_distance: &'w mut [f64],
 }

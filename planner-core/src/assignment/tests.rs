@@ -11,7 +11,7 @@ use super::*;
 
 const CAPACITY: usize = 8;
 
-/// The best of all assignments by `(pairs, key)`, found by trying all.
+/// The best of all assignments, by number of pairs and then by `objective`, found by trying all.
 fn brute_force(costs: &[f32], rows: usize, cols: usize, objective: Objective) -> Assignment {
     fn extend(
         costs: &[f32],

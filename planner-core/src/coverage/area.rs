@@ -9,7 +9,7 @@ use libm::{fabs, sqrt};
 
 use super::Flat;
 
-/// Largest magnitude of a coordinate, metres: at 100 km f32 resolves 8 mm.
+/// Largest magnitude of a coordinate, metres: up to there f32 resolves 16 mm.
 pub const MAX_VERTEX_COORDINATE_M: f32 = 150_000.0;
 /// Vertices nearer than this count as one, metres.
 pub const SAME_VERTEX_M: f32 = 1e-3;
@@ -31,7 +31,7 @@ pub enum RingKind {
 /// One ring. Its vertices are those from the `end` of the ring before it up to its own `end`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ring {
-    /// Index of the ring's last vertex plus one.
+    /// Index of the ring's last vertex among the vertices of all rings, plus one.
     pub end: u16,
     /// Kind of the region that the ring encloses.
     pub kind: RingKind,
@@ -179,6 +179,7 @@ impl<'a> Area<'a> {
         self.rings_with_kind().any(|(kind, ring)| kind == RingKind::NoFly && is_inside(ring, place))
     }
 
+    /// Checks that there is an outer ring, that the `end`s fit the vertices, and all coordinates.
     fn check_shape(&self) -> Result<(), AreaError> {
         if !self.rings.iter().any(|ring| ring.kind == RingKind::Outer) {
             return Err(AreaError::NoOuter);
@@ -208,6 +209,7 @@ impl<'a> Area<'a> {
         Ok(())
     }
 
+    /// Checks that no vertex is at the same place as the one before it.
     fn check_duplicates(&self) -> Result<(), AreaError> {
         let mut start = 0;
         for (_, ring) in self.rings_with_kind() {
@@ -219,6 +221,7 @@ impl<'a> Area<'a> {
         Ok(())
     }
 
+    /// Checks that each ring encloses more than rounding explains.
     fn check_ring_areas(&self) -> Result<(), AreaError> {
         // A ring is flat if its area is less than that of a strip half as long as its perimeter and
         // a millimetre wide.
@@ -231,6 +234,7 @@ impl<'a> Area<'a> {
         }
     }
 
+    /// Checks that no ring crosses itself, and that no two of the outer rings and holes cross.
     fn check_crossings(&self) -> Result<(), AreaError> {
         let mut start = 0;
         for (i, (kind, ring)) in self.rings_with_kind().enumerate() {
@@ -257,8 +261,8 @@ impl<'a> Area<'a> {
         Ok(())
     }
 
-    /// Checks which rings are inside others. Rings do not cross, so one interior point of a ring
-    /// decides for the whole ring.
+    /// Checks that each hole is inside an outer ring, and no outer ring inside another. Rings do
+    /// not cross, so one interior point of a ring decides for the whole ring.
     fn check_nesting(&self) -> Result<(), AreaError> {
         for (i, (kind, ring)) in self.rings_with_kind().enumerate() {
             if kind == RingKind::NoFly {
@@ -285,13 +289,15 @@ pub(super) fn edges_of(ring: &[Flat]) -> impl Iterator<Item = (Flat, Flat)> + Cl
     ring.iter().copied().zip(next.copied())
 }
 
-/// Signed area of a ring, m²: positive if it turns left. In f64, since large terms cancel.
+/// Signed area of a ring, m²: positive if its vertices run counter-clockwise. In f64, since large
+/// terms cancel.
 pub(super) fn signed_area_m2(ring: &[Flat]) -> f64 {
     let base = ring[0];
     let twice: f64 = edges_of(ring).map(|(a, b)| cross_product(&(a - base), &(b - base))).sum();
     twice / 2.0
 }
 
+/// Length of a ring, metres.
 fn perimeter(ring: &[Flat]) -> f64 {
     edges_of(ring).map(|(a, b)| f64::from((b - a).length())).sum()
 }

@@ -1,5 +1,5 @@
-//! One vehicle's detour over a height field, without a roadmap, home or to a place aside: around
-//! no-fly zones and vehicles that are out of the plan.
+//! One vehicle's detour over a height field, without a roadmap: home, or to a place aside to land
+//! there. It leads around no-fly zones and vehicles that are out of the plan.
 //!
 //! Home: the path leads vertically to the vehicle's own layer, in the layer on the shortest path to
 //! above its pad, and down. Obstacles in the layer are flown around: a visibility graph over the
@@ -51,10 +51,12 @@ struct LegConstraints<'a, 't, const N: usize> {
 }
 
 impl<const N: usize> LegConstraints<'_, '_, N> {
+    /// Whether the leg from `a` to `b` ends inside the fence, stays above terrain, and enters
+    /// neither no-fly zones nor keep-out zones.
     fn is_leg_free(&self, a: &Point, b: &Point) -> bool {
         let touches =
             |obstacle: &KeepOutZone| obstacle.impassable_part(&self.request.here).intersects(a, b);
-        // The fence is a box, so a leg between two points inside is inside. Only its end is
+        // The fence is a box, so a leg between two points inside is inside. Only the leg's end is
         // checked: the vehicle, where the first leg begins, may have strayed outside.
         self.request.is_inside_fence(b)
             && self.transit.is_line_clear(&a.xy(), &b.xy())
@@ -78,9 +80,10 @@ impl<const N: usize> LegConstraints<'_, '_, N> {
     }
 }
 
-/// Writes a path to the goal ([`DetourGoal::Home`]), or to a point aside, that keeps out of all
-/// `obstacles` and of the no-fly zones of `transit`, and stays above the field, to `out`. An
-/// obstacle that contains the vehicle already is shrunk.
+/// Writes a path to `out`: to the goal ([`DetourGoal::Home`]), or, with
+/// [`DetourRequest::land_aside`], to a point aside. The path keeps out of all `obstacles` and of
+/// the no-fly zones of `transit`, and stays above the field. An obstacle that already contains the
+/// vehicle is shrunk, unless it is a descending vehicle's.
 ///
 /// # Errors
 /// The reason why there is no such path.
@@ -125,8 +128,8 @@ pub fn plan_detour<const N: usize, const W: usize>(
     Err(DetourError::Search(SearchError::NoPath))
 }
 
-/// As [`plan_detour`], written as the plan of one vehicle that leaves the shared plan: only its
-/// path matters, and it has no gates.
+/// As [`plan_detour`], written as the plan of one vehicle that leaves the shared plan: a path with
+/// a descent at its end, without gates.
 ///
 /// # Errors
 /// The reason why there is no such path.
@@ -145,8 +148,8 @@ pub fn plan_detour_for_vehicle<const N: usize, const W: usize, const G: usize>(
     Ok(())
 }
 
-/// The nearest point on the rings that is outside all zones and reached by a free straight leg;
-/// `None` if there is none.
+/// The nearest point on the rings around the vehicle, at its height, that is outside all zones and
+/// reached by a free straight leg; `None` if there is none.
 fn nearest_reachable_place<const N: usize>(clear: &LegConstraints<'_, '_, N>) -> Option<Point> {
     let here = clear.request.here;
     let step = core::f32::consts::TAU / SIDESTEP_DIRECTIONS as f32;
@@ -164,11 +167,15 @@ fn nearest_reachable_place<const N: usize>(clear: &LegConstraints<'_, '_, N>) ->
         .find(|place| rests(place) && clear.is_leg_free(&here, place))
 }
 
-/// Nodes at one height, with the lengths of the shortest paths to them so far.
+/// Nodes at one height, and the state of the search for the shortest path from the first to the
+/// second.
 struct VisibilityGraph {
     nodes: Vec<Flat, MAX_GRAPH_NODES>,
+    /// Length of the shortest path so far from the start to each node, metres.
     distance_m: [f32; MAX_GRAPH_NODES],
+    /// For each node, the index of the one before it on that path.
     previous: [u16; MAX_GRAPH_NODES],
+    /// Whether that path is the shortest of all.
     settled: [bool; MAX_GRAPH_NODES],
 }
 
@@ -274,6 +281,8 @@ impl VisibilityGraph {
     }
 }
 
+/// Writes the path from the vehicle over `points` to `out`; a point at the place of the one before
+/// is left out.
 fn write_path<const W: usize>(
     request: &DetourRequest,
     points: &[Point],

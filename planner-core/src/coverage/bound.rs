@@ -3,8 +3,8 @@
 //! The larger of two bounds. (1) If m vehicles fly, their routes leave out at most the m − 1
 //! longest steps between waypoints, each vehicle flies at least to its nearest waypoint and back,
 //! and all use different layers. The largest cost is no less than the mean of these m costs; the
-//! bound is the least such mean over m. (2) Some vehicle flies to the waypoint that is furthest
-//! from all vehicles. O(n · K).
+//! bound is the least such mean over m. (2) Some vehicle flies to the waypoint that takes longest
+//! even for the vehicle that is soonest there and home. O(n · K) for n waypoints and K vehicles.
 
 use crate::Length;
 use libm::{fmaxf, fminf};
@@ -79,6 +79,7 @@ impl LargestValues {
         Self { values: [0.0; MAX_VEHICLES] }
     }
 
+    /// Inserts a value; the least value is dropped if there is no room.
     fn insert(&mut self, value: f32) {
         let at = self.values.partition_point(|held| *held >= value);
         if at < MAX_VEHICLES {

@@ -18,8 +18,8 @@ pub(super) fn group_into_cells(lanes: &mut [Lane]) {
         if strip != lanes[row].strip {
             (below, row) = (row, k);
         }
-        // Candidate: the only lane of the strip before that overlaps this one. It counts only if it
-        // overlaps no other lane of this strip.
+        // Candidate: the only lane of the strip before that overlaps this one. The candidate counts
+        // only if it overlaps no other lane of this strip.
         let mut under =
             (below..row).filter(|&i| lanes[i].strip + 1 == strip && touch(&lanes[i], &lanes[k]));
         let only = under.next().filter(|_| under.next().is_none());
@@ -38,8 +38,9 @@ pub(super) fn is_cell_boundary(lanes: &[Lane], k: usize) -> bool {
     k == 0 || k == lanes.len() || lanes[k - 1].cell() != lanes[k].cell()
 }
 
-/// Sorts lanes that are grouped into cells: the first cell comes first, then each time the cell
-/// with the corner nearest to the end of the cell before.
+/// Sorts lanes that are grouped into cells, and turns them so that each cell is flown back and
+/// forth. The first cell comes first, then each time, of the cells that are left, the one with the
+/// corner nearest to the end of the cell before.
 pub(super) fn order_cells<const N: usize>(lanes: &mut [Lane], transit: &TransitGraph<'_, N>) {
     for k in 1..lanes.len() {
         let place = lanes[..k].partition_point(|lane| lane.cell() <= lanes[k].cell());
@@ -103,6 +104,7 @@ fn nearest_cell<const N: usize>(
     (best.1, best.2)
 }
 
+/// Index of the lane after the cell whose lane `from` is its first.
 fn end_of_cell(lanes: &[Lane], from: usize) -> usize {
     (from + 1..lanes.len()).find(|k| is_cell_boundary(lanes, *k)).unwrap_or(lanes.len())
 }

@@ -1,9 +1,10 @@
 //! The waypoints of a path that remain after the loss of a vehicle, as a path of their own, which
 //! [`super::pack::binpat`] then divides among the remaining vehicles.
 //!
-//! A pure function of the path and of the waypoints that are photographed or promised, so that
-//! every vehicle computes the same bits. Remaining waypoints keep their order and their lane; the
-//! removed parts of the path between them become transits.
+//! A pure function of the path and of the waypoints that are photographed or promised (a vehicle
+//! will still photograph them before it holds), so that every vehicle computes the same bits.
+//! Remaining waypoints keep their order and their lane; the removed parts of the path between them
+//! become transits.
 
 use super::CoverageError;
 use super::tracks::{Lane, Tracks};
@@ -54,6 +55,8 @@ pub(super) fn is_sorted_disjoint(done: &[WaypointRange]) -> bool {
         && done.windows(2).all(|pair| pair[0].end <= pair[1].first)
 }
 
+/// Appends the waypoints `from` to `end` − 1 of a lane, by their numbers on the whole path, to
+/// `left` as a lane; nothing if there are none.
 fn push_lane_part<const L: usize>(
     lane: &Lane,
     from: u32,

@@ -1,5 +1,6 @@
-//! The exact minimum of max C_k over all contiguous divisions, subsets of vehicles, layers and
-//! directions: the benchmark of the other methods. For desktops only: 10 vehicles have 2²⁰ states.
+//! The exact minimum of max C_k, the largest cost of a route, over all contiguous divisions,
+//! subsets of vehicles, layers and directions: the benchmark of the other methods. For desktops
+//! only: 10 vehicles have 2²⁰ states.
 //!
 //! A dynamic program decides whether all waypoints can be photographed within a time T. Its state
 //! (vehicles, layers) holds the most waypoints, counted from the first, that this set of vehicles
@@ -8,7 +9,8 @@
 //! pointers find for all first waypoints at once. T is found by bisection to
 //! [`RELATIVE_TIME_RESOLUTION`].
 //!
-//! Cost: a few dozen rounds of Σ C(K, m)² · (K − m)² steps, m to K, and K² · n for the pointers.
+//! Cost, for K vehicles and n waypoints: a few dozen rounds, each of C(K, m)² · (K − m)² steps
+//! summed over m from 0 to K, and K² · n for the pointers.
 
 use super::CoverageError;
 use super::pack::{CoverageProblem, PackWorkspace, Route, RoutePlan, binpat, set_costs};
@@ -20,13 +22,15 @@ pub const RELATIVE_TIME_RESOLUTION: f32 = 1e-5;
 
 /// Memory that the caller lends, with lengths from [`ExactWorkspace::required_lengths`].
 pub struct ExactWorkspace<'a> {
-    /// Transit lengths, metres: for each vehicle to every waypoint, and from every waypoint home.
+    /// Transit lengths, metres: for each vehicle first from its start to every waypoint, then from
+    /// every waypoint home.
     pub transit_lengths_m: &'a mut [f32],
-    /// For each vehicle, layer and first waypoint, the number after the last waypoint that the
-    /// vehicle can photograph within T.
+    /// For each vehicle, layer and first waypoint of a route: the number of the last waypoint that
+    /// the vehicle can then photograph within T, plus one.
     pub reachable_ends: &'a mut [u32],
-    /// States of the dynamic program: most waypoints photographed, and the step (vehicle and layer)
-    /// that led there.
+    /// States of the dynamic program, indexed by set of vehicles, then set of layers: most
+    /// waypoints photographed, and the step that led there (vehicle times number of vehicles plus
+    /// layer).
     pub states: &'a mut [(u32, u16)],
 }
 
@@ -83,6 +87,7 @@ pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
     Ok(())
 }
 
+/// A coverage problem, and the tables of its dynamic program.
 struct DivisionTable<'t, 'w, 'm, const L: usize, const N: usize> {
     problem: &'t CoverageProblem<'w, L, N>,
     ws: &'t mut ExactWorkspace<'m>,
@@ -91,6 +96,7 @@ struct DivisionTable<'t, 'w, 'm, const L: usize, const N: usize> {
 }
 
 impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
+    /// Fills [`ExactWorkspace::transit_lengths_m`].
     fn fill_transit_lengths(&mut self) {
         for (v, vehicle) in self.problem.vehicles.iter().enumerate() {
             for i in 0..self.waypoint_count {
@@ -108,7 +114,8 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
     }
 
     /// Whether vehicle `v` can photograph waypoints `from` to `end` − 1, transits included, with at
-    /// most `most_m` metres of flight over ground; the way down to lower ground counts as so many.
+    /// most `most_m` metres of flight over ground. The extra descent and climb over terrain count
+    /// as the metres that the vehicle would cruise in their time.
     fn is_within_length(&self, v: usize, from: usize, end: usize, most_m: f32) -> bool {
         let to = &self.ws.transit_lengths_m[2 * v * self.waypoint_count..][..self.waypoint_count];
         let home =
@@ -165,7 +172,7 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
         self.complete_state().is_some()
     }
 
-    /// The state with the fewest vehicles that has all waypoints.
+    /// Index of the state with the fewest vehicles that has all waypoints; `None` if no state has.
     fn complete_state(&self) -> Option<usize> {
         let all = |state: &usize| self.ws.states[*state].0 as usize == self.waypoint_count;
         (0..1usize << (2 * self.vehicle_count)).filter(all).min_by_key(|state| state.count_ones())

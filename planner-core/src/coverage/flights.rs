@@ -35,14 +35,15 @@ pub const MAX_PATH_LENGTH_M: f32 = 6_553.0;
 pub struct Pad {
     /// Id of the vehicle, unique in the swarm.
     pub vehicle_id: u8,
-    /// First point of the vehicle's path, above the pad, over [`Vehicle::transit_start`]; ENU
-    /// metres.
+    /// First point of the vehicle's path, over [`Vehicle::transit_start`]: above the pad, or where
+    /// a vehicle in the air holds; ENU metres.
     pub path_start: Point,
-    /// Height of `start` above the pad, metres; 0 for a vehicle in the air.
+    /// Height of `path_start` above the pad, metres; 0 for a vehicle in the air.
     pub climb_m: f32,
-    /// Height of the path's last point, above the vehicle's home: z in the mission frame, metres.
+    /// Height of the path's last point, which is over the vehicle's home: z in the mission frame,
+    /// metres.
     pub path_end_z_m: f32,
-    /// Height of that point above the ground below it, metres.
+    /// Height of the path's last point above the ground below it, metres.
     pub descent_m: f32,
     /// Whether the vehicle is in the air: without a route it flies home.
     pub airborne: bool,
@@ -73,9 +74,11 @@ pub struct FlightInputs<'a> {
     pub schedule: ScheduleConfig,
     /// Most gates that a vehicle may have.
     pub max_gates: usize,
-    /// Photographed waypoints of the area, ascending: the lanes do not contain them.
+    /// Waypoints of the area that are photographed or promised, by their numbers on the path over
+    /// the whole area, ascending: the lanes do not contain them.
     pub photographed: &'a [WaypointRange],
-    /// Transit layers that are occupied: bit `i` is layer `i`.
+    /// Transit layers in which no vehicle may fly home, since a lost vehicle may be in them: bit
+    /// `i` is layer `i`.
     pub occupied_layers: u64,
     /// Height band above terrain that lanes and paths between them follow, all below the lowest
     /// layer. `None` over level ground.
@@ -83,10 +86,10 @@ pub struct FlightInputs<'a> {
 }
 
 /// Plans the flights of all vehicles, flight `i` for vehicle `i`, with their take-off times. A
-/// vehicle on its pad without a route stays there. If a route has more than `W` corners or is
-/// longer than [`MAX_PATH_LENGTH_M`], the flight covers its first lanes only
-/// ([`PicturePlan::is_first_part`]): as many as leave room for the path home. The next division
-/// ([`super::losses`]) divides the others.
+/// vehicle on its pad without a route stays there. If the path of a route has more waypoints or
+/// lanes than `W` and a [`PicturePlan`] allow, or is longer than [`MAX_PATH_LENGTH_M`], the flight
+/// covers the route's first lanes only ([`PicturePlan::is_first_part`]): as many as leave room for
+/// the path home. The next division ([`super::losses`]) divides the other lanes.
 ///
 /// # Errors
 /// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a
@@ -196,20 +199,21 @@ fn check_inputs<const L: usize, const N: usize>(
     Ok(())
 }
 
-/// The transit layers that are not in `held`, from the lowest one on.
+/// The transit layers whose bit in `held` is 0, from the lowest one, layer 1, on.
 pub(super) fn free_layers(held: u64) -> impl Iterator<Item = u8> {
     (1..64).filter(move |layer| held >> layer & 1 == 0)
 }
 
 /// Schedules the vehicle that flies longest first, each other one to take off as early as those
-/// before it allow. A vehicle for which they leave no take-off time is moved to the front, and all
-/// are scheduled again. Returns an upper bound of each vehicle's number of gates.
+/// before it allow. A vehicle for which those before leave no take-off time is moved to the front,
+/// and all are scheduled again. Returns for each flight an upper bound of its number of gates.
 fn schedule_departures<const V: usize, const W: usize>(
     inputs: &FlightInputs<'_>,
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<[u32; V], PlanError> {
     let cfg = &inputs.schedule;
+    // Whether the vehicle leaves its pad, the flight's duration in seconds, and the flight's index.
     let mut order: Vec<(bool, f32, u16), V> = Vec::new();
     for (flight, i) in out.flights.iter().zip(0..) {
         // Cannot overflow: one entry per flight.
@@ -238,8 +242,8 @@ fn schedule_departures<const V: usize, const W: usize>(
     }
 }
 
-/// Sets take-off times in this order. Returns an upper bound of each vehicle's number of gates, or
-/// the place in `order` of the first vehicle that has no take-off time.
+/// Sets take-off times in this order. Returns for each flight an upper bound of its number of
+/// gates, or the place in `order` of the first vehicle that has no take-off time, and the reason.
 fn schedule_in_order<const V: usize, const W: usize>(
     cfg: &ScheduleConfig,
     order: &[(bool, f32, u16)],
@@ -305,9 +309,9 @@ fn route_waypoints_on_lane(lane: &Lane, route: &Route) -> (u32, u32) {
     )
 }
 
-/// Heading of a vehicle on this route, as set in the inputs. But if it is to follow the path, and
-/// the route has only one waypoint of a lane, which gives no direction there, the heading is fixed
-/// to the direction of the lanes.
+/// Heading of a vehicle on this route, as set in the inputs. But if the heading is to follow the
+/// path, and the route has only one waypoint on some lane, that lane gives no direction: then the
+/// heading is fixed to the direction of the lanes for the whole flight.
 fn heading_mode<const L: usize, const N: usize>(
     problem: &CoverageProblem<'_, L, N>,
     route: &Route,
@@ -358,8 +362,8 @@ fn route_flight<const L: usize, const N: usize, const W: usize>(
     }
 }
 
-/// The flight along the first `most` lanes of a route. `laid` becomes the number of lanes that had
-/// room, without the path home.
+/// The flight along the first `most` lanes of a route. `laid` becomes the number of lanes for which
+/// the path had room, whether or not the path home had room too.
 fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     problem: &CoverageProblem<'_, L, N>,
     route: &Route,

@@ -23,7 +23,7 @@ pub enum Camera {
         sides_mm: [f32; 2],
         /// Focal length, millimetres.
         focal_mm: f32,
-        /// Number of pixels along both sides.
+        /// Number of pixels along each side, in the order of `sides_mm`.
         pixels: [u32; 2],
     },
 }

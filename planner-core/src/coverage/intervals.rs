@@ -22,6 +22,7 @@ impl<const N: usize> Intervals<N> {
         self.spans.clear();
     }
 
+    /// The intervals, in ascending order.
     pub(super) fn spans(&self) -> &[Interval] {
         &self.spans
     }
@@ -48,12 +49,13 @@ impl<const N: usize> Intervals<N> {
         self.spans.retain(|[from, to]| to - from >= least);
     }
 
-    /// Removes the interiors of the intervals of another set.
+    /// Removes each interval of another set, as [`Self::remove`] does.
     pub(super) fn remove_all(&mut self, other: &Self) -> Result<(), CoverageError> {
         other.spans().iter().try_for_each(|span| self.remove(*span))
     }
 
-    /// Removes the interior of an interval from the set; the interval's end points stay.
+    /// Removes an interval from the set. An interval of the set that reaches beyond an end of the
+    /// removed one keeps that end point.
     pub(super) fn remove(&mut self, [from, to]: Interval) -> Result<(), CoverageError> {
         let mut i = self.spans.partition_point(|span| span[1] <= from);
         while i < self.spans.len() && self.spans[i][0] < to {

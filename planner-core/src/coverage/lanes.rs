@@ -43,7 +43,7 @@ pub struct Lane {
     /// Length of the path from its beginning to this lane, metres. While lanes are being ordered:
     /// length of the link to the next lane.
     pub start_along_m: f32,
-    /// Index of the strip in which the lane lies.
+    /// Index of the strip in which the lane lies, from 0, counted across the lanes.
     pub strip: u16,
 }
 
@@ -62,6 +62,7 @@ impl Lane {
         }
     }
 
+    /// Fraction of the way from `from` to `to` at which waypoint `k` lies.
     fn fraction_at(&self, k: u32) -> f32 {
         if self.waypoint_count < 2 {
             0.0
@@ -75,6 +76,7 @@ impl Lane {
         self.first_waypoint
     }
 
+    /// Sets the number that [`Self::cell`] returns.
     pub(super) fn set_cell(&mut self, cell: u32) {
         self.first_waypoint = cell;
     }
@@ -85,6 +87,7 @@ impl Lane {
         self.start_along_m
     }
 
+    /// Sets the length that [`Self::link_to_next_m`] returns.
     pub(super) fn set_link_to_next_m(&mut self, link_m: f32) {
         self.start_along_m = link_m;
     }
@@ -99,6 +102,7 @@ impl Lane {
 #[derive(Clone, Debug, Default)]
 pub struct Tracks<const L: usize> {
     pub(super) lanes: Vec<Lane, L>,
+    /// Unit vector along the lanes.
     pub(super) lane_direction: Flat,
 }
 
@@ -140,7 +144,8 @@ impl<const L: usize> Tracks<L> {
         Some(lane.waypoint(k))
     }
 
-    /// Length of the path up to a waypoint, metres; up to the last one for a larger number.
+    /// Length of the path from its beginning to a waypoint, metres; to the last one for a larger
+    /// number.
     pub fn distance_to_waypoint_m(&self, number: u32) -> f32 {
         let Some(lane) = self.lanes.get(self.lane_of(number)) else { return 0.0 };
         lane.start_along_m + lane.length_m() * lane.fraction_at(number - lane.first_waypoint)

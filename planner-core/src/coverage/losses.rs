@@ -1,5 +1,5 @@
 //! The division after the loss of a vehicle: the waypoints that are left go to the remaining
-//! vehicles, which continue from where they hold.
+//! vehicles, each of which continues from where it holds.
 //!
 //! Beyond paper CPP, which names this as future work. The division is BINPAT over the remaining
 //! lanes ([`super::divide`]): a pure function of the plan before and of the [`VehicleStatus`] of
@@ -29,18 +29,22 @@ pub struct VehicleStatus {
     /// Whether the vehicle continues, and gets a part of the remaining lanes.
     pub continues: bool,
     /// Arc length of the vehicle's path up to which its pictures count as taken or promised,
-    /// metres. A vehicle that continues holds there; at 0 it is still on its pad. If it does not
-    /// continue, its last picture is taken again, since that picture may be missing. Infinite if it
-    /// took all its pictures.
+    /// metres. A vehicle that continues holds there; at 0 it is still on its pad, unless its path
+    /// begins in the air. If the vehicle does not continue, its last picture is taken again, since
+    /// that picture may be missing. Infinite if the vehicle took all its pictures.
     pub photographed_to_m: f32,
 }
 
 /// Memory of divisions, for areas of at most `L` lanes and fleets of at most `K` vehicles.
 pub struct LossesWorkspace<const L: usize, const K: usize> {
+    /// Waypoints that are photographed or promised, by their numbers on the whole path.
     done: WaypointSet<MAX_DONE_RANGES>,
+    /// The lanes without these waypoints.
     remaining: Tracks<L>,
+    /// All vehicles, lost ones too, with the places from which they continue; `pads` alike.
     vehicles: Vec<Vehicle, K>,
     pads: Vec<Pad, K>,
+    /// The division's routes; their vehicle indices count only the vehicles that continue.
     survivor_routes: RoutePlan<K>,
     /// Transit layers of lost vehicles, which may be flying home in them: bit `i` is layer `i`.
     occupied_layers: u64,
@@ -61,7 +65,7 @@ impl<const L: usize, const K: usize> LossesWorkspace<L, K> {
 
     /// Starts a new plan, before its first division, with the waypoints `done` photographed already
     /// (numbers on the whole path). If these are all waypoints, the area is photographed once more.
-    /// Returns the remaining lanes and what is done.
+    /// Returns the remaining lanes and the ranges of photographed waypoints.
     ///
     /// # Errors
     /// Those of [`divide::remaining_lanes`]; [`CoverageError::LanesFull`] for too many ranges.
@@ -101,9 +105,8 @@ impl<const L: usize, const K: usize> Default for LossesWorkspace<L, K> {
     }
 }
 
-/// What a division of the waypoints that are left is computed from, after a loss or at the end of a
-/// path that holds only part of its route: the plan before any division, and the status of all
-/// vehicles.
+/// Inputs of a division of the waypoints that are left, after a loss or at the end of a path that
+/// covers only part of its route: the plan before any division, and the status of all vehicles.
 #[derive(Clone, Copy)]
 pub struct DivisionProblem<'a, const L: usize, const N: usize> {
     /// The lanes of the whole area and all vehicles, as before any division.
@@ -138,12 +141,14 @@ impl From<PlanError> for LossesError {
 /// Divides the remaining waypoints. On entry `routes` and `out` are the routes and flights of the
 /// plan before; on success they are those of the division.
 ///
-/// Where no take-off times keep the vehicles apart, they exchange their routes.
+/// Where no take-off times keep the vehicles apart, they exchange their routes, at most three
+/// times.
 ///
 /// # Errors
 /// Those of [`divide::remaining_lanes`], [`pack::binpat`] and [`flights::plan_flights`];
 /// [`CoverageError::Vehicles`] if statuses, routes and vehicles are inconsistent;
-/// [`CoverageError::SettingOutOfRange`] for an `along_m` that is NaN or negative.
+/// [`CoverageError::SettingOutOfRange`] for a [`VehicleStatus::photographed_to_m`] that is NaN or
+/// negative.
 pub fn redivide_work<
     const L: usize,
     const N: usize,

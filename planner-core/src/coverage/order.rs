@@ -3,13 +3,13 @@
 //!
 //! A convex area has one lane per strip. These are flown back and forth (paper CPP §3.2.1), from
 //! the end of the first lane that gives the shorter links. Other areas start from an order by cells
-//! (`cells`). Parts of it are reversed (2-opt) and cells of up to ten lanes moved (Or-opt) as long
-//! as that shortens the path. Then the lanes that were added beside no-fly zones (`patches`) are
-//! inserted where they lengthen the path least. Then the same moves are tried with single lanes
-//! instead of cells, until the search steps are used up. Both ends of the path are free. O(n²) sums
-//! per round, rounds bounded by `steps_left`, and O(n²) for the initial order. The lengths of links
-//! between consecutive lanes are stored, and a distance around zones is computed only where
-//! straight lines would be shorter.
+//! (`cells`). Parts of it are reversed (2-opt) and runs of whole cells, at most ten lanes, moved
+//! (Or-opt) as long as that shortens the path. Then the lanes that were added beside no-fly zones
+//! (`patches`) are inserted where they lengthen the path least. Then the same moves are tried with
+//! single lanes instead of cells, until the search steps are used up. Both ends of the path are
+//! free. O(n²) sums per round, rounds bounded by the search steps, and O(n²) for the initial order.
+//! The lengths of links between consecutive lanes are stored, and a distance around zones is
+//! computed only where straight lines would be shorter.
 
 use super::Flat;
 use super::cells::{is_cell_boundary, order_cells};
@@ -23,11 +23,12 @@ const MIN_GAIN_M: f32 = 1e-3;
 const MAX_MOVED_LANES: usize = 10;
 
 /// Sorts lanes into the order, and turns them in the directions, in which they are flown. The first
-/// `strips` of them run along the middle of strips, in the order of the strips, grouped into cells.
-/// The local search tries at most `search_steps` changes of the order.
+/// `centre_count` of them run along the middle of strips, in the order of the strips, grouped into
+/// cells; the others were added beside no-fly zones. The local search tries at most `search_steps`
+/// changes of the order.
 pub(super) fn order_lanes<const N: usize>(
     lanes: &mut [Lane],
-    strips: usize,
+    centre_count: usize,
     transit: &TransitGraph<'_, N>,
     search_steps: u32,
 ) {
@@ -39,10 +40,10 @@ pub(super) fn order_lanes<const N: usize>(
         return;
     }
     let mut search = LaneOrderSearch { transit, steps_left: search_steps };
-    order_cells(&mut lanes[..strips], transit);
-    (1..=strips).for_each(|k| search.measure_links(&mut lanes[..strips], &[k]));
-    search.shorten(&mut lanes[..strips]);
-    (strips..lanes.len()).for_each(|k| search.insert_last(&mut lanes[..=k]));
+    order_cells(&mut lanes[..centre_count], transit);
+    (1..=centre_count).for_each(|k| search.measure_links(&mut lanes[..centre_count], &[k]));
+    search.shorten(&mut lanes[..centre_count]);
+    (centre_count..lanes.len()).for_each(|k| search.insert_last(&mut lanes[..=k]));
     // From here on each lane is moved by itself: it is a cell of its own.
     for (lane, k) in lanes.iter_mut().zip(0..) {
         lane.set_cell(k);
@@ -50,8 +51,8 @@ pub(super) fn order_lanes<const N: usize>(
     search.shorten(lanes);
 }
 
-/// Whether lanes in consecutive strips, flown back and forth, have shorter links if the first one
-/// is reversed.
+/// Whether lanes in ascending strips, flown back and forth, have shorter links if the first lane is
+/// reversed.
 fn is_shorter_with_first_reversed(lanes: &[Lane]) -> bool {
     let mut gain_m = 0.0;
     for (i, pair) in lanes.windows(2).enumerate() {
@@ -246,6 +247,8 @@ fn link_before_m(lanes: &[Lane], k: usize) -> f32 {
     k.checked_sub(1).map_or(0.0, |before| lanes[before].link_to_next_m())
 }
 
+/// Straight distance between two lane ends, metres; 0 if `from` is `None`, as at an end of the
+/// path.
 fn straight_distance_m(from: Option<Flat>, to: Flat) -> f32 {
     from.map_or(0.0, |from| (to - from).length())
 }

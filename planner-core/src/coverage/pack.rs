@@ -129,7 +129,7 @@ impl<const K: usize> RoutePlan<K> {
         Self { routes: Vec::new() }
     }
 
-    /// max C_k, seconds: when the last vehicle lands.
+    /// max C_k, seconds: when the last vehicle lands if all take off at once.
     pub fn max_cost_s(&self) -> f32 {
         self.routes.iter().map(|route| route.cost_s).fold(0.0, fmaxf)
     }
@@ -137,9 +137,12 @@ impl<const K: usize> RoutePlan<K> {
 
 /// Memory for packing with at most `K` vehicles.
 pub struct PackWorkspace<const K: usize> {
+    /// For each bin, by vehicle: length of both transits, metres; infinite for one not eligible.
     transits_m: Vec<f32, 1024>,
+    /// For each bin that is not empty, the index of its vehicle.
     assigned_vehicles: [Option<u16>; K],
     assignment: AssignmentWorkspace<K>,
+    /// For each bin, the number of its last waypoint plus one.
     bin_ends: [u32; K],
     pub(super) shares: [f32; K],
 }
@@ -157,8 +160,7 @@ impl<const K: usize> PackWorkspace<K> {
         }
     }
 
-    /// The shares of the path by which the bins were filled last, one per vehicle; only their
-    /// ratios count.
+    /// The shares of the path by which the bins were last filled; only their ratios count.
     pub fn shares(&self) -> &[f32; K] {
         &self.shares
     }
@@ -191,9 +193,8 @@ impl<const L: usize, const N: usize> CoverageProblem<'_, L, N> {
     /// Checks that all settings are in range.
     ///
     /// # Errors
-    /// [`CoverageError::SettingOutOfRange`] with the name of the setting that is out of range;
-    /// [`CoverageError::Vehicles`] for no vehicle or more than `K`;
-    /// [`CoverageError::NothingToCover`] without lanes.
+    /// [`CoverageError::SettingOutOfRange`] with the setting's name; [`CoverageError::Vehicles`]
+    /// for no vehicle or more than `K`; [`CoverageError::NothingToCover`] without lanes.
     pub fn check<const K: usize>(&self) -> Result<(), CoverageError> {
         if self.vehicles.is_empty() || self.vehicles.len() > K.min(usize::from(u8::MAX)) {
             return Err(CoverageError::Vehicles);
@@ -257,8 +258,7 @@ impl<const L: usize, const N: usize> CoverageProblem<'_, L, N> {
         };
         let forward = transit_m(&ends.first, &ends.last);
         let backward = if vehicle.transit_start == vehicle.home {
-            // If the vehicle starts and ends at one place, the transits are equal in both
-            // directions.
+            // Both transits have the same ends in either direction.
             forward
         } else {
             transit_m(&ends.last, &ends.first)

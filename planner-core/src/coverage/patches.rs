@@ -83,8 +83,8 @@ fn lines_beside(strips: &Strips<'_>, span: Interval) -> impl Iterator<Item = f32
     (0..=2 * STRIP_PARTS).map(move |k| middle + side(k) * k.div_ceil(2) as f32)
 }
 
-/// Whether images along the line `v` show the whole band from `low` to `high` across the lanes, and
-/// a little more.
+/// Whether images along the line `v` show the whole band from `low` to `high` across the lanes,
+/// with a margin on both sides if an image is wider than a strip.
 fn covers_band(strips: &Strips<'_>, v: f32, [low, high]: Interval) -> bool {
     let spacing = strips.pattern.spacing;
     let across = spacing.footprint.across_m;
@@ -121,8 +121,8 @@ fn compute_uncovered<const L: usize, const V: usize>(
     for lane in tracks.lanes().iter().filter(|lane| covers_band(strips, lane.from.y, span)) {
         ws.needed.remove([lane.from.x - along, lane.to.x + along])?;
     }
-    // Intervals left over by rounding are dropped: those shorter than the overlap that two
-    // neighbouring images keep in reserve.
+    // Intervals left over by rounding are dropped: those shorter than the margin by which `along`
+    // is less than half an image, or than 1 % of a strip's width if that is less.
     let kept_back_m = strips.pattern.spacing.footprint.along_m / 2.0 - along;
     ws.needed.drop_shorter(fminf(strips.strip_width_m / 100.0, kept_back_m));
     Ok(())

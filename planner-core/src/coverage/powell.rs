@@ -1,9 +1,9 @@
 //! POWELL-BINPAT: a search for the vehicles' shares W of the path, 0 ≤ W_k ≤ 1, with the least max
-//! C_k (the largest route cost). A vehicle with share 0 stays on the ground.
+//! C_k (the largest route cost). For each share of 0 one vehicle gets no route.
 //!
 //! Source: paper CPP §3.2.3; M. J. D. Powell, "An efficient method for finding the minimum of a
 //! function of several variables without calculating derivatives", Computer Journal 7 (1964). An
-//! implementation of our own, bounded by at most `evaluations` packings.
+//! implementation of our own, bounded by at most `max_evaluations` packings.
 //!
 //! max C_k over W is a staircase with flat steps (a waypoint goes to one vehicle or to another), so
 //! a line search first tries points along the whole line and then narrows around the best. Each
@@ -26,7 +26,7 @@ impl PowellConfig {
     pub const USUAL: Self = Self { max_evaluations: 4000 };
 }
 
-/// Number of intervals into which a line search divides the whole line.
+/// Number of intervals into which a line search divides the whole line within 0 ≤ W_k ≤ 1.
 const LINE_INTERVALS: u32 = 8;
 /// Times that a line search halves its step around the best point found so far.
 const STEP_HALVINGS: u32 = 7;
@@ -37,9 +37,13 @@ const MIN_ROUND_GAIN: f32 = 1e-4;
 pub struct PowellWorkspace<const K: usize> {
     /// Workspace of the packings.
     pub pack: PackWorkspace<K>,
+    /// Shares of the best plan so far.
     best_shares: [f32; K],
+    /// The point in the space of shares at which the search is.
     current_shares: [f32; K],
+    /// Search directions in the space of shares.
     directions: [[f32; K]; K],
+    /// The plan evaluated last.
     plan: RoutePlan<K>,
 }
 
@@ -117,6 +121,7 @@ pub fn powell<const L: usize, const N: usize, const K: usize>(
     Ok(())
 }
 
+/// The running search; `out` has the plan with the cost `least_cost_s`, the best so far.
 struct ShareSearch<'s, 'w, const L: usize, const N: usize, const K: usize> {
     problem: &'s CoverageProblem<'w, L, N>,
     evaluations_left: u32,
@@ -126,6 +131,7 @@ struct ShareSearch<'s, 'w, const L: usize, const N: usize, const K: usize> {
 }
 
 impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K> {
+    /// Sets the search directions to the axes: each changes the share of one bin.
     fn reset_directions(&mut self, count: usize) {
         for (k, line) in self.ws.directions[..count].iter_mut().enumerate() {
             line.fill(0.0);
@@ -133,8 +139,8 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
         }
     }
 
-    /// max C_k with the shares `current`; infinite if all are 0. Keeps the plan if it is the best
-    /// so far.
+    /// max C_k with the shares `current_shares`; infinite if all are 0. Keeps the plan if it is the
+    /// best so far.
     fn evaluate(&mut self) -> Result<f32, CoverageError> {
         self.evaluations_left = self.evaluations_left.saturating_sub(1);
         let ws = &mut *self.ws;
@@ -152,8 +158,9 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
         Ok(cost)
     }
 
-    /// Searches along a line through `current`, within 0 ≤ W_k ≤ 1, for the least cost. Returns
-    /// that cost, and moves `current` to the point that has it.
+    /// Searches along the direction `line` through `current_shares`, within 0 ≤ W_k ≤ 1, for a cost
+    /// less than `cost`, that of `current_shares`. Returns the least cost found, and moves
+    /// `current_shares` to its point.
     fn line_search(
         &mut self,
         line: &[f32; K],
@@ -183,6 +190,8 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
         Ok(best.0)
     }
 
+    /// Evaluates the shares `from` + `at` · `line` if evaluations are left. `best` becomes their
+    /// cost and `at` if they are better.
     fn evaluate_at(
         &mut self,
         from: &[f32; K],
@@ -201,6 +210,7 @@ impl<const L: usize, const N: usize, const K: usize> ShareSearch<'_, '_, L, N, K
         Ok(())
     }
 
+    /// Sets `current_shares` to `from` + `at` · `line`, each share limited to 0 to 1.
     fn move_along(&mut self, from: &[f32; K], line: &[f32; K], at: f32) {
         for (share, (from, line)) in self.ws.current_shares.iter_mut().zip(from.iter().zip(line)) {
             *share = (from + line * at).clamp(0.0, 1.0);

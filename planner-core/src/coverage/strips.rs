@@ -26,10 +26,13 @@ pub struct LaneWorkspace<const V: usize> {
 
 /// Sets of coordinates `u` along the lanes, on one line `v` or in one strip.
 pub(super) struct LaneIntervalSets<const V: usize> {
+    /// The `u` at which the line crosses edges, ascending.
     crossings: Vec<f32, V>,
+    /// The `u` at which there is ground to photograph.
     pub(super) needed: Intervals<V>,
     /// The `u` at which a no-fly zone covers all of a strip, or is too near for a lane.
     barred: Intervals<V>,
+    /// The `u` at which images are wanted and not barred.
     free: Intervals<V>,
 }
 
@@ -52,13 +55,15 @@ impl<const V: usize> Default for LaneWorkspace<V> {
     }
 }
 
-/// The lane frame: `u` along the lanes and `v` across them, metres from the area's first vertex.
+/// The lane frame: `u` along the lanes and `v` across them, metres from `origin`. A [`Flat`] in
+/// this frame has `u` as x and `v` as y.
 pub(super) struct LaneFrame {
     pub(super) origin: Flat,
     pub(super) direction: LaneDirection,
 }
 
 impl LaneFrame {
+    /// The lane frame whose origin is the area's first vertex.
     pub(super) fn new(area: &Area<'_>, direction: LaneDirection) -> Self {
         Self { origin: area.vertices()[0], direction }
     }
@@ -79,8 +84,10 @@ impl LaneFrame {
 pub(super) struct Strips<'a> {
     pub(super) area: Area<'a>,
     pub(super) pattern: LanePattern,
+    /// Least `v` of the outer rings: the lower border of the first strip.
     low_v_m: f32,
     pub(super) strip_width_m: f32,
+    /// Number of strips.
     pub(super) count: usize,
 }
 
@@ -118,12 +125,13 @@ impl<'a> Strips<'a> {
         [low, low + self.strip_width_m]
     }
 
+    /// Coordinate `v` of the line half way between two `v`.
     pub(super) fn centre_line(&self, [low, high]: Interval) -> f32 {
         (low + high) / 2.0
     }
 
     /// Sets `ws.needed` to all `u` along the lanes at which something is to be photographed between
-    /// the two `v` of `span`.
+    /// the two `v` of `span`. No-fly zones are ignored.
     pub(super) fn compute_needed<const V: usize>(
         &self,
         span: Interval,
@@ -226,8 +234,9 @@ impl<'a> Strips<'a> {
     }
 
     /// Lays lanes along the line `v` where `ws.barred` allows them, from border to border among
-    /// `ws.crossings`. An interval of `ws.needed` that one image shows, and that contains no
-    /// border, gets one image, as near to its middle as is allowed.
+    /// `ws.crossings`, and beyond by [`LanePattern::border_overshoot_m`]. An interval of
+    /// `ws.needed` that one image shows, and that contains no border, gets one image, as near to
+    /// its middle as is allowed.
     #[inline(never)]
     fn lay_between_borders<const L: usize, const V: usize>(
         &self,
@@ -270,9 +279,9 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// First and last image of the lane that photographs `need` in its strip: from border to
-    /// border, and further where a part would otherwise be beyond the first or last image. The
-    /// first is greater than the last if one image between both shows all.
+    /// The `u` of the first and last image of the lane that photographs `need` in its strip: from
+    /// border to border, and further where a part would otherwise be beyond the first or last
+    /// image. The first is greater than the last if one image between both shows all.
     fn lane_extent(&self, need: &Interval, borders: &[f32]) -> Interval {
         let reach = self.half_picture_along_m();
         let inside = borders.iter().filter(|u| (need[0]..=need[1]).contains(u));
@@ -283,8 +292,8 @@ impl<'a> Strips<'a> {
 
     /// Distance along the lane that an image reliably shows on each side of its middle: half of the
     /// footprint's side, less a margin for rounding. Where images overlap, the margin is such that
-    /// a cell (a tenth of the lane spacing) that a border cuts is entirely in one image: two
-    /// neighbouring images overlap by more than that.
+    /// a cell of the host's checker (its side is a tenth of the lane spacing) that a border cuts is
+    /// entirely in one image: two neighbouring images overlap by more than the margin.
     pub(super) fn half_picture_along_m(&self) -> f32 {
         let spacing = self.pattern.spacing;
         let half = spacing.footprint.along_m / 2.0;
@@ -319,8 +328,8 @@ fn line_crossings<const V: usize>(
 }
 
 /// Adds to `out` all `u` at which the rings contain a point between the two `v`: those inside on
-/// both border lines, and those of the rings' edges between the lines. From any other inner point
-/// the line across to a border line crosses an edge first, at the same `u`.
+/// either of the two border lines, and those of the rings' edges between the lines. From any other
+/// inner point the line across to a border line crosses an edge first, at the same `u`.
 fn project_rings<const V: usize>(
     edges: impl Iterator<Item = (Flat, Flat)> + Clone,
     [low, high]: Interval,
@@ -351,7 +360,7 @@ fn clip_edge((mut a, mut b): (Flat, Flat), [low, high]: Interval) -> Option<Inte
 }
 
 /// Range of `u` on the line `v` that is nearer than [`LANE_AND_TURN_CLEARANCE_M`] to an edge:
-/// within the circles around its ends and the lines beside it. `None` if there is none.
+/// within the circles around its ends and the lines beside it. `None` if no `u` is that near.
 fn range_near_edge((a, b): (Flat, Flat), v: f32) -> Option<Interval> {
     if fmaxf(a.y, b.y) < v - LANE_AND_TURN_CLEARANCE_M
         || fminf(a.y, b.y) > v + LANE_AND_TURN_CLEARANCE_M

@@ -33,8 +33,8 @@ impl LaneDirection {
     }
 }
 
-/// The direction across which the area's outer rings are least wide. `hull` is scratch memory; `V`
-/// must be at least the number of vertices of the outer rings.
+/// The lane direction across which the area's outer rings are least wide. `hull` is scratch memory;
+/// `V` must be at least the number of vertices of the outer rings.
 ///
 /// # Errors
 /// [`AreaError::AreaFull`] if `hull` is too small.
@@ -84,8 +84,8 @@ fn convex_hull<const V: usize>(
     let mut side = 0;
     for step in 0..2 * count {
         let place = sorted[if step < count { step } else { 2 * count - 1 - step }];
-        // A vertex above the line between both ends is no corner of the lower chain; a vertex below
-        // that line is none of the upper chain.
+        // A vertex above the line from the leftmost to the rightmost vertex is no corner of the
+        // lower chain; a vertex on or below that line is none of the upper chain.
         let above = (sorted[count - 1] - sorted[0]).perp(&(place - sorted[0]));
         if (step < count && above > 0.0) || (step > count && step + 1 < 2 * count && above <= 0.0) {
             continue;

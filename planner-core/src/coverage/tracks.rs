@@ -6,7 +6,7 @@
 //! "simple" and "sampled" patterns of the paper have the same lanes: the first packs whole lanes,
 //! the second single waypoints ([`super::pack::TrackUnit`]).
 //!
-//! Lane frame: `u` along the lanes, `v` across them, metres from the first vertex. O(lanes ·
+//! Lane frame: `u` along the lanes, `v` across them, metres from the area's first vertex. O(lanes ·
 //! vertices), and the ordering of the lanes ([`super::order`]).
 
 use super::CoverageError;

@@ -3,9 +3,9 @@
 //!
 //! Method: a visibility graph over the zones' convex corners, each moved out by
 //! [`LANE_AND_TURN_CLEARANCE_M`]. The shortest paths between all pairs of corners are computed once
-//! (Floyd and Warshall, n³). A path between two points then uses the cheapest pair of corners that
-//! are visible from them: n² sums per round, and one more round for each corner that turns out to
-//! be hidden, at most 2 n; visibility of each corner is checked once. All in metres.
+//! (Floyd and Warshall, n³ for n corners). A path between two points then uses the cheapest pair of
+//! corners that are visible from them: n² sums and two visibility checks per round, and one more
+//! round for each corner that turns out to be hidden, at most 2 n. All in metres.
 
 use crate::Length;
 use heapless::Vec;
@@ -24,6 +24,7 @@ pub const LANE_AND_TURN_CLEARANCE_M: f32 = 0.25;
 pub struct TransitGraph<'a, const N: usize> {
     area: Area<'a>,
     corners: Vec<Flat, N>,
+    /// Length of the shortest path between each two corners, metres; infinite if there is none.
     corner_distances_m: [[f32; N]; N],
 }
 
@@ -69,6 +70,7 @@ impl<'a, const N: usize> TransitGraph<'a, N> {
         Ok(())
     }
 
+    /// Computes `corner_distances_m`.
     fn compute_distances(&mut self) {
         let n = self.corners.len();
         for i in 0..n {
@@ -103,7 +105,8 @@ impl<'a, const N: usize> TransitGraph<'a, N> {
         self.area.is_in_no_fly_zone(place)
     }
 
-    /// Whether the straight line between two points stays outside all no-fly zones.
+    /// Whether the straight line between two points, both outside all no-fly zones, enters or
+    /// touches none of them.
     #[inline(never)]
     pub fn is_line_clear(&self, from: &Flat, to: &Flat) -> bool {
         if !self.area.has_no_fly() {
@@ -188,7 +191,7 @@ impl<'a, const N: usize> TransitGraph<'a, N> {
         corners.clear();
         let mut here = *from;
         // Each step leads to a corner from which the rest is shorter, so there are at most as many
-        // as corners.
+        // steps as corners.
         while !self.is_line_clear(&here, to) {
             let mut best = (f32::INFINITY, None);
             for corner in self.corners.iter().filter(|corner| **corner != here) {

@@ -91,7 +91,8 @@ fn a_vehicle_that_is_too_near_may_leave_but_come_no_nearer() {
     assert_eq!(planned(&request(), &[ahead]).unwrap()[1], NODES[0]);
 }
 
-/// Small vehicles have small zones: of any size, only a zone that contains the vehicle is ignored.
+/// Small vehicles have small zones. A zone of any size is kept out of if the vehicle is not in it
+/// already.
 #[test]
 fn zones_of_any_size_ahead_are_kept_out_of() {
     for radius_m in [0.1, 0.3, 0.5, 0.7] {

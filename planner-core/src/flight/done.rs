@@ -3,7 +3,7 @@
 
 use heapless::{Vec, VecView};
 
-/// The waypoints with numbers `first` to `end` − 1.
+/// The area's waypoints (places to photograph) with numbers `first` to `end` − 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WaypointRange {
     /// Number of the first waypoint.
@@ -48,8 +48,8 @@ impl<const N: usize> WaypointSet<N> {
     /// Adds a range. Returns whether at least one of its waypoints was not in the set.
     ///
     /// # Errors
-    /// Returns `range` if it touches no range of the set and the set has `N` ranges already; the
-    /// set is then unchanged.
+    /// Returns `range` if it neither overlaps nor touches a range of the set, and the set has `N`
+    /// ranges already; the set is then unchanged.
     pub fn insert(&mut self, range: WaypointRange) -> Result<bool, WaypointRange> {
         insert(&mut self.ranges, range)
     }
@@ -73,8 +73,8 @@ fn insert(
         }
         whole = WaypointRange { first: whole.first.min(held.first), end: whole.end.max(held.end) };
     }
-    // The later ranges move: back by one place to make room, or forward to follow the range that
-    // now holds all touched ones.
+    // The later ranges move: by one place towards the end to make room, or towards the front to
+    // follow the range that now holds all touched ones.
     if touched == 0 {
         ranges.push(whole)?;
         ranges[from..].rotate_right(1);

@@ -26,7 +26,8 @@ pub struct Waypoint {
 /// Reason why a path was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathError {
-    /// The path has more than `W` waypoints or stretches.
+    /// The path has more than `W` waypoints, or its [`PicturePlan`](super::PicturePlan) has no room
+    /// for a stretch.
     PathFull,
     /// A coordinate, a clearance or the length is NaN or infinite.
     NotFinite,
@@ -113,8 +114,8 @@ impl<const W: usize> Path<W> {
     }
 
     /// Time at which the vehicle is at an arc length by the schedule, at the end of a hold there,
-    /// seconds after take-off. Before the first waypoint it is 0, beyond the last one as at the
-    /// last one.
+    /// seconds after take-off. 0 before the first waypoint; beyond the last one the time at which
+    /// the vehicle leaves it.
     pub(crate) fn scheduled_s(&self, along_m: f32) -> f32 {
         let next = self.waypoints.partition_point(|w| w.along_m <= along_m);
         let Some(from) = next.checked_sub(1).map(|at| &self.waypoints[at]) else { return 0.0 };
@@ -158,8 +159,8 @@ impl<const W: usize> Path<W> {
         })
     }
 
-    /// Index of the waypoint that ends the leg on which an arc length lies; the number of waypoints
-    /// beyond the last one.
+    /// Index of the waypoint that ends the leg on which an arc length lies: 0 at or before the
+    /// first waypoint, the number of waypoints beyond the last one.
     fn leg_end_index_at(&self, along_m: f32) -> usize {
         self.waypoints.partition_point(|w| w.along_m < along_m)
     }
@@ -176,9 +177,9 @@ impl<const W: usize> Path<W> {
         Some(from.position + (to.position - from.position) * share)
     }
 
-    /// Arc length of the point of the path that is nearest to `position`, sought within `window_m`
-    /// of `near_m` only: a vehicle's progress, without a jump to another part of the path that
-    /// passes close by.
+    /// Arc length, metres, of the point of the path that is nearest to `position`, sought only at
+    /// arc lengths within `window_m` of `near_m`: a vehicle's progress, without a jump to another
+    /// part of the path that passes close by.
     pub fn project(&self, position: &Point, near_m: f32, window_m: f32) -> f32 {
         let (low, high) = (near_m - window_m, near_m + window_m);
         let mut best = (f32::INFINITY, near_m);

@@ -4,7 +4,8 @@ use super::done::WaypointRange;
 use super::path::{Path, PathError, Waypoint};
 use crate::Length;
 
-/// Tolerance of arc lengths: a picture this far ahead of the vehicle counts as reached, metres.
+/// Tolerance of arc lengths: a picture no more than this far ahead of the vehicle counts as
+/// reached, metres.
 const REACHED_TOLERANCE_M: f32 = 1e-2;
 
 /// Heading of a vehicle along its path while it photographs.
@@ -152,7 +153,7 @@ pub struct PicturePlan {
     order: WaypointOrder,
     /// Number of waypoints of the whole area; 0 if not set by [`Self::with_area_waypoints`].
     area_waypoint_count: u32,
-    /// Greatest distance over ground between neighbouring pictures, metres.
+    /// Greatest allowed distance over ground between neighbouring pictures, metres.
     pub max_spacing_m: f32,
     /// Heading of the vehicle along its path.
     pub heading_mode: HeadingMode,
@@ -172,7 +173,7 @@ impl PicturePlan {
     pub const MAX_AREA_WAYPOINTS: u32 = u16::MAX as u32 + 1;
 
     /// A plan without stretches; pictures are to be at most `spacing_m` apart over ground.
-    pub const fn new(spacing_m: f32, look: HeadingMode, trigger: Trigger) -> Self {
+    pub const fn new(spacing_m: f32, heading_mode: HeadingMode, trigger: Trigger) -> Self {
         let (numbers, counts) = ([0; Self::MAX_STRETCHES], [0; Self::MAX_STRETCHES]);
         Self {
             stretch_begin_bits: 0,
@@ -182,7 +183,7 @@ impl PicturePlan {
             order: WaypointOrder::Rising,
             area_waypoint_count: 0,
             max_spacing_m: spacing_m,
-            heading_mode: look,
+            heading_mode,
             trigger,
             is_first_part: false,
         }
@@ -205,7 +206,7 @@ impl PicturePlan {
     ///
     /// # Errors
     /// [`PathError::PathFull`] beyond [`Self::MAX_PATH_WAYPOINTS`], [`Self::MAX_STRETCHES`] or
-    /// [`Self::MAX_AREA_WAYPOINTS`], and if `waypoints` is empty.
+    /// [`Self::MAX_AREA_WAYPOINTS`], if `waypoints` is empty, and if `from` is after `to`.
     pub fn add_stretch(
         &mut self,
         from: usize,
@@ -260,8 +261,8 @@ impl PicturePlan {
             .fold(0, u32::saturating_add)
     }
 
-    /// Number of pictures certainly taken at arc length `along_m`: those up to one spacing before
-    /// that arc length. A later one may still be missing.
+    /// Number of pictures certainly taken at arc length `along_m`: those at least
+    /// [`Self::max_spacing_m`] before that arc length. A later one may still be missing.
     pub fn certainly_taken_count<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
         self.taken_count(path, along_m - self.max_spacing_m)
     }
@@ -290,8 +291,8 @@ impl PicturePlan {
         PictureStretch::new(corners, count).map(|stretch| stretch.picture_at_m(taken - 1))
     }
 
-    /// The waypoints of the area that correspond to the path's pictures with these numbers, which
-    /// count along the path from 0.
+    /// The waypoints of the area that the path's pictures `pictures.first` to `pictures.end` − 1
+    /// show. These picture numbers count along the path from 0; they are not waypoint numbers.
     pub fn waypoints_of_pictures<const W: usize>(
         &self,
         path: &Path<W>,

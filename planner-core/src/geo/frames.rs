@@ -13,8 +13,11 @@ use nalgebra::Vector3;
 
 use crate::Point;
 
+/// Semi-major axis of the WGS84 ellipsoid, metres.
 const WGS84_A: f64 = 6_378_137.0;
+/// Flattening of the WGS84 ellipsoid.
 const WGS84_F: f64 = 1.0 / 298.257_223_563;
+/// Square of the first eccentricity of the WGS84 ellipsoid.
 const WGS84_E2: f64 = WGS84_F * (2.0 - WGS84_F);
 /// Radius of the sphere on which PX4 projects (`CONSTANTS_RADIUS_OF_EARTH`), metres.
 pub const PX4_EARTH_RADIUS_M: f64 = 6_371_000.0;
@@ -40,6 +43,7 @@ impl Geodetic {
         fabs(self.lat_deg) <= 90.0 && fabs(self.lon_deg) <= 180.0 && self.alt_m.is_finite()
     }
 
+    /// The position in ECEF (earth-centred, earth-fixed) coordinates, metres.
     fn ecef(&self) -> Vector3<f64> {
         self.sin_cos().ecef(self.alt_m)
     }
@@ -60,6 +64,7 @@ struct LatLonSinCos {
 }
 
 impl LatLonSinCos {
+    /// ECEF coordinates, metres, of the point at this altitude.
     fn ecef(&self, alt_m: f64) -> Vector3<f64> {
         let n = WGS84_A / sqrt(1.0 - WGS84_E2 * self.sin_lat * self.sin_lat);
         Vector3::new(

@@ -5,9 +5,10 @@
 //! the first node f32, metres between nodes f32, then one i16 per node (decimetres up in the
 //! mission frame, rows from south to north), and a CRC-32 of all before it. Heights between nodes
 //! are interpolated bilinearly; beyond the border the height is that of the nearest point of the
-//! border. The desktop raises each node to the highest ground within a vehicle's position error and
-//! half a sample step of [`follow`], and flattens slopes that are too steep. So a path that is
-//! above the field at samples half a node spacing apart is above the ground everywhere.
+//! border. The desktop gives each node the height of the highest ground near it: within 1.5 node
+//! spacings, plus the distance by which a vehicle may be beside its path. Then it raises nodes
+//! until no slope is too steep. So a path that is above the field at samples half a node spacing
+//! apart is above the ground everywhere.
 
 pub mod follow;
 
@@ -26,6 +27,7 @@ pub const HEADER_LEN: usize = 28;
 pub const MAX_NODES: usize = 1 << 16;
 /// Unit of a stored node height, metres.
 pub const HEIGHT_STEP_M: f32 = 0.1;
+/// Bytes of the CRC-32 at the end of the file.
 const CRC_LEN: usize = 4;
 
 /// Position, spacing and number of a height field's nodes.
@@ -72,8 +74,12 @@ impl FieldShape {
 #[derive(Clone, Copy, Debug)]
 pub struct FieldView<'a> {
     shape: FieldShape,
+    /// Height of each node in the file's encoding: little-endian i16, decimetres; row by row from
+    /// the south, each row from west to east.
     nodes: &'a [[u8; 2]],
+    /// Height of the highest node, decimetres.
     highest_dm: i16,
+    /// The CRC-32 at the end of the file.
     crc: u32,
 }
 
@@ -122,8 +128,8 @@ impl<'a> FieldView<'a> {
         f32::from(self.highest_dm) * HEIGHT_STEP_M
     }
 
-    /// Height of the field at `place`, metres up in the mission frame; beyond the border that of
-    /// its nearest point.
+    /// Height of the field at `place`, metres up in the mission frame; beyond the border the height
+    /// of the border's nearest point.
     pub fn height_at(&self, place: &Flat) -> f32 {
         let axis = |at: f32, low: f32, count: u16| {
             let most = f32::from(count - 1);
@@ -151,6 +157,7 @@ pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, FileError> {
     Ok(parse_shape(head)?.encoded_len())
 }
 
+/// Reads and checks a file's header.
 fn parse_shape(header: &[u8; HEADER_LEN]) -> Result<FieldShape, FileError> {
     if header[..8] != MAGIC {
         return Err(FileError::Magic);

@@ -117,6 +117,7 @@ impl GridShape {
         })
     }
 
+    /// Checks dimensions, minimum corner and resolution.
     fn check(&self) -> Result<(), GridError> {
         // Words are indexed by 32 bits, on boards and on desktops.
         let countable = self.word_count() < u32::MAX as usize;

@@ -3,8 +3,8 @@
 //! Paths do not change. For each pair of flights one interval covers all differences of their
 //! take-off times at which they would come near each other. With these intervals, the take-off
 //! times of an order cost a few comparisons per pair, so many orders can be tried, each made from
-//! the last by moving one vehicle to another place in it. The best order is then scheduled exactly,
-//! and kept if the last vehicle lands earlier.
+//! the best so far by moving one vehicle to another place in the order. The best order is then
+//! scheduled exactly, and kept if the last vehicle lands earlier.
 //!
 //! Cost: the timed segments of each pair of flights, then [`MAX_COMPARISONS`] comparisons.
 
@@ -19,11 +19,11 @@ use crate::flight::Flight;
 use crate::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::sort;
 
-/// Most comparisons of a take-off time with that of a scheduled flight, in a whole search: a third
-/// of a second on a board.
+/// Most comparisons of a take-off time with that of a scheduled flight, in the whole search for a
+/// swarm of at most [`MAX_BOARD_VEHICLES`]: a third of a second on a board.
 const MAX_COMPARISONS: u32 = 150_000;
-/// Comparisons per pair of vehicles in a swarm larger than [`MAX_BOARD_VEHICLES`], if that is more
-/// than [`MAX_COMPARISONS`].
+/// Most comparisons in the search for a larger swarm, as a multiple of the squared number of
+/// vehicles that fly; at least [`MAX_COMPARISONS`].
 const COMPARISONS_PER_PAIR: u32 = 200;
 /// Weight of the mean landing time relative to the last landing time: of two orders with the same
 /// end of the mission, the one with less waiting wins.
@@ -34,10 +34,12 @@ const MEAN_LANDING_WEIGHT: f32 = 0.02;
 struct ForbiddenDepartureDifferences<'a> {
     /// For a pair i < j the interval's lower end is at `[i][j]`, its upper end at `[j][i]`.
     ends: &'a [f32],
+    /// Number of flights: `ends` is a square matrix of this side.
     flight_count: usize,
 }
 
 impl ForbiddenDepartureDifferences<'_> {
+    /// The interval of take-off time of `i` minus that of `j`, for `i` and `j` in either order.
     fn forbidden_interval(&self, i: usize, j: usize) -> (f32, f32) {
         let (low, high) = (i.min(j), i.max(j));
         let (from, to) =
@@ -45,9 +47,10 @@ impl ForbiddenDepartureDifferences<'_> {
         if i < j { (from, to) } else { (-to, -from) }
     }
 
-    /// Computes the take-off times of vehicles that are scheduled in this `order`, each as early as
-    /// those before it allow. Returns the order's cost in seconds: last landing time plus weighted
-    /// mean landing time. `comparisons_left` bounds the further comparisons.
+    /// Computes `departs_s`, the take-off times of vehicles that are scheduled in this `order`,
+    /// each as early as those before it allow. `lasts_s` are the flights' durations. Returns the
+    /// order's cost in seconds: last landing time plus weighted mean landing time. Subtracts the
+    /// comparisons made from `comparisons_left`.
     fn order_cost_s(
         &self,
         order: &[u16],
@@ -83,8 +86,8 @@ impl ForbiddenDepartureDifferences<'_> {
 }
 
 /// Changes the take-off times to those of the best order that the local search finds, if the last
-/// vehicle then lands earlier. The schedule lets a vehicle be at a place `handover_s` after another
-/// one has left it.
+/// vehicle then lands earlier; else leaves them. The schedule lets a vehicle be at a place
+/// `handover_s` after another one has left it.
 pub(super) fn improve_departure_order<
     const N: usize,
     const V: usize,
@@ -140,7 +143,7 @@ pub(super) fn improve_departure_order<
         } else {
             move_element(&mut order, to, from);
         }
-        // Each iteration counts, so that moves to the same place end the search as well.
+        // Each iteration counts as one more comparison, so that the search always ends.
         comparisons_left = comparisons_left.saturating_sub(1);
     }
     let makespan_s = |flights: &[Flight<W>]| {

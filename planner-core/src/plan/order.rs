@@ -2,9 +2,9 @@
 //!
 //! Each vehicle keeps clear of those planned before it: by the shortest path and a wait on the pad
 //! if that is enough, else by waiting and stepping aside in flight ([`sipp`]). A vehicle for which
-//! no times are found is moved to the front in the next round. When that does not help, the others
-//! leave it a head start. If this fails too, all is tried again with the vehicles of the shortest
-//! paths first. The number of rounds is bounded.
+//! no times are found is moved to the front in the next round. When that does not help, vehicles
+//! planned before it take off later, to give it a head start. If this fails too, all is tried again
+//! with the vehicles of the shortest paths first. The number of rounds is bounded.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -78,7 +78,7 @@ enum InitialOrder {
 
 /// Schedules in this order. In the next round a vehicle for which no times were found is moved to
 /// the front; after [`MAX_REORDERINGS`] such rounds, or as many as there are vehicles, it is moved
-/// to the end and gets a head start.
+/// to the end, and gets a head start together with those that were behind it in the order.
 fn schedule_with_reordering<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -112,12 +112,13 @@ fn move_to_front<const W: usize>(order: &mut [u16], place: usize, flights: &[Fli
 }
 
 /// Schedules in other orders while a vehicle would hover at one place for longer than
-/// [`MAX_ACCEPTED_HOVER_S`]. An order is kept if it halves the longest hover: others wait longer on
-/// their pads for it, and the last one may land later.
+/// [`MAX_ACCEPTED_HOVER_S`]. An order is kept only if it at least halves the longest hover, since
+/// in exchange the other vehicles wait longer on their pads, and the last one may land later.
 ///
-/// Such a vehicle has to leave its pad for one that was scheduled before it and lands there, but
-/// its goal, or the way there, is only free much later. In the next round it is moved to the front,
-/// so that the others wait on their pads for it; as is then one for which no times are found.
+/// Such a vehicle has to leave its pad because one that was scheduled before it lands there, but
+/// its own goal, or the way to the goal, is free only much later. In the next round it is moved to
+/// the front, so that the others wait on their pads for it. A vehicle for which no times are found
+/// in that round is moved to the front next.
 fn shorten_hovers<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -140,7 +141,8 @@ fn shorten_hovers<const N: usize, const V: usize, const W: usize, const P: usize
             Err((blocked, PlanError::Schedule(_, ScheduleError::Blocked))) => {
                 hovering = usize::from(order[blocked]);
             }
-            // For want of memory: a board has less than a desk.
+            // The workspace is too small for this order, as may happen on a board: no further order
+            // is tried.
             Err(_) => break,
             Ok(()) => {
                 let (vehicle, hover_s) = longest_hover_s(out);
@@ -167,24 +169,29 @@ fn longest_hover_s<const V: usize, const W: usize>(out: &SwarmPlan<V, W>) -> (us
 /// Longest hover at one place for which no other order is tried, seconds: less than what counts as
 /// a standstill (20 s), since the vehicle that is waited for may be late.
 const MAX_ACCEPTED_HOVER_S: f32 = 15.0;
-/// Share of the longest hover that another order may leave.
+/// Another order is kept if its longest hover is at most this share of that of the best order so
+/// far.
 const KEPT_HOVER_SHARE: f32 = 0.5;
-/// Most other orders that are tried for shorter hovers. Twice as many rounds help few more.
+/// Most other orders that are tried for shorter hovers. Twice as many would help few more swarms.
 const MAX_HOVER_REORDERINGS: usize = 8;
 
 /// Most rounds after which a vehicle for which no times were found is moved to the front; in later
-/// rounds the others depart later instead. At most the number of vehicles, too: in a crowd where
-/// many swap places, nearly every vehicle has to leave its place before another one comes.
+/// rounds the others depart later instead. Also at most the number of vehicles. So many rounds are
+/// needed where many swap places in a crowd: nearly every vehicle has to leave its place before
+/// another one comes.
 const MAX_REORDERINGS: usize = 64;
-/// Most rounds in which the others depart later, each time by [`HEAD_START_STEP_S`] more.
+/// Most rounds in which the vehicles without a head start depart later, each time by
+/// [`HEAD_START_STEP_S`] more.
 const MAX_HEAD_START_ROUNDS: usize = 8;
 /// Time in which one of two vehicles that meet head-on can step aside into a side room, seconds.
 const HEAD_START_STEP_S: f32 = 3.0;
 
-/// Head start: the last `early_vehicles` in the order may take off at once, all others after
-/// `head_start_s`.
+/// Head start: the last `early_vehicles` in the order may take off at once, all others no earlier
+/// than `head_start_s` seconds after the mission's start.
 struct HeadStart {
+    /// Number of vehicles at the end of the order that need not wait for the head start.
     early_vehicles: usize,
+    /// Earliest take-off of all other vehicles, seconds after the mission's start.
     head_start_s: f32,
     /// Time from when a vehicle has left a place until another one may be there, seconds.
     handover_s: f32,
@@ -198,12 +205,14 @@ struct SchedulingTurn<'a> {
     before: &'a [u16],
     /// Indices of the vehicles that are still to be scheduled.
     waiting: &'a [u16],
-    /// Earliest take-off of this vehicle, seconds.
+    /// Earliest take-off of this vehicle, seconds after the mission's start.
     not_before_s: f32,
     /// Time from when a vehicle has left a place until another one may be there, seconds.
     handover_s: f32,
 }
 
+/// Schedules all vehicles in this order. The error has the place in `order`, from 0, of the vehicle
+/// for which it failed.
 fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -243,7 +252,8 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
 }
 
 /// The vehicle's flight on a shortest path after the shortest wait on its pad that avoids
-/// conflicts; `None` if no wait on the pad avoids all conflicts.
+/// conflicts. Paths clear of parked vehicles are tried first. `None` if there is no path, or no
+/// wait on the pad avoids all conflicts.
 fn plan_with_pad_wait<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -284,7 +294,8 @@ fn plan_with_pad_wait<const N: usize, const V: usize, const W: usize, const P: u
 /// The vehicle's flight on a route searched with waits and sidesteps, if possible clear of the pads
 /// of waiting vehicles. The flight that arrives earliest may take off only to wait long in the air.
 /// Then later take-offs are tried, until no wait is longer than [`MAX_ACCEPTED_WAIT_S`], with at
-/// most [`MAX_DEPARTURE_TRIES`] searches; the flight whose longest wait is shortest is returned.
+/// most [`MAX_DEPARTURE_TRIES`] searches for each choice of pads to keep clear of; the flight whose
+/// longest wait is shortest is returned.
 fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -332,7 +343,8 @@ fn plan_with_path_waits<const N: usize, const V: usize, const W: usize, const P:
     Err(ScheduleError::Blocked)
 }
 
-/// Most take-off times that are tried for one vehicle.
+/// Most searches for one vehicle with the same pads to keep clear of: one for each take-off time
+/// that is tried, and one for each change to longer timed segments.
 const MAX_DEPARTURE_TRIES: usize = 6;
 /// Longest wait in the air at one place that the planner accepts without trying a later take-off,
 /// seconds: a quarter of what counts as a standstill (20 s), since the vehicle that is waited for
@@ -358,7 +370,9 @@ enum AvoidedParking {
 
 /// Points on the ground where other vehicles are parked, before and after their flights.
 struct ParkedVehicles<const V: usize> {
+    /// Pads of other vehicles.
     before_flight: Vec<Point, V>,
+    /// Landing places of other vehicles.
     after_flight: Vec<Point, V>,
 }
 
@@ -394,6 +408,7 @@ impl<const V: usize> ParkedVehicles<V> {
         parked
     }
 
+    /// Whether the segment from `a` to `b` keeps at least `distance_m` from all parked vehicles.
     fn is_segment_clear(&self, a: &Point, b: &Point, distance_m: f32) -> bool {
         let along = b - a;
         let near = |p: &Point| {
@@ -443,6 +458,7 @@ fn find_path<const N: usize, const V: usize, const W: usize>(
     }
 }
 
+/// The path along these nodes, with the clearances of the edges between them.
 fn path_from_nodes<const W: usize>(
     view: &RoadmapView<'_>,
     nodes: &[u16],

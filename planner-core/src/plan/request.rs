@@ -33,7 +33,8 @@ pub struct VehicleTask {
     pub required_clearance_m: f32,
     /// Height of the start node above the pad, metres.
     pub climb_m: f32,
-    /// Index of the vehicle's goal if goals are labelled; `None` if it stays on its pad.
+    /// Index of the vehicle's goal among the roadmap's goals, `None` if the vehicle stays on its
+    /// pad; ignored if goals are not labelled.
     pub goal: Option<u16>,
 }
 
@@ -90,7 +91,7 @@ pub enum PlanError {
     SwarmFull,
     /// A setting of the schedule is out of range.
     Config(SettingError),
-    /// Height or required clearance of the vehicle with this id is negative, NaN or infinite.
+    /// Climb or required clearance of the vehicle with this id is negative, NaN or infinite.
     BadTask(u8),
     /// The height of the goal with this index above its ground is negative, NaN or infinite.
     BadDescent(u16),
@@ -101,6 +102,7 @@ pub enum PlanError {
     /// The labelled goal of the vehicle with this id is not in the roadmap.
     BadGoal(u8),
     /// The roadmap search for the vehicle with this id failed, for a reason other than "no path".
+    /// If one search was for all vehicles, the id is that of the first.
     Search(u8, SearchError),
     /// The goals could not be assigned.
     Assignment(AssignmentError),

@@ -20,7 +20,7 @@ const SCHEDULE: ScheduleConfig = ScheduleConfig {
     cruise_mps: 2.0,
     vertical_mps: 1.0,
 };
-/// The building's starts hover this high over their pads.
+/// Height of all starts and goals above the ground below them, metres.
 const HEIGHT_M: f32 = 1.5;
 
 /// A roadmap over open ground: terminals first, then random nodes, edges up to 8 m.
@@ -183,7 +183,7 @@ fn corridor(length_m: f32, side_at_m: f32, depth_m: f32) -> StdVec<u8> {
 
 #[test]
 fn head_on_in_a_corridor_one_steps_into_the_side_room() {
-    // Just deep enough to be out of the way, and deeper.
+    // Just deep enough to keep clear of the corridor, and deeper.
     let depths = [2.1, 2.2, 2.4, 2.6, 2.8, 3.0, 3.2, 4.0];
     for (side_at_m, depth_m) in
         [8.0, 14.0, 16.0, 22.0].into_iter().flat_map(|at| depths.map(|depth| (at, depth)))
@@ -206,7 +206,7 @@ fn head_on_in_a_corridor_one_steps_into_the_side_room() {
 
 #[test]
 fn antipodal_swaps_over_a_circle_are_planned() {
-    // Ten pairs swap ends across a circle of 20 m radius.
+    // Five pairs of vehicles swap ends across a circle of 20 m radius.
     let place = |i: usize| {
         let angle = i as f32 * core::f32::consts::TAU / 10.0;
         Point::new(20.0 + 20.0 * libm::cosf(angle), 20.0 + 20.0 * libm::sinf(angle), HEIGHT_M)

@@ -14,8 +14,8 @@ use crate::schedule::sipp::SippWorkspace;
 pub struct SwarmPlan<const V: usize, const W: usize> {
     /// One flight per vehicle.
     pub flights: Vec<Flight<W>, V>,
-    /// CRC-32 over separations, speeds, ids, goals, climbs, descents, waypoints with their times,
-    /// and departures.
+    /// CRC-32 over separations, speeds, ids, goals, climbs, descents, segment lengths, waypoints
+    /// with their times, and departures.
     pub crc: u32,
 }
 
@@ -31,8 +31,9 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
     }
 }
 
-/// Memory of [`super::plan_swarm`] and its steps, for roadmaps of `N` nodes, swarms of `V` vehicles
-/// and goals, and `P` timed segments of all scheduled flights in [`crate::schedule::sipp`].
+/// Memory of [`super::plan_swarm`] and its steps, for roadmaps of up to `N` nodes, swarms of up to
+/// `V` vehicles and `V` goals, and up to `P` timed segments of all scheduled flights in
+/// [`crate::schedule::sipp`].
 pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
     /// Memory of roadmap searches, also for [`crate::detour`].
     pub search: SearchWorkspace<N>,
@@ -40,8 +41,8 @@ pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
     pub sipp: SippWorkspace<N, P>,
     /// Memory of [`crate::assignment`].
     pub assignment: AssignmentWorkspace<V>,
-    /// Path lengths from starts to goals, row-major and contiguous from the first number on; then
-    /// the intervals of `departures.rs`.
+    /// Path lengths from starts to goals, row-major and contiguous from the first number on. Later
+    /// the same memory holds the intervals of `departures.rs`.
     pub(super) costs: [[f32; V]; V],
     /// Memory of the schedule, also for [`super::vehicle_plan`].
     pub schedule: ScheduleWorkspace,

@@ -62,10 +62,10 @@ impl RoadmapView<'_> {
 
     /// Checks that the distances to landmarks are, to the bit, the shortest ones over all edges;
     /// only then are their differences lower bounds. No search is needed. The distances are right
-    /// if the landmark's own is zero, no edge leads to a shorter one, and each other distance is
-    /// the sum of an edge's length and the smaller distance at that edge's other end. (Following
-    /// ever smaller distances leads to the landmark, so none is too small; along the true shortest
-    /// path, none is too large.)
+    /// if the landmark's own is zero, no edge would give a node a shorter distance than the file
+    /// has for it, and each other distance is the sum of an edge's length and the smaller distance
+    /// at that edge's other end. (Following ever smaller distances leads to the landmark, so none
+    /// is too small; along the true shortest path, none is too large.)
     pub(super) fn check_landmarks(&self) -> Result<(), RoadmapError> {
         if self.landmark_distances.is_empty() {
             return Ok(());

@@ -17,8 +17,8 @@ pub const HEADER_LEN: usize = 72;
 pub const MAX_NODES: usize = u16::MAX as usize;
 /// Largest magnitude of a coordinate, metres: up to here f32 resolves a millimetre.
 pub const MAX_COORDINATE_M: f32 = 16_384.0;
-/// Longest edge that a roadmap may have, metres. The scheduler checks every metre of an edge, so
-/// this limit bounds the scheduler's work.
+/// Longest edge that a roadmap may have, metres. The scheduler cuts edges into timed segments of
+/// 1.5 m (longer only on long flights), so this limit bounds the work for one edge.
 pub const MAX_EDGE_M: f32 = 100.0;
 /// Longest path from a node to a landmark that the file may store, metres: up to this length the
 /// f32 sum of edge lengths errs by at most 4 mm per edge.
@@ -29,9 +29,13 @@ pub const MAX_CLEARANCE_M: f32 = 65.535;
 /// Number of landmarks of a roadmap, unless it has none.
 pub const LANDMARK_COUNT: usize = 2;
 
+/// Bytes of a node: east, north and up as f32.
 pub(super) const NODE_LEN: usize = 12;
+/// Bytes of a node's distances to the landmarks, an f32 each.
 pub(super) const LANDMARK_DISTANCES_LEN: usize = 4 * LANDMARK_COUNT;
+/// Bytes of a node's height above the ground, an f32.
 pub(super) const HEIGHT_LEN: usize = 4;
+/// Bytes of a row offset, of a half-edge and of the CRC.
 pub(super) const WORD_LEN: usize = 4;
 
 /// Reason why a roadmap was refused, when it was read or written.
@@ -41,7 +45,8 @@ pub enum RoadmapError {
     File(FileError),
     /// A coordinate of the node with this index is NaN, infinite or beyond [`MAX_COORDINATE_M`].
     Node(u16),
-    /// The row offset of this node is below the one before, or beyond the half-edges.
+    /// The row offset of this node is below the one before or beyond the half-edges; or the first
+    /// offset is not 0, or the last one not the number of half-edges.
     Offset(u16),
     /// A half-edge of this node leads to the node itself or to no node, or the targets of its row
     /// are not strictly ascending.
@@ -110,6 +115,7 @@ pub struct RoadmapHeader {
 }
 
 impl RoadmapHeader {
+    /// Checks that each number of the header is in its range; `node_count` is the number of nodes.
     pub(super) fn check(&self, node_count: usize) -> Result<(), RoadmapError> {
         let refuse = |name| Err(FileError::Header(name).into());
         if !self.origin.is_valid() {
@@ -169,6 +175,7 @@ pub struct HalfEdge {
 }
 
 impl HalfEdge {
+    /// Decodes a half-edge from its bytes in the file.
     #[inline]
     pub(super) fn from_bytes(bytes: &[u8; WORD_LEN]) -> Self {
         let millimetres = u16::from_le_bytes([bytes[2], bytes[3]]);
@@ -187,6 +194,7 @@ pub(crate) fn decode_target(bytes: &[u8; WORD_LEN]) -> u16 {
     u16::from_le_bytes([bytes[0], bytes[1]])
 }
 
+/// Position of a node, metres, decoded from its bytes in the file.
 #[inline(always)]
 pub(super) fn decode_node(b: &[u8; NODE_LEN]) -> Point {
     let at = |i: usize| f32::from_le_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
@@ -223,10 +231,10 @@ pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, RoadmapError> {
     Ok(total)
 }
 
-/// Length of a roadmap file in bytes, or `None` if it exceeds the file's 32-bit length. `columns`
-/// is how many numbers are stored per node besides its position and row offset: 0, or
-/// [`LANDMARK_COUNT`] for [`write_with_landmarks`](super::write_with_landmarks), and one more with
-/// heights.
+/// Length of a roadmap file in bytes, or `None` if it exceeds the file's 32-bit length. `edges` is
+/// the number of edges, not of half-edges. `columns` is how many numbers are stored per node
+/// besides its position and row offset: 0, or [`LANDMARK_COUNT`] for
+/// [`write_with_landmarks`](super::write_with_landmarks), and one more with heights.
 pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> {
     let a_node = columns.checked_add(4)?;
     let words = nodes.checked_mul(a_node)?.checked_add(2)?.checked_add(edges.checked_mul(2)?)?;
@@ -234,6 +242,7 @@ pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> 
     u32::try_from(bytes).ok().map(|_| bytes)
 }
 
+/// The little-endian number at byte `at` of the header.
 pub(super) fn u16_at(head: &[u8; HEADER_LEN], at: usize) -> u16 {
     u16::from_le_bytes([head[at], head[at + 1]])
 }

@@ -15,9 +15,9 @@ use crate::Point;
 
 /// Horizontal distance within which nodes count for the ground below a point, metres.
 pub const MAX_GROUND_NODE_DISTANCE_M: f32 = 3.0;
-/// Most nodes, the nearest ones, that count for the ground below a point. With fewer, edges of the
-/// floor are missed; with more, the range of heights is too wide for a detour to leave the path.
-/// Measured by `tests/tests/detours.rs`.
+/// Most nodes, the nearest ones, that count for the ground below a point. With fewer, a step or the
+/// end of a floor is missed; with more, the range of heights is too wide for a detour to leave the
+/// path. Measured by `tests/tests/detours.rs`.
 const MAX_GROUND_NODES: usize = 6;
 
 impl RoadmapView<'_> {
@@ -28,9 +28,9 @@ impl RoadmapView<'_> {
         height_m.is_finite().then(|| self.node(node).z - height_m)
     }
 
-    /// Lowest and highest ground below `place`, metres up in the mission frame: of the nearest
-    /// nodes on the same storey within [`MAX_GROUND_NODE_DISTANCE_M`]. `None` if none of these has
-    /// a ground. O(nodes).
+    /// Lowest and highest ground around `place`, metres up in the mission frame: that below the
+    /// nearest nodes (at most six) on the same storey within [`MAX_GROUND_NODE_DISTANCE_M`]. `None`
+    /// if there is no such node. O(nodes).
     pub fn ground_z_range_near(&self, place: &Point) -> Option<(f32, f32)> {
         let room_m = 2.0 * self.header.tested_clearance_m;
         let mut nearest =
@@ -55,6 +55,7 @@ impl RoadmapView<'_> {
             .reduce(|a, b| (fminf(a.0, b.0), fmaxf(a.1, b.1)))
     }
 
+    /// Checks that each height is from 0 to [`MAX_LANDMARK_DISTANCE_M`], or infinite.
     pub(super) fn check_heights(&self) -> Result<(), RoadmapError> {
         let sound = |height_m: f32| {
             (0.0..=MAX_LANDMARK_DISTANCE_M).contains(&height_m) || height_m == f32::INFINITY

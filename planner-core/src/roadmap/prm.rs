@@ -8,7 +8,7 @@
 //!
 //! 1. nodes are sorted into cubes ([`NodeIndex`]), so that only near pairs are measured;
 //! 2. around a node the largest empty box in a fixed order of growth is taken (`prm/free_box.rs`):
-//!    the segment to a neighbour inside the box is clear, and one that leaves the box mostly meets
+//!    the segment to another node inside the box is clear, and one that leaves the box mostly meets
 //!    a wall;
 //! 3. the remaining segments go to the exact check, without their part inside the box.
 //!
@@ -109,9 +109,13 @@ fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &PrmConfig, p: &Point, draw:
 
 /// Sequence of pseudo-random or Halton points of the unit cube, [0, 1) on each axis.
 struct SampleSequence {
+    /// Source of [`Sampling::Uniform`] and [`Sampling::Bridge`].
     rng: Pcg32,
     sampling: Sampling,
+    /// Number of Halton points drawn so far.
     halton_index: u32,
+    /// Vector by which each Halton point is shifted; what leaves the unit cube comes in at the
+    /// opposite face.
     halton_shift: Point,
 }
 
@@ -129,6 +133,7 @@ impl SampleSequence {
         }
     }
 
+    /// The next point of the sequence.
     fn next(&mut self) -> Point {
         match self.sampling {
             Sampling::Uniform | Sampling::Bridge => uniform_point(&mut self.rng),
@@ -165,8 +170,8 @@ fn radical_inverse(mut index: u32, base: u32) -> f32 {
     value.min(1.0 - f32::EPSILON)
 }
 
-/// Writes all edges between `nodes` into `edges` and returns their number. Their order depends on
-/// the nodes only, but is not ascending.
+/// Writes all edges between `nodes` into `edges` and returns their number. Their order depends only
+/// on nodes and settings, but is not ascending.
 pub fn connect<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
@@ -205,10 +210,11 @@ pub fn connect_range<const NODES: usize, const CUBES: usize>(
     )
 }
 
-/// As [`connect_range`], but `hint` may answer whether the segment between two nodes is clear. It
-/// must answer as [`segment_is_clear`] does, or `None`. It is called only where the free box does
-/// not decide, and just before `found`. The second argument of `found` is a lower bound on the
-/// distance of the edge to obstacles, metres, right to 2⁻¹¹ cell; 0 where the free box gives none.
+/// As [`connect_range`], but `hint` may answer whether the segment between two nodes is clear. The
+/// answer must be that of [`segment_is_clear`], or `None`. `hint` is called only where the free box
+/// does not decide; if the segment is clear, `found` is called next. The second argument of `found`
+/// is a lower bound on the distance of the edge to obstacles, metres, right to 2⁻¹¹ cell; 0 where
+/// the free box gives none.
 pub fn connect_range_with_clearance_bound<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     workspace: &NodeIndex<NODES, CUBES>,

@@ -50,7 +50,9 @@ pub enum SearchError {
 /// Memory of a search on roadmaps of up to `N` nodes: 16 bytes per node. All-zero when new, so a
 /// static of it takes .bss only.
 pub struct SearchWorkspace<const N: usize> {
+    /// Length of the shortest path found to each node, metres; final once the node is settled.
     distance: [f32; N],
+    /// Node before each node on that path; the source is its own parent.
     parent: [u16; N],
     heap: Heap<N>,
 }
@@ -72,7 +74,7 @@ impl<const N: usize> SearchWorkspace<N> {
     }
 
     /// Writes the nodes of the shortest path from the last search's source to `node`, both
-    /// included. Only reads the search's parents, so it may be called for every target of a
+    /// included. Leaves the workspace as it is, so it may be called for every target after
     /// [`path_lengths_to`].
     pub fn path_to<const P: usize>(
         &self,
@@ -170,7 +172,9 @@ impl Graph for RoadmapView<'_> {
 /// searches on it.
 #[derive(Clone, Copy, Debug)]
 pub struct RoadmapWithLengths<'a> {
+    /// The roadmap itself.
     view: RoadmapView<'a>,
+    /// Length of each half-edge, metres, in the file's order.
     lengths: &'a [f32],
 }
 

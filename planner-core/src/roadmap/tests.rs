@@ -249,7 +249,8 @@ fn ways_to_landmarks_are_written_and_checked() {
     let view = RoadmapView::parse(&out).unwrap();
     assert!(view.has_landmarks());
     assert_eq!(view.byte_len(), out.len());
-    // Node 0, and node 1, five metres away; from there node 2 is reached through node 0.
+    // The landmarks are node 0, and node 1, five metres away; from node 1, node 2 is reached
+    // through node 0.
     let aside = 2.0f32.sqrt();
     for (node, ways) in [(0, [0.0, 5.0]), (1, [5.0, 0.0]), (2, [aside, 5.0 + aside])] {
         assert_eq!(view.landmark_distances_m(node), ways, "node {node}");

@@ -13,9 +13,13 @@ use crate::geo::frames::Geodetic;
 #[derive(Clone, Copy, Debug)]
 pub struct RoadmapView<'a> {
     pub(super) header: RoadmapHeader,
+    /// The CRC-32 at the end of the file.
     crc: u32,
+    /// The positions of the nodes, as in the file.
     pub(super) nodes: &'a [[u8; NODE_LEN]],
+    /// For each node the index of its first half-edge, then the number of half-edges.
     pub(super) offsets: &'a [[u8; WORD_LEN]],
+    /// The half-edges of all nodes, those of node 0 first.
     pub(super) half_edges: &'a [[u8; WORD_LEN]],
     /// The distances to the landmarks, an entry for each node; empty if the roadmap has no
     /// landmarks.

@@ -38,9 +38,10 @@ pub fn write(
     Ok(append_crc(out))
 }
 
-/// As [`write()`], with the shortest distances from each node to [`LANDMARK_COUNT`] landmarks, with
-/// which a search in a building settles half as many nodes. The first landmark is node 0, a start
-/// if there are any; the second is the node farthest from it. Costs one more search per landmark.
+/// As [`write()`], with the lengths of the shortest paths from each node to [`LANDMARK_COUNT`]
+/// landmarks, with which a search in a building settles half as many nodes. The first landmark is
+/// node 0, a start if there are any; the second is the node whose shortest path to the first is
+/// longest. Costs one more search per landmark.
 ///
 /// `heights_m` are the nodes' heights above the ground, infinite where nothing is below; if the
 /// slice is empty, the file has no heights.
@@ -139,6 +140,8 @@ fn append_crc(out: &mut [u8]) -> usize {
     out.len()
 }
 
+/// Checks coordinates, and that each edge is one that [`RoadmapView::parse`] would accept;
+/// duplicates are found by [`write_rows`].
 fn check_edges(
     header: &RoadmapHeader,
     nodes: &[Point],

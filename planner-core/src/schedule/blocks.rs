@@ -83,10 +83,12 @@ impl SegmentBlock {
         }
     }
 
+    /// Whether the two capsules come within `reach_m` of each other; true if either radius is
+    /// infinite.
     fn capsules_come_near(&self, other: &Self, reach_m: f32) -> bool {
         let apart_m = reach_m + self.capsule_radius_m + other.capsule_radius_m;
         let (own, theirs) = (&self.capsule_axis, &other.capsule_axis);
-        // Between lines of 10^15 m the distance is not a number.
+        // Without this check boxes of 10^15 m would be ruled out: their squared distance is NaN.
         apart_m.is_infinite()
             || segments_distance_sq((&own.0, &own.1), (&theirs.0, &theirs.1)) <= apart_m * apart_m
     }
@@ -97,11 +99,13 @@ impl SegmentBlock {
 struct BoundingBox(Point, Point);
 
 impl BoundingBox {
+    /// The box without points, from which [`Self::include`] starts.
     const EMPTY: Self = {
         let (low, high) = (f32::INFINITY, f32::NEG_INFINITY);
         Self(Point::new(low, low, low), Point::new(high, high, high))
     };
 
+    /// Grows the box to hold the box from `low` to `high`.
     #[inline(never)]
     fn include(&mut self, low: &Point, high: &Point) {
         // Not `fminf`, whose handling of NaN takes ten times as long on a board.
@@ -139,8 +143,11 @@ impl BoundingBox {
 /// it.
 #[derive(Debug, Default)]
 pub(super) struct OwnBlocks {
+    /// The blocks, in order along the flight.
     blocks: Vec<SegmentBlock, MAX_BLOCKS>,
+    /// Box around each group of [`BLOCKS_PER_GROUP`] blocks.
     group_boxes: Vec<BoundingBox, MAX_GROUPS>,
+    /// Box around all blocks.
     whole_box: BoundingBox,
     /// Distance from which on two segments are not in conflict, metres.
     conflict_distance_m: f32,

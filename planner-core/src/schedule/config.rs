@@ -5,10 +5,10 @@ use crate::{SettingError, check_positive};
 /// Separations and nominal speeds of a schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ScheduleConfig {
-    /// Distance that two moving vehicles keep, metres: the safety distance plus the deviations of
-    /// both from their paths.
+    /// Distance that the centres of two moving vehicles keep, metres: the safety distance plus the
+    /// deviations of both from their paths.
     pub separation_m: f32,
-    /// Distance that a vehicle keeps from one that stands on the ground, metres.
+    /// Distance that a vehicle's centre keeps from that of one that stands on the ground, metres.
     pub parked_separation_m: f32,
     /// Nominal speed along the path, m/s.
     pub cruise_mps: f32,
@@ -37,7 +37,8 @@ pub enum ScheduleError {
     SegmentsFull,
     /// A vehicle has more than `G` gates, even merged.
     GatesFull,
-    /// At no take-off time is this vehicle without conflict with those already scheduled.
+    /// At every take-off time this vehicle is in conflict with those already scheduled; or
+    /// [`sipp`](super::sipp) found no route without conflict.
     Blocked,
     /// A flight or a node with this index does not exist.
     BadIndex,

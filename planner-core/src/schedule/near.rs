@@ -12,17 +12,21 @@ use crate::sort;
 
 /// Number of cells along one side of the grid.
 const CELLS_PER_SIDE: usize = 32;
-/// Least side of a cell, metres: far below the separation, smaller cells rule out no more segments.
+/// Least side of a cell, metres. It is far below the separation, so smaller cells would rule out
+/// hardly more segments.
 const MIN_CELL_M: f32 = 0.5;
 
 /// Index of timed segments by the horizontal cell of their midpoint.
 #[derive(Clone, Debug)]
 pub(super) struct SegmentGrid {
+    /// South-western corner of the grid, metres east and north in the mission frame.
     min: [f32; 2],
+    /// Side of a cell, metres.
     cell_m: f32,
     /// Half of the length of the longest segment, metres.
     max_half_length_m: f32,
-    /// Index of the first segment of each cell, row by row.
+    /// Index of the first segment of each cell, row by row from the south; the last entry is the
+    /// number of segments.
     cell_starts: [u16; CELLS_PER_SIDE * CELLS_PER_SIDE + 1],
 }
 
@@ -108,10 +112,12 @@ impl SegmentGrid {
     }
 }
 
+/// Midpoint of a segment, metres east and north.
 fn middle(segment: &TimedSegment) -> [f32; 2] {
     [(segment.from.x + segment.to.x) * 0.5, (segment.from.y + segment.to.y) * 0.5]
 }
 
+/// Half of a segment's length, metres.
 fn half_length(segment: &TimedSegment) -> f32 {
     (segment.to - segment.from).length() * 0.5
 }

@@ -8,7 +8,7 @@
 //! flown at departures outside the intervals that the timed segments near the edge forbid.
 //!
 //! Cost: states reached × their edges × scheduled segments, most of which a cheap bound rules out.
-//! When all states are used up the search may end without a route although there is one.
+//! When the memory for states is full, the search may miss a route that exists.
 
 use heapless::Vec;
 use libm::{fmaxf, fminf};
@@ -26,7 +26,7 @@ use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::sort;
 use crate::{Length, Point};
 
-/// A search state: one node in one of its safe intervals.
+/// A search state: one node in one of its safe intervals. Times are after the mission's start.
 #[derive(Clone, Copy)]
 struct SippState {
     node: u16,
@@ -35,7 +35,7 @@ struct SippState {
     /// Index of the state from which this one is reached; its own index if it is reached by the
     /// climb from the pad.
     parent: u16,
-    /// Time at which the vehicle leaves the parent's node, seconds.
+    /// Time at which the vehicle leaves the parent's node (the first state: the pad), seconds.
     left_parent_s: f32,
     /// Earliest arrival, seconds; infinite while the state is not reached.
     arrive_s: f32,
@@ -58,15 +58,19 @@ const NO_STATE: SippState = SippState {
 /// Memory for roadmaps of up to `N` nodes, `N` states, and `P` timed segments of scheduled flights.
 /// All zero when new.
 pub struct SippWorkspace<const N: usize, const P: usize> {
-    /// The scheduled timed segments, with absolute times; sorted by the cells of `cells`.
+    /// The scheduled timed segments, with times after the mission's start; sorted by the cells of
+    /// `cells`.
     segments: Vec<TimedSegment, P>,
     cells: SegmentGrid,
     states: [SippState; N],
     state_count: usize,
     /// Index plus one of each node's first state; 0 if its states have not been made.
     first_state: [u16; N],
+    /// Indices of reached states, by arrival plus the heuristic.
     heap: Heap<N>,
+    /// Timed segments of the scheduled flight that is being loaded.
     cut_segments: Vec<TimedSegment, MAX_TIMED_SEGMENTS>,
+    /// Departures forbidden on the leg that is being examined.
     forbidden: ForbiddenIntervals,
     /// Time from when another vehicle has left a place until this route may use it, seconds.
     handover_s: f32,
@@ -104,7 +108,7 @@ pub struct RouteQuery<'a> {
     pub from: u16,
     /// Node of the vehicle's goal.
     pub to: u16,
-    /// Earliest take-off, seconds.
+    /// Earliest take-off, seconds after the mission's start.
     pub not_before_s: f32,
     /// Points at which other vehicles are parked at all times.
     pub parked: &'a [Point],
@@ -122,7 +126,7 @@ struct Climb {
 /// The descent from the goal's node to the ground.
 struct Landing {
     down: Leg,
-    /// Time until which another vehicle needs the landing place, seconds.
+    /// Time from which no other vehicle needs the landing place, seconds.
     free_from_s: f32,
 }
 
@@ -222,7 +226,8 @@ fn check_inputs<const N: usize, const W: usize>(
     Ok(())
 }
 
-/// Cuts all scheduled flights into timed segments with absolute times; adds parked vehicles.
+/// Cuts all scheduled flights into timed segments with times after the mission's start, each held
+/// `handover_s` longer; adds parked vehicles.
 fn load_scheduled_segments<'a, const N: usize, const P: usize, const W: usize>(
     route: &RouteQuery<'_>,
     scheduled: impl Iterator<Item = &'a Flight<W>>,
@@ -404,8 +409,8 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         }
     }
 
-    /// Sets the earliest arrival in every state of the transition's node, from which the flight to
-    /// the goal takes at least `left_s`.
+    /// Lowers the arrival in each state of the transition's node that the transition reaches
+    /// earlier. From that node the flight to the goal takes at least `left_s`.
     fn relax_intervals(&mut self, hop: &StateTransition, left_s: f32) {
         let &StateTransition { to_node, parent, leave_s: (from_s, until_s), duration_s } = hop;
         let mut at = self.first_state[usize::from(to_node)];

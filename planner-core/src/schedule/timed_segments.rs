@@ -9,19 +9,20 @@ use crate::flight::{Flight, Waypoint};
 use crate::geo::distance::segments_distance_sq;
 use crate::{Length, Point};
 
-/// Longest timed segment, metres. With shorter ones vehicles follow one another more closely,
-/// longer ones cost less.
+/// Longest timed segment of a flight that needs at most [`MAX_TIMED_SEGMENTS`] of them, metres.
+/// With shorter ones vehicles follow one another more closely, longer ones cost less.
 pub const DEFAULT_MAX_SEGMENT_M: f32 = 1.5;
 /// Most timed segments of one flight; a flight that would need more gets longer ones.
 pub const MAX_TIMED_SEGMENTS: usize = 320;
 /// Most doublings of the length of timed segments: to 1.5 km.
 const MAX_SEGMENT_DOUBLINGS: usize = 10;
-/// Least time after take-off for which the pad is held, seconds: a vehicle that stands on its pad
-/// has not left it.
+/// Least time after take-off for which the pad is held, seconds, however short the climb is: a
+/// vehicle that stands on its pad has not left it.
 pub(super) const MIN_PAD_HOLD_S: f32 = 0.05;
 
 /// A timed segment: a straight part of a flight, and the interval in which it is held. Times are
-/// seconds after take-off; the pad is held from −∞, the landing place to +∞.
+/// seconds after take-off ([`super::sipp`]: after the mission's start); the pad is held from −∞,
+/// the landing place to +∞.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimedSegment {
     pub(super) from: Point,
@@ -36,6 +37,7 @@ pub(super) struct TimedSegment {
     pub(super) held_from_s: f32,
     /// Time at which the vehicle has left the segment, seconds.
     pub(super) held_until_s: f32,
+    /// Whether the vehicle stands on the ground: on its pad or landing place.
     pub(super) parked: bool,
 }
 
@@ -86,11 +88,13 @@ impl<const W: usize> Flight<W> {
 /// be missing; a leg of length 0 has no segments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StraightPart {
+    /// The stay on the pad, or the hover at the waypoint where the leg begins.
     stay_before: Option<TimedSegment>,
     pub(super) leg: Leg,
     /// Arc lengths of the leg's beginning and end, metres.
     from_m: f32,
     to_m: f32,
+    /// The stay at the landing place.
     stay_after: Option<TimedSegment>,
 }
 
@@ -169,7 +173,8 @@ pub(super) fn parked_segment(at: Point) -> TimedSegment {
     hold_segment(at, 0.0, 0.0, 0.0)
 }
 
-/// Timed segment of a vehicle that stays at a point, whose arc length is `m`.
+/// Timed segment of a vehicle that stays at a point, whose arc length is `m`. `parked` is true; for
+/// a hover the caller sets it to false.
 fn hold_segment(at: Point, m: f32, from_s: f32, to_s: f32) -> TimedSegment {
     TimedSegment {
         from: at,
@@ -182,6 +187,7 @@ fn hold_segment(at: Point, m: f32, from_s: f32, to_s: f32) -> TimedSegment {
     }
 }
 
+/// Part 0: the pad and the climb; for a vehicle that stays, its pad at all times.
 fn climb_part<const W: usize>(flight: &Flight<W>, first: &Waypoint) -> StraightPart {
     let pad = first.position - Point::new(0.0, 0.0, flight.climb_m);
     let (from_m, to_m) = (-flight.climb_m, 0.0);
@@ -202,6 +208,7 @@ fn climb_part<const W: usize>(flight: &Flight<W>, first: &Waypoint) -> StraightP
     StraightPart { stay_before: before, leg, from_m, to_m, stay_after: None }
 }
 
+/// The leg between two waypoints, without the hover at its beginning.
 fn leg_part(begin: &Waypoint, next: &Waypoint) -> StraightPart {
     let leg = Leg {
         from: begin.position,
@@ -220,6 +227,7 @@ fn leg_part(begin: &Waypoint, next: &Waypoint) -> StraightPart {
     }
 }
 
+/// The last part: the descent and the landing place, without the hover before the descent.
 fn descent_part<const W: usize>(
     flight: &Flight<W>,
     last: &Waypoint,
@@ -264,7 +272,8 @@ pub(super) enum WaitingPlaces {
     BeforeLegOnly,
 }
 
-/// A straight leg flown at constant speed, with its times in seconds.
+/// A straight leg flown at constant speed. `from_s` and `to_s` are the times at its ends, seconds,
+/// after take-off or after the beginning of the leg.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leg {
     pub(super) from: Point,
@@ -272,6 +281,7 @@ pub(super) struct Leg {
     pub(super) length_m: f32,
     pub(super) from_s: f32,
     pub(super) to_s: f32,
+    /// Where on the leg the vehicle may wait.
     pub(super) waiting_places: WaitingPlaces,
 }
 

@@ -2,11 +2,11 @@
 //!
 //! [`Method::Algorithm2`] is paper P3D §3.4 as printed, for comparison. [`Method::Priority`] keeps
 //! the order of the swarm's schedule: the vehicle stops at each gate ([`crate::schedule`]) until
-//! the other vehicle has left the stretch that conflicts with the one behind the gate. A vehicle
-//! that is out of the plan opens all gates that wait for it, and others fly around it
-//! ([`crate::detour`]). The own vehicle stops before a neighbour that does not fly the shared plan.
-//! If that neighbour hovers beside the own path, the own vehicle flies past slowly, where a stop
-//! from the lower speed still ends far enough away.
+//! the other vehicle has left the part of its path that conflicts with the own path just beyond the
+//! gate. A vehicle that is out of the plan opens all gates that wait for it, and others fly around
+//! it ([`crate::detour`]). The own vehicle stops before a neighbour that does not fly the shared
+//! plan. If that neighbour hovers beside the own path, the own vehicle flies past slowly, where a
+//! stop from the lower speed still ends far enough away.
 
 use fpu::sqrtf;
 use heapless::Vec;
@@ -31,7 +31,7 @@ pub enum Method {
 pub struct DeconflictConfig {
     /// Rule by which vehicles are kept apart.
     pub method: Method,
-    /// Smallest distance between the centres of two vehicles, metres.
+    /// Smallest allowed distance between the centres of two vehicles, metres.
     pub safety_distance_m: f32,
     /// Nominal speed along the path, m/s.
     pub cruise_mps: f32,
@@ -116,8 +116,8 @@ const MAX_PATH_SAMPLES: usize = 16;
 /// Time of flight between neighbouring samples of the path, seconds.
 const PATH_SAMPLE_S: f32 = 0.25;
 
-/// Margin for the rounding of distances, metres: subtracted from the distance to a conflict before
-/// samples are skipped by it.
+/// Margin for the rounding of distances, metres: subtracted from the distance to a conflict, which
+/// then decides how many samples are skipped.
 const DISTANCE_ROUNDING_M: f32 = 0.05;
 /// Distance beyond a gate at which the reference still counts as standing at it, metres: a small
 /// overshoot of the stop must not carry the vehicle through.
@@ -187,6 +187,9 @@ fn advise_by_algorithm2(
     }
 }
 
+/// Advice by [`Method::Priority`]: a stop at the first gate that is not open; and a stop, or a slow
+/// passage, before each airborne neighbour that is off its path of the plan (before every airborne
+/// one while `own` flies a detour).
 fn advise_by_priority<const W: usize>(
     cfg: &DeconflictConfig,
     own: &OwnVehicle<'_, W>,
@@ -243,12 +246,12 @@ fn advise_by_priority<const W: usize>(
 /// has.
 ///
 /// A neighbour needs at least the flight at `fastest_mps`, m/s, to where it opens the gate, and the
-/// own vehicle reaches the gate no earlier than by its schedule, 3 s (`DEPARTURE_S`) later. By the
-/// schedule the neighbour is that far when the own vehicle departs, if no vehicle is faster. So
-/// this wait leads to a deadlock no more than the gate itself does. False while any neighbour was
-/// last heard more than 2 s (`HEARD_LATELY_S`) ago or is off the plan: the late one may wait for
-/// that one. Work: the neighbours; the gates, a search among the neighbours and one along the path
-/// for each.
+/// own vehicle reaches the gate no earlier than by its schedule, 3 s (`DEPARTURE_S`) later. If all
+/// keep to the schedule and none is faster than `fastest_mps`, the neighbour is far enough on when
+/// the own vehicle is due to depart, and the answer is no. So this wait can lead to a deadlock no
+/// more than the gate itself can. False while any neighbour was last heard more than 2 s
+/// (`HEARD_LATELY_S`) ago or is off the plan: the late one may wait for that one. Work: the
+/// neighbours; the gates, a search among the neighbours and one along the path for each.
 pub fn has_late_neighbour<const W: usize>(
     cfg: &DeconflictConfig,
     fastest_mps: f32,
@@ -277,7 +280,9 @@ fn find_neighbour(neighbours: &[Neighbour], id: u8) -> Option<&Neighbour> {
 
 /// Samples of the own path ahead of the reference, at equal distances.
 struct PathSamples {
+    /// The samples; the first is `step_m` ahead of the reference.
     points: Vec<Point, MAX_PATH_SAMPLES>,
+    /// Distance along the path between two samples, metres.
     step_m: f32,
 }
 
@@ -299,15 +304,15 @@ impl PathSamples {
         own: &OwnVehicle<'_, W>,
         n: &Neighbour,
     ) -> Option<f32> {
-        let away = |looks: usize, own: &Point| {
-            n.position + n.velocity * (n.age_s + looks as f32 * PATH_SAMPLE_S) - own
+        let away = |samples: usize, own: &Point| {
+            n.position + n.velocity * (n.age_s + samples as f32 * PATH_SAMPLE_S) - own
         };
         let now = away(0, &own.position);
         let near = fminf(apart_m * apart_m, now.norm_squared());
         // Upper bound of how far both fly between two samples.
         let fastest_mps = n.velocity.x.abs() + n.velocity.y.abs() + n.velocity.z.abs();
-        let look_m = self.step_m + PATH_SAMPLE_S * fastest_mps;
-        let looks_a_metre = 1.0 / look_m;
+        let approach_m = self.step_m + PATH_SAMPLE_S * fastest_mps;
+        let samples_per_m = 1.0 / approach_m;
         let (mut i, mut last) = (0, (0, now));
         while let Some(there) = self.points.get(i) {
             let to = away(i + 1, there);
@@ -317,12 +322,12 @@ impl PathSamples {
                 let from = if last.0 == i { last.1 } else { away(i, &self.points[i - 1]) };
                 interior_closest_approach_sq(&from, &to).is_some_and(|square| square < near)
             };
-            if to.norm_squared() < near || room_m < look_m && comes_near() {
+            if to.norm_squared() < near || room_m < approach_m && comes_near() {
                 return Some(i as f32 * self.step_m);
             }
             last = (i + 1, to);
-            // The cast gives 0 for NaN; the product is not negative otherwise.
-            i = i.saturating_add(1).saturating_add((room_m * looks_a_metre) as usize);
+            // The cast gives 0 for NaN and for a negative product.
+            i = i.saturating_add(1).saturating_add((room_m * samples_per_m) as usize);
         }
         None
     }

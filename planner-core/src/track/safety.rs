@@ -90,7 +90,7 @@ pub struct NeighbourMotion<'a> {
 /// Bounds of a neighbour's motion, from which its reachable set is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionBounds {
-    /// Limits by which it stops.
+    /// Limits by which the neighbour stops.
     pub braking: Braking,
     /// Greatest speed that a neighbour is assumed to fly at, m/s.
     pub speed_max_mps: f32,
@@ -140,6 +140,8 @@ impl NeighbourMotion<'_> {
         self.age_s + self.delay_s
     }
 
+    /// Greatest distance, in any direction, of a stale neighbour from its last reported position,
+    /// metres.
     #[inline]
     fn reach_any_direction_m(&self, bounds: &MotionBounds) -> f32 {
         // The neighbour learns that no vehicle hears it from messages that are delayed as much as
@@ -166,6 +168,8 @@ impl NeighbourMotion<'_> {
             + ahead_s * bounds.speed_max_mps
     }
 
+    /// Distance to the side that acceleration may have carried the neighbour since its data,
+    /// metres.
     #[inline]
     fn lateral_reach_m(&self, bounds: &MotionBounds) -> f32 {
         0.5 * bounds.braking.accel_mps2 * self.data_age_s() * self.data_age_s()
@@ -189,13 +193,15 @@ impl NeighbourMotion<'_> {
         set
     }
 
+    /// Adds the motion of a fresh neighbour: along its points if it is on them, else straight on,
+    /// widened by what it may accelerate to the side.
     fn add_motion(&self, set: &mut ReachableSet, bounds: &MotionBounds, ahead_s: f32) {
-        let joint = self.place_on_points();
-        if let Some((nearest, ahead)) = joint.ahead(&self.position, self.reported_points) {
+        let place = self.place_on_points();
+        if let Some((nearest, ahead)) = place.ahead(&self.position, self.reported_points) {
             let ahead = core::iter::once(nearest).chain(ahead.iter().copied());
             set.extend_along(
                 ahead,
-                joint.place_uncertainty_m() + self.distance_until_stop_m(bounds, ahead_s),
+                place.place_uncertainty_m() + self.distance_until_stop_m(bounds, ahead_s),
             );
         } else {
             let share = if self.speed_mps > 0.0 {
@@ -208,6 +214,7 @@ impl NeighbourMotion<'_> {
         }
     }
 
+    /// Where the neighbour is on its points; computed here if that was not done when it was heard.
     #[inline]
     fn place_on_points(&self) -> PlaceOnPoints {
         if self.place_on_points == PlaceOnPoints::Unknown {

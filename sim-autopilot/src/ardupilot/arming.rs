@@ -19,6 +19,7 @@ impl Copter {
         }
     }
 
+    /// Arms, and sets home. Refused with a STATUSTEXT if the checks fail, unless forced.
     pub(super) fn arm(
         &mut self,
         platform: &mut Platform,

@@ -17,7 +17,7 @@ use crate::services::itinerary::{LandedState, MissionLeg, interpolate_height};
 
 /// Distance within which the place of a landing is reached, metres.
 const LANDING_POINT_REACHED_M: f32 = 0.5;
-/// Distance to the target beyond which the vehicle turns its heading towards it, metres.
+/// Horizontal distance to a waypoint beyond which the vehicle faces the waypoint, metres.
 const TURN_BEYOND_M: f32 = 2.0;
 
 impl Copter {

@@ -13,6 +13,7 @@ use crate::link::port::Sender;
 use crate::link::wire::PayloadReader;
 use crate::platform::Platform;
 
+/// Id of the message SET_MODE, which its COMMAND_ACK has as the command.
 const SET_MODE: u16 = 11;
 
 /// Values of MAV_DATA_STREAM, and the messages that each switches on (`SRn_*`).
@@ -106,6 +107,8 @@ impl Copter {
         platform.acknowledge(from, SET_MODE, result);
     }
 
+    /// Enters the mode of this number; returns the MAV_RESULT. `base` must have the custom mode
+    /// flag.
     fn change_mode(&mut self, platform: &mut Platform, base: u8, number: u32) -> u8 {
         if base & CUSTOM_MODE == 0 {
             return DENIED;

@@ -82,6 +82,7 @@ impl Copter {
             .map_or(f32::NAN, |&(_, up)| up)
     }
 
+    /// The goal of a take-off; ends the take-off once the reference is at its target height.
     pub(super) fn take_off_goal(&mut self) -> GuidedGoal {
         let Some(takeoff) = self.takeoff else { return GuidedGoal::STOP };
         let at = self.reference.position;
@@ -120,6 +121,7 @@ impl Copter {
         GuidedGoal { velocity: Point::new(0.0, 0.0, -sink), ..GuidedGoal::STOP }
     }
 
+    /// The goal of a return: climbs, flies home, waits and lands.
     pub(super) fn return_goal(&mut self, sensors: &SensorReadings) -> GuidedGoal {
         let home = sensors.home;
         let at = self.reference.position;

@@ -51,6 +51,7 @@ impl CopterMode {
         MODES.into_iter().find(|mode| mode.number() == number)
     }
 
+    /// Whether it can be entered only with a position estimate (while armed).
     pub(super) fn needs_position(self) -> bool {
         matches!(self, Self::Auto | Self::Guided | Self::Loiter | Self::Rtl | Self::Brake)
     }

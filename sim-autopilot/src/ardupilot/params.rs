@@ -95,19 +95,28 @@ pub struct CopterTuning {
     pub jerk_max: f32,
     pub jerk_max_z: f32,
     pub land_speed: f32,
+    /// Height above home at which a landing has slowed down to `land_speed`, metres.
     pub land_slow_below: f32,
+    /// Descent rate in modes flown by stick, whose throttle is simulated as low, m/s.
     pub low_stick_descent_rate: f32,
     pub guided_timeout_s: f32,
     pub disarm_delay_s: f32,
+    /// Height above home to which a return climbs, metres.
     pub return_height: f32,
+    /// Most height of a return for each metre of horizontal distance from home.
     pub return_cone_slope: f32,
+    /// Time for which a return waits above home before it lands, seconds.
     pub return_loiter_s: f32,
     pub gcs_failsafe: bool,
     pub gcs_timeout_s: f32,
+    /// MAVLink system id of the ground station whose silence starts the failsafe.
     pub gcs_system: u8,
     pub estimator_failsafe: bool,
+    /// What a charge below `battery_low_share` starts: 1 lands, more returns, 0 nothing.
     pub low_battery_action: i32,
+    /// Charge (0 to 1) below which the battery is low.
     pub battery_low_share: f32,
+    /// Charge (0 to 1) below which the vehicle cannot be armed.
     pub battery_to_arm_share: f32,
     pub arming_checks_enabled: bool,
 }

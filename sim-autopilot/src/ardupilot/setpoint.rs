@@ -2,8 +2,9 @@
 //! does (`GCS_MAVLINK_Copter::handle_message_set_position_target_*`).
 //!
 //! If the type mask leaves out one axis, the whole vector is left out. A message without any
-//! demand, in an unsupported frame, with force, or with acceleration alone (which ArduCopter would
-//! fly, but this simulation does not) is not refused: the vehicle stops.
+//! demand, in an unsupported frame, with force, with position and acceleration but no velocity, or
+//! with acceleration alone (which ArduCopter would fly, but this simulation does not) is not
+//! refused: the vehicle stops.
 
 use nalgebra::Vector3;
 use planner_core::Point;
@@ -12,6 +13,8 @@ use planner_core::geo::frames::Geodetic;
 use crate::link::wire::PayloadReader;
 use crate::platform::Platform;
 
+// Values of MAV_FRAME, then bits of the type mask: a set bit leaves its field out, and the force
+// bit makes the acceleration a force.
 const FRAME_LOCAL_NED: u8 = 1;
 const FRAME_LOCAL_OFFSET_NED: u8 = 7;
 const FRAME_BODY_NED: u8 = 8;
@@ -107,6 +110,8 @@ fn read_vector(fields: &PayloadReader<'_>, at: usize) -> Vector3<f64> {
     Vector3::new(fields.f32(at), fields.f32(at + 4), fields.f32(at + 8)).cast::<f64>()
 }
 
+/// The goal of a setpoint message: of position, velocity and acceleration (ENU) those that its type
+/// mask does not leave out.
 fn goal_from_fields(
     fields: &PayloadReader<'_>,
     position: Point,

@@ -2,6 +2,7 @@
 
 use crate::link::wire::PayloadReader;
 
+// Values of MAV_RESULT.
 pub const ACCEPTED: u8 = 0;
 pub const TEMPORARILY_REJECTED: u8 = 1;
 pub const DENIED: u8 = 2;

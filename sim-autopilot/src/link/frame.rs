@@ -158,6 +158,7 @@ impl PortFramer {
     }
 }
 
+/// Parses the frame that begins with the first byte, which is a start byte.
 fn parse_front(bytes: &[u8]) -> ParsedFront {
     let header = header_len(bytes);
     if header == V2_HEADER && bytes.get(2).is_some_and(|flags| flags & !FLAG_SIGNED != 0) {

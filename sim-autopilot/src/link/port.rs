@@ -56,6 +56,7 @@ pub struct PendingAck {
 /// Sender of a frame, and the port at which it arrived.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sender {
+    /// Index of the port.
     pub(crate) port: usize,
     pub(crate) system: u8,
     pub(crate) component: u8,
@@ -73,17 +74,20 @@ impl Sender {
 pub struct Port {
     framer: PortFramer,
     system_id: u8,
+    /// Sequence number of the next frame.
     sequence: u8,
+    /// Encoded frames; the first `sent_bytes` bytes have been fetched already.
     queue: Vec<u8>,
     sent_bytes: usize,
     /// Number of messages dropped because the send queue was full.
     pub dropped_messages: u64,
     /// Telemetry streams, in a fixed order.
     pub streams: Vec<Stream>,
+    /// Earliest time at which a stream may be due, microseconds since boot.
     next_due_us: u64,
     /// COMMAND_ACKs that wait, each with the time at which it is due, microseconds since boot.
     pub pending_acks: Vec<(u64, PendingAck)>,
-    /// Ids of messages to be sent once, in the next step.
+    /// Ids of messages to be sent once, at the end of the step.
     pub requested_once: Vec<u32>,
     /// Index of the next parameter of a PARAM_REQUEST_LIST that is being answered.
     pub param_cursor: Option<usize>,
@@ -124,7 +128,8 @@ impl Port {
         }
     }
 
-    /// A port for a ground station: the same messages at the rates of [`GROUND_STREAMS`].
+    /// A port for a ground station: the messages of `streams` at the rates of [`GROUND_STREAMS`];
+    /// those that are not listed there are off.
     pub fn for_ground(system_id: u8, streams: &[(u32, u32)]) -> Self {
         let rate =
             |id| GROUND_STREAMS.iter().find(|ground| ground.0 == id).map_or(0, |ground| ground.1);
@@ -138,6 +143,7 @@ impl Port {
         self.framer.next(now_us, input)
     }
 
+    /// Own system id, component id, and the sequence number of the next frame, which it counts.
     fn next_sender(&mut self) -> (u8, u8, u8) {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
@@ -240,7 +246,7 @@ impl Port {
     }
 
     /// Puts the ids of all due streams into `due`, in order, and schedules their next messages. If
-    /// the queue is congested they are dropped.
+    /// the queue is congested, drops the due messages and leaves `due` empty.
     pub fn take_due(&mut self, now_us: u64, due: &mut Vec<u32>) {
         due.clear();
         let mut next = u64::MAX;
@@ -272,8 +278,8 @@ impl Port {
         true
     }
 
-    /// Moves queued bytes into `out`, as many whole frames as fit, and returns their number. 280
-    /// bytes hold any frame.
+    /// Moves queued bytes into `out`, as many whole frames as fit, and returns the number of bytes.
+    /// 280 bytes hold any frame.
     pub fn poll_transmit(&mut self, out: &mut [u8]) -> usize {
         let waiting = &self.queue[self.sent_bytes..];
         let mut len = 0;

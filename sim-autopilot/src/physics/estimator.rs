@@ -33,7 +33,8 @@ impl EstimatorErrors {
 }
 
 /// Model of one axis: standard deviation of the velocity error (m/s), its time constant (s), time
-/// constant with which GPS reduces the position error (s), and limit of the position error (m).
+/// constant with which GPS reduces the position error (s), and limit of the position error (m; of
+/// both horizontal axes together).
 #[derive(Clone, Copy, Debug)]
 struct ErrorModel {
     sigma_mps: f32,
@@ -77,6 +78,7 @@ fn error_models(
 pub struct EstimateErrorState {
     random: Gaussian,
     axes: [ErrorModel; 3],
+    /// Position error without the constant height error, ENU metres.
     position_drift: Point,
     height_bias_m: f32,
     /// Position error, ENU metres.

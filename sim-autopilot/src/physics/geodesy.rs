@@ -10,13 +10,14 @@ use nalgebra::{Matrix3, Vector3};
 use planner_core::Point;
 use planner_core::geo::frames::{self, Geodetic, Projection};
 
-/// Distance of the vehicle from the linear approximation's centre at which it is renewed, metres.
+/// Distance of the vehicle from the linear approximation's centre beyond which the approximation is
+/// renewed about the vehicle, metres.
 const RENEW_BEYOND_M: f64 = 50.0;
 /// Distance from the linear approximation's centre beyond which a point is converted exactly,
 /// metres.
 const LINEAR_WITHIN_M: f64 = 100.0;
-/// Half of the distance over which the linear approximation's slopes are computed, metres: a power
-/// of two, so that the points are exact in f32.
+/// Half of the distance over which the linear approximation's slopes are computed, metres: whole
+/// metres, as the centre has, so that the points are exact in f32.
 const SLOPE_HALF_SPAN_M: f64 = 64.0;
 
 /// Conversions between one autopilot's frame (EKF origin and projection) and the mission frame.
@@ -25,10 +26,13 @@ pub struct LocalFrame {
     projection: Projection,
     world_origin: Geodetic,
     ekf_origin: Geodetic,
+    /// Point about which the conversions are linear, ENU metres; the next two are the same point.
     centre: Vector3<f64>,
     centre_ned: Vector3<f64>,
     centre_geodetic: Geodetic,
+    /// Change of NED for each metre of ENU.
     ned_slope: Matrix3<f64>,
+    /// Change of ENU for each metre of NED.
     enu_slope: Matrix3<f64>,
     /// Change of latitude and longitude (degrees) and altitude (metres) for each metre of ENU.
     geodetic_slope: Matrix3<f64>,
@@ -123,11 +127,13 @@ impl LocalFrame {
         frames::geodetic_to_enu(&self.world_origin, position).cast::<f64>()
     }
 
+    /// Converts a point from ENU to NED through latitude and longitude.
     fn exact_ned(&self, enu: &Vector3<f64>) -> Vector3<f64> {
         let geodetic = frames::enu_to_geodetic(&self.world_origin, &enu.cast::<f32>());
         frames::geodetic_to_ned(self.projection, &self.ekf_origin, &geodetic)
     }
 
+    /// Renews the linear approximation about `near`, rounded to whole metres.
     fn linearise(&mut self, near: Vector3<f64>) {
         // Whole metres are exact in f32, the type of the conversions' arguments.
         self.centre = near.map(libm::round);

@@ -28,8 +28,8 @@ const BIAS_TAU_S: f32 = 60.0;
 /// Time constant of the fast position error, seconds: GPS noise that the estimator does not filter
 /// out.
 const JITTER_TAU_S: f32 = 1.0;
-/// Velocity error for each metre of position error, 1/s: PX4's estimate drifts by 0.1 m/s where it
-/// is 0.5 m wrong.
+/// Standard deviation of the velocity error for each metre of that of the position error, 1/s:
+/// PX4's estimate drifts by 0.1 m/s where it is 0.5 m wrong.
 const VELOCITY_ERROR_PER_METRE: f32 = 0.2;
 
 /// Generator of Gaussian numbers. It sums four uniform 16-bit numbers (Irwin–Hall): mean 0,
@@ -61,7 +61,9 @@ impl Gaussian {
 #[derive(Clone, Debug)]
 struct OrnsteinUhlenbeck {
     value: Point,
+    /// Factor on the value in each update.
     decay: f32,
+    /// Standard deviation of the random part that each update adds.
     noise_gain: Point,
 }
 
@@ -84,6 +86,7 @@ pub struct Disturbance {
     random: Gaussian,
     gust: Option<OrnsteinUhlenbeck>,
     gust_peak_mps: f32,
+    /// Slow position error, fast position error (metres), and velocity error (m/s).
     errors: Option<[OrnsteinUhlenbeck; 3]>,
     mean_wind: Point,
     /// Wind now: mean and gust, ENU m/s.

@@ -90,7 +90,7 @@ pub struct TrueState {
     pub heading_rate: f32,
     /// Whether the body touches the ground.
     pub touching: bool,
-    /// Whether the motors are on.
+    /// Whether the autopilot is armed.
     pub armed: bool,
     /// Whether the autopilot's land detector reports the vehicle on the ground.
     pub landed: bool,
@@ -150,8 +150,11 @@ pub struct Gains {
 pub struct Multicopter {
     airframe: AirframeParameters,
     state: TrueState,
+    /// `state.position` in double precision.
     position: Vector3<f64>,
+    /// Acceleration by thrust and gravity together, ENU m/s²: zero in a hover.
     thrust_minus_gravity: Point,
+    /// Integral part of the velocity controller's output, ENU m/s².
     integral: Point,
     /// Velocity that the cascade commands, ENU m/s; for telemetry.
     pub velocity_setpoint: Point,
@@ -276,8 +279,8 @@ impl Multicopter {
             self.integral.z = 0.0;
             error.z = 0.0;
         }
-        // Thrust is never negative and at most twice the weight, since hovering takes half
-        // throttle.
+        // Thrust is at least the demand's minimum and at most twice the weight, since hovering
+        // takes half throttle.
         let bounded_z = asked.z.clamp((demand.min_thrust_per_weight - 1.0) * GRAVITY, GRAVITY);
         let across = libm::sqrtf(asked.x * asked.x + asked.y * asked.y);
         let across_max =
@@ -370,7 +373,8 @@ impl Multicopter {
     }
 }
 
-/// The angle within ±π. Correct for angles within ±3π, which adding a bounded rate never exceeds.
+/// The angle within ±π. Correct for angles within ±3π, such as the difference of two wrapped
+/// angles, or a wrapped angle plus the turn of one step.
 pub fn wrap_pi_once(angle: f32) -> f32 {
     use core::f32::consts::{PI, TAU};
     if angle > PI {

@@ -101,6 +101,7 @@ impl Px4 {
         }
     }
 
+    /// Whether PX4 sends this message on request.
     fn has_message(&self, id: u32) -> bool {
         matches!(id, msg::AUTOPILOT_VERSION | msg::PROTOCOL_VERSION)
             || telemetry::PX4_STREAMS.iter().any(|stream| stream.0 == id)
@@ -133,6 +134,7 @@ impl Px4 {
         self.arm(platform, Arming::Checked).result_or(DENIED)
     }
 
+    /// Arms; sets home if the vehicle was disarmed before.
     fn arm(&mut self, platform: &mut Platform, arming: Arming) -> CommandOutcome {
         let sensors = platform.sensors();
         let was_armed = self.commander.armed();
@@ -169,6 +171,7 @@ impl Px4 {
     }
 }
 
+/// The mode of a main and sub mode number; `None` unless `base` has the custom mode flag.
 fn mode_of(base: u8, main: u8, sub: u8) -> Option<Px4Mode> {
     if base & CUSTOM_MODE != 0 { Px4Mode::from_main_sub(main, sub) } else { None }
 }

@@ -18,7 +18,7 @@ use crate::status::AutopilotStatus;
 
 /// Gimbal commands that PX4 was recorded to send when a failsafe starts: take control (1001), point
 /// ahead (1000, DO_GIMBAL_MANAGER_PITCHYAW), release control (1001, DO_GIMBAL_MANAGER_CONFIGURE).
-/// They go to component 0, a broadcast, and are not answered.
+/// They go to all components (0) of PX4's own system. No component answers.
 const FAILSAFE_GIMBAL_COMMANDS: [(u16, [f32; 5]); 3] = [
     (1001, [1.0, 1.0, -1.0, -1.0, 0.0]),
     (1000, [f32::NAN, f32::NAN, f32::NAN, f32::NAN, 2.0]),

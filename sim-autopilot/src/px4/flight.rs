@@ -14,9 +14,9 @@ use crate::services::itinerary::{MissionLeg, interpolate_height};
 const MIN_CLIMB_DEMAND_M: f32 = 0.15;
 /// Least commanded upward velocity (m/s) or acceleration (m/s²) that counts as a demand to climb.
 const MIN_CLIMB_DEMAND_MPS: f32 = 0.05;
-/// Distance within which an automatic mode has reached its target, metres.
+/// Distance, horizontal or vertical, within which an automatic mode has reached its target, metres.
 const ARRIVED_M: f32 = 0.5;
-/// Distance to the target beyond which the vehicle turns its heading towards it, metres.
+/// Horizontal distance to a mission's waypoint beyond which the vehicle faces the waypoint, metres.
 const TURN_BEYOND_M: f32 = 2.0;
 /// Largest descent rate seen in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5. It is the rate of
 /// change of the height, which PX4 controls in Land; the velocity reported meanwhile reached 1.6.
@@ -169,10 +169,11 @@ impl Commander {
         }
     }
 
-    /// Demand to land: descends at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to
-    /// `MPC_LAND_ALT2`, then at `MPC_LAND_SPEED`; these heights count from home. If a distance
-    /// sensor shows the ground nearer than `MPC_LAND_ALT3` it crawls (`MPC_LAND_CRWL`). The descent
-    /// rate changes within `MPC_JERK_AUTO`.
+    /// Demand to land: descends at `MPC_Z_V_AUTO_DN` (at most [`MAX_LAND_DESCENT_MPS`]) down to
+    /// `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then at `MPC_LAND_SPEED`; these
+    /// heights count from home. If a distance sensor shows the ground nearer than `MPC_LAND_ALT3`,
+    /// the vehicle crawls ([`CRAWL_FACTOR`] · `MPC_LAND_CRWL`). The descent rate changes within
+    /// `MPC_ACC_DOWN_MAX` and `MPC_JERK_AUTO`.
     fn landing_demand(
         &mut self,
         sensors: &SensorReadings,
@@ -214,6 +215,7 @@ impl Commander {
         }
     }
 
+    /// Demand of Return: climbs, flies home, descends and lands.
     fn return_demand(
         &mut self,
         sensors: &SensorReadings,

@@ -7,7 +7,8 @@ use crate::physics::shaping::JerkLimitedRate;
 
 /// Horizontal acceleration of the automatic modes, m/s² (`MPC_ACC_HOR`).
 const AUTO_ACCEL_MPS2: f32 = 3.0;
-/// Time of flight at the speed before braking that PX4 adds to the braking distance, seconds.
+/// Time, seconds: PX4 adds to the braking distance what the vehicle flies in this time at its speed
+/// before braking.
 const BRAKING_DELAY_S: f32 = 0.6;
 /// Longest time step that is simulated, seconds, if the mode was not updated for longer.
 const MAX_STEP_S: f32 = 0.1;
@@ -23,6 +24,7 @@ pub fn stopping_offset(velocity: &Point) -> Point {
 /// velocity and keeps the automatic modes' limits.
 #[derive(Clone, Copy, Debug)]
 pub struct SmoothedApproach {
+    /// Time of the last update, microseconds since boot.
     updated_us: u64,
     /// Position, ENU metres; its height is not used.
     pub position: Point,

@@ -23,6 +23,7 @@ pub enum Px4Mode {
     Offboard,
 }
 
+/// Each mode with its main mode and sub mode in `custom_mode`.
 const MODES: [(Px4Mode, u8, u8); 9] = [
     (Px4Mode::Manual, 1, 0),
     (Px4Mode::Altitude, 2, 0),
@@ -63,10 +64,12 @@ impl Px4Mode {
         matches!(self, Self::Return | Self::Takeoff | Self::Land)
     }
 
+    /// Whether its main mode is AUTO.
     pub(super) fn is_auto(self) -> bool {
         matches!(self, Self::Mission | Self::Hold | Self::Return | Self::Takeoff | Self::Land)
     }
 
+    /// Whether a pilot's sticks fly it.
     pub(super) fn needs_sticks(self) -> bool {
         matches!(self, Self::Manual | Self::Altitude | Self::Position)
     }

@@ -129,29 +129,46 @@ pub struct Px4Tuning {
     pub climb_max: f32,
     pub descend_max: f32,
     pub cruise_speed: f32,
+    /// Climb limit of the automatic modes, m/s.
     pub auto_climb_max: f32,
     pub auto_descend_max: f32,
+    /// Descent rate below the second height of `land_slow_below`, m/s.
     pub land_speed: f32,
+    /// Heights above home between which a landing slows down, the upper first, metres.
     pub land_slow_below: [f32; 2],
     pub land_crawl_speed: f32,
+    /// Distance to the ground below which a landing with a distance sensor crawls, metres.
     pub land_crawl_below: f32,
     pub auto_jerk: f32,
     pub auto_acceleration_down: f32,
     pub takeoff_speed: f32,
+    /// Duration of the thrust's rise in a take-off, seconds.
     pub takeoff_ramp_s: f32,
+    /// Height above home to which a take-off without an altitude climbs, metres.
     pub takeoff_height: f32,
+    /// Least time from arming until the thrust rises, seconds.
     pub spool_up_s: f32,
+    /// Time on the ground after which the land detector reports a landing, seconds.
     pub land_trigger_s: f32,
     pub offboard_loss_timeout_s: f32,
+    /// What lost setpoints start: 4 lands, 5 holds, 6 and 7 disarm, others return.
     pub offboard_loss_action: i32,
     pub disarm_after_landing_s: f32,
+    /// Time after which an armed vehicle that never took off disarms, seconds; 0: never.
     pub disarm_preflight_s: f32,
+    /// Height above home to which a return climbs, metres.
     pub return_height: f32,
+    /// Height above home to which a return descends before it lands, metres.
     pub return_descend_height: f32,
+    /// Distance from home within which the cone `return_cone_tan` limits a return's climb, metres.
     pub return_min_distance: f32,
+    /// Tangent of `RTL_CONE_ANG`: metres away from home for each metre of a return's height.
     pub return_cone_tan: f32,
+    /// What a charge below `battery_critical_share` starts: 2 lands, 3 returns, others nothing.
     pub low_battery_action: i32,
+    /// Charge (0 to 1) below which `low_battery_action` starts.
     pub battery_critical_share: f32,
+    /// Charge (0 to 1) below which the vehicle cannot be armed.
     pub battery_low_share: f32,
 }
 

@@ -1,9 +1,9 @@
 //! Offboard setpoints: reads SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86) as PX4 does
 //! (`MavlinkReceiver::handle_message_set_position_target_*`).
 //!
-//! An axis that the type mask leaves out becomes NaN. A message without any demand, or in a frame
-//! that PX4 does not support, is ignored without an error; so after `COM_OF_LOSS_T` the setpoint
-//! stream counts as lost.
+//! An axis that the type mask leaves out becomes NaN. A message without any demand, with the force
+//! bit, or in a frame that PX4 does not support, is ignored without an error; if only such messages
+//! come, the setpoint stream counts as lost after `COM_OF_LOSS_T`.
 
 use nalgebra::Vector3;
 use planner_core::geo::frames::Geodetic;
@@ -12,6 +12,8 @@ use crate::link::wire::PayloadReader;
 use crate::physics::geodesy::LocalFrame;
 use planner_core::Point;
 
+// Values of MAV_FRAME, then bits of the type mask: a set bit leaves its field out, and the force
+// bit makes the acceleration a force.
 const FRAME_LOCAL_NED: u8 = 1;
 const FRAME_BODY_NED: u8 = 8;
 const FRAME_GLOBAL: u8 = 0;
@@ -111,6 +113,7 @@ pub fn read_global_int(
     setpoint_from_fields(fields, mask, position, velocity, acceleration, context)
 }
 
+/// Reads the vector at offset `at`; an axis whose bit of `mask` is set (bit 0: x) is NaN.
 fn read_masked_vector(fields: &PayloadReader<'_>, at: usize, mask: u16) -> Vector3<f64> {
     let axis = |k: usize| {
         if mask >> k & 1 == 0 { f64::from(fields.f32(at + 4 * k)) } else { f64::NAN }
@@ -118,6 +121,7 @@ fn read_masked_vector(fields: &PayloadReader<'_>, at: usize, mask: u16) -> Vecto
     Vector3::new(axis(0), axis(1), axis(2))
 }
 
+/// Rotates a vector from forward, right, down to NED.
 fn rotated_by_heading(v: Vector3<f64>, heading: f32) -> Vector3<f64> {
     let (sin, cos) = libm::sincos(f64::from(heading));
     Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
@@ -136,6 +140,8 @@ fn map_keeping_nan(ned: Vector3<f64>, map: impl Fn(&Vector3<f64>) -> Vector3<f64
     )
 }
 
+/// The setpoint of a message: `position` is ENU already, velocity and acceleration are NED. `None`
+/// if PX4 would ignore it.
 fn setpoint_from_fields(
     fields: &PayloadReader<'_>,
     mask: u16,

@@ -155,6 +155,7 @@ impl Platform {
         self.missions.progress.rewind();
     }
 
+    /// The leg of an item that is flown; `None` for items that are executed at once or skipped.
     fn leg_of_item(&self, item: &MissionItem) -> Option<MissionLeg> {
         let heading = item_f32(item, 12);
         let turn = core::f32::consts::TAU;
@@ -202,6 +203,7 @@ impl Platform {
         self.frame.enu_from_geodetic(&place).cast::<f32>()
     }
 
+    /// Executes an item without a leg; an unknown one has no effect.
     fn execute_item(&mut self, item: &MissionItem) {
         match item_command(item) {
             DO_CHANGE_SPEED => self.missions.requested_speed = Some(item_f32(item, 4)),
@@ -219,6 +221,7 @@ impl Platform {
         }
     }
 
+    /// Whether the current item's leg is flown. A landing and a return are completed elsewhere.
     fn is_leg_done(
         &mut self,
         leg: &MissionLeg,
@@ -253,6 +256,7 @@ impl Platform {
     }
 }
 
+/// Whether items of this command are flown, not executed at once or skipped.
 fn has_leg(id: u16) -> bool {
     matches!(id, NAV_WAYPOINT | NAV_RETURN_TO_LAUNCH | NAV_LAND | NAV_TAKEOFF | NAV_DELAY)
 }

@@ -25,7 +25,9 @@ const INVALID_SEQUENCE: u8 = 13;
 const MISSION_TYPES: usize = 3;
 /// Most items of a mission: 724 as in ArduCopter on small boards; PX4 has at least 500.
 const MAX_ITEMS: u16 = 724;
+/// Time after which an item of an upload is requested again, microseconds.
 const RETRY_AFTER_US: u64 = 250_000;
+/// Most repeated requests for one item; then the upload is dropped.
 const MAX_RETRIES: u32 = 20;
 
 /// An item as the first 37 bytes of MISSION_ITEM_INT's payload, without the mission type.
@@ -36,8 +38,11 @@ pub(crate) type MissionItem = [u8; 37];
 struct MissionUpload {
     from: Sender,
     mission_type: u8,
+    /// Number of items that COUNT announced.
     count: u16,
+    /// Items received so far.
     items: Vec<MissionItem>,
+    /// Time of the last item request, microseconds since boot.
     requested_us: u64,
     retries: u32,
 }
@@ -47,7 +52,9 @@ struct MissionUpload {
 pub(crate) struct MissionProgress {
     /// Number of the current item; the number of items when all are completed.
     pub current_item: u16,
+    /// Time at which the current item began, microseconds since boot.
     pub(crate) item_begun_us: Option<u64>,
+    /// Time at which the vehicle first was at the current item's place, microseconds since boot.
     pub(crate) arrived_us: Option<u64>,
 }
 
@@ -88,6 +95,7 @@ impl MissionProgress {
 /// Stored missions, geofences and rally points, and the mission's progress.
 #[derive(Clone, Debug, Default)]
 pub struct Missions {
+    /// Items of each mission type: mission, geofence, rally points.
     stored: [Vec<MissionItem>; MISSION_TYPES],
     upload: Option<MissionUpload>,
     /// Progress of the mission that is flown.
@@ -202,6 +210,7 @@ impl Missions {
         }
     }
 
+    /// Stores an item of the upload; requests the next one, or ends the upload.
     fn handle_item(
         &mut self,
         now_us: u64,
@@ -243,6 +252,7 @@ impl Missions {
         }
     }
 
+    /// Makes the stored mission continue with item `sequence` (SET_CURRENT).
     fn set_current(&mut self, port: &mut Port, from: Sender, sequence: u16) {
         if usize::from(sequence) < self.stored[0].len() {
             self.progress = MissionProgress::starting_at(sequence);

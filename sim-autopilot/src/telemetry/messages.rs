@@ -19,6 +19,7 @@ const PX4_VERSION: u32 = 17_891_583;
 const ARDUPILOT_VERSION: u32 = 0x0406_02FF;
 /// Sensor bits of SYS_STATUS: present, enabled, healthy.
 const PX4_SENSORS: [u32; 3] = [50_348_079, 50_413_615, 52_480_063];
+/// As [`PX4_SENSORS`]; bit PREARM is set as healthy only while the arming checks pass.
 const ARDUPILOT_SENSORS: [u32; 3] = [1_399_979_055, 1_382_128_687, 1_467_063_343 & !PREARM];
 /// Bit MAV_SYS_STATUS_PREARM_CHECK of SYS_STATUS.
 const PREARM: u32 = 0x1000_0000;
@@ -54,6 +55,7 @@ pub(crate) fn send_recorded(id: u32, port: &mut Port) {
 }
 
 impl Snapshot {
+    /// Throttle, 0 to 1: a hover takes half; 0 while disarmed.
     pub(crate) fn throttle(&self) -> f32 {
         if self.armed { (0.5 * self.specific_force.norm() / GRAVITY).clamp(0.0, 1.0) } else { 0.0 }
     }

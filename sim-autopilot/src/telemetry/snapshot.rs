@@ -21,7 +21,7 @@ pub struct Snapshot {
     pub status: AutopilotStatus,
     /// Whether the motors are armed.
     pub armed: bool,
-    /// Mission: number of the current item, and number of items.
+    /// Mission: number of the current item (the first is 0), and how many items are stored.
     pub mission_item_and_count: (u16, u16),
     /// Number of pictures since boot.
     pub pictures: u32,
@@ -38,11 +38,12 @@ pub struct Snapshot {
     pub home: (Geodetic, Vector3<f64>),
     /// EKF origin.
     pub ekf_origin: Geodetic,
-    /// Acceleration by thrust alone, NED m/s²; it points up.
+    /// Acceleration by thrust alone, NED m/s²: in a hover (0, 0, −9.8).
     pub specific_force: Vector3<f32>,
     /// Heading (radians clockwise from north) and rate of turn (rad/s).
     pub heading_and_rate: (f32, f32),
-    /// Position, velocity and acceleration setpoints of the controller, NED.
+    /// Position, velocity and acceleration setpoints of the controller, NED; while disarmed NaN,
+    /// and 100 m/s² down.
     pub target: [Vector3<f64>; 3],
     /// Height of the body above where it would rest on the ground, metres.
     pub height_above_ground: f32,

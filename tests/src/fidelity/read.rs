@@ -40,7 +40,7 @@ fn parse_message(text: &str) -> Option<Message> {
 
 /// State of reading the event rows of a recording.
 struct EventReader {
-    /// Commands without an ack so far: only accepted ones are replayed.
+    /// Commands without an ack so far (only accepted ones are replayed), and all PARAM_SETs.
     unacknowledged: Vec<(f64, Message)>,
     armed: bool,
 }

@@ -7,14 +7,15 @@ use sim_autopilot::SimulatedKind;
 /// Position and velocity of a vehicle at one time, estimated or true.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Seconds.
+    /// Time, seconds of the wall clock.
     pub t_s: f64,
     /// Position in NED from the EKF origin, metres.
     pub position: Vector3<f64>,
-    /// NED, m/s.
+    /// Velocity, NED m/s.
     pub velocity: Vector3<f64>,
 }
 
+/// A setpoint that the recorded companion sent: NED from the EKF origin, metres and seconds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setpoint {
     pub(super) t_s: f64,
@@ -25,6 +26,7 @@ pub(super) struct Setpoint {
     pub(super) yaw: f32,
 }
 
+/// A recorded message to the autopilot that a replay sends again.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Message {
     /// COMMAND_LONG: sender's system and component, command number, and its parameters.
@@ -53,5 +55,6 @@ pub struct Recording {
     /// When the mission began to follow its path, and when it began to land, seconds.
     pub follow_span_s: (f64, f64),
     pub(super) setpoints: Vec<Setpoint>,
+    /// Each with the time at which it was sent, seconds.
     pub(super) messages: Vec<(f64, Message)>,
 }

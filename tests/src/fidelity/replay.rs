@@ -75,7 +75,7 @@ impl Recording {
     }
 
     /// The position error that the replay counts as zero: the mean in the second before arming, as
-    /// for [`Self::start_ned`], or without one the first error.
+    /// for [`Self::start_ned`], or the first error if none is known in that second.
     fn zero_error(&self, errors: &[(f64, Point, Point)]) -> Point {
         let before = || {
             errors.iter().filter(|e| e.0 < self.armed_span_s.0 && e.0 > self.armed_span_s.0 - 1.0)

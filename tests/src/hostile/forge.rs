@@ -46,7 +46,7 @@ impl AttackedFlight {
     }
 
     /// Fills a payload with random or extreme numbers, some replaced by believable ones; returns
-    /// its length.
+    /// its length. The bits of `how` choose what is believable.
     fn fill_payload(
         &self,
         id: u32,

@@ -61,6 +61,7 @@ pub enum ControlSource {
     Other,
 }
 
+/// A setpoint, and when it came: ENU metres, m/s and m/s².
 #[derive(Clone, Copy, Debug)]
 struct Target {
     at: Instant,
@@ -92,23 +93,30 @@ pub struct Autopilot {
     landing_commanded: bool,
     /// What the autopilot does after a loss of setpoints.
     pub on_setpoint_loss: Failsafe,
+    /// Whether lost setpoints started the failsafe, which the next setpoint then ends (PX4).
     setpoints_lost: bool,
     /// Velocity that the pilot commands, ENU m/s.
     pub pilot_velocity: Point,
     /// Where its pilot gave the vehicle back last; `None` if nowhere.
     pub given_back_at: Option<Point>,
+    /// The last setpoint.
     target: Option<Target>,
+    /// Height to which a commanded take-off climbs, ENU metres; `None` without one.
     takeoff_z: Option<f32>,
     airborne: bool,
+    /// When the vehicle last left the ground; `None` if not since it was armed.
     lifted_at: Option<Instant>,
+    /// Since when the vehicle rests on the ground as the land detector detects it.
     grounded_since: Option<Instant>,
     armed_at: Instant,
     /// What holds the vehicle, and where; `None`: it is free.
     caught: Option<(Catch, Point)>,
     guid_timeout_s: f32,
+    /// Ids of the messages that the companion requested as streams.
     streams: BTreeSet<u16>,
     sequence: u8,
     framer: Framer,
+    /// Shift of the telemetry streams, in steps of 25 ms.
     stream_phase: u64,
     /// Checks the setpoints that the autopilot received.
     pub setpoint_check: SetpointCheck,
@@ -219,12 +227,12 @@ impl Autopilot {
         self.in_failsafe = true;
     }
 
-    /// From now on something holds the vehicle where it is.
+    /// From now on something holds the vehicle where it is, or carries it off from there.
     pub fn catch(&mut self, how: Catch) {
         self.caught = Some((how, self.position));
     }
 
-    /// Whether something holds the vehicle.
+    /// Whether something has caught the vehicle.
     pub fn is_caught(&self) -> bool {
         self.caught.is_some()
     }

@@ -162,7 +162,7 @@ pub struct VehicleState {
     pub airborne: bool,
     /// Whether its companion controls it, and so could stop it.
     pub companion_controls: bool,
-    /// Whether it lands by its autopilot, at its companion's command.
+    /// Whether its companion lands it: by the autopilot's landing mode, or by setpoints.
     pub lands_on_command: bool,
     /// Whether it has heard no other vehicle for so long that it has to land where it is.
     pub deaf: bool,
@@ -177,7 +177,8 @@ pub struct Violation {
     pub at_s: f32,
     /// Their distance at that time, metres.
     pub min_distance_m: f32,
-    /// When the sets of each vehicle first came too near in this approach, seconds; `None`: never.
+    /// When each vehicle's own set first came too near the other's, by what it had received, in
+    /// this approach, seconds; `None`: never.
     pub sets_near_since_s: [Option<f32>; 2],
     /// Smallest distance if each vehicle had stopped from its `sets_near_since_s` on, metres.
     pub distance_if_stopped_m: f32,
@@ -190,6 +191,7 @@ impl Violation {
     }
 }
 
+/// First and last step at which one vehicle's own set was too near that of another one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Approach {
     first_step: usize,
@@ -201,6 +203,7 @@ struct Approach {
 pub struct Oracle {
     vehicle_count: usize,
     tracks: Vec<Vec<VehicleState>>,
+    /// The latest approach of vehicle a to b, at index a · `vehicle_count` + b.
     approaches: Vec<Option<Approach>>,
     /// For each pair that is too near: when its sets came too near, the step at which the pair was
     /// nearest, and that distance.
@@ -282,6 +285,7 @@ impl Oracle {
         }
     }
 
+    /// Notes if the own set of vehicle a is too near to the set of b, by what a heard from b.
     fn judge_sets(
         &mut self,
         step: usize,
@@ -311,6 +315,8 @@ impl Oracle {
         }
     }
 
+    /// Notes violations of the safety distance and touches of a pair, by true positions. `carried`
+    /// says whether the second vehicle was carried off unheard by the first.
     fn judge_distance(
         &mut self,
         step: usize,
@@ -406,6 +412,7 @@ impl Oracle {
         track[step].position
     }
 
+    /// Judges the pair's violation, which is over; nothing if there is none.
     fn end_violation(&mut self, a: usize, b: usize) {
         let Some(near) = self.ongoing[a * self.vehicle_count + b].take() else { return };
         let first =

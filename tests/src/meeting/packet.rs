@@ -11,14 +11,18 @@ pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.765
 /// Content of a radio frame, decoded for the judge.
 #[derive(Clone, Debug)]
 pub(super) enum RadioContent {
+    /// GLOBAL_POSITION_INT: position (ENU metres), velocity (ENU m/s), `time_boot_ms`.
     Position(Point, Point, u32),
     Intent(Intent),
+    /// Any other message.
     Other,
 }
 
 /// A frame on its way to a receiver.
 pub(super) struct Packet {
+    /// When it arrives.
     pub(super) due_at: Instant,
+    /// Index of the vehicle that sent it.
     pub(super) from: usize,
     pub(super) bytes: Vec<u8>,
     pub(super) content: RadioContent,

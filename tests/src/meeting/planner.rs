@@ -8,7 +8,7 @@ use super::oracle;
 use super::scene::Plan;
 
 /// A detour in the open around the zones in `keep`: straight, or past one or two points beside and
-/// above; `None` if none is clear.
+/// above; if the request is to land aside, to a place aside. `None` if none is clear.
 pub(super) fn detour_in_the_open(
     request: &DetourRequest,
     keep: &[KeepOutZone],

@@ -16,8 +16,8 @@ use crate::setpoints::{SetpointCheck, SetpointLimits};
 
 /// Fence that no vehicle may leave, metres: lowest and highest corner.
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
-/// Time without any message after which a vehicle counts as deaf, seconds: it has stopped, and
-/// lands after 20 s.
+/// Time without a position of any other vehicle after which a vehicle counts as deaf, seconds: its
+/// companion has stopped it long before, and now lands it.
 const DEAF_AFTER_S: f32 = 20.0;
 /// Time within which a neighbour's position was received for the safety filter to expect it on its
 /// reported points, seconds; later it may be anywhere within a ball (SPEC §4).
@@ -33,8 +33,11 @@ type MeetingCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
 pub(super) struct MeetingVehicle {
     pub(super) companion: MeetingCompanion,
     pub(super) autopilot: Autopilot,
+    /// Radio frames on their way to it.
     pub(super) inbox: Vec<Packet>,
+    /// What it last received from each vehicle, by index.
     pub(super) heard: Vec<Heard>,
+    /// Reads the frames that its companion sends by radio.
     pub(super) framer: Framer,
     pub(super) companion_dead: bool,
     pub(super) radio_sends: bool,
@@ -163,6 +166,7 @@ impl MeetingVehicle {
         }
     }
 
+    /// Whether it stands disarmed, and its mission has ended or its companion is dead.
     pub(super) fn is_at_rest(&self) -> bool {
         let over = matches!(self.companion.state(), State::Done | State::Aborted);
         !self.autopilot.armed && !self.autopilot.is_airborne() && (over || self.companion_dead)

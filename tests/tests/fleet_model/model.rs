@@ -14,7 +14,9 @@ use crate::links::{Links, one_way, partitions};
 
 /// Most vehicles of a fleet.
 pub const MOST: usize = 4;
+/// Duration of a lease, ticks.
 const LEASE: u64 = 3;
+/// Silence after which a vehicle is lost, ticks.
 const SILENT: u64 = 6;
 /// Ticks within which a vehicle that has lost its lease stops.
 const STOP: u64 = 1;
@@ -23,6 +25,7 @@ pub const SETTLES: usize = 80;
 /// The time that every clock shows between two ticks.
 const NOW: Instant = Instant::from_millis(100_000);
 
+/// Duration of `count` ticks by the clocks of this model, which count a tick as a second.
 const fn ticks(count: u64) -> Duration {
     Duration::from_secs(count)
 }
@@ -54,6 +57,7 @@ pub enum Radio {
     Parts(u8),
 }
 
+/// Whether a vehicle flies, has landed (`Down`), or has no power (`Dead`).
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub enum Flight {
     Flies,
@@ -100,12 +104,16 @@ struct Choice {
 
 const BEST: Choice = Choice { advances: true, slow: false, leaves: false };
 
+/// State of the fleet.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub struct State {
+    /// Number of each vehicle's state in [`Known`].
     pub vehicles: [u32; MOST],
+    /// Number of vehicles that may still be lost.
     pub losses: u8,
     /// Links over which messages may arrive.
     pub links: Links,
+    /// Number of times that `links` may still change.
     pub changes: u8,
 }
 

@@ -55,10 +55,13 @@ sources: `FLOCKMATE_WRITE=1 cargo xtask structure`. How margins add up to an arg
 not here.
 ";
 
+/// What the page shows of a constant.
 struct PageRow {
     value: String,
     unit: &'static str,
+    /// Its doc comment.
     reason: String,
+    /// Files whose code names it.
     users: Vec<String>,
 }
 

@@ -31,6 +31,7 @@ pub fn import_cycles(tree: &Tree) -> Vec<Vec<String>> {
     found
 }
 
+/// The imports between the files of a cycle, each as `file → file`.
 fn imports_within(tree: &Tree, imports: &[BTreeSet<usize>], cycle: &[usize]) -> Vec<String> {
     let name = |file: usize| tree.sources[file].path.display().to_string();
     let of = |from: usize| {
@@ -43,6 +44,7 @@ fn imports_within(tree: &Tree, imports: &[BTreeSet<usize>], cycle: &[usize]) -> 
         .collect()
 }
 
+/// Files that the file `from` imports, directly or through others; itself only in a cycle.
 fn reachable_files(imports: &[BTreeSet<usize>], from: usize) -> BTreeSet<usize> {
     let mut reached = BTreeSet::new();
     let mut open: Vec<usize> = imports[from].iter().copied().collect();

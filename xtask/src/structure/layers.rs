@@ -40,7 +40,7 @@ const FORBIDDEN_IMPORTS: &[(&[&str], &[&str])] = &[
     (&["host-sim/src/swarm"], &["host-sim/src/flown", "host-sim/src/commands"]),
     (&["sim-autopilot/src"], &["companion"]),
     (&["firmware/src"], &["board_bench"]),
-    // From here on no code knows bytes, links or MAVLink.
+    // The companion's guidance knows no links, no bytes and no MAVLink; time and timers no MAVLink.
     (
         &["companion/src/guidance", "companion/src/guidance.rs"],
         &[

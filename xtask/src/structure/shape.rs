@@ -5,7 +5,7 @@ use syn::{FnArg, ImplItemFn, ItemFn, ItemStruct, Signature, TraitItemFn, Type};
 
 use super::sources::Tree;
 
-/// Most fields of a struct; the exceptions are settings and telemetry records.
+/// Most fields of a struct.
 const MAX_FIELDS: usize = 20;
 /// Most fields of `Companion`.
 const MAX_COMPANION_FIELDS: usize = 12;
@@ -14,6 +14,7 @@ const MAX_BODY_LINES: usize = 60;
 /// Most arguments of a function, without `self`.
 const MAX_ARGUMENTS: usize = 6;
 
+// Reasons that several exceptions share.
 const SETTINGS: &str = "settings: a field for each parameter that acts";
 const DRAWS: &str = "what is drawn follows from the order of the draws, which one body shows";
 
@@ -167,6 +168,7 @@ pub fn unused_exceptions(found: &[String]) -> Vec<String> {
     unused.map(|(file, name, _)| format!("{file}: {name} needs no exception")).collect()
 }
 
+/// Collects what is beyond the limits in one file after the other.
 struct ShapeVisitor {
     file: String,
     found: Vec<(String, Option<&'static str>)>,

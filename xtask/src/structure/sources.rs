@@ -63,6 +63,8 @@ impl Tree {
         self.read_modules(&items, path, folder, module, at)
     }
 
+    /// Reads the modules that `items` of the file `path` define; `at` is the file's index in
+    /// `sources`.
     fn read_modules(
         &mut self,
         items: &[Item],
@@ -110,6 +112,7 @@ fn is_test_only(attributes: &[Attribute]) -> bool {
     })
 }
 
+/// The file name in `#[path = "…"]`.
 fn path_attribute(attributes: &[Attribute]) -> Option<String> {
     attributes.iter().find_map(|attribute| {
         let syn::Meta::NameValue(pair) = &attribute.meta else { return None };

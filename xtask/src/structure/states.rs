@@ -56,6 +56,7 @@ fn lines_of_state_sets(items: &[Item], names: &BTreeSet<String>) -> Vec<usize> {
     sets.lines
 }
 
+/// Collects the lines of patterns that name two or more states.
 struct StateSetVisitor<'a> {
     names: &'a BTreeSet<String>,
     lines: Vec<usize>,

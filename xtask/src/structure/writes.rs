@@ -1,12 +1,13 @@
 //! Finds fields that are written outside the module of their struct.
 //!
-//! The compiler sees to it for private fields and those of `pub(super)`. This looks at fields that
-//! the whole crate can reach: `pub(crate)`, or `pub` in a struct that no other crate sees. The
-//! sources have no types, so a field is known by its name: a write to `x.name` is foreign if a
-//! struct elsewhere in the crate has such a field and no struct that the place may write has one.
-//! Not looked at are names of one letter, a vector's, and names of records that other crates may
-//! write: `pub` fields of public structs, here or in planner-core. A write is an assignment, a
-//! `&mut` borrow, or a call of a method that changes an option or a container.
+//! The compiler prevents such writes to private fields and those of `pub(super)`. This check is of
+//! fields that the whole crate can reach: `pub(crate)`, or `pub` in a struct that no other crate
+//! sees. A parsed source has no types, so a field is known by its name: a write to `x.name` is
+//! foreign if a struct elsewhere in the crate has a field of this name and no struct that the place
+//! may write has one. Two kinds of names are not checked: those of one letter (a vector's axes),
+//! and those of fields that other crates may write (`pub` in a public struct, here or in
+//! planner-core). A write is an assignment, a `&mut` borrow, or a call of a method that changes an
+//! option or a container.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -47,7 +48,7 @@ pub fn public_fields(tree: &Tree) -> BTreeSet<String> {
     fields.into_iter().filter_map(public).collect()
 }
 
-/// A line for each foreign write. Fields named in `records` are not looked at.
+/// A line for each foreign write. Fields named in `records` are not checked.
 pub fn foreign_writes(tree: &Tree, records: &BTreeSet<String>) -> Vec<String> {
     let fields = reach_of_fields(tree);
     let mut found = Vec::new();
@@ -79,7 +80,7 @@ pub fn foreign_writes(tree: &Tree, records: &BTreeSet<String>) -> Vec<String> {
     found
 }
 
-/// Who may write a field.
+/// Which code may write a field.
 #[derive(PartialEq)]
 enum FieldReach {
     /// Other crates too.
@@ -90,6 +91,7 @@ enum FieldReach {
     Module(Vec<String>),
 }
 
+/// For each name of a field: the reach of each field of the crate that has this name.
 fn reach_of_fields(tree: &Tree) -> BTreeMap<String, Vec<FieldReach>> {
     let public = public_modules(tree);
     let exported = imports::exported_names(tree);
@@ -155,6 +157,7 @@ impl Visit<'_> for FieldCollector {
 struct WriteCollector(Vec<(String, usize)>);
 
 impl WriteCollector {
+    /// Notes the field that `place` ends in, also behind an index.
     fn note_written_field(&mut self, place: &Expr) {
         match place {
             Expr::Field(field) => {

@@ -29,6 +29,7 @@ use rand_pcg::Pcg32;
 const COMPANION_BYTES: usize = size_of::<BoardCompanion>();
 /// Bytes that the shell passes to the companion at once.
 const CHUNK_LEN: usize = 256;
+/// Message ids.
 const FILE_TRANSFER: u32 = 110;
 const PARAM_REQUEST_LIST: u32 = 21;
 const PARAM_SET: u32 = 23;
@@ -43,6 +44,7 @@ const BURST_READ: u8 = 15;
 const ACK: u8 = 128;
 /// Data bytes of an FTP packet.
 const FTP_DATA_LEN: usize = 239;
+/// System id and component id of the ground station.
 const GROUND_STATION_IDS: (u8, u8) = (255, 190);
 
 /// Makes all counted calls of companion on the ground, each part in a function that is not inlined:
@@ -73,7 +75,7 @@ fn measure_grounded_companion(meter: &mut impl Meter) {
 }
 
 /// Counts the instructions of the framer on chunks of 256 bytes. Three of four chunks are full of
-/// frame starts with a wrong CRC; the others are random bytes.
+/// frame starts of which none makes a valid frame; the others are random bytes.
 #[inline(never)]
 fn measure_framing(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(1);

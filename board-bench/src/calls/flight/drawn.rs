@@ -62,7 +62,7 @@ pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
     path
 }
 
-/// A random plan with the most gates.
+/// A random plan with as many gates as a plan holds.
 pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     let path = random_path(rng);
     let length_m = path.length_m();

@@ -15,13 +15,14 @@ impl Telemetry {
         self.landed.is_some_and(|report| report.on_ground)
     }
 
-    /// Whether the landing detector reported the ground in the last 1.2 s.
+    /// Whether the landing detector's last report is of the ground and at most 1.2 s old.
     pub(in crate::autopilot) fn lately_reported_ground(&self, now: Instant) -> bool {
         self.landed.is_some_and(|report| report.is_recent_ground(now))
     }
 
-    /// Whether the landing detector reports the ground. Unless the vehicle rests disarmed, an old
-    /// report counts for 3 s, as long as the vehicle has not risen.
+    /// Whether the landing detector's last report is of the ground and still holds. While the
+    /// vehicle rests disarmed it holds however old it is. Else it holds for 3 s while the vehicle
+    /// is known not to have risen, or for 0.4 s.
     pub fn reports_ground(&self, now: Instant) -> bool {
         let known = self.position_age(now) < MAX_POSITION_AGE;
         let z_m = if known { self.position.z } else { f32::NAN };
@@ -32,7 +33,7 @@ impl Telemetry {
     }
 
     /// Whether the last HEARTBEAT says that the motors are off, and the vehicle has not flown
-    /// since: where no other one comes, neither the landing detector nor the height shows flight.
+    /// since: while HEARTBEAT is silent, neither the landing detector nor the height shows flight.
     pub(crate) fn rests_disarmed(&self, now: Instant) -> bool {
         let heard = self.heartbeat_age(now) < MAX_HEARTBEAT_AGE;
         let risen = self.position.z > self.heartbeat_z_m + RISEN_M;

@@ -32,7 +32,8 @@ fn heard(
     (telemetry, change)
 }
 
-/// Whether places about the mission's origin come back as they were sent, metres off at most.
+/// Greatest distance, metres, from a place to where the autopilot finds it from the NED setpoint;
+/// `None` without an EKF origin.
 fn worst_m(
     telemetry: &Telemetry,
     kind: AutopilotKind,

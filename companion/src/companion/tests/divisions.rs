@@ -85,7 +85,7 @@ struct Other {
     /// Whether it sends no reports; it still hears.
     mute: bool,
     sequence: u8,
-    /// Number of reports of this vehicle after which it commits the division.
+    /// Reports of this vehicle that it holds, after which vehicle 77 commits the division.
     counts_after: u32,
 }
 
@@ -151,7 +151,7 @@ struct Watch {
     other: Other,
     /// Whether this vehicle was commanded to land or return.
     ends: bool,
-    /// Number of ticks for which it has waited on its way back.
+    /// Number of ticks for which this vehicle has waited on its way back.
     returns: u32,
     /// Whether vehicle 77 was last near the path, heard or not.
     near: bool,
@@ -335,8 +335,8 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
     b.run_until(Done, 60.0);
 }
 
-/// It also waits for a vehicle that reports to hear nobody, since that one is to land; but if that
-/// one flies on, it waits for three minutes only.
+/// Above its pad a vehicle also waits for one that reports that it hears nobody, since that one is
+/// to land; if that one flies on, it waits for three minutes only.
 #[test]
 fn above_its_pad_a_vehicle_waits_for_one_that_hears_nobody_for_a_limited_time() {
     let mut b = over_a_field_with(AutopilotKind::Px4, |config| _ = config.roster.pop());
@@ -348,7 +348,7 @@ fn above_its_pad_a_vehicle_waits_for_one_that_hears_nobody_for_a_limited_time() 
     b.run_until(Done, 150.0);
 }
 
-/// On a detour beside its path a vehicle waits for no silent one: the end of that path is not its
+/// On a detour beside its path a vehicle waits for no silent one: the detour does not end above its
 /// pad. Vehicle 77 lies on the path.
 #[test]
 fn a_vehicle_flies_around_what_lies_on_its_path_while_another_is_silent() {

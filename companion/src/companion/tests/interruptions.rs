@@ -30,6 +30,7 @@ const TAKE_OFF: u16 = 22;
 /// True height above the ground up to which a disarmed vehicle does not fall far, metres.
 const HARMLESS_M: f32 = 0.35;
 
+/// A flight mode into which a pilot switches the autopilot.
 fn pilot_mode(kind: AutopilotKind) -> u32 {
     match kind {
         AutopilotKind::Px4 => px4::HOLD,
@@ -37,6 +38,7 @@ fn pilot_mode(kind: AutopilotKind) -> u32 {
     }
 }
 
+/// Sends a command of the ground station; returns the MAV_RESULT that answers it.
 fn order(b: &mut Bench, command: MavCmd, param1: f32) -> Option<u8> {
     b.acks.clear();
     b.command(command, param1, SYSTEM, crate::COMPANION_COMPONENT);
@@ -55,6 +57,7 @@ fn land(b: &mut Bench) -> Option<u8> {
     order(b, MavCmd::MAV_CMD_NAV_LAND, 0.0)
 }
 
+/// A vehicle on its pad, in `Ready`; an ArduCopter lifts off 2 s after NAV_TAKEOFF.
 fn bench(kind: AutopilotKind) -> Bench {
     let mut bench = match kind {
         AutopilotKind::Px4 => Bench::new(config()),

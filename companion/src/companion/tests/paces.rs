@@ -25,6 +25,7 @@ fn lanes(long_m: f32, apart_m: f32) -> Plan {
     VehiclePlan { path, descent_m: START.z, ..plan() }
 }
 
+/// Distance of a place from the nearest point of the path, metres.
 pub(super) fn beside_m(path: &Path<WAYPOINTS>, place: &Point) -> f32 {
     let legs = path.waypoints().windows(2);
     let off = legs.map(|leg| {

@@ -16,7 +16,7 @@ use crate::planner::coverage::OPEN_FIELD_CLEARANCE_M;
 use crate::swarm::fleet::Fleet;
 use crate::{Link, RosterEntry};
 
-/// Vehicle 77 out of the way.
+/// Vehicle 77, far away from every path.
 const FAR: Option<(Point, u8, f32, u32)> = Some((Point::new(8.0, 1200.0, 1.5), ON_PLAN, 0.0, 5));
 
 /// `count` lanes, `long_m` metres long and `apart_m` apart, with pictures, and the way home.
@@ -80,6 +80,7 @@ fn following(
     bench
 }
 
+/// The path that the vehicle flies.
 fn path_of(bench: &Bench) -> Path<WAYPOINTS> {
     bench.companion.mission.plan().map(|plan| plan.path.clone()).expect("a plan")
 }
@@ -113,7 +114,7 @@ fn hold_error_m(
         let fleet = bench.companion.neighbours.fleet().expect("an area");
         promise_m = promise_m.or(fleet.commitment_dm().map(|dm| f32::from(dm) / 10.0));
         held += u32::from(bench.state() == Dividing);
-        // A while later, as far as it rolls on.
+        // After 3 s in `Dividing` the setpoint has come to rest.
         if let (60.., Some(promise_m)) = (held, promise_m) {
             let place = path.point_at(promise_m).expect("on the path");
             return Some((bench.companion.guidance.setpoint_position() - place).length());
@@ -182,7 +183,8 @@ proptest::proptest! {
         proptest::prop_assert!(off_m.is_some_and(|m| m < 0.35), "{off_m:?} m at {cruise_mps} m/s");
     }
 
-    /// A vehicle that lags, or does not know its position well, stops before it is there.
+    /// A vehicle that lags, or does not know its position well, stops before it is at the promised
+    /// place.
     #[test]
     fn a_vehicle_holds_only_where_its_setpoint_is_at_the_promised_place(
         cruise_mps in 1f32..12.0, accel_mps2 in 0.7f32..2.4, ticks in 0u32..240,
@@ -201,7 +203,8 @@ proptest::proptest! {
         proptest::prop_assert!(off_m.is_none_or(|m| m < 0.35), "{off_m:?} m at {cruise_mps} m/s");
     }
 
-    /// One that takes more than the 10 s of a commitment to stop promises where it can.
+    /// A vehicle that takes more than the 10 s of a commitment to stop promises the place at which
+    /// it can stop.
     #[test]
     fn a_vehicle_that_brakes_slowly_promises_to_hold_at_cruise_too(
         cruise_mps in 2f32..12.0, accel_mps2 in 0.2f32..0.8,

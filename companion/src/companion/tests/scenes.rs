@@ -150,6 +150,7 @@ fn stuck(b: &mut Bench, seconds: f32) {
 
 // Starting points of scenes.
 
+/// A vehicle on its pad, in `Ready`, with these settings.
 fn ready_with(config: Config<4>) -> Bench {
     let mut bench = Bench::new(config);
     bench.run_until(State::Ready, 6.0);
@@ -189,6 +190,7 @@ fn accompanied(state: State, seconds: f32) -> Bench {
     accompanied_with(two_vehicles(), state, seconds)
 }
 
+/// As [`accompanied`], with these settings.
 fn accompanied_with(config: Config<4>, state: State, seconds: f32) -> Bench {
     let mut bench = Bench::started_with_neighbour(config);
     bench.run_until(state, 20.0);
@@ -204,10 +206,12 @@ fn fenced(mut config: Config<4>, low: Point, high: Point) -> Config<4> {
 
 // Reports of the other vehicle.
 
+/// The other vehicle is on the ground at `place`; `flags` are set in its intent, too.
 fn stands(place: Point, flags: u8) -> Neighbour {
     Some((place, GROUNDED | flags, 0.0, 5))
 }
 
+/// The other vehicle is in the air at `place`; `flags` are set in its intent, too.
 fn flies(place: Point, flags: u8) -> Neighbour {
     Some((place, FLYING | flags, 0.0, 5))
 }
@@ -217,10 +221,12 @@ fn landed(place: Point) -> Neighbour {
     Some((place, GROUNDED | LANDED | ON_PLAN, 99.0, 5))
 }
 
+/// The other vehicle is on its own pad, 8 m beside this one's start.
 fn on_pad(flags: u8) -> Neighbour {
     stands(Point::new(8.0, 20.0, 0.0), flags)
 }
 
+/// The other vehicle is on ground 1 m high, so near to this one's path that it blocks the path.
 fn below_the_path(flags: u8) -> Neighbour {
     stands(Point::new(14.5, 12.5, 1.0), flags)
 }

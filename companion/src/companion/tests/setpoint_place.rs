@@ -113,7 +113,7 @@ struct Flight {
     reference: Reference,
     early_m: f32,
     late_m: f32,
-    /// Greatest change of the place in a step beyond that at cruise speed, metres.
+    /// Greatest change of the place in a step beyond the distance flown at cruise speed, metres.
     jump_m: f32,
     checked: u32,
 }

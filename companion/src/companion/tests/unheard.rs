@@ -80,9 +80,9 @@ fn last_report(bench: &Bench) -> (f32, f32) {
     (x, (x - before) / (1e-3 * (at_ms - before_ms) as f32))
 }
 
-/// Runs the bench for 4 s in which the neighbour, whose messages take `delay` times 0.1 s, hears it
-/// no more: it reports to hear it for `reports_s` longer, and echoes the last intent that arrived
-/// for 2.5 s.
+/// Runs the bench for 4 s in which the neighbour, whose messages take `delay` times 0.1 s, hears
+/// the vehicle no more. The neighbour reports for `reports_s` longer that it hears the vehicle, and
+/// echoes for 2.5 s the last intent that arrived.
 fn hear_no_more(bench: &mut Bench, delay: usize, reports_s: f32) {
     let count = |bench: &Bench| {
         let of_intent = |f: &&Frame| Intent::decode(f.padded_payload(), SYSTEM).is_some();
@@ -103,10 +103,11 @@ fn hear_no_more(bench: &mut Bench, delay: usize, reports_s: f32) {
 
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 60 } else { 600 }))]
-    /// Whatever its speed, and whether its radio still hears or not. Messages take `delay_s`: those
-    /// of others that were under way come later, or not. Of the reports that they heard it, which
-    /// they send for 0.8 s, it hears a share. Its gate may open meanwhile: others do not know that
-    /// it flies on.
+    /// An unheard vehicle rests where others expect it, whatever its speed, and whether its radio
+    /// still receives or not. Messages take `delay_s`: those of others that were under way as its
+    /// radio failed arrive later, or never. The others report for 0.8 s that they heard it; it
+    /// receives a share of these reports. Its gate may open meanwhile: others do not know that it
+    /// flies on.
     #[test]
     fn an_unheard_vehicle_rests_where_others_expect_it(
         cruise_mps in 0.5f32..15.0,
@@ -117,10 +118,11 @@ proptest::proptest! {
         gate_m in proptest::option::of(5f32..60.0),
         opens in proptest::bool::ANY,
     ) {
-        // One that is faster overshoots by more than it flies back before it lands; with longer
-        // delays it does not know what arrived last.
+        // A vehicle that is faster overshoots by more than it flies back before it lands; with
+        // longer delays it does not know which of its intents arrived last.
         let opens = opens && cruise_mps < 4.0 && delay < 4;
-        // An intent is sent each 0.2 s: each that the echo is behind adds 0.1 s each way.
+        // An intent is sent each 0.2 s: each intent by which the echo is behind adds 0.1 s each
+        // way.
         let delay_s = 0.1 * delay as f32;
         let mut config = Config { cruise_mps, ..two_vehicles() };
         (config.slowest_vehicle_mps, config.fastest_vehicle_mps) = (cruise_mps, cruise_mps);
@@ -174,8 +176,8 @@ proptest::proptest! {
     }
 }
 
-/// A gate opens as its transmitter fails: it flies on, and back. Heard again, it reports no
-/// progress that it has yet to make.
+/// A gate opens as the vehicle's transmitter fails: the vehicle flies on, and back. Heard again, it
+/// reports no progress that it has yet to make.
 #[test]
 fn a_vehicle_heard_again_reports_no_progress_that_it_has_yet_to_make() {
     for cruise_mps in [1.0, 2.0, 3.0] {

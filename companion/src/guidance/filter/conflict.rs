@@ -23,14 +23,16 @@ const MAX_NEAR_COMPARED: usize = 4;
 /// Overshoot of two vehicles in the air beyond their stops, together, metres; the schedule leaves
 /// 0.5 m for this and for tracking errors.
 const OVERSHOOT_MARGIN_M: f32 = 0.25;
-/// Tracking error of this vehicle beside its path, metres: kept from a vehicle on the ground.
+/// Tracking error of this vehicle beside its path, metres: added to the safety distance from a
+/// vehicle on the ground.
 const TRACKING_MARGIN_M: f32 = 0.1;
 /// Distance between the hulls that is kept from a stranger that is passed slowly, and in a late
 /// landing, metres.
 const STRANGER_HULL_GAP_M: f32 = 0.3;
 /// Sway, m/s: speed of the vehicle in excess of its setpoint's for which no longer stop is assumed.
 const STOPPING_SWAY_MPS: f32 = 0.3;
-/// Time for which a landing was held, after which only the hulls are kept apart.
+/// Time for which a landing was held, after which the vehicle lands beside one that lies there with
+/// only the hulls kept apart, if it has no other place to land, and no longer waits for a stranger.
 const LATE_LANDING_AFTER: Duration = Duration::from_secs(40);
 
 impl Guidance {
@@ -88,7 +90,7 @@ impl Guidance {
         let place = scene.telemetry.position;
         let lands = state.lands_or_landing_is_held();
         let hears_nobody = neighbours.hears_nobody(now);
-        // Hearing nobody, the vehicle flies on only to a landing place aside.
+        // Hearing nobody, the vehicle lands, or flies on only to a landing place aside.
         let deaf = hears_nobody && (lands || (self.has_begun_path && self.ends_away_from_goal));
         // Like a landing, a guided descent in a coverage mission checks for unheard vehicles on the
         // ground.
@@ -222,6 +224,8 @@ impl Guidance {
         None
     }
 
+    /// Whether this vehicle follows the shared plan: neither back, nor on a detour, nor in a
+    /// landing.
     pub(super) fn flies_by_plan<const W: usize, const G: usize>(
         &self,
         state: State,
@@ -230,8 +234,9 @@ impl Guidance {
         !self.returning && !scene.is_on_detour() && !state.lands_or_landing_is_held()
     }
 
-    /// Whether this vehicle lets the neighbour `met` go first: a vehicle on the plan goes before
-    /// one off it, then the order of the gates decides, then the lower id goes first.
+    /// Whether this vehicle lets the neighbour `met` go first: a stranger goes first, then a
+    /// vehicle on the plan before one off it; then the order of the gates decides; then the one
+    /// goes first that does not wait; then the lower id.
     pub(super) fn yields_to<const W: usize, const G: usize>(
         &self,
         state: State,

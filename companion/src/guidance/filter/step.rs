@@ -138,7 +138,8 @@ impl Guidance {
                 }
                 self.filter.path_clear_since = None;
                 self.filter.yields_to_blocker = found.own_yields;
-                // A stranger counts as a hindrance only where it bars even the slow flight past it.
+                // A stranger counts as a hindrance only once this vehicle flies slowly past it,
+                // where it bars even that.
                 if !found.stranger || self.filter.passes_stranger(now) {
                     self.filter.note_hindered(now);
                 }
@@ -212,8 +213,8 @@ impl Guidance {
         self.tracker.speed_mps < 0.0 || self.step_back_to_m.is_some()
     }
 
-    /// Counts a stop by advice as a stop by the filter if the vehicle stands right before a
-    /// neighbour for which no gate nearby waits.
+    /// Counts a stop by advice as a hindrance by the filter if the vehicle is at that stop, and no
+    /// gate there makes it wait for the neighbour for which advice stops it.
     fn note_hindered_by_advice<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,

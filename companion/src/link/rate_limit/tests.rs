@@ -22,6 +22,7 @@ struct Greedy {
     bench: Bench,
     flash: Flash,
     sequence: u8,
+    /// Sequence number of the last FTP request.
     packet: u16,
     /// Bytes that went to the radio, and when.
     sent: Vec<(Instant, usize)>,

@@ -4,10 +4,10 @@
 //! Two triggers. By distance: `MAV_CMD_DO_SET_CAM_TRIGG_DIST` switches the autopilot's trigger on
 //! at a stretch's first place and off at its last, with a picture at each. By waypoint:
 //! `MAV_CMD_DO_DIGICAM_CONTROL` takes each picture. Commands are sent one after the other, each
-//! repeated until acknowledged. A vehicle that leaves its path between two pictures takes a last
-//! one there: others photograph the rest, but may not come near to a vehicle that hovers there. The
-//! trigger is then off. Back on the path it starts with a picture at once, so that no gap is wider
-//! than the spacing.
+//! repeated until it is acknowledged, and dropped after five tries. A vehicle that leaves its path
+//! between two pictures takes a last one there: others photograph the rest, but may not come near
+//! to a vehicle that hovers there. The trigger is then off. Back on the path it starts with a
+//! picture at once, so that no gap is wider than the spacing.
 
 use heapless::Deque;
 use libm::atan2f;
@@ -72,8 +72,9 @@ impl CameraCommand {
 /// State of the camera commands along one path.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CameraControl {
-    /// Index of the current stretch, and number (`next_picture`) of the next picture on it.
+    /// Index of the current stretch of the path.
     stretch_index: usize,
+    /// Number of the next picture on the current stretch, from 0.
     next_picture: u32,
     /// On a detour beside the path: place along the detour where the next picture is taken, metres.
     next_detour_picture_m: f32,
@@ -89,8 +90,8 @@ pub(super) struct CameraControl {
     current_sent: bool,
     /// Whether a command was dropped or refused: from then on such failures are not reported.
     failure_reported: bool,
-    /// The trigger of the picture at or just ahead of this place of the path; `None` if no picture
-    /// is due there.
+    /// The plan's trigger, while the reference is no further than 0.3 m before the next picture's
+    /// place (by distance: before the stretch's first), or beyond it; else `None`.
     due_trigger: Option<Trigger>,
 }
 
@@ -137,14 +138,15 @@ impl CameraControl {
         (self.path_relation, self.next_detour_picture_m) = (PathRelation::Elsewhere, 0.0);
     }
 
+    /// Switches the autopilot's trigger off, without a further picture.
     fn switch_off(&mut self) {
         if self.running_trigger.take() == Some(Trigger::Distance) {
             self.queue_command(CameraCommand::Off);
         }
     }
 
-    /// Takes a last picture if the vehicle leaves its path before the last one there, and switches
-    /// the trigger off.
+    /// Takes one more picture if the vehicle leaves its path within a stretch, and switches the
+    /// trigger off.
     fn end_early(&mut self) {
         match self.running_trigger.take() {
             Some(Trigger::Distance) => self.queue_command(CameraCommand::Every(0.0)),
@@ -173,6 +175,8 @@ impl CameraControl {
         }
     }
 
+    /// On the path: switches the trigger on or off, or takes the picture that is due, and moves on
+    /// to the next stretch at the end of this one, `shots`.
     fn update_trigger(
         &mut self,
         trigger: Trigger,
@@ -184,8 +188,8 @@ impl CameraControl {
             Trigger::Distance => shots.from_m,
             _ => shots.picture_at_m(self.next_picture),
         };
-        // A vehicle counts as holding once its setpoint stands; it may still be up to a metre short
-        // of it.
+        // A vehicle counts as holding once its setpoint stands; the vehicle may still be up to a
+        // metre short of the setpoint.
         self.due_trigger =
             Some(trigger).filter(|_| along.reference_m >= next_m - HOLDS_AT_PICTURE_WITHIN_M);
         if progress_m < shots.from_m {
@@ -266,6 +270,8 @@ impl CameraControl {
         (self.tries, self.current_sent) = (0, false);
     }
 
+    /// Handles a COMMAND_ACK: the answered command leaves the queue, and the first refusal is
+    /// reported.
     pub(super) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
         let waits = self.current_sent
             && self.commands.front().is_some_and(|o| o.mav_command() == ack.command);
@@ -284,7 +290,8 @@ impl CameraControl {
 }
 
 /// Heading of the vehicle `along_m` metres along its path, radians from east, counter-clockwise:
-/// the direction of the stretch there, or of the next stretch before its first picture. `None` on a
+/// the plan's fixed heading if there is one; else the direction of the stretch there, or of the
+/// next stretch before its first picture, and behind the last stretch that stretch's. `None` on a
 /// path without a stretch.
 pub(super) fn heading<const W: usize>(
     photographs: &PicturePlan,

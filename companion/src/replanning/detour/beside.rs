@@ -20,8 +20,8 @@ use crate::replanning::view::DetourView;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
-/// Deviation of a vehicle from its path, metres: a neighbour within the safety distance plus this
-/// of the path blocks it.
+/// Deviation of a vehicle from its path, metres: a neighbour that is nearer to the path than the
+/// safety distance plus this blocks it.
 pub(super) const BLOCKED_BEYOND_SAFETY_DISTANCE_M: f32 = 0.25;
 /// Distance beyond where the vehicle can stop within which a keep-out zone blocks its path, metres.
 /// The vehicle photographs the path up to its stop; the detour leaves out up to this much of the
@@ -64,6 +64,7 @@ const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 /// succeeded.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct AreaDetourSearches {
+    /// Number of paths that the planner has found while this plan is flown.
     found: u8,
 }
 

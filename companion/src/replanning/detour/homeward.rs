@@ -20,6 +20,7 @@ const MAX_TURNS_HOME: u8 = 4;
 pub(crate) struct HomewardSearch {
     /// Since when the vehicle has been stopping to seek a path home; `None` if it does not.
     seeks_since: Option<Instant>,
+    /// Number of times that the vehicle has turned home, at most [`MAX_TURNS_HOME`].
     turns_home: u8,
 }
 

@@ -1,8 +1,8 @@
 //! The path that a vehicle flies, and the path that it seeks: one value each.
 //!
 //! A path is sought from the request to the shell until the path comes, or the vehicle leaves the
-//! state in which it waits for it. A path that has come is flown for the purpose for which it was
-//! requested.
+//! state in which it waits for the path. A path that has come is flown for the purpose for which it
+//! was requested.
 
 use planner_core::Point;
 
@@ -11,6 +11,7 @@ use planner_core::Point;
 pub(crate) struct RejoinPlace {
     /// Arc length along the plan's path, metres.
     pub along_m: f32,
+    /// The place itself, ENU metres.
     pub position: Point,
 }
 
@@ -51,7 +52,7 @@ pub(crate) enum PathKind {
     PlanReady,
     /// A path that was requested for this purpose.
     Detour(DetourPurpose),
-    /// A path beside the plan's, to which the vehicle does not come back any more.
+    /// A path beside the plan's; the vehicle does not come back to the plan's any more.
     OffPlan,
 }
 

@@ -81,7 +81,7 @@ impl Detours {
 
     /// Place where a vehicle aside returns to its path now: where it left the path; or beyond the
     /// block, once the first place has been barred, or no way to it was found, for too long. `None`
-    /// while the vehicle waits for that place to be free.
+    /// while the vehicle waits for the first place to be free.
     pub(crate) fn rejoin_place_from_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,

@@ -37,7 +37,7 @@ pub(crate) enum RetryOutlook {
     SilentVehicleComesDown,
     /// Another vehicle may still move.
     OthersMayMove,
-    /// The search did not end, or its answer could not be used: another may find a path.
+    /// The search did not end, or its answer could not be used: another search may find a path.
     NotSearched,
     /// No other vehicle will move any more.
     NoneWillMove,
@@ -57,7 +57,7 @@ fn reference_leg_ends<'a, const V: usize, const W: usize, const G: usize>(
 impl Detours {
     /// Pause after a search that found no detour, seconds: each blocked vehicle has its turn in it,
     /// and before the third search a vehicle that waits counts as blocked (`DEAD_END_AFTER`), and
-    /// may leave. While all stand, nothing else changes what the next search finds.
+    /// may fly a detour. While all stand, nothing else changes what the next search finds.
     pub(super) fn search_pause_s<const V: usize, const W: usize, const G: usize>(
         view: &DetourView<'_, V, W, G>,
     ) -> u64 {
@@ -77,8 +77,9 @@ impl Detours {
     }
 
     /// Whether this vehicle may search for a landing place beside its path: its task leaves the
-    /// pad; it hears another vehicle, all others rest, or its landing has been held for
-    /// [`HELD_LANDING_SIDESTEP_AFTER`]; and no search aside failed within [`ASIDE_SEARCH_PAUSE_S`].
+    /// pad; it hears another vehicle, all others have landed or are out of the plan, or its landing
+    /// has been held for [`HELD_LANDING_SIDESTEP_AFTER`]; and no search aside failed within
+    /// [`ASIDE_SEARCH_PAUSE_S`].
     pub(crate) fn may_seek_landing_aside<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -100,7 +101,8 @@ impl Detours {
     }
 
     /// Time for which this vehicle has waited below a vehicle that lands, unable to leave along its
-    /// path; zero for [`MAX_SEARCH_PAUSE_S`] after a search aside failed.
+    /// path; zero while its setpoint is not at the reference, and for [`MAX_SEARCH_PAUSE_S`] after
+    /// a search aside failed.
     pub(crate) fn time_below_landing<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
@@ -114,8 +116,9 @@ impl Detours {
         trapped.map_or(Duration::default(), |at| view.now - at)
     }
 
-    /// Notes that a path for this purpose is requested from the shell. Unless it leads aside or
-    /// back to the plan's path, the vehicle gives up returning to that.
+    /// Notes that a path for this purpose is requested from the shell. Unless that path only makes
+    /// room for another vehicle ([`DetourPurpose::Aside`]) or leads back to the plan's path, the
+    /// vehicle gives up returning to the plan's path.
     pub(crate) fn note_request(&mut self, purpose: DetourPurpose) {
         if !matches!(purpose, DetourPurpose::Aside(_) | DetourPurpose::Rejoin(_)) {
             self.path_kind = self.path_kind.without_rejoin();
@@ -143,8 +146,8 @@ impl Detours {
 
     /// Where the requested path begins: at the reference, or for a landing aside where the setpoint
     /// stands. A vehicle that is held far from its reference may not be able to fly there first.
-    /// But outside the tube around the path that leaves the required clearance, only a search over
-    /// an area checks the way.
+    /// But further from the path than its clearance allows, only the search in a coverage mission
+    /// checks the way from the setpoint: elsewhere the path then begins at the reference.
     pub(crate) fn start_of_detour<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,

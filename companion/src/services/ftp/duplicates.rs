@@ -21,10 +21,12 @@ type Outcome = Result<(), NakError>;
 #[derive(Clone, Debug, Default)]
 pub struct DuplicateDetection {
     answered: [Option<AnsweredRequest>; MAX_REMEMBERED],
+    /// Index in `answered` of the entry that is replaced next, the oldest.
     next: usize,
     closed: Option<ClosedSession>,
 }
 
+/// An answered request, and its outcome.
 #[derive(Clone, Copy, Debug)]
 struct AnsweredRequest {
     request: RequestFingerprint,

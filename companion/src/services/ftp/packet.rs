@@ -95,9 +95,12 @@ pub fn upload_text(file: File, result: Result<(), UploadError>) -> Text {
     }]
 }
 
+/// A client's request, decoded.
 #[derive(Clone, Copy, Debug)]
 pub struct FtpRequest {
+    /// Index of the link on which the request came.
     pub link: usize,
+    /// System id and component id.
     pub client: (u8, u8),
     pub sequence: u16,
     pub session: u8,
@@ -124,6 +127,7 @@ impl FtpRequest {
         }
     }
 
+    /// Whether the other request is a repetition of this one, or this one of the other.
     pub fn is_same_request(&self, other: &Self) -> bool {
         request_fingerprint(self) == request_fingerprint(other)
     }
@@ -144,6 +148,7 @@ impl FtpRequest {
         &path[start..]
     }
 
+    /// The file that the request names; `None` if there is no such file.
     pub fn requested_file(&self) -> Option<File> {
         File::ALL.into_iter().find(|file| file.name().as_bytes() == self.path())
     }
@@ -171,6 +176,7 @@ pub fn chunk_len(request: &FtpRequest) -> usize {
     }
 }
 
+/// The number in decimal digits, written to the end of `digits`.
 pub fn format_decimal(mut number: u32, digits: &mut [u8; 10]) -> &[u8] {
     let mut at = digits.len();
     loop {

@@ -40,6 +40,7 @@ impl Ftp {
         self.set_reply(request, NAK, 0, &[code]);
     }
 
+    /// Sets the reply to `request` that is sent next: `opcode` is ACK or NAK.
     pub(super) fn set_reply(
         &mut self,
         request: &FtpRequest,

@@ -244,7 +244,9 @@ fn nothing_is_erased_while_armed() {
 /// Sequence numbers of a request that is repeated.
 #[derive(Clone, Copy, PartialEq)]
 enum Numbers {
+    /// The same number each time, as a copy of the packet has.
     Same,
+    /// A new number each time, as MAVSDK sends.
     New,
 }
 

@@ -57,14 +57,14 @@ pub struct CoverageHeader {
     pub heading_rule: HeadingRule,
     /// How the pictures are triggered.
     pub trigger: Trigger,
-    /// Most changes of the lanes' order that the planner tries.
+    /// Maximum number of changes of the lanes' order that the planner tries.
     pub search_steps: u32,
     /// Height at which pictures are taken, and distance between the layers of transit flights.
     pub heights: Heights,
     /// Footprint of a picture, and distances between lanes and between waypoints.
     pub spacing: Spacing,
-    /// Direction of the lanes, degrees from east, counter-clockwise; `None` for the direction of
-    /// least width of the area.
+    /// Direction of the lanes, degrees from east, counter-clockwise; `None`: the planner takes the
+    /// direction across which the area is narrowest.
     pub lane_angle_deg: Option<f32>,
     /// Distance by which lanes begin and end beyond the area's edge, metres.
     pub lane_overshoot_m: f32,
@@ -180,7 +180,7 @@ const UNHEARD_DOWN_EXCEPT_DESCENT_S: f32 =
 impl<'a> CoverageView<'a> {
     /// Time, seconds, after which a vehicle that no other vehicle hears any more is on the ground:
     /// the end of its lease, the delays and the stop (`UNHEARD_DOWN_EXCEPT_DESCENT_S`), and the
-    /// descent from the highest layer at the slowest vehicle's descent speed.
+    /// descent from the highest layer to the lowest ground at the slowest descent speed.
     pub fn unheard_vehicle_down_after_s(&self) -> f32 {
         let Heights { max_picture_height_m: mission_m, layer_spacing_m: layer_m } =
             self.header.heights;

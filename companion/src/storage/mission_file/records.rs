@@ -15,7 +15,7 @@ pub const GOAL_LEN: usize = 16;
 /// Goal index of a vehicle that has no goal of its own.
 pub const NO_GOAL: u16 = u16::MAX;
 
-/// One vehicle of a mission; vehicle `i` starts at node `i` of the roadmap.
+/// One vehicle of a mission; vehicle `i`, in the file's order, starts at node `i` of the roadmap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MissionVehicle {
     /// System id, required clearance, height of the path's start above the pad, and goal.

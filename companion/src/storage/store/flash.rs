@@ -21,6 +21,7 @@ pub(crate) fn continue_crc(state: u32, bytes: &[u8]) -> u32 {
     !digest.finalize()
 }
 
+/// CRC-32 (ISO-HDLC) of all the bytes.
 pub(crate) fn crc32(bytes: &[u8]) -> u32 {
     CRC32.checksum(bytes)
 }
@@ -104,7 +105,7 @@ pub enum FlashRequest<'a> {
     },
 }
 
-/// Whether the store may erase areas now, which may stall the processor for seconds.
+/// Whether the store may erase areas now: an erasure may stall the processor for seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErasePermission {
     /// The vehicle is on the ground and disarmed.

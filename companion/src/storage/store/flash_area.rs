@@ -16,9 +16,12 @@ use super::flash::{FlashFault, FlashLayout, MAX_PROGRAM_LEN, ReadFlash, WORD_LEN
 
 /// Offset of an area's data from its first byte.
 pub const DATA_OFFSET: u32 = MAX_PROGRAM_LEN as u32;
+/// Offset of the "used" mark from the area's first byte.
 const USED_OFFSET: u32 = WORD_LEN as u32;
+/// Offset of the seal from the area's first byte.
 const SEAL_OFFSET: u32 = 2 * WORD_LEN as u32;
 
+/// The marks "clean" and "used", and the first bytes of a seal.
 const CLEAN: [u8; WORD_LEN] = *b"FLKCLEAN: erased, may be written";
 const USED: [u8; WORD_LEN] = *b"FLKUSED:  written to, seal ahead";
 const SEAL_MAGIC: [u8; 4] = *b"FLKS";

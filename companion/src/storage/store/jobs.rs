@@ -15,7 +15,8 @@ use super::upload_state::{UploadError, UploadState};
 impl Store {
     /// The next request to the shell; [`Self::handle_flash_outcome`] must get its outcome before
     /// the next one. `None` if there is nothing to do or a request is open. `erasing` says whether
-    /// areas may be erased. A flash that stalls the processor is only read while it is `Forbidden`.
+    /// areas may be erased. While `erasing` is `Forbidden`, a flash that stalls the processor is
+    /// only read.
     pub fn poll_request(&mut self, erasing: ErasePermission) -> Option<FlashRequest<'_>> {
         if self.request_pending {
             return None;
@@ -127,6 +128,7 @@ impl Store {
         self.buffer[..count].copy_from_slice(&rest[..count]);
     }
 
+    /// The next job: for an upload, else for the journal, else an erasure ahead of time.
     fn choose_job(&mut self, erasing: ErasePermission) -> Option<FlashJob> {
         let may_erase = erasing == ErasePermission::Allowed;
         match self.upload {
@@ -178,10 +180,12 @@ impl Store {
         Some(self.erase_job(area))
     }
 
+    /// The job that reads an upload back and checks its CRC.
     fn crc_check_job(&self, slot: FlashArea) -> FlashJob {
         FlashJob::CheckUploadCrc { slot, done: 0, sum: CRC_START, tail: [0; 4] }
     }
 
+    /// Marks an area as dirty, and returns the job that erases it.
     pub(super) fn erase_job(&mut self, area: FlashArea) -> FlashJob {
         *self.condition_mut(area) = AreaCondition::Dirty;
         self.paused_erasure = FlashJob::None;
@@ -294,6 +298,8 @@ impl Store {
         }
     }
 
+    /// Continues reading an upload back: `bytes` are those of the file from `done` on. Once all are
+    /// read and the CRC is right, requests the slot's seal.
     fn check_upload_crc(
         &mut self,
         slot: FlashArea,
@@ -328,6 +334,7 @@ impl Store {
         self.job = FlashJob::Seal(slot, Seal { sequence: newest + 1, len, crc, is_height_field });
     }
 
+    /// Continues after an area's seal was read back: an upload has succeeded, or a compaction.
     fn handle_sealed(&mut self, area: FlashArea, seal: Seal) {
         *self.condition_mut(area) = AreaCondition::Sealed(seal);
         match area {

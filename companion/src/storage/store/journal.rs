@@ -26,7 +26,8 @@ pub struct Journal {
     pub(super) next_record_at: u32,
     /// Range of the mission file in the storage bank; `None` if there is none.
     pub(super) mission: Option<Range<u32>>,
-    /// CRC-32 of the mission file, as in its record.
+    /// CRC-32 of all bytes of the mission file, as its record's head states it: not the CRC at the
+    /// file's end, by which vehicles recognise their mission.
     pub(super) mission_crc: u32,
     /// Whether the mission file was removed and no record says so yet.
     pub(super) mission_removal_unsaved: bool,

@@ -89,6 +89,8 @@ impl Store {
         }
     }
 
+    /// The first job of a compaction: marking the other half as used, or erasing it before. `None`
+    /// where it may not be erased; an upload of a mission file then fails, unless it may wait.
     fn begin_compaction(&mut self, erasing: ErasePermission) -> Option<FlashJob> {
         let half = usize::from(self.journal.active_half == Some(0));
         match self.journal.halves[half] {
@@ -110,6 +112,7 @@ impl Store {
         }
     }
 
+    /// Makes the parameters' record for offset `at`; they count as saved unless writing fails.
     fn make_parameters_record(&mut self, at: u32) -> JournalRecord {
         let len = journal::PARAMETERS_LEN;
         self.buffer.fill(0xFF);
@@ -119,6 +122,8 @@ impl Store {
         self.buffer_record(RecordKind::Parameters, at, len)
     }
 
+    /// Makes the photographed waypoints' record for offset `at`, as
+    /// [`Self::make_parameters_record`].
     fn make_photographed_record(&mut self, at: u32) -> JournalRecord {
         let len = self.photographed.len();
         self.buffer.fill(0xFF);
@@ -141,6 +146,7 @@ impl Store {
         }
     }
 
+    /// Continues a record after a request succeeded; `bytes` are those that were read, if any.
     pub(super) fn continue_record(&mut self, mut record: JournalRecord, bytes: &[u8]) {
         match (record.step, record.source) {
             (RecordStep::Head, RecordSource::Buffer) => record.step = RecordStep::Data,
@@ -188,6 +194,7 @@ impl Store {
         }
     }
 
+    /// Continues after a record was read back correctly.
     fn finish_record(&mut self, record: &JournalRecord) {
         let data_at = record.at + WORD_LEN as u32;
         let held = (record.len > 0).then_some(data_at..data_at + record.len);
@@ -217,7 +224,7 @@ impl Store {
     }
 
     /// Handles a record that was not written correctly: nothing is written behind it in its half,
-    /// and its data is written again.
+    /// and the records are written again in the other half.
     pub(super) fn fail_record(&mut self) {
         if let Some(compaction) = self.journal.compacting.clone() {
             return self.discard_area(FlashArea::JournalHalf(compaction.half));

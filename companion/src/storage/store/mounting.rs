@@ -7,6 +7,7 @@ use super::journal::*;
 use super::records::RecordKind;
 
 impl Store {
+    /// Finds the newest sealed half of the journal, and restores what its records hold.
     pub(super) fn mount_journal(&mut self, flash: &mut impl ReadFlash) {
         let layout = self.layout;
         self.journal.halves =
@@ -39,6 +40,7 @@ impl Store {
         self.journal.next_record_at = at;
     }
 
+    /// Restores the data of a record, from `at` on, if its CRC is right.
     fn restore_record(
         &mut self,
         kind: u8,

@@ -53,7 +53,8 @@ impl UploadReassembly {
         self.window_start
     }
 
-    /// Length of the file, as far as pieces were received.
+    /// End of the furthest piece received, bytes from the file's start: the file's length once all
+    /// pieces were sent.
     pub fn file_len(&self) -> u32 {
         self.received_end
     }

@@ -285,8 +285,8 @@ fn a_read_goes_first_between_two_sectors() {
     );
 }
 
-/// Cuts the power at a random word of `change`; afterwards a fresh start must find `before` or
-/// `after`, whole.
+/// Cuts the power at a random word of `change`; afterwards a fresh start must find the old files or
+/// the new ones, whole.
 fn cut_anywhere(
     seed: u64,
     change: impl Fn(&mut Store, &mut Flash) -> Result<(), PowerLoss>,
@@ -378,7 +378,7 @@ fn a_cut_anywhere_leaves_the_old_mission_or_the_new_one_whole() {
 }
 
 #[test]
-fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
+fn a_flash_that_fails_ends_the_upload_and_is_not_asked_for_ever() {
     for failing in 0..3 {
         let mut flash = Flash::new(6);
         let mut store = started(&mut flash);

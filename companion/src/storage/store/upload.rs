@@ -86,6 +86,7 @@ impl Store {
         }
     }
 
+    /// Ends the upload with this result; after an error its slot is to be erased.
     pub(super) fn end_upload(&mut self, result: Result<(), UploadError>) {
         if let Some((file, _)) = self.upload {
             self.upload = Some((file, UploadState::Ended(result)));

@@ -5,11 +5,12 @@
 pub enum UploadError {
     /// An area would have to be erased or programmed, and the vehicle is armed.
     Armed,
-    /// No slot is free: one is in use, and the other has a newer file that waits for a restart.
+    /// No slot is free: one is in use, and the other has a newer file that waits for a restart; or
+    /// the file of the upload before is still being stored.
     AwaitsRestart,
     /// Bytes of the file are missing.
     Incomplete,
-    /// The file is of another kind than its name, or its CRC is wrong.
+    /// The file is of another kind than its name, has no bytes, or its CRC is wrong.
     Damaged,
     /// The flash failed to erase, program or read.
     Flash,

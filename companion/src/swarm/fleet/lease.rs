@@ -5,8 +5,8 @@ use crate::link::roster::{RosterReportEntry, ShareStatus};
 use crate::time::{Duration, Instant};
 
 impl<const V: usize> Fleet<V> {
-    /// Whether these ranks, as bits, hold a majority of those that count, by the rule of
-    /// [`Self::is_majority`].
+    /// Whether the vehicles of these `ranks`, as bits, are a majority of the `counted` ones, by the
+    /// rule of [`Self::is_majority`].
     pub(super) fn is_majority_of(ranks: u32, counted: u32) -> bool {
         let among = ranks & counted;
         let lowest = among & counted.wrapping_neg() != 0;
@@ -36,7 +36,8 @@ impl<const V: usize> Fleet<V> {
         2 * these > all || (2 * these == all && lowest)
     }
 
-    /// Whether this vehicle has its lease: a majority lately reported that they hear it.
+    /// Whether this vehicle has its lease: within [`FleetTimeouts::lease`] a majority reported that
+    /// they hear it.
     pub fn has_lease(&self, now: Instant) -> bool {
         now - self.lease_renewed_at <= self.limits.lease
     }
@@ -47,7 +48,7 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
-    /// takes no part, and needs no lease.
+    /// takes no part: it needs no lease.
     pub fn unheard_for(&self, now: Instant) -> Duration {
         if self.vehicle_takes_part(usize::from(self.own_rank)) {
             self.lease_age(now)
@@ -73,21 +74,21 @@ impl<const V: usize> Fleet<V> {
         self.members[usize::from(self.own_rank)].entry.status == ShareStatus::Left
     }
 
-    /// Whether another vehicle takes part, or left a part that is not divided yet.
+    /// Whether a vehicle without a part may still get one: another vehicle takes part, or left a
+    /// part that is not divided yet.
     pub(crate) fn is_reserve_needed(&self) -> bool {
         let mut others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own_rank));
         self.is_dividing() || others.any(|rank| self.vehicle_takes_part(rank))
     }
 
-    /// Whether another vehicle flies, or has flown and finished, left or was lost since it was
-    /// started.
+    /// Whether another vehicle flies, or any vehicle has finished, left or was lost.
     pub(crate) fn has_others_flight_begun(&self) -> bool {
         let ended = |member: &FleetVehicle| member.entry.status != ShareStatus::Alive;
         self.is_another_in_flight() || self.members.iter().any(ended)
     }
 
-    /// When the last of the vehicles that have been silent for `MISSED_AFTER`, and so may be lost,
-    /// is down. `None` if there is none.
+    /// When the last of the vehicles that have been silent for 3 s, and so may be lost, is surely
+    /// on the ground. `None` if there is none.
     pub(crate) fn last_down_at(&self) -> Option<Instant> {
         Some(self.down_at).filter(|at| *at > Instant::ZERO)
     }
@@ -98,6 +99,7 @@ impl<const V: usize> Fleet<V> {
         self.any_missing
     }
 
+    /// Gives the status [`ShareStatus::Lost`] to those with a part that were silent for too long.
     pub(super) fn count_silent_as_lost(&mut self, now: Instant) {
         let silent = self.limits.lost_after;
         for member in self.members.iter_mut().filter(|m| m.has_part && now - m.heard_at >= silent) {
@@ -105,8 +107,8 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Takes part again, on the ground, after this vehicle could not start or no vehicle heard it,
-    /// once it can start and no flight is under way.
+    /// Takes part again, on the ground, if this vehicle has left but could start now (`own`, the
+    /// status that it would report, is alive), holds its lease, and no other vehicle is in flight.
     pub(super) fn rejoin_if_ready(&mut self, now: Instant, own: ShareStatus) {
         let RosterReportEntry { incarnation, status, .. } =
             self.members[usize::from(self.own_rank)].entry;
@@ -120,16 +122,16 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Enters this vehicle's commitment and hold where a division is under way or asked for, and
-    /// makes the division binding once it is agreed. To be called only if this vehicle's path is
-    /// that of the last binding division.
+    /// Enters this vehicle's commitment and hold if a division is under way or this vehicle
+    /// requests one, and makes the division binding once it is agreed. To be called only if this
+    /// vehicle's path is that of the last binding division.
     pub(super) fn step_division(&mut self, now: Instant, own: &OwnReport) {
         let takes_part = self.vehicle_takes_part(usize::from(self.own_rank));
         let asks = own.wants_division && takes_part && !self.divisions.is_full();
         if !self.is_dividing() && !asks {
             return;
         }
-        // This vehicle's commitment, in its next report, also requests the division from the
+        // By its commitment in its next report this vehicle also requests the division from the
         // others.
         let entry = &mut self.members[usize::from(self.own_rank)].entry;
         entry.commitment_dm = entry.commitment_dm.or(own.new_commitment_dm);

@@ -13,8 +13,9 @@ impl<const V: usize> Fleet<V> {
         }
         self.note_flight(sender, roster);
         let here = self.divisions.len() as u8;
-        // The sender may fly, or have flown, by another plan: before a restart, or without what was
-        // photographed meanwhile. Its divisions and places then belong to another plan than ours.
+        // The sender may fly, or have flown, by another plan: one from before a restart, or one
+        // that leaves out what was photographed meanwhile. Its divisions and places along paths
+        // then belong to that plan, not to ours.
         let same_plan = roster.plan_crc8 == self.plan_crc8;
         if same_plan && roster.division_count > here {
             let status = self.sender_status(sender, roster);
@@ -38,8 +39,9 @@ impl<const V: usize> Fleet<V> {
                 let behind = same_plan
                     && roster.division_count < self.divisions.len() as u8
                     && rank != sender;
-                // The member may have finished its share of a division that the sender does not
-                // know; it reports that itself.
+                // The vehicle of this rank may have finished its share of a division that the
+                // sender does not know. This vehicle hears it directly, and learns its status from
+                // itself.
                 if !(behind && entry.status == ShareStatus::Left && self.members[rank].heard_by_us)
                 {
                     let counts = if same { *entry } else { entry.seen_from_another_division() };
@@ -63,9 +65,10 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Status of the sender of a report, as this report or an earlier one says. A division that
-    /// only a sender that has left had agreed to before it was cut off excludes nobody: the sender
-    /// flew by it until its lease ended, and the others divide what they had heard of the sender.
+    /// Status of the sender of a report, as this report or an earlier one says. It matters where
+    /// the sender has left: a division that it alone took as binding before it was cut off excludes
+    /// nobody. The sender flew by that division until its lease ended; the others divide by what
+    /// they had heard of the sender.
     fn sender_status(&self, sender: usize, roster: &RosterReport) -> ShareStatus {
         let own =
             sender.checked_sub(usize::from(roster.first_rank)).and_then(|i| roster.entries.get(i));
@@ -73,9 +76,10 @@ impl<const V: usize> Fleet<V> {
         own.unwrap_or(known).status
     }
 
-    /// Makes the sender's last division binding here too, if this vehicle had reported its hash:
-    /// then the others counted on that. Returns whether it did so. Where the sender has left, by
-    /// its `status`, the others may meanwhile have counted on a later hash instead.
+    /// Makes the sender's last division binding here too, if it is the one after ours and this
+    /// vehicle had reported its hash: then the others counted on that. Returns whether it did so.
+    /// If the sender has left, by its `status`, a hash that this vehicle withdrew counts only while
+    /// it has reported no later one, on which the others may have counted instead.
     fn adopt_division(&mut self, roster: &RosterReport, status: ShareStatus) -> bool {
         let here = self.divisions.len() as u8;
         if roster.division_count != here + 1
@@ -96,8 +100,8 @@ impl<const V: usize> Fleet<V> {
         reported
     }
 
-    /// Takes a sender's incarnation as it is the first time that it reports itself: this vehicle,
-    /// just switched on, knew none, and could not tell a newer one from an older one.
+    /// Takes the sender's incarnation as the sender states it in its first report, whether it looks
+    /// newer or older than the stored one: this vehicle, just switched on, knew none.
     fn take_first_incarnation(&mut self, sender: usize, incarnation: u8, own: StartStatus) {
         let bit = 1 << sender.min(31);
         if self.introduced_bits & bit == 0 && self.members[sender].entry.incarnation != incarnation
@@ -125,9 +129,10 @@ impl<const V: usize> Fleet<V> {
         known.holds |= entry.holds;
     }
 
-    /// The vehicle of this rank was started again. In a flight under way it keeps its status and
-    /// progress: of two sides that do not hear each other one might count it again and the other
-    /// not, and both be a majority. Before that flight and after it, it is a new vehicle.
+    /// Stores a newer incarnation of the vehicle of this rank: it was started again. In a flight
+    /// under way it keeps its status and progress: of two groups that do not hear each other one
+    /// might count that vehicle again and the other not, and both be a majority. Before that flight
+    /// and after it, it is a new vehicle.
     fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, own: StartStatus) {
         let started = own == StartStatus::Started;
         let (takes_part, flight) =

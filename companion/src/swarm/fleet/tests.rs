@@ -20,7 +20,7 @@ const STEP_DM: u16 = 5;
 /// `shares_plan_with_others` has it, and a second more.
 const READY_S: u32 = 6;
 const MOST: usize = 5;
-/// CRCs of plans; the area may be begun again by the same plan.
+/// CRCs of plans; a new flight may have the same plan as the one before.
 const PLANS: [u32; 2] = [0x0102_0304, 0x1112_1325];
 
 struct Vehicle {
@@ -227,7 +227,7 @@ impl Swarm {
         for own in again.iter().copied() {
             if self.below(2) == 0 {
                 self.reset(own);
-                // Until it knows its position it hears the others.
+                // Before it knows its position and plans, it already hears the others.
                 self.run_s(2);
             }
             self.plan(own, plan_crc);

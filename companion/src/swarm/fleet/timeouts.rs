@@ -3,8 +3,7 @@
 use crate::margins::LEASE_S;
 use crate::time::Duration;
 
-/// Time for which a vehicle continues photographing after a majority last reported that they hear
-/// it.
+/// Time for which a vehicle photographs on after a majority last reported that they hear it.
 pub const LEASE: Duration = Duration::from_secs(LEASE_S);
 /// Greatest age of a neighbour's report that renews the lease.
 pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);

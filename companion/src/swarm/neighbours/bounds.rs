@@ -4,12 +4,13 @@ use planner_core::Point;
 
 use crate::time::Duration;
 
-/// Speed below which a vehicle counts as hovering, m/s: its sway.
+/// Speed below which a vehicle counts as hovering, m/s: it sways no faster.
 pub(crate) const MAX_HOVER_MPS: f32 = 0.3;
 /// Difference of `time_boot_ms` to that of the last position, milliseconds. A position older by
 /// less is late and is dropped; if it is older by more, its sender has restarted.
 pub(super) const SENDER_RESTARTED_STEP_BACK_MS: u32 = 10_000;
-/// Age of its last message within which a neighbour counts as heard: four positions and intents.
+/// Age of its last message within which a neighbour counts as heard: four positions and
+/// intents at the default rate.
 pub(super) const HEARD_WITHIN: Duration = Duration::from_millis(800);
 /// Age of a neighbour's position from which it may have fallen silent: no vehicle arms beside it,
 /// since a silent one would bar the climb.
@@ -47,13 +48,17 @@ pub(super) const DOWN_AFTER: Duration = Duration::from_secs(75);
 /// Silence after which the column of a vehicle that left the plan in the air in a coverage mission
 /// is free again: the vehicle is down by then, whatever it flew there.
 pub(super) const COLUMN_KEPT_FOR: Duration = Duration::from_secs(600);
-/// Time by which a vehicle that still hears others notices later that it is unheard, seconds.
+/// Additional time until a vehicle that still hears others notices that none hears it, compared
+/// with a vehicle that hears nobody, seconds.
 pub(super) const UNHEARD_NOTICED_LATER_S: f32 = 0.8;
-/// Share of its points that a vehicle flies at least: it may brake for their end already.
+/// Least share of the length of its reported points that a vehicle flies once it is unheard: it may
+/// be braking for their end already.
 pub(super) const MIN_FLOWN_SHARE_OF_POINTS: f32 = 0.8;
-/// Distance of a point from the vehicle from which on it shows the course, metres.
+/// Least distance of a reported point from the vehicle for the direction to that point to count as
+/// the vehicle's course, metres.
 pub(super) const MIN_COURSE_M: f32 = 0.5;
-/// Least spacing of the places on the unheard stretch below which the vehicle may lie, metres.
+/// Least spacing of the sampled places on the unheard stretch, the part of its points that a
+/// vehicle may have flown unheard, metres: below any of them the vehicle may lie.
 pub(super) const MIN_UNHEARD_STRETCH_SPACING_M: f32 = 1.0;
 /// Silence after which a vehicle in a coverage mission may have landed further along its path than
 /// `max_unheard_travel_m`: its lease, and the time that row `SwarmLinkLost` waits. No vehicle
@@ -62,8 +67,8 @@ pub(super) const UNHEARD_LANDING_AFTER: Duration = Duration::from_secs(40);
 /// Rounding of the length of a path of eight legs, metres.
 pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
 /// Maximum number of spacings of the places on the unheard stretch, which is long at a high speed,
-/// and in a coverage mission as long as the lease allows: with eight corners it makes at most 17
-/// keep-out zones, and the pad one more.
+/// and in a coverage mission as long as the lease allows: with eight corners the stretch makes at
+/// most 17 keep-out zones, and the pad one more.
 pub(super) const MAX_STRETCH_SPACINGS: f32 = 8.0;
 /// Height of the column below a neighbour's place in which it may lie on the ground, metres; the
 /// planner shortens the column where it knows the ground.
@@ -87,7 +92,8 @@ pub(super) const LANDING_COLUMN_DEPTH_M: f32 = 15.0;
 /// Greatest speed of a landing, m/s: the rate at which a landing column grows downwards while the
 /// vehicle's height is unknown.
 pub(super) const MAX_LANDING_MPS: f32 = 2.0;
-/// Age of a landing vehicle's position from which its height is unknown, seconds.
+/// Age of a neighbour's position from which its height is unknown if it lands, and from which the
+/// safety filter counts the neighbour as silent, seconds.
 pub(super) const MAX_HEIGHT_AGE_S: f32 = 1.0;
 /// [`MAX_HEIGHT_AGE_S`] as a duration.
 pub(super) const MAX_HEIGHT_AGE: Duration = Duration::from_secs(1);
@@ -105,7 +111,8 @@ pub(super) const AVOIDED_WITHIN_M: f32 = 0.5;
 /// the one that the schedule keeps from landed vehicles in announced gusts of 3 m/s.
 pub(super) const MAX_UNHEARD_LANDING_OFFSET_M: f32 = 0.15;
 /// Acceleration by which the safety filter widens the set of a vehicle that is off the points that
-/// it reports, m/s², with the default `FLK_ACCEL`; with a greater one it may stop a detour.
+/// it reports, m/s², with the default `FLK_ACCEL`. Detours stay clear of that set; with a greater
+/// `FLK_ACCEL` the filter may stop a detour.
 pub(super) const OFF_POINTS_ACCEL_MPS2: f32 = 1.5;
 /// Age of a vehicle's last position that is seldom exceeded, without the delay of its message,
 /// seconds: five are sent a second.

@@ -26,7 +26,7 @@ pub(super) struct AreaGround {
 
 impl NeighbourEntry {
     /// Whether the neighbour counts as dead: silent, by relays too, for [`LOST_AFTER`] and the time
-    /// that it may fly on unheard.
+    /// that it may fly on unheard. A stranger never counts as dead.
     // Not inlined, as other functions with many callers: a board has little flash.
     #[inline(never)]
     pub(super) fn is_dead(&self, now: Instant) -> bool {
@@ -46,7 +46,8 @@ impl NeighbourEntry {
             .is_some_and(|(heard, known)| heard - known >= MAY_LAND_AFTER)
     }
 
-    /// Time that the neighbour may fly on unheard, through open gates, seconds.
+    /// Time that the neighbour may fly on unheard, through open gates, seconds; 0 where it stops at
+    /// once.
     pub(super) fn unheard_flight_time_s(&self) -> f32 {
         match self.state.progress_m.filter(|_| self.flies_plan_unheard()) {
             Some(progress_m) => {
@@ -58,8 +59,8 @@ impl NeighbourEntry {
         }
     }
 
-    /// Whether the neighbour flies on along its plan while unheard: it was at the edge of the
-    /// radio's range, with open gates ahead.
+    /// Whether the neighbour flies on along its plan while unheard: when last heard it was on the
+    /// plan, at the edge of the radio's range, with open gates ahead.
     #[inline(never)]
     pub(super) fn flies_plan_unheard(&self) -> bool {
         self.state.progress_m.is_some_and(|progress_m| {
@@ -85,8 +86,9 @@ impl NeighbourEntry {
         }
     }
 
-    /// Progress along the shared plan that the neighbour has surely made, metres: unheard at the
-    /// edge of the radio's range it is assumed to fly on as far as its gates were open.
+    /// Progress along the shared plan that the neighbour has surely made, metres: silent at the
+    /// edge of the radio's range, or without a known position, it is assumed to fly on as far as
+    /// its gates were open.
     pub(super) fn min_progress_m(&self, now: Instant) -> Option<f32> {
         let known_m = self.heard_progress_m(now)?;
         let Some(known_at) = self.intent_at.max(self.relayed_report_at) else {
@@ -105,8 +107,8 @@ impl NeighbourEntry {
         ))
     }
 
-    /// Seconds until the neighbour has surely passed `until_m`, heard or not; `None` where its
-    /// gates may stop it before.
+    /// Seconds until the neighbour has surely passed the place `until_m` along its path, heard or
+    /// not; `None` where its gates may stop it before, or it is off the plan.
     pub(super) fn time_until_passed_s(&self, until_m: f32, now: Instant) -> Option<f32> {
         let known_m =
             self.heard_progress_m(now).filter(|_| !self.reports_any(ON_DETOUR | OUT_OF_PLAN))?;
@@ -118,6 +120,7 @@ impl NeighbourEntry {
             .then(|| libm::fmaxf(fly_s + after_s, 0.0))
     }
 
+    /// Whether the neighbour last reported that it is out of the plan, or counts as dead.
     pub(super) fn is_out_of_plan(&self, now: Instant) -> bool {
         self.reports_any(OUT_OF_PLAN) || self.is_dead(now)
     }
@@ -131,8 +134,8 @@ impl NeighbourEntry {
                 && !self.heard_within(now, down))
     }
 
-    /// Whether the neighbour is out of the plan, or lately reported that it stands until another
-    /// vehicle moves, or lands after its detour.
+    /// Whether the neighbour is out of the plan, or lately reported that it has landed or stands
+    /// until another vehicle moves, or descends at the end of a detour.
     pub(super) fn is_waiting_or_out_of_plan(&self, now: Instant) -> bool {
         self.is_out_of_plan(now)
             || (self.reports_any(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
@@ -157,7 +160,8 @@ impl NeighbourEntry {
             && self.state.velocity.length() < MAX_HOVER_MPS
     }
 
-    /// Whether the neighbour may land without avoiding others: off the plan, or unheard.
+    /// Whether the neighbour, in the air, may land without avoiding others: it is silent, or off
+    /// the plan without a detour.
     pub(super) fn may_land_without_avoiding(&self, now: Instant) -> bool {
         let silent = !self.heard_within(now, MAY_LAND_AFTER)
             && !self.is_reported_out_of_range(now)
@@ -169,7 +173,7 @@ impl NeighbourEntry {
     }
 
     /// Calls `visit` with the columns, of radius `apart_m`, in which the neighbour may come down;
-    /// unheard, below all places up to `upto_m` along its points.
+    /// after 3 s of silence, those below all places up to `upto_m` along its points.
     pub(super) fn visit_landing_columns(
         &self,
         now: Instant,
@@ -209,7 +213,8 @@ impl NeighbourEntry {
         }
     }
 
-    /// Depth of the column below a place on its path, metres: in a coverage mission to the ground.
+    /// Depth of the column below a place on its path, metres: [`DEFAULT_COLUMN_DEPTH_M`]; in a
+    /// coverage mission to the ground if that is deeper.
     pub(super) fn column_depth_m(&self, place: &Point) -> f32 {
         // NaN, a ground never reported, counts as none.
         if self.would_fly_all_points_unheard() {
@@ -229,9 +234,8 @@ impl NeighbourEntry {
         (climbs && top.z > here.z + CLIMB_DONE_BELOW_TOP_M).then_some(top.z)
     }
 
-    /// Distance along its points that the neighbour may fly unheard, metres. In a coverage mission
-    /// that is all of them; elsewhere the length of a stop, plus what delays add: of its own
-    /// messages and of those by which it learns that no vehicle hears it.
+    /// Distance along its points that the neighbour may fly unheard, metres: that of a stop
+    /// ([`Self::unheard_stopping_distance_m`]); in a coverage mission all of them, if longer.
     #[inline]
     pub(super) fn max_unheard_distance_m(&self) -> f32 {
         // The slack keeps rounding from cutting off the last corner.
@@ -240,7 +244,8 @@ impl NeighbourEntry {
         if all_m > stops_m { all_m } else { stops_m }
     }
 
-    /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres.
+    /// Length of path until the neighbour has noticed that it is unheard, and stopped, metres, with
+    /// what delays add: of its own messages and of those by which it learns that it is unheard.
     #[inline]
     pub(super) fn unheard_stopping_distance_m(&self) -> f32 {
         self.max_unheard_travel_m
@@ -252,7 +257,8 @@ impl NeighbourEntry {
         !self.reports_any(GROUNDED | LANDED) || self.unheard_flight_point_count > 0
     }
 
-    /// Whether the neighbour, silent in a coverage mission, may fly on by lease or autopilot.
+    /// Whether the neighbour, silent for 3 s in a coverage mission, may fly on: while its lease
+    /// lasts, or flown home by its autopilot.
     pub(super) fn may_fly_on_silent(&self, now: Instant) -> bool {
         self.would_fly_all_points_unheard()
             && self.is_under_way()
@@ -261,7 +267,8 @@ impl NeighbourEntry {
     }
 
     /// Where the neighbour, silent in a coverage mission, may have fallen without power: the line
-    /// from its position to where its speed carried it, and the distance beside it, metres.
+    /// from its position to where its speed carried it, and the greatest distance from that line,
+    /// metres.
     #[inline(never)]
     pub(super) fn fall_line(&self, now: Instant) -> Option<([Point; 2], f32)> {
         let silent = self.would_fly_all_points_unheard()
@@ -317,8 +324,8 @@ impl NeighbourEntry {
         }
     }
 
-    /// Calls `visit` with the keep-out zones, of radius `apart_m`, of all places where
-    /// the neighbour may be from now on; unheard up to `upto_m` along its points.
+    /// Calls `visit` with the keep-out zones, of radius `apart_m`, of all places where the
+    /// neighbour may be from now on; if it counts as dead, those up to `upto_m` along its points.
     pub(super) fn visit_keep_out_zones(
         &self,
         now: Instant,

@@ -1,4 +1,4 @@
-//! The fleet of a coverage mission, and which vehicles hear each other, by which it decides.
+//! The fleet of a coverage mission, and which vehicles hear each other: by that the fleet decides.
 
 use super::Neighbours;
 use super::bounds::*;

@@ -24,7 +24,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// An echo of a neighbour's last intent, for this vehicle's next intent; the neighbours take
-    /// turns.
+    /// turns by `turn`, the number of intents that this vehicle has sent.
     pub(crate) fn next_echo(&self, turn: usize, now: Instant) -> Option<IntentEcho> {
         let entry = self.entries[..self.roster_count].get(turn % self.roster_count.max(1))?;
         IntentEcho::new(entry.rank, entry.intent_sequence, now - entry.intent_at?)

@@ -14,17 +14,26 @@ use crate::time::{Duration, Instant};
 /// The table's entry of one neighbour: what was last heard of it.
 #[derive(Clone, Debug)]
 pub(crate) struct NeighbourEntry {
+    /// MAVLink system id.
     pub(super) id: u8,
+    /// Index in the roster sorted by id, this vehicle included; [`RANK_OUTSIDE_ROSTER`] for a
+    /// stranger.
     pub(super) rank: u16,
+    /// Rejects intents that are no newer than the last one.
     pub(super) sequence: SequenceFilter,
+    /// When a valid position, or an intent of our mission, was last heard.
     pub(super) heard_at: Option<Instant>,
+    /// When a valid position was last heard.
     pub(super) position_at: Option<Instant>,
+    /// `time_boot_ms` of that position.
     pub(super) position_boot_ms: u32,
+    /// Flags of the last intent, such as [`OUT_OF_PLAN`].
     pub(super) flags: u8,
     /// Since when the neighbour has reported that it is out of the plan, with its position known.
     pub(super) out_of_plan_since: Option<Instant>,
+    /// When the neighbour last reported that it hears this vehicle.
     pub(super) hears_us_at: Option<Instant>,
-    /// Vehicles that the neighbour hears, a bit for each rank.
+    /// Vehicles that the neighbour hears, by its last intent, a bit for each rank.
     pub(super) heard_bits: u32,
     /// The neighbour's progress along the shared plan as others relayed it, metres.
     pub(super) relayed_progress_m: Option<f32>,
@@ -32,39 +41,46 @@ pub(crate) struct NeighbourEntry {
     pub(super) relayed_report_at: Option<Instant>,
     /// Sequence number of the neighbour's last intent.
     pub(super) intent_sequence: u8,
+    /// Estimated one-way delay of the neighbour's messages.
     pub(super) message_delay: MessageDelay,
     /// When the neighbour's last intent of our mission was heard.
     pub(super) intent_at: Option<Instant>,
+    /// Points that the neighbour flies along next, by its last intent.
     pub(super) points: Vec<Point, MAX_POINTS>,
-    /// Number of points, at the end of the list, to which the neighbour flies only while unheard.
+    /// Number of points, at the end of `points`, to which the neighbour flies only if no vehicle
+    /// hears it; before them is the point where it will stop for now.
     pub(super) unheard_flight_point_count: u8,
     /// Where the neighbour's position is on its reported points.
     pub(super) place_on_points: PlaceOnPoints,
-    /// How far the neighbour's points, up to its stop for now, lead it.
+    /// How far the neighbour's points, up to where it will stop for now, lead it from its position.
     pub(super) reported_path_reach: ReportedPathReach,
-    /// Greatest distance of the points, up to its stop for now, from the first of them, metres.
+    /// Greatest distance of the points, up to where it will stop for now, from the first, metres.
     pub(super) points_extent_m: f32,
     /// Length of the polyline from the neighbour's position through all its points, metres: in a
-    /// coverage mission it flies all of it unheard, as far as its lease allows. −1 in other
-    /// missions.
+    /// coverage mission it flies all of them if no vehicle hears it, as far as its lease allows.
+    /// −1 in other missions, and before the first intent.
     pub(super) points_length_m: f32,
-    /// Whether the neighbour may come down from where it is; and the height of the ground below it,
-    /// ENU up, metres, NaN if it never reported any.
+    /// Whether the neighbour may come down from where it is, by its last intent.
     pub(super) may_come_down: bool,
+    /// Height of the ground below the neighbour as it reported it, ENU up, metres; NaN before its
+    /// first intent.
     pub(super) ground_m: f32,
     /// Place along its path up to which the neighbour's gates were open, or would open after a
-    /// wait, metres: unheard it flies on to there.
+    /// wait, metres: it flies on to there even if no vehicle hears it. −∞ if unknown.
     pub(super) gates_open_up_to_m: f32,
-    /// Seconds by which gates and climb delay its unheard flight to `gates_open_up_to_m`.
+    /// Seconds by which gates and climb delay its flight to `gates_open_up_to_m`, compared with a
+    /// flight at `min_unheard_progress_mps`.
     pub(super) unheard_flight_delay_s: u8,
-    /// Whether the neighbour's last position was where the radio may not reach.
+    /// Whether the neighbour's last position was so far from this vehicle that the radio may not
+    /// reach.
     pub(super) at_range_edge: bool,
-    /// Least speed at which the neighbour is assumed to make progress while unheard, m/s.
+    /// Least speed at which the neighbour is assumed to make progress while none hears it, m/s.
     pub(super) min_unheard_progress_mps: f32,
-    /// Length of its points on which the neighbour comes to rest unheard, metres, where messages
-    /// come at once; longer where the radio's range is known.
+    /// Distance along its points within which the neighbour comes to rest once no vehicle hears it,
+    /// metres, without what the delay of messages adds. Greater where the radio's range is known.
     pub(super) max_unheard_travel_m: f32,
-    /// Greatest speed at which the neighbour is assumed to fly on unheard, m/s.
+    /// Greatest speed at which the neighbour is assumed to fly on while none hears it, m/s: that of
+    /// the mission's fastest vehicle.
     pub(super) fastest_vehicle_mps: f32,
     /// The neighbour's speed at its last position, m/s.
     pub(super) speed_mps: f32,
@@ -74,12 +90,15 @@ pub(crate) struct NeighbourEntry {
     pub(super) follows_other_plan: bool,
     /// When a position last showed the neighbour faster than [`MAX_HOVER_MPS`].
     pub(super) moved_at: Instant,
-    /// Greatest progress that the neighbour can have made, metres along its path, and when.
+    /// Greatest progress that is believed of the neighbour, metres along its path, at an instant;
+    /// the bound grows from then on. `None` before the first report of progress.
     pub(super) max_progress: Option<(f32, Instant)>,
     /// The neighbour's place before its take-off: its autopilot may fly it back there.
     pub(super) pad: Option<Point>,
-    /// Place where the neighbour rested when the present detour was planned; NaN for none.
+    /// Place where the neighbour, out of the plan, rested when the present detour was planned; NaN
+    /// for none.
     pub(super) avoided_place: Point,
+    /// State as last heard, as the advice uses it; its age and [`OUT_OF_PLAN`] are not kept here.
     pub(super) state: Neighbour,
 }
 
@@ -145,8 +164,8 @@ impl NeighbourEntry {
         }
     }
 
-    /// Whether the neighbour, if it were unheard, would fly on to the last of its points: so it is
-    /// in coverage missions. Says nothing of whether it is heard.
+    /// Whether the neighbour would fly on to the last of its points if no vehicle heard it: so it
+    /// is in coverage missions, once an intent was heard. Says nothing of whether it is heard now.
     pub(crate) fn would_fly_all_points_unheard(&self) -> bool {
         self.points_length_m >= 0.0
     }
@@ -157,6 +176,7 @@ impl NeighbourEntry {
             [..self.points.len().saturating_sub(usize::from(self.unheard_flight_point_count))]
     }
 
+    /// Whether a position or intent of the neighbour was heard less than `span` ago.
     pub(super) fn heard_within(&self, now: Instant, span: Duration) -> bool {
         self.heard_at.is_some_and(|at| now - at < span)
     }
@@ -166,14 +186,15 @@ impl NeighbourEntry {
         self.state.progress_m.is_some() && !self.reports_any(ON_DETOUR | OUT_OF_PLAN)
     }
 
+    /// Whether the neighbour's last intent had any of these flags.
     pub(super) fn reports_any(&self, flags: u8) -> bool {
         self.flags & flags != 0
     }
 
     /// The part of a reported progress that is believed, metres: no more than the vehicle can have
-    /// flown since the report before, at `fastest_mps`. The rest is believed by and by; so is a
-    /// landing, whose report jumps to the end of the way. A lower progress is believed: it opens no
-    /// gate. The first report of a plan is believed, and that of a vehicle that was restarted.
+    /// flown since the report before, at `fastest_mps`. The rest is believed as time passes; so is
+    /// a landing, whose report jumps to the end of the path. A lower progress is believed: it opens
+    /// no gate. The first report of a plan is believed in full.
     pub(super) fn plausible_progress_m(
         &mut self,
         progress_m: f32,

@@ -17,6 +17,7 @@ use crate::time::{Duration, Instant};
 /// inputs.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FilterNeighbour<'a> {
+    /// MAVLink system id.
     pub(crate) id: u8,
     /// Whether the roster does not name the neighbour, so that only its positions count.
     pub(crate) stranger: bool,
@@ -41,7 +42,7 @@ pub(crate) struct FilterNeighbour<'a> {
 }
 
 impl<'a> FilterNeighbour<'a> {
-    /// The neighbour has been silent for so long that it counts as lost.
+    /// Marks the neighbour as silent for so long that it counts as lost.
     pub(crate) fn count_as_lost(&mut self) {
         self.lost = true;
     }
@@ -51,19 +52,20 @@ impl<'a> FilterNeighbour<'a> {
         self.motion.delay_s = 0.0;
     }
 
-    /// The neighbour counts as one that has flown on, unheard, for `age_s` seconds.
+    /// Makes the neighbour count as one that has flown on, unheard, for `age_s` seconds.
     pub(crate) fn fly_on_for(&mut self, age_s: f32) {
         (self.motion.age_s, self.motion.grounded) = (age_s, false);
     }
 
-    /// The neighbour counts as one that stands where it was last heard.
+    /// Makes the neighbour count as one that stands at `motion.position`.
     pub(crate) fn stop_at_last_position(&mut self) {
         (self.motion.age_s, self.motion.speed_mps, self.motion.reported_points) = (0.0, 0.0, &[]);
         self.motion.reported_path_reach = ReportedPathReach::UNBOUNDED;
         self.motion.rests_within_m = 0.0;
     }
 
-    /// The neighbour, `entry`, flies no further than along the points that it reported.
+    /// Limits the set of the neighbour, whose entry is `entry`, to the points that it reported, if
+    /// it has been silent for longer than a stop takes.
     pub(crate) fn limit_to_points(&mut self, entry: &'a NeighbourEntry, bounds: &MotionBounds) {
         entry.limit_to_points(&mut self.motion, bounds);
     }
@@ -78,14 +80,14 @@ pub(crate) struct ReachQuery<'a> {
     pub(crate) within_m: f32,
     /// Limits within which neighbours are expected to fly.
     pub(crate) bounds: &'a MotionBounds,
-    /// Time for which neighbours fly on that has to be free of conflicts as well, seconds.
+    /// Time of flight that is added to each neighbour's set before it brakes, seconds.
     pub(crate) ahead_s: f32,
     /// Whether this vehicle follows the shared plan: gates keep it apart from those that do too.
     pub(crate) on_plan: bool,
     /// Whether this vehicle hears no other one: then the others are assumed to fly on.
     pub(crate) hears_nobody: bool,
-    /// Whether this vehicle holds its lease in a coverage mission: heard by it or not, no other one
-    /// then flies on for long.
+    /// Whether this vehicle, which hears nobody, still holds its lease in a coverage mission: then
+    /// a neighbour that was silent for `down_after` has landed.
     pub(crate) holds_lease: bool,
     /// Whether this vehicle lands, or descends in a coverage mission: then places where unheard
     /// vehicles may lie count too.
@@ -95,19 +97,19 @@ pub(crate) struct ReachQuery<'a> {
 /// What may have become of a silent neighbour.
 #[derive(Clone, Copy, Debug)]
 struct SilentFate {
-    /// Whether it counts as dead.
+    /// Whether it counts as lost, at rest on its points ([`NeighbourEntry::is_lost_on_points`]).
     dead: bool,
     /// Whether it has been silent for so long that it lies on the ground.
     lies: bool,
-    /// Whether it may fly on, since this vehicle hears nobody.
+    /// Whether it may fly on though it counts as dead, since this vehicle hears nobody.
     may_fly_on: bool,
 }
 
 impl NeighbourEntry {
-    /// Whether the neighbour counts as dead, if it may come within reach; `None` if it stays out of
-    /// reach wherever it can be, or has no position. Most are far away: this test needs no
-    /// reachable set. Never `None` for a neighbour that is within reach after
-    /// [`Neighbours::apply_silence`].
+    /// Whether the neighbour counts as dead ([`Self::is_lost_on_points`]), if it may come within
+    /// reach; `None` if it stays out of reach wherever it can be, or has no position. Most are far
+    /// away: this test needs no reachable set. Never `None` for a neighbour that is within reach
+    /// after [`Neighbours::apply_silence`].
     #[inline(always)]
     fn dead_if_within_reach(
         &self,
@@ -134,7 +136,7 @@ impl NeighbourEntry {
             speed_mps: self.speed_mps,
             age_s: age.as_secs_f32(),
             delay_s: if reach.on_plan && self.on_plan() { 0.0 } else { self.message_delay.delay_s },
-            // Not read.
+            // `max_reach_m` does not read the points.
             reported_points: &[],
             place_on_points: PlaceOnPoints::Unknown,
             reported_path_reach: self.reported_path_reach,
@@ -270,8 +272,9 @@ impl NeighbourEntry {
         }
     }
 
-    /// In a coverage mission: for a neighbour silent for longer than a stop takes, replaces the
-    /// ball around its last position by the part of its points that it may have flown since.
+    /// For a neighbour silent for longer than a stop takes, replaces the ball around its last
+    /// position by the part of its points that it may have flown since. To be called only in a
+    /// coverage mission.
     fn limit_to_points<'a>(&'a self, heard: &mut NeighbourMotion<'a>, bounds: &MotionBounds) {
         let stopped_s = bounds.stopped_when_unheard_for_s + 2.0 * heard.delay_s;
         let follows = !heard.reported_points.is_empty()
@@ -394,6 +397,8 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
+    /// Changes `met` to what a neighbour with a position this old may have done since: stopped on
+    /// its points, climbed on, or come down.
     #[inline(never)]
     fn change_to_silent<'a>(
         &'a self,
@@ -464,7 +469,8 @@ impl<const V: usize> Neighbours<V> {
     }
 }
 
-/// Puts a neighbour whose position or points were replaced on these points.
+/// Sets the place on its points, and their reach, of a neighbour whose position or points were
+/// replaced.
 fn put_on_points(motion: &mut NeighbourMotion<'_>, place: PlaceOnPoints, extent_m: f32) {
     motion.place_on_points = place;
     motion.reported_path_reach =

@@ -27,9 +27,11 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
-    /// Distance along its points that a neighbour may have flown unheard, metres, from the first
-    /// place on them where it may have been. If this vehicle hears nobody, its own radio has more
-    /// likely failed: then the others fly on to places unknown here, and only a stop is assumed.
+    /// Distance along its points that a neighbour may have flown since it was last heard, metres,
+    /// from the first place on them where it may have been: that of a stop; in a coverage mission,
+    /// after [`UNHEARD_LANDING_AFTER`] of silence, all of them. If this vehicle hears nobody, its
+    /// own radio has more likely failed: then the others fly on to places unknown here, and only a
+    /// stop is assumed.
     #[inline(never)]
     fn max_unheard_flown_m(&self, entry: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !entry.heard_within(now, UNHEARD_LANDING_AFTER);
@@ -41,8 +43,8 @@ impl<const V: usize> Neighbours<V> {
         flown_m + entry.place_on_points.place_uncertainty_m()
     }
 
-    /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` where it is out
-    /// of the plan, unless the present detour already avoids that place.
+    /// Calls `visit` with the keep-out zones, of radius `apart_m`, of neighbour `i` of the table if
+    /// it is out of the plan, unless the present detour already avoids its place.
     pub fn for_each_unavoided_zone_of(
         &self,
         i: usize,
@@ -76,7 +78,8 @@ impl<const V: usize> Neighbours<V> {
 
     /// Calls `visit` with the keep-out zones of the roster's other vehicles where they stand now,
     /// or rest out of the plan. `apart`: radius for one in the air; for one of these that is heard
-    /// and on plan, which keeps its place; and for one on the ground, which no longer deviates.
+    /// and not out of the plan, which keeps its place; and for one on the ground, which no longer
+    /// deviates.
     pub fn for_each_keep_out_zone(
         &self,
         now: Instant,
@@ -87,8 +90,8 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Calls `visit` with the keep-out zones of neighbour `i` of the roster where it stands or
-    /// rests: of radius `lying_m` if it is on the ground, `hovering_m` if it is heard and on plan,
-    /// else `apart_m`.
+    /// rests: of radius `lying_m` if it is on the ground, `hovering_m` if it is heard and not out
+    /// of the plan, else `apart_m`.
     pub(crate) fn for_each_zone_of(
         &self,
         i: usize,
@@ -113,8 +116,9 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Calls `visit` with zones around a silent neighbour in the air that the safety filter lets no
-    /// vehicle enter: along its path once it counts as dead, before that a ball, smaller than the
-    /// filter's. Otherwise the search would find, again and again, a detour that the filter stops.
+    /// vehicle enter: along its path once it counts as dead; before that a ball, smaller than the
+    /// filter's, if this vehicle hears others. Without these zones the search would find, again and
+    /// again, a detour that the filter stops.
     // Not inlined, as other calls that a board seldom makes.
     #[inline(never)]
     fn visit_silent_zones(
@@ -203,8 +207,8 @@ impl<const V: usize> Neighbours<V> {
                     bar(leg, 0.0);
                 });
             }
-            // A vehicle in the air comes down at its pad; off its plan perhaps also below its
-            // place, or at the end of its points.
+            // A vehicle in the air may come down at its pad; off its plan also below its place, or
+            // at the end of its points.
             if entry.would_fly_all_points_unheard() && entry.is_under_way() {
                 entry.pad.into_iter().for_each(|pad| bar([pad; 2], 0.0));
                 if !entry.reports_any(ON_PLAN) {
@@ -228,9 +232,10 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether neighbour `i`, unheard in flight, may have come down within `apart_m` of the column
-    /// from `place` to the ground at `floor_m`: from each place along its points it comes down,
-    /// never up. With a time in `fallen` it may also have fallen, and not straight down.
+    /// Whether neighbour `i`, silent in flight, may have come down within `apart_m` of the column
+    /// from `place` to the ground at `floor_m`: below any leg that it may have flown along its
+    /// points, except legs `apart_m` or more below that ground. With the present time in `fallen`
+    /// it may also have fallen, and not straight down.
     pub(crate) fn may_lie_below(
         &self,
         i: usize,
@@ -272,8 +277,8 @@ impl<const V: usize> Neighbours<V> {
         self.entries.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
     }
 
-    /// Notes where the vehicles out of the plan rest now: the detour that begins avoids these
-    /// places.
+    /// Notes where the vehicles out of the plan rest now: the detour that begins now avoids
+    /// these places.
     pub fn mark_out_of_plan_avoided(&mut self, now: Instant) {
         for entry in &mut self.entries {
             entry.avoided_place =

@@ -21,8 +21,9 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Length of its path on which an unheard vehicle comes to rest, metres. With a known range one
-    /// that notices late does not fly back: it may be out of range.
+    /// Distance along its path within which a vehicle that none hears comes to rest, metres.
+    /// Greater with a known range: a vehicle that notices late that none hears it may then be out
+    /// of range, and does not fly back.
     pub(super) fn max_unheard_travel_for_range_m(&self) -> f32 {
         let later_s = if self.knows_radio_range() { UNHEARD_NOTICED_LATER_S } else { 0.0 };
         max_unheard_travel_m(self.fastest_vehicle_mps) + later_s * self.fastest_vehicle_mps
@@ -34,7 +35,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether every vehicle of the roster that has not ended its flight was last heard, if ever,
-    /// where the radio may not reach: then its silence is no failure.
+    /// where the radio may not reach: then silence is no failure.
     pub(crate) fn are_all_out_of_range(&self) -> bool {
         let beyond = |c: &NeighbourEntry| {
             c.at_range_edge || c.position_at.is_none() || c.reports_any(LANDED | OUT_OF_PLAN)

@@ -33,9 +33,13 @@ use crate::time::{Duration, Instant};
 pub(crate) const PAYLOAD_TYPE: u16 = 0xF10D;
 /// Maximum number of vehicles relayed in one message.
 const MAX_RELAYED: usize = 10;
+/// Version of the payload's layout.
 const VERSION: u8 = 3;
+/// Bytes of TUNNEL before its payload.
 const TUNNEL_HEADER_LEN: usize = 5;
+/// Bytes of the payload before the first vehicle's report.
 const HEADER_LEN: usize = 12;
+/// Bytes of one vehicle's report.
 const ITEM_LEN: usize = 11;
 /// Longest TUNNEL payload, bytes.
 pub(crate) const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_RELAYED * ITEM_LEN;
@@ -45,31 +49,38 @@ const OUT_OF_RANGE_AFTER: Duration = Duration::from_secs(3);
 /// Age up to which a relayed report that a vehicle follows the plan counts: three hops, and the
 /// loss of a message.
 const RELAYED_LIFETIME: Duration = Duration::from_secs(6);
-/// Least age that each relay adds to a report, microseconds: longer than most messages take. A
-/// message that takes longer adds its own delay: otherwise a report relayed in a circle stays
-/// young.
+/// Least age that each relay adds to a report, microseconds: longer than most messages take. Where
+/// the messages' measured delay is longer, that is added: otherwise a report relayed in a circle
+/// stays young.
 const MIN_HOP_AGE_US: u64 = 500_000;
-/// Time that each relay adds to the reported delay of a vehicle's flight, seconds: its progress is
-/// not as old as the added age says.
+/// Time that each relay adds to the reported delay of a vehicle's flight, seconds: a relay adds
+/// more age to a report than the message took, so the progress reckoned from that age would be too
+/// far.
 const HOP_DELAY_S: u8 = 1;
 /// Unit of an age in the message, microseconds.
 const AGE_TICK_US: u64 = 100_000;
 
-/// Relayed report of the vehicle of one rank: its progress, the report's age in 0.1 s, and how far
-/// and how late the vehicle flies on though no other vehicle hears it.
+/// Relayed report of the vehicle of one rank: its progress, and how far and how late the vehicle
+/// flies on though no other vehicle hears it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct RelayedProgress {
     rank: u8,
+    /// Age of the report, in units of 0.1 s.
     age_ticks: u8,
+    /// Progress along the vehicle's path of the plan, metres.
     progress_m: f32,
+    /// Place along that path up to which the vehicle's gates are open or will be, metres.
     gates_open_up_to_m: f32,
+    /// Delay of the flight to that place by gates and climb, seconds.
     unheard_flight_delay_s: u8,
 }
 
 /// A relay message: the reports of several vehicles, as one vehicle sends them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Relay {
+    /// CRC-32 of the sender's mission file.
     pub(crate) mission_crc: u32,
+    /// CRC-32 of the swarm's plan that the sender has.
     pub(crate) plan_crc: u32,
     items: Vec<RelayedProgress, MAX_RELAYED>,
 }
@@ -97,8 +108,8 @@ impl Relay {
         TUNNEL_HEADER_LEN + len
     }
 
-    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not a sound
-    /// relay.
+    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not a valid relay
+    /// message.
     pub(crate) fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let body = padded[TUNNEL_HEADER_LEN..].get(..usize::from(padded[4]))?;
         let is_ours = u16::from_le_bytes([padded[0], padded[1]]) == PAYLOAD_TYPE;
@@ -142,7 +153,8 @@ impl NeighbourEntry {
             && self.heard_progress_m(now).is_some()
     }
 
-    /// The neighbour's report as it is to be relayed; `None` if the neighbour is off the plan.
+    /// The neighbour's report as it is to be relayed; `None` if the neighbour is off the plan, or
+    /// was never heard.
     fn progress_to_relay(&self, now: Instant) -> Option<RelayedProgress> {
         let progress_m = self.heard_progress_m(now)?;
         let age_ticks =
@@ -213,6 +225,7 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
+    /// Index into `entries` of the roster's vehicle of this rank; `None` for this vehicle.
     fn index_of_rank(&self, rank: u8) -> Option<usize> {
         self.entries[..self.roster_count].binary_search_by_key(&u16::from(rank), |c| c.rank).ok()
     }

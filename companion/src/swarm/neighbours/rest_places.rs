@@ -1,4 +1,4 @@
-//! Where along the points that it reported a neighbour comes to rest that no other hears.
+//! Where a neighbour that no vehicle hears comes to rest along the points that it reported.
 
 use planner_core::track::safety::PlaceOnPoints;
 use planner_core::{Length, Point};
@@ -8,7 +8,9 @@ use super::entry::NeighbourEntry;
 use crate::margins::{CRUISE_TRACKING_ERROR_M, min_unheard_travel_m};
 
 impl NeighbourEntry {
-    /// The points that the neighbour flies to next from its position; its setpoint may be behind.
+    /// The points that the neighbour flies to next from its position: without those that it has
+    /// passed, such as a setpoint behind it. All points in a coverage mission, or if it is not on
+    /// its points.
     pub(super) fn next_points(&self) -> &[Point] {
         match self.place_on_points {
             PlaceOnPoints::On { leg_end: leg, .. } if !self.would_fly_all_points_unheard() => {
@@ -45,8 +47,7 @@ impl NeighbourEntry {
         if (here - on_points).norm_squared() <= MOST_SQ_M2 { on_points } else { here }
     }
 
-    /// As [`Self::for_each_unheard_leg_from`], from where the neighbour comes to rest on its
-    /// points.
+    /// As [`Self::for_each_unheard_leg_from`], from [`Self::start_of_unheard_stretch`].
     pub(super) fn for_each_unheard_leg(
         &self,
         left_m: f32,
@@ -55,9 +56,9 @@ impl NeighbourEntry {
         self.for_each_unheard_leg_from(self.start_of_unheard_stretch(), left_m, each);
     }
 
-    /// Calls `each` with the place `at` and each leg from there along the neighbour's points that
-    /// it may have flown unheard, `left_m` in all: both ends, and metres of the leg and of its
-    /// flown part.
+    /// Calls `each` with the place `at`, as a leg of length 0, and with each leg from there along
+    /// the neighbour's points that it may have flown unheard, `left_m` in all: both ends of the
+    /// whole leg, then its length and that of its flown part, metres.
     #[inline(never)]
     pub(super) fn for_each_unheard_leg_from(
         &self,
@@ -77,8 +78,8 @@ impl NeighbourEntry {
     }
 
     /// Calls `visit` with places along its points where the neighbour may rest unheard, from
-    /// `from_m` to `to_m` along them, and with its greatest distance from the nearest of them,
-    /// metres.
+    /// `from_m` to `to_m` along them, and with the greatest distance of a place where it may rest
+    /// from the nearest of those visited, metres.
     #[inline(never)]
     pub(super) fn for_each_rest_place(
         &self,
@@ -129,8 +130,9 @@ impl NeighbourEntry {
         MIN_FLOWN_SHARE_OF_POINTS * points_m
     }
 
-    /// The place `least_m` along its points, with the points from the beginning of its leg on, and
-    /// its place on these; `None` where that is the neighbour's own.
+    /// The place `least_m` along its points from the neighbour's position, the points from the
+    /// beginning of that place's leg on, and where on these points it is. `None` if `least_m` is 0,
+    /// if the points end sooner, or if the neighbour is not on them.
     pub(super) fn nearest_rest_place(
         &self,
         least_m: f32,

@@ -7,16 +7,17 @@ use crate::link::intent::{BLOCKED, GROUNDED, LANDED, OUT_OF_PLAN};
 use crate::time::{Duration, Instant};
 
 impl<const V: usize> Neighbours<V> {
-    /// Whether all vehicles of the roster last reported that they have landed or are out of the
-    /// plan, or have been silent for `down_after`, when a lost vehicle is on the ground.
+    /// Whether all other vehicles of the roster last reported that they have landed or are out of
+    /// the plan, or have been silent for `down_after`, when a lost vehicle is on the ground.
     pub(crate) fn are_all_out_or_down(&self, now: Instant) -> bool {
         self.entries[..self.roster_count]
             .iter()
             .all(|c| c.reports_any(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down_after))
     }
 
-    /// Whether a vehicle of the roster counts as dead, but may still be in the air: silent for less
-    /// than `down_after`, it last reported itself neither on the ground nor out of the plan.
+    /// Whether any other vehicle of the roster counts as dead, but may still be in the air: silent
+    /// for less than `down_after`, it last reported itself neither on the ground nor out of the
+    /// plan.
     pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
         self.entries[..self.roster_count].iter().any(|c| c.comes_down_unheard(now, self.down_after))
     }
@@ -28,8 +29,8 @@ impl<const V: usize> Neighbours<V> {
         at.is_some_and(|at| self.entries[at].comes_down_unheard(now, self.down_after))
     }
 
-    /// Whether the vehicle `id` has landed, or is out of the plan; false for an id outside the
-    /// roster.
+    /// Whether the vehicle `id` has landed, or is out of the plan, dead included; false for an id
+    /// outside the roster.
     pub(crate) fn is_landed_or_out(&self, id: u8, now: Instant) -> bool {
         self.roster_index(id).is_some_and(|at| {
             self.entries[at].reports_any(LANDED) || self.entries[at].is_out_of_plan(now)

@@ -43,7 +43,8 @@ impl<const V: usize> Neighbours<V> {
         &self.states
     }
 
-    /// Whether `gate` is open for good: its vehicle has passed it, or is out of the plan.
+    /// Whether `gate` is open for good: the vehicle that it waits for has passed, or is out of the
+    /// plan, and a scan has found since that it does not block the path.
     pub(crate) fn is_open_for_good(&self, gate: &Gate, now: Instant) -> bool {
         let entry = self.roster_index(gate.wait_for_id).map(|at| &self.entries[at]);
         entry.is_some_and(|c| {

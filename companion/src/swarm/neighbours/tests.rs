@@ -247,7 +247,7 @@ fn a_vehicle_out_of_the_plan_opens_gates_only_after_a_scan() {
     table.mark_path_clear(at(1400));
     table.handle_intent(at(1500), 1, &intent(0, 7, 8), 7, None);
     assert!(!out(&mut table, at(1600)), "it is not out any more");
-    // Silent from now on: dead later, but nobody counts on that before the next scan.
+    // Silent from now on: it counts as dead later, but not before the next scan.
     let dead = at(1500) + LOST_AFTER;
     assert!(!out(&mut table, dead) && !table.states_with_age(dead)[0].grounded);
     table.mark_path_clear(dead);
@@ -308,7 +308,7 @@ proptest::proptest! {
             }
             last = Some((believed_m, now));
         }
-        // A landing that reports its whole way is believed after the time that it takes to fly it.
+        // A landing that reports its whole path is believed after the time that it takes to fly it.
         for second in 1..200 {
             let now = Instant::from_millis(heard_ms + second * 1000);
             lying.handle_intent(now, 1, &reported(250.0), 1, Some(2));
@@ -403,7 +403,7 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             met.motion.delay_s = 0.0;
         }
         if met.lost && !lands && reach.hears_nobody {
-            // As a vehicle that hears no other vehicle sees it.
+            // For a vehicle that hears nobody, the other one has flown on.
             (met.motion.age_s, met.motion.grounded) = (bounds.stopped_when_unheard_for_s, false);
         }
         let silent = met.lost || met.motion.age_s > MAX_HEIGHT_AGE_S;
@@ -449,7 +449,7 @@ fn nobody_falls_up() {
         let reported = Intent { points: points.clone(), ..intent(0, 1, 2) };
         table.handle_intent(Instant::from_millis(500), 1, &reported, 1, None);
         table.handle_position(Instant::from_millis(500), &ORIGIN, 9, &place(50, 0));
-        // Where the position says it is.
+        // The neighbour's position in the mission frame.
         let from = table.entries[1].state.position;
         let mut place = Point::from_fn(|_, _| uniform(&mut rng, -6.0, 6.0));
         place.z = uniform(&mut rng, 0.0, 30.0);
@@ -463,7 +463,8 @@ fn nobody_falls_up() {
             assert!(highest_m > floor_m - apart_m, "it would have to climb");
         } else if near {
             above += 1;
-            // Whatever of its way is beside the column is too far below the floor.
+            // Each part of the neighbour's path within the column's reach is too far below the
+            // floor.
             let (mut nearest, mut at) = (f32::INFINITY, from);
             let mut left_m = table.entries[1].max_unheard_distance_m();
             for next in &points {

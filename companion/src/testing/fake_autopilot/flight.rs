@@ -8,6 +8,7 @@ use crate::Duration;
 use crate::autopilot::AutopilotKind;
 
 impl Bench {
+    /// Whether the vehicle is on the ground in truth.
     pub(crate) fn on_ground(&self) -> bool {
         self.enu.z < 0.05
     }
@@ -17,7 +18,7 @@ impl Bench {
         self.on_ground() || self.false_ground
     }
 
-    /// Error of the estimated position.
+    /// Error of the estimated position, estimated minus true, ENU metres.
     pub(super) fn height_error(&self) -> Point {
         Point::new(0.0, 0.0, self.height_error_m)
     }

@@ -62,6 +62,7 @@ impl Bench {
         Some((request, obstacles))
     }
 
+    /// The shell's answer to a request for a detour; `None` for no answer.
     fn planned_detour(
         &mut self,
         request: &DetourRequest,

@@ -10,6 +10,7 @@ use crate::Link;
 use crate::autopilot::AutopilotKind;
 
 impl Bench {
+    /// The autopilot's next HEARTBEAT, as a frame.
     pub(crate) fn heartbeat(&mut self) -> Vec<u8> {
         let armed =
             if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };

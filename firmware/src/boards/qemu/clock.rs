@@ -18,12 +18,15 @@ use super::registers::Register;
 pub(super) const COUNTS_PER_US: u64 = 25;
 /// Instructions in a timer count, with `-icount shift=0`.
 const INSTRUCTIONS_PER_COUNT: u64 = 40;
+/// Addresses of the timers.
 const TIMER0: usize = 0x4000_0000;
 const TIMER1: usize = 0x4000_1000;
+/// Offsets of a timer's registers.
 const CTRL: usize = 0;
 const VALUE: usize = 4;
 const RELOAD: usize = 8;
 const INTSTATUS: usize = 12;
+/// Bits of CTRL.
 const ENABLE: u32 = 1;
 const INTERRUPT: u32 = 8;
 
@@ -52,7 +55,7 @@ pub fn start() {
     interrupts::enable(Irq::Timer1, interrupts::DEVICES_PRIORITY);
 }
 
-/// Interrupt handler of timer 0, which has wrapped round: counts the round.
+/// Interrupt handler of timer 0, which has wrapped round: counts the wrap.
 pub fn on_timer0() {
     critical_section::with(CLOCK_NOW);
 }
@@ -68,17 +71,17 @@ pub fn on_timer1() {
 /// Reads the clock: counts since the start. Also counts a wrap of timer 0 whose interrupt has not
 /// run yet.
 pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
-    let rounds = CLOCK.timer0_wraps.borrow(cs);
+    let wraps = CLOCK.timer0_wraps.borrow(cs);
     let before = Register::new(TIMER0, VALUE).read();
-    let ended = Register::new(TIMER0, INTSTATUS).read() != 0;
+    let wrapped = Register::new(TIMER0, INTSTATUS).read() != 0;
     let mut value = before;
-    if ended {
+    if wrapped {
         Register::new(TIMER0, INTSTATUS).write(1);
-        rounds.set(rounds.get() + 1);
+        wraps.set(wraps.get() + 1);
         // Read again: the first value may be from before the wrap.
         value = Register::new(TIMER0, VALUE).read();
     }
-    (u64::from(rounds.get()) << 32 | u64::from(u32::MAX - value))
+    (u64::from(wraps.get()) << 32 | u64::from(u32::MAX - value))
         + CLOCK.skipped_counts.borrow(cs).get()
 };
 

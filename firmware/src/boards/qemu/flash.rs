@@ -19,6 +19,7 @@ const WORD_MARKS_ADDRESS: usize = 0x6020_0000;
 const BANK_INITIALISED_ADDRESS: usize = 0x6030_0000;
 const MAGIC: u32 = 0x464c_4153;
 const BANK_LEN: usize = LAYOUT.len() as usize;
+/// Marks of a word: erased, programmed, its erasure or programming not completed.
 const ERASED: u8 = 0;
 const WHOLE: u8 = 1;
 const TORN: u8 = 2;

@@ -8,8 +8,8 @@
 //! that read, and with `-icount` its timers count instructions: so waiting takes no board time,
 //! timers and watchdog need not be stopped, and computing takes its own time.
 //!
-//! Bytes enter the UART driver's receive buffer directly, and leave instead of its send buffer: the
-//! host's serial line simulates the baud rate.
+//! Received bytes enter the UART driver's receive buffer directly, and sent bytes do not pass its
+//! send buffer: the host's serial line simulates the baud rate.
 #![expect(
     unsafe_code,
     reason = "memory that the linker knows nothing of, and the host's debug probe"
@@ -34,6 +34,7 @@ use super::registers::Register;
 const MESSAGE_ADDRESS: usize = 0x6060_0000;
 const SENT_ADDRESS: usize = 0x6068_0000;
 
+/// Address of the dual timer, of which the first timer is used, and offsets of its registers.
 const TIMER: usize = 0x4000_2000;
 const LOAD: usize = 0;
 const CONTROL: usize = 8;
@@ -53,16 +54,16 @@ struct SimulationLink {
     queued_len: usize,
     /// Time of the message's next record, counts since the start.
     next_record_due: u64,
-    /// Gives bytes that arrive to the UART with this number.
+    /// Gives a UART, by its number, the bytes that arrive there.
     receive_on_port: fn(u8, &[u8]),
 }
 
 static SIMULATION_LINK: Mutex<RefCell<Option<SimulationLink>>> = Mutex::new(RefCell::new(None));
 
 /// Enters lock step if the board's command line is [`COMMAND_LINE`]: announces the board to the
-/// host and waits for the first message. `take` is called with a UART's number and the bytes that
-/// arrive there.
-pub fn start(take: fn(u8, &[u8])) {
+/// host and waits for the first message. `receive_on_port` is called with a UART's number and the
+/// bytes that arrive there.
+pub fn start(receive_on_port: fn(u8, &[u8])) {
     let mut line = [MaybeUninit::uninit(); 2 * COMMAND_LINE.len()];
     if sys_get_cmdline_uninit(&mut line).is_ok_and(|line| line == COMMAND_LINE.as_bytes()) {
         let input = File::open(c"/dev/stdin").expect("QEMU has an input");
@@ -75,7 +76,7 @@ pub fn start(take: fn(u8, &[u8])) {
             executed_len: 0,
             queued_len: 0,
             next_record_due: 0,
-            receive_on_port: take,
+            receive_on_port,
         };
         host.queue_record(FromBoard::Started, &[]);
         host.flush();
@@ -209,6 +210,7 @@ impl SimulationLink {
         }
     }
 
+    /// Writes the queued records to the host.
     fn flush(&mut self) {
         // SAFETY: as in `queue_record`, which wrote it.
         let sent = unsafe { slice::from_raw_parts(SENT_ADDRESS as *const u8, self.queued_len) };

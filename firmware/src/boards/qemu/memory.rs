@@ -21,7 +21,9 @@ pub const BANK2_LEN: usize = 1 << 20;
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Bank2Use {
+    /// Read in place as a slice.
     Read = 1,
+    /// Programmed by the flash driver.
     Programmed,
 }
 

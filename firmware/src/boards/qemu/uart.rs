@@ -9,11 +9,13 @@ use super::grants;
 use super::interrupts::{self, Irq};
 use super::registers::Register;
 
+/// Offsets of a UART's registers.
 const DATA: usize = 0;
 const STATE: usize = 4;
 const CTRL: usize = 8;
 const INTCLEAR: usize = 12;
 const BAUDDIV: usize = 16;
+/// Bits of STATE.
 const TX_FULL: u32 = 1;
 const RX_FULL: u32 = 2;
 const RX_OVERRUN: u32 = 8;
@@ -23,6 +25,7 @@ const BOTH_ENABLED: u32 = 0b1111;
 const DIVISOR: u32 = 27;
 /// Bytes of the receive buffer: a quarter of a second at 18 kB/s, the fastest that QEMU delivers.
 const RECEIVE_BUFFER_LEN: usize = 4096;
+/// Bytes of the send buffer.
 const SEND_BUFFER_LEN: usize = 1024;
 
 /// Counters of a UART's losses.
@@ -36,11 +39,15 @@ pub struct LossCounters {
 
 /// One UART and its buffers.
 pub struct Uart {
+    /// Address of the device.
     base: usize,
     /// Number of the UART in lock step's records.
     port: u8,
+    /// Interrupt by which the device asks for the next byte to send.
     transmit_irq: Irq,
+    /// Receive buffer.
     received: Pipe<CriticalSectionRawMutex, RECEIVE_BUFFER_LEN>,
+    /// Send buffer: bytes that the device has not taken yet.
     sent: Pipe<CriticalSectionRawMutex, SEND_BUFFER_LEN>,
     /// Losses since the start.
     pub counters: LossCounters,

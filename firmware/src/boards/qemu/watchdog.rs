@@ -11,11 +11,13 @@ use super::clock::CLOCK_NOW;
 use super::registers::Register;
 use crate::boards::limits::WATCHDOG_TIMEOUT_US;
 
+/// Address of the device, and offsets of its registers.
 const WATCHDOG: usize = 0x4000_8000;
 const LOAD: usize = 0;
 const CTRL: usize = 8;
 const INTCLR: usize = 12;
 const LOCK: usize = 0xC00;
+/// Value of LOCK with which the other registers can be written.
 const UNLOCK: u32 = 0x1ACC_E551;
 /// Reload value of the watchdog's timer, which runs down twice at 25 MHz before the reset: half the
 /// timeout.
@@ -41,6 +43,7 @@ pub fn limit_skip_or_reset(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
     due.min(reset_time)
 }
 
+/// Stores the present time as that of the last feeding.
 fn note_fed() {
     critical_section::with(|cs| LAST_FED.borrow(cs).set(CLOCK_NOW(cs)));
 }

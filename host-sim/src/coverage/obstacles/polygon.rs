@@ -46,9 +46,9 @@ pub(super) fn bounding_box(points: &Polygon) -> Polygon {
     vec![low, [high[0], low[1]], high, [low[0], high[1]]]
 }
 
-/// A polygon of at most `most` corners (five or more) around a convex one. While it has more, it
-/// drops the edge that thereby adds the least area, and extends the two neighbouring edges until
-/// they meet.
+/// A polygon of at most `most` corners around a convex one; `most` is at least 5. As long as the
+/// polygon has more, the edge whose removal adds the least area is dropped, and the two
+/// neighbouring edges are extended until they meet.
 pub(super) fn simplified_outward(mut polygon: Polygon, most: usize) -> Polygon {
     while polygon.len() > most {
         let n = polygon.len();

@@ -25,7 +25,9 @@ const FAR_AWAY_CELLS: f32 = 1e18;
 /// together; cells. Either all of them are obstacles, or all are bounding boxes of child nodes.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
+    /// Lowest corners of the boxes: by axis, then by box.
     pub(super) low: [[f32; BOXES_PER_NODE]; 3],
+    /// Highest corners of the boxes: by axis, then by box.
     pub(super) high: [[f32; BOXES_PER_NODE]; 3],
     /// Offset in the node list from this node to the child under each box; [`LEAF`] if the boxes
     /// are obstacles.
@@ -49,6 +51,7 @@ impl Node {
 #[derive(Clone, Copy, Default)]
 struct OpenNode {
     min_distance_sq: f32,
+    /// Index in the node list.
     node: u32,
 }
 
@@ -106,9 +109,13 @@ fn least_of<S: Simd>(simd: S, numbers: &[f32; BOXES_PER_NODE]) -> f32 {
 
 /// A segment, in cells.
 pub(super) struct CellSegment {
+    /// Start of the segment.
     a: [f32; 3],
+    /// End minus start.
     d: [f32; 3],
+    /// Lowest corner of the segment's bounding box.
     low: [f32; 3],
+    /// Highest corner of the segment's bounding box.
     high: [f32; 3],
     /// 1 / d; infinite along an axis without motion.
     per_d: [f32; 3],
@@ -134,8 +141,8 @@ impl CellSegment {
         self.d.iter().chain(&self.a).all(|x| x.is_finite())
     }
 
-    /// Distance from the segment to the nearest face of a grid of `dims` cells, cells; negative
-    /// outside.
+    /// Distance from the segment to the nearest face of a grid of `dims` cells, cells; negative if
+    /// a part of the segment is outside the grid.
     pub(super) fn distance_to_faces(&self, dims: [u32; 3]) -> f32 {
         (0..3)
             .map(|axis| self.low[axis].min(dims[axis] as f32 - self.high[axis]))
@@ -145,8 +152,8 @@ impl CellSegment {
     /// For each box of a node: a lower and an upper bound of its squared distance from the segment.
     /// The upper bound is the squared distance of one point of the segment, nearest to the box's
     /// centre. The lower bound is the greater of two: the squared distance between the box and the
-    /// segment's bounding box, and the tangent at that point, since squared distance along a
-    /// segment is convex.
+    /// segment's bounding box, and the least value over the segment of the tangent at that point,
+    /// since squared distance along a segment is convex.
     #[inline(always)]
     fn distance_bounds_sq<S: Simd>(
         &self,
@@ -244,6 +251,7 @@ struct Boxes<S: Simd> {
     half_sides: [SimdLanes<S>; 3],
     /// Start of the segment relative to the boxes' centres.
     start_from_centres: [SimdLanes<S>; 3],
+    /// End of the segment minus its start.
     d: [SimdLanes<S>; 3],
 }
 

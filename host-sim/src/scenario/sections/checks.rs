@@ -52,6 +52,7 @@ pub(super) fn check_margins(
     Err(text.error_with_hint(span, why, hint))
 }
 
+/// Refuses starts nearer to each other than the safety distance.
 pub(super) fn check_starts_apart(
     text: TomlText<'_>,
     vehicles: &[(VehicleSection, VehicleSpans)],
@@ -72,8 +73,8 @@ pub(super) fn check_starts_apart(
     Ok(())
 }
 
-/// Refuses goals nearer than the safety distance: vehicles that land below them would stay too
-/// near.
+/// Refuses goals nearer to each other than the safety distance: vehicles that land below them would
+/// stay too near.
 pub(super) fn check_goals_apart(
     table: &Table<'_>,
     mission: &MissionSection,
@@ -130,6 +131,8 @@ fn goal_span(table: &Table<'_>, index: usize) -> TomlSpan {
     item.unwrap_or(goals.span)
 }
 
+/// Refuses a labelled mission in which a vehicle has no goal, one that does not exist, or another
+/// vehicle's.
 pub(super) fn check_labelled_goals(
     text: TomlText<'_>,
     vehicles: &[(VehicleSection, VehicleSpans)],

@@ -20,7 +20,9 @@ use crate::scenario::{Deconfliction, MapSection, RoadmapSection, Simulation, Veh
 /// The map that stands beside an area, not yet read.
 pub(super) struct MapBesideArea {
     map: MapSection,
+    /// Where `map.file` stands, for errors.
     span: TomlSpan,
+    /// Whether the scenario gives `map.origin`.
     has_origin: bool,
 }
 
@@ -95,7 +97,7 @@ impl MapBesideArea {
         flown.check_climbs(text, &obstacles)?;
         let below_m = flown.clearance_below_m().max(clearance_m);
         let floor_m = area.heights.max_picture_height_m - below_m;
-        // Lanes are longer by the margin, and lie up to half a picture beside the border.
+        // Lanes extend beyond the border by the overrun, and lie up to half a picture beside it.
         let beyond_m = area.lane_overrun_m + area.spacing.footprint.across_m / 2.0;
         let pads = flown.vehicles.iter().map(|vehicle| vehicle.start.xy());
         let places: Vec<_> = area.vertices.iter().copied().chain(pads).collect();
@@ -122,7 +124,8 @@ impl MapBesideArea {
 
 impl FlightSettings<'_> {
     /// Horizontal distance between paths and obstacles, metres: the largest radius, plus how far
-    /// companions let a vehicle deviate from its path over a field, at least the margin to walls.
+    /// companions let a vehicle deviate from its path in a coverage mission, at least the margin to
+    /// walls and the roadmap's safety margin.
     fn clearance_m(&self) -> f32 {
         let Deconfliction { separation_m, safety_distance_m, .. } = *self.deconfliction;
         let walls_m =

@@ -49,6 +49,7 @@ pub(super) fn read_simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulat
     Ok(simulation)
 }
 
+/// Reads one of `[[faults]]`; its vehicle, if given, must be among `ids`.
 pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
     let words: Vec<(&str, &'static str)> =
         VEHICLE_FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();

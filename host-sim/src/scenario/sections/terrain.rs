@@ -106,8 +106,8 @@ impl UnreadTerrain {
         })
     }
 
-    /// Reads the terrain file; sets the area's terrain and mission height, and puts the vehicles on
-    /// the ground.
+    /// Reads the terrain file; sets the area's terrain and greatest picture height, and puts the
+    /// vehicles on the ground.
     pub(super) fn apply_terrain(
         &self,
         text: TomlText<'_>,

@@ -1,8 +1,9 @@
 use super::*;
 use planner_core::map::voxel::{GridShape, Outside};
 
-/// A floor at z < 1 and a wall at x > 8 in a 10 m cube of 1 m cells.
-fn with_monitor(test: impl FnOnce(Referee<'_>)) {
+/// Runs a test with a referee in a 10 m cube of 1 m cells, with a floor at z < 1 and a wall at
+/// x > 8.
+fn with_referee(test: impl FnOnce(Referee<'_>)) {
     let shape = GridShape { dims: [10; 3], min: Point::zeros(), resolution_m: 1.0 };
     let mut words = vec![0; shape.word_count()];
     for i in 0..10 {
@@ -32,7 +33,7 @@ fn at(x: f32, y: f32, z: f32, phase: RefereePhase) -> Observation {
 
 #[test]
 fn a_body_in_the_wall_is_one_contact_however_long() {
-    with_monitor(|mut referee| {
+    with_referee(|mut referee| {
         let far = at(2.0, 8.0, 5.0, RefereePhase::Flying);
         for (step, x) in [7.0, 7.6, 7.7, 7.0, 7.6].into_iter().enumerate() {
             referee.observe(step as f64 * 0.004, &[at(x, 2.0, 5.0, RefereePhase::Flying), far]);
@@ -44,7 +45,7 @@ fn a_body_in_the_wall_is_one_contact_however_long() {
 
 #[test]
 fn the_floor_is_none_while_landing_but_a_wall_is() {
-    with_monitor(|mut referee| {
+    with_referee(|mut referee| {
         let far = at(2.0, 8.0, 5.0, RefereePhase::Flying);
         referee.observe(0.0, &[at(4.0, 2.0, 1.4, RefereePhase::TakeOffOrLanding), far]);
         assert_eq!(referee.wall_contacts, 0);
@@ -59,7 +60,7 @@ fn the_floor_is_none_while_landing_but_a_wall_is() {
 /// What a vehicle touches under its pilot is a contact as any other, and is counted apart too.
 #[test]
 fn contacts_under_its_pilot_are_counted_apart_too() {
-    with_monitor(|mut referee| {
+    with_referee(|mut referee| {
         let rests = at(5.0, 5.0, 5.0, RefereePhase::Grounded);
         for (step, flown_by_pilot) in [false, true, true, false].into_iter().enumerate() {
             for (tenth, x) in [(0, 7.0), (1, 7.6)] {
@@ -75,7 +76,7 @@ fn contacts_under_its_pilot_are_counted_apart_too() {
 
 #[test]
 fn a_near_pair_is_one_violation_unless_both_stand() {
-    with_monitor(|mut referee| {
+    with_referee(|mut referee| {
         let pair = |apart: f32, phase| {
             [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, RefereePhase::Grounded)]
         };
@@ -95,7 +96,7 @@ fn a_near_pair_is_one_violation_unless_both_stand() {
 
 #[test]
 fn a_wreck_may_be_passed_near_but_not_touched() {
-    with_monitor(|mut referee| {
+    with_referee(|mut referee| {
         let wreck = at(2.0, 2.0, 1.5, RefereePhase::Wreck);
         for (step, z) in [3.0, 2.6, 2.4, 2.3, 2.6].into_iter().enumerate() {
             referee.observe(step as f64 * 0.004, &[at(2.0, 2.0, z, RefereePhase::Flying), wreck]);
@@ -106,7 +107,7 @@ fn a_wreck_may_be_passed_near_but_not_touched() {
 
 #[test]
 fn hovering_on_for_twenty_seconds_is_a_deadlock() {
-    with_monitor(|mut referee| {
+    with_referee(|mut referee| {
         let seen =
             [at(2.0, 2.0, 5.0, RefereePhase::Flying), at(5.0, 5.0, 5.0, RefereePhase::Grounded)];
         for step in 0..300 {
@@ -118,7 +119,7 @@ fn hovering_on_for_twenty_seconds_is_a_deadlock() {
 
 #[test]
 fn a_vehicle_that_reports_no_progress_makes_some_by_flying_on() {
-    with_monitor(|mut referee| {
+    with_referee(|mut referee| {
         let silent = |x| Observation { progress_m: None, ..at(x, 2.0, 5.0, RefereePhase::Flying) };
         let rests = at(5.0, 5.0, 5.0, RefereePhase::Grounded);
         for step in 0..300 {
@@ -135,7 +136,7 @@ fn a_vehicle_that_reports_no_progress_makes_some_by_flying_on() {
 
 #[test]
 fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
-    with_monitor(|mut referee| {
+    with_referee(|mut referee| {
         referee.retracts_ended_deadlocks = true;
         let on_path =
             |x| [at(x, 2.0, 5.0, RefereePhase::Flying), at(5.0, 5.0, 5.0, RefereePhase::Grounded)];
@@ -175,7 +176,7 @@ fn out_of_radio_range_only_a_short_wait_that_flying_on_ends_is_no_deadlock() {
     let phases = [RefereePhase::Flying, RefereePhase::TakeOffOrLanding];
     for (stands_s, phase, deadlocks) in [(40, phases[0], 0), (80, phases[0], 1), (40, phases[1], 1)]
     {
-        with_monitor(|mut referee| {
+        with_referee(|mut referee| {
             referee.retracts_out_of_range_waits = true;
             let rests = at(5.0, 5.0, 5.0, RefereePhase::Grounded);
             for step in 0..10 * stands_s {

@@ -16,7 +16,7 @@ fn data(name: &str) -> Option<PathBuf> {
 
 #[test]
 fn bilbao_is_where_its_system_says() {
-    // Number of cells and sum of all heights as another reader finds them.
+    // Number of cells along a side and sum of all heights as another reader finds them.
     for (name, size, sum, range) in [
         ("bilbao_DEM.tif", 680, 9_637_843.0, [-2.0, 103.0]),
         ("bilbao_BDSM.tif", 1359, 4_762_879.0, [0.0, 52.0]),

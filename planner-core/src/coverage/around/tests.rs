@@ -29,7 +29,9 @@ fn column(place: Flat, low_m: f32, high_m: f32, radius_m: f32) -> KeepOutZone {
     KeepOutZone { from: at(high_m), to: at(low_m), radius_m, kind: ZoneKind::Static }
 }
 
-/// A field of 400 m, and zones in it: each in a cell of its own, so that none crosses another.
+/// A field of 400 m, and no-fly zones in it: each in a cell of its own, so that none crosses
+/// another. A zone is given by its rotation, outer radius, ratio of inner to outer radius, and
+/// number of corners.
 fn field(zones: &[Option<(f32, f32, f32, u8)>]) -> (StdVec<Flat>, StdVec<Ring>) {
     let mut vertices = StdVec::from(
         [(0.0, 0.0), (400.0, 0.0), (400.0, 400.0), (0.0, 400.0)].map(|(x, y)| Flat::new(x, y)),
@@ -94,7 +96,7 @@ fn planned(
             assert!(!known.iter().any(|o| o.contains(end)), "{end:?} is no place to rest");
         } else {
             assert!((end - OVER).norm() <= SAME_CORNER_M, "{end:?}");
-            // Up, along one height, down: never in the height of another's layer.
+            // Up or down to one height, its layer's or its own, along that, then down.
             let level = points[1..points.len() - 1].iter().all(|p| p.z == points[1].z);
             assert!(level && [LAYER_M, request.here.z].contains(&points[1].z), "{points:?}");
         }
@@ -178,7 +180,7 @@ proptest! {
         };
         let things: StdVec<_> = things.iter().map(thing).collect();
         let Some((way, shortest_m)) = planned(&zones, &request, &things) else { return Ok(()) };
-        // A fence that contains both ends removes paths, and adds none.
+        // A fence that contains both ends of the path rules out some paths, and allows no new ones.
         let room = Point::repeat(room_m);
         let fence = Some((
             here.inf(&OVER) - room,

@@ -16,7 +16,7 @@ fn lane(strip: u16, [from, to]: [f32; 2]) -> Lane {
     }
 }
 
-/// Lanes around a zone in strips 2 to 5, one whole strip below and three above.
+/// Lanes around a zone in strips 2 to 5, two whole strips below and three above.
 fn around_a_zone() -> Vec<Lane> {
     let whole = |strip| lane(strip, [0.0, 100.0]);
     let both = |strip| [lane(strip, [0.0, 40.0]), lane(strip, [60.0, 100.0])];
@@ -30,7 +30,7 @@ fn a_zone_makes_four_cells() {
     group_into_cells(&mut lanes);
     let cells: Vec<u32> = lanes.iter().map(super::super::lanes::Lane::cell).collect();
     assert_eq!(cells, [0, 0, 1, 2, 1, 2, 1, 2, 1, 2, 3, 3, 3]);
-    // A strip that is left out ends a cell, and so does a lane beside one that goes on.
+    // A strip without lanes ends a cell, and so does a strip in which one lane becomes two.
     let mut lanes =
         [lane(0, [0.0, 9.0]), lane(2, [0.0, 9.0]), lane(3, [0.0, 4.0]), lane(3, [5.0, 9.0])];
     group_into_cells(&mut lanes);
@@ -43,7 +43,7 @@ fn each_cell_is_flown_back_and_forth_in_one_go() {
     let mut lanes = laid.clone();
     group_into_cells(&mut lanes);
     order_cells(&mut lanes, &TransitGraph::<1>::empty());
-    // Up on one side of the zone, down on the other, and over both.
+    // Up on one side of the zone, on over the strips above it, then down on the other side.
     let strips: Vec<u16> = lanes.iter().map(|lane| lane.strip).collect();
     assert_eq!(strips, [0, 1, 2, 3, 4, 5, 6, 7, 8, 5, 4, 3, 2]);
     for pair in lanes.windows(2).filter(|pair| pair[0].cell() == pair[1].cell()) {

@@ -9,6 +9,7 @@ use crate::Point;
 use crate::flight::{Path, PathError};
 use crate::map::field::follow::TerrainFollowing;
 
+/// The point over `place` whose z in the mission frame is `height_m`.
 pub(super) fn point_at_height(place: &Flat, height_m: f32) -> Point {
     Point::new(place.x, place.y, height_m)
 }
@@ -17,6 +18,7 @@ pub(super) fn point_at_height(place: &Flat, height_m: f32) -> Point {
 pub(super) struct FlightPathBuilder<'a, const N: usize, const W: usize> {
     pub(super) path: Path<W>,
     transit: &'a TransitGraph<'a, N>,
+    /// Clearance that every leg is taken to have, metres.
     clearance_m: f32,
     following: Option<TerrainFollowing<'a>>,
     /// Last point of the path so far.
@@ -24,7 +26,7 @@ pub(super) struct FlightPathBuilder<'a, const N: usize, const W: usize> {
 }
 
 impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
-    /// A path without waypoints; the caller adds the first one, above the pad.
+    /// A path without waypoints; the caller adds the first one, at `here`.
     pub(super) const fn new(
         transit: &'a TransitGraph<'a, N>,
         clearance_m: f32,
@@ -34,7 +36,7 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         Self { path: Path::new(), transit, clearance_m, following, here }
     }
 
-    /// Appends a straight leg to `place`. Returns the index of its waypoint.
+    /// Appends a straight leg to `place`. Returns the index of the waypoint at the leg's end.
     pub(super) fn add_straight_leg(&mut self, place: Point) -> Result<usize, PathError> {
         self.path.push(place, self.clearance_m)?;
         self.here = place;
@@ -44,7 +46,8 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     /// Writes the corners of the path from here to `to` around no-fly zones to `corners`.
     #[inline(never)]
     fn find_corners_around_zones(&self, to: &Flat, corners: &mut Vec<Flat, N>) {
-        // The routes have finite lengths, so there is a path between all their points.
+        // The routes have finite lengths, so there is a path between all their points, and no
+        // error.
         if self.transit.shortest_path(&self.here.xy(), to, corners).is_err() {
             corners.clear();
         }
@@ -64,8 +67,8 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.add_straight_leg(point_at_height(to, height_m)).map(|_| ())
     }
 
-    /// Appends the descent to the first lane, which begins below and leads to `end`. Returns the
-    /// index of the waypoint where the lane begins.
+    /// Appends the vertical descent to the first lane, which begins below the path's last point and
+    /// leads to `end`. Returns the index of the waypoint where the lane begins.
     pub(super) fn descend_to_lane(
         &mut self,
         end: &Flat,
@@ -79,7 +82,8 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.add_straight_leg(begin)
     }
 
-    /// Appends a leg at picture height, along terrain. Returns the index of its last waypoint.
+    /// Appends a leg at picture height to the point over `to`: along terrain, or at
+    /// `max_picture_height_m` over level ground. Returns the index of its last waypoint.
     pub(super) fn add_picture_leg(
         &mut self,
         to: &Flat,

@@ -2,7 +2,8 @@
 
 use crate::coverage::Flat;
 
-/// First and last waypoint of a route, and the length of the path between them, metres.
+/// The waypoints of a route with the lowest (`first`) and the highest number (`last`), east and
+/// north, and the length of the path between them, metres.
 pub(in crate::coverage) struct RouteEnds {
     pub(super) first: Flat,
     pub(super) last: Flat,

@@ -24,8 +24,9 @@ impl<const L: usize, const N: usize> CoverageProblem<'_, L, N> {
         )
     }
 
-    /// Seconds that a vehicle sinks from [`Heights::max_picture_height_m`] to the first waypoint of
-    /// a route, and rises from the last one: forward, and backward.
+    /// Time in which a vehicle sinks from [`Heights::max_picture_height_m`] to the first waypoint
+    /// of a route, plus that in which it rises from the last one, seconds: for the route flown
+    /// forward, and flown backward.
     pub(super) fn extra_vertical_times_s(&self, vehicle: &Vehicle, ends: &RouteEnds) -> (f32, f32) {
         let (first_m, last_m) =
             (self.extra_descent_m(&ends.first), self.extra_descent_m(&ends.last));

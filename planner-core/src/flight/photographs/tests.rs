@@ -97,8 +97,8 @@ fn pictures_have_the_numbers_of_their_waypoints_both_ways() {
         assert_eq!(numbers(8), [(7, 12), part]);
         assert_eq!(numbers(11), [(7, 12), whole, (40, 41)]);
         assert_eq!(numbers(99), numbers(11));
-        // Whatever pictures are asked for, they show what fewer of them do not, each waypoint
-        // once.
+        // The pictures `first..end` show the waypoints that the first `end` pictures show and the
+        // first `first` ones do not, each waypoint once.
         for (first, end) in (0..13).flat_map(|first| (0..13).map(move |end| (first, end))) {
             let all = |ranges: std::vec::Vec<(u32, u32)>| -> std::collections::BTreeSet<u32> {
                 ranges.into_iter().flat_map(|(first, end)| first..end).collect()

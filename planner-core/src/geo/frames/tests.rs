@@ -52,8 +52,8 @@ fn enu_matches_independent_figures() {
     }
 }
 
-/// GLOBAL_POSITION_INT (33) and, 8 to 16 ms from it, LOCAL_POSITION_NED (32): position and
-/// velocity.
+/// Latitude and longitude of a GLOBAL_POSITION_INT (33), 1e-7 degrees; seconds from a
+/// LOCAL_POSITION_NED (32) to it; position, metres, and velocity, m/s, of the LOCAL_POSITION_NED.
 type Sample = (f64, f64, f64, [f64; 3], [f64; 3]);
 
 fn check_recording(projection: Projection, origin: &Geodetic, samples: &[Sample]) {

@@ -1,5 +1,5 @@
-//! A path with few corners at a height above the field and at most a tolerance higher, no steeper
-//! than the vehicle can climb and descend.
+//! A path with few corners that keeps a least height above the field and is at most a tolerance
+//! higher, no steeper than the vehicle can climb and descend.
 //!
 //! Method: at each sample the path's height must be in the tunnel, from `min_height_m` to
 //! `min_height_m + tolerance_m` above the field. The slopes from the last corner that keep the path
@@ -15,7 +15,7 @@ use super::FieldView;
 use crate::geo::Flat;
 use crate::{Length, Point};
 
-/// Most height samples of one leg; on a longer leg the samples are further apart.
+/// Most height samples of one leg; where a leg would need more, its samples are further apart.
 const MAX_LEG_SAMPLES: f32 = 65_536.0;
 
 /// The height band above a field in which a path has to stay, and its steepest slope.

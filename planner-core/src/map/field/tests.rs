@@ -55,7 +55,7 @@ proptest! {
         let at = cut.index(nodes.len());
         let (column, row) = (at % usize::from(columns), at / usize::from(columns));
         let place = shape.south_west + Flat::new(column as f32, row as f32) * cell_m;
-        // Places are rounded: of 1e5 m to 8 mm.
+        // Coordinates are rounded: at 1e5 m to 8 mm.
         let beside = 6554.0 * 0.05 / cell_m + 0.01;
         prop_assert!(
             (view.height_at(&place) - f32::from(nodes[at]) * HEIGHT_STEP_M).abs() < beside * 2.0
@@ -114,8 +114,8 @@ fn over_level_ground_and_along_a_slope_a_path_is_straight() {
     let level = field(&shape, &[70; 40]);
     let rising: Vec<i16> = (0..40).map(|i| (i % 20) * 10).collect();
     let rising = field(&shape, &rising);
-    // A ridge of 10 m takes a corner before it, one on each side of its top or on it, and one
-    // behind it.
+    // A ridge of 10 m, which rises and falls along the whole path, takes one corner at its top
+    // besides the path's end.
     let ridge: Vec<i16> =
         (0..40).map(|i| 100 - 10 * i16::abs(i % 20 - 10)).map(|h| h.max(0)).collect();
     let ridge = field(&shape, &ridge);

@@ -25,7 +25,9 @@ const BRICK_HALF_DIAGONAL: f32 = 4.0 * CELL_HALF_DIAGONAL;
 
 /// A segment from `a` to `a + d`, in cells.
 struct Segment {
+    /// Beginning, in cells from the grid's minimum corner.
     a: Point,
+    /// Vector from beginning to end, in cells.
     d: Point,
     /// 1 / |d|², or 0 where |d|² is no normal f32: then the segment is taken for the point `a`.
     inv_length_sq: f32,
@@ -262,7 +264,8 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     let mut reach = 1.0_f32;
     loop {
         let tried = reach.min(limit);
-        // If the cell's centre is farther than this, no part of the cell is nearer than `reach`.
+        // A squared distance: if the cell's centre is farther, no part of the cell is nearer than
+        // `reach`.
         let around =
             |reach: f32| (reach + CELL_HALF_DIAGONAL) * (reach + CELL_HALF_DIAGONAL) * (1.0 + 1e-5);
         let (mut nearest, mut bound) = (tried * tried, around(tried));

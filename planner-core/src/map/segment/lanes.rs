@@ -7,6 +7,7 @@ pub(crate) fn brick_layer_mask(axis: usize, layers: u32) -> u64 {
     LAYER_MASKS[axis][(layers & 15) as usize]
 }
 
+/// The masks of [`brick_layer_mask`] for each axis and each set of layers.
 const fn all_brick_layer_masks() -> [[u64; 16]; 3] {
     let mut out = [[0; 16]; 3];
     let mut layers = 0;

@@ -178,8 +178,8 @@ fn lattice_segments_agree_with_brute_force_exactly() {
         let grid = VoxelGrid::new(shape, outside, &words).unwrap();
         for _ in 0..1000 {
             let (a, b) = lattice_segment(&mut rng, &shape);
-            // Corners on the lattice cannot be nearer than 1e-4 cells to a line through lattice
-            // points this near.
+            // Corners of cells and ends of segments are lattice points: a corner that is not on the
+            // line is at least 1e-4 cells from it.
             let touches = brute_clearance(&grid, &a, &b, 0.0) < 1e-7;
             assert_eq!(
                 segment_is_clear(&grid, &a, &b, 0.0),
@@ -200,9 +200,9 @@ fn lattice_segments_agree_with_brute_force_exactly() {
     );
 }
 
-/// 40 000 segments with any f32 ends: right wherever the true distance is not within 2e-5 cells of
-/// touching, which is [`max_snap_error_cells`] of a grid this small, along each of two or three
-/// axes, and the segment's shift at most.
+/// 40 000 segments with any f32 ends: right wherever the true distance is not within 6e-5 cells of
+/// touching. That is the most by which snapping may shift the segment: [`max_snap_error_cells`] of
+/// a grid this small along each of three axes.
 #[test]
 fn any_segments_agree_with_brute_force() {
     let band = f64::from(max_snap_error_cells(16.0)) * 3.0_f64.sqrt();

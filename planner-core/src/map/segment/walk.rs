@@ -43,7 +43,9 @@ pub(crate) fn snapped_rest_touches(
 
 /// A walk along the segment's longest axis `U`; `V` and `W` are the other two axes.
 struct Walk<'g, const U: usize, const V: usize, const W: usize> {
+    /// Words of the grid, one per brick.
     words: &'g [u64],
+    /// Lower and upper end of the segment along `U`: the caller's ends, swapped if necessary.
     a: Snapped,
     b: Snapped,
     /// First and last coordinate of the walk along `U`, lattice units.
@@ -63,11 +65,15 @@ struct Walk<'g, const U: usize, const V: usize, const W: usize> {
 /// if `first > last`.
 #[derive(Clone, Copy)]
 struct Span {
+    /// First cell of the range.
     first: i32,
+    /// Last cell of the range.
     last: i32,
 }
 
 impl Span {
+    /// The cells between two coordinates, lattice units, widened by `slack` on each side; the axis
+    /// has `dim` cells.
     #[inline(always)]
     fn new(from: i32, to: i32, slack: i32, dim: i32) -> Self {
         let (low, high) = if from < to { (from, to) } else { (to, from) };
@@ -133,6 +139,7 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
         self.a[axis] + ((run * self.slopes[axis]) >> 30) as i32
     }
 
+    /// Whether the walk meets an occupied cell that the segment touches.
     #[inline(always)]
     fn touches_obstacle(&self) -> bool {
         // Cells are closed: an end on a cell's lower face touches the neighbour below that face
@@ -211,7 +218,8 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
 }
 
 /// Whether the segment from `a` to `b` meets a closed cell: the six separating axes, in integers.
-/// Coordinates stay below 1.5 · 2³⁰, so the two products and their difference stay below 2⁶³.
+/// Differences of coordinates stay below 1.5 · 2³⁰, so the two products and their difference stay
+/// below 2⁶³.
 #[inline(always)]
 fn cell_is_touched(a: &Snapped, b: &Snapped, cell: [i32; 3]) -> bool {
     /// Half the edge of a cell, in units of a snapped coordinate.

@@ -4,8 +4,8 @@
 /// one free cell in a thousand a node is still found with a probability of 1 − e⁻¹⁰.
 pub const MAX_TRIES_PER_NODE: usize = 10_000;
 
-/// Random pairs of points that the bridge test draws for one node before a uniform node takes its
-/// place: in a map without narrow passages no pair passes the test.
+/// Points that are drawn for the bridge test of one node before a uniform node takes its place: in
+/// a map without narrow passages no point passes the test.
 pub const MAX_TRIES_PER_BRIDGE: usize = 1_000;
 
 /// Distribution of the random nodes.
@@ -45,7 +45,8 @@ pub struct PrmConfig {
 pub enum PrmError {
     /// The named setting is NaN, infinite, negative, too large, or makes an empty range.
     Config(&'static str),
-    /// The terminal with this index is not finite, is outside the map, or is inside an obstacle.
+    /// The terminal with this index is not finite, is inside an obstacle, or is outside a map whose
+    /// [`Outside`](crate::map::voxel::Outside) is blocked.
     TerminalBlocked(usize),
     /// More nodes than the caller's memory or 16-bit indices hold.
     TooManyNodes,
@@ -102,7 +103,9 @@ pub fn squared_length(a: [f32; 3], b: [f32; 3]) -> f32 {
 /// joined.
 #[derive(Clone, Copy)]
 pub(super) struct LengthRange {
+    /// Least squared length of an edge, m².
     min_sq: f32,
+    /// Greatest squared length of an edge, m².
     max_sq: f32,
 }
 
@@ -112,6 +115,7 @@ impl LengthRange {
         Self { min_sq: min.max(f32::MIN_POSITIVE), max_sq: config.edge_max_m * config.edge_max_m }
     }
 
+    /// Whether an edge may have this squared length, m².
     #[inline(always)]
     pub(super) fn contains(self, square: f32) -> bool {
         square >= self.min_sq && square <= self.max_sq

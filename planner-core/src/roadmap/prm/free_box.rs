@@ -40,12 +40,16 @@ struct FreeBox {
 pub(super) struct NodeVisibility<'g, 'a> {
     grid: &'g VoxelGrid<'a>,
     clearance_m: f32,
+    /// The required clearance, in cells.
     clearance_cells: f32,
     cells_per_m: f32,
     /// Most cells by which a free box is grown from its node's cell in each direction.
     max_growth_cells: i32,
+    /// The free boxes that were grown last.
     boxes: [FreeBox; MAX_BOXES],
+    /// Index of the newest box in `boxes`; the next one replaces the box after it.
     newest_box: usize,
+    /// Position of the node, metres in the mission frame.
     here: [f32; 3],
     /// `here` in cells, relative to the grid's minimum corner.
     here_cells: [f32; 3],
@@ -56,6 +60,7 @@ pub(super) struct NodeVisibility<'g, 'a> {
     view: Option<BoxView>,
 }
 
+/// The free box around `here`, relative to `here`.
 #[derive(Clone, Copy)]
 struct BoxView {
     /// Bounds, in cells relative to `here`: a segment that ends strictly between them is clear.
@@ -255,6 +260,7 @@ enum RayClass {
 }
 
 impl FreeBox {
+    /// Whether a cell is in the box.
     fn contains(&self, cell: [i32; 3]) -> bool {
         (0..3).all(|axis| cell[axis] >= self.low[axis] && cell[axis] < self.high[axis])
     }

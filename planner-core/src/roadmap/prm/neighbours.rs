@@ -1,10 +1,10 @@
 //! Spatial index of the nodes: they are sorted into cubes, so that pairs within the length range
 //! are found without measuring all pairs.
 //!
-//! A counting sort over a grid of cubes around the nodes. A cube's edge is half the longest roadmap
-//! edge (longer where that would be too many cubes). Cubes are numbered x fastest, so the nodes of
-//! cubes that are neighbours in x are neighbours in the sorted order, and a node's candidates are a
-//! few contiguous runs.
+//! A counting sort over a grid of cubes around the nodes. A cube's edge is half of `edge_max_m`
+//! (longer where that would be too many cubes). Cubes are numbered x fastest, so the nodes of cubes
+//! that are neighbours in x are neighbours in the sorted order, and a node's candidates are a few
+//! contiguous runs.
 
 use super::config::{LengthRange, PrmConfig, PrmError, squared_length};
 use crate::Point;
@@ -12,8 +12,8 @@ use crate::Point;
 /// Candidate nodes whose distances are computed at once.
 const CANDIDATE_LANES: usize = 16;
 
-/// The index of up to `NODES` nodes in fewer than `CUBES` cubes: 14 bytes per node, 2 per cube. The
-/// default board has 4096 of each.
+/// Spatial index of up to `NODES` nodes, sorted into fewer than `CUBES` cubes: 14 bytes per node, 2
+/// per cube. The default board has 4096 of each.
 pub struct NodeIndex<const NODES: usize, const CUBES: usize> {
     /// Coordinates of the nodes in sorted order.
     x: [f32; NODES],
@@ -23,9 +23,13 @@ pub struct NodeIndex<const NODES: usize, const CUBES: usize> {
     sorted_nodes: [u16; NODES],
     /// Place of the first node of each cube; the entry after the last cube is the number of nodes.
     cube_starts: [u16; CUBES],
+    /// Number of nodes in the index.
     len: usize,
+    /// Minimum corner of the first cube, metres in the mission frame.
     min: [f32; 3],
+    /// Edge of a cube, metres.
     cube_m: f32,
+    /// Number of cubes along each axis.
     dims: [usize; 3],
 }
 
@@ -85,8 +89,9 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
         let [nx, ny, nz] = self.dims;
         let count = nx * ny * nz;
         self.cube_starts.fill(0);
-        // `first` counts the nodes of each cube, then holds the end of each cube's run. Placing a
-        // node lowers that end by one, so that finally `first` holds the run's beginning.
+        // `cube_starts` first counts the nodes of each cube, then holds the end of each cube's run
+        // in the sorted order. Placing a node lowers that end by one, so that finally `cube_starts`
+        // holds the run's beginning.
         for node in nodes {
             self.cube_starts[self.cube_of(node)] += 1;
         }
@@ -124,10 +129,12 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
         }
     }
 
+    /// Index along `axis` of the cube that holds coordinate `x`, or of the nearest cube.
     fn cube_along(&self, axis: usize, x: f32) -> usize {
         (((x - self.min[axis]) / self.cube_m) as usize).min(self.dims[axis] - 1)
     }
 
+    /// Index of the cube that holds a point.
     fn cube_of(&self, p: &Point) -> usize {
         let [i, j, k] = [0, 1, 2].map(|axis| self.cube_along(axis, p[axis]));
         (k * self.dims[1] + j) * self.dims[0] + i
@@ -155,8 +162,8 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
     ) -> Result<(), E> {
         let lengths = LengthRange::new(config);
         let here = self.point(place);
-        // The search radius is a millionth and four ulps of the largest coordinate more than the
-        // longest edge, so that the rounding of `x ± reach` loses no cube.
+        // The search radius is the longest edge plus a millionth of it and plus the largest
+        // coordinate times four f32 epsilons, so that the rounding of `x ± reach` loses no cube.
         let largest = here[0].abs().max(here[1].abs()).max(here[2].abs());
         let reach = config.edge_max_m * (1.0 + 1e-6) + largest * 4.0 * f32::EPSILON;
         let [_, j0, k0] = [0, 1, 2].map(|axis| self.cube_along(axis, here[axis]));

@@ -163,15 +163,15 @@ fn nodes_are_free_and_repeat_with_the_seed() {
         sample_nodes(&grid, None, &terminals, &PrmConfig { seed: 6, ..config }, &mut again)
             .unwrap();
         assert_ne!(nodes, again);
-        // Even: each eighth of the map holds its share within what 300 draws allow.
+        // Even: about half of the 300 nodes lie in the western half of the map.
         let middle = (shape.min + shape.max()) / 2.0;
         let low = nodes[2..].iter().filter(|p| p.x < middle.x).count();
         assert!((100..200).contains(&low), "{low} of 300 in one half");
     }
 }
 
-/// A wall across the map with a door that leaves 0.2 m to fly in. The edges of the rooms draw
-/// bridges as well.
+/// A wall across the map with a door that leaves 0.2 m to fly in. Nodes of the bridge test also lie
+/// along the edges of the rooms.
 #[test]
 fn bridges_lie_in_doors() {
     let (mut in_doors, mut by_chance) = (0, 0);

@@ -9,7 +9,9 @@ pub(crate) const SETTLED: u16 = u16::MAX;
 /// Children of each heap entry.
 const HEAP_ARITY: usize = 4;
 
+/// The heap, and the state of each node: not reached, in the heap, or settled.
 pub(crate) struct Heap<const N: usize> {
+    /// Number of nodes in the heap.
     len: usize,
     /// Cost in the upper bits (a non-negative f32, whose bits order like its value), node in the
     /// lower sixteen: one comparison orders by cost, then by node.
@@ -18,10 +20,12 @@ pub(crate) struct Heap<const N: usize> {
     places: [u16; N],
 }
 
+/// The heap entry of a node with this cost.
 fn entry_of(node: u16, cost: f32) -> u64 {
     u64::from(cost.to_bits()) << 16 | u64::from(node)
 }
 
+/// The node of a heap entry.
 fn node_of(entry: u64) -> usize {
     (entry & 0xffff) as usize
 }
@@ -53,13 +57,14 @@ impl<const N: usize> Heap<N> {
         self.places[..nodes].fill(NOT_REACHED);
     }
 
+    /// [`NOT_REACHED`], [`SETTLED`], or the node's index in `entries` plus one.
     #[inline]
     pub(crate) fn node_mark(&self, node: u16) -> u16 {
         self.places[usize::from(node)]
     }
 
-    /// Inserts a node, or lowers its cost if it is in the heap. `cost` must be finite and not
-    /// negative.
+    /// Inserts a node that is not settled, or lowers its cost if it is in the heap. `cost` must be
+    /// finite and not negative.
     #[inline]
     pub(crate) fn push(&mut self, node: u16, cost: f32) {
         let mut at = match self.places[usize::from(node)] {
@@ -103,6 +108,7 @@ impl<const N: usize> Heap<N> {
         }
     }
 
+    /// Places `entry` at index `at` or below, so that no parent is greater than its child.
     fn sift_down(&mut self, mut at: usize, entry: u64) {
         loop {
             let first = at * HEAP_ARITY + 1;
@@ -120,6 +126,7 @@ impl<const N: usize> Heap<N> {
         self.set_entry(at, entry);
     }
 
+    /// Writes `entry` at index `at`, and this index into the node's place.
     #[inline]
     fn set_entry(&mut self, at: usize, entry: u64) {
         self.entries[at] = entry;

@@ -144,7 +144,7 @@ proptest! {
     }
 }
 
-/// A square 0 1 2 3 with nodes 4 (apart) and a diagonal 0–2.
+/// A rectangle of nodes 0 to 3 with the diagonal 0–2, and node 4 without edges.
 fn square() -> StdVec<u8> {
     let corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0), (9.0, 9.0)];
     let nodes: StdVec<_> = corners.iter().map(|&(x, y)| Point::new(x, y, 0.0)).collect();

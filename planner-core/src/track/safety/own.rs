@@ -33,6 +33,7 @@ pub struct SetLeg<'a> {
     from: &'a Point,
     to: &'a Point,
     middle: Point,
+    /// Upper bound of half the leg's length, at most 7 % above it, metres.
     half_length_bound_m: f32,
 }
 
@@ -67,12 +68,14 @@ impl<'a> SetLeg<'a> {
 #[derive(Clone, Debug)]
 pub struct OwnSet<'a> {
     set: &'a ReachableSet,
+    /// The legs of the set's polyline.
     legs: &'a [SetLeg<'a>],
     /// Centre of the bounding box, and half of its size.
     box_middle: Point,
     box_half: Point,
     /// Distance of centres at which the two hulls touch, metres: a vehicle already this near to
-    /// where another one may come has no distance left to keep, and only has to leave.
+    /// where another one may come has no distance left to keep, and only has to leave. 0 until the
+    /// caller sets it.
     pub touching_m: f32,
 }
 
@@ -155,7 +158,8 @@ impl<'a> OwnSet<'a> {
         found.is_some_and(|nearest| self.comes_nearer(nearest, other, place, most_m))
     }
 
-    /// Whether a motion that comes too near also comes nearer than the vehicle is now.
+    /// Whether a motion that comes too near also comes nearer than the vehicle is now. True for an
+    /// own set that is widened.
     #[inline(never)]
     fn comes_nearer(
         &self,

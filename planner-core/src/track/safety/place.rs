@@ -39,7 +39,8 @@ pub enum PlaceOnPoints {
     Beside,
     /// The vehicle is on its points.
     On {
-        /// Index of the point that ends the first leg on which the vehicle may be.
+        /// Index of the point that ends the first leg on which the vehicle may be; 0 if the first
+        /// place where it may be is the first point.
         leg_end: u8,
         /// Distance along the points from the first place where the vehicle may be to the last one,
         /// decimetres, rounded up: above 0 where the points turn back and lead past the vehicle

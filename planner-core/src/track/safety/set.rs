@@ -13,6 +13,7 @@ pub(super) const MAX_SET_POINTS: usize = 9;
 /// that may stand below its first point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ReachableSet {
+    /// Corners of the polyline, at least one; the first is the vehicle's position.
     pub(super) points: Vec<Point, MAX_SET_POINTS>,
     /// Lower end of the column; `None` if there is no column.
     pub(super) column_bottom: Option<Point>,
@@ -100,8 +101,10 @@ impl ReachableSet {
 
 /// Iterator of [`ReachableSet::segments`]: the legs from point to point, then the column.
 pub(super) struct Segments<'a> {
+    /// Beginning of the next leg.
     from: &'a Point,
     next: core::slice::Iter<'a, Point>,
+    /// Upper and lower end of the column, until it was returned.
     column: Option<(&'a Point, &'a Point)>,
 }
 

@@ -191,7 +191,8 @@ struct Flier {
     path: StdVec<Point>,
     along_m: f32,
     speed_mps: f32,
-    /// What the other vehicle heard last: place, velocity, time, and index of the next path point.
+    /// What the other vehicle heard last: place, velocity, time, and index of the path point that
+    /// begins the current leg.
     reported: (Point, Point, f32, usize),
 }
 

@@ -4,7 +4,7 @@
 //! In these rows "ours" is the difference of the positions from arming to disarming (RMS, metres),
 //! for the setpoints as they were sent and under the recorded errors of the estimate; "theirs" is
 //! what is allowed. Flights in which a person or a failsafe took the vehicle are printed and not
-//! rated: each such error adds up in what follows.
+//! rated: a difference at such a moment adds up in what follows.
 
 use flockmate_tests::fidelity::{
     Comparison, Correction, Difference, EstimateErrors, RECORDED_RUNS, Recording, allowed_rms_m,

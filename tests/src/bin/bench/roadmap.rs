@@ -54,7 +54,9 @@ struct BaselineResult {
     nodes: usize,
     rays: usize,
     edges: usize,
+    /// Number of vehicles with a path from start to goal.
     solved: usize,
+    /// Sum of the lengths of these paths, metres.
     labelled_m: f64,
     nodes_ms: f64,
     edges_ms: f64,
@@ -255,8 +257,10 @@ enum Threads {
     One,
 }
 
+/// Our program: its input, its workspaces, and what it computed last.
 struct OurBench<'a> {
     grid: &'a VoxelGrid<'a>,
+    /// Starts, then goals.
     terminals: &'a [Point],
     workspace: Box<BoardNodeIndex>,
     search: Box<SearchWorkspace<4096>>,

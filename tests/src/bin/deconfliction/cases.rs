@@ -30,6 +30,7 @@ pub struct Meeting {
     /// each seed, somewhere on its path.
     struck_vehicle: Option<u8>,
     map: PathBuf,
+    /// Start and goal of each vehicle, ENU metres.
     vehicles: Vec<(Point, Point)>,
     resolution_m: f32,
     nodes: usize,

@@ -30,9 +30,10 @@ const MAX_REST_STRETCH_M: f32 = 4.6;
 const MIN_FLY_ON_S: f32 = 0.3;
 const MAX_STOP_MPS2: f32 = 3.0;
 const MIN_FALL_S: f32 = 0.6;
-/// Time between two of its positions, seconds: so old may be what the others heard last.
+/// Time between two positions that a vehicle reports, seconds: so old may be the last one that the
+/// others heard.
 const REPORTED_EVERY_S: f32 = 0.2;
-/// Time over which its speed is measured, seconds.
+/// Time over which the speed of a vehicle that falls silent is measured, seconds.
 const SPEED_OVER_S: f32 = 0.5;
 /// Distance kept from a vehicle that lies or stands beyond the safety distance, metres: a vehicle
 /// that flies by may deviate so far from its path.
@@ -48,7 +49,7 @@ const REST_PLACE_SPACING_M: f32 = 0.5;
 /// What kept a vehicle from its goal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Cause {
-    /// The struck vehicle lies at the goal of the other.
+    /// The struck vehicle lies at the goal of the vehicle that landed short.
     AtGoal,
     /// The struck vehicle lies on the only route to the goal.
     OnlyRoute,
@@ -114,7 +115,7 @@ pub fn cause_of_short_landing(
     let path = &plan.flights[held].path;
     let Some(over) = path.waypoints().last().map(|w| w.position) else { return Cause::WayLeft };
     let ground = over - Point::new(0.0, 0.0, plan.flights[held].descent_m);
-    // One that never took off would have begun at the top of its climb.
+    // A vehicle that never took off would have begun its path at the top of its climb.
     let from = if was_airborne(&flight.tracks[held]) { from } else { path.waypoints()[0].position };
     let others: Vec<KeepOutBall> = (0..flight.tracks.len())
         .filter(|i| *i != held && *i != struck.index)
@@ -245,10 +246,12 @@ struct PathSearch<'a> {
 }
 
 impl PathSearch<'_> {
+    /// Whether the descent from `over` to `ground` enters a ball.
     fn is_goal_blocked(&self, balls: &[KeepOutBall]) -> bool {
         !keeps_out_of_balls(&self.over, &self.ground, balls)
     }
 
+    /// Whether there is a path outside all balls.
     fn finds_path(&self, balls: &[KeepOutBall]) -> bool {
         if self.is_goal_blocked(balls) {
             return false;
@@ -312,6 +315,7 @@ impl PathSearch<'_> {
     }
 }
 
+/// Whether the segment from `a` to `b` stays outside all balls.
 fn keeps_out_of_balls(a: &Point, b: &Point, balls: &[KeepOutBall]) -> bool {
     let leg = b - a;
     balls.iter().all(|(place, radius_m)| {

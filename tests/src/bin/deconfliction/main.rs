@@ -100,6 +100,7 @@ struct Row {
     /// Errors of the flights: seed, seconds, vehicle and text.
     #[serde(skip)]
     incidents: Vec<String>,
+    /// Number of vehicles' flights over which `extra_flight` is summed.
     #[serde(skip)]
     flights: u32,
 }
@@ -334,7 +335,8 @@ fn note_causes(
     flight: &swarm::SwarmFlight,
     struck: Struck,
 ) {
-    // One that waited on its pad until all others had landed may have flown its mission then.
+    // A silent vehicle that waited on its pad until all others had landed may have flown its
+    // mission then.
     let lies = struck.silent && !flight.result.vehicles[struck.index].reached;
     if let Some([beside_m, along_m]) = held::rest_offsets_m(plan, flight, struck).filter(|_| lies) {
         row.lies_m = [row.lies_m[0].max(beside_m), row.lies_m[1].max(along_m)];

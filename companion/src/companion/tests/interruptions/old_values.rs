@@ -119,7 +119,7 @@ fn a_vehicle_flown_after_its_landing_is_not_reported_as_landed() {
     }
 }
 
-/// An autopilot that does not know the charge of its battery says so in each SYS_STATUS: the
+/// An autopilot that does not know the charge of its battery reports −1 in each SYS_STATUS: the
 /// vehicle does not take off.
 #[test]
 fn an_unknown_charge_is_not_a_known_one() {

@@ -30,16 +30,16 @@ struct Watch {
     unheard_acts: u32,
     /// Number of ticks since the position was last heard.
     unknown: u32,
-    /// Number of ticks for which it has been heard.
+    /// Number of ticks for which the position has been heard.
     known: u32,
     /// Number of ticks since the landing detector last reported ground falsely.
     honest: u32,
-    /// Number of ticks for which a gust, or its pilot, lifts the vehicle at 0.6 m/s.
+    /// Number of ticks for which a gust, or the pilot, still lifts the vehicle, at 0.6 m/s.
     lifted_for: u32,
     /// Whether an arming request has taken effect since the last start or resume.
     armed_once: bool,
     /// Whether the start that a pause on the pad ended was resumed before the disarming: the next
-    /// arming request after that is the resume's.
+    /// arming request after the disarming is the resume's.
     resumed: bool,
     log: Vec<String>,
 }
@@ -152,7 +152,8 @@ impl Watch {
             "an accepted landing is forgotten in {state:?}: {:#?}",
             self.log
         );
-        // Close to the ground a pause waits until the vehicle is higher, as the step knew it.
+        // Close to the ground, by the position known to the step, a pause waits until the vehicle
+        // is higher.
         assert!(
             !b.companion.mission.pending().pause
                 || (low && state == State::Climb)

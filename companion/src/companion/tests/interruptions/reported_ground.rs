@@ -99,7 +99,7 @@ fn high_bench(kind: AutopilotKind, up_m: f32, error_m: f32) -> Bench {
     b
 }
 
-/// A flight whose landing detector reports ground, at any height, from a time on.
+/// A flight whose landing detector reports ground, at any height, from `ground_from` on.
 struct Fall {
     b: Bench,
     ground_from: Instant,

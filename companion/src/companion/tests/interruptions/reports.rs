@@ -27,7 +27,7 @@ fn check(b: &Bench, case: &str) {
 }
 
 /// A vehicle that stood reported that it stays; once a failsafe or the pilot flies it, it no longer
-/// does.
+/// reports that.
 #[test]
 fn a_vehicle_taken_where_it_stood_no_longer_reports_that_it_stays() {
     let mut held = 0;
@@ -48,7 +48,8 @@ fn a_vehicle_taken_where_it_stood_no_longer_reports_that_it_stays() {
     assert!(held >= 4, "{held} of these reported that they stay");
 }
 
-/// It does not report a detour either, on which it would look for others before it lands.
+/// A vehicle taken on a detour does not report the detour either: on a detour it would avoid others
+/// before it lands.
 #[test]
 fn a_vehicle_taken_on_a_detour_no_longer_reports_it() {
     for by in OTHERS_FLY {

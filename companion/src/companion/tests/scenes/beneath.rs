@@ -1,5 +1,5 @@
-//! Another vehicle comes down without guidance above one that holds its place: that one makes room,
-//! whatever it waits for, and continues its flight.
+//! Another vehicle comes down without guidance above one that holds its place: the one that holds
+//! makes room, whatever it waits for, and continues its flight.
 
 use std::collections::VecDeque;
 
@@ -310,7 +310,7 @@ fn whoever_made_room_over_an_area_comes_back_to_where_it_left_its_path() {
         faller.place = b.enu + Point::new(east_m, north_m, faller.real(10.0, 16.0));
         faller.until(&mut b, 1.0, |_| false);
         faller.falls_mps = faller.real(0.3, 1.5);
-        // Otherwise it evaded backwards along its path.
+        // Else it evaded backwards along its path, and is not counted.
         let aside = faller.until(&mut b, 20.0, |b| b.companion.detours.is_beside_plan());
         (b.answer_detour, b.answer_division) = (Some(Ok(())), true);
         if !aside || !faller.until(&mut b, 120.0, |b| b.companion.detours.ends_on_plan_path()) {
@@ -337,7 +337,7 @@ fn whoever_is_interrupted_while_it_seeks_a_way_aside_flies_its_part() {
             faller.place = b.enu + Point::new(east_m, north_m, faller.real(10.0, 16.0));
             faller.until(&mut b, 1.0, |_| false);
             (faller.falls_mps, faller.answers) = (1.0, false);
-            // Otherwise it evades backwards along its path.
+            // Else it evades backwards along its path, and is not counted.
             if !faller.until(&mut b, 20.0, |b| b.state() == Replanning) {
                 continue;
             }

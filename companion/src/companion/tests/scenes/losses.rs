@@ -33,7 +33,7 @@ fn over_a_field_of(mut config: Config<4>, plan: Plan, state: State) -> Bench {
     bench
 }
 
-/// Settings with three vehicles, of which one alone is no majority.
+/// Settings with three vehicles: one alone is no majority.
 fn three() -> Config<4> {
     let mut config = two_vehicles();
     let start = Point::new(8.0, 28.0, 1.5);

@@ -23,9 +23,9 @@ pub(super) fn in_flight(scenes: &mut Scenes) {
         back(b);
     };
     scenes.play(to(Climb), called_back, Land, 1.0);
-    // Paused before it has left the ground.
+    // Paused before the vehicle has left the ground.
     scenes.play(to(Climb), pause, Scheduled, 6.0);
-    // Paused and unheard: others assume after a while that it is down.
+    // Paused and unheard: others assume after a while that the vehicle is down, so it lands.
     let unheard = |b: &mut Bench| {
         pause(b);
         b.neighbour = None;

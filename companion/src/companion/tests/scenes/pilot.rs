@@ -11,6 +11,7 @@ fn piloted() -> Bench {
     bench
 }
 
+/// The pilot gives the vehicle back: it is in Offboard again.
 fn gives_back(b: &mut Bench) {
     b.mode = px4::OFFBOARD;
 }
@@ -23,6 +24,7 @@ fn returned() -> Bench {
     bench
 }
 
+/// The pilot gives the vehicle back, and the ground station resumes the mission.
 fn resumed(b: &mut Bench) {
     gives_back(b);
     b.run(2.0);

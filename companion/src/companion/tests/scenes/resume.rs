@@ -13,6 +13,7 @@ fn knows(b: &mut Bench, first: u32, round: u8) {
     reports(b, &PhotographedReport { round, ..report(first) });
 }
 
+/// A report of vehicle 77 that the ten waypoints from `first` on are photographed.
 fn report(first: u32) -> PhotographedReport {
     let ranges = [WaypointRange { first, end: first + 10 }].into_iter().collect();
     PhotographedReport {
@@ -23,6 +24,7 @@ fn report(first: u32) -> PhotographedReport {
     }
 }
 
+/// Vehicle 77 sends this report.
 fn reports(b: &mut Bench, report: &PhotographedReport) {
     let mut payload = [0; done::MAX_LEN];
     let len = report.encode(&mut payload);

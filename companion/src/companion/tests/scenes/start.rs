@@ -5,6 +5,7 @@ use planner_core::flight::{Gate, Task};
 use super::State::*;
 use super::*;
 
+/// A vehicle whose planner answers the request for a plan by `answer`; `None`: not at all.
 fn answered(answer: Option<Result<Plan, PlanFailure>>) -> Bench {
     let mut bench = Bench::new(config());
     bench.answer_plan = answer;

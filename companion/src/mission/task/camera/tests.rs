@@ -44,7 +44,9 @@ fn photographs(trigger: Trigger) -> PicturePlan {
 /// An autopilot with a camera, on a path.
 #[derive(Default)]
 struct Fake {
+    /// Distance between two pictures of the trigger by distance, metres; 0: it is off.
     step_m: f32,
+    /// Place along the path of the last picture, or where the trigger was last set, metres.
     last_m: f32,
     pictures_m: Vec<f32>,
 }
@@ -151,8 +153,8 @@ fn fly(photographs: &PicturePlan, loss: f64, stops: f64, seed: u64) -> (Vec<f32>
 }
 
 /// Checks that each stretch is photographed from end to end; the error is the first gap that is too
-/// wide.
-fn widest(photographs: &PicturePlan, pictures_m: &[f32], late_m: f32) -> Result<(), (f32, f32)> {
+/// wide: from where to where along the path, metres.
+fn first_gap(photographs: &PicturePlan, pictures_m: &[f32], late_m: f32) -> Result<(), (f32, f32)> {
     for shots in photographs.stretches(&path()) {
         let mut before_m = shots.from_m - shots.ground_spacing_m;
         let inside =
@@ -176,7 +178,7 @@ proptest! {
     ) {
         let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
         let (pictures_m, on) = fly(&photographs, 0.0, if stops { 0.01 } else { 0.0 }, seed);
-        prop_assert_eq!(widest(&photographs, &pictures_m, LATE_M), Ok(()), "{:?}", pictures_m);
+        prop_assert_eq!(first_gap(&photographs, &pictures_m, LATE_M), Ok(()), "{:?}", pictures_m);
         prop_assert!(!on);
         if !stops {
             // With the trigger by distance the last picture of a stretch may be taken twice.
@@ -193,7 +195,7 @@ proptest! {
     fn lost_commands_and_answers_are_repeated(seed in any::<u64>(), distance in any::<bool>()) {
         let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
         let (pictures_m, on) = fly(&photographs, 0.1, 0.0, seed);
-        prop_assert_eq!(widest(&photographs, &pictures_m, LOST_M), Ok(()), "{:?}", pictures_m);
+        prop_assert_eq!(first_gap(&photographs, &pictures_m, LOST_M), Ok(()), "{:?}", pictures_m);
         prop_assert!(!on);
     }
 }
@@ -243,8 +245,8 @@ proptest! {
 }
 
 proptest! {
-    /// A vehicle that leaves its path for good between two pictures of a stretch takes exactly one
-    /// there and switches the trigger off: its pictures end where it left the path.
+    /// A vehicle that leaves its path for good between two pictures of a stretch takes one more
+    /// picture there and switches the trigger off: its pictures end where it left the path.
     #[test]
     fn where_a_vehicle_leaves_its_path_a_last_picture_is_taken(
         distance in any::<bool>(),

@@ -40,7 +40,7 @@ pub(super) struct World {
     /// Share of frames lost, and share repeated, in 256ths.
     pub(super) loss: u32,
     pub(super) repeats: u32,
-    /// Requests under way, and answers that arrived.
+    /// Requests under way to the server, and replies that arrived at the client.
     pub(super) under_way: Vec<Vec<u8>>,
     pub(super) heard: Vec<Packet>,
     pub(super) texts: Vec<&'static str>,
@@ -69,11 +69,13 @@ impl World {
         }
     }
 
+    /// Restarts the server with the same flash.
     pub(super) fn restart(&mut self) {
         self.store = started(&mut self.flash);
         self.ftp = Ftp::default();
     }
 
+    /// True with a probability of `share` 256ths.
     pub(super) fn chance(&mut self, share: u32) -> bool {
         self.rng.next_u32() % 256 < share
     }
@@ -164,6 +166,7 @@ impl World {
         self.ask_again(&request)
     }
 
+    /// Sends this request until it is answered.
     pub(super) fn ask_again(&mut self, request: &[u8]) -> Packet {
         let sequence = u16::from_le_bytes([request[3], request[4]]).wrapping_add(1);
         for _ in 0..200 {

@@ -38,7 +38,7 @@ proptest! {
 }
 
 #[test]
-fn what_does_not_fit_is_told() {
+fn what_does_not_fit_is_refused() {
     let mut window = UploadReassembly::default();
     assert_eq!(window.insert(4000, &[0; 100], 9000), PieceOutcome::RetryLater);
     assert_eq!(window.insert(8990, &[0; 11], 9000), PieceOutcome::TooLarge);

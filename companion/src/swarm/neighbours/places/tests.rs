@@ -15,7 +15,7 @@ use crate::margins::max_unheard_travel_m;
 use crate::time::Duration;
 
 /// Wherever a vehicle in a coverage mission is on the points that it reported before it fell
-/// silent: nobody lands below, and no place below is taken for free.
+/// silent: no vehicle lands below, and no place below counts as free.
 #[test]
 fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
     let mut rng = Pcg32::seed_from_u64(14);
@@ -83,7 +83,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
 }
 
 /// Wherever a vehicle whose motors stop falls, from any height and in any wind up to 3 m/s, however
-/// long before that it was last heard: nobody lands beside it, and no place beside it is taken for
+/// long before that it was last heard: no vehicle lands beside it, and no place beside it counts as
 /// free.
 #[test]
 fn where_a_vehicle_may_have_fallen_nobody_lands() {
@@ -264,7 +264,7 @@ fn start_of_unheard_legs(table: &Neighbours<4>) -> Point {
     start.unwrap()
 }
 
-/// Only what flies level along its points, or holds its place, and is little aside of them is
+/// Only a vehicle that flies level along its points, or holds its place, and is near its points is
 /// expected on them.
 #[test]
 fn the_unheard_stretch_begins_on_the_points_only_in_level_flight_near_them() {
@@ -284,8 +284,8 @@ fn the_unheard_stretch_begins_on_the_points_only_in_level_flight_near_them() {
     }
 }
 
-/// Where its points lead back beside themselves, it may be on either leg: the stretch begins where
-/// it was heard, and reaches as far as from the furthest of these places.
+/// Where a vehicle's points lead back beside themselves, it may be on either leg: the stretch
+/// begins where the vehicle was heard, and reaches as far as from its furthest possible place.
 #[test]
 fn an_unheard_vehicle_at_a_hairpin_is_kept_off_on_both_legs() {
     let points =
@@ -402,7 +402,7 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
         let lies = flags & GROUNDED != 0 || (flags & OUT_OF_PLAN == 0 && silent_s >= 75.0);
         let comes_down = flags & (GROUNDED | OUT_OF_PLAN) == 0 && (45.0..75.0).contains(&silent_s);
         table.for_each_keep_out_zone(now, [apart_m, apart_m, lying_m], |off| {
-            // The place of a silent vehicle is not known any better than that.
+            // The place of a silent vehicle is known to `STALE_POSITION_ERROR_M` only.
             let most_m = lying_m + STALE_POSITION_ERROR_M;
             let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };
             assert!(fits && off.radius_m >= lying_m, "{flags:#x}, {silent_s} s: {off:?}");
@@ -426,7 +426,7 @@ fn a_vehicle_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
             let reported = Intent { ground_m: 0.0, ..intent(flags, 1, 2) };
             table.handle_intent(Instant::ZERO, 1, &reported, 1, Some(2));
-            // Whatever shape was reported, no place is free that may truly be too near.
+            // Whatever was reported, no place counts as free that may truly be too near.
             let away = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0)
                 .normalize();
             let truly_m = apart_m + if in_air { stray_m } else { 0.0 };

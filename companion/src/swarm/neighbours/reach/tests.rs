@@ -20,7 +20,7 @@ const PLAN: u32 = 9;
 const STEP_MS: u64 = 200;
 const STEP_S: f32 = 0.2;
 const CRUISE_MPS: f32 = 2.0;
-/// Spacing of gates, metres.
+/// Distance between a vehicle's gates, metres.
 const GATES_M: f32 = 1.4;
 /// A gate opens once the vehicle ahead has passed it by this distance, metres.
 const AHEAD_M: f32 = 3.0;
@@ -30,6 +30,7 @@ struct Row {
     tables: List<Neighbours<8>>,
     cruise_mps: List<f32>,
     flown_m: List<f32>,
+    /// Present speed of each, which changes at random.
     pace_mps: List<f32>,
     gates: List<List<Gate>>,
     length_m: f32,
@@ -101,7 +102,7 @@ impl Row {
         }
     }
 
-    /// All fly on.
+    /// All fly on for a step, up to their next closed gate.
     fn fly(&mut self) {
         self.now = self.now + Duration::from_millis(STEP_MS);
         for rank in 0..self.tables.len() {

@@ -15,7 +15,7 @@ use planner_core::Point;
 
 const MISSION: u32 = 7;
 const PLAN: u32 = 9;
-/// A step of the swarm below.
+/// Time of one step of [`Swarm`].
 const STEP_MS: u64 = 200;
 
 fn padded(relay: &Relay) -> [u8; 255] {
@@ -63,7 +63,7 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
     }
 }
 
-/// A swarm in a row, each vehicle of which hears only the next; the progress of each grows with
+/// A swarm in a row: each vehicle hears only those next to it; the progress of each grows with
 /// time.
 struct Swarm {
     tables: List<Neighbours<8>>,
@@ -249,8 +249,8 @@ fn a_vehicle_that_fails_is_lost_in_time_though_messages_are_late() {
         let delay_ms = 50 + u64::from(rng.next_u32() % 950);
         let failed_at = swarm.now;
         let mut late = List::new();
-        // Vehicle 1 hears neither of them, which is why they relay what they know of each other and
-        // of it; it was heard up to now by both.
+        // Vehicle 1 hears neither vehicle 2 nor 3, so these two relay what they know of each other
+        // and of vehicle 1. Both heard vehicle 1 up to now.
         for of in [1, 2] {
             let delays = &mut swarm.tables[of];
             let heard = Intent {

@@ -42,7 +42,7 @@ fn read_pair<T: Copy>(
     Ok([item(a)?, item(b)?])
 }
 
-/// Height of the pictures, metres: given, or computed from the ground sampling distance.
+/// Height of the pictures, metres: given, or computed from the ground sampling distance, else 35.
 fn read_height(table: &Table<'_>, camera: Option<&Camera>) -> Result<f32> {
     let height = table.get("height_m");
     let gsd = table.get("gsd_m");

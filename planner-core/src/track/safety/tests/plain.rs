@@ -10,7 +10,7 @@ use crate::geo::distance::segments_distance_sq;
 use crate::track::safety::*;
 
 const BRAKING: Braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
-/// The same value as in the definition.
+/// An approach by less than this, metres, does not count: the value of `APPROACH_ROUNDING_M`.
 const NEARER_M: f32 = 0.003;
 
 impl ReachableSet {

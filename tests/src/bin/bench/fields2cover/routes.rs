@@ -145,8 +145,8 @@ impl Obstacles {
             let (mut enters, mut leaves) = (0.0_f64, 1.0_f64);
             let turn = ring_orientation(ring);
             for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
-                // The inside is to the left of the edges of a ring that turns left. In metres; a
-                // leg along an edge is outside.
+                // The inside is to the left of the edges of a ring that turns left. `side` is in
+                // metres. A leg along an edge is outside.
                 let edge = [b[0] - a[0], b[1] - a[1]];
                 let length_m = turn * edge[0].hypot(edge[1]);
                 let side = (edge[0] * (from[1] - a[1]) - edge[1] * (from[0] - a[0])) / length_m
