@@ -13,7 +13,7 @@ use super::*;
 use crate::testing::fake_flash::*;
 
 /// Uploads a file in pieces of `piece` bytes.
-fn upload(
+pub(super) fn upload(
     store: &mut Store,
     flash: &mut Flash,
     file: File,

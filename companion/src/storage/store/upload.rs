@@ -61,7 +61,9 @@ impl Store {
     pub fn finish_upload(&mut self) {
         let Some((file, UploadState::Receiving)) = self.upload else { return };
         let state = match (file, self.reassembly.last_part()) {
-            (_, Some([])) => UploadState::Ended(Err(UploadError::Damaged)),
+            (_, Some(_)) if self.reassembly.file_len() == 0 => {
+                UploadState::Ended(Err(UploadError::Damaged))
+            }
             (_, None) => UploadState::Ended(Err(UploadError::Incomplete)),
             (File::Mission, Some(rest))
                 if MissionView::parse(rest).is_ok_and(|view| view.byte_len() == rest.len()) =>
@@ -128,3 +130,6 @@ impl Store {
         declared == Some(len as usize)
     }
 }
+
+#[cfg(test)]
+mod tests;
