@@ -50,6 +50,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         RoadmapAction::Build { scenario, out, board } => {
             let scenario = load_supported(scenario, None)?;
+            ensure!(
+                scenario.area.is_none(),
+                "no roadmap: {}: a coverage mission flies without one\n\
+                 hint: `plan` writes what its boards need",
+                scenario.path
+            );
             let mut results = ResultFiles::single_file(out)?;
             let mission = PreparedMission::prepare_for(scenario, *board, &Progress::on_terminal())?;
             results.add_file(out, &mission.roadmap_or_field_file)?;

@@ -4,6 +4,7 @@
 //! suggest the nearest key; here both are known where the value is read.
 
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
 
 use planner_core::roadmap::MAX_COORDINATE_M;
@@ -180,7 +181,7 @@ pub(super) struct Table<'a> {
     name: String,
     table: &'a DeTable<'a>,
     /// Keys that were read or declared so far, given in the file or not.
-    requested_keys: RefCell<Vec<&'static str>>,
+    requested_keys: RefCell<BTreeSet<&'static str>>,
 }
 
 impl<'a> Table<'a> {
@@ -200,7 +201,7 @@ impl<'a> Table<'a> {
 
     /// The value of `key`, if it is given; from now on the key is known.
     pub(super) fn get(&self, key: &'static str) -> Option<TomlValue<'a>> {
-        self.requested_keys.borrow_mut().push(key);
+        self.declare_keys(&[key]);
         self.table.get(key).map(|value| TomlValue::new(self.text, self.path(key), value))
     }
 

@@ -52,6 +52,9 @@ pub fn add(cases: &mut Cases) {
             cases.push(format!("{number} {name}, cut"), &given[..given.len() - 1]);
         }
     }
+    let out = cases.out();
+    cases.push("a roadmap of an area", &["roadmap", "build", &area, "--out", &format!("{out}/r")]);
+    cases.push("cover without an area", &["cover", &scenario, "--out", &out]);
     for (name, args) in [
         ("no command", &[][..]),
         ("an unknown command", &["flyy"]),
