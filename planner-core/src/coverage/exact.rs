@@ -9,6 +9,10 @@
 //! pointers find for all first waypoints at once. T is found by bisection to
 //! [`RELATIVE_TIME_RESOLUTION`].
 //!
+//! Over terrain a longer route can cost less, where it begins or ends on a hill instead of in a
+//! valley. The plan's costs are right there too, and no higher than BINPAT's; but a lower one may
+//! exist.
+//!
 //! Cost, for K vehicles and n waypoints: a few dozen rounds, each of C(K, m)² · (K − m)² steps
 //! summed over m from 0 to K, and K² · n for the pointers.
 
@@ -72,17 +76,19 @@ pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
     let mut table = DivisionTable { problem, ws, vehicle_count: count, waypoint_count: waypoints };
     table.fill_transit_lengths();
     let (mut low, mut high) = (0.0, out.max_cost_s() * (1.0 + RELATIVE_TIME_RESOLUTION));
-    if table.find_division_within(high) {
-        table.write_plan(out);
-    }
+    let mut found = out.clone();
+    let mut middle = high;
     while high - low > high * RELATIVE_TIME_RESOLUTION {
-        let middle = low + (high - low) / 2.0;
         if table.find_division_within(middle) {
-            table.write_plan(out);
-            high = libm::fminf(middle, out.max_cost_s());
+            table.write_plan(&mut found);
+            high = libm::fminf(middle, found.max_cost_s());
+            if found.max_cost_s() <= out.max_cost_s() {
+                out.clone_from(&found);
+            }
         } else {
             low = middle;
         }
+        middle = low + (high - low) / 2.0;
     }
     Ok(())
 }
@@ -134,6 +140,7 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
     /// Computes all states for T = `time_s`. Returns whether some state has all waypoints.
     fn find_division_within(&mut self, time_s: f32) -> bool {
         let (count, waypoints) = (self.vehicle_count, self.waypoint_count);
+        let over_terrain = self.problem.following.is_some();
         for v in 0..count {
             let vehicle = self.problem.vehicles[v];
             for layer in 0..count {
@@ -142,6 +149,10 @@ impl<const L: usize, const N: usize> DivisionTable<'_, '_, '_, L, N> {
                 let mut end = 0;
                 for from in 0..waypoints {
                     end = end.max(from);
+                    while over_terrain && end > from && !self.is_within_length(v, from, end, most_m)
+                    {
+                        end -= 1;
+                    }
                     while end < waypoints && self.is_within_length(v, from, end + 1, most_m) {
                         end += 1;
                     }
