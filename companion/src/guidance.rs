@@ -125,12 +125,12 @@ pub struct Guidance {
     pub smoother: SetpointSmoother,
     phase: Phase,
     /// The reference on the path: its arc length and speed.
-    tracker: ReferenceState,
+    reference: ReferenceState,
     /// The straight leg of a climb, a join or a descent; `None` until the next step makes it, from
     /// where the setpoint stands.
     leg: Option<Path<2>>,
     /// The reference on `leg`.
-    leg_tracker: ReferenceState,
+    leg_reference: ReferenceState,
     /// The waypoint that the vehicle flies to by Algorithm 2 of the paper.
     waypoints: Algorithm2Waypoints,
     /// Whether the raw point was set back to where the setpoint stands.
@@ -149,7 +149,7 @@ pub struct Guidance {
     departs_later_by: Duration,
     /// Number of gates of the plan, from the first on, that have opened; they stay open.
     open_gate_count: usize,
-    /// Whether the path was begun ([`Self::start_following`]): only then `tracker` counts.
+    /// Whether the path was begun ([`Self::start_following`]): only then `reference` counts.
     has_begun_path: bool,
     /// Whether its path begins above its pad, so that it may join it from where it took off.
     path_begins_above_pad: bool,
@@ -230,9 +230,9 @@ impl Guidance {
             estimate_speed_share: 1.0,
             smoother,
             phase: Phase::Hold,
-            tracker: ReferenceState::default(),
+            reference: ReferenceState::default(),
             leg: None,
-            leg_tracker: ReferenceState::default(),
+            leg_reference: ReferenceState::default(),
             waypoints: Algorithm2Waypoints::default(),
             raw_point_at_setpoint: true,
             position_was_lost: false,
@@ -291,7 +291,7 @@ impl Guidance {
 
     /// Forgets the flight before: phase, leg, path progress, advice and filter. The setpoint stays.
     pub fn reset(&mut self) {
-        (self.tracker, self.setpoint_along_m) = (ReferenceState::default(), 0.0);
+        (self.reference, self.setpoint_along_m) = (ReferenceState::default(), 0.0);
         self.phase = Phase::Hold;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
@@ -305,7 +305,7 @@ impl Guidance {
 
     /// Arc length of the reference along the path, metres; −∞ before the path is begun.
     pub fn reference_along_m(&self) -> f32 {
-        if self.has_begun_path { self.tracker.along_m } else { f32::NEG_INFINITY }
+        if self.has_begun_path { self.reference.along_m } else { f32::NEG_INFINITY }
     }
 
     /// One step of `dt_s` seconds: advice, safety filter, raw points, setpoint. Returns false where
@@ -320,7 +320,7 @@ impl Guidance {
     ) -> bool {
         let position = scene.telemetry.position;
         self.since_sent_s += dt_s;
-        let advised_at_m = self.tracker.along_m;
+        let advised_at_m = self.reference.along_m;
         self.update_advice(state, scene, neighbours, now);
         if let Some(plan) = scene.plan {
             let next = plan.gates.get(self.open_gate_count);
@@ -328,12 +328,13 @@ impl Guidance {
                 self.open_gate_count += 1;
             }
             self.update_setpoint_along_m(&plan.path, dt_s);
-            let along_m = if self.has_begun_path { self.tracker.along_m } else { -plan.climb_m };
+            let along_m = if self.has_begun_path { self.reference.along_m } else { -plan.climb_m };
             self.stops_at_m = match state.follows_path_or_is_blocked() {
                 // Never less than the braking distance, even if a nearer stop is advised: the
                 // filter checks up to where the vehicle really stops.
                 true => {
-                    let least_m = track::braking_distance_m(&self.track, &plan.path, &self.tracker);
+                    let least_m =
+                        track::braking_distance_m(&self.track, &plan.path, &self.reference);
                     self.brakes_to_m = along_m + least_m;
                     along_m + self.advice.stop_within_m.max(least_m)
                 }
@@ -435,7 +436,7 @@ impl Guidance {
         self.stopped_at_fence &= !moves;
         for _ in 0..self.smoother.begin_step(ClockPace { speed_share: share, urgency }, dt_s) {
             if self.phase == Phase::Path && !self.is_algorithm2() {
-                advice.stop_within_m = (stops_at_m - self.tracker.along_m).max(0.0);
+                advice.stop_within_m = (stops_at_m - self.reference.along_m).max(0.0);
             }
             let raw = match scene.plan {
                 Some(plan) if moves => {
@@ -468,8 +469,8 @@ impl Guidance {
         let change = self.smoother.acceleration() + correction - self.sent_acceleration;
         let most = self.smoother.max_jerk_mps3(urgency) * dt_s;
         self.sent_acceleration += change * (most / change.length().max(most).max(1e-6));
-        if self.tracker.along_m > self.last_progress_m + MIN_PROGRESS_M {
-            self.last_progress_m = self.tracker.along_m;
+        if self.reference.along_m > self.last_progress_m + MIN_PROGRESS_M {
+            self.last_progress_m = self.reference.along_m;
             self.last_progress_at = now;
         }
         if scene.plan.is_some() && (self.has_begun_path || self.phase == Phase::Climb) && known {

@@ -3,11 +3,11 @@
 
 pub(crate) mod answer_limits;
 pub mod commands;
-pub mod done;
 pub mod echo;
 pub mod frame;
 pub mod intent;
 pub mod outbox;
+pub mod photographed;
 pub mod rate_limit;
 pub mod roster;
 pub mod sequence;

@@ -35,7 +35,7 @@ pub fn has_row_for(state: State, guard: Guard) -> bool {
 /// where the state is kept.
 pub fn first_applicable_row(state: State, inputs: &GuardInputs) -> Option<&'static TransitionRow> {
     let here = state_mask(&[state]);
-    TABLE.iter().find(|row| row.from_mask & here != 0 && row.guard.is_met(inputs, row.min_duration))
+    TABLE.iter().find(|row| row.from_mask & here != 0 && row.guard.is_met(inputs, row.limit))
 }
 
 #[cfg(test)]

@@ -203,7 +203,7 @@ impl From<PlanError> for PlanFailure {
     /// The failure that a companion handles, for an error of the planner.
     fn from(error: PlanError) -> Self {
         match error {
-            PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => {
+            PlanError::CountMismatch | PlanError::BadGoal(_) | PlanError::SameId(_) => {
                 Self::RoadmapUnusable
             }
             PlanError::Config(_)

@@ -21,9 +21,9 @@ pub(crate) enum Timer {
     /// Roster report of a coverage mission, to the swarm.
     Roster,
     /// Notes the waypoints photographed so far, stores them in flash and sends their number.
-    Done,
+    NotePhotographed,
     /// Report of the photographed waypoints, to the swarm.
-    DoneReport,
+    PhotographedReport,
     /// Next try of the request that the state repeats until it takes effect: mode, take-off,
     /// landing, disarming.
     Request,

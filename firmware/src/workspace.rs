@@ -121,7 +121,7 @@ impl Default for WorkspaceOverlay {
 pub struct RoadmapBuilder {
     nodes: [Point; ROADMAP_NODES],
     node_count: usize,
-    index: prm::NodeIndex<ROADMAP_NODES, ROADMAP_CUBES>,
+    node_grid: prm::NodeGrid<ROADMAP_NODES, ROADMAP_CUBES>,
     edges: [Edge; HALF_EDGES / 2],
     edge_count: usize,
 }
@@ -139,7 +139,7 @@ impl RoadmapBuilder {
         config: &PrmConfig,
     ) -> Result<(), PrmError> {
         self.sample_nodes(grid, terminals, config)?;
-        self.build_index(config)?;
+        self.sort_nodes(config)?;
         self.connect_nodes(grid, config)
     }
 
@@ -162,8 +162,8 @@ impl RoadmapBuilder {
     ///
     /// # Errors
     /// As [`Self::build`].
-    pub fn build_index(&mut self, config: &PrmConfig) -> Result<(), PrmError> {
-        self.index.build_index(&self.nodes[..self.node_count], config)
+    pub fn sort_nodes(&mut self, config: &PrmConfig) -> Result<(), PrmError> {
+        self.node_grid.sort_nodes(&self.nodes[..self.node_count], config)
     }
 
     /// Step 3 of 3: connects near nodes by edges that are clear.
@@ -175,9 +175,9 @@ impl RoadmapBuilder {
         grid: &VoxelGrid<'_>,
         config: &PrmConfig,
     ) -> Result<(), PrmError> {
-        let Self { node_count, index, edges, edge_count, .. } = self;
+        let Self { node_count, node_grid, edges, edge_count, .. } = self;
         *edge_count = 0;
-        prm::connect_range(grid, index, config, 0..*node_count, |edge| {
+        prm::connect_range(grid, node_grid, config, 0..*node_count, |edge| {
             let to = edges.get_mut(*edge_count).ok_or(PrmError::RoadmapFull)?;
             *to = Edge { a: edge.a, b: edge.b, clearance_m: config.clearance_m };
             *edge_count += 1;

@@ -15,7 +15,7 @@ use anyhow::{anyhow, bail};
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
 use planner_core::map::voxel::{GridShape, VoxelGrid};
-use planner_core::roadmap::prm::{self, NodeIndex, PrmConfig, PrmError};
+use planner_core::roadmap::prm::{self, NodeGrid, PrmConfig, PrmError};
 use planner_core::roadmap::search::SearchWorkspace;
 use planner_core::roadmap::{self, Edge, LANDMARK_COUNT, RoadmapError, RoadmapHeader};
 use rayon::prelude::*;
@@ -82,7 +82,7 @@ pub fn build(
         rayon::join(|| timed(|| BoxTree::new(&grid)), || timed(sampled));
     let (nodes, heights_m) = sampled?;
     let joining = Instant::now();
-    let mut workspace = Box::new(NodeIndex::<ROADMAP_NODES, ROADMAP_CUBES>::new());
+    let mut workspace = Box::new(NodeGrid::<ROADMAP_NODES, ROADMAP_CUBES>::new());
     let edges = connect_with_clearances(&grid, &tree, &nodes, config, &mut workspace)
         .map_err(|e| describe_prm_error(&e))?;
     let parts = BuildTimes {
@@ -116,7 +116,7 @@ pub fn add_passages(
         .heights_above_ground_m
         .extend(added.iter().map(|node| height_above_ground_m(map, node)));
     roadmap.nodes.extend(&added);
-    let mut workspace = Box::new(NodeIndex::<ROADMAP_NODES, ROADMAP_CUBES>::new());
+    let mut workspace = Box::new(NodeGrid::<ROADMAP_NODES, ROADMAP_CUBES>::new());
     roadmap.edges = connect_with_clearances(&grid, &tree, &roadmap.nodes, config, &mut workspace)
         .map_err(|e| describe_prm_error(&e))?;
     Ok(added.len())
@@ -157,9 +157,9 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
     config: &PrmConfig,
-    workspace: &mut NodeIndex<NODES, CUBES>,
+    workspace: &mut NodeGrid<NODES, CUBES>,
 ) -> Result<Vec<prm::PrmEdge>, PrmError> {
-    workspace.build_index(nodes, config)?;
+    workspace.sort_nodes(nodes, config)?;
     map_nodes_in_parallel(nodes.len(), |range, edges| {
         prm::connect_range(grid, workspace, config, range, |edge| {
             edges.push(edge);
@@ -177,9 +177,9 @@ pub fn connect_with_clearances<const NODES: usize, const CUBES: usize>(
     tree: &BoxTree,
     nodes: &[Point],
     config: &PrmConfig,
-    workspace: &mut NodeIndex<NODES, CUBES>,
+    workspace: &mut NodeGrid<NODES, CUBES>,
 ) -> Result<Vec<Edge>, PrmError> {
-    workspace.build_index(nodes, config)?;
+    workspace.sort_nodes(nodes, config)?;
     // The clearance of an edge is at most that of either end, and mostly equal to the smaller one.
     let around: Vec<f32> = nodes
         .par_iter()

@@ -59,7 +59,7 @@ pub enum ZoneKind {
     /// A vehicle at `from` that descends to `to`: a detour may cross the zone well below that
     /// vehicle, but may neither climb towards the vehicle nor land aside in the zone. Also a column
     /// above a vehicle, in which a detour must not land aside.
-    Descending,
+    LandingColumn,
     /// A vehicle on the ground below `from`: where the roadmap has the ground's height, only a
     /// column from the ground to the vehicle that lies on it is kept clear.
     Grounded,
@@ -104,12 +104,12 @@ impl KeepOutZone {
     }
 
     /// The part of the zone that may not be flown through: all of it, unless the zone is
-    /// [`ZoneKind::Descending`]. A descending vehicle and one that climbs as fast may meet half
+    /// [`ZoneKind::LandingColumn`]. A descending vehicle and one that climbs as fast may meet half
     /// way, so only the lower third of the space between `here` and the zone around the vehicle
     /// above may be crossed. If that vehicle is higher than `here` by no more than the radius, the
     /// part is empty.
     pub(crate) fn impassable_part(&self, here: &Point) -> Self {
-        if self.kind != ZoneKind::Descending {
+        if self.kind != ZoneKind::LandingColumn {
             return *self;
         }
         let room_m = self.from.z - here.z - self.radius_m;
@@ -239,10 +239,10 @@ pub enum DetourGoal {
     RoadmapGoal(u16),
     /// In a coverage mission, without a roadmap: the vehicle's own pad, or the place where the
     /// vehicle rejoins its path.
-    Home {
+    Point {
         /// Point at which the detour ends, above the pad or on the path, ENU metres in the mission
         /// frame.
-        above_pad: Point,
+        end: Point,
         /// Height of the layer in which the vehicle crosses the field, metres up in the mission
         /// frame.
         layer_z_m: f32,
@@ -286,9 +286,9 @@ impl DetourRequest {
         check_finite("here", &self.here)?;
         check_finite("leg", &self.leg[0])?;
         check_finite("leg", &self.leg[1])?;
-        if let DetourGoal::Home { above_pad: over, layer_z_m: layer_m } = &self.goal {
-            check_finite("over", over)?;
-            check_finite("layer_m", &Point::repeat(*layer_m))?;
+        if let DetourGoal::Point { end, layer_z_m } = &self.goal {
+            check_finite("end", end)?;
+            check_finite("layer_z_m", &Point::repeat(*layer_z_m))?;
         }
         if let Some((low, high)) = &self.fence {
             check_finite("fence", low)?;
@@ -329,7 +329,7 @@ const MAX_SIDESTEP_M: f32 = 20.0;
 
 /// Writes the shortest path to the goal, or to a node aside, that keeps out of all `obstacles` to
 /// `out`. Changes `obstacles`: zones end at the ground, and a zone that contains the vehicle is
-/// shrunk unless it is [`ZoneKind::Descending`]. `nodes` is scratch memory.
+/// shrunk unless it is [`ZoneKind::LandingColumn`]. `nodes` is scratch memory.
 pub fn plan_detour<const N: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
@@ -414,9 +414,9 @@ fn nearest_place_aside<const N: usize>(
 }
 
 /// Shrinks each zone that contains the vehicle, so that the vehicle is just outside; zones of
-/// descending vehicles are not changed.
+/// landing columns are not changed.
 pub(crate) fn shrink_zones(obstacles: &mut [KeepOutZone], here: &Point) {
-    for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.kind != ZoneKind::Descending) {
+    for obstacle in obstacles.iter_mut().filter(|zone| zone.kind != ZoneKind::LandingColumn) {
         let shrunk = obstacle.shrunk_to(here, PATH_APPROACH_ROUNDING_M);
         let is_inside = shrunk.radius_m < obstacle.radius_m;
         *obstacle = shrunk;
@@ -441,7 +441,7 @@ pub fn plan_detour_for_vehicle<const N: usize, const W: usize, const G: usize>(
     plan_detour(view, request, obstacles, ws, nodes, &mut out.path)?;
     out.task = match request.goal {
         DetourGoal::RoadmapGoal(goal) => Task::Goto(goal),
-        DetourGoal::Home { .. } => Task::Stay,
+        DetourGoal::Point { .. } => Task::Stay,
     };
     (out.climb_m, out.descent_m, out.depart_s) = (0.0, request.descent_m, 0.0);
     out.gates.clear();

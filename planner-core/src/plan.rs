@@ -62,7 +62,7 @@ pub fn compute_costs<const N: usize, const V: usize, const P: usize>(
     request.check()?;
     let header = view.header();
     if usize::from(header.start_count) != starts || usize::from(header.goal_count) != goals {
-        return Err(PlanError::Terminals);
+        return Err(PlanError::CountMismatch);
     }
     if starts > V || goals > V {
         return Err(PlanError::SwarmFull);
@@ -143,7 +143,7 @@ pub fn schedule_flights<const N: usize, const V: usize, const W: usize, const P:
     if assigned.len() != request.vehicles.len()
         || counts != [assigned.len(), request.goal_descents_m.len()]
     {
-        return Err(PlanError::Terminals);
+        return Err(PlanError::CountMismatch);
     }
     request.check()?;
     out.flights.clear();

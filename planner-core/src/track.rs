@@ -240,15 +240,15 @@ impl PathAhead<'_> {
 pub fn advance<const W: usize>(
     cfg: &TrackConfig,
     path: &Path<W>,
-    tracker: &mut ReferenceState,
+    reference: &mut ReferenceState,
     advice: &Advice,
     dt_s: f32,
 ) -> Option<Reference> {
     let points = path.waypoints();
-    path.point_at(tracker.along_m)?;
+    path.point_at(reference.along_m)?;
     let dt_s = if dt_s > 0.0 { fminf(dt_s, 1.0) } else { 0.0 };
     let length_m = path.length_m();
-    let next = points.partition_point(|w| w.along_m <= tracker.along_m);
+    let next = points.partition_point(|w| w.along_m <= reference.along_m);
     let leg = next.clamp(1, max_usize(points.len(), 2) - 1);
     let along_leg = |i: usize| match (points.get(i.wrapping_sub(1)), points.get(i)) {
         (Some(from), Some(to)) => unit_direction(from, to),
@@ -263,34 +263,34 @@ pub fn advance<const W: usize>(
     let ahead = PathAhead {
         waypoints: points,
         next_waypoint: next,
-        along_m: tracker.along_m,
+        along_m: reference.along_m,
         stop_within_m: stop_m,
         direction: before,
         accel,
     };
     let max_stoppable_speed_sq = ahead.max_stoppable_speed_sq(cfg);
-    let speed_before = tracker.speed_mps;
+    let speed_before = reference.speed_mps;
     // No faster than the leg's acceleration can brake from, if braking begins with the next step.
     let most = fminf(top_mps, max_stoppable_speed(accel, max_stoppable_speed_sq, dt_s));
     let change = accel * dt_s;
-    tracker.speed_mps = fmaxf(fminf(most, speed_before + change), speed_before - change);
-    let crawls = most < ABOUT_TO_STOP_MPS && tracker.speed_mps >= 0.0;
-    tracker.along_m = fminf(fmaxf(tracker.along_m + tracker.speed_mps * dt_s, 0.0), length_m);
+    reference.speed_mps = fmaxf(fminf(most, speed_before + change), speed_before - change);
+    let crawls = most < ABOUT_TO_STOP_MPS && reference.speed_mps >= 0.0;
+    reference.along_m = fminf(fmaxf(reference.along_m + reference.speed_mps * dt_s, 0.0), length_m);
     // The last centimetres of braking take many steps; within one centimetre the end counts as
     // reached.
     if crawls
-        && length_m - tracker.along_m < PATH_END_TOLERANCE_M
-        && stop_m >= length_m - tracker.along_m
+        && length_m - reference.along_m < PATH_END_TOLERANCE_M
+        && stop_m >= length_m - reference.along_m
     {
-        tracker.along_m = length_m;
-        tracker.speed_mps = 0.0;
+        reference.along_m = length_m;
+        reference.speed_mps = 0.0;
     }
     let clearance_m = points.get(leg).map_or(f32::INFINITY, |w| w.leg_clearance_m);
     Some(Reference {
-        position: path.point_at(tracker.along_m)?,
-        along_m: tracker.along_m,
-        lead_limit_m: lead_limit_m(cfg, clearance_m, tracker.speed_mps),
-        finished: tracker.along_m >= length_m,
+        position: path.point_at(reference.along_m)?,
+        along_m: reference.along_m,
+        lead_limit_m: lead_limit_m(cfg, clearance_m, reference.speed_mps),
+        finished: reference.along_m >= length_m,
     })
 }
 
@@ -302,15 +302,15 @@ const BRAKING_LEGS: usize = 6;
 pub fn braking_distance_m<const W: usize>(
     cfg: &TrackConfig,
     path: &Path<W>,
-    tracker: &ReferenceState,
+    reference: &ReferenceState,
 ) -> f32 {
     let points = path.waypoints();
-    let next = points.partition_point(|w| w.along_m <= tracker.along_m);
+    let next = points.partition_point(|w| w.along_m <= reference.along_m);
     let leg = next.clamp(1, max_usize(points.len(), 2) - 1);
-    let speed_mps = fmaxf(tracker.speed_mps, 0.0);
+    let speed_mps = fmaxf(reference.speed_mps, 0.0);
     let least_accel = fminf(cfg.accel_mps2, cfg.accel_z_mps2);
     let (mut speed_sq, mut from_m, mut accel) =
-        (speed_mps * speed_mps, tracker.along_m, least_accel);
+        (speed_mps * speed_mps, reference.along_m, least_accel);
     for (i, ends) in points.windows(2).skip(leg - 1).enumerate() {
         let [from, to] = ends else { break };
         if i == BRAKING_LEGS {
@@ -324,7 +324,7 @@ pub fn braking_distance_m<const W: usize>(
         }
         (speed_sq, from_m) = (slowed_sq, to.along_m);
     }
-    from_m - tracker.along_m + speed_sq / (2.0 * accel)
+    from_m - reference.along_m + speed_sq / (2.0 * accel)
 }
 
 /// Greatest distance of the vehicle behind the reference on a leg of this clearance, at this speed

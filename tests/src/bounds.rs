@@ -36,7 +36,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("prm::edge_clearance, to 2 m", "one `segment_clearance`"),
     ("prm::sample_nodes, 2300", "10 000 draws a node"),
     ("prm::sample_nodes, 2300, 0.8 m", "10 000 draws a node"),
-    ("prm::NodeIndex::build_index, 2300", "n + cubes"),
+    ("prm::NodeGrid::sort_nodes, 2300", "n + cubes"),
     ("prm::connect_range, 2300", "pairs within Dmax × one segment check"),
     ("prm::connect_range, 2300, 0.8 m", "the same"),
     ("prm::connect, 300", "`index` and `connect_range`"),

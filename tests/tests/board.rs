@@ -111,9 +111,10 @@ fn swarm_crc(mission: &PreparedMission) -> u32 {
 fn built(grid: &planner_core::map::voxel::VoxelGrid<'_>, config: &PrmConfig) -> String {
     let mut nodes = vec![planner_core::Point::zeros(); config.random_nodes];
     prm::sample_nodes(grid, None, &[], config, &mut nodes).expect("free space");
-    let mut index = Box::new(prm::NodeIndex::<4096, 8192>::new());
+    let mut node_grid = Box::new(prm::NodeGrid::<4096, 8192>::new());
     let mut edges = vec![prm::PrmEdge::default(); 1 << 15];
-    let count = prm::connect(grid, &nodes, config, &mut index, &mut edges).expect("it connects");
+    let count =
+        prm::connect(grid, &nodes, config, &mut node_grid, &mut edges).expect("it connects");
     let edge = |e: &prm::PrmEdge| planner_core::roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
     let edges: Vec<_> = edges[..count].iter().map(edge).collect();
     format!("{} {} {:08x}", nodes.len(), edges.len(), cases::roadmap_crc(&nodes, &edges))

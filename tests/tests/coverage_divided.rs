@@ -27,7 +27,8 @@ fn is_first_part(flight: &Flight<WAYPOINTS>) -> bool {
 fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
     let Task::Photograph(photographs) = &flight.task else { return Vec::new() };
     let places = photographs.stretches(&flight.path);
-    let places = places.flat_map(|shots| (0..shots.count).map(move |k| shots.picture_at_m(k)));
+    let places =
+        places.flat_map(|shots| (0..shots.count).map(move |k| shots.picture_arc_length_m(k)));
     places
         .filter(|at_m| *at_m <= along_m + 0.01)
         .filter_map(|at_m| flight.path.point_at(at_m))

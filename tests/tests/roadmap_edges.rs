@@ -4,7 +4,7 @@
 use flockmate_tests::shared_data;
 use host_sim::map::{self, BoxTree, UnknownSpace, VoxelMap};
 use host_sim::roadmap::{self, MAX_STORED_CLEARANCE_M};
-use planner_core::roadmap::prm::{self, NodeIndex, PrmConfig, Sampling};
+use planner_core::roadmap::prm::{self, NodeGrid, PrmConfig, Sampling};
 
 const SEEDS: u64 = 20;
 
@@ -14,7 +14,7 @@ fn load(file: &str, resolution_m: f32) -> VoxelMap {
 
 fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
     let mut fewest = usize::MAX;
-    let mut workspace = Box::new(NodeIndex::<4096, 4096>::new());
+    let mut workspace = Box::new(NodeGrid::<4096, 4096>::new());
     let grid = map.grid();
     let tree = BoxTree::new(&grid);
     for seed in 1..=SEEDS {

@@ -294,7 +294,7 @@ fn measure_detours_home(
             here,
             leg: [here; 2],
             leg_clearance_m: 10.0,
-            goal: DetourGoal::Home { above_pad: Point::new(-150.0, -80.0, 3.0), layer_z_m: 40.0 },
+            goal: DetourGoal::Point { end: Point::new(-150.0, -80.0, 3.0), layer_z_m: 40.0 },
             descent_m: 3.0,
             required_clearance_m: 1.2,
             fence: None,

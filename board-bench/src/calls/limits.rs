@@ -170,8 +170,8 @@ fn call_sampling(to: &mut Results<'_, impl CallListener>) {
         sampling: Sampling::Halton,
     };
     let mut nodes = [Point::zeros(); 8];
-    let mut index = to.call("neighbours::NodeIndex::new", prm::NodeIndex::<8, 16>::new);
-    assert!(to.call("neighbours::NodeIndex::is_empty", || index.is_empty()));
+    let mut node_grid = to.call("neighbours::NodeGrid::new", prm::NodeGrid::<8, 16>::new);
+    assert!(to.call("neighbours::NodeGrid::is_empty", || node_grid.is_empty()));
     for hard in EXTREME_NUMBERS {
         for config in [
             PrmConfig { edge_min_m: hard, ..good },
@@ -186,7 +186,7 @@ fn call_sampling(to: &mut Results<'_, impl CallListener>) {
             assert!(checked.is_ok() || sampled == Err(checked.unwrap_err()));
             let mut edges = [prm::PrmEdge { a: 0, b: 0 }; 4];
             let joined = to.call("prm::connect", || {
-                prm::connect(&grid, &nodes[..6], &config, &mut index, &mut edges)
+                prm::connect(&grid, &nodes[..6], &config, &mut node_grid, &mut edges)
             });
             let mut pairs = 0;
             let all = to.call("prm::connect_all_pairs", || {
@@ -205,23 +205,30 @@ fn call_sampling(to: &mut Results<'_, impl CallListener>) {
     );
     assert!(prm::sample_nodes(&grid, None, &[Point::zeros()], &good, &mut nodes[..3]).is_err());
     for p in extreme_points() {
-        let indexed = to.call("neighbours::NodeIndex::build_index", || {
-            index.build_index(&[p, Point::zeros()], &good)
+        let indexed = to.call("neighbours::NodeGrid::sort_nodes", || {
+            node_grid.sort_nodes(&[p, Point::zeros()], &good)
         });
         assert_eq!(indexed.is_ok(), p.iter().all(|c| c.abs() <= 1e6));
-        let len = to.call("neighbours::NodeIndex::len", || index.len());
+        let len = to.call("neighbours::NodeGrid::len", || node_grid.len());
         assert_eq!(len, if indexed.is_ok() { 2 } else { 0 });
         // Ranges of nodes that do not exist yield no edges.
         for range in [0..2, 1..usize::MAX, usize::MAX..usize::MAX] {
             let found = to.call("prm::connect_range", || {
-                prm::connect_range(&grid, &index, &good, range.clone(), |_| {
+                prm::connect_range(&grid, &node_grid, &good, range.clone(), |_| {
                     Err(PrmError::RoadmapFull)
                 })
             });
             to.add_count(usize::from(found.is_ok()));
             let full = |_: prm::PrmEdge, _: f32| Err(PrmError::RoadmapFull);
             let found = to.call("prm::connect_range_with_clearance_bound", || {
-                prm::connect_range_with_clearance_bound(&grid, &index, &good, range, |_| None, full)
+                prm::connect_range_with_clearance_bound(
+                    &grid,
+                    &node_grid,
+                    &good,
+                    range,
+                    |_| None,
+                    full,
+                )
             });
             to.add_count(usize::from(found.is_ok()));
         }
@@ -293,20 +300,19 @@ fn call_tracking(to: &mut Results<'_, impl CallListener>, path: &Path<4>, hard: 
     };
     let length_m = path.length_m();
     for dt_s in [0.05, hard] {
-        let mut tracker = ReferenceState { along_m: 0.5 * length_m, speed_mps: 1.0 };
+        let mut state = ReferenceState { along_m: 0.5 * length_m, speed_mps: 1.0 };
         let reference = to
             .call("track::advance", || {
-                track::advance(&track, path, &mut tracker, &advice(hard, other), dt_s)
+                track::advance(&track, path, &mut state, &advice(hard, other), dt_s)
             })
             .expect("a path with waypoints");
         assert!(reference.position.iter().all(|c| c.is_finite()), "{hard} {other} {reference:?}");
-        let brakes_m = to.call("track::braking_distance_m", || {
-            track::braking_distance_m(&track, path, &tracker)
-        });
+        let brakes_m = to
+            .call("track::braking_distance_m", || track::braking_distance_m(&track, path, &state));
         assert!(brakes_m >= 0.0, "{hard} {other} {brakes_m}");
-        assert!((0.0..=length_m).contains(&tracker.along_m), "{hard} {other} {tracker:?}");
+        assert!((0.0..=length_m).contains(&state.along_m), "{hard} {other} {state:?}");
         let waits = dt_s.is_nan() || dt_s <= 0.0;
-        assert!(!waits || tracker == ReferenceState { along_m: 0.5 * length_m, speed_mps: 1.0 });
+        assert!(!waits || state == ReferenceState { along_m: 0.5 * length_m, speed_mps: 1.0 });
     }
     let config = TrackConfig { accel_mps2: hard, response_s: other, ..track };
     let checked = to.call("track::TrackConfig::check", || config.check());
@@ -388,8 +394,9 @@ fn call_pictures(
         assert!(shown <= stretches, "{count}: {shown} of {stretches}");
     }
     for shots in plan.stretches(path) {
-        let place_m = to
-            .call("photographs::PictureStretch::picture_at_m", || shots.picture_at_m(shots.count));
+        let place_m = to.call("photographs::PictureStretch::picture_arc_length_m", || {
+            shots.picture_arc_length_m(shots.count)
+        });
         to.add(place_m);
     }
 }

@@ -165,11 +165,11 @@ fn call_flight_plans(
     );
     assert_eq!(
         plan(good, routes, &FlightInputs { pads: &PADS[1..], ..FLIGHT_INPUTS }),
-        Err(PlanError::Terminals)
+        Err(PlanError::CountMismatch)
     );
     let ranges = [WaypointRange { first: 4, end: 9 }, WaypointRange { first: 8, end: u32::MAX }];
     let planned = plan(good, routes, &FlightInputs { photographed: &ranges, ..FLIGHT_INPUTS });
-    assert_eq!(planned, Err(PlanError::Terminals));
+    assert_eq!(planned, Err(PlanError::CountMismatch));
     for done in [&ranges[..1], &ranges[1..]] {
         let _ = plan(good, routes, &FlightInputs { photographed: done, ..FLIGHT_INPUTS });
     }
@@ -230,7 +230,7 @@ fn call_unusual_routes(
     ] {
         let mut routes = routes.clone();
         routes.routes[0] = route;
-        assert_eq!(plan(good, &routes, &FLIGHT_INPUTS), Err(PlanError::Terminals));
+        assert_eq!(plan(good, &routes, &FLIGHT_INPUTS), Err(PlanError::CountMismatch));
     }
     for (direction, layer) in [(RouteDirection::Backward, 0), (RouteDirection::Forward, u8::MAX)] {
         let mut routes = routes.clone();
@@ -373,12 +373,12 @@ fn call_detours_home(
         here,
         leg: [here; 2],
         leg_clearance_m: 10.0,
-        goal: DetourGoal::Home { above_pad: over, layer_z_m: 40.0 },
+        goal: DetourGoal::Point { end: over, layer_z_m: 40.0 },
         descent_m: 1.5,
         required_clearance_m: 0.8,
         fence: None,
     };
-    let natures = [ZoneKind::Static, ZoneKind::Descending, ZoneKind::Grounded];
+    let natures = [ZoneKind::Static, ZoneKind::LandingColumn, ZoneKind::Grounded];
     for (i, p) in extreme_points().enumerate() {
         let hard = EXTREME_NUMBERS[i % EXTREME_NUMBERS.len()];
         let thing = KeepOutZone { from: p, to: here, radius_m: hard, kind: natures[i % 3] };
@@ -389,8 +389,8 @@ fn call_detours_home(
             DetourRequest { here: p, land_aside: true, ..good },
             DetourRequest { descent_m: hard, ..good },
             DetourRequest { required_clearance_m: hard, ..good },
-            DetourRequest { goal: DetourGoal::Home { above_pad: p, layer_z_m: 40.0 }, ..good },
-            DetourRequest { goal: DetourGoal::Home { above_pad: over, layer_z_m: hard }, ..good },
+            DetourRequest { goal: DetourGoal::Point { end: p, layer_z_m: 40.0 }, ..good },
+            DetourRequest { goal: DetourGoal::Point { end: over, layer_z_m: hard }, ..good },
             DetourRequest { goal: DetourGoal::RoadmapGoal(0), ..good },
             DetourRequest { fence: Some((p, here)), ..good },
         ] {

@@ -175,7 +175,7 @@ fn call_plans(
         let request = request(vehicles, &heights[..goals]);
         assert_eq!(
             to.call("plan::compute_costs", || plan::compute_costs(view, &request, ws)),
-            Err(PlanError::Terminals)
+            Err(PlanError::CountMismatch)
         );
         let mut assigned = AssignedGoals::<VEHICLES>::new();
         let many =
@@ -184,7 +184,7 @@ fn call_plans(
         let planned = to.call("plan::schedule_flights", || {
             plan::schedule_flights(view, &request, &assigned, ws, out)
         });
-        assert_eq!(planned, Err(PlanError::Terminals));
+        assert_eq!(planned, Err(PlanError::CountMismatch));
     }
     for (first, second) in
         [(Some(2), None), (None, Some(u16::MAX)), (Some(1), Some(1)), (None, None)]
@@ -315,7 +315,7 @@ fn call_detours(
         required_clearance_m: 0.8,
         fence: None,
     };
-    let natures = [ZoneKind::Static, ZoneKind::Descending, ZoneKind::Grounded];
+    let natures = [ZoneKind::Static, ZoneKind::LandingColumn, ZoneKind::Grounded];
     let path = own.path.clone();
     let empty: Path<WAYPOINTS> = Path::new();
     for (i, p) in extreme_points().enumerate() {
@@ -329,7 +329,7 @@ fn call_detours(
             DetourRequest { leg: [p, p], ..good },
             DetourRequest { descent_m: hard, leg_clearance_m: hard, ..good },
             DetourRequest { required_clearance_m: hard, ..good },
-            DetourRequest { goal: DetourGoal::Home { above_pad: p, layer_z_m: hard }, ..good },
+            DetourRequest { goal: DetourGoal::Point { end: p, layer_z_m: hard }, ..good },
             DetourRequest { fence: Some((p, NODE_POSITIONS[5])), ..good },
         ] {
             let bad = [
@@ -337,7 +337,7 @@ fn call_detours(
                 to.call("detour::KeepOutZone::check", || thing.check()).is_err(),
             ];
             let finite = |places: &[Point]| places.iter().flatten().all(|c| c.is_finite());
-            let over = if let DetourGoal::Home { above_pad: over, .. } = request.goal {
+            let over = if let DetourGoal::Point { end: over, .. } = request.goal {
                 over
             } else {
                 request.here

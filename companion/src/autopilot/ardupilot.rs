@@ -27,14 +27,14 @@ pub const VELOCITY_LEAD_S: f32 = 0.5;
 /// Parameters that limit how ArduCopter flies, with 4.6's defaults; their units are centimetres,
 /// those of the jerks metres.
 pub const LIMITS: [LimitParameter; 8] = [
-    LimitParameter { name: "WPNAV_SPEED", limit: Limit::SpeedXy, unit: 0.01, default: 1000.0 },
-    LimitParameter { name: "WPNAV_SPEED_UP", limit: Limit::Climb, unit: 0.01, default: 250.0 },
-    LimitParameter { name: "WPNAV_SPEED_DN", limit: Limit::Descend, unit: 0.01, default: 150.0 },
-    LimitParameter { name: "WPNAV_ACCEL", limit: Limit::AccelXy, unit: 0.01, default: 250.0 },
-    LimitParameter { name: "WPNAV_ACCEL_Z", limit: Limit::AccelUp, unit: 0.01, default: 100.0 },
-    LimitParameter { name: "WPNAV_ACCEL_Z", limit: Limit::AccelDown, unit: 0.01, default: 100.0 },
-    LimitParameter { name: "PSC_JERK_XY", limit: Limit::JerkXy, unit: 1.0, default: 5.0 },
-    LimitParameter { name: "PSC_JERK_Z", limit: Limit::JerkZ, unit: 1.0, default: 5.0 },
+    LimitParameter { name: "WPNAV_SPEED", limit: Limit::SpeedXy, to_si: 0.01, default: 1000.0 },
+    LimitParameter { name: "WPNAV_SPEED_UP", limit: Limit::Climb, to_si: 0.01, default: 250.0 },
+    LimitParameter { name: "WPNAV_SPEED_DN", limit: Limit::Descend, to_si: 0.01, default: 150.0 },
+    LimitParameter { name: "WPNAV_ACCEL", limit: Limit::AccelXy, to_si: 0.01, default: 250.0 },
+    LimitParameter { name: "WPNAV_ACCEL_Z", limit: Limit::AccelUp, to_si: 0.01, default: 100.0 },
+    LimitParameter { name: "WPNAV_ACCEL_Z", limit: Limit::AccelDown, to_si: 0.01, default: 100.0 },
+    LimitParameter { name: "PSC_JERK_XY", limit: Limit::JerkXy, to_si: 1.0, default: 5.0 },
+    LimitParameter { name: "PSC_JERK_Z", limit: Limit::JerkZ, to_si: 1.0, default: 5.0 },
 ];
 
 /// `type_mask` of a setpoint whose velocity alone counts: at velocity 0 ArduCopter stops where it

@@ -48,7 +48,7 @@ pub struct LimitParameter {
     /// The quantity that the parameter limits.
     pub limit: Limit,
     /// Factor from the parameter's own unit to metres and seconds: 0.01 for centimetres.
-    pub unit: f32,
+    pub to_si: f32,
     /// Default of the parameter, in the parameter's own unit.
     pub default: f32,
 }
@@ -66,7 +66,7 @@ impl AutopilotLimits {
     pub(crate) fn from_defaults(parameters: &[LimitParameter]) -> Self {
         let mut limits = Self { values: [f32::INFINITY; LIMIT_KINDS] };
         for parameter in parameters {
-            limits.values[parameter.limit as usize] = parameter.default * parameter.unit;
+            limits.values[parameter.limit as usize] = parameter.default * parameter.to_si;
         }
         limits
     }
@@ -79,7 +79,7 @@ impl AutopilotLimits {
     /// Stores a parameter's value, given in the parameter's own unit, unless it is outside of
     /// `Limit::range`. Returns whether the limit changed.
     pub(crate) fn set(&mut self, parameter: &LimitParameter, value: f32) -> bool {
-        let (value, (least, most)) = (value * parameter.unit, parameter.limit.range());
+        let (value, (least, most)) = (value * parameter.to_si, parameter.limit.range());
         if !(least..=most).contains(&value) {
             return false;
         }

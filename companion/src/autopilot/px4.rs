@@ -19,13 +19,13 @@ pub const MASK_POSITION_VELOCITY_ACCELERATION: u16 = 0xC00;
 
 /// Parameters that limit how PX4 flies, with 1.17's defaults; all are floats.
 pub const LIMITS: [LimitParameter; 7] = [
-    LimitParameter { name: "MPC_XY_VEL_MAX", limit: Limit::SpeedXy, unit: 1.0, default: 12.0 },
-    LimitParameter { name: "MPC_Z_VEL_MAX_UP", limit: Limit::Climb, unit: 1.0, default: 3.0 },
-    LimitParameter { name: "MPC_Z_VEL_MAX_DN", limit: Limit::Descend, unit: 1.0, default: 1.5 },
-    LimitParameter { name: "MPC_ACC_HOR", limit: Limit::AccelXy, unit: 1.0, default: 3.0 },
-    LimitParameter { name: "MPC_ACC_UP_MAX", limit: Limit::AccelUp, unit: 1.0, default: 4.0 },
-    LimitParameter { name: "MPC_ACC_DOWN_MAX", limit: Limit::AccelDown, unit: 1.0, default: 3.0 },
-    LimitParameter { name: "MPC_JERK_AUTO", limit: Limit::JerkXy, unit: 1.0, default: 4.0 },
+    LimitParameter { name: "MPC_XY_VEL_MAX", limit: Limit::SpeedXy, to_si: 1.0, default: 12.0 },
+    LimitParameter { name: "MPC_Z_VEL_MAX_UP", limit: Limit::Climb, to_si: 1.0, default: 3.0 },
+    LimitParameter { name: "MPC_Z_VEL_MAX_DN", limit: Limit::Descend, to_si: 1.0, default: 1.5 },
+    LimitParameter { name: "MPC_ACC_HOR", limit: Limit::AccelXy, to_si: 1.0, default: 3.0 },
+    LimitParameter { name: "MPC_ACC_UP_MAX", limit: Limit::AccelUp, to_si: 1.0, default: 4.0 },
+    LimitParameter { name: "MPC_ACC_DOWN_MAX", limit: Limit::AccelDown, to_si: 1.0, default: 3.0 },
+    LimitParameter { name: "MPC_JERK_AUTO", limit: Limit::JerkXy, to_si: 1.0, default: 4.0 },
 ];
 
 /// `type_mask` of a setpoint whose velocity alone counts: at velocity 0 PX4 stops where it is.

@@ -12,13 +12,13 @@ use crate::timers::Timer;
 
 /// Maximum number of transitions that one evaluation of the mission table makes. More would mean
 /// that the table has a cycle.
-const MAX_TRANSITIONS_PER_STEP: usize = 4;
+const MAX_TRANSITIONS_PER_EVALUATION: usize = 4;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Takes rows of the mission table until none applies, or `MAX_TRANSITIONS_PER_STEP` were
+    /// Takes rows of the mission table until none applies, or `MAX_TRANSITIONS_PER_EVALUATION` were
     /// taken.
     pub(super) fn run_mission_table(&mut self) {
-        for _ in 0..MAX_TRANSITIONS_PER_STEP {
+        for _ in 0..MAX_TRANSITIONS_PER_EVALUATION {
             let inputs = self.guard_inputs();
             let Some(row) = mission::first_applicable_row(self.mission.state(), &inputs) else {
                 return;
@@ -105,11 +105,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.hold_after_pilot(position, self.mission.plan());
             }
             Action::HoldHere => self.guidance.stop_and_hold(position),
-            Action::HoldOver => {
+            Action::HoldLanding => {
                 self.timers.set(Timer::Request, now);
                 self.timers.set(Timer::UnheardMode, now);
             }
-            Action::RequestOffboard | Action::RequestArming | Action::RequestTakeOff => {
+            Action::RequestSetpointMode | Action::RequestArming | Action::RequestTakeOff => {
                 self.timers.set(Timer::Request, now);
             }
             Action::RequestLandMode => self.request_landing(from),

@@ -111,7 +111,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             unlinked_for: self.unlinked_for(),
             division_overdue: self.timers.is_due(Timer::DivisionDue, now),
             may_fly_on_unheard: self.is_flying_unheard(),
-            others_out_of_range: self.neighbours.are_all_out_of_range(),
+            others_out_of_range: self.neighbours.are_all_out_of_range_or_done(),
             swarm_linked: self.is_linked(),
             excluded: self.is_excluded(),
             left_out_set_changed: self.mission.photographed().has_left_out_set_changed(),
@@ -174,7 +174,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             airborne: t.armed && t.last_reported_flight(),
             take_off_command_done: !kind.takes_off_by_command() || t.last_reported_flight(),
             may_take_off: self.plan_leaves_pad()
-                && self.guidance.may_depart()
+                && self.guidance.advice_allows_departure()
                 && self.guidance.filter.column_clear()
                 && self.mission.departure_due(now, self.guidance.departs_later_by())
                 && !self.hears_another_plan()
@@ -238,7 +238,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             our_turn_to_detour: self.detours.is_our_turn(&view),
             detour_ready: self.detours.is_detour_ready(),
             detours_given_up: self.detours.has_given_up_detours(),
-            waited_below_landing_for: self.detours.time_below_landing(&view),
+            waited_below_landing_for: self.detours.time_trapped_below_landing(&view),
             standing,
         }
     }
@@ -248,7 +248,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let needed = |fleet: &Fleet<V>| {
             // A committed division whose plan has not come yet may give it a part.
             let behind = fleet.division_count() > self.mission.division_count();
-            (behind || fleet.is_reserve_needed()) && fleet.lease_age(self.now) < MAX_RESERVE_UNHEARD
+            (behind || fleet.may_reserve_get_a_part())
+                && fleet.lease_age(self.now) < MAX_RESERVE_UNHEARD
         };
         !self.plan_leaves_pad() && self.neighbours.fleet().is_some_and(needed)
     }
@@ -275,7 +276,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn unlinked_for(&self) -> Duration {
         let (now, state) = (self.now, self.mission.state());
         if let Some(fleet) = self.neighbours.fleet() {
-            let age = fleet.unheard_for(now).saturating_sub(UNHEARD_AFTER);
+            let age = fleet.time_without_majority(now).saturating_sub(UNHEARD_AFTER);
             // On the pad the age counts from the entry into the state, so that the warning row that
             // enters `Scheduled` again is not taken in each step.
             let on_pad = state == State::Scheduled;
@@ -342,7 +343,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// they hear it.
     fn is_linked(&self) -> bool {
         match self.neighbours.fleet() {
-            Some(fleet) => fleet.unheard_for(self.now) < HEARTBEAT_EVERY,
+            Some(fleet) => fleet.time_without_majority(self.now) < HEARTBEAT_EVERY,
             None => self.neighbours.linked_within(self.now, HEARTBEAT_EVERY),
         }
     }
@@ -375,7 +376,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let length_m = self.mission.plan().map_or(0.0, |plan| plan.path.length_m());
         let clear_m = self.guidance.gates_open_up_to_m(&self.detour_view().guidance_inputs);
         self.may_fly_unheard()
-            && self.neighbours.are_all_out_of_range()
+            && self.neighbours.are_all_out_of_range_or_done()
             && (clear_m > self.guidance.reference_along_m() + MIN_CLOSED_GATE_AHEAD_M
                 || clear_m >= length_m)
     }

@@ -7,7 +7,7 @@ use planner_core::flight::WaypointRange;
 use super::Companion;
 use crate::events::Link;
 use crate::link::OnDemandMessage;
-use crate::link::done::{self, PhotographedReport};
+use crate::link::photographed::{self, PhotographedReport};
 use crate::mission::photographed::{FlightStage, PlanningPartners};
 use crate::state::State;
 use crate::swarm::fleet::Fleet;
@@ -36,14 +36,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether this vehicle was not started yet, or waits on its pad for its departure
     /// (`Scheduled`): until then its plan may still be replaced by one that fits the others'.
-    fn is_unstarted_or_scheduled(&self) -> bool {
+    fn is_before_departure(&self) -> bool {
         self.is_not_started() || self.mission.state() == State::Scheduled
     }
 
     /// How far this vehicle's flight is.
     fn flight_stage(&self) -> FlightStage {
         match self.mission.state() {
-            _ if self.is_unstarted_or_scheduled() => FlightStage::OnPad,
+            _ if self.is_before_departure() => FlightStage::OnPad,
             state if state.is_over() => FlightStage::Over,
             _ => FlightStage::UnderWay,
         }
@@ -52,7 +52,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether the photographed waypoints are to be noted, stored and reported now, at 1 Hz.
     pub(super) fn take_photographed_due(&mut self) -> bool {
         self.is_area_mission()
-            && self.timers.take_due(Timer::Done, self.now, NOTE_PHOTOGRAPHED_EVERY)
+            && self.timers.take_due(Timer::NotePhotographed, self.now, NOTE_PHOTOGRAPHED_EVERY)
     }
 
     /// Notes the photographed waypoints of its own path, up to `pictures_to_m` metres along it;
@@ -78,10 +78,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             .into_iter()
             .for_each(|link| self.links.set_due(link, OnDemandMessage::PhotographedCount));
         let every = match stage {
-            FlightStage::UnderWay => done::PERIOD_IN_FLIGHT,
-            FlightStage::OnPad | FlightStage::Over => done::PERIOD_ON_GROUND,
+            FlightStage::UnderWay => photographed::PERIOD_IN_FLIGHT,
+            FlightStage::OnPad | FlightStage::Over => photographed::PERIOD_ON_GROUND,
         };
-        if self.timers.take_due(Timer::DoneReport, self.now, every) {
+        if self.timers.take_due(Timer::PhotographedReport, self.now, every) {
             self.links.set_due(Link::Swarm, OnDemandMessage::PhotographedReport);
         }
     }
@@ -104,7 +104,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if ours && self.is_area_mission() && self.config.skips_photographed {
             let under_way = || self.neighbours.fleet().is_some_and(Fleet::has_others_flight_begun);
             let planning = match self.mission.state() {
-                _ if !self.is_unstarted_or_scheduled() => PlanningPartners::Nobody,
+                _ if !self.is_before_departure() => PlanningPartners::Nobody,
                 // Once started in a flight that others have begun, this vehicle keeps its plan
                 // whatever vehicles on the ground report.
                 State::Scheduled if under_way() => PlanningPartners::ThoseInFlight,

@@ -39,7 +39,7 @@ enum EstimatePace {
 
 impl EstimatePace {
     /// The pace by its share of the nominal speed.
-    fn of(share: f32) -> Self {
+    fn from_speed_share(share: f32) -> Self {
         match share {
             share if share >= 1.0 => Self::Nominal,
             share if share > 0.0 => Self::Slower,
@@ -175,7 +175,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// reported.
     fn update_barred_start(&mut self) {
         let later_by = self.guidance.departs_later_by();
-        let due = self.mission.departure_due(self.now, later_by) && self.guidance.may_depart();
+        let due = self.mission.departure_due(self.now, later_by)
+            && self.guidance.advice_allows_departure();
         let waits =
             due && self.mission.state() == State::Scheduled && !self.mission.pending().pause;
         let least = self.config.battery_low_percent;
@@ -227,8 +228,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let before = self.guidance.set_estimate_speed_share(pace);
         self.mission.note_estimate_speed_share(pace, now);
-        let now_allowed = EstimatePace::of(pace);
-        if EstimatePace::of(before) == now_allowed || !self.mission.state().streams_setpoints() {
+        let now_allowed = EstimatePace::from_speed_share(pace);
+        if EstimatePace::from_speed_share(before) == now_allowed
+            || !self.mission.state().streams_setpoints()
+        {
             return;
         }
         // In whole centimetres, rounded up; a bound above 100 m stands for an unknown accuracy.

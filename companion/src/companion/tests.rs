@@ -252,7 +252,7 @@ fn land_and_return_are_obeyed() {
 }
 
 #[test]
-fn unknown_commands_are_told_so_and_foreign_ones_left_alone() {
+fn unknown_commands_are_refused_and_foreign_ones_left_alone() {
     let mut bench = Bench::new(config());
     bench.run_until(State::Ready, 6.0);
     bench.command(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, SYSTEM, crate::COMPANION_COMPONENT);

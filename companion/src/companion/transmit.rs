@@ -18,7 +18,7 @@ use crate::link::intent::{self, Intent};
 use crate::link::rate_limit::{ARMED_EXTRA_BYTES_PER_S, DISARMED_EXTRA_BYTES_PER_S};
 use crate::link::roster;
 use crate::link::severity::Severity;
-use crate::link::{OnDemandMessage, done};
+use crate::link::{OnDemandMessage, photographed};
 use crate::margins::{LEASE_RENEWAL_DELAY_S, LEASE_S, UNHEARD_NOTICED_AFTER_S};
 use crate::services;
 use crate::state::{State, SystemStatus};
@@ -75,7 +75,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return encode_tunnel(header, &payload[..len], out);
         }
         if link == Link::Swarm && self.links.take_due(link, OnDemandMessage::PhotographedReport) {
-            let mut payload = [0; done::MAX_LEN];
+            let mut payload = [0; photographed::MAX_LEN];
             let len = self.photographed_report().encode(&mut payload);
             let header = self.links.next_header(link, system);
             return encode_tunnel(header, &payload[..len], out);
@@ -176,7 +176,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             (still, frames::swap_enu_ned(velocity), still, None, kind.stop_type_mask())
         };
         let (position, velocity, acceleration, heading, mask) =
-            match self.guidance.setpoint(self.mission.state(), &self.guidance_inputs()) {
+            match self.guidance.setpoint_to_send(self.mission.state(), &self.guidance_inputs()) {
                 Setpoint::None => return None,
                 Setpoint::Stop(velocity) => stop(&velocity),
                 Setpoint::Move(position, velocity, acceleration, heading) => self
@@ -390,10 +390,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         let mut points = heapless::Vec::new();
         let here = self.telemetry.position;
-        let setpoint = match self.guidance.setpoint(self.mission.state(), &self.guidance_inputs()) {
-            Setpoint::Move(place, ..) => place,
-            _ => here,
-        };
+        let setpoint =
+            match self.guidance.setpoint_to_send(self.mission.state(), &self.guidance_inputs()) {
+                Setpoint::Move(place, ..) => place,
+                _ => here,
+            };
         let mut add = |point: Point| {
             // With `MAX_POINTS` points the list is full: the other points are further ahead than
             // the vehicle flies before its next intent.

@@ -16,7 +16,7 @@ const MAX_DEPARTURE_DELAY: Duration = Duration::from_secs(5);
 
 impl Guidance {
     /// Whether advice lets the vehicle fly on far enough for its departure to be worth it.
-    pub(crate) fn may_depart(&self) -> bool {
+    pub(crate) fn advice_allows_departure(&self) -> bool {
         self.advice.stop_within_m > MIN_FREE_PATH_TO_DEPART_M
     }
 
@@ -36,7 +36,7 @@ impl Guidance {
     ) {
         let asks = state == State::Scheduled || state.follows_path_or_is_blocked();
         let Some(plan) = scene.plan.filter(|_| asks) else { return };
-        let along_m = if self.has_begun_path { self.tracker.along_m } else { -plan.climb_m };
+        let along_m = if self.has_begun_path { self.reference.along_m } else { -plan.climb_m };
         let own = OwnVehicle {
             rank: scene.rank,
             position: scene.telemetry.position,

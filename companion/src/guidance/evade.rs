@@ -136,19 +136,19 @@ impl EvadeSearch {
 /// too near.
 pub fn step_back<const W: usize>(
     path: &Path<W>,
-    tracker: &mut ReferenceState,
+    reference: &mut ReferenceState,
     to_m: f32,
     neighbours: &[Neighbour],
     safety_m: f32,
     dt_s: f32,
 ) -> Option<Point> {
-    let here = path.point_at(tracker.along_m)?;
-    let back = path.point_at(tracker.along_m - PLACE_STEP_M)?;
-    if tracker.speed_mps > 0.0 {
+    let here = path.point_at(reference.along_m)?;
+    let back = path.point_at(reference.along_m - PLACE_STEP_M)?;
+    if reference.speed_mps > 0.0 {
         // The reference still moves forward: it brakes first.
-        tracker.speed_mps = (tracker.speed_mps - BRAKING_MPS2 * dt_s).max(0.0);
-        tracker.along_m = (tracker.along_m + tracker.speed_mps * dt_s).min(path.length_m());
-        return point_at(path, tracker);
+        reference.speed_mps = (reference.speed_mps - BRAKING_MPS2 * dt_s).max(0.0);
+        reference.along_m = (reference.along_m + reference.speed_mps * dt_s).min(path.length_m());
+        return point_at(path, reference);
     }
     let follows = |n: &&Neighbour| {
         let apart = |p: &Point| (n.position - p).length();
@@ -160,20 +160,20 @@ pub fn step_back<const W: usize>(
         return None;
     }
     let corner_m =
-        path.waypoints().iter().rev().map(|w| tracker.along_m - w.along_m).find(|m| *m > 0.0);
+        path.waypoints().iter().rev().map(|w| reference.along_m - w.along_m).find(|m| *m > 0.0);
     let allowed = |end: f32, left_m: f32| fpu::sqrtf(end * end + 2.0 * EVADE_MPS2 * left_m);
-    let ahead =
-        allowed(MAX_CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
+    let ahead = allowed(MAX_CORNER_MPS, corner_m.unwrap_or(0.0))
+        .min(allowed(0.0, reference.along_m - to_m));
     // `speed_mps` is positive forward along the path, and negative on the way back.
-    let speed = ahead.min(MAX_EVADE_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));
-    tracker.speed_mps = -speed;
-    tracker.along_m = (tracker.along_m - speed * dt_s).max(to_m);
-    point_at(path, tracker)
+    let speed = ahead.min(MAX_EVADE_MPS).min(EVADE_MPS2 * dt_s - reference.speed_mps.min(0.0));
+    reference.speed_mps = -speed;
+    reference.along_m = (reference.along_m - speed * dt_s).max(to_m);
+    point_at(path, reference)
 }
 
 /// The point of the path at which the reference is.
-fn point_at<const W: usize>(path: &Path<W>, tracker: &ReferenceState) -> Option<Point> {
-    path.point_at(tracker.along_m)
+fn point_at<const W: usize>(path: &Path<W>, reference: &ReferenceState) -> Option<Point> {
+    path.point_at(reference.along_m)
 }
 
 #[cfg(test)]

@@ -74,7 +74,7 @@ pub(crate) struct SafetyFilter {
     /// Whether the neighbour that the filter stops for is a stranger.
     blocker_is_stranger: bool,
     /// Whether this vehicle's reachable set conflicted with that of a neighbour in the last step.
-    sets_intersect: bool,
+    sets_conflict: bool,
     /// Whether the filter checked the path backwards in the last step: the vehicle flies back or is
     /// about to.
     scanned_backwards: bool,
@@ -87,7 +87,7 @@ pub(crate) struct SafetyFilter {
     column_blocked_for_good_since: Option<Instant>,
     /// Since when this landing has been waiting for a free column; times at which the column was
     /// free do not end the wait.
-    landing_held_since: Option<Instant>,
+    column_wait_since: Option<Instant>,
     /// Since when the filter has kept the vehicle from continuing; gaps shorter than
     /// [`UNHINDERED_AFTER`] count as part of that time.
     hindered_since: Instant,
@@ -196,8 +196,8 @@ impl SafetyFilter {
 
     /// Time since this landing first had to wait for a free column; times at which the column was
     /// free do not end the wait.
-    fn landing_held_for(&self, now: Instant) -> Duration {
-        self.landing_held_since.map_or(Duration::default(), |at| now - at)
+    fn column_wait_for(&self, now: Instant) -> Duration {
+        self.column_wait_since.map_or(Duration::default(), |at| now - at)
     }
 
     /// Time for which the filter has kept the vehicle from continuing, stops and short flights
@@ -227,7 +227,7 @@ impl SafetyFilter {
     /// [`Urgency::Urgent`] while the filter stops the vehicle in this step; passing a stranger
     /// slowly it stops only while the sets conflict.
     pub(super) fn urgency(&self, now: Instant) -> Urgency {
-        match self.is_stopped() && (self.sets_intersect || !self.passes_stranger(now)) {
+        match self.is_stopped() && (self.sets_conflict || !self.passes_stranger(now)) {
             true => Urgency::Urgent,
             false => Urgency::Smooth,
         }
@@ -267,7 +267,7 @@ impl SafetyFilter {
         self.column_blocked_for_good_since =
             self.column_blocked_for_good_since.or(Some(now)).filter(|_| rests);
         if !clear {
-            self.landing_held_since.get_or_insert(now);
+            self.column_wait_since.get_or_insert(now);
         }
         if clear != self.column_clear || self.column_clear_changed_at.is_none() {
             (self.column_clear, self.column_clear_changed_at) = (clear, Some(now));

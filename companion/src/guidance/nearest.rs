@@ -8,7 +8,7 @@ use super::{Guidance, REFERENCE_RESET_WINDOW_M};
 
 /// Length of path searched for a jump, in one step, of the point nearest to the setpoint, metres.
 /// Where the setpoint rounds a corner, the point jumps from one leg to the next, by 0.25 m at most.
-const MAX_CORNER_JUMP_M: f32 = 0.5;
+const CORNER_JUMP_SEARCH_M: f32 = 0.5;
 /// Greatest rounding error of an arc length, metres. The search for the nearest point reaches
 /// further by it at both ends, so that the place of a setpoint that stands does not creep.
 const MAX_ARC_LENGTH_ROUNDING_ERROR_M: f32 = 1e-3;
@@ -33,8 +33,8 @@ impl Guidance {
     /// It may be 1.2 s of flight behind the reference, 18 m at 15 m/s. A window of that length
     /// could find a later leg too early, where that leads back over the one before.
     pub(super) fn update_setpoint_along_m<const W: usize>(&mut self, path: &Path<W>, dt_s: f32) {
-        let (from_m, along_m) = (self.setpoint_along_m, self.tracker.along_m);
-        let reach_m = 0.5 * (MAX_CORNER_JUMP_M + self.track.cruise_mps * dt_s);
+        let (from_m, along_m) = (self.setpoint_along_m, self.reference.along_m);
+        let reach_m = 0.5 * (CORNER_JUMP_SEARCH_M + self.track.cruise_mps * dt_s);
         let place = self.smoother.position();
         let seen_m =
             path.project(&place, from_m + reach_m, reach_m + MAX_ARC_LENGTH_ROUNDING_ERROR_M);
@@ -44,9 +44,9 @@ impl Guidance {
     /// Sets the reference back to the setpoint, which stands.
     pub(super) fn reset_reference_to_setpoint<const W: usize>(&mut self, path: &Path<W>) {
         let from_m = self.setpoint_along_m;
-        let stepped_back = self.tracker.along_m <= from_m;
+        let stepped_back = self.reference.along_m <= from_m;
         let reach_m = if stepped_back { 0.5 * REFERENCE_RESET_WINDOW_M } else { 0.0 };
-        self.tracker.along_m =
+        self.reference.along_m =
             nearest_arc_length_m(path, &self.smoother.position(), from_m + reach_m, reach_m);
     }
 }

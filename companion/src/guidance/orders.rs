@@ -41,8 +41,8 @@ impl Guidance {
         let away =
             |end: Point| (end - point).xy().norm_squared() > ARRIVED_WITHIN_M * ARRIVED_WITHIN_M;
         if self.is_reference_at_end_of(path) && path.point_at(path.length_m()).is_some_and(away) {
-            self.tracker.along_m = path.length_m() - ARRIVED_WITHIN_M;
-            self.setpoint_along_m = self.tracker.along_m;
+            self.reference.along_m = path.length_m() - ARRIVED_WITHIN_M;
+            self.setpoint_along_m = self.reference.along_m;
         }
     }
 
@@ -62,7 +62,7 @@ impl Guidance {
         (self.has_begun_path, self.lands_off_path) = (true, false);
         self.evade_search.reset();
         self.acknowledged_path.start_following(now);
-        self.last_progress_m = self.tracker.along_m;
+        self.last_progress_m = self.reference.along_m;
         self.last_progress_at = now;
     }
 
@@ -70,8 +70,8 @@ impl Guidance {
     pub fn begin_path(&mut self, now: Instant) {
         // If the reference has not moved along the path before, this path begins at the same place
         // as that one.
-        self.path_begins_above_pad &= self.tracker.along_m <= 0.0;
-        (self.tracker, self.setpoint_along_m) = (ReferenceState::default(), 0.0);
+        self.path_begins_above_pad &= self.reference.along_m <= 0.0;
+        (self.reference, self.setpoint_along_m) = (ReferenceState::default(), 0.0);
         self.phase = Phase::Path;
         self.leg = None;
         self.waypoints = Algorithm2Waypoints::default();
@@ -112,7 +112,7 @@ impl Guidance {
     /// Begins another path, at the place `along_m` metres along it; the setpoint stands there.
     pub(crate) fn begin_path_at(&mut self, along_m: f32, now: Instant) {
         self.begin_path(now);
-        (self.tracker.along_m, self.setpoint_along_m) = (along_m, along_m);
+        (self.reference.along_m, self.setpoint_along_m) = (along_m, along_m);
         self.last_progress_m = along_m;
     }
 
@@ -140,7 +140,7 @@ impl Guidance {
     /// Whether the setpoint has reached the reference, at which a path aside begins: a setpoint
     /// that was stopped short of the reference would first have to fly on.
     pub(crate) fn is_setpoint_at_reference(&self) -> bool {
-        libm::fabsf(self.tracker.along_m - self.setpoint_along_m) < SETPOINT_AT_REFERENCE_M
+        libm::fabsf(self.reference.along_m - self.setpoint_along_m) < SETPOINT_AT_REFERENCE_M
     }
 
     /// Whether the setpoint stands, in a descent too.
@@ -161,14 +161,14 @@ impl Guidance {
     /// Nearest place along `path`, the path that is flown, at which the vehicle could stop now,
     /// metres: both the reference and the setpoint behind it have to brake.
     pub(crate) fn stopping_point_m<const W: usize>(&self, path: &Path<W>) -> f32 {
-        let braking_m = track::braking_distance_m(&self.track, path, &self.tracker);
+        let braking_m = track::braking_distance_m(&self.track, path, &self.reference);
         let setpoint_braking_m = self.smoother.stop_distance_m(Urgency::Smooth);
-        (self.tracker.along_m + braking_m).max(self.setpoint_along_m + setpoint_braking_m)
+        (self.reference.along_m + braking_m).max(self.setpoint_along_m + setpoint_braking_m)
     }
 
     /// Where along its path the reference could have stopped in the last step, metres.
     pub(crate) fn braking_end_m(&self) -> f32 {
-        self.brakes_to_m.max(self.tracker.along_m)
+        self.brakes_to_m.max(self.reference.along_m)
     }
 
     /// Begins a landing that setpoints lead straight down from where the setpoint stands, to the
@@ -220,14 +220,14 @@ impl Guidance {
         });
         if self.raw_point_at_setpoint && !(self.phase == Phase::Descent && below) {
             self.phase = Phase::Path;
-            let along_m = self.tracker.along_m;
-            self.tracker.along_m = nearest_arc_length_m(path, &place, along_m, REJOIN_WINDOW_M);
+            let along_m = self.reference.along_m;
+            self.reference.along_m = nearest_arc_length_m(path, &place, along_m, REJOIN_WINDOW_M);
             if self.join_target(path, place).is_none() {
                 // The nearest point cannot be joined: the vehicle was on its way, from its pad or
                 // back up its column, to the place where the reference was before.
-                self.tracker.along_m = along_m;
+                self.reference.along_m = along_m;
             }
-            self.setpoint_along_m = self.tracker.along_m;
+            self.setpoint_along_m = self.reference.along_m;
         }
         self.start_following(now);
     }
@@ -236,10 +236,10 @@ impl Guidance {
     /// its clearance. The raw point may still move forward: the new path begins where it can have
     /// braked, and the raw point at first moves backwards on the new path.
     pub fn reverse_path<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
-        let speed = self.tracker.speed_mps.max(0.0);
+        let speed = self.reference.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
         let braking_m = speed * speed / (2.0 * accel) + speed * TICK_S;
-        let from_m = (self.tracker.along_m + braking_m).min(path.length_m());
+        let from_m = (self.reference.along_m + braking_m).min(path.length_m());
         let mut back = Path::new();
         let ahead = path.waypoints().iter().find(|w| w.along_m >= from_m);
         let mut clearance_m = ahead.map_or(0.0, |w| w.leg_clearance_m);
@@ -251,14 +251,14 @@ impl Guidance {
             let _ = back.push(waypoint.position, clearance_m);
             clearance_m = waypoint.leg_clearance_m;
         }
-        let tracker = ReferenceState {
-            along_m: from_m - self.tracker.along_m,
-            speed_mps: -self.tracker.speed_mps,
+        let reference = ReferenceState {
+            along_m: from_m - self.reference.along_m,
+            speed_mps: -self.reference.speed_mps,
         };
         let (phase, leg) = (self.phase, self.leg.take());
         *path = back;
         self.begin_path(now);
-        (self.tracker, self.setpoint_along_m) = (tracker, tracker.along_m);
+        (self.reference, self.setpoint_along_m) = (reference, reference.along_m);
         self.returning = true;
         match phase {
             Phase::Climb | Phase::Join => (self.phase, self.leg) = (phase, leg),
@@ -271,8 +271,8 @@ impl Guidance {
                     for end in [ends.0, ends.1].into_iter().flatten() {
                         let _ = up.push(end.position, end.leg_clearance_m);
                     }
-                    self.leg_tracker.along_m = leg.length_m() - self.leg_tracker.along_m;
-                    self.leg_tracker.speed_mps = -self.leg_tracker.speed_mps;
+                    self.leg_reference.along_m = leg.length_m() - self.leg_reference.along_m;
+                    self.leg_reference.speed_mps = -self.leg_reference.speed_mps;
                     (self.phase, self.leg) = (Phase::Join, Some(up));
                 }
             }
@@ -285,7 +285,7 @@ impl Guidance {
     pub(super) fn forget_leg(&mut self) {
         self.raw_point_at_setpoint = true;
         self.leg = None;
-        self.leg_tracker = ReferenceState::default();
-        self.tracker.speed_mps = 0.0;
+        self.leg_reference = ReferenceState::default();
+        self.reference.speed_mps = 0.0;
     }
 }

@@ -11,7 +11,7 @@ use crate::state::State;
 impl Guidance {
     /// The setpoint to be sent in this state: none, a stop where the position is unknown, or a
     /// place with velocity, acceleration and heading.
-    pub fn setpoint<const W: usize, const G: usize>(
+    pub fn setpoint_to_send<const W: usize, const G: usize>(
         &self,
         state: State,
         scene: &GuidanceInputs<'_, W, G>,

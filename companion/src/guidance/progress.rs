@@ -129,20 +129,20 @@ impl Guidance {
                 let window_m = 2.0 * lead_m + EXTRA_LAG_WINDOW_S * faster_mps;
                 let seen = path.project(
                     &scene.telemetry.position,
-                    self.tracker.along_m + lead_m - window_m,
+                    self.reference.along_m + lead_m - window_m,
                     window_m,
                 );
                 // Within `ARRIVED_WITHIN_M` of its reference the vehicle reports at least the
                 // progress that gates ask of a vehicle that waits there.
-                let at = path.point_at(self.tracker.along_m);
+                let at = path.point_at(self.reference.along_m);
                 let arrived = at
                     .is_some_and(|at| (at - scene.telemetry.position).length() < ARRIVED_WITHIN_M);
                 let least = if arrived {
-                    self.tracker.along_m - MAX_REPORTED_SHORTFALL_M
+                    self.reference.along_m - MAX_REPORTED_SHORTFALL_M
                 } else {
                     f32::NEG_INFINITY
                 };
-                seen.max(least).min(self.tracker.along_m)
+                seen.max(least).min(self.reference.along_m)
             }
             _ => -plan.climb_m,
         }
@@ -169,7 +169,7 @@ impl Guidance {
 
     /// Whether the reference has reached the end of this path; false before the path was begun.
     pub(super) fn is_reference_at_end_of<const W: usize>(&self, path: &Path<W>) -> bool {
-        self.has_begun_path && self.tracker.along_m >= path.length_m()
+        self.has_begun_path && self.reference.along_m >= path.length_m()
     }
 
     /// Height of the ground below the vehicle as far as the plan says, ENU up, metres: that of the
@@ -270,7 +270,7 @@ impl Guidance {
     ) -> bool {
         let Some(plan) = scene.plan else { return false };
         let position = &scene.telemetry.position;
-        let along_m = plan.path.project(position, self.tracker.along_m, window_m);
+        let along_m = plan.path.project(position, self.reference.along_m, window_m);
         if let (Phase::Descent, Some(last)) = (self.phase, plan.path.waypoints().last()) {
             let away = position - last.position;
             if (-plan.descent_m - ARRIVED_WITHIN_M..ARRIVED_WITHIN_M).contains(&away.z)
@@ -279,7 +279,7 @@ impl Guidance {
                 return true;
             }
         }
-        if (along_m - self.tracker.along_m).abs() > window_m - WINDOW_EDGE_M {
+        if (along_m - self.reference.along_m).abs() > window_m - WINDOW_EDGE_M {
             return false;
         }
         plan.path.point_at(along_m).is_some_and(|nearest| {
@@ -329,7 +329,7 @@ impl Guidance {
         path: &Path<W>,
         place: Point,
     ) -> Option<Point> {
-        let along_m = self.tracker.along_m;
+        let along_m = self.reference.along_m;
         let at = path.point_at(along_m)?;
         let away = place - at;
         let arrived_sq = ARRIVED_WITHIN_M * ARRIVED_WITHIN_M;

@@ -48,7 +48,7 @@ impl Guidance {
             Phase::Climb => path.point_at(0.0).map(|start| Point::new(raw.x, raw.y, start.z)),
             // Without a free way the setpoint stays where it is.
             Phase::Join if self.leg.is_none() => self.join_target(path, raw),
-            Phase::Join => path.point_at(self.tracker.along_m),
+            Phase::Join => path.point_at(self.reference.along_m),
             Phase::Descent => path.point_at(path.length_m()).map(|end| {
                 let down_m = if self.climbing_back {
                     0.0
@@ -77,15 +77,15 @@ impl Guidance {
             // Two points fit.
             let _ = leg.push(raw, f32::INFINITY.min(self.track.lead_max_m));
             let _ = leg.push(target, f32::INFINITY.min(self.track.lead_max_m));
-            (self.leg, self.leg_tracker) = (Some(leg), ReferenceState::default());
+            (self.leg, self.leg_reference) = (Some(leg), ReferenceState::default());
         }
         let Some(leg) = &self.leg else { return raw };
         let advice = Advice { speed_scale: self.descent_speed_share(plan, leg), ..Advice::FREE };
-        let before_m = self.leg_tracker.along_m;
+        let before_m = self.leg_reference.along_m;
         let reference =
-            track::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
+            track::advance(&self.leg_track, leg, &mut self.leg_reference, &advice, TICK_S);
         self.max_lead_m = MAX_LEG_LEAD_M;
-        if self.phase == Phase::Descent && self.leg_tracker.along_m > before_m {
+        if self.phase == Phase::Descent && self.leg_reference.along_m > before_m {
             self.last_progress_at = now;
         }
         if self.phase == Phase::Join && (leg.length_m() < MIN_LEG_M || self.is_leg_done()) {
@@ -103,10 +103,10 @@ impl Guidance {
         let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for_id: 0 };
         let reference = match (self.phase, &self.leg) {
             (Phase::Path, None) => {
-                track::advance(&self.track, path, &mut self.tracker, &stop, TICK_S)
+                track::advance(&self.track, path, &mut self.reference, &stop, TICK_S)
             }
             (Phase::Path | Phase::Climb | Phase::Join | Phase::Descent, Some(leg)) => {
-                track::advance(&self.leg_track, leg, &mut self.leg_tracker, &stop, TICK_S)
+                track::advance(&self.leg_track, leg, &mut self.leg_reference, &stop, TICK_S)
             }
             _ => None,
         };
@@ -132,7 +132,7 @@ impl Guidance {
             if !free {
                 advice.stop_within_m = 0.0;
             } else if let Some(place) =
-                evade::step_back(path, &mut self.tracker, to_m, near, safety_m, TICK_S)
+                evade::step_back(path, &mut self.reference, to_m, near, safety_m, TICK_S)
             {
                 return Some(place);
             } else {
@@ -141,11 +141,11 @@ impl Guidance {
             }
         }
         // Where the path leaves the geofence, the raw point stops before the fence.
-        let speed = self.tracker.speed_mps.max(0.0);
+        let speed = self.reference.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
         let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + FENCE_MARGIN_M;
         let allowed = |by_m: f32| {
-            let ahead = path.point_at(self.tracker.along_m + by_m);
+            let ahead = path.point_at(self.reference.along_m + by_m);
             ahead.is_none_or(|ahead| self.smoother.is_within_fence_slack(&ahead))
         };
         let (mut inside_m, mut outside_m) = (0.0, braking_m + FENCE_MARGIN_M);
@@ -158,7 +158,7 @@ impl Guidance {
             self.stopped_at_fence = true;
         }
         let Reference { position, lead_limit_m: lead_m, .. } =
-            track::advance(&self.track, path, &mut self.tracker, &advice, TICK_S)?;
+            track::advance(&self.track, path, &mut self.reference, &advice, TICK_S)?;
         self.max_lead_m = lead_m;
         Some(position)
     }
@@ -187,30 +187,30 @@ impl Guidance {
                 // The component of the old leg's velocity along the new leg is kept.
                 let kept =
                     self.leg.as_ref().map_or(0.0, |old| course(old).dot(&course(&leg)).max(0.0));
-                let speed_mps = self.leg_tracker.speed_mps * kept;
-                (self.leg, self.leg_tracker) =
+                let speed_mps = self.leg_reference.speed_mps * kept;
+                (self.leg, self.leg_reference) =
                     (Some(leg), ReferenceState { along_m: 0.0, speed_mps });
             }
             Some(_) => {}
         }
         let leg = self.leg.as_ref()?;
-        let speed = self.leg_tracker.speed_mps.max(0.0);
+        let speed = self.leg_reference.speed_mps.max(0.0);
         let braking_m = speed * speed / (2.0 * self.track.accel_z_mps2.min(self.track.accel_mps2));
-        let ahead_m = self.leg_tracker.along_m + braking_m + 2.0 * speed * TICK_S + MIN_LEG_M;
+        let ahead_m = self.leg_reference.along_m + braking_m + 2.0 * speed * TICK_S + MIN_LEG_M;
         if leg.point_at(ahead_m).is_some_and(|ahead| !self.smoother.is_within_fence_slack(&ahead)) {
             advice.stop_within_m = braking_m;
             self.stopped_at_fence = true;
         }
-        let reference = track::advance(&self.track, leg, &mut self.leg_tracker, &advice, TICK_S)?;
+        let reference = track::advance(&self.track, leg, &mut self.leg_reference, &advice, TICK_S)?;
         self.max_lead_m = MAX_LEG_LEAD_M;
-        self.tracker.speed_mps = self.leg_tracker.speed_mps;
+        self.reference.speed_mps = self.leg_reference.speed_mps;
         let length_m = path.length_m();
-        self.tracker.along_m = if self.waypoints.is_completed() {
+        self.reference.along_m = if self.waypoints.is_completed() {
             length_m
         } else {
             let seen_m =
-                path.project(&reference.position, self.tracker.along_m, REFERENCE_RESET_WINDOW_M);
-            seen_m.max(self.tracker.along_m).min((length_m - MIN_LEG_M).max(0.0))
+                path.project(&reference.position, self.reference.along_m, REFERENCE_RESET_WINDOW_M);
+            seen_m.max(self.reference.along_m).min((length_m - MIN_LEG_M).max(0.0))
         };
         Some(reference.position)
     }
@@ -218,7 +218,7 @@ impl Guidance {
     /// Whether the raw point has reached the end of its straight leg: of a climb, a join or a
     /// descent.
     pub(super) fn is_leg_done(&self) -> bool {
-        self.leg.as_ref().is_some_and(|leg| self.leg_tracker.along_m >= leg.length_m())
+        self.leg.as_ref().is_some_and(|leg| self.leg_reference.along_m >= leg.length_m())
     }
 
     /// Depth below the end of the path to which setpoints lead the descent, metres: to the ground
@@ -285,7 +285,7 @@ impl Guidance {
             return 1.0;
         };
         let over_m = top.position.z
-            - self.leg_tracker.along_m
+            - self.leg_reference.along_m
             - (self.planned_ground_m(plan) + self.final_descent_height_m);
         let most_mps = fpu::sqrtf(
             TOUCHDOWN_MPS * TOUCHDOWN_MPS

@@ -48,11 +48,11 @@ impl Guidance {
         now: Instant,
     ) {
         let safety_m = self.deconflict.safety_distance_m;
-        let along_m = self.tracker.along_m;
+        let along_m = self.reference.along_m;
         if neighbours.is_reported_heard_within(now, MAX_NEW_REPORT_AGE) {
             self.acknowledged_path.note_reported_heard(
                 along_m,
-                self.tracker.speed_mps.max(0.0),
+                self.reference.speed_mps.max(0.0),
                 now,
             );
         }

@@ -33,10 +33,10 @@ const HEADER_LEN: usize = 18;
 const ENTRY_LEN: usize = 5;
 /// Bits of byte 2 with the number of committed divisions.
 const DIVISIONS_MASK: u8 = 15;
-/// Bit of byte 2: the sender hears a vehicle that sets [`IN_FLIGHT`].
-const HEARS_VEHICLE_IN_FLIGHT: u8 = 1 << 6;
+/// Bit of byte 2: the sender hears a vehicle that sets [`HAS_STARTED`].
+const HEARS_STARTED_VEHICLE: u8 = 1 << 6;
 /// Bit of byte 2: the sender was started and takes part; it may still be on its pad.
-const IN_FLIGHT: u8 = 1 << 7;
+const HAS_STARTED: u8 = 1 << 7;
 /// Longest payload of TUNNEL, bytes, with TUNNEL's own five bytes.
 pub const MAX_LEN: usize = TUNNEL_HEADER_LEN + HEADER_LEN + MAX_ENTRIES_PER_MESSAGE * ENTRY_LEN;
 
@@ -109,9 +109,9 @@ pub struct RosterReport {
     /// at most 15.
     pub division_count: u8,
     /// Whether the sender was started and takes part; it may still be on its pad.
-    pub in_flight: bool,
+    pub has_started: bool,
     /// Whether the sender hears another vehicle that was started and takes part.
-    pub hears_vehicle_in_flight: bool,
+    pub hears_started_vehicle: bool,
     /// Rank of the vehicle of the first entry.
     pub first_rank: u8,
     /// 8 bits of the CRC of the plan of the sender's flight, before any division; 0 while it has
@@ -137,8 +137,8 @@ impl RosterReport {
         let count = self.entries.len() as u8;
         let Self { system_id, first_rank, plan_crc8, .. } = *self;
         let divisions = self.division_count & DIVISIONS_MASK
-            | if self.hears_vehicle_in_flight { HEARS_VEHICLE_IN_FLIGHT } else { 0 }
-            | if self.in_flight { IN_FLIGHT } else { 0 };
+            | if self.hears_started_vehicle { HEARS_STARTED_VEHICLE } else { 0 }
+            | if self.has_started { HAS_STARTED } else { 0 };
         body[..6].copy_from_slice(&[VERSION, system_id, divisions, first_rank, count, plan_crc8]);
         body[6..10].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[10..14].copy_from_slice(&self.committed_hash.to_le_bytes());
@@ -189,8 +189,8 @@ impl RosterReport {
         Some(Self {
             system_id: sender,
             division_count: body[2] & DIVISIONS_MASK,
-            in_flight: body[2] & IN_FLIGHT != 0,
-            hears_vehicle_in_flight: body[2] & HEARS_VEHICLE_IN_FLIGHT != 0,
+            has_started: body[2] & HAS_STARTED != 0,
+            hears_started_vehicle: body[2] & HEARS_STARTED_VEHICLE != 0,
             first_rank: body[3],
             plan_crc8: body[5],
             mission_crc: word(6),

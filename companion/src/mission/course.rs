@@ -288,7 +288,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// of the descent there, metres.
     pub(crate) fn home_goal(&self) -> (DetourGoal, f32) {
         let (over, layer_m, descent_m) = self.home;
-        (DetourGoal::Home { above_pad: over, layer_z_m: layer_m }, descent_m)
+        (DetourGoal::Point { end: over, layer_z_m: layer_m }, descent_m)
     }
 
     /// Whether the plan after the last division has come and is not flown yet.

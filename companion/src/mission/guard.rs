@@ -9,8 +9,9 @@ use crate::time::Duration;
 /// is below: in `Land` the landing is held then, and the vehicle flies back.
 const MAX_WAIT_AT_FENCE: Duration = Duration::from_secs(30);
 
-/// Condition of a row: a field of [`GuardInputs`], or a comparison of fields. "Limit" is the row's
-/// minimum duration. "MISSION_START" and other commands mean that the command is pending.
+/// Condition of a row: a field of [`GuardInputs`], or a comparison of fields. "Limit" is the
+/// row's [`limit`](super::TransitionRow::limit). "MISSION_START" and other commands mean that the
+/// command is pending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guard {
     /// HEARTBEAT is younger than 1.5 s.
@@ -40,7 +41,7 @@ pub enum Guard {
     /// MISSION_START.
     StartAgain,
     /// MISSION_START in a coverage mission.
-    StartOverField,
+    StartInCoverage,
     /// MISSION_START, but the plan does not leave the pad, and no vehicle will leave a part to this
     /// one; in a coverage mission all others heard have the same plan.
     StartWithoutGoal,
@@ -58,9 +59,9 @@ pub enum Guard {
     /// The position is younger than 0.5 s, and not at the vehicle's pad.
     AwayFromPad,
     /// The battery's charge is below the configured limit.
-    ChargeLow,
+    BatteryLowOnPad,
     /// The vehicle is outside the geofence, or stands at it.
-    Outside,
+    OutsideGeofenceOnPad,
     /// MISSION_START, but the estimate's error bound does not fit into the margin at cruise speed,
     /// and the state has lasted for the limit: time for the first report of the accuracy.
     StartImprecise,
@@ -76,7 +77,7 @@ pub enum Guard {
     Elapsed,
     /// The autopilot's mode is the one that follows setpoints: Offboard (PX4) or Guided
     /// (ArduCopter).
-    Offboard,
+    InSetpointMode,
     /// The pilot changed the autopilot's mode: it is foreign ([`GuardInputs::mode_foreign`]), and
     /// the autopilot reports no failsafe.
     ModeTaken,
@@ -158,15 +159,14 @@ pub enum Guard {
     ReturnCommanded,
     /// NAV_RETURN_TO_LAUNCH before the climb is done.
     ReturnInClimb,
-    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where a path home over the field may be
-    /// requested.
-    ReturnOverField,
+    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where a path home may be requested.
+    ReturnInCoverage,
     /// In a coverage mission: the path is blocked, was first found blocked here the limit ago or
     /// earlier, and a path home may be requested.
-    BlockedOverField,
+    BlockedInCoverage,
     /// In a coverage mission: the path has been blocked for the limit, and the vehicle may fly
     /// around the obstacle and back to its path.
-    MayDetourOverField,
+    MayDetourInCoverage,
     /// The vehicle stands at the end of its detour, back on its path.
     DetourFlown,
     /// The vehicle is back on its path after a detour, and the rest of its own plan has come.
@@ -176,13 +176,13 @@ pub enum Guard {
     OwnPlanLost,
     /// In a coverage mission, before the last descent: the safety filter has made the vehicle yield
     /// for the limit, and a path home may be requested.
-    YieldedOverField,
+    YieldedInCoverage,
     /// In a coverage mission, before the last descent: the safety filter has kept the vehicle from
     /// moving on for the limit, and a path home may be requested.
-    HinderedOverField,
+    HinderedInCoverage,
     /// In a coverage mission: no progress along the path for the limit, and a path home may be
     /// requested.
-    StalledOverField,
+    StalledInCoverage,
     /// The vehicle seeks a path home, stands, and may request it from the shell.
     StandsToReturn,
     /// The path home has come.
@@ -315,13 +315,13 @@ impl Guard {
             Self::RoadmapBad => i.roadmap_unusable,
             Self::StartCommanded => i.start_pending && !i.imprecise_at_cruise && i.plan_leaves_pad,
             Self::StartAgain => i.start_pending,
-            Self::MayDetourOverField => {
+            Self::MayDetourInCoverage => {
                 i.path_blocked && i.may_detour_and_rejoin && i.path_blocked_for >= limit
             }
             Self::DetourFlown => i.stands_at_detour_end,
             Self::OwnPlanReady => i.own_plan_ready,
             Self::OwnPlanLost => i.own_plan_failed,
-            Self::StartOverField => i.start_pending && i.is_coverage,
+            Self::StartInCoverage => i.start_pending && i.is_coverage,
             Self::StartWithoutGoal => {
                 i.start_pending && !i.plan_leaves_pad && i.shares_plan_with_others && !i.in_reserve
             }
@@ -331,8 +331,8 @@ impl Guard {
             Self::StartBatteryLow => i.start_pending && i.battery_low,
             Self::StartOutside => i.start_pending && i.outside_geofence,
             Self::AwayFromPad => i.position_age < MAX_POSITION_AGE && !i.at_pad,
-            Self::ChargeLow => i.battery_low,
-            Self::Outside => i.outside_geofence,
+            Self::BatteryLowOnPad => i.battery_low,
+            Self::OutsideGeofenceOnPad => i.outside_geofence,
             Self::StartImprecise => {
                 i.start_pending && i.imprecise_at_cruise && i.time_in_state >= limit
             }
@@ -340,7 +340,7 @@ impl Guard {
             Self::OriginMoved => i.origin_moved,
             Self::GatesOpen => i.may_take_off,
             Self::Elapsed => i.time_in_state >= limit,
-            Self::Offboard => i.in_setpoint_mode,
+            Self::InSetpointMode => i.in_setpoint_mode,
             Self::ModeTaken => i.mode_foreign && !i.autopilot_critical,
             Self::FailsafeActs => i.mode_foreign && i.autopilot_critical,
             Self::ModeTakenArmed => i.armed && i.mode_foreign && !i.autopilot_critical,
@@ -389,17 +389,17 @@ impl Guard {
             Self::LandUnattended => i.land_pending && i.armed && i.in_setpoint_mode,
             Self::ReturnCommanded => i.return_pending,
             Self::ReturnInClimb => i.return_pending && i.in_climb,
-            Self::ReturnOverField => i.return_pending && i.may_seek_path_home,
-            Self::BlockedOverField => {
+            Self::ReturnInCoverage => i.return_pending && i.may_seek_path_home,
+            Self::BlockedInCoverage => {
                 i.path_blocked && i.path_blocked_for >= limit && i.may_begin_seeking_home()
             }
-            Self::YieldedOverField => {
+            Self::YieldedInCoverage => {
                 i.yielded_for >= limit && i.may_begin_seeking_home() && !i.in_last_descent
             }
-            Self::HinderedOverField => {
+            Self::HinderedInCoverage => {
                 i.hindered_for >= limit && i.may_begin_seeking_home() && !i.in_last_descent
             }
-            Self::StalledOverField => i.stalled_for >= limit && i.may_begin_seeking_home(),
+            Self::StalledInCoverage => i.stalled_for >= limit && i.may_begin_seeking_home(),
             Self::StandsToReturn => i.ready_to_request_path_home,
             Self::WayHomeReady => i.detour_ready && i.seeks_or_flies_path_home,
             Self::NoWayHome => {

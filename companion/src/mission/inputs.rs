@@ -258,7 +258,7 @@ const IN_AIR_HYSTERESIS_M: f32 = 0.5;
 const SURELY_IN_AIR_M: f32 = MAX_HEIGHT_ERROR_ON_GROUND_M + IN_AIR_HYSTERESIS_M;
 
 impl GuardInputs {
-    /// Whether the vehicle can request a path home over the field, and does not seek one yet.
+    /// Whether the vehicle can request a path home, and does not seek one yet.
     pub(super) fn may_begin_seeking_home(&self) -> bool {
         self.may_seek_path_home && self.seeking_home_for.is_none()
     }

@@ -36,7 +36,7 @@ impl PendingCommands {
         let lands = to.stops_to_land_or_lands();
         let resumed =
             matches!(guard, Guard::ResumeCommanded | Guard::ResumedOnPath) && to != State::Paused;
-        let returns = matches!(guard, Guard::ReturnCommanded | Guard::ReturnOverField);
+        let returns = matches!(guard, Guard::ReturnCommanded | Guard::ReturnInCoverage);
         if lands || resumed || returns {
             self.pause = false;
         }

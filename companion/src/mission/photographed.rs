@@ -10,7 +10,9 @@
 
 use planner_core::flight::{Path, PicturePlan, WaypointRange, WaypointSet};
 
-use crate::link::done::{MAX_RANGES, PhotographedReport, RANGE_LEN, decode_range, encode_range};
+use crate::link::photographed::{
+    MAX_RANGES, PhotographedReport, RANGE_LEN, decode_range, encode_range,
+};
 use crate::storage::store::{self, MAX_PROGRAM_LEN};
 use crate::time::{Duration, Instant};
 

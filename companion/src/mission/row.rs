@@ -19,8 +19,9 @@ pub enum Action {
     ForgetStart,
     /// Hold the current position from now on.
     HoldHere,
-    /// Request Offboard or Guided from the autopilot, every second.
-    RequestOffboard,
+    /// Request the mode that follows setpoints (Offboard or Guided) from the autopilot, every
+    /// second.
+    RequestSetpointMode,
     /// Request arming from the autopilot; a denied request is repeated after a second.
     RequestArming,
     /// Request NAV_TAKEOFF from the autopilot every four seconds, to the climb's height above where
@@ -29,7 +30,7 @@ pub enum Action {
     /// Let the setpoint climb from the current position to the start of the path.
     BeginClimb,
     /// Hold where the landing was stopped, and request Offboard or Guided, every second.
-    HoldOver,
+    HoldLanding,
     /// Let the reference move on along the path.
     FollowPath,
     /// Brake the reference to a stop along the path.
@@ -78,9 +79,9 @@ pub struct TransitionRow {
     pub(crate) from_mask: u32,
     /// Condition under which the row is taken.
     pub guard: Guard,
-    /// How long the guard's condition must have lasted; zero for at once. Guards without a duration
-    /// ignore it.
-    pub min_duration: Duration,
+    /// The duration that the guard compares with: how long its condition must have lasted; zero for
+    /// at once. Guards without a duration ignore it.
+    pub limit: Duration,
     /// State after the row.
     pub to: TargetState,
     /// What the companion does when the row is taken.
@@ -91,7 +92,7 @@ pub struct TransitionRow {
     pub severity: Severity,
 }
 
-/// `min_duration` of a row that is taken in the first step in which its guard is met.
+/// `limit` of a row that is taken in the first step in which its guard is met.
 pub(crate) const AT_ONCE: Duration = Duration::from_millis(0);
 
 /// Bit mask with one bit for each of these states.

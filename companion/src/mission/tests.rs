@@ -22,7 +22,7 @@ fn printed() -> String {
     );
     for row in TABLE {
         let from: Vec<String> = row.from.iter().map(|s| std::format!("{s:?}")).collect();
-        let limit = match row.min_duration.as_micros() {
+        let limit = match row.limit.as_micros() {
             0 => String::new(),
             us => std::format!("{} s", us as f64 / 1e6),
         };
@@ -167,7 +167,7 @@ fn every_state_is_reached_and_every_wait_ends() {
             .iter()
             .any(|row| row.to == TargetState::State(*state) && !row.from.contains(state));
         assert!(reached || *state == WaitAutopilot, "{state:?} is never reached");
-        let timed = |row: &&TransitionRow| row.from.contains(state) && row.min_duration > AT_ONCE;
+        let timed = |row: &&TransitionRow| row.from.contains(state) && row.limit > AT_ONCE;
         // On the ground, disarmed, a state that waits for the operator, the autopilot or a
         // neighbour needs no limit.
         let patient = [WaitAutopilot, WaitPosition, Ready, Scheduled, Done, Aborted];
@@ -229,8 +229,8 @@ fn inputs_for(guard: Guard) -> GuardInputs {
                 (true, true, true, false, true);
         }
         G::AwayFromPad => i.armed = false,
-        G::ChargeLow => (i.armed, i.battery_low) = (false, true),
-        G::Outside => (i.armed, i.outside_geofence) = (false, true),
+        G::BatteryLowOnPad => (i.armed, i.battery_low) = (false, true),
+        G::OutsideGeofenceOnPad => (i.armed, i.outside_geofence) = (false, true),
         G::DisarmedAtGoal => (i.armed, i.reference_at_goal) = (false, true),
         G::StaysArmed => i.time_in_state = long,
         G::StaysDisarmed => (i.armed, i.time_in_state) = (false, long),
@@ -249,7 +249,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::LandUnattended => (i.land_pending, i.airborne, i.in_setpoint_mode) = (true, true, true),
         G::ReturnInClimb => (i.return_pending, i.in_climb) = (true, true),
         G::Elapsed => i.time_in_state = long,
-        G::Offboard => i.in_setpoint_mode = true,
+        G::InSetpointMode => i.in_setpoint_mode = true,
         G::ModeTaken => i.mode_foreign = true,
         G::FailsafeActs => (i.mode_foreign, i.autopilot_critical) = (true, true),
         G::ModeTakenArmed => i.mode_foreign = true,
@@ -271,23 +271,23 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::ResumedOffPath => (i.in_setpoint_mode, i.resume_pending) = (true, true),
         G::LandCommanded => i.land_pending = true,
         G::ReturnCommanded => i.return_pending = true,
-        G::ReturnOverField => (i.return_pending, i.may_seek_path_home) = (true, true),
-        G::BlockedOverField => {
+        G::ReturnInCoverage => (i.return_pending, i.may_seek_path_home) = (true, true),
+        G::BlockedInCoverage => {
             (i.path_blocked, i.may_seek_path_home, i.path_blocked_for) = (true, true, long);
         }
-        G::MayDetourOverField => {
+        G::MayDetourInCoverage => {
             (i.path_blocked, i.may_detour_and_rejoin, i.path_blocked_for) = (true, true, long);
         }
         G::DetourFlown => i.stands_at_detour_end = true,
         G::OwnPlanReady => i.own_plan_ready = true,
         G::OwnPlanLost => i.own_plan_failed = true,
-        G::YieldedOverField => {
+        G::YieldedInCoverage => {
             (i.yielded_for, i.hindered_for, i.may_seek_path_home) = (long, long, true);
         }
-        G::HinderedOverField => (i.hindered_for, i.may_seek_path_home) = (long, true),
+        G::HinderedInCoverage => (i.hindered_for, i.may_seek_path_home) = (long, true),
         G::StartAgain => i.start_pending = true,
-        G::StartOverField => (i.start_pending, i.is_coverage) = (true, true),
-        G::StalledOverField => (i.stalled_for, i.may_seek_path_home) = (long, true),
+        G::StartInCoverage => (i.start_pending, i.is_coverage) = (true, true),
+        G::StalledInCoverage => (i.stalled_for, i.may_seek_path_home) = (long, true),
         G::StartBarred => {
             (i.start_barred_for, i.may_leave_part_to_others, i.plan_leaves_pad) =
                 (long, true, true);
@@ -373,7 +373,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
             inputs.at_pad |= !matches!(row.guard, G::AwayFromPad | G::StartElsewhere);
             let taken = first_applicable_row(*from, &inputs).expect("a row");
             assert!(core::ptr::eq(taken, row), "{from:?} with {:?}: {}", row.guard, taken.text);
-            if row.min_duration > AT_ONCE {
+            if row.limit > AT_ONCE {
                 let quiet = GuardInputs { armed: inputs.armed, ..GuardInputs::default() };
                 let before = first_applicable_row(*from, &quiet);
                 assert!(

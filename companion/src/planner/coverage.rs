@@ -36,7 +36,7 @@ pub(crate) const OPEN_FIELD_CLEARANCE_M: f32 = 10.0;
 pub struct Workspace<const X: usize, const L: usize, const K: usize> {
     vertices: Vec<Flat, X>,
     rings: Vec<Ring, MAX_RINGS>,
-    strips: tracks::LaneWorkspace<X>,
+    lane_workspace: tracks::LaneWorkspace<X>,
     tracks: Tracks<L>,
     pack: PackWorkspace<K>,
     routes: RoutePlan<K>,
@@ -66,7 +66,7 @@ impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
         Self {
             vertices: Vec::new(),
             rings: Vec::new(),
-            strips: tracks::LaneWorkspace::new(),
+            lane_workspace: tracks::LaneWorkspace::new(),
             tracks: Tracks::new(),
             pack: PackWorkspace::new(),
             routes: RoutePlan::new(),
@@ -353,7 +353,7 @@ pub fn plan_flights<
             border_overshoot_m: header.lane_overshoot_m,
             max_search_steps: header.search_steps,
         };
-        tracks::build_lanes(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
+        tracks::build_lanes(&area, &pattern, &transit, &mut ws.lane_workspace, &mut ws.tracks)?;
         if ws.tracks.waypoint_count() > PicturePlan::MAX_AREA_WAYPOINTS {
             return Err(CoverageError::LanesFull.into());
         }

@@ -241,7 +241,7 @@ fn an_area_is_planned_without_what_is_photographed_and_after_losses() {
 #[test]
 fn each_failure_has_its_reason() {
     use PlanFailure::*;
-    let home = DetourGoal::Home { above_pad: STARTS[0], layer_z_m: 30.0 };
+    let home = DetourGoal::Point { end: STARTS[0], layer_z_m: 30.0 };
     let requests = [RequestedPlan::Flight, detour(DetourGoal::RoadmapGoal(0)), detour(home)];
     for requested in &requests {
         let mut nothing = Box::<Bench>::default();

@@ -114,7 +114,7 @@ pub(crate) struct Detours {
     failed_at_m: f32,
     /// Where along the path, metres, the last search for a detour to the goal found none, if no
     /// other vehicle has moved since.
-    found_none_at_m: Option<f32>,
+    no_path_found_at_m: Option<f32>,
     /// When the first of `failed_searches_here` failed, and the last search for a detour anywhere.
     failed_since: Instant,
     failed_at: Instant,
@@ -281,7 +281,7 @@ impl Detours {
                     || !view.guidance.filter.column_clear()
                     || view.neighbours.unlinked_duration(now, view.mission.started_at())
                         >= WAITS_UNHEARD_ON_PAD_AFTER
-                    || (held && !view.guidance.may_depart())
+                    || (held && !view.guidance.advice_allows_departure())
             }
             State::Follow => held && stands,
             State::Climb => {
@@ -379,7 +379,7 @@ impl Detours {
         }
         if !view.neighbours.are_all_standing(now) {
             // Another vehicle moved, which may have freed the path.
-            (self.all_standing_since, self.found_none_at_m) = (None, None);
+            (self.all_standing_since, self.no_path_found_at_m) = (None, None);
             (self.failed_searches, self.no_retry) = (0, false);
         } else if self.all_standing_since.is_none() {
             self.all_standing_since = Some(now);

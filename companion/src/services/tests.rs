@@ -195,7 +195,7 @@ fn a_flying_companion_asks_for_no_erasure() {
 }
 
 #[test]
-fn time_and_version_are_told_on_either_link() {
+fn time_and_version_are_answered_on_either_link() {
     for link in [Link::Autopilot, Link::Swarm] {
         let mut ground = Ground::new();
         let heard = ground.ask(link, &TIMESYNC_DATA { tc1: 0, ts1: 42 });

@@ -7,9 +7,9 @@
 //! flies, and where it then holds. From the entries all compute the same division, and report its
 //! hash. Once all that live have reported the same hash and hold, the division is binding, and all
 //! fly on ([`Fleet::step`]). A vehicle photographs only while it has its lease: within [`LEASE`] a
-//! majority reported that they hear it. Others take its part no sooner than [`SILENT_AFTER`] after
-//! each of them last heard it. Why no waypoint has two owners is in `docs/coverage.md`, claim by
-//! claim; `tests/tests/fleet_model` searches for a counterexample.
+//! majority reported that they hear it. Others take its part no sooner than [`LOST_AFTER_SILENCE`]
+//! after each of them last heard it. Why no waypoint has two owners is in `docs/coverage.md`, claim
+//! by claim; `tests/tests/fleet_model` searches for a counterexample.
 
 use heapless::Vec;
 use planner_core::file::CRC32;
@@ -25,7 +25,7 @@ mod tests;
 mod timeouts;
 
 pub use division_input::{DivisionInputs, VehicleDivisionInput};
-pub use timeouts::{FleetTimeouts, LEASE, LEASE_HEARD_WITHIN, SILENT_AFTER};
+pub use timeouts::{FleetTimeouts, LEASE, LEASE_HEARD_WITHIN, LOST_AFTER_SILENCE};
 
 /// Time of flight up to a vehicle's commitment, seconds: it commits itself to fly to the last
 /// picture that it takes in that time. A vehicle whose path ends before its route requests a
@@ -117,7 +117,7 @@ impl FleetVehicle {
 pub struct Fleet<const V: usize> {
     own_rank: u8,
     /// All vehicles of the roster by rank, this one included.
-    members: Vec<FleetVehicle, V>,
+    vehicles: Vec<FleetVehicle, V>,
     /// Inputs of the binding divisions, oldest first.
     divisions: Vec<DivisionInputs<V>, MAX_DIVISIONS>,
     /// Hash of the last binding division; 0 before the first.
@@ -139,10 +139,10 @@ pub struct Fleet<const V: usize> {
     /// Whether this vehicle waits for its start, and knows of none that was started: there is no
     /// flight in which one could be lost or leave.
     idle: bool,
-    /// Ranks of the vehicles in flight (started, and taking part) by their own reports, as bits.
-    in_flight_bits: u32,
-    /// Ranks of the other vehicles that report that they hear one in flight, as bits.
-    hears_flight_bits: u32,
+    /// Ranks of the vehicles that were started and take part, by their own reports, as bits.
+    started_bits: u32,
+    /// Ranks of the other vehicles that report that they hear a started one, as bits.
+    hears_started_bits: u32,
     /// Ranks of the vehicles that have reported their own entry, as bits.
     introduced_bits: u32,
     /// Whether this vehicle is in the air.
@@ -157,10 +157,10 @@ pub struct Fleet<const V: usize> {
 impl<const V: usize> Fleet<V> {
     /// A fleet of `count` vehicles (at most `V`), as known to the vehicle of rank `own`.
     pub fn new(own: usize, count: usize, limits: FleetTimeouts) -> Self {
-        let member = FleetVehicle { has_part: true, ..FleetVehicle::default() };
+        let vehicle = FleetVehicle { has_part: true, ..FleetVehicle::default() };
         Self {
             own_rank: own as u8,
-            members: core::iter::repeat_n(member, count.min(V)).collect(),
+            vehicles: core::iter::repeat_n(vehicle, count.min(V)).collect(),
             divisions: Vec::new(),
             committed_hash: 0,
             pending_inputs: Vec::new(),
@@ -171,8 +171,8 @@ impl<const V: usize> Fleet<V> {
             excluded: false,
             plan_crc8: 0,
             idle: false,
-            in_flight_bits: 0,
-            hears_flight_bits: 0,
+            started_bits: 0,
+            hears_started_bits: 0,
             introduced_bits: 0,
             airborne: false,
             down_at: Instant::ZERO,
@@ -185,13 +185,13 @@ impl<const V: usize> Fleet<V> {
     /// is forgotten. A vehicle that was lost, excluded, has left, finished or flew a division takes
     /// part again under a new incarnation number.
     pub fn begin_flight(&mut self, now: Instant) {
-        let entry = self.members[usize::from(self.own_rank)].entry;
+        let entry = self.vehicles[usize::from(self.own_rank)].entry;
         if entry.status != ShareStatus::Alive || self.excluded || !self.divisions.is_empty() {
             self.rejoin((entry.incarnation + 1) % INCARNATIONS);
         }
         self.forget_plan();
-        (self.in_flight_bits, self.hears_flight_bits) = (0, 0);
-        self.members.iter_mut().for_each(|member| member.heard_at = now);
+        (self.started_bits, self.hears_started_bits) = (0, 0);
+        self.vehicles.iter_mut().for_each(|vehicle| vehicle.heard_at = now);
         // A majority has to hear this vehicle before it takes off.
         self.lease_renewed_at = Instant::ZERO;
     }
@@ -210,9 +210,9 @@ impl<const V: usize> Fleet<V> {
         self.divisions.clear();
         self.pending_inputs.clear();
         self.withdrawn_inputs.clear();
-        for member in &mut self.members {
-            member.entry = member.entry.seen_from_another_division();
-            (member.has_part, member.pending_hash) = (true, 0);
+        for vehicle in &mut self.vehicles {
+            vehicle.entry = vehicle.entry.seen_from_another_division();
+            (vehicle.has_part, vehicle.pending_hash) = (true, 0);
         }
     }
 
@@ -221,20 +221,20 @@ impl<const V: usize> Fleet<V> {
     /// all would count as lost.
     fn rejoin(&mut self, incarnation: u8) {
         let fresh = FleetVehicle { has_part: true, ..FleetVehicle::default() };
-        for member in &mut self.members {
-            *member = FleetVehicle { heard_at: member.heard_at, ..fresh };
+        for vehicle in &mut self.vehicles {
+            *vehicle = FleetVehicle { heard_at: vehicle.heard_at, ..fresh };
         }
         *self = Self {
-            members: core::mem::take(&mut self.members),
+            vehicles: core::mem::take(&mut self.vehicles),
             lease_renewed_at: self.lease_renewed_at,
-            in_flight_bits: self.in_flight_bits,
-            hears_flight_bits: self.hears_flight_bits,
+            started_bits: self.started_bits,
+            hears_started_bits: self.hears_started_bits,
             airborne: self.airborne,
             plan_crc8: self.plan_crc8,
             idle: self.idle,
             ..Self::new(usize::from(self.own_rank), 0, self.limits)
         };
-        self.members[usize::from(self.own_rank)].entry.incarnation = incarnation;
+        self.vehicles[usize::from(self.own_rank)].entry.incarnation = incarnation;
     }
 
     /// One step: updates this vehicle's entry, the reception of the others, the lease, and the
@@ -248,7 +248,7 @@ impl<const V: usize> Fleet<V> {
         (self.airborne, self.down_at, self.any_missing) = (own.airborne, Instant::ZERO, false);
         // This vehicle may not yet have the path of the last division.
         let caught_up = own.path_division_count == self.divisions.len();
-        let entry = &mut self.members[usize::from(self.own_rank)].entry;
+        let entry = &mut self.vehicles[usize::from(self.own_rank)].entry;
         // The path of a vehicle that has left is no part of its share: its progress does not count.
         if caught_up && entry.status == ShareStatus::Alive {
             entry.progress_dm = entry.progress_dm.max(own.progress_dm);
@@ -257,32 +257,32 @@ impl<const V: usize> Fleet<V> {
         entry.status = entry.status.max(status);
         let takes_off = !own.waits_for_start && entry.status == ShareStatus::Alive;
         let bit = self.own_bit();
-        self.in_flight_bits = self.in_flight_bits & !bit | if takes_off { bit } else { 0 };
-        self.hears_flight_bits &= !bit;
+        self.started_bits = self.started_bits & !bit | if takes_off { bit } else { 0 };
+        self.hears_started_bits &= !bit;
         let mut linked = bit;
         let counted = self.counted_ranks();
-        for (rank, member) in self.members.iter_mut().enumerate() {
+        for (rank, vehicle) in self.vehicles.iter_mut().enumerate() {
             let heard = hearing(rank);
             let lately = heard.heard_at.is_some_and(|at| now - at <= self.limits.heard_within);
             if rank == usize::from(self.own_rank) || lately || heard.heard_by_others {
-                member.heard_at = now;
+                vehicle.heard_at = now;
             }
-            member.heard_by_us = lately;
-            let (silence, bit) = (now - member.heard_at, 1 << rank.min(31));
-            if silence >= MISSED_AFTER && member.has_part {
-                let falls = member.entry.status <= ShareStatus::Lost;
-                let down_at = member.heard_at + self.limits.down_after;
+            vehicle.heard_by_us = lately;
+            let (silence, bit) = (now - vehicle.heard_at, 1 << rank.min(31));
+            if silence >= MISSED_AFTER && vehicle.has_part {
+                let falls = vehicle.entry.status <= ShareStatus::Lost;
+                let down_at = vehicle.heard_at + self.limits.down_after;
                 self.down_at = if falls { self.down_at.max(down_at) } else { self.down_at };
             }
             // A vehicle that hears no majority is to land, and leaves its part when its lease ends.
             let cut_off = lately && !Self::is_majority_of(heard.heard_bits | bit, counted);
-            self.any_missing |= (silence >= MISSED_AFTER || cut_off) && member.takes_part();
+            self.any_missing |= (silence >= MISSED_AFTER || cut_off) && vehicle.takes_part();
             if silence >= self.limits.lost_after {
-                self.hears_flight_bits &= !bit;
+                self.hears_started_bits &= !bit;
                 // The vehicle counts as lost and has landed by now; or its battery is empty.
-                let lost = member.entry.status == ShareStatus::Lost;
+                let lost = vehicle.entry.status == ShareStatus::Lost;
                 if (lost && silence >= self.limits.down_after) || silence >= LANDED_AFTER_SILENCE {
-                    self.in_flight_bits &= !bit;
+                    self.started_bits &= !bit;
                 }
             }
             linked |= u32::from(lately && heard.hears_us) << rank.min(31);
@@ -290,7 +290,7 @@ impl<const V: usize> Fleet<V> {
         if self.is_majority(|rank, _| linked >> rank & 1 != 0) {
             self.lease_renewed_at = now;
         }
-        self.idle = own.waits_for_start && !self.is_another_in_flight();
+        self.idle = own.waits_for_start && !self.is_another_started();
         if self.idle {
             self.forget_earlier_flight(now);
         }
@@ -304,17 +304,17 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Whether another vehicle is in flight, as far as this one has heard, or as a vehicle that it
-    /// hears has heard. A vehicle that fell silent in flight may still fly.
-    fn is_another_in_flight(&self) -> bool {
-        self.other_ranks_in_flight() | self.hears_flight_bits & !self.own_bit() != 0
+    /// Whether another vehicle was started and takes part, as far as this one has heard, or as a
+    /// vehicle that it hears has heard. One that fell silent in flight may still fly.
+    fn is_another_started(&self) -> bool {
+        self.other_started_ranks() | self.hears_started_bits & !self.own_bit() != 0
     }
 
-    /// Ranks of the other vehicles that this one knows to be in flight, as bits.
-    fn other_ranks_in_flight(&self) -> u32 {
-        let counts = |rank: &usize| self.members[*rank].entry.status <= ShareStatus::Lost;
-        let known = (0..self.members.len()).filter(counts).fold(0, |bits, rank| bits | 1 << rank);
-        self.in_flight_bits & known & !self.own_bit()
+    /// Ranks of the other vehicles that this one knows to be started, as bits.
+    fn other_started_ranks(&self) -> u32 {
+        let counts = |rank: &usize| self.vehicles[*rank].entry.status <= ShareStatus::Lost;
+        let known = (0..self.vehicles.len()).filter(counts).fold(0, |bits, rank| bits | 1 << rank);
+        self.started_bits & known & !self.own_bit()
     }
 
     fn own_bit(&self) -> u32 {
@@ -324,10 +324,10 @@ impl<const V: usize> Fleet<V> {
     /// Before a start vehicles come up one after the other, and report places along their paths of
     /// an earlier flight: neither silence nor progress counts yet.
     fn forget_earlier_flight(&mut self, now: Instant) {
-        for (rank, member) in self.members.iter_mut().enumerate() {
-            member.heard_at = now;
+        for (rank, vehicle) in self.vehicles.iter_mut().enumerate() {
+            vehicle.heard_at = now;
             if rank != usize::from(self.own_rank) {
-                member.entry = member.entry.seen_from_another_division();
+                vehicle.entry = vehicle.entry.seen_from_another_division();
             }
         }
     }
@@ -338,12 +338,12 @@ impl<const V: usize> Fleet<V> {
     /// commitment until a division is binding, even if the lost vehicle turns out to have
     /// finished: others may already count on it.
     pub fn is_dividing(&self) -> bool {
-        let asks = |m: &FleetVehicle| match m.entry.status {
-            ShareStatus::Alive => m.entry.commitment_dm.is_some(),
+        let asks = |v: &FleetVehicle| match v.entry.status {
+            ShareStatus::Alive => v.entry.commitment_dm.is_some(),
             ShareStatus::Lost | ShareStatus::Left => true,
             ShareStatus::Finished => false,
         };
-        self.may_divide() && self.members.iter().any(|m| m.has_part && asks(m))
+        self.may_divide() && self.vehicles.iter().any(|v| v.has_part && asks(v))
     }
 
     /// Whether this vehicle takes part in a flight in which a division is still possible.
@@ -355,34 +355,34 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether the vehicle of this rank has a part, and was not lost, has not left or finished.
     pub(crate) fn vehicle_takes_part(&self, rank: usize) -> bool {
-        self.members[rank].takes_part()
+        self.vehicles[rank].takes_part()
     }
 
     /// Computes the inputs of the division under way, once all vehicles that live have reported
-    /// commitments, and this vehicle has not heard the lost ones for [`SILENT_AFTER`] either;
+    /// commitments, and this vehicle has not heard the lost ones for [`LOST_AFTER_SILENCE`] either;
     /// without its lease this vehicle computes none.
     fn prepare_division_inputs(&mut self, now: Instant) {
-        let known = |m: &FleetVehicle| match m.entry.status {
-            ShareStatus::Alive => m.entry.commitment_dm.is_some(),
-            ShareStatus::Lost => now - m.heard_at >= self.limits.lost_after,
+        let known = |v: &FleetVehicle| match v.entry.status {
+            ShareStatus::Alive => v.entry.commitment_dm.is_some(),
+            ShareStatus::Lost => now - v.heard_at >= self.limits.lost_after,
             ShareStatus::Left | ShareStatus::Finished => true,
         };
-        if !self.has_lease(now) || !self.members.iter().filter(|m| m.has_part).all(known) {
+        if !self.has_lease(now) || !self.vehicles.iter().filter(|v| v.has_part).all(known) {
             self.withdraw_inputs();
             self.pending_inputs.clear();
             return;
         }
         // A vehicle that has no part since an earlier division gets none in this one.
-        let input = |m: &FleetVehicle| {
-            if m.has_part {
-                VehicleDivisionInput::from_entry(&m.entry)
+        let input = |v: &FleetVehicle| {
+            if v.has_part {
+                VehicleDivisionInput::from_entry(&v.entry)
             } else {
                 VehicleDivisionInput::default()
             }
         };
-        if !self.members.iter().map(input).eq(self.pending_inputs.iter().copied()) {
+        if !self.vehicles.iter().map(input).eq(self.pending_inputs.iter().copied()) {
             self.withdraw_inputs();
-            self.pending_inputs = self.members.iter().map(input).collect();
+            self.pending_inputs = self.vehicles.iter().map(input).collect();
         }
     }
 
@@ -419,7 +419,7 @@ impl<const V: usize> Fleet<V> {
             }
             // 0 stands for no hash.
             self.pending_hash = digest.finalize().max(1);
-            self.members[usize::from(self.own_rank)].pending_hash = self.pending_hash;
+            self.vehicles[usize::from(self.own_rank)].pending_hash = self.pending_hash;
         }
     }
 
@@ -427,15 +427,15 @@ impl<const V: usize> Fleet<V> {
     /// hash that this vehicle computed, and hold; they are a majority; the lost ones are down.
     fn is_division_agreed(&self, now: Instant) -> bool {
         let agrees = |rank: usize| {
-            let member = &self.members[rank];
-            member.pending_hash == self.pending_hash && member.entry.holds
+            let vehicle = &self.vehicles[rank];
+            vehicle.pending_hash == self.pending_hash && vehicle.entry.holds
         };
-        let is_down = |m: &FleetVehicle| {
-            m.entry.status != ShareStatus::Lost || now - m.heard_at >= self.limits.down_after
+        let is_down = |v: &FleetVehicle| {
+            v.entry.status != ShareStatus::Lost || now - v.heard_at >= self.limits.down_after
         };
         self.pending_hash != 0
-            && self.members.iter().filter(|m| m.has_part).all(is_down)
-            && (0..self.members.len()).filter(|rank| self.vehicle_takes_part(*rank)).all(agrees)
+            && self.vehicles.iter().filter(|v| v.has_part).all(is_down)
+            && (0..self.vehicles.len()).filter(|rank| self.vehicle_takes_part(*rank)).all(agrees)
             && self.is_majority(|rank, _| self.vehicle_takes_part(rank))
     }
 
@@ -446,12 +446,12 @@ impl<const V: usize> Fleet<V> {
         self.committed_hash = self.pending_hash;
         (self.pending_hash, self.withdrawn_hash) = (0, 0);
         self.withdrawn_inputs.clear();
-        for (member, input) in self.members.iter_mut().zip(&inputs) {
-            member.has_part &= input.alive;
-            member.pending_hash = 0;
-            member.entry = match input.alive {
-                true => member.entry.seen_from_another_division(),
-                false => member.entry.without_places(),
+        for (vehicle, input) in self.vehicles.iter_mut().zip(&inputs) {
+            vehicle.has_part &= input.alive;
+            vehicle.pending_hash = 0;
+            vehicle.entry = match input.alive {
+                true => vehicle.entry.seen_from_another_division(),
+                false => vehicle.entry.without_places(),
             };
         }
         // With `MAX_DIVISIONS` no further one is ever under way.
@@ -460,7 +460,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Number of vehicles in the roster.
     pub(crate) fn vehicle_count(&self) -> usize {
-        self.members.len()
+        self.vehicles.len()
     }
 
     /// Hash of the inputs of all binding divisions, and of the one under way if that is to be
@@ -478,7 +478,7 @@ impl<const V: usize> Fleet<V> {
     /// division is under way; `None` before it was reported.
     pub fn commitment_dm(&self) -> Option<u16> {
         // An own commitment alone means that a division is under way.
-        self.members[usize::from(self.own_rank)].entry.commitment_dm.filter(|_| self.may_divide())
+        self.vehicles[usize::from(self.own_rank)].entry.commitment_dm.filter(|_| self.may_divide())
     }
 
     /// Where this vehicle held for the last binding division, decimetres along the path that it

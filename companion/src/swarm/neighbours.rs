@@ -134,7 +134,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Adds the entry of a vehicle not heard yet. Returns its index; `None` if the table is full.
     fn add_entry(&mut self, id: u8, rank: u16) -> Option<usize> {
-        let entry = NeighbourEntry::unheard(
+        let entry = NeighbourEntry::new_not_heard_yet(
             id,
             rank,
             self.min_unheard_progress_mps,

@@ -15,7 +15,7 @@ fn any_number_of_threads_gives_the_same_edges() {
         sampling: Sampling::Uniform,
     };
     let nodes = sample(&map, &[], &config).unwrap();
-    let mut workspace = Box::new(NodeIndex::<512, 4096>::new());
+    let mut workspace = Box::new(NodeGrid::<512, 4096>::new());
     let mut alone = vec![prm::PrmEdge::default(); 20_000];
     let count = prm::connect(&map.grid(), &nodes, &config, &mut workspace, &mut alone).unwrap();
     assert!(count > 500);

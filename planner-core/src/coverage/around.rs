@@ -80,7 +80,7 @@ impl<const N: usize> LegConstraints<'_, '_, N> {
     }
 }
 
-/// Writes a path to `out`: to the goal ([`DetourGoal::Home`]), or, with
+/// Writes a path to `out`: to the goal ([`DetourGoal::Point`]), or, with
 /// [`DetourRequest::land_aside`], to a point aside. The path keeps out of all `obstacles` and of
 /// the no-fly zones of `transit`, and stays above the field. An obstacle that already contains the
 /// vehicle is shrunk, unless it is a descending vehicle's.
@@ -96,7 +96,7 @@ pub fn plan_detour<const N: usize, const W: usize>(
 ) -> Result<(), DetourError> {
     request.check().map_err(DetourError::Config)?;
     obstacles.iter().try_for_each(KeepOutZone::check).map_err(DetourError::Config)?;
-    let DetourGoal::Home { above_pad: over, layer_z_m: layer_m } = request.goal else {
+    let DetourGoal::Point { end: over, layer_z_m: layer_m } = request.goal else {
         return Err(DetourError::Search(SearchError::NoPath));
     };
     detour::shrink_zones(obstacles, &request.here);

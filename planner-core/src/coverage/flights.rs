@@ -93,9 +93,9 @@ pub struct FlightInputs<'a> {
 ///
 /// # Errors
 /// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a
-/// vehicle that cannot be kept apart from the others, [`PlanError::Terminals`] if pads, vehicles,
-/// routes and lanes are inconsistent, [`PlanError::Config`] for a setting, [`PlanError::BadTask`]
-/// for a setting of a vehicle, [`PlanError::SameId`].
+/// vehicle that cannot be kept apart from the others, [`PlanError::CountMismatch`] if pads,
+/// vehicles, routes and lanes are inconsistent, [`PlanError::Config`] for a setting,
+/// [`PlanError::BadTask`] for a setting of a vehicle, [`PlanError::SameId`].
 pub fn plan_flights<
     const L: usize,
     const N: usize,
@@ -171,7 +171,7 @@ fn check_inputs<const L: usize, const N: usize>(
         || !routes.iter().all(within)
         || !divide::is_sorted_disjoint(inputs.photographed)
     {
-        return Err(PlanError::Terminals);
+        return Err(PlanError::CountMismatch);
     }
     for (index, (pad, vehicle)) in inputs.pads.iter().zip(problem.vehicles).enumerate() {
         let speeds = [

@@ -36,7 +36,11 @@ fn at(place: Point, radius_m: f32) -> KeepOutZone {
 }
 
 fn landing(from: Point) -> KeepOutZone {
-    KeepOutZone { to: Point::new(from.x, from.y, 0.0), kind: ZoneKind::Descending, ..at(from, 2.0) }
+    KeepOutZone {
+        to: Point::new(from.x, from.y, 0.0),
+        kind: ZoneKind::LandingColumn,
+        ..at(from, 2.0)
+    }
 }
 
 /// Plans a detour, and checks what holds for every path: it begins at the vehicle, joins nodes and

@@ -125,7 +125,7 @@ impl<'p> PictureStretch<'p> {
 
     /// Arc length along the path of picture `k` of this stretch (from 0), metres; that of the last
     /// picture if `k` is too large.
-    pub fn picture_at_m(&self, k: u32) -> f32 {
+    pub fn picture_arc_length_m(&self, k: u32) -> f32 {
         let mut left_m = self.ground_spacing_m * k as f32;
         for segment in straight_segments(self.corners) {
             if left_m < segment.ground_length_m {
@@ -288,7 +288,7 @@ impl PicturePlan {
             })
             .filter(|(.., taken)| *taken > 0)
             .last()?;
-        PictureStretch::new(corners, count).map(|stretch| stretch.picture_at_m(taken - 1))
+        PictureStretch::new(corners, count).map(|stretch| stretch.picture_arc_length_m(taken - 1))
     }
 
     /// The waypoints of the area that the path's pictures `pictures.first` to `pictures.end` − 1

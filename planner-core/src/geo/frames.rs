@@ -22,7 +22,7 @@ const WGS84_E2: f64 = WGS84_F * (2.0 - WGS84_F);
 /// Radius of the sphere on which PX4 projects (`CONSTANTS_RADIUS_OF_EARTH`), metres.
 pub const PX4_EARTH_RADIUS_M: f64 = 6_371_000.0;
 /// ArduPilot's `LOCATION_SCALING_FACTOR`: metres along a meridian per 1e-7 degree of latitude.
-pub const ARDUPILOT_M_PER_1E7_DEG: f64 = 0.011_131_884_502_145_034;
+pub const ARDUPILOT_M_PER_DEG_E7: f64 = 0.011_131_884_502_145_034;
 
 /// A geodetic position on WGS84.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -156,7 +156,7 @@ pub fn geodetic_to_ned(
             Vector3::new(north, k * cos(lat) * sin(dlon), down)
         }
         Projection::ArduPilot => {
-            let scale = ARDUPILOT_M_PER_1E7_DEG * 1e7;
+            let scale = ARDUPILOT_M_PER_DEG_E7 * 1e7;
             let middle = ((origin.lat_deg + position.lat_deg) / 2.0).to_radians();
             let east =
                 wrap_180_deg(position.lon_deg - origin.lon_deg) * scale * cos(middle).max(0.01);
@@ -183,7 +183,7 @@ pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<
             Geodetic { lat_deg: lat.to_degrees(), lon_deg: wrap_180_deg(lon.to_degrees()), alt_m }
         }
         Projection::ArduPilot => {
-            let scale = ARDUPILOT_M_PER_1E7_DEG * 1e7;
+            let scale = ARDUPILOT_M_PER_DEG_E7 * 1e7;
             let lat_deg = origin.lat_deg + ned.x / scale;
             let middle = ((origin.lat_deg + lat_deg) / 2.0).to_radians();
             let lon_deg = wrap_180_deg(origin.lon_deg + ned.y / (scale * cos(middle).max(0.01)));

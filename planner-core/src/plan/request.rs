@@ -86,7 +86,7 @@ impl PlanRequest<'_> {
 pub enum PlanError {
     /// The numbers of starts and goals in the roadmap are not those of the request; or pads, routes
     /// and lanes of a coverage mission are inconsistent.
-    Terminals,
+    CountMismatch,
     /// More than `V` vehicles or goals.
     SwarmFull,
     /// A setting of the schedule is out of range.

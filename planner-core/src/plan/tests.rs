@@ -267,7 +267,7 @@ fn the_same_request_gives_the_same_plan_and_another_gives_another_crc() {
 fn wrong_requests_are_refused_by_name() {
     let bytes = open_roadmap(&spread(4, 7), 2, 50, 7);
     let unlabelled = GoalMode::Unlabelled(Objective::TotalDistance);
-    assert_eq!(plan(&bytes, &tasks(3), 2, unlabelled).unwrap_err(), PlanError::Terminals);
+    assert_eq!(plan(&bytes, &tasks(3), 2, unlabelled).unwrap_err(), PlanError::CountMismatch);
     let mut twice = tasks(2);
     twice[1].id = 1;
     assert_eq!(plan(&bytes, &twice, 2, unlabelled).unwrap_err(), PlanError::SameId(1));

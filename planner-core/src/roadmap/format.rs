@@ -82,7 +82,7 @@ pub enum RoadmapError {
     /// The edge with this index joins a node to itself.
     SelfLoop(usize),
     /// The edge with this index has a clearance that is NaN, infinite or negative.
-    Clearance(usize),
+    InvalidClearance(usize),
     /// Two edges join these two nodes.
     Duplicate(u16, u16),
 }

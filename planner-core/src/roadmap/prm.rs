@@ -6,7 +6,7 @@
 //! the segment between them keeps `clearance_m` ([`segment_is_clear`]). The edges are exactly those
 //! that a loop over all pairs finds ([`connect_all_pairs`]), with less work:
 //!
-//! 1. nodes are sorted into cubes ([`NodeIndex`]), so that only near pairs are measured;
+//! 1. nodes are sorted into cubes ([`NodeGrid`]), so that only near pairs are measured;
 //! 2. around a node the largest empty box in a fixed order of growth is taken (`prm/free_box.rs`):
 //!    the segment to another node inside the box is clear, and one that leaves the box mostly meets
 //!    a wall;
@@ -32,7 +32,7 @@ pub use self::config::{
     squared_length,
 };
 use self::free_box::NodeVisibility;
-pub use self::neighbours::NodeIndex;
+pub use self::neighbours::NodeGrid;
 use crate::Point;
 use crate::map::segment::{point_clearance, segment_clearance, segment_is_clear};
 use crate::map::voxel::VoxelGrid;
@@ -176,10 +176,10 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     nodes: &[Point],
     config: &PrmConfig,
-    workspace: &mut NodeIndex<NODES, CUBES>,
+    workspace: &mut NodeGrid<NODES, CUBES>,
     edges: &mut [PrmEdge],
 ) -> Result<usize, PrmError> {
-    workspace.build_index(nodes, config)?;
+    workspace.sort_nodes(nodes, config)?;
     let mut count = 0;
     connect_range(grid, workspace, config, 0..nodes.len(), |edge| {
         *edges.get_mut(count).ok_or(PrmError::RoadmapFull)? = edge;
@@ -195,7 +195,7 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
 /// result.
 pub fn connect_range<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
-    workspace: &NodeIndex<NODES, CUBES>,
+    workspace: &NodeGrid<NODES, CUBES>,
     config: &PrmConfig,
     range: Range<usize>,
     mut found: impl FnMut(PrmEdge) -> Result<(), PrmError>,
@@ -217,7 +217,7 @@ pub fn connect_range<const NODES: usize, const CUBES: usize>(
 /// the free box gives none.
 pub fn connect_range_with_clearance_bound<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
-    workspace: &NodeIndex<NODES, CUBES>,
+    workspace: &NodeGrid<NODES, CUBES>,
     config: &PrmConfig,
     range: Range<usize>,
     hint: impl Fn(PrmEdge) -> Option<bool>,

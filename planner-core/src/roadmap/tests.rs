@@ -206,8 +206,14 @@ fn bad_input_is_refused_by_name() {
     assert_eq!(refuse(|_, nodes, _| nodes[2] = nodes[0]), RoadmapError::ZeroLength(2));
     assert_eq!(refuse(|_, _, edges| edges[1].b = 3), RoadmapError::EdgeNode(1));
     assert_eq!(refuse(|_, _, edges| edges[1].b = 2), RoadmapError::SelfLoop(1));
-    assert_eq!(refuse(|_, _, edges| edges[0].clearance_m = f32::NAN), RoadmapError::Clearance(0));
-    assert_eq!(refuse(|_, _, edges| edges[0].clearance_m = -0.1), RoadmapError::Clearance(0));
+    assert_eq!(
+        refuse(|_, _, edges| edges[0].clearance_m = f32::NAN),
+        RoadmapError::InvalidClearance(0)
+    );
+    assert_eq!(
+        refuse(|_, _, edges| edges[0].clearance_m = -0.1),
+        RoadmapError::InvalidClearance(0)
+    );
     assert_eq!(refuse(|_, _, edges| edges[1].clearance_m = 0.248), RoadmapError::EdgeClearance(2));
     assert_eq!(refuse(|_, nodes, _| nodes[1] *= 16.0), RoadmapError::EdgeLength(0));
     assert_eq!(refuse(|header, _, _| header.edge_min_m = 2.0), RoadmapError::EdgeLength(2));

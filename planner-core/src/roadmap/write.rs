@@ -162,7 +162,7 @@ fn check_edges(
             return Err(RoadmapError::SelfLoop(i));
         }
         if !(edge.clearance_m >= 0.0 && edge.clearance_m.is_finite()) {
-            return Err(RoadmapError::Clearance(i));
+            return Err(RoadmapError::InvalidClearance(i));
         }
         if edge.clearance_m < least_m {
             return Err(RoadmapError::EdgeClearance(edge.a));

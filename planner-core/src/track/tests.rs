@@ -9,16 +9,16 @@ fn a_stop_that_is_advised_too_late_is_as_long_as_flown() {
     path.push(Point::zeros(), 10.0).unwrap();
     path.push(Point::new(200.0, 0.0, 0.0), 10.0).unwrap();
     let cfg = TrackConfig { cruise_mps: 15.0, ..TrackConfig::default() };
-    let mut tracker = ReferenceState::default();
-    while tracker.along_m < 80.0 {
-        advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.02).unwrap();
+    let mut state = ReferenceState::default();
+    while state.along_m < 80.0 {
+        advance(&cfg, &path, &mut state, &Advice::FREE, 0.02).unwrap();
     }
-    let (from_m, brakes_m) = (tracker.along_m, braking_distance_m(&cfg, &path, &tracker));
+    let (from_m, brakes_m) = (state.along_m, braking_distance_m(&cfg, &path, &state));
     let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for_id: 2 };
-    while tracker.speed_mps > 0.0 {
-        advance(&cfg, &path, &mut tracker, &stop, 0.02).unwrap();
+    while state.speed_mps > 0.0 {
+        advance(&cfg, &path, &mut state, &stop, 0.02).unwrap();
     }
-    let flown_m = tracker.along_m - from_m;
+    let flown_m = state.along_m - from_m;
     assert!(flown_m > 10.0 && (brakes_m - flown_m).abs() < 0.3, "{brakes_m} {flown_m}");
 }
 
@@ -48,20 +48,20 @@ proptest! {
             deviation_max_m: 10.0,
             ..TrackConfig::default()
         };
-        let mut tracker = ReferenceState::default();
+        let mut state = ReferenceState::default();
         let stop_at_m = stop_share * path.length_m();
         for _ in 0..20_000 {
-            if tracker.along_m >= stop_at_m {
+            if state.along_m >= stop_at_m {
                 break;
             }
-            advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.01).unwrap();
+            advance(&cfg, &path, &mut state, &Advice::FREE, 0.01).unwrap();
         }
-        let (from, brakes_m) = (tracker, braking_distance_m(&cfg, &path, &tracker));
+        let (from, brakes_m) = (state, braking_distance_m(&cfg, &path, &state));
         let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for_id: 2 };
-        while tracker.speed_mps > 0.0 {
-            advance(&cfg, &path, &mut tracker, &stop, 0.001).unwrap();
+        while state.speed_mps > 0.0 {
+            advance(&cfg, &path, &mut state, &stop, 0.001).unwrap();
         }
-        let flown_m = tracker.along_m - from.along_m;
+        let flown_m = state.along_m - from.along_m;
         let stepped_m = 0.02 + 0.02 * brakes_m;
         prop_assert!(flown_m < brakes_m + stepped_m, "{brakes_m} {flown_m} {from:?}");
         let legs = |m: f32| path.waypoints().iter().filter(|w| w.along_m <= m).count();
@@ -74,13 +74,13 @@ proptest! {
 #[test]
 fn a_vehicle_that_follows_arrives_and_slows_in_the_corner() {
     let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
-    let mut tracker = ReferenceState::default();
+    let mut state = ReferenceState::default();
     let (mut at_corner, mut fastest, mut steps) = (f32::INFINITY, 0.0_f32, 0);
     let vehicle = loop {
-        let reference = advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.05).unwrap();
-        fastest = fastest.max(tracker.speed_mps);
-        if (tracker.along_m - 6.0).abs() < 0.1 {
-            at_corner = at_corner.min(tracker.speed_mps);
+        let reference = advance(&cfg, &path, &mut state, &Advice::FREE, 0.05).unwrap();
+        fastest = fastest.max(state.speed_mps);
+        if (state.along_m - 6.0).abs() < 0.1 {
+            at_corner = at_corner.min(state.speed_mps);
         }
         steps += 1;
         if reference.finished || steps > 1000 {
@@ -94,13 +94,13 @@ fn a_vehicle_that_follows_arrives_and_slows_in_the_corner() {
 #[test]
 fn stops_before_the_distance_advised_and_goes_on_when_freed() {
     let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
-    let mut tracker = ReferenceState::default();
+    let mut state = ReferenceState::default();
     for _ in 0..400 {
-        let advice = Advice { stop_within_m: 4.0 - tracker.along_m, ..Advice::FREE };
-        advance(&cfg, &path, &mut tracker, &advice, 0.05).unwrap();
-        assert!(tracker.along_m <= 4.0 + 1e-4, "{}", tracker.along_m);
+        let advice = Advice { stop_within_m: 4.0 - state.along_m, ..Advice::FREE };
+        advance(&cfg, &path, &mut state, &advice, 0.05).unwrap();
+        assert!(state.along_m <= 4.0 + 1e-4, "{}", state.along_m);
     }
-    assert!(tracker.along_m > 3.9, "{}", tracker.along_m);
+    assert!(state.along_m > 3.9, "{}", state.along_m);
 }
 
 #[test]
@@ -115,26 +115,26 @@ fn speed_changes_by_no_more_than_each_axis_allows() {
     for (x, z) in [(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (6.0, 1.0), (9.0, 1.2)] {
         path.push(Point::new(x, 0.0, z), 0.8).unwrap();
     }
-    let mut tracker = ReferenceState::default();
+    let mut state = ReferenceState::default();
     let (mut last, mut steps) = (Point::zeros(), 0);
     loop {
-        let before = tracker;
-        let reference = advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.05).unwrap();
+        let before = state;
+        let reference = advance(&cfg, &path, &mut state, &Advice::FREE, 0.05).unwrap();
         let leg = path.waypoints().iter().filter(|w| w.along_m <= before.along_m).count();
-        let same = path.waypoints().iter().filter(|w| w.along_m <= tracker.along_m).count() == leg;
+        let same = path.waypoints().iter().filter(|w| w.along_m <= state.along_m).count() == leg;
         let velocity = (reference.position - last) / 0.05;
-        let change = (tracker.speed_mps - before.speed_mps).abs() / 0.05;
+        let change = (state.speed_mps - before.speed_mps).abs() / 0.05;
         let whole = path
             .waypoints()
             .iter()
-            .all(|w| w.along_m <= tracker.along_m || w.along_m > tracker.along_m + 0.02);
+            .all(|w| w.along_m <= state.along_m || w.along_m > state.along_m + 0.02);
         if same && whole && !reference.finished {
             assert!((-0.71..1.01).contains(&velocity.z), "{velocity:?}");
-            let ahead = path.point_at(tracker.along_m + 1e-2).unwrap() - reference.position;
+            let ahead = path.point_at(state.along_m + 1e-2).unwrap() - reference.position;
             let up = (ahead.z / 1e-2).abs().min(1.0);
             assert!(
                 change * up < 1.0 + 0.02 && change * (1.0 - up * up).sqrt() < 1.52,
-                "{tracker:?}"
+                "{state:?}"
             );
         }
         (last, steps) = (reference.position, steps + 1);

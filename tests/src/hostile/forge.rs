@@ -231,8 +231,8 @@ fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> 
     let roster = RosterReport {
         system_id: if how & 8 == 0 { NEIGHBOUR_ID } else { bits as u8 },
         division_count: if ahead { (bits >> 8) as u8 } else { 0 },
-        in_flight: bits >> 4 & 1 != 0,
-        hears_vehicle_in_flight: bits >> 5 & 1 != 0,
+        has_started: bits >> 4 & 1 != 0,
+        hears_started_vehicle: bits >> 5 & 1 != 0,
         // The plan of the flight, whose CRC is 5, or another one.
         plan_crc8: if how & 32 == 0 { 5 } else { (bits >> 16) as u8 },
         first_rank: if how & 64 == 0 { 0 } else { 1 + (bits >> 16) as u8 % 255 },

@@ -22,7 +22,7 @@ pub(super) fn detour_in_the_open(
             let now_m = oracle::distance((here, here), (k.from, k.to));
             let apart_m = k.radius_m.min((now_m - 0.002).max(0.0));
             let solid =
-                if k.kind == ZoneKind::Descending { (k.from, k.from) } else { (k.from, k.to) };
+                if k.kind == ZoneKind::LandingColumn { (k.from, k.from) } else { (k.from, k.to) };
             oracle::distance((from, to), solid) >= apart_m
         })
     };

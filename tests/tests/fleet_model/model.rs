@@ -192,7 +192,7 @@ impl FleetModel {
 
     /// Whether a vehicle may photograph: it has its lease, or has not stopped since it lost it.
     fn flies(&self, vehicle: &Vehicle) -> bool {
-        let unheard = vehicle.fleet.unheard_for(NOW);
+        let unheard = vehicle.fleet.time_without_majority(NOW);
         vehicle.flight == Flight::Flies
             && (unheard <= ticks(LEASE + STOP) || self.planted == Planted::LeaseIgnored)
     }
@@ -266,7 +266,7 @@ impl FleetModel {
             vehicle.division = vehicle.fleet.division_count();
             vehicle.along = 0;
         }
-        let hovered = vehicle.fleet.unheard_for(now) >= ticks(2 * LEASE);
+        let hovered = vehicle.fleet.time_without_majority(now) >= ticks(2 * LEASE);
         if lands || (hovered && self.planted != Planted::LeaseIgnored) {
             vehicle.flight = Flight::Down;
         }

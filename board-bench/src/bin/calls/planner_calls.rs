@@ -45,7 +45,7 @@ const SMALL_ROADMAP_NODES: usize = 300;
 /// Memory of the bench beside the workspace overlay.
 struct BenchMemory {
     plan: Plan,
-    small_index: prm::NodeIndex<SMALL_ROADMAP_NODES, 1024>,
+    small_grid: prm::NodeGrid<SMALL_ROADMAP_NODES, 1024>,
     nodes: [Point; SMALL_ROADMAP_NODES],
     edges: [prm::PrmEdge; 1024],
     kept: Vec<roadmap::Edge, 1024>,
@@ -56,7 +56,7 @@ struct BenchMemory {
 static WORKSPACE: ConstStaticCell<WorkspaceOverlay> = ConstStaticCell::new(WorkspaceOverlay::new());
 static BENCH_MEMORY: ConstStaticCell<BenchMemory> = ConstStaticCell::new(BenchMemory {
     plan: Plan::new(),
-    small_index: prm::NodeIndex::new(),
+    small_grid: prm::NodeGrid::new(),
     nodes: [Point::new(0.0, 0.0, 0.0); SMALL_ROADMAP_NODES],
     edges: [prm::PrmEdge { a: 0, b: 0 }; 1024],
     kept: Vec::new(),
@@ -292,7 +292,7 @@ fn measure_largest_swarm(
 fn measure_detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut Search) {
     let mut rng = Pcg32::seed_from_u64(5);
     let bytes = size_of::<Search>();
-    let natures = [ZoneKind::Static, ZoneKind::Descending, ZoneKind::Grounded];
+    let natures = [ZoneKind::Static, ZoneKind::LandingColumn, ZoneKind::Grounded];
     let mut nodes: Vec<u16, WAYPOINTS> = Vec::new();
     let mut own = VehiclePlan::<WAYPOINTS, GATES>::default();
     for case in 0..2 {
@@ -356,13 +356,13 @@ fn measure_paths(meter: &mut impl Meter) {
         });
         meter.call("flight::Path::project", 0, || path.project(&near, along_m, length_m));
         let track = TrackConfig { cruise_mps: flight::CRUISE_MPS, ..TrackConfig::default() };
-        let mut tracker =
+        let mut reference =
             ReferenceState { along_m, speed_mps: track.cruise_mps, ..ReferenceState::default() };
         meter.call("track::advance", size_of::<ReferenceState>(), || {
-            track::advance(&track, &path, &mut tracker, &Advice::FREE, 0.05)
+            track::advance(&track, &path, &mut reference, &Advice::FREE, 0.05)
         });
         meter.call("track::braking_distance_m", 0, || {
-            track::braking_distance_m(&track, &path, &tracker)
+            track::braking_distance_m(&track, &path, &reference)
         });
         let obstacle = KeepOutZone { from: near, to: near, radius_m: 1.0, kind: ZoneKind::Static };
         meter.call("detour::is_path_blocked", 0, || {
@@ -423,7 +423,7 @@ fn measure_roadmap_builds(
     grid: &VoxelGrid<'_>,
     workspace: &mut WorkspaceOverlay,
 ) {
-    let bytes = size_of::<prm::NodeIndex<ROADMAP_NODES, ROADMAP_CUBES>>();
+    let bytes = size_of::<prm::NodeGrid<ROADMAP_NODES, ROADMAP_CUBES>>();
     let good = "the building has room";
     let builder = workspace.builder();
     meter
@@ -432,8 +432,8 @@ fn measure_roadmap_builds(
         })
         .expect(good);
     meter
-        .call("prm::NodeIndex::build_index, 2300", bytes, || {
-            builder.build_index(&cases::ROADMAP_CONFIG)
+        .call("prm::NodeGrid::sort_nodes, 2300", bytes, || {
+            builder.sort_nodes(&cases::ROADMAP_CONFIG)
         })
         .expect(good);
     meter
@@ -445,7 +445,7 @@ fn measure_roadmap_builds(
     meter
         .call("prm::sample_nodes, 2300, 0.8 m", 0, || builder.sample_nodes(grid, &[], &wide))
         .expect(good);
-    builder.build_index(&wide).expect(good);
+    builder.sort_nodes(&wide).expect(good);
     meter
         .call("prm::connect_range, 2300, 0.8 m", bytes, || builder.connect_nodes(grid, &wide))
         .expect(good);
@@ -458,13 +458,13 @@ fn measure_host_calls(
     search: &mut Search,
     beside: &mut BenchMemory,
 ) {
-    let BenchMemory { small_index, nodes, edges, kept, file, lengths, .. } = beside;
+    let BenchMemory { small_grid, nodes, edges, kept, file, lengths, .. } = beside;
     let config = PrmConfig { random_nodes: SMALL_ROADMAP_NODES, ..cases::ROADMAP_CONFIG };
     let good = "the building has room";
     prm::sample_nodes(grid, None, &[], &config, nodes).expect(good);
     let count = meter
-        .call("prm::connect, 300", size_of::<prm::NodeIndex<SMALL_ROADMAP_NODES, 1024>>(), || {
-            prm::connect(grid, nodes, &config, small_index, edges)
+        .call("prm::connect, 300", size_of::<prm::NodeGrid<SMALL_ROADMAP_NODES, 1024>>(), || {
+            prm::connect(grid, nodes, &config, small_grid, edges)
         })
         .expect(good);
     let mut pairs = 0;

@@ -451,7 +451,7 @@ fn a_neighbour_heard_again_lets_it_go_on() {
 }
 
 #[test]
-fn the_swarm_is_told_where_it_is_and_where_it_goes() {
+fn the_swarm_hears_where_it_is_and_where_it_goes() {
     let mut bench = Bench::following(config());
     bench.swarm.clear();
     bench.run(1.0);

@@ -29,7 +29,7 @@ fn above(x: f32, y: f32, z: f32) -> Neighbour {
 /// The column of a vehicle that comes down from 8 m.
 fn column(x: f32, y: f32, radius_m: f32) -> KeepOutZone {
     let (from, to) = (Point::new(x, y, 8.0), Point::new(x, y, 0.0));
-    KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending }
+    KeepOutZone { from, to, radius_m, kind: ZoneKind::LandingColumn }
 }
 
 /// Result of a search for a waiting place back from 9 m along the path, and the steps that it
@@ -79,17 +79,20 @@ fn a_search_among_all_columns_there_can_be_takes_a_dozen_steps() {
 #[test]
 fn it_goes_back_slowly_round_the_corner_and_not_into_a_follower() {
     let path = path();
-    let mut tracker = ReferenceState { along_m: 9.0, ..ReferenceState::default() };
+    let mut reference = ReferenceState { along_m: 9.0, ..ReferenceState::default() };
     let mut follower = above(0.0, 0.0, 1.0);
     follower.progress_m = Some(0.0);
     let mut steps = 0;
-    while tracker.along_m > 4.0 && steps < 400 {
-        step_back(&path, &mut tracker, 4.0, &[follower], 1.5, 0.05).unwrap();
-        let corner_m = (tracker.along_m - 6.0).abs();
-        assert!(corner_m > 0.05 || tracker.speed_mps.abs() < MAX_CORNER_MPS + 0.15, "{tracker:?}");
+    while reference.along_m > 4.0 && steps < 400 {
+        step_back(&path, &mut reference, 4.0, &[follower], 1.5, 0.05).unwrap();
+        let corner_m = (reference.along_m - 6.0).abs();
+        assert!(
+            corner_m > 0.05 || reference.speed_mps.abs() < MAX_CORNER_MPS + 0.15,
+            "{reference:?}"
+        );
         steps += 1;
     }
-    assert!(tracker.along_m < 4.05 && steps < 200, "{tracker:?} after {steps}");
+    assert!(reference.along_m < 4.05 && steps < 200, "{reference:?} after {steps}");
     let mut near = ReferenceState { along_m: 2.0, ..ReferenceState::default() };
     while step_back(&path, &mut near, 0.0, &[follower], 1.5, 0.05).is_some() {}
     assert!(near.along_m > 1.5, "{near:?}");

@@ -51,8 +51,8 @@ impl Guidance {
         // Beside its path the vehicle flies straight to where it continues on it.
         let joins =
             self.phase == Phase::Join || (self.phase == Phase::Path && self.raw_point_at_setpoint);
-        let join = if joins { path.point_at(self.tracker.along_m) } else { None };
-        let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_along_m };
+        let join = if joins { path.point_at(self.reference.along_m) } else { None };
+        let along_m = if join.is_some() { self.reference.along_m } else { self.setpoint_along_m };
         let reference_mps = fpu::sqrtf(self.smoother.velocity().norm_squared());
         let speed_mps = reference_mps.max(velocity_mps - STOPPING_SWAY_MPS);
         let braking_m = bounds
@@ -115,10 +115,11 @@ impl Guidance {
         };
         let follows = !lands && !hears_nobody;
         let mut next = 0;
-        while let Some((i, entry, dead)) = neighbours.next_within_reach(next, now, &reach) {
+        while let Some((i, entry, lost_on_points)) = neighbours.next_within_reach(next, now, &reach)
+        {
             next = i + 1;
             let mut met = entry.filter_neighbour(now);
-            if dead {
+            if lost_on_points {
                 met.count_as_lost();
             }
             neighbours.apply_silence(entry, now, &mut met);
@@ -131,7 +132,7 @@ impl Guidance {
                 // Gates keep two vehicles on the plan apart, whatever the delay of their messages.
                 met.ignore_message_delay();
             }
-            if met.lost && !(lands || deaf) && neighbours.may_fly_on_though_dead(entry, now, &reach)
+            if met.lost && !(lands || deaf) && neighbours.may_fly_on_though_lost(entry, now, &reach)
             {
                 // Where no neighbour is heard this vehicle's receiver may have failed: the others
                 // are not lost, they fly on.
@@ -148,7 +149,7 @@ impl Guidance {
             }
             let ahead_s =
                 if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
-            let held = self.filter.landing_held_for(now);
+            let held = self.filter.column_wait_for(now);
             if lands && met.stranger && held >= LATE_LANDING_AFTER {
                 // A stranger, which anybody can fake, keeps no vehicle in the air for good.
                 continue;
@@ -248,7 +249,7 @@ impl Guidance {
         if met.stranger || met.on_plan != on_plan {
             return met.stranger || met.on_plan;
         }
-        let along_m = if self.has_begun_path { self.tracker.along_m } else { f32::NEG_INFINITY };
+        let along_m = if self.has_begun_path { self.reference.along_m } else { f32::NEG_INFINITY };
         let waits = |plan: &VehiclePlan<W, G>| {
             plan.gates.iter().any(|gate| gate.wait_for_id == met.id && gate.at_m >= along_m)
         };

@@ -63,8 +63,8 @@ impl Guidance {
         if !whole_column {
             (self.filter.column_clear, self.filter.column_clear_changed_at) = (true, None);
             self.filter.column_blocked_for_good_since = None;
-            self.filter.landing_held_since =
-                self.filter.landing_held_since.filter(|_| state == State::Replanning);
+            self.filter.column_wait_since =
+                self.filter.column_wait_since.filter(|_| state == State::Replanning);
         }
         if matches!(way, FlightDirection::Stands) {
             self.filter.reset();
@@ -129,7 +129,7 @@ impl Guidance {
             self.filter.blocker_id = found.map_or(0, |found| found.id);
             return;
         }
-        self.filter.sets_intersect = found.is_some();
+        self.filter.sets_conflict = found.is_some();
         match found {
             Some(found) => {
                 if !stopped {
@@ -194,7 +194,7 @@ impl Guidance {
     /// Whether the vehicle flies back along its path, or stands and is about to; false as long as
     /// the setpoint is still to fly forward to the reference.
     fn is_flying_back<const W: usize>(&self, path: &Path<W>) -> bool {
-        if self.tracker.along_m > self.setpoint_along_m + MAX_LAG_WHEN_TURNING_M {
+        if self.reference.along_m > self.setpoint_along_m + MAX_LAG_WHEN_TURNING_M {
             return false;
         }
         let velocity = self.smoother.velocity();
@@ -210,7 +210,7 @@ impl Guidance {
                 return onward < 0.0;
             }
         }
-        self.tracker.speed_mps < 0.0 || self.step_back_to_m.is_some()
+        self.reference.speed_mps < 0.0 || self.step_back_to_m.is_some()
     }
 
     /// Counts a stop by advice as a hindrance by the filter if the vehicle is at that stop, and no
@@ -223,7 +223,7 @@ impl Guidance {
         now: Instant,
     ) {
         let id = self.advice.waiting_for_id;
-        let along_m = self.tracker.along_m;
+        let along_m = self.reference.along_m;
         let gate = |plan: &VehiclePlan<W, G>| {
             let near = |at_m: f32| {
                 (along_m - AT_ADVISED_STOP_M..along_m + AT_ADVISED_STOP_M).contains(&at_m)

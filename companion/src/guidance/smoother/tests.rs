@@ -41,7 +41,7 @@ proptest! {
         let fence =
             fenced.then(|| (first - Point::new(5.0, 5.0, 1.0), first + Point::new(5.0, 5.0, 1.0)));
         let cfg = TrackConfig::default();
-        let (mut tracker, mut smoother) =
+        let (mut state, mut smoother) =
             (ReferenceState::default(), SetpointSmoother::new(LIMITS, fence));
         smoother.begin_at(first, 0.0);
         for (step, (kind, share, steps)) in
@@ -63,15 +63,15 @@ proptest! {
                     ..Advice::FREE
                 };
                 // Guidance stops before the fence.
-                let v = tracker.speed_mps;
+                let v = state.speed_mps;
                 let braking_m = v * v / 3.0 + 2.0 * v * TICK_S + 0.05;
                 if path
-                    .point_at(tracker.along_m + braking_m)
+                    .point_at(state.along_m + braking_m)
                     .is_some_and(|ahead| !smoother.is_within_fence_slack(&ahead))
                 {
                     advice.stop_within_m = advice.stop_within_m.min(braking_m);
                 }
-                let reference = track::advance(&cfg, &path, &mut tracker, &advice, TICK_S).unwrap();
+                let reference = track::advance(&cfg, &path, &mut state, &advice, TICK_S).unwrap();
                 smoother.push_raw_point(reference.position);
             }
             smoother.make_setpoint();
@@ -99,7 +99,7 @@ proptest! {
             // that the raw point has flown, though every seventh step of a hairpin is late.
             if fence.is_none() && step % 16 == 0 {
                 let place = smoother.position();
-                let near = path.project(&place, tracker.along_m, path.length_m());
+                let near = path.project(&place, state.along_m, path.length_m());
                 let off = (path.point_at(near).unwrap() - place).norm();
                 prop_assert!(off < 0.3, "{off} m off the path");
             }

@@ -9,8 +9,8 @@ use mavlink::dialects::ardupilotmega::*;
 use planner_core::Point;
 
 use super::*;
-use crate::link::done;
 use crate::link::frame::{self, Header};
+use crate::link::photographed;
 use crate::link::roster::{self, RosterReport, RosterReportEntry};
 use crate::storage::store::{ErasePermission, MAX_READ_LEN};
 use crate::testing::fake_autopilot::*;
@@ -194,7 +194,7 @@ fn reports_of_a_coverage_mission_are_as_long_as_said() {
     assert_eq!([3, 5, 22, 10].map(roster), [50, 60, 145, 85]);
     assert_eq!(roster(4) - roster(3), 5, "5 bytes a vehicle");
     assert_eq!(NAMED_VALUE_FLOAT_DATA::ENCODED_LEN + 12, 30);
-    assert_eq!(done::MAX_LEN + 12, 141);
+    assert_eq!(photographed::MAX_LEN + 12, 141);
     assert_eq!(COVERAGE_STATE_BYTES_PER_S, 575 + 30 + 141);
     assert_ne!(roster::PAYLOAD_TYPE, crate::link::intent::PAYLOAD_TYPE);
 }

@@ -16,7 +16,7 @@ proptest! {
             1..=MAX_ENTRIES_PER_MESSAGE,
         ),
         head in (0u8..16, any::<u8>(), any::<u8>(), any::<u32>(), any::<u32>(), any::<u32>()),
-        [in_flight, hears_vehicle_in_flight] in any::<[bool; 2]>(),
+        [has_started, hears_started_vehicle] in any::<[bool; 2]>(),
     ) {
         let entries = entries
             .iter()
@@ -35,8 +35,8 @@ proptest! {
         let roster = RosterReport {
             system_id: 9,
             division_count: divisions,
-            in_flight,
-            hears_vehicle_in_flight,
+            has_started,
+            hears_started_vehicle,
             first_rank: first,
             plan_crc8: plan,
             mission_crc,

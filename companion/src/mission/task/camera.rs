@@ -186,7 +186,7 @@ impl CameraControl {
         let progress_m = along.progress_m;
         let next_m = match trigger {
             Trigger::Distance => shots.from_m,
-            _ => shots.picture_at_m(self.next_picture),
+            _ => shots.picture_arc_length_m(self.next_picture),
         };
         // A vehicle counts as holding once its setpoint stands; the vehicle may still be up to a
         // metre short of the setpoint.
@@ -207,7 +207,7 @@ impl CameraControl {
                 // Of several pictures passed within one step one is taken: all would show the same.
                 let before = self.next_picture;
                 while self.next_picture < shots.count
-                    && shots.picture_at_m(self.next_picture) <= progress_m
+                    && shots.picture_arc_length_m(self.next_picture) <= progress_m
                 {
                     self.next_picture += 1;
                 }

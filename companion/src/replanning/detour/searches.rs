@@ -103,7 +103,7 @@ impl Detours {
     /// Time for which this vehicle has waited below a vehicle that lands, unable to leave along its
     /// path; zero while its setpoint is not at the reference, and for [`MAX_SEARCH_PAUSE_S`] after
     /// a search aside failed.
-    pub(crate) fn time_below_landing<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn time_trapped_below_landing<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &DetourView<'_, V, W, G>,
     ) -> Duration {
@@ -201,8 +201,8 @@ impl Detours {
             Some(_) => match requested.rejoin_place() {
                 Some(back) => {
                     let (over, ground_m) = (back.position, view.guidance.planned_ground_m(plan));
-                    let home = DetourGoal::Home { above_pad: over, layer_z_m: over.z };
-                    (home, (over.z - ground_m).max(0.0))
+                    let goal = DetourGoal::Point { end: over, layer_z_m: over.z };
+                    (goal, (over.z - ground_m).max(0.0))
                 }
                 None => view.mission.home_goal(),
             },
@@ -280,13 +280,13 @@ impl Detours {
         along_m: f32,
         apart_m: f32,
     ) -> [f32; 3] {
-        let [aloft_m, lying_m] =
+        let [aloft_m, grounded_m] =
             [DETOUR_MARGIN_M, BLOCKED_BEYOND_SAFETY_DISTANCE_M].map(|m| apart_m + m);
         let found_none_here = |at_m: &f32| (along_m - at_m).abs() <= SAME_SEARCH_PLACE_M;
-        let nearer = self.found_none_at_m.filter(found_none_here).is_some();
+        let nearer = self.no_path_found_at_m.filter(found_none_here).is_some();
         match requested == DetourPurpose::Goal && nearer {
-            true => [aloft_m, lying_m, lying_m],
-            false => [aloft_m, aloft_m, lying_m],
+            true => [aloft_m, grounded_m, grounded_m],
+            false => [aloft_m, aloft_m, grounded_m],
         }
     }
 
@@ -327,7 +327,7 @@ impl Detours {
             self.failed_since = now;
         }
         if outlook == RetryOutlook::OthersMayMove {
-            self.found_none_at_m = Some(along_m);
+            self.no_path_found_at_m = Some(along_m);
         }
         self.failed_searches = self.failed_searches.saturating_add(1);
         self.failed_searches_here = self.failed_searches_here.saturating_add(1);

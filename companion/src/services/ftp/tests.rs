@@ -264,7 +264,7 @@ fn ask_three_times(world: &mut World, numbers: Numbers, opcode: u8, data: &[u8])
 }
 
 #[test]
-fn a_client_whose_answers_are_lost_is_told_the_same_late_and_under_other_numbers() {
+fn a_client_whose_answers_are_lost_gets_the_same_late_and_under_other_numbers() {
     use Numbers::*;
     for (numbers, damaged) in [(Same, false), (Same, true), (New, false), (New, true)] {
         let mut world = World::new(70, 0, 0);
@@ -301,7 +301,7 @@ fn an_upload_after_a_download_of_the_same_numbers_is_stored() {
 }
 
 #[test]
-fn what_came_of_an_earlier_request_of_the_same_number_is_not_told_of_a_later_one() {
+fn a_later_request_of_the_same_number_does_not_get_the_answer_to_an_earlier_one() {
     for pause in [4, 60] {
         let mut world = World::new(71, 0, 0);
         let (good, mut damaged) = (roadmap(80), roadmap(80));

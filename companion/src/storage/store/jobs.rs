@@ -90,11 +90,11 @@ impl Store {
                             journal::record_head(record.kind, record.len, record.crc);
                         FlashRequest::Program { at: record.at, bytes: &self.program_word }
                     }
-                    (RecordStep::Load, RecordSource::Flash(from)) => FlashRequest::Read {
+                    (RecordStep::NextData, RecordSource::Flash(from)) => FlashRequest::Read {
                         at: from + record.done,
                         len: left.min(MAX_PROGRAM_LEN),
                     },
-                    (RecordStep::Load | RecordStep::Data, _) => {
+                    (RecordStep::NextData | RecordStep::Data, _) => {
                         let count = left.next_multiple_of(WORD_LEN).min(MAX_PROGRAM_LEN);
                         FlashRequest::Program { at: data_at, bytes: &self.buffer[..count] }
                     }
@@ -115,7 +115,7 @@ impl Store {
                 self.reassembly.last_part().and_then(|rest| rest.get(done as usize..))
             }
             FlashJob::Record(JournalRecord {
-                step: RecordStep::Load,
+                step: RecordStep::NextData,
                 source: RecordSource::Window,
                 done,
                 ..

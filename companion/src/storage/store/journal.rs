@@ -28,7 +28,7 @@ pub struct Journal {
     pub(super) mission: Option<Range<u32>>,
     /// CRC-32 of all bytes of the mission file, as its record's head states it: not the CRC at the
     /// file's end, by which vehicles recognise their mission.
-    pub(super) mission_crc: u32,
+    pub(super) mission_record_crc: u32,
     /// Whether the mission file was removed and no record says so yet.
     pub(super) mission_removal_unsaved: bool,
     /// The compaction under way: the other half is being filled.
@@ -44,7 +44,7 @@ impl Default for Journal {
             active_half: None,
             next_record_at: 0,
             mission: None,
-            mission_crc: 0,
+            mission_record_crc: 0,
             mission_removal_unsaved: false,
             compacting: None,
             consecutive_failures: 0,

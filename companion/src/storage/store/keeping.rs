@@ -73,7 +73,7 @@ impl Store {
                 kind: RecordKind::Mission,
                 at,
                 len: kept.end - kept.start,
-                crc: self.journal.mission_crc,
+                crc: self.journal.mission_record_crc,
                 source: RecordSource::Flash(kept.start),
                 step: RecordStep::Head,
                 done: 0,
@@ -150,8 +150,8 @@ impl Store {
     pub(super) fn continue_record(&mut self, mut record: JournalRecord, bytes: &[u8]) {
         match (record.step, record.source) {
             (RecordStep::Head, RecordSource::Buffer) => record.step = RecordStep::Data,
-            (RecordStep::Head, _) => record.step = RecordStep::Load,
-            (RecordStep::Load, RecordSource::Flash(_)) => {
+            (RecordStep::Head, _) => record.step = RecordStep::NextData,
+            (RecordStep::NextData, RecordSource::Flash(_)) => {
                 let count = bytes.len().min(MAX_PROGRAM_LEN);
                 self.buffer.fill(0xFF);
                 self.buffer[..count].copy_from_slice(&bytes[..count]);
@@ -159,12 +159,12 @@ impl Store {
                 self.job = FlashJob::Record(record);
                 return;
             }
-            (RecordStep::Load | RecordStep::Data, _) => {
+            (RecordStep::NextData | RecordStep::Data, _) => {
                 record.done = (record.done + MAX_PROGRAM_LEN as u32).min(record.len);
                 record.step = if matches!(record.source, RecordSource::Buffer) {
                     RecordStep::Data
                 } else {
-                    RecordStep::Load
+                    RecordStep::NextData
                 };
             }
             (RecordStep::Verify, _) => {
@@ -215,7 +215,7 @@ impl Store {
         self.journal.consecutive_failures = 0;
         if record.kind == RecordKind::Mission {
             self.journal.mission = held;
-            self.journal.mission_crc = record.crc;
+            self.journal.mission_record_crc = record.crc;
             self.journal.mission_removal_unsaved = false;
             if record.len > 0 {
                 self.end_upload(Ok(()));

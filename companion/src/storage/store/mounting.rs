@@ -64,7 +64,7 @@ impl Store {
         }
         if kind == RecordKind::Mission as u8 {
             self.journal.mission = (len > 0).then_some(at..at + len);
-            self.journal.mission_crc = crc;
+            self.journal.mission_record_crc = crc;
         } else if kind == RecordKind::Parameters as u8
             && (4..=MAX_PROGRAM_LEN as u32).contains(&len)
         {

@@ -62,7 +62,7 @@ pub enum RecordStep {
     /// Program the head.
     Head,
     /// From flash: read the next data into the buffer. From the window: program the next data.
-    Load,
+    NextData,
     /// Program the data that is in the buffer.
     Data,
     /// Read head and data back.

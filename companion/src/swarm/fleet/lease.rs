@@ -16,18 +16,18 @@ impl<const V: usize> Fleet<V> {
 
     /// Ranks of the vehicles that take part, or were lost, as bits.
     pub(super) fn counted_ranks(&self) -> u32 {
-        let counts = |m: &FleetVehicle| m.has_part && m.entry.status <= ShareStatus::Lost;
-        let ranks = self.members.iter().enumerate();
-        ranks.filter(|(_, m)| counts(m)).fold(0, |bits, (rank, _)| bits | 1 << rank.min(31))
+        let counts = |v: &FleetVehicle| v.has_part && v.entry.status <= ShareStatus::Lost;
+        let ranks = self.vehicles.iter().enumerate();
+        ranks.filter(|(_, v)| counts(v)).fold(0, |bits, (rank, _)| bits | 1 << rank.min(31))
     }
 
     /// Whether the vehicles `among` are a majority of those that take part, or were lost; of two
     /// halves, the one with the lowest rank is.
     pub(super) fn is_majority(&self, among: impl Fn(usize, &FleetVehicle) -> bool) -> bool {
         let (mut all, mut these, mut lowest) = (0, 0, false);
-        for (rank, member) in self.members.iter().enumerate() {
-            if member.has_part && member.entry.status <= ShareStatus::Lost {
-                let is_among = among(rank, member);
+        for (rank, vehicle) in self.vehicles.iter().enumerate() {
+            if vehicle.has_part && vehicle.entry.status <= ShareStatus::Lost {
+                let is_among = among(rank, vehicle);
                 lowest |= is_among && all == 0;
                 all += 1;
                 these += usize::from(is_among);
@@ -49,7 +49,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Time since a majority last reported that they hear this vehicle; zero for a vehicle that
     /// takes no part: it needs no lease.
-    pub fn unheard_for(&self, now: Instant) -> Duration {
+    pub fn time_without_majority(&self, now: Instant) -> Duration {
         if self.vehicle_takes_part(usize::from(self.own_rank)) {
             self.lease_age(now)
         } else {
@@ -61,7 +61,7 @@ impl<const V: usize> Fleet<V> {
     /// has finished its part.
     pub fn is_excluded(&self) -> bool {
         self.excluded
-            && self.members[usize::from(self.own_rank)].entry.status != ShareStatus::Finished
+            && self.vehicles[usize::from(self.own_rank)].entry.status != ShareStatus::Finished
     }
 
     /// Whether this vehicle flies its part of the area, or will.
@@ -71,20 +71,21 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether this vehicle has left the mission and reported that.
     pub(crate) fn has_reported_leaving(&self) -> bool {
-        self.members[usize::from(self.own_rank)].entry.status == ShareStatus::Left
+        self.vehicles[usize::from(self.own_rank)].entry.status == ShareStatus::Left
     }
 
     /// Whether a vehicle without a part may still get one: another vehicle takes part, or left a
     /// part that is not divided yet.
-    pub(crate) fn is_reserve_needed(&self) -> bool {
-        let mut others = (0..self.members.len()).filter(|rank| *rank != usize::from(self.own_rank));
+    pub(crate) fn may_reserve_get_a_part(&self) -> bool {
+        let mut others =
+            (0..self.vehicles.len()).filter(|rank| *rank != usize::from(self.own_rank));
         self.is_dividing() || others.any(|rank| self.vehicle_takes_part(rank))
     }
 
     /// Whether another vehicle flies, or any vehicle has finished, left or was lost.
     pub(crate) fn has_others_flight_begun(&self) -> bool {
-        let ended = |member: &FleetVehicle| member.entry.status != ShareStatus::Alive;
-        self.is_another_in_flight() || self.members.iter().any(ended)
+        let ended = |vehicle: &FleetVehicle| vehicle.entry.status != ShareStatus::Alive;
+        self.is_another_started() || self.vehicles.iter().any(ended)
     }
 
     /// When the last of the vehicles that have been silent for 3 s, and so may be lost, is surely
@@ -102,20 +103,21 @@ impl<const V: usize> Fleet<V> {
     /// Gives the status [`ShareStatus::Lost`] to those with a part that were silent for too long.
     pub(super) fn count_silent_as_lost(&mut self, now: Instant) {
         let silent = self.limits.lost_after;
-        for member in self.members.iter_mut().filter(|m| m.has_part && now - m.heard_at >= silent) {
-            member.entry.status = member.entry.status.max(ShareStatus::Lost);
+        let is_lost = |v: &&mut FleetVehicle| v.has_part && now - v.heard_at >= silent;
+        for vehicle in self.vehicles.iter_mut().filter(is_lost) {
+            vehicle.entry.status = vehicle.entry.status.max(ShareStatus::Lost);
         }
     }
 
     /// Takes part again, on the ground, if this vehicle has left but could start now (`own`, the
-    /// status that it would report, is alive), holds its lease, and no other vehicle is in flight.
+    /// status that it would report, is alive), holds its lease, and no other vehicle was started.
     pub(super) fn rejoin_if_ready(&mut self, now: Instant, own: ShareStatus) {
         let RosterReportEntry { incarnation, status, .. } =
-            self.members[usize::from(self.own_rank)].entry;
+            self.vehicles[usize::from(self.own_rank)].entry;
         if status == ShareStatus::Left
             && own == ShareStatus::Alive
             && !self.airborne
-            && !self.is_another_in_flight()
+            && !self.is_another_started()
             && self.has_lease(now)
         {
             self.rejoin((incarnation + 1) % INCARNATIONS);
@@ -133,7 +135,7 @@ impl<const V: usize> Fleet<V> {
         }
         // By its commitment in its next report this vehicle also requests the division from the
         // others.
-        let entry = &mut self.members[usize::from(self.own_rank)].entry;
+        let entry = &mut self.vehicles[usize::from(self.own_rank)].entry;
         entry.commitment_dm = entry.commitment_dm.or(own.new_commitment_dm);
         entry.holds |= own.holds && entry.commitment_dm.is_some();
         self.prepare_division_inputs(now);
@@ -143,7 +145,7 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// Moves all times to a clock that shows `then` where the old one shows `now`; ages past every
-    /// limit are cut to that limit, and which others are in flight or were never heard is
+    /// limit are cut to that limit, and which others were started or never heard is
     /// forgotten: that matters only before a start. Fleets that will act alike become equal, so a
     /// search recognises a state that it has visited.
     pub fn normalise_for_search(&mut self, now: Instant, then: Instant) {
@@ -152,13 +154,13 @@ impl<const V: usize> Fleet<V> {
             let age = (now - at).min(most);
             Instant::from_micros(then.as_micros().saturating_sub(age.as_micros()))
         };
-        (self.in_flight_bits, self.hears_flight_bits) = (self.in_flight_bits & self.own_bit(), 0);
+        (self.started_bits, self.hears_started_bits) = (self.started_bits & self.own_bit(), 0);
         (self.introduced_bits, self.down_at, self.any_missing) = (u32::MAX, Instant::ZERO, false);
         self.lease_renewed_at =
             moved(self.lease_renewed_at, Duration::from_micros(2 * lease.as_micros()));
-        for member in &mut self.members {
-            let counts = member.has_part && member.entry.status <= ShareStatus::Lost;
-            member.heard_at = if counts { moved(member.heard_at, lost.max(down)) } else { then };
+        for vehicle in &mut self.vehicles {
+            let counts = vehicle.has_part && vehicle.entry.status <= ShareStatus::Lost;
+            vehicle.heard_at = if counts { moved(vehicle.heard_at, lost.max(down)) } else { then };
         }
     }
 }

@@ -8,7 +8,7 @@ impl<const V: usize> Fleet<V> {
     /// Handles the roster report of the vehicle of rank `sender`; `own`: whether this vehicle was
     /// started.
     pub fn handle_roster_report(&mut self, sender: usize, roster: &RosterReport, own: StartStatus) {
-        if sender >= self.members.len() || sender == usize::from(self.own_rank) {
+        if sender >= self.vehicles.len() || sender == usize::from(self.own_rank) {
             return;
         }
         self.note_flight(sender, roster);
@@ -25,14 +25,14 @@ impl<const V: usize> Fleet<V> {
         }
         let same = same_plan && usize::from(roster.division_count) == self.divisions.len();
         if same || !same_plan {
-            self.members[sender].pending_hash = if same { roster.pending_hash } else { 0 };
+            self.vehicles[sender].pending_hash = if same { roster.pending_hash } else { 0 };
         }
         for (rank, entry) in
             roster.entries.iter().enumerate().map(|(i, e)| (i + usize::from(roster.first_rank), e))
         {
             if rank == usize::from(self.own_rank) {
                 self.handle_own_entry(entry, own);
-            } else if rank < self.members.len() {
+            } else if rank < self.vehicles.len() {
                 if rank == sender {
                     self.take_first_incarnation(sender, entry.incarnation, own);
                 }
@@ -42,24 +42,24 @@ impl<const V: usize> Fleet<V> {
                 // The vehicle of this rank may have finished its share of a division that the
                 // sender does not know. This vehicle hears it directly, and learns its status from
                 // itself.
-                if !(behind && entry.status == ShareStatus::Left && self.members[rank].heard_by_us)
+                if !(behind && entry.status == ShareStatus::Left && self.vehicles[rank].heard_by_us)
                 {
                     let counts = if same { *entry } else { entry.seen_from_another_division() };
                     self.merge_entry(rank, &counts, own);
                 }
                 if same && entry.agrees && rank != sender && roster.pending_hash != 0 {
-                    self.members[rank].pending_hash = roster.pending_hash;
+                    self.vehicles[rank].pending_hash = roster.pending_hash;
                 }
             }
         }
     }
 
-    /// Notes what the vehicle of this rank reports: whether it is in flight, and hears one that is.
+    /// Notes what the vehicle of this rank reports: whether it was started, and hears one that was.
     fn note_flight(&mut self, rank: usize, roster: &RosterReport) {
         let bit = 1u32 << rank.min(31);
         for (bits, set) in [
-            (&mut self.in_flight_bits, roster.in_flight),
-            (&mut self.hears_flight_bits, roster.hears_vehicle_in_flight),
+            (&mut self.started_bits, roster.has_started),
+            (&mut self.hears_started_bits, roster.hears_started_vehicle),
         ] {
             *bits = if set { *bits | bit } else { *bits & !bit };
         }
@@ -72,7 +72,7 @@ impl<const V: usize> Fleet<V> {
     fn sender_status(&self, sender: usize, roster: &RosterReport) -> ShareStatus {
         let own =
             sender.checked_sub(usize::from(roster.first_rank)).and_then(|i| roster.entries.get(i));
-        let known = &self.members[sender].entry;
+        let known = &self.vehicles[sender].entry;
         own.unwrap_or(known).status
     }
 
@@ -104,7 +104,7 @@ impl<const V: usize> Fleet<V> {
     /// newer or older than the stored one: this vehicle, just switched on, knew none.
     fn take_first_incarnation(&mut self, sender: usize, incarnation: u8, own: StartStatus) {
         let bit = 1 << sender.min(31);
-        if self.introduced_bits & bit == 0 && self.members[sender].entry.incarnation != incarnation
+        if self.introduced_bits & bit == 0 && self.vehicles[sender].entry.incarnation != incarnation
         {
             self.take_newer_incarnation(sender, incarnation, own);
         }
@@ -115,14 +115,14 @@ impl<const V: usize> Fleet<V> {
     /// plan and last division; `own`: whether this vehicle was started.
     fn merge_entry(&mut self, rank: usize, entry: &RosterReportEntry, own: StartStatus) {
         let newer =
-            entry.incarnation.wrapping_sub(self.members[rank].entry.incarnation) % INCARNATIONS;
+            entry.incarnation.wrapping_sub(self.vehicles[rank].entry.incarnation) % INCARNATIONS;
         if newer >= INCARNATIONS / 2 {
             return;
         }
         if newer > 0 {
             self.take_newer_incarnation(rank, entry.incarnation, own);
         }
-        let known = &mut self.members[rank].entry;
+        let known = &mut self.vehicles[rank].entry;
         known.status = known.status.max(entry.status);
         known.progress_dm = known.progress_dm.max(entry.progress_dm);
         known.commitment_dm = known.commitment_dm.or(entry.commitment_dm);
@@ -136,25 +136,25 @@ impl<const V: usize> Fleet<V> {
     fn take_newer_incarnation(&mut self, rank: usize, incarnation: u8, own: StartStatus) {
         let started = own == StartStatus::Started;
         let (takes_part, flight) =
-            (self.vehicle_takes_part(usize::from(self.own_rank)), self.is_another_in_flight());
+            (self.vehicle_takes_part(usize::from(self.own_rank)), self.is_another_started());
         if started && !takes_part && !flight && !self.airborne {
             // The flight in which this vehicle left is over, and another one begins.
             self.forget_plan();
         }
-        let member = &mut self.members[rank];
-        let RosterReportEntry { status, progress_dm, .. } = member.entry;
+        let vehicle = &mut self.vehicles[rank];
+        let RosterReportEntry { status, progress_dm, .. } = vehicle.entry;
         let kept = RosterReportEntry { status, progress_dm, ..RosterReportEntry::default() };
         let kept =
             if takes_part && (started || flight) { kept } else { RosterReportEntry::default() };
-        member.entry = RosterReportEntry { incarnation, ..kept };
-        member.pending_hash = 0;
+        vehicle.entry = RosterReportEntry { incarnation, ..kept };
+        vehicle.pending_hash = 0;
     }
 
     /// Handles the entry about this vehicle in another one's report; `start`: whether it was
     /// started.
     fn handle_own_entry(&mut self, entry: &RosterReportEntry, start: StartStatus) {
-        let flies = self.is_another_in_flight();
-        let own = &mut self.members[usize::from(self.own_rank)].entry;
+        let flies = self.is_another_started();
+        let own = &mut self.vehicles[usize::from(self.own_rank)].entry;
         let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
         let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.status > own.status);
         match (outlived, start) {
@@ -176,20 +176,20 @@ impl<const V: usize> Fleet<V> {
         // A vehicle that has left computes no divisions: its hash would soon be outdated.
         let hash =
             if self.vehicle_takes_part(usize::from(self.own_rank)) { self.pending_hash } else { 0 };
-        let entry = |m: &FleetVehicle| RosterReportEntry {
-            agrees: hash != 0 && m.pending_hash == hash,
-            ..m.entry
+        let entry = |v: &FleetVehicle| RosterReportEntry {
+            agrees: hash != 0 && v.pending_hash == hash,
+            ..v.entry
         };
         RosterReport {
             division_count: self.divisions.len() as u8,
             first_rank: first as u8,
             plan_crc8: self.plan_crc8,
-            in_flight: self.in_flight_bits & self.own_bit() != 0,
-            hears_vehicle_in_flight: self.other_ranks_in_flight() != 0,
+            has_started: self.started_bits & self.own_bit() != 0,
+            hears_started_vehicle: self.other_started_ranks() != 0,
             committed_hash: self.committed_hash,
             pending_hash: hash,
             entries: self
-                .members
+                .vehicles
                 .iter()
                 .skip(first)
                 .take(MAX_ENTRIES_PER_MESSAGE)

@@ -8,7 +8,7 @@ pub const LEASE: Duration = Duration::from_secs(LEASE_S);
 /// Greatest age of a neighbour's report that renews the lease.
 pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);
 /// Silence of a vehicle after which it counts as lost, and the others divide its share of the area.
-pub const SILENT_AFTER: Duration = Duration::from_secs(45);
+pub const LOST_AFTER_SILENCE: Duration = Duration::from_secs(45);
 
 /// Time limits of a fleet. A vehicle without a lease lands after twice the lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -17,7 +17,7 @@ pub struct FleetTimeouts {
     pub lease: Duration,
     /// Greatest age of a report that renews the lease, as [`LEASE_HEARD_WITHIN`].
     pub heard_within: Duration,
-    /// Silence after which a vehicle counts as lost, as [`SILENT_AFTER`].
+    /// Silence after which a vehicle counts as lost, as [`LOST_AFTER_SILENCE`].
     pub lost_after: Duration,
     /// Silence after which a lost vehicle is down, at whatever height it was lost.
     pub down_after: Duration,
@@ -30,7 +30,7 @@ impl FleetTimeouts {
         Self {
             lease: LEASE,
             heard_within: LEASE_HEARD_WITHIN,
-            lost_after: SILENT_AFTER,
+            lost_after: LOST_AFTER_SILENCE,
             down_after,
         }
     }

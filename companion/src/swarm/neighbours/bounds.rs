@@ -94,9 +94,9 @@ pub(super) const LANDING_COLUMN_DEPTH_M: f32 = 15.0;
 pub(super) const MAX_LANDING_MPS: f32 = 2.0;
 /// Age of a neighbour's position from which its height is unknown if it lands, and from which the
 /// safety filter counts the neighbour as silent, seconds.
-pub(super) const MAX_HEIGHT_AGE_S: f32 = 1.0;
-/// [`MAX_HEIGHT_AGE_S`] as a duration.
-pub(super) const MAX_HEIGHT_AGE: Duration = Duration::from_secs(1);
+pub(super) const SILENT_AFTER_POSITION_AGE_S: f32 = 1.0;
+/// [`SILENT_AFTER_POSITION_AGE_S`] as a duration.
+pub(super) const SILENT_AFTER_POSITION_AGE: Duration = Duration::from_secs(1);
 /// Height by which a landing column begins above the vehicle that lands, metres: another vehicle
 /// that is above it by less may be below it in a moment.
 pub(super) const COLUMN_TOP_ABOVE_M: f32 = 1.0;

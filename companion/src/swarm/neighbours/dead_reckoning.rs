@@ -187,7 +187,7 @@ impl NeighbourEntry {
                 let radius_m = fpu::sqrtf(apart_m * apart_m + wider_m * wider_m);
                 let (from, to) =
                     (place + up(COLUMN_TOP_ABOVE_M), place - up(self.column_depth_m(&place)));
-                visit(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
+                visit(KeepOutZone { from, to, radius_m, kind: ZoneKind::LandingColumn });
             });
         }
         let mut column = |from: Point, below_m: f32, nature: ZoneKind| {
@@ -200,16 +200,16 @@ impl NeighbourEntry {
         };
         let age_s = self.position_at.map_or(0.0, |at| (now - at).as_secs_f32());
         let fallen_m = (MAX_LANDING_MPS * age_s).min(DEFAULT_COLUMN_DEPTH_M);
-        if age_s < MAX_HEIGHT_AGE_S {
+        if age_s < SILENT_AFTER_POSITION_AGE_S {
             column(
                 here,
                 (LANDING_COLUMN_DEPTH_M + fallen_m).min(DEFAULT_COLUMN_DEPTH_M),
-                ZoneKind::Descending,
+                ZoneKind::LandingColumn,
             );
         } else {
             // The neighbour may be anywhere down to `fallen_m` below by now, and descends on.
             column(here, fallen_m, ZoneKind::Static);
-            column(here - up(fallen_m), LANDING_COLUMN_DEPTH_M, ZoneKind::Descending);
+            column(here - up(fallen_m), LANDING_COLUMN_DEPTH_M, ZoneKind::LandingColumn);
         }
     }
 

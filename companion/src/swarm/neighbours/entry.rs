@@ -106,7 +106,7 @@ impl NeighbourEntry {
     /// The entry of a neighbour that has not been heard yet.
     // Inlined at its only caller: a board's stack has no room for a copy.
     #[inline(always)]
-    pub(super) fn unheard(
+    pub(super) fn new_not_heard_yet(
         id: u8,
         rank: u16,
         min_unheard_progress_mps: f32,

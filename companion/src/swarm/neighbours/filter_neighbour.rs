@@ -98,20 +98,20 @@ pub(crate) struct ReachQuery<'a> {
 #[derive(Clone, Copy, Debug)]
 struct SilentFate {
     /// Whether it counts as lost, at rest on its points ([`NeighbourEntry::is_lost_on_points`]).
-    dead: bool,
+    lost_on_points: bool,
     /// Whether it has been silent for so long that it lies on the ground.
     lies: bool,
-    /// Whether it may fly on though it counts as dead, since this vehicle hears nobody.
+    /// Whether it may fly on though it counts as lost, since this vehicle hears nobody.
     may_fly_on: bool,
 }
 
 impl NeighbourEntry {
-    /// Whether the neighbour counts as dead ([`Self::is_lost_on_points`]), if it may come within
+    /// Whether the neighbour counts as lost ([`Self::is_lost_on_points`]), if it may come within
     /// reach; `None` if it stays out of reach wherever it can be, or has no position. Most are far
     /// away: this test needs no reachable set. Never `None` for a neighbour that is within reach
     /// after [`Neighbours::apply_silence`].
     #[inline(always)]
-    fn dead_if_within_reach(
+    fn lost_if_within_reach(
         &self,
         down: Duration,
         now: Instant,
@@ -121,14 +121,14 @@ impl NeighbourEntry {
         let away = reach.own.box_distances(&self.state.position);
         let across_sq = away.x * away.x + away.y * away.y;
         let age = now - placed_at;
-        if age > MAX_HEIGHT_AGE {
+        if age > SILENT_AFTER_POSITION_AGE {
             let fate = SilentFate {
-                dead: self.is_lost_on_points(age, now),
+                lost_on_points: self.is_lost_on_points(age, now),
                 lies: age >= down && !self.ground_m.is_nan(),
-                may_fly_on: self.may_fly_on_though_dead(down, now, reach),
+                may_fly_on: self.may_fly_on_though_lost(down, now, reach),
             };
             let beyond = self.is_silent_out_of_reach(age, fate, across_sq, now, reach);
-            return (!beyond).then_some(fate.dead);
+            return (!beyond).then_some(fate.lost_on_points);
         }
         let heard = NeighbourMotion {
             position: self.state.position,
@@ -150,12 +150,12 @@ impl NeighbourEntry {
         (!beyond).then_some(false)
     }
 
-    /// Whether the neighbour may fly on although it counts as dead: this vehicle hears nobody, so
+    /// Whether the neighbour may fly on although it counts as lost: this vehicle hears nobody, so
     /// that its own receiver may have failed. Not once the neighbour has been silent for `down`, in
     /// which a vehicle without a lease lands, while this vehicle holds its lease. A neighbour out
     /// of the plan needs no lease: its pilot may keep it in the air.
     #[inline(always)]
-    pub(crate) fn may_fly_on_though_dead(
+    pub(crate) fn may_fly_on_though_lost(
         &self,
         down: Duration,
         now: Instant,
@@ -165,15 +165,15 @@ impl NeighbourEntry {
         reach.hears_nobody && (!must_have_landed || self.reports_any(OUT_OF_PLAN))
     }
 
-    /// Whether a neighbour whose position is older than [`MAX_HEIGHT_AGE`] stays out of reach, seen
-    /// from above. The neighbour is at its last position or, by a newer intent, at the first of its
-    /// points; or as far from there as it can have flown: at full speed for as long as it may not
-    /// have noticed that no vehicle hears it; in a climb to its top and a little further; once
-    /// dead, along its points alone. A vehicle that lies on the ground moves no more.
+    /// Whether a neighbour whose position is older than [`SILENT_AFTER_POSITION_AGE`] stays out of
+    /// reach, seen from above. The neighbour is at its last position or, by a newer intent, at the
+    /// first of its points; or as far from there as it can have flown: at full speed for as long as
+    /// it may not have noticed that no vehicle hears it; in a climb to its top and a little
+    /// further; once lost, along its points alone. A vehicle that lies on the ground moves no more.
     fn is_silent_out_of_reach(
         &self,
         age: Duration,
-        SilentFate { dead, lies, may_fly_on }: SilentFate,
+        SilentFate { lost_on_points, lies, may_fly_on }: SilentFate,
         across_sq: f32,
         now: Instant,
         reach: &ReachQuery<'_>,
@@ -181,7 +181,7 @@ impl NeighbourEntry {
         let delay_s = self.message_delay.delay_s;
         let mut most_m = 0.0;
         let mut reaches = |far_m: f32| most_m = if far_m > most_m { far_m } else { most_m };
-        if may_fly_on || !dead {
+        if may_fly_on || !lost_on_points {
             let silent_s = reach.bounds.stopped_when_unheard_for_s;
             let age_s = if may_fly_on { silent_s } else { age.as_secs_f32().min(silent_s) };
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
@@ -190,18 +190,18 @@ impl NeighbourEntry {
         if reach.lands && self.would_fly_all_points_unheard() {
             reaches(FALL_CARRY_S * self.speed_mps + self.max_fall_drift_m());
         }
-        if reach.lands || (dead && !lies) || (flies_on && !dead) {
+        if reach.lands || (lost_on_points && !lies) || (flies_on && !lost_on_points) {
             let beyond_m = self.reported_path_reach.added_reach_m + OFF_REPORTED_PATH_M;
             reaches(self.max_unheard_distance_m() + beyond_m);
         }
-        if dead {
+        if lost_on_points {
             reaches(MIN_FALL_TIME_S * self.speed_mps);
         }
         if reach.lands || self.climb_top_m().is_some() {
             reaches(self.rest_radius_m(reach));
         }
         let mut away_sq = across_sq;
-        let reported = self.intent_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
+        let reported = self.intent_at.is_some_and(|at| now - at <= SILENT_AFTER_POSITION_AGE);
         if let Some(first) = self.points.first().filter(|_| reported) {
             away_sq = away_sq.min(reach.own.box_distances(first).xy().norm_squared());
             reaches(if self.would_fly_all_points_unheard() {
@@ -230,7 +230,9 @@ impl NeighbourEntry {
     /// Age of the neighbour's last intent, seconds, if it is fresh and reports points.
     fn fresh_intent_age_s(&self, now: Instant) -> Option<f32> {
         let heard_at = self.intent_at.filter(|_| !self.points.is_empty());
-        heard_at.map(|at| (now - at).as_secs_f32()).filter(|heard_s| *heard_s < MAX_HEIGHT_AGE_S)
+        heard_at
+            .map(|at| (now - at).as_secs_f32())
+            .filter(|heard_s| *heard_s < SILENT_AFTER_POSITION_AGE_S)
     }
 
     /// Age of the neighbour's position; if it never had one, the time since the companion's start.
@@ -240,7 +242,7 @@ impl NeighbourEntry {
     }
 
     /// The neighbour for the safety filter, as its last reports describe it. If it counts as
-    /// dead, [`FilterNeighbour::count_as_lost`] has to follow; then, if its position is old,
+    /// lost, [`FilterNeighbour::count_as_lost`] has to follow; then, if its position is old,
     /// [`Neighbours::apply_silence`].
     #[inline(always)]
     pub(crate) fn filter_neighbour(&self, now: Instant) -> FilterNeighbour<'_> {
@@ -313,7 +315,8 @@ impl NeighbourEntry {
     /// Whether the neighbour follows the plan out of radio range, as others relay or by its last
     /// position.
     fn is_out_of_range(&self, now: Instant) -> bool {
-        let silent = !self.reports_any(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
+        let silent =
+            !self.reports_any(GROUNDED) && !self.heard_within(now, SILENT_AFTER_POSITION_AGE);
         let unheard = silent && self.at_range_edge && self.on_plan();
         let flies_on =
             || self.flies_plan_unheard() || self.heard_within(now, MAX_OUT_OF_RANGE_WAIT);
@@ -353,7 +356,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// The first neighbour from index `from` on, inclusive, that has a position and may be within
-    /// reach: its index, its entry, and whether it counts as dead.
+    /// reach: its index, its entry, and whether it counts as lost.
     pub(crate) fn next_within_reach(
         &self,
         from: usize,
@@ -362,27 +365,27 @@ impl<const V: usize> Neighbours<V> {
     ) -> Option<(usize, &NeighbourEntry, bool)> {
         // A loop: a board takes a third longer for the chain of iterators.
         for (i, entry) in self.entries.iter().enumerate().skip(from) {
-            if let Some(dead) = entry.dead_if_within_reach(self.down_after, now, reach) {
-                return Some((i, entry, dead));
+            if let Some(lost_on_points) = entry.lost_if_within_reach(self.down_after, now, reach) {
+                return Some((i, entry, lost_on_points));
             }
         }
         None
     }
 
-    /// Whether a neighbour may fly on although it counts as dead
-    /// ([`NeighbourEntry::may_fly_on_though_dead`]).
-    pub(crate) fn may_fly_on_though_dead(
+    /// Whether a neighbour may fly on although it counts as lost
+    /// ([`NeighbourEntry::may_fly_on_though_lost`]).
+    pub(crate) fn may_fly_on_though_lost(
         &self,
         entry: &NeighbourEntry,
         now: Instant,
         reach: &ReachQuery<'_>,
     ) -> bool {
-        entry.may_fly_on_though_dead(self.down_after, now, reach)
+        entry.may_fly_on_though_lost(self.down_after, now, reach)
     }
 
     /// Changes `met`, made by [`NeighbourEntry::filter_neighbour`], if the neighbour's position is
-    /// older than [`MAX_HEIGHT_AGE`]. A call of its own: a board takes long to copy what one call
-    /// would return.
+    /// older than [`SILENT_AFTER_POSITION_AGE`]. A call of its own: a board takes long to copy what
+    /// one call would return.
     #[inline(always)]
     pub(crate) fn apply_silence<'a>(
         &'a self,
@@ -392,7 +395,7 @@ impl<const V: usize> Neighbours<V> {
     ) {
         let position_age = entry.position_age(now);
         // Most are heard.
-        if position_age >= MAX_HEIGHT_AGE {
+        if position_age >= SILENT_AFTER_POSITION_AGE {
             self.change_to_silent(entry, position_age, now, met);
         }
     }
@@ -407,22 +410,23 @@ impl<const V: usize> Neighbours<V> {
         now: Instant,
         met: &mut FilterNeighbour<'a>,
     ) {
-        let (motion, dead) = (&mut met.motion, met.lost);
+        let (motion, lost) = (&mut met.motion, met.lost);
         let placed_s = motion.age_s;
+        let is_old = |age_s: f32| age_s > SILENT_AFTER_POSITION_AGE_S;
         // If only an intent is fresh, its first point, the setpoint, stands for the position.
-        let heard_s = entry.fresh_intent_age_s(now).filter(|_| placed_s > MAX_HEIGHT_AGE_S);
+        let heard_s = entry.fresh_intent_age_s(now).filter(|_| is_old(placed_s));
         let (by_intent, age_s) = (heard_s.is_some(), heard_s.unwrap_or(placed_s));
         // Silent for `down_after`, or grounded without a position of its own, the neighbour lies on
         // the ground below; before that it rests in the zone that detours stay clear of.
         let down = position_age >= self.down_after
             || (entry.reports_any(GROUNDED) && entry.lacks_position());
-        let lies = down && (dead || entry.reports_any(GROUNDED)) && !entry.ground_m.is_nan();
-        let least_m = if dead && !by_intent { entry.min_rest_distance_m() } else { 0.0 };
+        let lies = down && (lost || entry.reports_any(GROUNDED)) && !entry.ground_m.is_nan();
+        let least_m = if lost && !by_intent { entry.min_rest_distance_m() } else { 0.0 };
         let rest = entry.nearest_rest_place(least_m);
         let heard = entry.points.first().filter(|_| by_intent).copied();
         motion.position = heard.or(rest.map(|(at, ..)| at)).unwrap_or(motion.position);
         // A neighbour silent in its climb may have flown to the climb's top, or just above it.
-        let top = if age_s > MAX_HEIGHT_AGE_S && !lies { entry.climb_top_m() } else { None };
+        let top = if is_old(age_s) && !lies { entry.climb_top_m() } else { None };
         let mut highest_m = entry.ground_m;
         if lies {
             let field = self.area_ground();
@@ -433,14 +437,14 @@ impl<const V: usize> Neighbours<V> {
         }
         motion.grounded = (motion.grounded && top.is_none()) || lies;
         let bottom_m = entry.column_bottom_m(motion.position.z);
-        // A dead neighbour that flew along its points stopped on them, and rests in the zone that
+        // A lost neighbour that flew along its points stopped on them, and rests in the zone that
         // detours stay clear of.
         motion.age_s = age_s;
-        if dead || top.is_some() {
+        if lost || top.is_some() {
             (motion.speed_mps, motion.age_s) = (0.0, 0.0);
-            motion.delay_s = if dead { 0.0 } else { MAX_UNHEARD_BEYOND_TOP_S };
+            motion.delay_s = if lost { 0.0 } else { MAX_UNHEARD_BEYOND_TOP_S };
         }
-        if dead {
+        if lost {
             motion.reported_points = rest.map_or(&entry.points, |(_, points, _)| points);
             if top.is_none() {
                 motion.rests_within_m = entry.max_unheard_distance_m() - least_m;
@@ -456,14 +460,14 @@ impl<const V: usize> Neighbours<V> {
             None => None,
         };
         moved.into_iter().for_each(|place| put_on_points(motion, place, entry.points_extent_m));
-        if dead && flies {
+        if lost && flies {
             motion.reported_path_reach.max_reach_m = f32::INFINITY;
         }
         let column =
-            (dead || entry.has_column()) && (!motion.grounded || (lies && highest_m > bottom_m));
+            (lost || entry.has_column()) && (!motion.grounded || (lies && highest_m > bottom_m));
         motion.column_bottom_z_m = column.then_some(bottom_m);
         met.out_of_range = entry.is_out_of_range(now);
-        let stands = now - entry.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S;
+        let stands = now - entry.moved_at >= STANDS_AFTER && age_s < SILENT_AFTER_POSITION_AGE_S;
         met.stands = motion.grounded || stands;
         met.before_climb = top.map(|_| entry.state.position);
     }

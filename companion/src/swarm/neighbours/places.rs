@@ -6,8 +6,8 @@ use planner_core::{Length, Point};
 use super::dead_reckoning::AreaGround;
 use super::entry::NeighbourEntry;
 use super::{
-    AVOIDED_WITHIN_M, GROUNDED, LANDED, MAX_HEIGHT_AGE, MAX_HEIGHT_AGE_S, MAX_HEIGHT_DIFFERENCE_M,
-    NO_PLACE, Neighbours, ON_PLAN, OUT_OF_PLAN, UNHEARD_LANDING_AFTER,
+    AVOIDED_WITHIN_M, GROUNDED, LANDED, MAX_HEIGHT_DIFFERENCE_M, NO_PLACE, Neighbours, ON_PLAN,
+    OUT_OF_PLAN, SILENT_AFTER_POSITION_AGE, SILENT_AFTER_POSITION_AGE_S, UNHEARD_LANDING_AFTER,
 };
 use crate::time::Instant;
 
@@ -90,21 +90,21 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Calls `visit` with the keep-out zones of neighbour `i` of the roster where it stands or
-    /// rests: of radius `lying_m` if it is on the ground, `hovering_m` if it is heard and not out
-    /// of the plan, else `apart_m`.
+    /// rests: of radius `grounded_m` if it is on the ground, `heard_in_air_m` if it is heard and
+    /// not out of the plan, else `apart_m`.
     pub(crate) fn for_each_zone_of(
         &self,
         i: usize,
         now: Instant,
-        [apart_m, hovering_m, lying_m]: [f32; 3],
+        [apart_m, heard_in_air_m, grounded_m]: [f32; 3],
         visit: &mut dyn FnMut(KeepOutZone),
     ) {
         let rostered = self.entries[..self.roster_count].get(i);
         if let Some(entry) = rostered.filter(|c| c.position_at.is_some()) {
-            let heard = entry.heard_within(now, MAX_HEIGHT_AGE);
+            let heard = entry.heard_within(now, SILENT_AFTER_POSITION_AGE);
             let far_m = match (entry.is_on_ground(now, self.down_after), heard) {
-                (true, _) => lying_m,
-                (false, true) if !entry.reports_any(OUT_OF_PLAN) => hovering_m,
+                (true, _) => grounded_m,
+                (false, true) if !entry.reports_any(OUT_OF_PLAN) => heard_in_air_m,
                 (false, _) => apart_m,
             };
             let reach = [far_m, self.max_unheard_flown_m(entry, now)];
@@ -143,7 +143,7 @@ impl<const V: usize> Neighbours<V> {
             });
         } else if !self.hears_nobody(now) {
             let from = entry.state.position;
-            let far_s = MAX_HEIGHT_AGE_S + 2.0 * entry.message_delay.delay_s;
+            let far_s = SILENT_AFTER_POSITION_AGE_S + 2.0 * entry.message_delay.delay_s;
             let radius_m = apart_m + self.max_progress_mps * far_s;
             visit(KeepOutZone { from, to: from, radius_m, kind });
         }
@@ -192,7 +192,7 @@ impl<const V: usize> Neighbours<V> {
     ) {
         for entry in self.entries.iter().filter(|c| c.position_at.is_some()) {
             let mut zone = |from: Point, to: Point, radius_m: f32| {
-                visit(KeepOutZone { from, to, radius_m, kind: ZoneKind::Descending });
+                visit(KeepOutZone { from, to, radius_m, kind: ZoneKind::LandingColumn });
             };
             let from = entry.state.position;
             zone(from, from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M), apart_m);

@@ -36,7 +36,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether every vehicle of the roster that has not ended its flight was last heard, if ever,
     /// where the radio may not reach: then silence is no failure.
-    pub(crate) fn are_all_out_of_range(&self) -> bool {
+    pub(crate) fn are_all_out_of_range_or_done(&self) -> bool {
         let beyond = |c: &NeighbourEntry| {
             c.at_range_edge || c.position_at.is_none() || c.reports_any(LANDED | OUT_OF_PLAN)
         };

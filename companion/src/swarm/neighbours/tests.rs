@@ -395,9 +395,9 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             holds_lease: false,
             lands,
         };
-        let dead = table.entries[1].is_lost_on_points(now - placed_at, now);
+        let lost = table.entries[1].is_lost_on_points(now - placed_at, now);
         let mut met = table.entries[1].filter_neighbour(now);
-        met.lost = dead;
+        met.lost = lost;
         table.apply_silence(&table.entries[1], now, &mut met);
         if met.on_plan && reach.on_plan {
             met.motion.delay_s = 0.0;
@@ -406,7 +406,7 @@ fn a_vehicle_beyond_reach_is_out_of_reach_of_the_filter_too() {
             // For a vehicle that hears nobody, the other one has flown on.
             (met.motion.age_s, met.motion.grounded) = (bounds.stopped_when_unheard_for_s, false);
         }
-        let silent = met.lost || met.motion.age_s > MAX_HEIGHT_AGE_S;
+        let silent = met.lost || met.motion.age_s > SILENT_AFTER_POSITION_AGE_S;
         if lands && silent {
             (met.motion.age_s, met.motion.speed_mps, met.motion.reported_points) = (0.0, 0.0, &[]);
             met.motion.reported_path_reach = ReportedPathReach::UNBOUNDED;

@@ -73,7 +73,7 @@ impl Bench {
         }
         let found = |()| {
             let mut path = Path::new();
-            if matches!(request.goal, DetourGoal::Home { .. }) {
+            if matches!(request.goal, DetourGoal::Point { .. }) {
                 around::plan_detour(
                     &TransitGraph::<1>::empty(),
                     None,

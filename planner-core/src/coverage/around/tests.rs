@@ -17,7 +17,7 @@ fn request(here: Point) -> DetourRequest {
         here,
         leg: [here, here],
         leg_clearance_m: 10.0,
-        goal: DetourGoal::Home { above_pad: OVER, layer_z_m: LAYER_M },
+        goal: DetourGoal::Point { end: OVER, layer_z_m: LAYER_M },
         descent_m: 12.0,
         required_clearance_m: 1.2,
         fence: None,
@@ -145,7 +145,7 @@ fn a_pad_below_somebody_is_no_home_and_nobody_flies_through_a_ring_of_columns() 
 fn what_is_no_number_is_refused() {
     let here = Point::new(300.0, 200.0, 25.0);
     let bad = [f32::NAN, f32::INFINITY]
-        .map(|layer_m| DetourGoal::Home { above_pad: OVER, layer_z_m: layer_m });
+        .map(|layer_m| DetourGoal::Point { end: OVER, layer_z_m: layer_m });
     for goal in bad {
         let (way, _) = planned(&[], &DetourRequest { goal, ..request(here) }, &[]).unwrap();
         assert!(matches!(way, Err(DetourError::Config(_))));
@@ -174,7 +174,7 @@ proptest! {
         let request = DetourRequest { land_aside: aside, ..request(here) };
         let thing = |&(x, y, low_m, high_m, radius_m, lands): &(f32, f32, f32, f32, f32, bool)| {
             KeepOutZone {
-                kind: if lands { ZoneKind::Descending } else { ZoneKind::Static },
+                kind: if lands { ZoneKind::LandingColumn } else { ZoneKind::Static },
                 ..column(Flat::new(x, y), low_m, low_m + high_m, radius_m)
             }
         };

@@ -29,7 +29,7 @@ fn pictures_stand_at_both_ends_of_a_stretch_and_evenly_between() {
         (0.0, 30.0, 7.5, 5)
     );
     let second = stretches.next().unwrap();
-    assert_eq!((second.from_m, second.to_m, second.picture_at_m(4)), (40.0, 70.0, 70.0));
+    assert_eq!((second.from_m, second.to_m, second.picture_arc_length_m(4)), (40.0, 70.0, 70.0));
     let third = stretches.next().unwrap();
     assert_eq!(
         (third.from_m, third.to_m, third.ground_spacing_m, third.count),
@@ -66,9 +66,11 @@ fn pictures_are_evenly_apart_over_ground_where_the_path_rises_and_falls() {
     let shots = photographs.stretches(&path).next().unwrap();
     assert_eq!((shots.ground_spacing_m, shots.count), (10.0, 9));
     for k in 0..9 {
-        let place = path.point_at(shots.picture_at_m(k)).unwrap();
+        let place = path.point_at(shots.picture_arc_length_m(k)).unwrap();
         assert!((place.x - 10.0 * k as f32).abs() < 1e-3, "{place}");
-        let by = |beside_m: f32| photographs.taken_count(&path, shots.picture_at_m(k) + beside_m);
+        let by = |beside_m: f32| {
+            photographs.taken_count(&path, shots.picture_arc_length_m(k) + beside_m)
+        };
         assert_eq!((by(-0.05), by(0.0), by(0.05)), (k, k + 1, k + 1), "{k}");
     }
     assert_eq!(photographs.taken_count(&path, 1e9), 9);

@@ -125,8 +125,8 @@ fn ardupilot_projection_agrees_with_the_recording() {
 fn ardupilot_constant_is_the_equatorial_circle() {
     // LATLON_TO_M: 1e-7 degree of the equator, 2π · 6 378 100 m / 360 / 1e7, as an f32.
     let metres = (6_378_100.0 * 1e-7f64).to_radians();
-    assert!((ARDUPILOT_M_PER_1E7_DEG - metres).abs() < 1e-9, "{metres}");
-    assert_eq!(f64::from(ARDUPILOT_M_PER_1E7_DEG as f32) as f32, 0.011_131_884_5);
+    assert!((ARDUPILOT_M_PER_DEG_E7 - metres).abs() < 1e-9, "{metres}");
+    assert_eq!(f64::from(ARDUPILOT_M_PER_DEG_E7 as f32) as f32, 0.011_131_884_5);
 }
 
 #[test]

@@ -9,7 +9,7 @@
 //! cell. All other segments go to the exact check.
 
 use super::config::PrmConfig;
-use super::neighbours::NodeIndex;
+use super::neighbours::NodeGrid;
 use crate::Point;
 use crate::map::segment::{
     Snapped, TOUCH_CHECK_CLEARANCE_CELLS, brick_layer_mask, is_farther_than, segment_is_clear,
@@ -145,7 +145,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     #[inline(always)]
     pub(super) fn for_each_visible<E, const NODES: usize, const CUBES: usize>(
         &self,
-        workspace: &NodeIndex<NODES, CUBES>,
+        workspace: &NodeGrid<NODES, CUBES>,
         places: &[u16],
         hint: impl Fn(usize) -> Option<bool>,
         mut found: impl FnMut(usize, f32) -> Result<(), E>,
@@ -156,12 +156,12 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
             let (clear, room) = match self
                 .view
                 .as_ref()
-                .map_or(RayClass::Leaves(0.0), |view| self.classify_ray(view, there))
+                .map_or(SegmentClass::Leaves(0.0), |view| self.classify_segment(view, there))
             {
-                RayClass::Clear(room) => (true, room),
-                RayClass::Blocked => (false, 0.0),
-                RayClass::Leaves(known) => {
-                    (hint(place).unwrap_or_else(|| self.is_ray_clear(there, known)), 0.0)
+                SegmentClass::Clear(room) => (true, room),
+                SegmentClass::Blocked => (false, 0.0),
+                SegmentClass::Leaves(known) => {
+                    (hint(place).unwrap_or_else(|| self.is_rest_clear(there, known)), 0.0)
                 }
             };
             if clear {
@@ -174,7 +174,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     /// The exact check of the segment from `here` to `there`; the first part, `known` (0 to 1) of
     /// its length, lies in the free box and need not be checked.
     #[inline]
-    fn is_ray_clear(&self, there: [f32; 3], known: f32) -> bool {
+    fn is_rest_clear(&self, there: [f32; 3], known: f32) -> bool {
         let there = Point::from(there);
         let (Some(a), Some(b)) = (&self.here_snapped, snap(self.grid.shape(), &there)) else {
             return false;
@@ -197,7 +197,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
     /// Whether the segment from `here` to `there` is clear, as far as the free box can decide with
     /// certainty.
     #[inline(always)]
-    fn classify_ray(&self, view: &BoxView, there: [f32; 3]) -> RayClass {
+    fn classify_segment(&self, view: &BoxView, there: [f32; 3]) -> SegmentClass {
         let d = [0, 1, 2].map(|axis| (there[axis] - self.here[axis]) * self.cells_per_m);
         let inside = (d[0] > view.clear_low[0])
             & (d[0] < view.clear_high[0])
@@ -210,7 +210,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
                 let (low, high) = (view.clear_low[axis], view.clear_high[axis]);
                 (d[axis].min(0.0) - low).min(high - d[axis].max(0.0))
             });
-            return RayClass::Clear(room[0].min(room[1]).min(room[2]) + view.inset);
+            return SegmentClass::Clear(room[0].min(room[1]).min(room[2]) + view.inset);
         }
         // A component of zero never leaves the box: its quotient is infinite.
         let leave = [0, 1, 2].map(|axis| {
@@ -220,14 +220,14 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
         let t = leave[0].min(leave[1]).min(leave[2]);
         let at = |t: f32| [0, 1, 2].map(|axis| self.here_cells[axis] + d[axis] * t);
         if t < 0.999 && self.is_certainly_obstacle(at(t)) {
-            return RayClass::Blocked;
+            return SegmentClass::Blocked;
         }
         // The cell beyond the face by which the segment leaves the box is free, or may be. Up to
         // that face, less the probe depth and the clearance, the segment is certainly clear.
         let near =
             [0, 1, 2].map(|axis| leave[axis] - (PROBE_DEPTH_CELLS + view.inset) / d[axis].abs());
         let known = near[0].min(near[1]).min(near[2]).clamp(0.0, 1.0);
-        RayClass::Leaves(if view.clear_high[0] > 0.0 { known } else { 0.0 })
+        SegmentClass::Leaves(if view.clear_high[0] > 0.0 { known } else { 0.0 })
     }
 
     /// Whether a point, in cells from the grid's minimum corner, lies in an occupied cell, and not
@@ -248,7 +248,7 @@ impl<'g, 'a> NodeVisibility<'g, 'a> {
 }
 
 /// What the free box alone says about the segment from `here` to another node.
-enum RayClass {
+enum SegmentClass {
     /// The segment ends inside the box, and keeps at least this many cells from the nearest face,
     /// up to rounding.
     Clear(f32),

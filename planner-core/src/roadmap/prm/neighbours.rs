@@ -1,5 +1,5 @@
-//! Spatial index of the nodes: they are sorted into cubes, so that pairs within the length range
-//! are found without measuring all pairs.
+//! Spatial grid of the nodes: they are sorted into cubes, so that pairs within the length range are
+//! found without measuring all pairs.
 //!
 //! A counting sort over a grid of cubes around the nodes. A cube's edge is half of `edge_max_m`
 //! (longer where that would be too many cubes). Cubes are numbered x fastest, so the nodes of cubes
@@ -12,9 +12,9 @@ use crate::Point;
 /// Candidate nodes whose distances are computed at once.
 const CANDIDATE_LANES: usize = 16;
 
-/// Spatial index of up to `NODES` nodes, sorted into fewer than `CUBES` cubes: 14 bytes per node, 2
+/// Spatial grid of up to `NODES` nodes, sorted into fewer than `CUBES` cubes: 14 bytes per node, 2
 /// per cube. The default board has 4096 of each.
-pub struct NodeIndex<const NODES: usize, const CUBES: usize> {
+pub struct NodeGrid<const NODES: usize, const CUBES: usize> {
     /// Coordinates of the nodes in sorted order.
     x: [f32; NODES],
     y: [f32; NODES],
@@ -23,7 +23,7 @@ pub struct NodeIndex<const NODES: usize, const CUBES: usize> {
     sorted_nodes: [u16; NODES],
     /// Place of the first node of each cube; the entry after the last cube is the number of nodes.
     cube_starts: [u16; CUBES],
-    /// Number of nodes in the index.
+    /// Number of nodes in the grid.
     len: usize,
     /// Minimum corner of the first cube, metres in the mission frame.
     min: [f32; 3],
@@ -33,14 +33,14 @@ pub struct NodeIndex<const NODES: usize, const CUBES: usize> {
     dims: [usize; 3],
 }
 
-impl<const NODES: usize, const CUBES: usize> Default for NodeIndex<NODES, CUBES> {
+impl<const NODES: usize, const CUBES: usize> Default for NodeGrid<NODES, CUBES> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
-    /// Creates an empty index, all zero: a static of it takes no flash.
+impl<const NODES: usize, const CUBES: usize> NodeGrid<NODES, CUBES> {
+    /// Creates an empty grid, all zero: a static of it takes no flash.
     pub const fn new() -> Self {
         const { assert!(NODES <= u16::MAX as usize && CUBES >= 2) };
         Self {
@@ -56,18 +56,18 @@ impl<const NODES: usize, const CUBES: usize> NodeIndex<NODES, CUBES> {
         }
     }
 
-    /// Number of nodes in the index.
+    /// Number of nodes in the grid.
     pub fn len(&self) -> usize {
         self.len
     }
 
-    /// Whether the index has no nodes.
+    /// Whether the grid has no nodes.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Sorts the nodes into the index, replacing what it held. O(nodes + cubes).
-    pub fn build_index(&mut self, nodes: &[Point], config: &PrmConfig) -> Result<(), PrmError> {
+    /// Sorts the nodes into the grid, replacing what it held. O(nodes + cubes).
+    pub fn sort_nodes(&mut self, nodes: &[Point], config: &PrmConfig) -> Result<(), PrmError> {
         config.check()?;
         self.len = 0;
         if nodes.len() > NODES {

@@ -52,7 +52,7 @@ fn rooms(rng: &mut Pcg32, resolution_m: f32) -> (GridShape, Vec<u64>) {
 
 /// Checks edges: the same set as the all-pairs loop gives, none twice.
 fn check_edges(grid: &VoxelGrid<'_>, nodes: &[Point], config: &PrmConfig) -> usize {
-    let mut workspace = NodeIndex::<400, 600>::new();
+    let mut workspace = NodeGrid::<400, 600>::new();
     let mut edges = vec![PrmEdge::default(); 50_000];
     let count = connect(grid, nodes, config, &mut workspace, &mut edges).unwrap();
     let mut split = Vec::new();
@@ -253,7 +253,7 @@ fn refusals_are_named() {
     ] {
         assert_eq!(sample_nodes(&empty, None, &[], &bad, &mut nodes), Err(PrmError::Config(name)));
     }
-    let mut workspace = NodeIndex::<20, 8>::new();
+    let mut workspace = NodeGrid::<20, 8>::new();
     let count = sample_nodes(&empty, None, &[inside], &few, &mut nodes).unwrap();
     let mut edges = [PrmEdge::default(); 5];
     assert_eq!(

@@ -4,7 +4,7 @@
 //! Both programs get the same map (the built-in building at 0.25 m, for theirs written as `.bt`),
 //! the same ten starts and goals, 2300 random nodes, Dmin 0.5 m, Dmax 8 m, margin 0, and are run
 //! alternately. Loading the map is in neither time: theirs holds an octree, ours the voxel grid.
-//! Both times include random nodes, the index of nodes, neighbours, rays, and the graph in both
+//! Both times include random nodes, the grid of nodes, neighbours, rays, and the graph in both
 //! directions with the lengths of its edges (theirs an adjacency list, ours the roadmap file with
 //! its CRC-32 and a list of lengths beside it). Nothing is kept from one repeat to the next. Our
 //! reader's check of the file is in neither time, since their graph is not read from a file.
@@ -30,7 +30,7 @@ use host_sim::scenario;
 use planner_core::Point;
 use planner_core::geo::frames::Geodetic;
 use planner_core::map::voxel::VoxelGrid;
-use planner_core::roadmap::prm::{self, NodeIndex, PrmConfig, PrmEdge, Sampling, squared_length};
+use planner_core::roadmap::prm::{self, NodeGrid, PrmConfig, PrmEdge, Sampling, squared_length};
 use planner_core::roadmap::search::{RoadmapWithLengths, SearchWorkspace, astar, cost_matrix};
 use planner_core::roadmap::{self, LANDMARK_COUNT, RoadmapHeader, RoadmapView};
 use serde::Deserialize;
@@ -46,7 +46,7 @@ const VEHICLES: usize = 10;
 const ROUNDS: usize = 9;
 const REPEATS: usize = 3;
 /// Workspace with the capacities of the default board.
-type BoardNodeIndex = NodeIndex<4096, 4096>;
+type BoardNodeGrid = NodeGrid<4096, 4096>;
 
 /// The JSON line that the baseline program prints.
 #[derive(Deserialize)]
@@ -262,7 +262,7 @@ struct OurBench<'a> {
     grid: &'a VoxelGrid<'a>,
     /// Starts, then goals.
     terminals: &'a [Point],
-    workspace: Box<BoardNodeIndex>,
+    workspace: Box<BoardNodeGrid>,
     search: Box<SearchWorkspace<4096>>,
     nodes: Vec<Point>,
     edges: Vec<roadmap::Edge>,
@@ -276,7 +276,7 @@ impl<'a> OurBench<'a> {
         Self {
             grid,
             terminals,
-            workspace: Box::new(NodeIndex::new()),
+            workspace: Box::new(NodeGrid::new()),
             search: Box::new(SearchWorkspace::new()),
             nodes: Vec::new(),
             edges: Vec::new(),
@@ -312,7 +312,7 @@ impl<'a> OurBench<'a> {
                 self.edges = edges.into_iter().map(edge).collect();
             }
             Threads::One => {
-                self.workspace.build_index(nodes, &config).map_err(to_anyhow)?;
+                self.workspace.sort_nodes(nodes, &config).map_err(to_anyhow)?;
                 prm::connect_range(grid, &self.workspace, &config, 0..nodes.len(), |e| {
                     self.edges.push(edge(e));
                     Ok(())

@@ -5,7 +5,7 @@ use planner_core::flight::WaypointRange;
 use super::State::*;
 use super::losses::{over_a_field, report_status, tunnels};
 use super::*;
-use crate::link::done::{self, PhotographedReport};
+use crate::link::photographed::{self, PhotographedReport};
 use crate::link::roster::ShareStatus;
 
 /// The other vehicle reports from the ground what it knows to be photographed.
@@ -26,7 +26,7 @@ fn report(first: u32) -> PhotographedReport {
 
 /// Vehicle 77 sends this report.
 fn reports(b: &mut Bench, report: &PhotographedReport) {
-    let mut payload = [0; done::MAX_LEN];
+    let mut payload = [0; photographed::MAX_LEN];
     let len = report.encode(&mut payload);
     tunnels(b, &payload[..len]);
 }

@@ -214,7 +214,7 @@ proptest! {
     ) {
         let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
         let path = path();
-        let hold_m = photographs.stretches(&path).next().unwrap().picture_at_m(number);
+        let hold_m = photographs.stretches(&path).next().unwrap().picture_arc_length_m(number);
         let (mut camera, mut links, mut fake) =
             (CameraControl::default(), Links::default(), Fake::default());
         let mut timers = Timers::default();

@@ -397,15 +397,15 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
         table.handle_intent(Instant::ZERO, 1, &intent(flags, 1, 2), 1, Some(2));
         let silent_s = uniform(&mut rng, 1.0, 120.0);
         let now = Instant::from_millis((1000.0 * silent_s) as u64);
-        let lying_m = uniform(&mut rng, 1.0, 2.0);
-        let apart_m = lying_m + uniform(&mut rng, 0.1, 1.0);
+        let grounded_m = uniform(&mut rng, 1.0, 2.0);
+        let apart_m = grounded_m + uniform(&mut rng, 0.1, 1.0);
         let lies = flags & GROUNDED != 0 || (flags & OUT_OF_PLAN == 0 && silent_s >= 75.0);
         let comes_down = flags & (GROUNDED | OUT_OF_PLAN) == 0 && (45.0..75.0).contains(&silent_s);
-        table.for_each_keep_out_zone(now, [apart_m, apart_m, lying_m], |off| {
+        table.for_each_keep_out_zone(now, [apart_m, apart_m, grounded_m], |off| {
             // The place of a silent vehicle is known to `STALE_POSITION_ERROR_M` only.
-            let most_m = lying_m + STALE_POSITION_ERROR_M;
+            let most_m = grounded_m + STALE_POSITION_ERROR_M;
             let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };
-            assert!(fits && off.radius_m >= lying_m, "{flags:#x}, {silent_s} s: {off:?}");
+            assert!(fits && off.radius_m >= grounded_m, "{flags:#x}, {silent_s} s: {off:?}");
         });
         assert_eq!(table.any_comes_down_unheard(now), comes_down, "{flags:#x}, {silent_s} s");
         seen[if lies { 0 } else { 1 + usize::from(comes_down) }] += 1;
