@@ -53,9 +53,7 @@ impl<'a> CoveragePlan<'a> {
     /// # Errors
     /// No plan was found; the error says why, and names the place in the scenario.
     pub fn new(scenario: &'a Scenario, method: CoverageMethod) -> anyhow::Result<Self> {
-        // A pad may be on a roof, unless the origin's altitude is 0, which counts as not given.
-        let given = scenario.area.as_ref().is_some_and(|area| area.origin.alt_m != 0.0);
-        check_start_heights(scenario, if given { f32::INFINITY } else { MAX_START_OFF_GROUND_M })?;
+        check_starts_on_ground(scenario)?;
         Self::plan_with_search(scenario, method, HOST_SEARCH_STEPS)
     }
 
@@ -324,18 +322,15 @@ fn build_tracks(
 /// # Errors
 /// A vehicle starts too far above or below the ground; the error names it.
 pub fn check_starts_on_ground(scenario: &Scenario) -> anyhow::Result<()> {
-    check_start_heights(scenario, MAX_START_OFF_GROUND_M)
-}
-
-/// Refuses a start more than [`MAX_START_OFF_GROUND_M`] below the ground, or `most_m` above it.
-fn check_start_heights(scenario: &Scenario, most_m: f32) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
     let above_m = |v: &VehicleSection| v.start.z - area.ground_height_m(&v.start.xy());
-    let stray = |v: &VehicleSection| !(-MAX_START_OFF_GROUND_M..=most_m).contains(&above_m(v));
+    let stray = |v: &VehicleSection| {
+        !(-MAX_START_OFF_GROUND_M..=MAX_START_OFF_GROUND_M).contains(&above_m(v))
+    };
     if let Some(index) = scenario.vehicles.iter().position(stray) {
         let vehicle = &scenario.vehicles[index];
         bail!(
-            "bad vehicle: {}: vehicle {} starts {:.1} m {} the ground\nhint: {ORIGIN_HINT}",
+            "bad vehicle: {}: vehicle {} starts {:.1} m {} the ground\nhint: pads stand on the ground; z of a start counts from the origin; {ORIGIN_HINT}",
             scenario.vehicle_file_lines[index],
             vehicle.id,
             above_m(vehicle).abs(),

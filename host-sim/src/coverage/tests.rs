@@ -122,3 +122,19 @@ fn a_start_inside_a_no_fly_zone_is_refused_by_the_name_of_the_zone() {
         assert_eq!(refused, Some(why));
     }
 }
+
+#[test]
+fn a_pad_off_the_ground_is_refused() {
+    for (start_z_m, is_refused) in
+        [(1.4, false), (-1.4, false), (1.6, true), (-1.6, true), (15.0, true)]
+    {
+        let mut scenario = field(&format!(
+            "{SPACING}origin = {{ lat_deg = 40.3, lon_deg = -3.7, alt_m = 700.0 }}"
+        ));
+        scenario.vehicles[1].start.z = start_z_m;
+        let plan = CoveragePlan::new(&scenario, CoverageMethod::Binpat);
+        let error = plan.err().map(|error| error.to_string());
+        assert_eq!(error.is_some(), is_refused, "{start_z_m} m: {error:?}");
+        assert!(error.is_none_or(|error| error.contains("vehicle 2 starts")));
+    }
+}
