@@ -39,6 +39,15 @@ fn large_random_areas_are_photographed_whole_in_stretches() {
     are_photographed_whole(areas::many_lanes_scenario, 1);
 }
 
+#[test]
+fn random_areas_are_flown_over_whole_without_a_trigger() {
+    let draw = |random: &mut Pcg32, shape, vehicles| {
+        let text = areas::flyable_scenario(random, shape, vehicles);
+        text.replace("\"distance\"", "\"none\"").replace("\"waypoint\"", "\"none\"")
+    };
+    are_photographed_whole(draw, 0);
+}
+
 /// Flies random areas of `draw`; at least `stretched` of them must be flown in stretches.
 fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String, stretched: usize) {
     let (from, count) =

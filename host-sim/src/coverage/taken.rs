@@ -24,6 +24,7 @@
 use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::tracks::Lane;
+use planner_core::flight::Trigger;
 
 use super::CoveragePlan;
 use crate::margins;
@@ -79,7 +80,27 @@ pub fn count_missed_and_repeated(planned: &CoveragePlan<'_>, pictures: &[Picture
     let lanes = planned.tracks.lanes();
     let left: u64 =
         lanes.iter().map(|lane| count_missed_on_lane(planned, lane, pictures, &tolerance)).sum();
-    (left, count_repeated(lanes, planned.tracks.waypoint_count(), pictures))
+    let passes = match planned.area_settings.trigger {
+        Trigger::None => track_points_at_waypoints(planned, pictures),
+        _ => pictures.to_vec(),
+    };
+    (left, count_repeated(lanes, planned.tracks.waypoint_count(), &passes))
+}
+
+/// Of the points of tracks, all given as pictures, those within a quarter of a spacing of a
+/// waypoint from which the vehicle flies along the lanes. The others may be on a transit at the
+/// height of the lanes.
+fn track_points_at_waypoints(planned: &CoveragePlan<'_>, points: &[Picture]) -> Vec<Picture> {
+    let (lanes, along) = (planned.tracks.lanes(), planned.tracks.lane_direction());
+    let spacing = planned.area_settings.spacing;
+    let near_m = 0.25 * spacing.max_waypoint_spacing_m.min(spacing.max_lane_spacing_m);
+    let is_pass = |ends: &&[Picture]| {
+        let (place, flown) = (ends[0].position.xy(), (ends[1].position - ends[0].position).xy());
+        ends[0].vehicle == ends[1].vehicle
+            && flown.perp(&along).abs() < 0.2 * flown.dot(&along).abs()
+            && nearest_waypoint(lanes, &place).is_some_and(|(_, distance_m)| distance_m < near_m)
+    };
+    points.windows(2).filter(is_pass).map(|ends| ends[0]).collect()
 }
 
 /// Distance of a point along a lane from its first waypoint, and distance beside the lane, metres.
@@ -120,15 +141,16 @@ fn count_missed_on_lane(
     (0..lane.waypoint_count).filter(|k| !has_picture(k)).count() as u64
 }
 
-/// Number of the waypoint nearest to a picture taken at `place`; `None` if there are no lanes.
-fn nearest_waypoint(lanes: &[Lane], place: &Flat) -> Option<u32> {
+/// Number of the waypoint nearest to a picture taken at `place`, and its distance, metres; `None`
+/// if there are no lanes.
+fn nearest_waypoint(lanes: &[Lane], place: &Flat) -> Option<(u32, f32)> {
     let nearest = |lane: &Lane| {
         let share = along_and_cross_track(lane, place).0 / lane.length_m().max(f32::MIN_POSITIVE);
         let last = lane.waypoint_count.saturating_sub(1);
         let k = (share * last as f32).round().clamp(0.0, last as f32) as u32;
         (lane.first_waypoint + k, (lane.waypoint(k) - place).norm())
     };
-    lanes.iter().map(nearest).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(number, _)| number)
+    lanes.iter().map(nearest).min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Number of waypoints that were flown more than once.
@@ -140,7 +162,7 @@ fn count_repeated(lanes: &[Lane], waypoints: u32, pictures: &[Picture]) -> u64 {
     for vehicle in vehicles {
         let own = pictures.iter().filter(|picture| picture.vehicle == vehicle);
         let mut flown: Vec<u32> =
-            own.filter_map(|p| nearest_waypoint(lanes, &p.position.xy())).collect();
+            own.filter_map(|p| Some(nearest_waypoint(lanes, &p.position.xy())?.0)).collect();
         // Of pictures of earlier flights neither vehicle nor order is known: all those at one
         // waypoint count as one pass.
         if vehicle.is_none() {

@@ -23,8 +23,8 @@ pub struct FlightFindings {
     pub complete: bool,
 }
 
-/// Every track point at the height of the lanes from which the vehicle flies along them, as a
-/// picture taken there whose heading is the lanes' direction. `None` without an area, or if companions trigger the camera: then there are
+/// Every track point at the height of the lanes, as a picture taken there whose heading is the
+/// lanes' direction. `None` without an area, or if companions trigger the camera: then there are
 /// real pictures to judge.
 ///
 /// # Errors
@@ -43,12 +43,8 @@ pub fn track_points_as_pictures(
     let is_on_lanes =
         |place: &Point| heights_m.contains(&(place.z - area.ground_height_m(&place.xy())));
     let places = scenario.vehicles.iter().zip(tracks).flat_map(|(vehicle, track)| {
-        let on_lanes = track.windows(2).filter(|ends| {
-            // A transit to another lane may cross lanes between.
-            let flown = ends[1].1.xy() - ends[0].1.xy();
-            is_on_lanes(&ends[0].1) && flown.perp(&along).abs() < flown.dot(&along).abs()
-        });
-        on_lanes.map(|ends| ends[0]).map(|(t_s, position)| Picture {
+        let on_lanes = track.iter().filter(|(_, place)| is_on_lanes(place));
+        on_lanes.map(|&(t_s, position)| Picture {
             vehicle: Some(vehicle.id),
             t_s,
             position,
