@@ -117,15 +117,15 @@ impl EmulatedBoard {
         self.now_us
     }
 
-    /// Grants the board time until `until_us`, and hands over `pieces`: the bytes that its ports
+    /// Grants the board time until `until_us`, and hands over `received`: the bytes that its ports
     /// receive until then, sorted by time. The caller has to call
     /// [`wait_for_grant_end`](Self::wait_for_grant_end) next.
     ///
     /// # Errors
     /// The QEMU process has ended, or the bytes are too many for one message.
-    pub fn begin_grant(&mut self, until_us: u64, pieces: &[PortBytes]) -> anyhow::Result<()> {
+    pub fn begin_grant(&mut self, until_us: u64, received: &[PortBytes]) -> anyhow::Result<()> {
         let mut message = Vec::new();
-        for PortBytes { port, at_us, bytes } in pieces {
+        for PortBytes { port, at_us, bytes } in received {
             let (port, due_us) = (*port as u8, *at_us);
             for bytes in bytes.chunks(u16::MAX.into()) {
                 let len = bytes.len() as u16;
@@ -169,9 +169,9 @@ impl EmulatedBoard {
     pub fn run_grant(
         &mut self,
         until_us: u64,
-        pieces: &[PortBytes],
+        received: &[PortBytes],
     ) -> anyhow::Result<GrantResult> {
-        self.begin_grant(until_us, pieces)?;
+        self.begin_grant(until_us, received)?;
         self.wait_for_grant_end()
     }
 

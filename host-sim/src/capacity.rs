@@ -8,31 +8,31 @@ use companion::{Companion, Config};
 use planner_core::roadmap::RoadmapView;
 
 /// Most nodes of a roadmap, starts and goals among them: 30 bytes each in the search workspace.
-pub const ROADMAP_NODES: usize = 16_384;
+pub const MAX_ROADMAP_NODES: usize = 16_384;
 /// Most cubes of the grid into which nodes are sorted while a roadmap is built: 2 bytes each.
 /// Enough for 250 × 250 × 100 m with edges of at most 8 m.
-pub const ROADMAP_CUBES: usize = 1 << 17;
+pub const MAX_ROADMAP_CUBES: usize = 1 << 17;
 /// Most vehicles, and most goals: 4 bytes for each pair of vehicle and goal, 1.6 kB for each path.
-pub const VEHICLES: usize = 256;
+pub const MAX_VEHICLES: usize = 256;
 /// Most waypoints of a path: 24 bytes each.
-pub const WAYPOINTS: usize = 64;
+pub const MAX_WAYPOINTS: usize = 64;
 /// Most gates of one vehicle: 12 bytes each.
-pub const GATES: usize = 2048;
+pub const MAX_GATES: usize = 2048;
 /// Most timed segments of all scheduled flights; the search for a side-step (SIPP) plans around
 /// them: 44 bytes each.
-pub const TIMED_SEGMENTS: usize = 32_768;
+pub const MAX_TIMED_SEGMENTS: usize = 32_768;
 
 /// Most keep-out zones of a detour: 32 bytes each.
-pub const ZONES: usize = 32 * VEHICLES;
+pub const MAX_ZONES: usize = 32 * MAX_VEHICLES;
 
 /// A companion with the host's capacities.
-pub type HostCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
+pub type HostCompanion = Companion<MAX_VEHICLES, MAX_WAYPOINTS, MAX_GATES>;
 
 /// A companion on the heap: it is too large for a thread's stack.
 ///
 /// # Errors
 /// The companion refuses the configuration; the error names what is wrong.
-pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<HostCompanion>> {
+pub fn new_companion(config: Config<MAX_VEHICLES>) -> anyhow::Result<Box<HostCompanion>> {
     let companion = HostCompanion::new(config)
         .map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
     Ok(Box::new(companion))

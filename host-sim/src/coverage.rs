@@ -9,8 +9,8 @@ pub mod flight;
 pub mod heights;
 pub mod obstacles;
 pub mod page;
-pub mod parts;
 mod planned;
+pub mod report_layers;
 pub mod result;
 pub mod separation;
 pub mod sorties;
@@ -31,7 +31,7 @@ use planner_core::coverage::{CoverageError, Flat, exact, powell};
 use planner_core::geo::frames::{Geodetic, enu_to_geodetic};
 use planner_core::map::field::follow::TerrainFollowing;
 
-pub use self::planned::{CoveragePlan, MAX_LANES, MAX_NO_FLY_CORNERS, MAX_VEHICLES};
+pub use self::planned::{CoveragePlan, MAX_AREA_VEHICLES, MAX_LANES, MAX_NO_FLY_CORNERS};
 use self::sorties::{BATTERY_SWAP_S, LaneTooLong, Sortie, USABLE_CHARGE};
 use crate::area::MAX_VERTICES;
 use crate::scenario::coverage::{AreaSection, CoverageMethod, ORIGIN_HINT};
@@ -307,7 +307,7 @@ fn build_tracks(
     max_search_steps: u32,
 ) -> Result<Box<Tracks<MAX_LANES>>, CoverageError> {
     let (spacing, angle_from_east_deg) = (wanted.usable_spacing, wanted.lane_angle_deg);
-    let border_overshoot_m = wanted.lane_overrun_m;
+    let border_overshoot_m = wanted.border_overshoot_m;
     let pattern =
         LanePattern { spacing, angle_from_east_deg, border_overshoot_m, max_search_steps };
     let mut tracks = Box::new(Tracks::new());
@@ -481,8 +481,8 @@ fn explain_error(error: CoverageError, wanted: &AreaSection, vehicles: usize) ->
         CoverageError::InsideNoFly(index) => format!("vehicle {index} starts inside a no-fly zone"),
         CoverageError::Unreachable => "no-fly zones leave no way to a part of it".to_owned(),
         CoverageError::Vehicles => {
-            let most =
-                if vehicles > MAX_VEHICLES { MAX_VEHICLES } else { exact::MAX_EXACT_VEHICLES };
+            let is_too_many = vehicles > MAX_AREA_VEHICLES;
+            let most = if is_too_many { MAX_AREA_VEHICLES } else { exact::MAX_EXACT_VEHICLES };
             format!("it takes 1 to {most} vehicles, not {vehicles}")
         }
         CoverageError::WorkspaceTooSmall => "the planner's memory is too small for it".to_owned(),

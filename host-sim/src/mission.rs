@@ -21,7 +21,9 @@ use planner_core::schedule::ScheduleError;
 use self::planner::GoalsWorkspace;
 use self::ready::schedule_config;
 pub use self::ready::{HostPlan, OwnPlan, PreparedMission, VERTICAL_MPS};
-use crate::capacity::{BoardCapacity, GATES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS, on_heap};
+use crate::capacity::{
+    BoardCapacity, MAX_GATES, MAX_TIMED_SEGMENTS, MAX_VEHICLES, MAX_WAYPOINTS, on_heap,
+};
 use crate::coverage::check_starts_on_ground;
 use crate::map::{self, VoxelMap};
 use crate::margins;
@@ -178,7 +180,7 @@ impl PreparedMission {
 
     /// Most gates of one vehicle: the board's capacity, or the host's where no board is given.
     fn max_gates(&self) -> usize {
-        self.board.map_or(GATES, |board| board.gates)
+        self.board.map_or(MAX_GATES, |board| board.gates)
     }
 
     fn describe_plan_error(&self, error: &PlanError) -> anyhow::Error {
@@ -200,17 +202,17 @@ impl PreparedMission {
             }
             PlanError::Schedule(id, ScheduleError::SegmentsFull) => {
                 anyhow!(
-                    "vehicle {id} meets too many others: {path}: the swarm has at most {TIMED_SEGMENTS} timed segments"
+                    "vehicle {id} meets too many others: {path}: the swarm has at most {MAX_TIMED_SEGMENTS} timed segments"
                 )
             }
             PlanError::Path(id, PathError::PathFull) => {
                 anyhow!(
-                    "the flight of vehicle {id} is too long: {path}: a path holds at most {WAYPOINTS} waypoints\n\
+                    "the flight of vehicle {id} is too long: {path}: a path holds at most {MAX_WAYPOINTS} waypoints\n\
                      hint: a larger roadmap.edge_max_m makes fewer of them"
                 )
             }
             PlanError::SwarmFull => {
-                anyhow!("too many vehicles or goals: {path}: at most {VEHICLES}")
+                anyhow!("too many vehicles or goals: {path}: at most {MAX_VEHICLES}")
             }
             PlanError::Search(id, error) => {
                 anyhow!("no search for vehicle {id}: {path}: {error:?}")

@@ -20,7 +20,7 @@ use planner_core::roadmap::search::SearchWorkspace;
 use planner_core::roadmap::{self, Edge, LANDMARK_COUNT, RoadmapError, RoadmapHeader};
 use rayon::prelude::*;
 
-use crate::capacity::{BoardCapacity, ROADMAP_CUBES, ROADMAP_NODES, on_heap};
+use crate::capacity::{BoardCapacity, MAX_ROADMAP_CUBES, MAX_ROADMAP_NODES, on_heap};
 use crate::map::{BoxTree, VoxelMap};
 
 /// Greatest clearance stored with an edge, metres: enough for our largest vehicle.
@@ -82,7 +82,7 @@ pub fn build(
         rayon::join(|| timed(|| BoxTree::new(&grid)), || timed(sampled));
     let (nodes, heights_m) = sampled?;
     let joining = Instant::now();
-    let mut workspace = Box::new(NodeGrid::<ROADMAP_NODES, ROADMAP_CUBES>::new());
+    let mut workspace = Box::new(NodeGrid::<MAX_ROADMAP_NODES, MAX_ROADMAP_CUBES>::new());
     let edges = connect_with_clearances(&grid, &tree, &nodes, config, &mut workspace)
         .map_err(|e| describe_prm_error(&e))?;
     let parts = BuildTimes {
@@ -109,14 +109,16 @@ pub fn add_passages(
         return Ok(0);
     }
     let total = roadmap.nodes.len() + added.len();
-    if total > ROADMAP_NODES {
-        bail!("the roadmap would have {total} nodes: this build plans on at most {ROADMAP_NODES}");
+    if total > MAX_ROADMAP_NODES {
+        bail!(
+            "the roadmap would have {total} nodes: this build plans on at most {MAX_ROADMAP_NODES}"
+        );
     }
     roadmap
         .heights_above_ground_m
         .extend(added.iter().map(|node| height_above_ground_m(map, node)));
     roadmap.nodes.extend(&added);
-    let mut workspace = Box::new(NodeGrid::<ROADMAP_NODES, ROADMAP_CUBES>::new());
+    let mut workspace = Box::new(NodeGrid::<MAX_ROADMAP_NODES, MAX_ROADMAP_CUBES>::new());
     roadmap.edges = connect_with_clearances(&grid, &tree, &roadmap.nodes, config, &mut workspace)
         .map_err(|e| describe_prm_error(&e))?;
     Ok(added.len())
@@ -142,11 +144,13 @@ pub fn sample(
     config: &PrmConfig,
 ) -> anyhow::Result<Vec<Point>> {
     let total = terminals.len() + config.random_nodes;
-    if total > ROADMAP_NODES {
-        bail!("the roadmap would have {total} nodes: this build plans on at most {ROADMAP_NODES}");
+    if total > MAX_ROADMAP_NODES {
+        bail!(
+            "the roadmap would have {total} nodes: this build plans on at most {MAX_ROADMAP_NODES}"
+        );
     }
     let mut nodes = vec![Point::zeros(); total];
-    let never_sample = map.never_sample_grid();
+    let never_sample = map.no_node_grid();
     prm::sample_nodes(&map.grid(), Some(&never_sample), terminals, config, &mut nodes)
         .map_err(|e| describe_prm_error(&e))?;
     Ok(nodes)
@@ -290,7 +294,7 @@ pub fn encode(roadmap: &BuiltRoadmap, header: &RoadmapHeader) -> anyhow::Result<
     let length = roadmap::encoded_len(nodes.len(), edges.len(), LANDMARK_AND_HEIGHT_COLUMNS)
         .ok_or_else(too_large)?;
     let mut bytes = vec![0; length];
-    let mut workspace = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
+    let mut workspace = on_heap(SearchWorkspace::<MAX_ROADMAP_NODES>::new);
     roadmap::write_with_landmarks(header, nodes, edges, heights_m, &mut workspace, &mut bytes)
         .map_err(|e: RoadmapError| anyhow!("the roadmap cannot be written: {e:?}"))?;
     Ok(bytes)

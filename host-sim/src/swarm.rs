@@ -124,7 +124,7 @@ struct SimulationRun<'a> {
     mission: &'a PreparedMission,
     plan: &'a HostPlan,
     planner: HostPlanner<'a>,
-    members: Vec<SimulatedVehicle>,
+    vehicles: Vec<SimulatedVehicle>,
     radio: Radio,
     referee: Referee<'a>,
     ground_station: GroundStation,
@@ -179,13 +179,13 @@ fn simulate(
         }
     }
     let wall_time_s = began.elapsed().as_secs_f64();
-    run.members.iter_mut().try_for_each(SimulatedVehicle::print_stack_use)?;
+    run.vehicles.iter_mut().try_for_each(SimulatedVehicle::print_stack_use)?;
     let result = run.result(command);
     run.log_trouble_and_incidents(&result);
-    let tracks = (0..run.members.len()).map(|i| run.referee.track(i).to_vec()).collect();
+    let tracks = (0..run.vehicles.len()).map(|i| run.referee.track(i).to_vec()).collect();
     let power_lost_at_s =
-        run.members.iter().map(|m| m.power_lost_at_s.map(|t_s| t_s as f32)).collect();
-    let pictures = run.members.iter_mut().flat_map(SimulatedVehicle::drain_pictures).collect();
+        run.vehicles.iter().map(|v| v.power_lost_at_s.map(|t_s| t_s as f32)).collect();
+    let pictures = run.vehicles.iter_mut().flat_map(SimulatedVehicle::drain_pictures).collect();
     let SimulationRun { referee, log, photographed_before, divisions, t_s, .. } = run;
     let divisions = divisions.into_divisions();
     Ok(SwarmFlight {
@@ -210,30 +210,30 @@ impl<'a> SimulationRun<'a> {
     ) -> anyhow::Result<Self> {
         let scenario = &mission.scenario;
         let settings = &scenario.simulation;
-        let mut members = vehicles_on_pads(mission)?;
+        let mut vehicles = vehicles_on_pads(mission)?;
         let mut radio = Radio::new(
             RadioConfig {
                 range_m: settings.radio_range_m,
                 loss_probability: f64::from(settings.radio_loss),
                 delay_s: f64::from(settings.radio_delay_s),
             },
-            members.len(),
+            vehicles.len(),
             scenario.seed,
         );
         if let Some(gateway) = &gateway {
-            gateway.add_ground_ports(&mut members);
+            gateway.add_ground_ports(&mut vehicles);
         }
         if gateway.is_some() || scenario.covers_area() {
             radio.start_recording();
         }
-        let vehicles: Vec<(u8, f32)> =
+        let ids_and_radii: Vec<(u8, f32)> =
             scenario.vehicles.iter().map(|v| (v.id, v.radius_m)).collect();
         let safety_distance_m = scenario.deconfliction.safety_distance_m;
         let mut referee = Referee::new(
             mission.map.grid(),
             mission.clearance_field(),
             safety_distance_m,
-            &vehicles,
+            &ids_and_radii,
         );
         referee.terrain =
             scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
@@ -254,9 +254,9 @@ impl<'a> SimulationRun<'a> {
             script: FaultScript::new(scenario),
             log: Vec::new(),
             photographed_before: Vec::new(),
-            true_positions: members.iter().map(|m| m.autopilot.true_state().position).collect(),
-            nearest_to_end_m: vec![f32::INFINITY; members.len()],
-            members,
+            true_positions: vehicles.iter().map(|v| v.autopilot.true_state().position).collect(),
+            nearest_to_end_m: vec![f32::INFINITY; vehicles.len()],
+            vehicles,
             t_s: 0.0,
             last_active_s: 0.0,
             ends_at_s: f64::INFINITY,
@@ -265,30 +265,31 @@ impl<'a> SimulationRun<'a> {
 
     /// One step of 4 ms, from 0; `now_us` is the time at its end.
     fn step(&mut self, step: u64, now_us: u64) -> anyhow::Result<()> {
-        let Self { mission, plan, planner, members, radio, true_positions: places, log, .. } = self;
+        let Self { mission, plan, planner, vehicles, radio, true_positions: places, log, .. } =
+            self;
         self.t_s = now_us as f64 * 1e-6;
         let mut world = FaultTargets {
-            members,
+            vehicles,
             radio,
             ground_station: &mut self.ground_station,
             obstacles: &mut self.referee.sphere_obstacles,
         };
         self.script.step(now_us, &mut world, log)?;
-        for (i, member) in members.iter_mut().enumerate() {
-            member.step(step, i, mission, radio, places, log)?;
-            if let Some(wanted) = member.take_plan_request() {
-                let own = match member.plan_answer {
+        for (i, vehicle) in vehicles.iter_mut().enumerate() {
+            vehicle.step(step, i, mission, radio, places, log)?;
+            if let Some(wanted) = vehicle.take_plan_request() {
+                let own = match vehicle.plan_answer {
                     PlanAnswer::BadRoadmap => {
                         Err(plan_failure_on_damaged_roadmap(&mission.roadmap_or_field_file))
                     }
-                    _ => planner.answer(i, wanted, &mut member.companion),
+                    _ => planner.answer(i, wanted, &mut vehicle.companion),
                 };
                 if wanted == PlanKind::Mission {
-                    self.photographed_before = member.companion.excluded_waypoints().to_vec();
+                    self.photographed_before = vehicle.companion.excluded_waypoints().to_vec();
                 }
-                member.hand_over_plan(now_us, wanted, own);
+                vehicle.hand_over_plan(now_us, wanted, own);
             }
-            places[i] = member.autopilot.true_state().position;
+            places[i] = vehicle.autopilot.true_state().position;
             let flight = &plan.flights[i];
             // A vehicle without a part of an area may get one later: it too comes back to its pad.
             let end = match flight.task.leaves_pad() {
@@ -307,60 +308,62 @@ impl<'a> SimulationRun<'a> {
                 };
             }
         }
-        self.ground_station.step(now_us, members, radio, places);
+        self.ground_station.step(now_us, vehicles, radio, places);
         let overheard = radio.take_recorded();
         self.divisions.handle_packets(self.t_s as f32, &overheard);
         if let Some(gateway) = &mut self.gateway {
-            gateway.step(now_us, members, radio, places, &overheard).context("link lost: --qgc")?;
+            gateway
+                .step(now_us, vehicles, radio, places, &overheard)
+                .context("link lost: --qgc")?;
         }
-        let seen: Vec<_> = members.iter().map(SimulatedVehicle::observation).collect();
+        let seen: Vec<_> = vehicles.iter().map(SimulatedVehicle::observation).collect();
         self.referee.observe(self.t_s, &seen);
         Ok(())
     }
 
     /// Sets the end of the simulation once no vehicle is expected to move any more.
     fn update_end(&mut self) {
-        let (members, plan) = (&self.members, self.plan);
+        let (vehicles, plan) = (&self.vehicles, self.plan);
         let started = self.ground_station.is_start_commanded();
         let done = |i: usize| {
-            let at_rest = is_finished(members[i].state()) || members[i].is_powerless();
+            let at_rest = is_finished(vehicles[i].state()) || vehicles[i].is_powerless();
             let has_no_goal = !plan.flights[i].task.leaves_pad();
             at_rest
-                || (has_no_goal && started && !is_started(members[i].state()))
-                || is_left_to_pilot(&members[i])
+                || (has_no_goal && started && !is_started(vehicles[i].state()))
+                || is_left_to_pilot(&vehicles[i])
         };
-        let still = |m: &SimulatedVehicle| !m.autopilot.true_state().armed || is_left_to_pilot(m);
-        if !(self.script.has_no_change_left() && started && members.iter().all(still)) {
+        let still = |v: &SimulatedVehicle| !v.autopilot.true_state().armed || is_left_to_pilot(v);
+        if !(self.script.has_no_change_left() && started && vehicles.iter().all(still)) {
             self.last_active_s = self.t_s;
         }
         // In a coverage mission vehicles on the ground wait until a lost vehicle is down.
-        let still_s = END_AFTER_STANDSTILL_S + f64::from(members[0].lost_vehicle_down_after_s());
-        let over = (0..members.len()).all(done) || self.t_s - self.last_active_s > still_s;
+        let still_s = END_AFTER_STANDSTILL_S + f64::from(vehicles[0].lost_vehicle_down_after_s());
+        let over = (0..vehicles.len()).all(done) || self.t_s - self.last_active_s > still_s;
         if self.ends_at_s.is_infinite() && self.script.has_no_change_left() && over {
             self.ends_at_s = self.t_s + AFTERMATH_S;
         }
     }
 
     fn result(&self, command: &'static str) -> MissionResult {
-        let Self { mission, plan, members, referee, .. } = self;
+        let Self { mission, plan, vehicles, referee, .. } = self;
         let scenario = &mission.scenario;
-        let vehicles: Vec<_> = (0..members.len()).map(|i| self.vehicle_result(i)).collect();
-        let served = vehicles.iter().filter(|v| v.goal.is_some()).count();
-        let all_served = served == mission.goals.len().min(members.len());
+        let results: Vec<_> = (0..vehicles.len()).map(|i| self.vehicle_result(i)).collect();
+        let served = results.iter().filter(|v| v.goal.is_some()).count();
+        let all_served = served == mission.goals.len().min(vehicles.len());
         let clean = referee.wall_contacts == 0 && referee.violations == 0 && referee.deadlocks == 0;
         let finite = |m: f32| m.is_finite().then(|| rounded(m));
-        let last_landing_s = members.iter().filter_map(|m| m.landed_s).fold(0.0, f64::max);
+        let last_landing_s = vehicles.iter().filter_map(|v| v.landed_s).fold(0.0, f64::max);
         MissionResult {
             command,
             scenario: scenario.path.clone(),
             seed: scenario.seed,
             complete: clean
                 && all_served
-                && vehicles
+                && results
                     .iter()
                     .enumerate()
                     .all(|(i, v)| self.has_completed_task(i, v) || self.is_disabled_by_fault(i)),
-            vehicles,
+            vehicles: results,
             totals: Totals {
                 path_m: rounded(plan.total_path_m() as f32),
                 makespan_s: (last_landing_s - self.ground_station.start_commanded_s()).max(0.0),
@@ -393,36 +396,37 @@ impl<'a> SimulationRun<'a> {
         );
         let nearest_to_end_m = self.nearest_to_end_m[i] - error_m;
         let flown_m = self.referee.flown_m(i);
-        vehicle_result(&self.members[i], &self.plan.flights[i], flown_m, nearest_to_end_m, self.t_s)
+        let flight = &self.plan.flights[i];
+        vehicle_result(&self.vehicles[i], flight, flown_m, nearest_to_end_m, self.t_s)
     }
 
     /// Whether the vehicle flew to the end of its path and landed, or had no flight to make.
     fn has_completed_task(&self, i: usize, vehicle: &VehicleResult) -> bool {
         let flight = &self.plan.flights[i];
-        !has_flight_to_make(&self.members[i], flight) || (vehicle.reached && vehicle.landed)
+        !has_flight_to_make(&self.vehicles[i], flight) || (vehicle.reached && vehicle.landed)
     }
 
     /// Whether a fault struck the vehicle and its flight is over: it has no power, never took off,
     /// is finished, or is left to its pilot.
     fn is_disabled_by_fault(&self, i: usize) -> bool {
-        let member = &self.members[i];
+        let vehicle = &self.vehicles[i];
         self.script.was_struck(i)
-            && (member.is_powerless()
-                || member.took_off_s.is_none()
-                || is_finished(member.state())
-                || is_left_to_pilot(member))
+            && (vehicle.is_powerless()
+                || vehicle.took_off_s.is_none()
+                || is_finished(vehicle.state())
+                || is_left_to_pilot(vehicle))
     }
 
     /// Logs the fault of the serial link of each vehicle that did not complete its task, and the
     /// referee's incidents.
     fn log_trouble_and_incidents(&mut self, result: &MissionResult) {
         let scenario = &self.mission.scenario;
-        for (i, (member, vehicle)) in self.members.iter().zip(&result.vehicles).enumerate() {
+        for (i, (vehicle, outcome)) in self.vehicles.iter().zip(&result.vehicles).enumerate() {
             if let (false, Some(text)) =
-                (self.has_completed_task(i, vehicle), member.link_trouble(self.t_s))
+                (self.has_completed_task(i, outcome), vehicle.link_trouble(self.t_s))
             {
                 let (t_s, level) = (self.t_s as f32, Level::Error);
-                self.log.push(report::LogEvent { t_s, vehicle: Some(vehicle.id), level, text });
+                self.log.push(report::LogEvent { t_s, vehicle: Some(outcome.id), level, text });
             }
         }
         self.log.extend(self.referee.incidents.iter().map(|seen| report::LogEvent {
@@ -435,8 +439,8 @@ impl<'a> SimulationRun<'a> {
 }
 
 /// Whether a pilot controls the vehicle or has just given it back: this may last for any time.
-fn is_left_to_pilot(member: &SimulatedVehicle) -> bool {
-    member.state().is_left_to_pilot()
+fn is_left_to_pilot(vehicle: &SimulatedVehicle) -> bool {
+    vehicle.state().is_left_to_pilot()
 }
 
 /// How planning fails on the roadmap file with one bit changed.
@@ -454,32 +458,32 @@ fn plan_failure_on_damaged_roadmap(file: &[u8]) -> PlanFailure {
 /// Whether the vehicle took off, or the plan gives it a flight that earlier flights did not
 /// complete.
 fn has_flight_to_make(
-    member: &SimulatedVehicle,
-    flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,
+    vehicle: &SimulatedVehicle,
+    flight: &planner_core::flight::Flight<{ crate::capacity::MAX_WAYPOINTS }>,
 ) -> bool {
-    let stays = !flight.task.leaves_pad() || member.state() == State::Done;
-    member.took_off_s.is_some() || !stays
+    let stays = !flight.task.leaves_pad() || vehicle.state() == State::Done;
+    vehicle.took_off_s.is_some() || !stays
 }
 
 fn vehicle_result(
-    member: &SimulatedVehicle,
-    flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,
+    vehicle: &SimulatedVehicle,
+    flight: &planner_core::flight::Flight<{ crate::capacity::MAX_WAYPOINTS }>,
     flown_m: f64,
     nearest_to_end_m: f32,
     now_s: f64,
 ) -> VehicleResult {
     // A flight in a coverage mission ends where it began: only a landing shows that it is over.
-    let landed = member.landed_s.is_some();
+    let landed = vehicle.landed_s.is_some();
     let reached =
         nearest_to_end_m <= GOAL_REACHED_WITHIN_M && (landed || flight.task.goal().is_some());
-    let end = match (has_flight_to_make(member, flight), member.state()) {
+    let end = match (has_flight_to_make(vehicle, flight), vehicle.state()) {
         (false, _) => "no goal".to_owned(),
         // Its estimate was at the goal, its true position was not.
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
-        _ => member.describe_end(),
+        _ => vehicle.describe_end(),
     };
     let flight_time_s =
-        member.took_off_s.map_or(0.0, |from| member.back_on_ground_s.unwrap_or(now_s) - from);
+        vehicle.took_off_s.map_or(0.0, |from| vehicle.back_on_ground_s.unwrap_or(now_s) - from);
     VehicleResult {
         id: flight.vehicle_id,
         goal: flight.task.goal(),

@@ -11,9 +11,9 @@
 //! the file.
 
 mod asc;
-mod claims;
 mod cloud;
 mod crs;
+mod declared_sizes;
 mod error;
 mod field;
 mod frame;

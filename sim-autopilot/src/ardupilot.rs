@@ -425,7 +425,7 @@ impl Copter {
             self.failsafe = Some(Failsafe::GroundStation);
             platform.send_text(4, "GCS Failsafe");
             self.force_mode(CopterMode::Rtl, sensors);
-        } else if sensors.battery < self.tuning.battery_low_share
+        } else if sensors.battery < self.tuning.battery_low_charge
             && self.tuning.low_battery_action > 0
         {
             self.failsafe = Some(Failsafe::Battery);

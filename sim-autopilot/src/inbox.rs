@@ -25,9 +25,9 @@ impl Autopilot {
             (system == 0 || system == system_id)
                 && (component == 0 || component == AUTOPILOT_COMPONENT)
         };
-        let (firmware, platform) = (&mut self.firmware, &mut self.platform);
+        let (software, platform) = (&mut self.software, &mut self.platform);
         match frame.message_id {
-            msg::HEARTBEAT => firmware.handle_heartbeat(platform, from),
+            msg::HEARTBEAT => software.handle_heartbeat(platform, from),
             msg::PING if fields.u8(12) == 0 && fields.u8(13) == 0 => {
                 let answer = telemetry::ping_payload(
                     fields.u64(0),
@@ -38,7 +38,7 @@ impl Autopilot {
                 platform.ports[port].send_raw(msg::PING, &answer);
             }
             msg::SET_MODE if fields.u8(4) == system_id => {
-                firmware.handle_set_mode(platform, from, &fields);
+                software.handle_set_mode(platform, from, &fields);
             }
             msg::PARAM_REQUEST_READ if for_us(2, 3) => self.handle_param_read(port, &fields),
             msg::PARAM_REQUEST_LIST if for_us(0, 1) => platform.ports[port].param_cursor = Some(0),
@@ -61,17 +61,17 @@ impl Autopilot {
                 platform.handle_mission(from, frame.message_id, &fields);
             }
             msg::REQUEST_DATA_STREAM if for_us(2, 3) => {
-                firmware.handle_stream_request(platform, from, &fields);
+                software.handle_stream_request(platform, from, &fields);
             }
             msg::COMMAND_INT if for_us(30, 31) => {
-                firmware.handle_command(
+                software.handle_command(
                     platform,
                     from,
                     &ReceivedCommand::from_command_int(&fields),
                 );
             }
             msg::COMMAND_LONG if for_us(30, 31) => {
-                firmware.handle_command(
+                software.handle_command(
                     platform,
                     from,
                     &ReceivedCommand::from_command_long(&fields),
@@ -80,7 +80,7 @@ impl Autopilot {
             msg::SET_POSITION_TARGET_LOCAL_NED | msg::SET_POSITION_TARGET_GLOBAL_INT
                 if for_us(50, 51) =>
             {
-                firmware.handle_setpoint(platform, frame.message_id, &fields);
+                software.handle_setpoint(platform, frame.message_id, &fields);
             }
             msg::TIMESYNC if fields.i64(0) == 0 => {
                 let message = dialect::TIMESYNC_DATA {
@@ -105,7 +105,7 @@ impl Autopilot {
     fn handle_param_set(&mut self, port: usize, fields: &PayloadReader<'_>) {
         let name = fields.text::<16>(6);
         if let Some(name) = name {
-            self.firmware.set_param(name, fields.f32(0), fields.u8(22));
+            self.software.set_param(name, fields.f32(0), fields.u8(22));
         }
         // A refused value is answered by a PARAM_VALUE with the unchanged value.
         self.send_named_param(port, name);
@@ -114,7 +114,7 @@ impl Autopilot {
     /// Sends a parameter by its name; an unknown name gets no answer. ArduPilot then reports 65535
     /// instead of the index.
     fn send_named_param(&mut self, port: usize, name: Option<&str>) {
-        let params = self.firmware.params();
+        let params = self.software.params();
         if let Some(index) = name.and_then(|name| params.index(name)) {
             let reported =
                 if params.encoding() == Encoding::Cast { u16::MAX } else { index as u16 };
@@ -124,7 +124,7 @@ impl Autopilot {
 
     /// Queues PARAM_VALUE of the parameter at `index`, with `reported` as its `param_index`.
     pub(super) fn send_param(&mut self, port: usize, index: usize, reported: u16) {
-        let params = self.firmware.params();
+        let params = self.software.params();
         let Some((name, value)) = params.get(index) else { return };
         // Encoded by hand: value, count, index, name, type.
         let mut payload = [0; 25];

@@ -33,7 +33,6 @@
 pub mod ardupilot;
 mod camera;
 mod config;
-mod firmware;
 mod inbox;
 mod kinds;
 pub mod link;
@@ -41,6 +40,7 @@ pub mod physics;
 mod platform;
 pub mod px4;
 pub mod services;
+mod software;
 mod status;
 pub mod telemetry;
 
@@ -52,7 +52,6 @@ use planner_core::geo::frames::{self, Geodetic};
 
 pub use self::camera::Photo;
 pub use self::config::{AutopilotConfig, AutopilotConfigError};
-use self::firmware::Firmware;
 pub use self::kinds::{EstimatorErrors, GpsFix, SimulatedKind};
 use self::link::port::Port;
 use self::link::routing;
@@ -60,6 +59,7 @@ use self::physics::vehicle::GRAVITY;
 pub use self::physics::vehicle::{AirframeParameters, TrueState, power_ratio_at_speed};
 use self::platform::{IntegralAction, Platform};
 pub use self::px4::Px4Mode;
+use self::software::AutopilotSoftware;
 use self::status::{AutopilotFlags, MotorState};
 use self::telemetry::snapshot::Snapshot;
 
@@ -67,7 +67,7 @@ use self::telemetry::snapshot::Snapshot;
 #[derive(Clone, Debug)]
 pub struct Autopilot {
     platform: Platform,
-    firmware: Firmware,
+    software: AutopilotSoftware,
     /// Buffer for the message ids that are due at one port in one step; empty between steps.
     due_messages: Vec<u32>,
 }
@@ -79,10 +79,10 @@ impl Autopilot {
     /// [`AutopilotConfigError`] where the configuration has an invalid value.
     pub fn new(config: &AutopilotConfig) -> Result<Self, AutopilotConfigError> {
         config::check(config)?;
-        let mut platform = Platform::new(config, Firmware::streams(config.autopilot));
-        let mut firmware = Firmware::new(config);
-        firmware.send_boot_messages(&mut platform);
-        Ok(Self { platform, firmware, due_messages: Vec::new() })
+        let mut platform = Platform::new(config, AutopilotSoftware::streams(config.autopilot));
+        let mut software = AutopilotSoftware::new(config);
+        software.send_boot_messages(&mut platform);
+        Ok(Self { platform, software, due_messages: Vec::new() })
     }
 
     /// The vehicle's true position and motion, without errors of its estimator.
@@ -98,7 +98,7 @@ impl Autopilot {
 
     /// `custom_mode` of HEARTBEAT: the flight mode in use, a failsafe's included.
     pub fn custom_mode(&self) -> u32 {
-        self.firmware.status(&self.platform, &self.platform.sensors()).custom_mode
+        self.software.status(&self.platform, &self.platform.sensors()).custom_mode
     }
 
     /// Whether the simulated autopilot is in its Land mode.
@@ -112,7 +112,7 @@ impl Autopilot {
 
     /// Whether a failsafe is active.
     pub fn in_failsafe(&self) -> bool {
-        self.firmware.in_failsafe()
+        self.software.in_failsafe()
     }
 
     /// Time since boot, microseconds.
@@ -122,7 +122,7 @@ impl Autopilot {
 
     /// Wind at the vehicle now (mean and gust), ENU m/s.
     pub fn wind(&self) -> &Point {
-        &self.platform.disturbance.wind
+        &self.platform.wind_and_noise.wind
     }
 
     /// Handles bytes that arrived at port 0.
@@ -166,7 +166,7 @@ impl Autopilot {
         let config = &mut self.platform.config;
         if !config.ground_port {
             config.ground_port = true;
-            let streams = Firmware::streams(config.autopilot);
+            let streams = AutopilotSoftware::streams(config.autopilot);
             self.platform.ports.push(Port::for_ground(config.system_id, streams));
         }
     }
@@ -189,8 +189,8 @@ impl Autopilot {
     pub fn step(&mut self, dt_s: f32, ground_up_m: f32) {
         self.platform.advance_time(dt_s, ground_up_m);
         let sensors = self.platform.sensors();
-        let output = self.firmware.update(&mut self.platform, &sensors, dt_s);
-        let (armed, landed) = (self.firmware.armed(), self.firmware.landed());
+        let output = self.software.update(&mut self.platform, &sensors, dt_s);
+        let (armed, landed) = (self.software.armed(), self.software.landed());
         let platform = &mut self.platform;
         platform.vehicle.set_flags(AutopilotFlags { armed, landed });
         match output.integral {
@@ -199,13 +199,13 @@ impl Autopilot {
             IntegralAction::Match => platform.vehicle.match_integral_to_demand(),
         }
         if output.motors == MotorState::Lifting {
-            let gains = self.firmware.gains();
+            let gains = self.software.gains();
             let mut velocity = sensors.velocity;
             velocity.z += output.demand.height_rate_weight * (sensors.height_rate - velocity.z);
             platform.vehicle.control(&output.demand, gains, &sensors.position, &velocity, dt_s);
         }
         platform.last_demand = armed.then_some(output.demand);
-        platform.vehicle.advance(output.motors, &platform.disturbance.wind, ground_up_m, dt_s);
+        platform.vehicle.advance(output.motors, &platform.wind_and_noise.wind, ground_up_m, dt_s);
         platform.frame.recentre_if_far(platform.vehicle.position());
         platform.update_camera();
         self.transmit();
@@ -234,7 +234,7 @@ impl Autopilot {
                 && !port.is_congested()
             {
                 self.send_param(index, next, next as u16);
-                let more = next + 1 < self.firmware.params().len();
+                let more = next + 1 < self.software.params().len();
                 self.platform.ports[index].param_cursor = more.then_some(next + 1);
             }
             let port = &mut self.platform.ports[index];
@@ -256,8 +256,8 @@ impl Autopilot {
     /// The state for the telemetry messages of this step.
     fn snapshot(&mut self) -> Snapshot {
         let sensors = self.platform.sensors();
-        let status = self.firmware.status(&self.platform, &sensors);
-        let armed = self.firmware.armed();
+        let status = self.software.status(&self.platform, &sensors);
+        let armed = self.software.armed();
         let platform = &mut self.platform;
         let error = platform.position_error().cast::<f64>();
         let position = *platform.vehicle.position() + error;
@@ -281,8 +281,8 @@ impl Autopilot {
         };
         let gps = if noise > 0.0 {
             (
-                noise * platform.disturbance.unit_sensor_noise(),
-                noise * platform.disturbance.unit_sensor_noise(),
+                noise * platform.wind_and_noise.unit_sensor_noise(),
+                noise * platform.wind_and_noise.unit_sensor_noise(),
                 platform.gps_ok,
             )
         } else {
@@ -329,7 +329,7 @@ impl Autopilot {
             booted.platform.vehicle.set_battery(battery);
             booted.platform.missions = self.platform.missions.clone();
             booted.platform.camera = self.platform.camera.after_reboot();
-            booted.firmware.copy_params_from(&self.firmware);
+            booted.software.copy_params_from(&self.software);
             *self = booted;
         }
     }
@@ -341,7 +341,7 @@ impl Autopilot {
     /// Returns false if the autopilot has no such mode.
     pub fn set_pilot_mode(&mut self, mode: impl Into<u32>) -> bool {
         let sensors = self.platform.sensors();
-        self.firmware.force_mode(mode.into(), &sensors)
+        self.software.force_mode(mode.into(), &sensors)
     }
 
     /// The pilot takes over: mode Position in PX4, BRAKE in ArduCopter. Both hold where the vehicle
@@ -417,7 +417,7 @@ impl Autopilot {
         name: &'static str,
         value: i32,
     ) -> Result<(), AutopilotConfigError> {
-        if self.firmware.set_integer(name, value) {
+        if self.software.set_integer(name, value) {
             Ok(())
         } else {
             Err(AutopilotConfigError::NoIntegerParameter(name))
@@ -427,7 +427,7 @@ impl Autopilot {
     /// Takes the GPS fix away or restores it.
     pub fn set_gps_fix(&mut self, fix: GpsFix) {
         self.platform.gps_ok = fix == GpsFix::Held;
-        self.firmware.set_gps_fix(fix);
+        self.software.set_gps_fix(fix);
     }
 }
 

@@ -80,13 +80,13 @@ pub struct Platform {
     pub(super) config: AutopilotConfig,
     /// Time since boot, microseconds.
     pub(super) time_us: u64,
-    /// Time at which `disturbance` and `errors` change next, microseconds since boot.
+    /// Time at which `wind_and_noise` and `estimator_errors` change next, microseconds since boot.
     next_noise_us: u64,
     pub(super) vehicle: Multicopter,
     /// Wind, and the errors of `position_noise_m`.
-    pub(super) disturbance: Disturbance,
+    pub(super) wind_and_noise: Disturbance,
     /// Errors by the estimator's model ([`crate::EstimatorErrors`]).
-    pub(super) errors: EstimateErrorState,
+    pub(super) estimator_errors: EstimateErrorState,
     /// Error of the position estimate (estimated minus true) that a replay or fault imposes, ENU
     /// metres.
     pub(super) imposed_position_error: Point,
@@ -130,13 +130,13 @@ impl Platform {
         Self {
             time_us: 0,
             next_noise_us: 0,
-            disturbance: Disturbance::new(
+            wind_and_noise: Disturbance::new(
                 config.wind,
                 config.gust_peak_mps,
                 config.position_noise_m,
                 seed,
             ),
-            errors: EstimateErrorState::new(config.estimator, config.autopilot, seed),
+            estimator_errors: EstimateErrorState::new(config.estimator, config.autopilot, seed),
             imposed_position_error: Point::zeros(),
             imposed_velocity_error: Point::zeros(),
             imposed_height_error_rate: 0.0,
@@ -162,8 +162,8 @@ impl Platform {
         self.time_us += libm::roundf(dt_s * 1e6) as u64;
         if self.time_us >= self.next_noise_us {
             self.next_noise_us += (noise::UPDATE_PERIOD_S * 1e6) as u64;
-            self.disturbance.advance();
-            self.errors.advance();
+            self.wind_and_noise.advance();
+            self.estimator_errors.advance();
         }
         self.height_above_ground =
             self.vehicle.state().position.z - ground_up_m - self.config.vehicle.radius_m;
@@ -175,12 +175,12 @@ impl Platform {
             now_us: self.time_us,
             position: state.position + self.position_error(),
             velocity: state.velocity
-                + self.disturbance.velocity_error
+                + self.wind_and_noise.velocity_error
                 + self.imposed_velocity_error
-                + self.errors.velocity,
+                + self.estimator_errors.velocity,
             height_rate: state.velocity.z
                 + self.imposed_height_error_rate
-                + self.errors.position_rate.z,
+                + self.estimator_errors.position_rate.z,
             acceleration: state.acceleration,
             heading: state.heading_rad,
             touching: state.touching,
@@ -196,7 +196,9 @@ impl Platform {
 
     /// Error of the position estimate: estimated minus true, ENU metres.
     pub(super) fn position_error(&self) -> Point {
-        self.disturbance.position_error + self.errors.position + self.imposed_position_error
+        self.wind_and_noise.position_error
+            + self.estimator_errors.position
+            + self.imposed_position_error
     }
 
     /// Sets home for good (arming does not move it), and queues HOME_POSITION.

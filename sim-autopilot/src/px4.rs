@@ -12,26 +12,26 @@
 //! next setpoint ends it. Times are arguments, in microseconds since boot; no clock is read.
 
 mod flight;
-mod glide;
 mod modes;
 pub mod params;
 pub mod setpoint;
+mod smoothed_approach;
 
 mod commands;
-pub mod firmware;
+pub mod software;
 
 use planner_core::Point;
 
-use self::glide::SmoothedApproach;
 pub use self::modes::Px4Mode;
 use self::params::Px4Tuning;
 use self::setpoint::OffboardSetpoint;
+use self::smoothed_approach::SmoothedApproach;
 use crate::GpsFix;
 use crate::link::command::{Arming, CommandOutcome};
 use crate::physics::shaping::JerkLimitedRate;
 use crate::physics::vehicle::Demand;
 use crate::platform::{FlightModeOutput, IntegralAction, Platform, SensorReadings};
-use crate::services::itinerary::MissionLeg;
+use crate::services::mission_flight::MissionLeg;
 use crate::status::MotorState;
 
 /// Delay of the failsafe beyond `COM_OF_LOSS_T`, seconds: in recordings the failsafe started at
@@ -266,7 +266,7 @@ impl Commander {
             Px4Mode::Land | Px4Mode::Return => false,
             Px4Mode::Manual | Px4Mode::Altitude | Px4Mode::Position => false,
         };
-        runs && self.has_gps_fix && sensors.battery >= tuning.battery_low_share
+        runs && self.has_gps_fix && sensors.battery >= tuning.battery_low_charge
     }
 
     /// Disarms. Refused in the air, unless forced.
@@ -427,7 +427,7 @@ impl Commander {
     fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Px4Tuning) {
         let stream_lost = self.intended_mode == Px4Mode::Offboard
             && !self.is_setpoint_stream_fresh(sensors.now_us, tuning);
-        let battery_out = sensors.battery < tuning.battery_critical_share
+        let battery_out = sensors.battery < tuning.battery_critical_charge
             && !self.intended_mode.is_left_on_disarm();
         let action = if !self.has_gps_fix {
             (self.intended_mode != Px4Mode::Land).then_some(Px4Mode::Land)

@@ -106,7 +106,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("pack::binpat, 32", "the same"),
     ("powell::powell, 3", "4000 `binpat`"),
     ("bound::lower_bound_s, 3", "waypoints · v"),
-    ("divide::original_waypoint_number, 32", "v"),
+    ("divide::number_on_whole_path, 32", "v"),
     ("a coverage plan, 3", "`build` and `powell`"),
     ("left and binpat, 3", "`divide::remaining_lanes`, lanes · v, and one `binpat`"),
     ("left and binpat, 32", "the same"),

@@ -2,15 +2,15 @@
 //! loses and delays frames.
 //!
 //! A meeting follows from its seed. [`fly`] simulates it and returns what went wrong, as judged by
-//! [`oracle`]. Nothing here uses the safety filter's code.
+//! [`referee`]. Nothing here uses the safety filter's code.
 
 pub mod autopilot;
 pub mod dice;
 mod forged;
-pub mod oracle;
 mod outcome;
 mod packet;
 mod planner;
+pub mod referee;
 pub mod scene;
 mod vehicle;
 
@@ -25,10 +25,10 @@ use mavlink::dialects::ardupilotmega::{
 use self::autopilot::{ControlSource, STEP_S};
 use self::dice::Dice;
 use self::forged::{forge_report, reported_position_and_velocity};
-use self::oracle::Oracle;
 pub use self::outcome::{Outcome, Summary, outcome_line, summary};
 use self::packet::{Packet, RadioContent};
 use self::planner::detour_in_the_open;
+use self::referee::MeetingReferee;
 use self::scene::{MeetingEvent, Scene, floor_z, landing_point};
 use self::vehicle::MeetingVehicle;
 use crate::setpoints::SetpointStats;
@@ -37,7 +37,7 @@ use crate::setpoints::SetpointStats;
 const AFTERMATH_S: f32 = 3.0;
 /// Horizontal distance beyond the safety distance within which a vehicle counts as above another
 /// one, metres.
-const MAX_LANDING_DRIFT_M: f32 = 1.0;
+const ABOVE_MARGIN_M: f32 = 1.0;
 /// Distance from its path beyond which a vehicle is off it, metres.
 const OFF_PATH_M: f32 = 1.2;
 /// Horizontal distance within which a vehicle is still where its pilot left it, metres.
@@ -79,7 +79,7 @@ impl<'a> World<'a> {
 
     fn fly(mut self) -> Outcome {
         let scene = self.scene;
-        let mut oracle = Oracle::new(scene.vehicles.len());
+        let mut referee = MeetingReferee::new(scene.vehicles.len());
         let mut next = 0;
         let mut rested_s = 0.0;
         let steps = ((scene::START_S + scene.limit_s) / STEP_S) as usize;
@@ -93,9 +93,9 @@ impl<'a> World<'a> {
             }
             self.step();
             let seen: Vec<_> =
-                self.vehicles.iter().map(|vehicle| vehicle.state_for_judge(now_s)).collect();
+                self.vehicles.iter().map(|vehicle| vehicle.state_for_referee(now_s)).collect();
             let heard = |a: usize, b: usize| self.vehicles[a].heard[b].clone();
-            oracle.observe(&seen, heard, |place| floor_z(&scene.vehicles, place));
+            referee.observe(&seen, heard, |place| floor_z(&scene.vehicles, place));
             if self.trace.is_some() && step % 20 == 0 {
                 self.trace_positions(now_s);
             }
@@ -108,8 +108,8 @@ impl<'a> World<'a> {
                 break;
             }
         }
-        oracle.finish();
-        self.outcome(oracle, ended_s)
+        referee.finish();
+        self.outcome(referee, ended_s)
     }
 
     fn trace_event(&mut self, vehicle: usize, what: &str) {
@@ -370,7 +370,7 @@ impl<'a> World<'a> {
         let place = own.autopilot.position;
         let below = |other: &MeetingVehicle| {
             let away = place - other.autopilot.position;
-            away.z > 0.0 && away.xy().norm() < scene::SAFETY_DISTANCE_M + MAX_LANDING_DRIFT_M
+            away.z > 0.0 && away.xy().norm() < scene::SAFETY_DISTANCE_M + ABOVE_MARGIN_M
         };
         let others = self.vehicles.iter().enumerate().filter(|(j, _)| *j != i);
         (own.autopilot.is_caught() || self.was_left_off_path(i))
@@ -389,7 +389,7 @@ impl<'a> World<'a> {
             && (0..=steps).filter_map(away).all(|away| away.norm() > OFF_PATH_M)
     }
 
-    fn outcome(self, oracle: Oracle, ended_s: f32) -> Outcome {
+    fn outcome(self, referee: MeetingReferee, ended_s: f32) -> Outcome {
         let scene = self.scene;
         let mut setpoints = SetpointStats::default();
         let mut unfit = Vec::new();
@@ -421,12 +421,12 @@ impl<'a> World<'a> {
             on_plan: scene.on_plan,
             has_liar: scene.liar.is_some(),
             vehicle_count: scene.vehicles.len(),
-            violations: oracle.violations,
-            touches: oracle.touches,
-            unforeseen_touches: oracle.unforeseen_touches,
+            violations: referee.violations,
+            touches: referee.touches,
+            unforeseen_touches: referee.unforeseen_touches,
             not_landed: stuck,
             held_above_another: held,
-            min_distance_m: oracle.min_distance_m,
+            min_distance_m: referee.min_distance_m,
             ended_s,
             setpoints,
             unfit_setpoints: unfit,

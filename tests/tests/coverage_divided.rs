@@ -6,7 +6,7 @@
 use companion::swarm::fleet::VehicleDivisionInput;
 use flockmate_tests::areas::Shape;
 use flockmate_tests::{areas, number_from_env};
-use host_sim::capacity::WAYPOINTS;
+use host_sim::capacity::MAX_WAYPOINTS;
 use host_sim::coverage::CoveragePlan;
 use host_sim::mission::PreparedMission;
 use host_sim::mission::stretches::next_division_inputs;
@@ -19,12 +19,12 @@ use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
 /// Whether a flight covers the first lanes of its route only: the next division gives the rest.
-fn is_first_part(flight: &Flight<WAYPOINTS>) -> bool {
+fn is_first_part(flight: &Flight<MAX_WAYPOINTS>) -> bool {
     matches!(&flight.task, Task::Photograph(photographs) if photographs.is_first_part)
 }
 
 /// Places of the pictures that a flight takes up to `along_m` of its path, metres ENU.
-fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
+fn pictures(flight: &Flight<MAX_WAYPOINTS>, along_m: f32) -> Vec<Point> {
     let Task::Photograph(photographs) = &flight.task else { return Vec::new() };
     let places = photographs.stretches(&flight.path);
     let places =
@@ -54,7 +54,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
         }
         let mut whole: Vec<Point> =
             plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)).collect();
-        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<VehicleDivisionInput>>::new());
+        let (mut kept, mut divisions) = (Vec::new(), Vec::<Vec<VehicleDivisionInput>>::new());
         let mut lives = vec![true; vehicles];
         let mut divided = 0;
         for _ in 0..3 {
@@ -73,10 +73,10 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
             let inputs: Vec<VehicleDivisionInput> =
                 (0..vehicles).map(|i| input(i, &mut random)).collect();
             let before = plan;
-            losses.push(inputs.clone());
+            divisions.push(inputs.clone());
             // There is no plan if vehicles hold so near to each other that no order of departures
             // is possible, or if a path would need more corners than it may have.
-            match mission.plan_remaining(&[], losses.iter().map(|inputs| &inputs[..])) {
+            match mission.plan_remaining(&[], divisions.iter().map(|inputs| &inputs[..])) {
                 Ok(divided) => plan = divided,
                 Err(error) => {
                     let text = format!("{error:#}");
@@ -138,14 +138,14 @@ fn stretches_leave_nothing_out_and_give_nothing_twice() {
         let planned = CoveragePlan::plan_as_companions(&mission.scenario).expect("it was planned");
         let whole = (0..planned.tracks.waypoint_count())
             .filter_map(|number| planned.tracks.waypoint(number));
-        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<VehicleDivisionInput>>::new());
+        let (mut kept, mut divisions) = (Vec::new(), Vec::<Vec<VehicleDivisionInput>>::new());
         while let Some(inputs) = next_division_inputs(&plan) {
             for (flight, input) in plan.flights.iter().zip(&inputs) {
                 kept.extend(pictures(flight, input.along_m()));
             }
-            losses.push(inputs);
+            divisions.push(inputs);
             plan = mission
-                .plan_remaining(&[], losses.iter().map(|inputs| &inputs[..]))
+                .plan_remaining(&[], divisions.iter().map(|inputs| &inputs[..]))
                 .expect("it was divided before");
         }
         kept.extend(plan.flights.iter().flat_map(|flight| pictures(flight, f32::INFINITY)));
@@ -156,7 +156,7 @@ fn stretches_leave_nothing_out_and_give_nothing_twice() {
             assert_eq!(taken, 1, "seed {seed}: {place:?}");
         }
         assert_eq!(kept.len(), count, "seed {seed}");
-        losses.len()
+        divisions.len()
     };
     let count = number_from_env("FLOCKMATE_DIVIDED", 40);
     let divided: Vec<usize> = (0..count).into_par_iter().map(one).collect();

@@ -192,7 +192,7 @@ fn tried(seed: u64, shape: Shape) -> Option<Tried> {
         unit: TrackUnit::Waypoint,
         following: planned.terrain_following,
     };
-    let mut plan = RoutePlan::<{ host_sim::coverage::MAX_VEHICLES }>::new();
+    let mut plan = RoutePlan::<{ host_sim::coverage::MAX_AREA_VEHICLES }>::new();
     divide_by_method(&work, CoverageMethod::Exact, &mut plan).ok()?;
     let lengths = Lengths::new(&planned, &vehicles);
     let all: Vec<usize> = (0..vehicles.len()).collect();

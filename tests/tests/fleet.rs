@@ -43,10 +43,10 @@ const ENDS_S: f32 = 900.0;
 const HOME_S: f32 = 10.0;
 const DESCENT_S: f32 = 15.0;
 
-type Whole = Fleet<8>;
+type ModelFleet = Fleet<8>;
 
 struct Vehicle {
-    fleet: Whole,
+    fleet: ModelFleet,
     part: Vec<u32>,
     /// Most waypoints of its path, which is the first stretch of a longer part.
     most: usize,
@@ -100,7 +100,7 @@ struct Outcome {
     /// Number of waypoints without a picture.
     left_out: usize,
     /// Whether some vehicle is still up at the end; without a majority all land.
-    majority: bool,
+    some_still_up: bool,
     /// Text about a division without a lost vehicle, or about a vehicle whose part others took
     /// although it was heard all the time.
     needless: Option<String>,
@@ -150,7 +150,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
     let mut vehicles: Vec<Vehicle> = (0..count)
         .map(|own| {
             let mut fleet =
-                Whole::new(own, count, FleetTimeouts::of_flight(Duration::from_secs(60)));
+                ModelFleet::new(own, count, FleetTimeouts::of_flight(Duration::from_secs(60)));
             fleet.begin_flight(zero);
             let part = divide_waypoints(&whole, &fleet, count).0.swap_remove(own);
             Vehicle {
@@ -334,7 +334,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
         agreed_s: agreed_s.filter(|_| clean && losses.len() == 1 && most == usize::MAX),
         loss,
         left_out: taken.iter().filter(|taken| !**taken).count(),
-        majority: alive > 0,
+        some_still_up: alive > 0,
         needless: vehicles.iter().enumerate().filter(|_| clean).find_map(|(rank, vehicle)| {
             let given_away = vehicle.fleet.is_excluded() && !lost(rank);
             // If half of the messages are lost, others' reports about a vehicle may arrive before
@@ -351,14 +351,14 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
 }
 
 /// Whether the vehicle knows that all living vehicles have computed the same division.
-fn has_all_hashes(fleet: &Whole) -> bool {
+fn has_all_hashes(fleet: &ModelFleet) -> bool {
     let roster = fleet.roster_report(0);
     roster.pending_hash != 0
         && roster.entries.iter().all(|e| e.status != ShareStatus::Alive || e.agrees)
 }
 
 /// Each vehicle's part by the divisions that count, without one under way.
-fn counted_parts(whole: &[u32], fleet: &Whole, count: usize) -> Vec<Vec<u32>> {
+fn counted_parts(whole: &[u32], fleet: &ModelFleet, count: usize) -> Vec<Vec<u32>> {
     assert!(!fleet.is_division_to_be_computed(), "what begins to count leaves nothing under way");
     divide_waypoints(whole, fleet, count).0
 }
@@ -392,7 +392,7 @@ fn no_waypoint_has_two_owners_and_none_is_left_out() {
         (from..from + count).into_par_iter().map(|seed| fly(seed, Lease::Obeyed)).collect();
     let wrong: Vec<&String> = all.iter().filter_map(|outcome| outcome.wrong.as_ref()).collect();
     let left_out: Vec<usize> =
-        (0..all.len()).filter(|i| all[*i].left_out > 0 && all[*i].majority).collect();
+        (0..all.len()).filter(|i| all[*i].left_out > 0 && all[*i].some_still_up).collect();
     println!(
         "{count} fleets: {} with two owners, {} with waypoints left out though somebody flew on",
         wrong.len(),
@@ -436,10 +436,10 @@ fn vehicles_that_fly_on_without_their_lease_are_found() {
 /// its commitment.
 #[test]
 fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
-    let mut fleet = Whole::new(1, 3, FleetTimeouts::of_flight(Duration::from_secs(60)));
+    let mut fleet = ModelFleet::new(1, 3, FleetTimeouts::of_flight(Duration::from_secs(60)));
     fleet.begin_flight(Instant::ZERO);
     let own = OwnReport { new_commitment_dm: Some(WAYPOINT_DM), ..OwnReport::default() };
-    let step = |fleet: &mut Whole, at_s: u64, heard: usize| {
+    let step = |fleet: &mut ModelFleet, at_s: u64, heard: usize| {
         let now = Instant::from_millis(1000 * at_s);
         let hears = VehicleReception {
             heard_at: Some(now),

@@ -112,32 +112,34 @@ fn fly(seed: u64) -> Errors {
     let mut mission =
         PreparedMission::prepare(scenario, &Progress::hidden()).expect("the lobby is free");
     let plan = mission.plan().expect("they fly side by side");
-    let mut members = vehicles_on_pads(&mission).expect("good vehicles");
+    let mut vehicles = vehicles_on_pads(&mission).expect("good vehicles");
     // The radio has one station more than vehicles, which only listens.
-    let listener = members.len();
+    let listener = vehicles.len();
     let config = RadioConfig { range_m: 1e6, loss_probability: 0.0, delay_s: 0.05 };
     let mut radio = Radio::new(config, listener + 1, seed);
     let (mut framer, mut ground_station, mut log) =
         (Framer::new(), GroundStation::new(255), Vec::new());
     let mut places: Vec<Point> =
-        members.iter().map(|m| m.autopilot.true_state().position).collect();
+        vehicles.iter().map(|v| v.autopilot.true_state().position).collect();
     places.push(Point::zeros());
-    let mut tracks: Vec<Vec<Point>> = vec![Vec::new(); members.len()];
-    let mut nearest_m = vec![f32::INFINITY; members.len()];
+    let mut tracks: Vec<Vec<Point>> = vec![Vec::new(); vehicles.len()];
+    let mut nearest_m = vec![f32::INFINITY; vehicles.len()];
     let (mut errors, mut heard) = (Errors::default(), 0);
     let origin = mission.scenario.map.origin;
     for step in 0..LIMIT_S * 1_000_000 / STEP_US {
         let now_us = (step + 1) * STEP_US;
-        for (i, member) in members.iter_mut().enumerate() {
-            member.step(step, i, &mission, &mut radio, &places, &mut log).expect("it has no board");
-            if let Some(wanted) = member.take_plan_request() {
+        for (i, vehicle) in vehicles.iter_mut().enumerate() {
+            vehicle
+                .step(step, i, &mission, &mut radio, &places, &mut log)
+                .expect("it has no board");
+            if let Some(wanted) = vehicle.take_plan_request() {
                 let own = mission.own_plan(&plan, i).expect("few gates");
-                member.hand_over_plan(now_us, wanted, Ok(&own));
+                vehicle.hand_over_plan(now_us, wanted, Ok(&own));
             }
-            let truth = member.autopilot.true_state().position;
+            let truth = vehicle.autopilot.true_state().position;
             places[i] = truth;
             tracks[i].push(truth);
-            let telemetry = member.companion.telemetry();
+            let telemetry = vehicle.companion.telemetry();
             if telemetry.position_at == Some(Instant::from_micros(now_us)) {
                 errors.known_m = errors.known_m.max((telemetry.position - truth).norm());
             }
@@ -145,14 +147,14 @@ fn fly(seed: u64) -> Errors {
                 mission.goals[usize::from(plan.flights[i].task.goal().expect("a goal for each"))];
             nearest_m[i] = nearest_m[i].min((truth - goal).norm());
         }
-        ground_station.step(now_us, &mut members, &mut radio, &places);
+        ground_station.step(now_us, &mut vehicles, &mut radio, &places);
         while let Some(packet) = radio.receive(now_us, listener) {
             let mut bytes = &packet[..];
             while let Some(frame) = framer.next(Instant::from_micros(now_us), &mut bytes) {
                 let Some(said) = frame.decode::<GLOBAL_POSITION_INT_DATA>() else { continue };
-                let i = members
+                let i = vehicles
                     .iter()
-                    .position(|m| m.system_id() == frame.system)
+                    .position(|v| v.system_id() == frame.system)
                     .expect("one of ours");
                 let place = Geodetic {
                     lat_deg: f64::from(said.lat) * 1e-7,
@@ -166,14 +168,14 @@ fn fly(seed: u64) -> Errors {
                 heard += 1;
             }
         }
-        if members.iter().all(|m| is_finished(m.companion.state())) {
+        if vehicles.iter().all(|v| is_finished(v.companion.state())) {
             break;
         }
     }
     errors.goal_m = nearest_m.into_iter().fold(0.0, f32::max);
     let log: Vec<_> =
         log.iter().map(|e| format!("{:.1} s {:?}: {}", e.t_s, e.vehicle, e.text)).collect();
-    let ends: Vec<_> = members.iter().map(SimulatedVehicle::describe_end).collect();
+    let ends: Vec<_> = vehicles.iter().map(SimulatedVehicle::describe_end).collect();
     assert!(
         ends.iter().all(|end| end == "Done"),
         "mission {seed}: {ends:?}\n{text}\n{}",

@@ -263,9 +263,11 @@ fn measure_division(
     sum.add_tracks(left);
     sum.add_plan(plan);
     let last = left.waypoint_count() - 1;
-    sum.add(meter.call("divide::original_waypoint_number, 32", 0, || {
-        divide::original_waypoint_number(&done, last)
-    }));
+    sum.add(
+        meter.call("divide::number_on_whole_path, 32", 0, || {
+            divide::number_on_whole_path(&done, last)
+        }),
+    );
 }
 
 /// Plans three detours home and one to a place beside the path, among no-fly zones and 128 keep-out

@@ -46,7 +46,7 @@ pub(super) const FLIGHT_INPUTS: FlightInputs<'static> = FlightInputs {
     assumed_clearance_m: 10.0,
     schedule: SCHEDULE,
     max_gates: GATES,
-    photographed: &[],
+    done_waypoints: &[],
     occupied_layers: 0,
     following: None,
 };

@@ -146,7 +146,7 @@ fn write_mission(mission: &Mission<'_>, out: &mut [u8]) -> usize {
         heights: HEIGHTS,
         spacing: spacing(mission.lane_m),
         lane_angle_deg: mission.angle_deg,
-        lane_overshoot_m: 0.0,
+        border_overshoot_m: 0.0,
         ground: None,
     };
     let share = VehicleShare { weight: 1.0, climb_mps: CLIMB_MPS, descend_mps: DESCEND_MPS };

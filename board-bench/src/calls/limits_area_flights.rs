@@ -168,10 +168,10 @@ fn call_flight_plans(
         Err(PlanError::CountMismatch)
     );
     let ranges = [WaypointRange { first: 4, end: 9 }, WaypointRange { first: 8, end: u32::MAX }];
-    let planned = plan(good, routes, &FlightInputs { photographed: &ranges, ..FLIGHT_INPUTS });
+    let planned = plan(good, routes, &FlightInputs { done_waypoints: &ranges, ..FLIGHT_INPUTS });
     assert_eq!(planned, Err(PlanError::CountMismatch));
     for done in [&ranges[..1], &ranges[1..]] {
-        let _ = plan(good, routes, &FlightInputs { photographed: done, ..FLIGHT_INPUTS });
+        let _ = plan(good, routes, &FlightInputs { done_waypoints: done, ..FLIGHT_INPUTS });
     }
     for (max_gates, occupied_layers) in [(0, 0), (usize::MAX, u64::MAX)] {
         let _ = plan(good, routes, &FlightInputs { max_gates, occupied_layers, ..FLIGHT_INPUTS });
@@ -329,7 +329,7 @@ fn call_divisions(
                 assert!(
                     statuses.len() == VEHICLES || divided == Err(CoverageError::Vehicles.into())
                 );
-                let setting = Err(CoverageError::SettingOutOfRange("along_m").into());
+                let setting = Err(CoverageError::SettingOutOfRange("photographed_to_m").into());
                 assert!(statuses.len() != VEHICLES || hard >= 0.0 || divided == setting);
                 to.add_count(routes.routes.len());
                 // The same division again: what is already done must not be divided again.

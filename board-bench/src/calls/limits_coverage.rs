@@ -300,8 +300,8 @@ fn call_divisions(
                 assert!(found.is_err() || first <= end && end <= tracks.waypoint_count());
                 to.add_count(usize::from(found.is_ok()));
                 for number in WAYPOINT_NUMBERS {
-                    let whole = to.call("divide::original_waypoint_number", || {
-                        divide::original_waypoint_number(done, number)
+                    let whole = to.call("divide::number_on_whole_path", || {
+                        divide::number_on_whole_path(done, number)
                     });
                     assert!(whole >= number);
                     to.add_count(whole as usize);

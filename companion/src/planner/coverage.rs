@@ -350,7 +350,7 @@ pub fn plan_flights<
         let pattern = LanePattern {
             spacing: header.spacing,
             angle_from_east_deg: header.lane_angle_deg,
-            border_overshoot_m: header.lane_overshoot_m,
+            border_overshoot_m: header.border_overshoot_m,
             max_search_steps: header.search_steps,
         };
         tracks::build_lanes(&area, &pattern, &transit, &mut ws.lane_workspace, &mut ws.tracks)?;
@@ -383,7 +383,7 @@ pub fn plan_flights<
         assumed_clearance_m: OPEN_FIELD_CLEARANCE_M,
         schedule: mission.header().schedule,
         max_gates: gates_most,
-        photographed: &[],
+        done_waypoints: &[],
         occupied_layers: 0,
         following,
     };
@@ -398,7 +398,7 @@ pub fn plan_flights<
                 pack::binpat_by_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
             }
         }
-        let inputs = FlightInputs { photographed: done, ..flight_inputs };
+        let inputs = FlightInputs { done_waypoints: done, ..flight_inputs };
         flights::plan_flights(&work, &ws.routes, &inputs, schedule, out)?;
         known = 1;
     }

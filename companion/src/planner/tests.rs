@@ -156,7 +156,7 @@ fn over_area(ground: Option<UnevenGround>) -> Box<Bench> {
             max_waypoint_spacing_m: 8.0,
         },
         lane_angle_deg: None,
-        lane_overshoot_m: 0.0,
+        border_overshoot_m: 0.0,
         ground,
     };
     let vertices = [(0.0, 10.0), (100.0, 10.0), (100.0, 70.0), (0.0, 70.0)];

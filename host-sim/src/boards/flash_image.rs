@@ -20,9 +20,10 @@ pub const ERASED: u8 = 0;
 pub const PROGRAMMED: u8 = 1;
 /// Mark of a flash word whose programming or erasure has begun and not ended.
 pub const TORN: u8 = 2;
-/// Address and value of a word in memory by which the board's firmware knows that the bank holds an
-/// image.
-pub const BANK_IMAGE_MARK: (u32, u32) = (0x6030_0000, 0x464c_4153);
+/// Address of a word in memory by which the board's firmware knows that the bank holds an image.
+pub const BANK_IMAGE_MARK_ADDRESS: u32 = 0x6030_0000;
+/// Value of that word if the bank holds an image.
+pub const BANK_IMAGE_MARK: u32 = 0x464c_4153;
 
 /// Image of a flash bank after the store accepted an upload of these files into an empty bank;
 /// `roadmap` may also be a field file. Each file has two slots, of which the other is erased.

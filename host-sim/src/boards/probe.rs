@@ -7,7 +7,8 @@ use anyhow::ensure;
 use lock_step::ToBoard;
 
 use super::flash_image::{
-    BANK_IMAGE_MARK, ERASED, FLASH_BANK2_ADDRESS, PROGRAMMED, TORN, WORD_MARKS_ADDRESS,
+    BANK_IMAGE_MARK, BANK_IMAGE_MARK_ADDRESS, ERASED, FLASH_BANK2_ADDRESS, PROGRAMMED, TORN,
+    WORD_MARKS_ADDRESS,
 };
 use super::{EmulatedBoard, GrantResult, STACK_LEN};
 use crate::flash::HOST_FLASH_LAYOUT;
@@ -84,7 +85,7 @@ impl EmulatedBoard {
         let marks: Vec<u8> = bank.chunks(WORD_LEN).map(mark).collect();
         self.write_memory(FLASH_BANK2_ADDRESS, bank)?;
         self.write_memory(WORD_MARKS_ADDRESS, &marks)?;
-        self.write_memory(BANK_IMAGE_MARK.0, &BANK_IMAGE_MARK.1.to_le_bytes())
+        self.write_memory(BANK_IMAGE_MARK_ADDRESS, &BANK_IMAGE_MARK.to_le_bytes())
     }
 
     /// Indices of the flash words that are being programmed or erased now.

@@ -53,10 +53,10 @@ pub struct AutopilotArgs {
         allow_hyphen_values = true,
         default_value = "47.397742,8.545594,488"
     )]
-    pub home: Place,
+    pub home: GeodeticArgument,
     /// Origin of the autopilot's local frame (EKF origin); the vehicle's home if absent
     #[arg(long, value_name = "LAT,LON,ALT", allow_hyphen_values = true)]
-    pub origin: Option<Place>,
+    pub origin: Option<GeodeticArgument>,
 }
 
 fn autopilot_kind_parser() -> impl TypedValueParser<Value = SimulatedKind> {
@@ -71,9 +71,9 @@ fn parse_seconds(text: &str) -> Result<f32, String> {
 
 /// A WGS84 position in the notation of the command line, `LAT,LON,ALT`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place(pub Geodetic);
+pub struct GeodeticArgument(pub Geodetic);
 
-impl FromStr for Place {
+impl FromStr for GeodeticArgument {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
@@ -102,7 +102,7 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
         system_id: args.sysid,
         autopilot: args.autopilot,
         world_origin: home,
-        ekf_origin: args.origin.map_or(home, |place| place.0),
+        ekf_origin: args.origin.map_or(home, |origin| origin.0),
         start: Point::zeros(),
         estimator_ready_s: args.ready_after,
         boot_unix_us: SystemTime::now()

@@ -12,7 +12,7 @@ use companion::{Config, Event, Instant, Link, State};
 use heapless::Vec as FixedVec;
 
 use super::load_supported;
-use crate::capacity::{HostCompanion, VEHICLES, new_companion};
+use crate::capacity::{HostCompanion, MAX_VEHICLES, new_companion};
 use crate::flash::{self, HostFlash};
 use crate::link::{self, LinkUrl};
 use crate::mission::PreparedMission;
@@ -181,7 +181,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 /// A new companion with the store in its flash, which holds parameters and uploaded files.
 fn companion_with_store(
-    config: &Config<VEHICLES>,
+    config: &Config<MAX_VEHICLES>,
     flash: &mut HostFlash,
 ) -> anyhow::Result<Box<HostCompanion>> {
     let store = Store::mount(flash::HOST_FLASH_LAYOUT, flash);

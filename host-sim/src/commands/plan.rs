@@ -8,7 +8,7 @@ use std::time::Instant;
 use anyhow::bail;
 
 use super::load_supported;
-use crate::capacity::{BOARDS, BoardCapacity, WAYPOINTS};
+use crate::capacity::{BOARDS, BoardCapacity, MAX_WAYPOINTS};
 use crate::files::ResultFiles;
 use crate::mission::{HostPlan, PreparedMission};
 use crate::output;
@@ -101,7 +101,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 /// `result.json` of a plan, with nothing flown.
 fn planned_result(mission: &PreparedMission, plan: &HostPlan) -> MissionResult {
     let schedule = mission.schedule();
-    let nominal_s = |f: &planner_core::flight::Flight<WAYPOINTS>| {
+    let nominal_s = |f: &planner_core::flight::Flight<MAX_WAYPOINTS>| {
         (f.climb_m + f.descent_m) / schedule.vertical_mps + f.path.length_m() / schedule.cruise_mps
     };
     let flying = || plan.flights.iter().filter(|f| f.task.leaves_pad());

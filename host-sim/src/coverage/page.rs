@@ -7,7 +7,7 @@ use planner_core::coverage::area::RingKind;
 
 use super::check::CoverageFindings;
 use super::flight::FlightPoint;
-use super::{CoveragePlan, SortieFlight, parts};
+use super::{CoveragePlan, SortieFlight, report_layers};
 use crate::report::{AreaOutline, Curve, OutlineKind, Plot, ReportData, ReportVehicle, TrackPoint};
 
 /// Spacing of the points of a height profile along a path, metres.
@@ -50,7 +50,7 @@ pub fn report_data(
         scenario_toml: scenario.text.clone(),
         vehicles: vehicles.collect(),
         outlines: area_outlines(planned),
-        coverage: Some(parts::planned_layers(planned, flights)),
+        coverage: Some(report_layers::planned_layers(planned, flights)),
         plots: coverage_plots(planned, flights, findings),
         result,
         ..ReportData::default()

@@ -10,7 +10,7 @@ use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, CoverageMethod};
 
 /// Most vehicles of a coverage mission.
-pub const MAX_VEHICLES: usize = 32;
+pub const MAX_AREA_VEHICLES: usize = 32;
 /// Most lanes over an area that the host plans.
 pub const MAX_LANES: usize = 8192;
 /// Most convex corners of no-fly zones that the host plans around.
@@ -59,7 +59,7 @@ pub struct CoveragePlan<'a> {
     /// Shortest paths around no-fly zones.
     pub transit: Box<TransitGraph<'a, MAX_NO_FLY_CORNERS>>,
     /// Routes of the vehicles that fly, in the order of the path.
-    pub plan: RoutePlan<MAX_VEHICLES>,
+    pub plan: RoutePlan<MAX_AREA_VEHICLES>,
     /// The shares (W in paper CPP) by which companions divide the path into these routes, one for
     /// each vehicle; `None` if no shares give this plan.
     pub binpat_shares: Option<Vec<f32>>,

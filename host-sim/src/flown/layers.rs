@@ -7,9 +7,9 @@ use companion::swarm::fleet::VehicleDivisionInput;
 use planner_core::Point;
 use planner_core::flight::{Flight, Task, WaypointRange};
 
-use crate::capacity::WAYPOINTS;
+use crate::capacity::MAX_WAYPOINTS;
 use crate::coverage::check::Picture;
-use crate::coverage::{CoveragePlan, parts};
+use crate::coverage::{CoveragePlan, report_layers};
 use crate::mission::{HostPlan, PreparedMission};
 use crate::report::{CoverageLayers, ReportDivision, ReportPart, WaypointTransfer};
 use crate::swarm::SwarmFlight;
@@ -33,7 +33,7 @@ pub fn flown_layers(
     let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.vehicle_id).collect();
     ids.sort_unstable();
     let mut shown: Vec<ReportDivision> = Vec::new();
-    let (mut before, mut gone, mut losses) =
+    let (mut before, mut gone, mut divisions) =
         (WaypointOwners::new(), Vec::new(), Vec::<&[VehicleDivisionInput]>::new());
     let whole = FlownDivision {
         t_s: 0.0,
@@ -52,12 +52,12 @@ pub fn flown_layers(
         {
             continue;
         }
-        losses.extend((division.number > 0).then_some(&division.inputs[..]));
-        let rest = match losses.is_empty() && flight.photographed_before.is_empty() {
+        divisions.extend((division.number > 0).then_some(&division.inputs[..]));
+        let rest = match divisions.is_empty() && flight.photographed_before.is_empty() {
             true => None,
-            false => {
-                Some(mission.plan_remaining(&flight.photographed_before, losses.iter().copied())?)
-            }
+            false => Some(
+                mission.plan_remaining(&flight.photographed_before, divisions.iter().copied())?,
+            ),
         };
         let flights = rest.as_ref().map_or(&plan.flights, |rest| &rest.flights);
         let own = waypoint_owners(flights);
@@ -77,11 +77,11 @@ pub fn flown_layers(
         });
         before = own;
     }
-    Ok(parts::coverage_layers(planned, shown, pictures))
+    Ok(report_layers::coverage_layers(planned, shown, pictures))
 }
 
 /// The path of a flight, and what it photographs.
-fn report_part(flight: &Flight<WAYPOINTS>) -> ReportPart {
+fn report_part(flight: &Flight<MAX_WAYPOINTS>) -> ReportPart {
     let path = &flight.path;
     let (mut lanes, mut waypoints) = (Vec::<Point>::new(), 0);
     if let Task::Photograph(photographs) = &flight.task {
@@ -100,7 +100,7 @@ fn report_part(flight: &Flight<WAYPOINTS>) -> ReportPart {
 }
 
 /// Which vehicle photographs each waypoint by the plan of these flights.
-fn waypoint_owners(flights: &[Flight<WAYPOINTS>]) -> WaypointOwners {
+fn waypoint_owners(flights: &[Flight<MAX_WAYPOINTS>]) -> WaypointOwners {
     let mut owners = WaypointOwners::new();
     for flight in flights {
         let Task::Photograph(photographs) = &flight.task else { continue };

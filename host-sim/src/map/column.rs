@@ -62,7 +62,7 @@ pub fn ground_below_clear_column(
     required_m: f32,
 ) -> Result<f32, ColumnError> {
     let shape = &map.shape;
-    if map.never_sample_grid().is_blocked_at(point) {
+    if map.no_node_grid().is_blocked_at(point) {
         return Err(ColumnError::NotFree);
     }
     let [i, j, top] = shape.cell_of(point).ok_or(ColumnError::NotFree)?;

@@ -27,7 +27,7 @@ impl VoxelMap {
     }
 
     /// The bit grid of cells in which no roadmap node may lie; space beyond the map counts as such.
-    pub fn never_sample_grid(&self) -> VoxelGrid<'_> {
+    pub fn no_node_grid(&self) -> VoxelGrid<'_> {
         let words = self.no_node_words.as_deref().unwrap_or(&self.obstacle_words);
         VoxelGrid::new(self.shape, Outside::Blocked, words)
             .expect("the words were made for the shape")
@@ -50,7 +50,7 @@ impl VoxelMap {
             masks
         });
         let all = [0, 1, 2].map(|axis| brick_masks(axis, 0, self.shape.dims[axis]));
-        let mut words = self.never_sample_grid().words().to_vec();
+        let mut words = self.no_node_grid().words().to_vec();
         let mut word = words.iter_mut();
         for (k, z) in &all[2] {
             for (j, y) in &all[1] {

@@ -24,11 +24,11 @@ use planner_core::schedule::ScheduleError;
 use super::planner::HostAreaWorkspace;
 use super::ready::{HostPlan, PreparedMission, schedule_config};
 use crate::area::MAX_VERTICES;
-use crate::capacity::{BOARD_NO_FLY_CORNERS, BoardCapacity, GATES, VEHICLES, WAYPOINTS, on_heap};
-use crate::coverage::sorties::{self, USABLE_CHARGE};
-use crate::coverage::{
-    CoveragePlan, MAX_LANES, MAX_NO_FLY_CORNERS, MAX_VEHICLES as COVERAGE_VEHICLES,
+use crate::capacity::{
+    BOARD_NO_FLY_CORNERS, BoardCapacity, MAX_GATES, MAX_VEHICLES, MAX_WAYPOINTS, on_heap,
 };
+use crate::coverage::sorties::{self, USABLE_CHARGE};
+use crate::coverage::{CoveragePlan, MAX_AREA_VEHICLES, MAX_LANES, MAX_NO_FLY_CORNERS};
 use crate::scenario::coverage::{CoverageMethod, Terrain};
 use crate::scenario::{self, Scenario};
 use crate::{map, margins};
@@ -54,7 +54,7 @@ pub(super) fn prepare(
     };
     let map = ground_map(&planned)?;
     let routes = planned.plan.clone();
-    let climbs: Vec<VehicleShare> = planned
+    let shares_with_speeds: Vec<VehicleShare> = planned
         .vehicles
         .iter()
         .zip(&shares)
@@ -86,13 +86,13 @@ pub(super) fn prepare(
         .collect();
     let mut schedule = schedule_config(&scenario);
     schedule.vertical_mps =
-        climbs.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
+        shares_with_speeds.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
     let voxels = map.to_voxel_map(map::UnknownSpace::Free);
     let mut mission = PreparedMission::new(scenario, voxels, tasks, schedule, board);
     if let Some(terrain) = mission.scenario.area.as_ref().and_then(|area| area.terrain.as_ref()) {
         mission.roadmap_or_field_file = terrain.field_file.to_vec();
     }
-    mission.encode_area_mission(&climbs)?;
+    mission.encode_area_mission(&shares_with_speeds)?;
     let mut ws = on_heap(HostAreaWorkspace::new);
     let plan = mission.plan_area(&[], iter::empty(), &mut ws)?;
     if ws.area.routes() != &routes {
@@ -242,7 +242,7 @@ impl PreparedMission {
             heights: area.heights,
             spacing: area.usable_spacing,
             lane_angle_deg: area.lane_angle_deg,
-            lane_overshoot_m: area.lane_overrun_m,
+            border_overshoot_m: area.border_overshoot_m,
             ground: area
                 .terrain
                 .as_ref()
@@ -256,12 +256,11 @@ impl PreparedMission {
     }
 
     /// Plans the flights of all vehicles as every companion does, without the waypoints `done`,
-    /// after the divisions `losses`, each with one input per vehicle; `ws` keeps the lanes and
-    /// routes.
+    /// after `divisions`, each with one input per vehicle; `ws` keeps the lanes and routes.
     fn plan_area<'l>(
         &self,
         done: &[WaypointRange],
-        losses: impl Iterator<Item = &'l [VehicleDivisionInput]> + Clone,
+        divisions: impl Iterator<Item = &'l [VehicleDivisionInput]> + Clone,
         ws: &mut HostAreaWorkspace,
     ) -> anyhow::Result<Box<HostPlan>> {
         let mission = self.mission_view();
@@ -272,10 +271,10 @@ impl PreparedMission {
         coverage::plan_flights::<
             MAX_VERTICES,
             MAX_LANES,
-            COVERAGE_VEHICLES,
+            MAX_AREA_VEHICLES,
             MAX_NO_FLY_CORNERS,
-            VEHICLES,
-            WAYPOINTS,
+            MAX_VEHICLES,
+            MAX_WAYPOINTS,
         >(
             &Request {
                 mission: &mission,
@@ -284,7 +283,7 @@ impl PreparedMission {
                 max_gates: self.max_gates(),
                 photographed: done,
             },
-            losses,
+            divisions,
             &mut ws.area,
             &mut ws.schedule,
             &mut plan,
@@ -304,17 +303,17 @@ impl PreparedMission {
         self.plan_area(&[], iter::empty(), &mut on_heap(HostAreaWorkspace::new))
     }
 
-    /// Plans what is left: without the waypoints `done`, and after the divisions `losses`, each of
-    /// which is one [`VehicleDivisionInput`] per vehicle.
+    /// Plans what is left: without the waypoints `done`, and after `divisions`, each of which
+    /// is one [`VehicleDivisionInput`] per vehicle.
     ///
     /// # Errors
     /// No plan was found; the error says why.
     pub fn plan_remaining<'l>(
         &self,
         done: &[WaypointRange],
-        losses: impl Iterator<Item = &'l [VehicleDivisionInput]> + Clone,
+        divisions: impl Iterator<Item = &'l [VehicleDivisionInput]> + Clone,
     ) -> anyhow::Result<Box<HostPlan>> {
-        self.plan_area(done, losses, &mut on_heap(HostAreaWorkspace::new))
+        self.plan_area(done, divisions, &mut on_heap(HostAreaWorkspace::new))
     }
 
     /// Text about the first capacity of a board that the area exceeds; `None` if the board holds
@@ -345,7 +344,7 @@ impl PreparedMission {
         let path = &self.scenario.path;
         match error {
             Error::Plan(PlanError::Path(id, PathError::PathFull)) => anyhow!(
-                "the route of vehicle {id} has too many corners: {path}: not one lane fits into a path of {WAYPOINTS} \
+                "the route of vehicle {id} has too many corners: {path}: not one lane fits into a path of {MAX_WAYPOINTS} \
                  waypoints\nhint: no-fly zones with fewer corners{}",
                 if self.roadmap_or_field_file.is_empty() {
                     ""
@@ -363,7 +362,7 @@ impl PreparedMission {
             ),
             Error::Plan(PlanError::Schedule(id, ScheduleError::GatesFull)) => {
                 anyhow!(
-                    "vehicle {id} meets too many others: {path}: its plan holds at most {GATES} gates"
+                    "vehicle {id} meets too many others: {path}: its plan holds at most {MAX_GATES} gates"
                 )
             }
             other => anyhow!("no plan: {path}: {other}"),

@@ -9,7 +9,7 @@ use planner_core::plan::{self, PlanError, PlanWorkspace};
 use planner_core::schedule::ScheduleError;
 
 use super::ready::{HostPlan, PreparedMission};
-use crate::capacity::{BoardCapacity, NUCLEO_H743, PICO2, WAYPOINTS, on_heap};
+use crate::capacity::{BoardCapacity, MAX_WAYPOINTS, NUCLEO_H743, PICO2, on_heap};
 
 impl PreparedMission {
     /// Text about the first capacity of a board that the mission or its plan exceeds; `None` if the
@@ -60,7 +60,7 @@ impl PreparedMission {
                 ))
             }
             Err(PlanError::Path(id, PathError::PathFull)) => Some(format!(
-                "the flight of vehicle {id} is too long, {name} holds {WAYPOINTS} waypoints"
+                "the flight of vehicle {id} is too long, {name} holds {MAX_WAYPOINTS} waypoints"
             )),
             Err(other) => Some(format!("{name} finds no plan: {other:?}")),
         }
@@ -73,7 +73,7 @@ impl PreparedMission {
         board: &BoardCapacity,
     ) -> Result<u32, PlanError> {
         let mut workspace = on_heap(PlanWorkspace::<N, V, P>::new);
-        let mut plan = on_heap(plan::SwarmPlan::<V, WAYPOINTS>::new);
+        let mut plan = on_heap(plan::SwarmPlan::<V, MAX_WAYPOINTS>::new);
         planner::plan_goal_mission(
             &self.mission_view(),
             &self.roadmap_view(),

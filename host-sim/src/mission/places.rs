@@ -211,13 +211,13 @@ pub(super) fn build_roadmap(
     };
     let (mut roadmap, mut parts) = roadmap::build(map, &terminals, &config)?;
     // Removes the edges that join two terminals, if the scenario forbids them.
-    let keep_apart = |roadmap: &mut BuiltRoadmap| {
+    let drop_terminal_edges = |roadmap: &mut BuiltRoadmap| {
         if settings.terminal_edges == TerminalEdges::Forbidden {
             let is_terminal = |node: u16| usize::from(node) < terminals.len();
             roadmap.edges.retain(|edge| !(is_terminal(edge.a) && is_terminal(edge.b)));
         }
     };
-    keep_apart(&mut roadmap);
+    drop_terminal_edges(&mut roadmap);
     if settings.adds_passages {
         let searching = Instant::now();
         roadmap::add_passages(
@@ -226,7 +226,7 @@ pub(super) fn build_roadmap(
             &config,
             &wanted_connections(scenario, goals.len()),
         )?;
-        keep_apart(&mut roadmap);
+        drop_terminal_edges(&mut roadmap);
         parts.passages_s = searching.elapsed().as_secs_f64();
     }
     let header = roadmap::header(

@@ -12,15 +12,16 @@ use planner_core::roadmap::RoadmapView;
 use super::ready::{HostPlan, OwnPlan, PreparedMission};
 use crate::area::MAX_VERTICES;
 use crate::capacity::{
-    GATES, HostCompanion, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS, ZONES, on_heap,
+    HostCompanion, MAX_GATES, MAX_ROADMAP_NODES, MAX_TIMED_SEGMENTS, MAX_VEHICLES, MAX_WAYPOINTS,
+    MAX_ZONES, on_heap,
 };
-use crate::coverage::{MAX_LANES, MAX_NO_FLY_CORNERS, MAX_VEHICLES as COVERAGE_VEHICLES};
+use crate::coverage::{MAX_AREA_VEHICLES, MAX_LANES, MAX_NO_FLY_CORNERS};
 
 /// Workspace for planning a swarm on a roadmap.
-pub(super) type GoalsWorkspace = PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
+pub(super) type GoalsWorkspace = PlanWorkspace<MAX_ROADMAP_NODES, MAX_VEHICLES, MAX_TIMED_SEGMENTS>;
 /// Workspace for planning a coverage mission.
 pub(super) type HostAreaWorkspace =
-    AreaWorkspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_NO_FLY_CORNERS>;
+    AreaWorkspace<MAX_VERTICES, MAX_LANES, MAX_AREA_VEHICLES, MAX_NO_FLY_CORNERS>;
 
 /// The workspaces that were needed so far.
 #[derive(Default)]
@@ -31,12 +32,12 @@ struct HostWorkspaces {
 
 impl
     LendWorkspace<
-        ROADMAP_NODES,
-        VEHICLES,
-        TIMED_SEGMENTS,
+        MAX_ROADMAP_NODES,
+        MAX_VEHICLES,
+        MAX_TIMED_SEGMENTS,
         MAX_VERTICES,
         MAX_LANES,
-        COVERAGE_VEHICLES,
+        MAX_AREA_VEHICLES,
         MAX_NO_FLY_CORNERS,
     > for HostWorkspaces
 {
@@ -60,7 +61,7 @@ pub struct HostPlanner<'a> {
     /// Memory for the swarm's plan while a request is answered.
     swarm_plan: Box<HostPlan>,
     /// Memory for the requesting vehicle's inputs and plan.
-    own: Box<OwnPlanMemory<VEHICLES, WAYPOINTS, GATES, ZONES>>,
+    own: Box<OwnPlanMemory<MAX_VEHICLES, MAX_WAYPOINTS, MAX_GATES, MAX_ZONES>>,
 }
 
 impl<'a> HostPlanner<'a> {

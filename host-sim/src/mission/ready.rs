@@ -16,7 +16,7 @@ use planner_core::plan::{self, GoalMode, Objective, VehicleTask};
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::ScheduleConfig;
 
-use crate::capacity::{BoardCapacity, GATES, VEHICLES, WAYPOINTS};
+use crate::capacity::{BoardCapacity, MAX_GATES, MAX_VEHICLES, MAX_WAYPOINTS};
 use crate::map::{ClearanceField, VoxelMap};
 use crate::margins;
 use crate::result::{RoadmapCounts, Timing};
@@ -24,9 +24,9 @@ use crate::roadmap::BuiltRoadmap;
 use crate::scenario::{self, Scenario};
 
 /// The swarm's plan, with the host's capacities.
-pub type HostPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
+pub type HostPlan = plan::SwarmPlan<MAX_VEHICLES, MAX_WAYPOINTS>;
 /// One vehicle's part of the swarm's plan, with its gates.
-pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
+pub type OwnPlan = VehiclePlan<MAX_WAYPOINTS, MAX_GATES>;
 
 /// Nominal speed of take-off and landing in the plan of a mission with goals, m/s.
 pub const VERTICAL_MPS: f32 = 1.0;

@@ -7,14 +7,14 @@ use companion::swarm::fleet::{COMMITMENT_S, MAX_DIVISIONS, VehicleDivisionInput}
 use planner_core::flight::{Flight, Task};
 
 use super::ready::{HostPlan, PreparedMission};
-use crate::capacity::WAYPOINTS;
+use crate::capacity::MAX_WAYPOINTS;
 
 /// Number of divisions, out of `MAX_DIVISIONS`, that are reserved for losses of vehicles.
 const DIVISIONS_RESERVED_FOR_LOSSES: usize = 3;
 
 /// Time at which a flight, by its plan, will request a division, seconds after the start; `None` if
 /// the whole route fits into its path.
-fn division_request_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
+fn division_request_s(flight: &Flight<MAX_WAYPOINTS>) -> Option<f32> {
     let Task::Photograph(photographs) = &flight.task else { return None };
     let end_m = photographs.last_picture_m(&flight.path).filter(|_| photographs.is_first_part)?;
     let end = flight.path.waypoints().iter().find(|waypoint| waypoint.along_m >= end_m)?;
@@ -23,7 +23,7 @@ fn division_request_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
 
 /// The input of a vehicle to a division if all vehicles hold `t_s` seconds after the start: whether
 /// it still takes part, and how far along its path it holds, decimetres (0 on its pad).
-fn division_input_at(flight: &Flight<WAYPOINTS>, t_s: f32) -> VehicleDivisionInput {
+fn division_input_at(flight: &Flight<MAX_WAYPOINTS>, t_s: f32) -> VehicleDivisionInput {
     let waypoints = flight.path.waypoints();
     let flown_s = t_s - flight.depart_s;
     let Some(next) = waypoints.iter().position(|waypoint| waypoint.arrive_s > flown_s) else {
@@ -59,20 +59,20 @@ impl PreparedMission {
     /// Refuses a mission whose routes take more divisions without a loss than `MAX_DIVISIONS` less
     /// the reserve.
     pub(super) fn check_division_count(&self, plan: &HostPlan) -> anyhow::Result<()> {
-        let mut losses: Vec<Vec<VehicleDivisionInput>> = Vec::new();
+        let mut divisions: Vec<Vec<VehicleDivisionInput>> = Vec::new();
         let mut next = next_division_inputs(plan);
         while let Some(inputs) = next {
-            losses.push(inputs);
-            if losses.len() > MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES {
+            divisions.push(inputs);
+            if divisions.len() > MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES {
                 bail!(
-                    "area too large: {}: its routes take more than {} stretches of {WAYPOINTS} corners each\nhint: more \
+                    "area too large: {}: its routes take more than {} stretches of {MAX_WAYPOINTS} corners each\nhint: more \
                      vehicles, wider lanes, or the plans of `cover`, which autopilots fly alone",
                     self.scenario.path,
                     MAX_DIVISIONS - DIVISIONS_RESERVED_FOR_LOSSES
                 );
             }
             next = next_division_inputs(
-                &*self.plan_remaining(&[], losses.iter().map(|inputs| &inputs[..]))?,
+                &*self.plan_remaining(&[], divisions.iter().map(|inputs| &inputs[..]))?,
             );
         }
         Ok(())

@@ -176,7 +176,7 @@ impl<'a> CellSearch<'a> {
     fn shortest_cell_path(&self, from: &Point, to: &Point) -> Option<Vec<Point>> {
         let ends: BTreeSet<usize> = self.adjacent_cells_in_sight(to).into_iter().collect();
         let grid = self.map.grid();
-        let never_sample = self.map.never_sample_grid();
+        let never_sample = self.map.no_node_grid();
         let cells = self.shape.dims.iter().map(|&d| d as usize).product();
         let (mut cost, mut came) = (vec![f32::INFINITY; cells], vec![u32::MAX; cells]);
         let mut open = BinaryHeap::new();

@@ -52,7 +52,7 @@ pub struct AreaSection {
     /// Direction of the lanes, degrees counter-clockwise from east; `None`: the plan chooses it.
     pub lane_angle_deg: Option<f32>,
     /// How far beyond the area's edge lanes begin and end, metres.
-    pub lane_overrun_m: f32,
+    pub border_overshoot_m: f32,
     /// Whether a route may take more than one battery.
     pub allows_battery_swaps: bool,
     /// How the work is divided among the vehicles.

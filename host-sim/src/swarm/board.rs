@@ -257,19 +257,19 @@ impl LockStep {
     fn begin_grant(&mut self, now_us: u64, lines: &mut BoardLinks<'_>) -> anyhow::Result<()> {
         let until_us = now_us + STEP_US;
         let board_us = |us: u64| us.max(now_us) - self.started_us;
-        let mut pieces = Vec::new();
+        let mut received = Vec::new();
         while let Some(packet) = lines.radio.receive(now_us, lines.station) {
-            pieces.push(PortBytes {
+            received.push(PortBytes {
                 port: Port::Swarm,
                 at_us: board_us(now_us),
                 bytes: packet.to_vec(),
             });
         }
         while let Some((arrives_us, bytes)) = lines.to_board.take_write_by(until_us) {
-            pieces.push(PortBytes { port: Port::Autopilot, at_us: board_us(arrives_us), bytes });
+            received.push(PortBytes { port: Port::Autopilot, at_us: board_us(arrives_us), bytes });
         }
         self.grant_running = true;
-        self.board.begin_grant(board_us(until_us), &pieces)
+        self.board.begin_grant(board_us(until_us), &received)
     }
 }
 

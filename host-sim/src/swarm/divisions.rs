@@ -36,7 +36,7 @@ pub struct FlownDivision {
 #[derive(Clone, Debug, Default)]
 struct Agreement {
     /// When a vehicle first reported a commitment, seconds.
-    asked_s: Option<f32>,
+    first_commitment_s: Option<f32>,
     /// Ids of the vehicles that reported that all have the same division.
     agreeing: BTreeSet<u8>,
     /// When the last of them did, seconds.
@@ -117,8 +117,10 @@ impl DivisionLog {
         let own = |entry: &&RosterReportEntry| entry.status == ShareStatus::Alive;
         let alive = roster.entries.iter().filter(own);
         let agreement = self.agreements.entry(roster.division_count + 1).or_default();
-        if agreement.asked_s.is_none() && alive.clone().any(|e| e.commitment_dm.is_some()) {
-            agreement.asked_s = Some(t_s);
+        if agreement.first_commitment_s.is_none()
+            && alive.clone().any(|e| e.commitment_dm.is_some())
+        {
+            agreement.first_commitment_s = Some(t_s);
         }
         if roster.pending_hash != 0 && alive.clone().all(|entry| entry.agrees) {
             agreement.agreeing.insert(roster.system_id);
@@ -143,7 +145,7 @@ impl DivisionLog {
             let VehicleReport { number, committed_hash, plan_crc, .. } = *reported;
             let inputs = self.inputs_by_hash.get(&committed_hash).cloned().unwrap_or_default();
             let agreement = self.agreements.get(&number);
-            let agreement_s = agreement.and_then(|a| Some(a.agreed_s? - a.asked_s?));
+            let agreement_s = agreement.and_then(|a| Some(a.agreed_s? - a.first_commitment_s?));
             let division = FlownDivision { t_s, vehicle, number, inputs, plan_crc, agreement_s };
             self.flown.push(division);
         }

@@ -82,7 +82,7 @@ pub fn check(scenario: &Scenario) -> anyhow::Result<()> {
 /// The parts of the simulation that a fault acts on.
 pub struct FaultTargets<'a> {
     /// The vehicles, in the order of the scenario.
-    pub members: &'a mut [SimulatedVehicle],
+    pub vehicles: &'a mut [SimulatedVehicle],
     /// Radio of the swarm.
     pub radio: &'a mut Radio,
     /// The ground station, which commands vehicles and reports obstacles.
@@ -197,12 +197,12 @@ fn begin_fault(
     now_us: u64,
     world: &mut FaultTargets<'_>,
 ) -> anyhow::Result<()> {
-    let member = &mut world.members[i];
+    let vehicle = &mut world.vehicles[i];
     let until_us = now_us + (fault.duration_s.unwrap_or(DEFAULT_STALL_OR_BOOT_S) * 1e6) as u64;
     match fault.kind {
         "kill" => {
             world.radio.set_outage(i, RadioOutage { tx_failed: true, rx_failed: true });
-            member.cut_power();
+            vehicle.cut_power();
         }
         "radio-cut" => {
             let way = fault.radio_cut_direction.as_deref().unwrap_or("both");
@@ -210,24 +210,24 @@ fn begin_fault(
                 .radio
                 .set_outage(i, RadioOutage { tx_failed: way != "rx", rx_failed: way != "tx" });
         }
-        "serial-stall" => member.stall_serial(until_us),
-        "serial-corrupt" => member.set_serial_corruption(CORRUPTED_SHARE),
+        "serial-stall" => vehicle.stall_serial(until_us),
+        "serial-corrupt" => vehicle.set_serial_corruption(CORRUPTED_SHARE),
         "position-jump" => {
-            member
+            vehicle
                 .autopilot
                 .jump_estimated_position(&fault.offset_m.unwrap_or(DEFAULT_POSITION_JUMP_M));
         }
         "origin-change" => {
-            member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(DEFAULT_ORIGIN_CHANGE_M));
+            vehicle.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(DEFAULT_ORIGIN_CHANGE_M));
         }
-        "gps-loss" => member.autopilot.set_gps_fix(GpsFix::Lost),
-        "battery-low" => member.autopilot.set_battery(BATTERY_LEFT_SHARE),
-        "pilot-takeover" => member.autopilot.take_over_by_pilot(),
+        "gps-loss" => vehicle.autopilot.set_gps_fix(GpsFix::Lost),
+        "battery-low" => vehicle.autopilot.set_battery(BATTERY_LEFT_SHARE),
+        "pilot-takeover" => vehicle.autopilot.take_over_by_pilot(),
         "pilot-return" => return_from_pilot(i, now_us, world),
-        "autopilot-reboot" => member.reboot_autopilot(until_us),
-        "companion-reset" => member.reset_companion(now_us)?,
-        "late-plan" => member.plan_answer = PlanAnswer::Withheld,
-        "bad-roadmap" => member.plan_answer = PlanAnswer::BadRoadmap,
+        "autopilot-reboot" => vehicle.reboot_autopilot(until_us),
+        "companion-reset" => vehicle.reset_companion(now_us)?,
+        "late-plan" => vehicle.plan_answer = PlanAnswer::Withheld,
+        "bad-roadmap" => vehicle.plan_answer = PlanAnswer::BadRoadmap,
         "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Pause),
         "return-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Return),
         "land-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Land),
@@ -238,21 +238,21 @@ fn begin_fault(
 
 /// Ends a fault on vehicle `i`; `corruption` is the scenario's share of corrupted serial bytes.
 fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>, corruption: f64) {
-    let member = &mut world.members[i];
+    let vehicle = &mut world.vehicles[i];
     match fault.kind {
         "radio-cut" => world.radio.set_outage(i, RadioOutage::default()),
-        "serial-corrupt" => member.set_serial_corruption(corruption),
+        "serial-corrupt" => vehicle.set_serial_corruption(corruption),
         "position-jump" => {
-            member
+            vehicle
                 .autopilot
                 .jump_estimated_position(&-fault.offset_m.unwrap_or(DEFAULT_POSITION_JUMP_M));
         }
         "origin-change" => {
-            member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(DEFAULT_ORIGIN_CHANGE_M));
+            vehicle.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(DEFAULT_ORIGIN_CHANGE_M));
         }
-        "gps-loss" => member.autopilot.set_gps_fix(GpsFix::Held),
+        "gps-loss" => vehicle.autopilot.set_gps_fix(GpsFix::Held),
         "pilot-takeover" => return_from_pilot(i, now_us, world),
-        "late-plan" | "bad-roadmap" => member.plan_answer = PlanAnswer::Correct,
+        "late-plan" | "bad-roadmap" => vehicle.plan_answer = PlanAnswer::Correct,
         "pause-order" => world.ground_station.set_command(now_us, i, OperatorCommand::Resume),
         // All other faults end by themselves or never.
         _ => {}
@@ -261,7 +261,7 @@ fn end_fault(fault: &Fault, i: usize, now_us: u64, world: &mut FaultTargets<'_>,
 
 /// The pilot gives vehicle `i` back, and the ground station commands its companion to continue.
 fn return_from_pilot(i: usize, now_us: u64, world: &mut FaultTargets<'_>) {
-    world.members[i].autopilot.return_from_pilot();
+    world.vehicles[i].autopilot.return_from_pilot();
     world.ground_station.set_command(now_us, i, OperatorCommand::Resume);
 }
 

@@ -36,8 +36,8 @@ impl Gateway {
     }
 
     /// Gives every vehicle's autopilot a port for the ground station.
-    pub fn add_ground_ports(&self, members: &mut [SimulatedVehicle]) {
-        members.iter_mut().for_each(|member| member.autopilot.add_ground_port());
+    pub fn add_ground_ports(&self, vehicles: &mut [SimulatedVehicle]) {
+        vehicles.iter_mut().for_each(|vehicle| vehicle.autopilot.add_ground_port());
     }
 
     /// Passes on what the ground station sent since the last step. Then sends the ground station
@@ -48,7 +48,7 @@ impl Gateway {
     pub fn step(
         &mut self,
         now_us: u64,
-        members: &mut [SimulatedVehicle],
+        vehicles: &mut [SimulatedVehicle],
         radio: &mut Radio,
         places: &[Point],
         overheard: &[Rc<[u8]>],
@@ -60,15 +60,15 @@ impl Gateway {
                 break;
             }
             let bytes = &buffer[..length];
-            members.iter_mut().for_each(|member| member.handle_qgc_bytes(now_us, bytes));
+            vehicles.iter_mut().for_each(|vehicle| vehicle.handle_qgc_bytes(now_us, bytes));
             radio.broadcast(now_us, None, places, bytes);
         }
         for packet in overheard.iter().filter(|packet| is_for_ground(packet)) {
             self.append_frames(packet)?;
         }
-        for member in members {
+        for vehicle in vehicles {
             loop {
-                let length = member.poll_qgc_transmit(now_us, &mut buffer[..MAX_DATAGRAM]);
+                let length = vehicle.poll_qgc_transmit(now_us, &mut buffer[..MAX_DATAGRAM]);
                 if length == 0 {
                     break;
                 }

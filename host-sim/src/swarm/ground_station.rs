@@ -49,7 +49,7 @@ impl OperatorCommand {
     }
 
     /// The MAVLink command to the vehicle with this id.
-    fn command(self, id: u8) -> COMMAND_LONG_DATA {
+    fn to_command_long(self, id: u8) -> COMMAND_LONG_DATA {
         match self {
             Self::Resume => command_long(PAUSE_CONTINUE, id, 1.0),
             Self::Pause => command_long(PAUSE_CONTINUE, id, 0.0),
@@ -70,7 +70,7 @@ pub struct GroundStation {
     /// When frames were last due, the start's first one or a repetition.
     last_sent_us: u64,
     /// Commands to single vehicles: vehicle's index, command, and until when it is repeated.
-    orders: Vec<(usize, OperatorCommand, u64)>,
+    commands: Vec<(usize, OperatorCommand, u64)>,
     /// Centre and radius (metres) of each obstacle to report.
     obstacles: Vec<(Geodetic, f32)>,
 }
@@ -84,7 +84,7 @@ impl GroundStation {
             first_ready_us: None,
             start_commanded_us: None,
             last_sent_us: 0,
-            orders: Vec::new(),
+            commands: Vec::new(),
             obstacles: Vec::new(),
         }
     }
@@ -100,9 +100,9 @@ impl GroundStation {
     }
 
     /// Sets the command for one vehicle, repeated for 10 s; it replaces the vehicle's earlier one.
-    pub fn set_command(&mut self, now_us: u64, vehicle: usize, order: OperatorCommand) {
-        self.orders.retain(|&(of, ..)| of != vehicle);
-        self.orders.push((vehicle, order, now_us + COMMAND_REPEATED_FOR_US));
+    pub fn set_command(&mut self, now_us: u64, vehicle: usize, command: OperatorCommand) {
+        self.commands.retain(|&(of, ..)| of != vehicle);
+        self.commands.push((vehicle, command, now_us + COMMAND_REPEATED_FOR_US));
     }
 
     /// Reports a spherical obstacle to all vehicles, each second from now on.
@@ -115,26 +115,27 @@ impl GroundStation {
     pub fn step(
         &mut self,
         now_us: u64,
-        members: &mut [SimulatedVehicle],
+        vehicles: &mut [SimulatedVehicle],
         radio: &mut Radio,
         places: &[Point],
     ) {
-        let frames = self.due_frames(now_us, members);
+        let frames = self.due_frames(now_us, vehicles);
         for frame in frames {
             radio.broadcast(now_us, None, places, &frame);
-            members.iter_mut().for_each(|member| member.forward_to_board(now_us, &frame));
+            vehicles.iter_mut().for_each(|vehicle| vehicle.forward_to_board(now_us, &frame));
         }
     }
 
     /// Frames that the ground station sends at `now_us`; empty if none is due.
-    fn due_frames(&mut self, now_us: u64, members: &[SimulatedVehicle]) -> Vec<Vec<u8>> {
-        let state = |m: &SimulatedVehicle| m.state();
+    fn due_frames(&mut self, now_us: u64, vehicles: &[SimulatedVehicle]) -> Vec<Vec<u8>> {
+        let state = |v: &SimulatedVehicle| v.state();
         if self.start_commanded_us.is_none() {
-            let ready = || members.iter().filter(|m| state(m) == State::Ready);
+            let ready = || vehicles.iter().filter(|v| state(v) == State::Ready);
             if ready().next().is_some() {
                 self.first_ready_us.get_or_insert(now_us);
             }
-            let settled = members.iter().all(|m| state(m) == State::Ready || is_finished(state(m)));
+            let settled =
+                vehicles.iter().all(|v| state(v) == State::Ready || is_finished(state(v)));
             let waited = self
                 .first_ready_us
                 .is_some_and(|since_us| now_us >= since_us + START_WITHOUT_REST_US);
@@ -150,9 +151,10 @@ impl GroundStation {
         }
         self.last_sent_us = now_us;
         // A pause that was obeyed is not repeated: another station may resume the vehicle.
-        self.orders.retain(|&(of, order, until_us)| {
+        self.commands.retain(|&(of, command, until_us)| {
             now_us < until_us
-                && (order != OperatorCommand::Pause || order.is_still_needed(state(&members[of])))
+                && (command != OperatorCommand::Pause
+                    || command.is_still_needed(state(&vehicles[of])))
         });
         let mut frames = Vec::new();
         for (centre, radius_m) in self.obstacles.clone() {
@@ -167,14 +169,14 @@ impl GroundStation {
                 ..COMMAND_INT_DATA::DEFAULT
             }));
         }
-        for (i, member) in members.iter().enumerate() {
-            let id = member.system_id();
-            if state(member) == State::Ready {
+        for (i, vehicle) in vehicles.iter().enumerate() {
+            let id = vehicle.system_id();
+            if state(vehicle) == State::Ready {
                 frames.push(self.command_frame(&command_long(START, id, 0.0)));
             }
-            for (_, order, _) in self.orders.clone().into_iter().filter(|&(of, ..)| of == i) {
-                if order.is_still_needed(state(member)) {
-                    frames.push(self.command_frame(&order.command(id)));
+            for (_, command, _) in self.commands.clone().into_iter().filter(|&(of, ..)| of == i) {
+                if command.is_still_needed(state(vehicle)) {
+                    frames.push(self.command_frame(&command.to_command_long(id)));
                 }
             }
         }

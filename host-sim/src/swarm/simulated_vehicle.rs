@@ -13,7 +13,7 @@ use super::radio::Radio;
 use super::serial::{SerialLink, SimulatedSerialConfig};
 use super::step::{STEP_S, STEP_US};
 use crate::boards::STACK_LEN;
-use crate::capacity::{HostCompanion, VEHICLES, new_companion};
+use crate::capacity::{HostCompanion, MAX_VEHICLES, new_companion};
 use crate::coverage::check::Picture;
 use crate::flash::{HOST_FLASH_LAYOUT, HostFlash};
 use crate::mission::{OwnPlan, PreparedMission};
@@ -60,7 +60,7 @@ pub struct SimulatedVehicle {
     pub back_on_ground_s: Option<f64>,
     /// When the vehicle lost its power, or its motors in the air, seconds.
     pub power_lost_at_s: Option<f64>,
-    config: Config<VEHICLES>,
+    config: Config<MAX_VEHICLES>,
     to_companion: SerialLink,
     to_autopilot: SerialLink,
     /// Height of ground or obstacle below the vehicle, metres ENU, as last measured.
@@ -78,7 +78,7 @@ impl SimulatedVehicle {
     /// A vehicle on its pad, switched on.
     pub fn new(
         autopilot: &sim_autopilot::AutopilotConfig,
-        config: Config<VEHICLES>,
+        config: Config<MAX_VEHICLES>,
         serial: SimulatedSerialConfig,
         seed: u64,
     ) -> anyhow::Result<Self> {

@@ -11,7 +11,7 @@ use sim_autopilot as autopilot;
 use super::board::RemoteCompanion;
 use super::serial::SimulatedSerialConfig;
 use super::simulated_vehicle::SimulatedVehicle;
-use crate::capacity::VEHICLES;
+use crate::capacity::MAX_VEHICLES;
 use crate::flash::HostFlash;
 use crate::mission::PreparedMission;
 use crate::scenario::{AutopilotKind, CompanionHost, PositionErrors, VehicleSection};
@@ -39,22 +39,22 @@ pub fn vehicles_on_pads(mission: &PreparedMission) -> anyhow::Result<Vec<Simulat
         .map(|(vehicle, task)| {
             let config = autopilot_config(mission, vehicle, task.climb_m);
             let companion = companion_config(mission, vehicle.id)?;
-            let mut member = SimulatedVehicle::new(&config, companion, serial, scenario.seed)?;
-            member.autopilot.set_land_on_offboard_loss();
+            let mut simulated = SimulatedVehicle::new(&config, companion, serial, scenario.seed)?;
+            simulated.autopilot.set_land_on_offboard_loss();
             match &vehicle.companion {
                 CompanionHost::InProcess { flash: None } => {}
                 CompanionHost::InProcess { flash: Some(file) } => {
-                    member.attach_flash(HostFlash::open(Some(file))?)?;
+                    simulated.attach_flash(HostFlash::open(Some(file))?)?;
                 }
                 CompanionHost::Url { autopilot, radio } => {
-                    member.attach_board(RemoteCompanion::open(autopilot, radio.as_ref())?);
+                    simulated.attach_board(RemoteCompanion::open(autopilot, radio.as_ref())?);
                 }
                 CompanionHost::Emulated { program, log } => {
                     let (roadmap, file) = (&mission.roadmap_or_field_file, &mission.mission_file);
-                    member.attach_board(RemoteCompanion::emulate(program, log, roadmap, file)?);
+                    simulated.attach_board(RemoteCompanion::emulate(program, log, roadmap, file)?);
                 }
             }
-            Ok(member)
+            Ok(simulated)
         })
         .collect()
 }
@@ -119,7 +119,7 @@ fn estimator_errors(errors: PositionErrors) -> autopilot::EstimatorErrors {
 
 /// Settings of one vehicle's companion: those of the mission file, with the scenario's fence,
 /// method and radio range; the same in a swarm simulation and for a companion alone.
-pub fn companion_config(mission: &PreparedMission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
+pub fn companion_config(mission: &PreparedMission, id: u8) -> anyhow::Result<Config<MAX_VEHICLES>> {
     mission.index_of(id)?;
     let config = mission.mission_view().companion_config(id);
     let config =

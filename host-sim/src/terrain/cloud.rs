@@ -18,7 +18,7 @@ use super::frame::{TerrainFrame, widened_window};
 use super::geokeys::GeoKeys;
 use super::grid::HeightGrid;
 use super::limits::MAX_BYTES;
-use super::{claims, guard};
+use super::{declared_sizes, guard};
 use crate::files;
 
 /// Name of the format in errors.
@@ -51,7 +51,7 @@ pub(super) fn decode<R>(mut file: R, frame: &TerrainFrame<'_>) -> Result<HeightG
 where
     R: Read + Seek + Send + Sync + 'static,
 {
-    claims::check_declared_sizes(&mut file)?.map_err(|why| malformed(&why))?;
+    declared_sizes::check_declared_sizes(&mut file)?.map_err(|why| malformed(&why))?;
     let decoded = guard::catch_panic(|| grid_of_returns(file, frame));
     decoded.unwrap_or_else(|| Err(malformed(&"its returns are damaged")))
 }

@@ -12,7 +12,7 @@ use super::transit::TransitGraph;
 use crate::flight::WaypointRange;
 
 /// Writes the lanes without the waypoints `done` to `left`. The ranges must be in ascending order
-/// and not overlap. A remaining waypoint gets a new number; [`original_waypoint_number`] returns
+/// and not overlap. A remaining waypoint gets a new number; [`number_on_whole_path`] returns
 /// its number on the whole path.
 ///
 /// # Errors
@@ -79,7 +79,7 @@ fn push_lane_part<const L: usize>(
 
 /// The number on the whole path of the waypoint with `number` on the path without the ranges
 /// `done`. `u32::MAX` instead of an overflow.
-pub fn original_waypoint_number(done: &[WaypointRange], number: u32) -> u32 {
+pub fn number_on_whole_path(done: &[WaypointRange], number: u32) -> u32 {
     let mut whole = number;
     for range in done.iter().filter(|range| range.first < range.end) {
         if whole < range.first {

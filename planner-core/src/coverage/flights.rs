@@ -76,7 +76,7 @@ pub struct FlightInputs<'a> {
     pub max_gates: usize,
     /// Waypoints of the area that are photographed or promised, by their numbers on the path over
     /// the whole area, ascending: the lanes do not contain them.
-    pub photographed: &'a [WaypointRange],
+    pub done_waypoints: &'a [WaypointRange],
     /// Transit layers in which no vehicle may fly home, since a lost vehicle may be in them: bit
     /// `i` is layer `i`.
     pub occupied_layers: u64,
@@ -169,7 +169,7 @@ fn check_inputs<const L: usize, const N: usize>(
     };
     if inputs.pads.len() != problem.vehicles.len()
         || !routes.iter().all(within)
-        || !divide::is_sorted_disjoint(inputs.photographed)
+        || !divide::is_sorted_disjoint(inputs.done_waypoints)
     {
         return Err(PlanError::CountMismatch);
     }
@@ -375,7 +375,7 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
     let CaptureSettings { max_picture_spacing_m: waypoint_m, trigger, .. } = inputs.capture;
     let look = heading_mode(problem, route, inputs);
     let done = inputs
-        .photographed
+        .done_waypoints
         .iter()
         .map(|range| range.end - range.first)
         .fold(0, u32::saturating_add);
@@ -404,7 +404,7 @@ fn partial_route_flight<const L: usize, const N: usize, const W: usize>(
         let lane = if backward { high - (lane - low) } else { lane };
         let Some(lane) = problem.tracks.lanes().get(lane) else { continue };
         let (begin, end) = route_waypoints_on_lane(lane, route);
-        let first = divide::original_waypoint_number(inputs.photographed, begin);
+        let first = divide::number_on_whole_path(inputs.done_waypoints, begin);
         let waypoints = WaypointRange { first, end: first.saturating_add(end + 1 - begin) };
         let (begin, end) = if backward { (end, begin) } else { (begin, end) };
         let (begin, end) = (place(begin)?, place(end)?);

@@ -173,7 +173,7 @@ pub fn redivide_work<
         return Err(CoverageError::Vehicles.into());
     }
     if !statuses.iter().all(|fate| fate.photographed_to_m >= 0.0) {
-        return Err(CoverageError::SettingOutOfRange("along_m").into());
+        return Err(CoverageError::SettingOutOfRange("photographed_to_m").into());
     }
     add_done_waypoints(statuses, ws, out)?;
     set_start_places(division, ws, out)?;
@@ -196,7 +196,7 @@ pub fn redivide_work<
     let problem = CoverageProblem { tracks: &ws.remaining, vehicles: &ws.vehicles, ..*problem };
     let flight_inputs = FlightInputs {
         pads: &ws.pads,
-        photographed: ws.done.ranges(),
+        done_waypoints: ws.done.ranges(),
         occupied_layers: ws.occupied_layers,
         ..*flight_inputs
     };

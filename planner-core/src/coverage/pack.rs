@@ -14,8 +14,8 @@
 //!
 //! Cost for K vehicles and n lanes: K · log n steps, K² transits, one assignment (K³).
 
+mod extra_descent;
 mod route_ends;
-mod sink;
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -237,8 +237,8 @@ impl<const L: usize, const N: usize> CoverageProblem<'_, L, N> {
     pub(super) fn route_ends(&self, first: u32, end: u32) -> RouteEnds {
         let place = |number| self.tracks.waypoint(number).unwrap_or_default();
         RouteEnds {
-            first: place(first),
-            last: place(end - 1),
+            lowest: place(first),
+            highest: place(end - 1),
             between_m: self.tracks.distance_to_waypoint_m(end - 1)
                 - self.tracks.distance_to_waypoint_m(first),
         }
@@ -256,12 +256,12 @@ impl<const L: usize, const N: usize> CoverageProblem<'_, L, N> {
             self.transit.distance_m(&vehicle.transit_start, from)
                 + self.transit.distance_m(to, &vehicle.home)
         };
-        let forward = transit_m(&ends.first, &ends.last);
+        let forward = transit_m(&ends.lowest, &ends.highest);
         let backward = if vehicle.transit_start == vehicle.home {
             // Both transits have the same ends in either direction.
             forward
         } else {
-            transit_m(&ends.last, &ends.first)
+            transit_m(&ends.highest, &ends.lowest)
         };
         let (forward_s, backward_s) = self.extra_vertical_times_s(vehicle, ends);
         match backward + backward_s * vehicle.cruise_mps < forward + forward_s * vehicle.cruise_mps
@@ -491,8 +491,8 @@ pub(super) fn set_costs<const L: usize, const N: usize, const K: usize>(
         let sink_s = problem.extra_vertical_times_s(vehicle, &ends);
         route.cost_m = route.ground_length_m
             + 2.0 * top_m
-            + problem.extra_descent_m(&ends.first)
-            + problem.extra_descent_m(&ends.last);
+            + problem.extra_descent_m(&ends.lowest)
+            + problem.extra_descent_m(&ends.highest);
         route.cost_s = route.ground_length_m / vehicle.cruise_mps
             + problem.altitude_delay_s(vehicle, route.layer)
             + if route.direction == RouteDirection::Forward { sink_s.0 } else { sink_s.1 };

@@ -12,7 +12,7 @@ impl Copter {
             Err("Arm: Mode not armable")
         } else if self.tuning.arming_checks_enabled && !self.position_known(sensors.now_us) {
             Err("Arm: Need Position Estimate")
-        } else if sensors.battery < self.tuning.battery_to_arm_share {
+        } else if sensors.battery < self.tuning.battery_to_arm_charge {
             Err("Arm: Battery 1 below minimum arming capacity")
         } else {
             Ok(())

@@ -13,7 +13,7 @@ use super::setpoint::GuidedGoal;
 use super::{Copter, CopterMode, RtlLeg, TakeOff};
 use crate::link::command::CommandOutcome;
 use crate::platform::{Platform, SensorReadings};
-use crate::services::itinerary::{LandedState, MissionLeg, interpolate_height};
+use crate::services::mission_flight::{LandedState, MissionLeg, interpolate_height};
 
 /// Distance within which the place of a landing is reached, metres.
 const LANDING_POINT_REACHED_M: f32 = 0.5;

@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 
-use crate::services::itinerary::MissionLeg;
+use crate::services::mission_flight::MissionLeg;
 
 /// State of the mode AUTO.
 #[derive(Clone, Copy, Debug, Default)]

@@ -112,12 +112,12 @@ pub struct CopterTuning {
     /// MAVLink system id of the ground station whose silence starts the failsafe.
     pub gcs_system: u8,
     pub estimator_failsafe: bool,
-    /// What a charge below `battery_low_share` starts: 1 lands, more returns, 0 nothing.
+    /// What a charge below `battery_low_charge` starts: 1 lands, more returns, 0 nothing.
     pub low_battery_action: i32,
     /// Charge (0 to 1) below which the battery is low.
-    pub battery_low_share: f32,
+    pub battery_low_charge: f32,
     /// Charge (0 to 1) below which the vehicle cannot be armed.
-    pub battery_to_arm_share: f32,
+    pub battery_to_arm_charge: f32,
     pub arming_checks_enabled: bool,
 }
 
@@ -175,8 +175,8 @@ impl CopterTuning {
             gcs_system: params.i32_value("SYSID_MYGCS") as u8,
             estimator_failsafe: params.i32_value("FS_EKF_ACTION") != 0,
             low_battery_action: params.i32_value("BATT_FS_LOW_ACT"),
-            battery_low_share: params.f32_value("BATT_LOW_MAH") / capacity,
-            battery_to_arm_share: params.i32_value("BATT_ARM_MAH") as f32 / capacity,
+            battery_low_charge: params.f32_value("BATT_LOW_MAH") / capacity,
+            battery_to_arm_charge: params.i32_value("BATT_ARM_MAH") as f32 / capacity,
             arming_checks_enabled: params.i32_value("ARMING_CHECK") != 0,
         }
     }

@@ -5,7 +5,7 @@ use crate::link::msg;
 use planner_core::geo::frames::Geodetic;
 
 use super::Px4Mode;
-use super::firmware::Px4;
+use super::software::Px4;
 use crate::link::cmd;
 use crate::link::command::{
     ACCEPTED, Arming, CUSTOM_MODE, CommandOutcome, DENIED, FAILED, ReceivedCommand,

@@ -2,12 +2,12 @@
 
 use planner_core::Point;
 
-use super::glide::{self, SmoothedApproach};
 use super::params::Px4Tuning;
+use super::smoothed_approach::{self, SmoothedApproach};
 use super::{CRAWL_FACTOR, Commander, Px4Mode, ReturnLeg, SensorReadings};
 use crate::physics::shaping::JerkLimitedRate;
 use crate::physics::vehicle::Demand;
-use crate::services::itinerary::{MissionLeg, interpolate_height};
+use crate::services::mission_flight::{MissionLeg, interpolate_height};
 
 /// Least height of a setpoint above the vehicle that counts as a demand to climb, metres; a
 /// velocity or acceleration of [`MIN_CLIMB_DEMAND_MPS`] counts too.
@@ -28,7 +28,7 @@ const GROUND_DISTANCE_LAG_S: f32 = 0.2;
 impl Commander {
     /// Initialises a mode that is entered: stopping point, heading, first leg of a return.
     pub(super) fn enter_mode(&mut self, mode: Px4Mode, sensors: &SensorReadings) {
-        self.hold_point = sensors.position + glide::stopping_offset(&sensors.velocity);
+        self.hold_point = sensors.position + smoothed_approach::stopping_offset(&sensors.velocity);
         self.approach = SmoothedApproach::new(sensors.now_us, &sensors.position, &sensors.velocity);
         self.hold_heading = sensors.heading;
         self.return_leg = ReturnLeg::Climb { up: f32::NAN };

@@ -164,12 +164,12 @@ pub struct Px4Tuning {
     pub return_min_distance: f32,
     /// Tangent of `RTL_CONE_ANG`: metres away from home for each metre of a return's height.
     pub return_cone_tan: f32,
-    /// What a charge below `battery_critical_share` starts: 2 lands, 3 returns, others nothing.
+    /// What a charge below `battery_critical_charge` starts: 2 lands, 3 returns, others nothing.
     pub low_battery_action: i32,
     /// Charge (0 to 1) below which `low_battery_action` starts.
-    pub battery_critical_share: f32,
+    pub battery_critical_charge: f32,
     /// Charge (0 to 1) below which the vehicle cannot be armed.
-    pub battery_low_share: f32,
+    pub battery_low_charge: f32,
 }
 
 impl Px4Tuning {
@@ -242,8 +242,8 @@ impl Px4Tuning {
                 (params.i32_value("RTL_CONE_ANG").clamp(0, 90) as f32).to_radians(),
             ),
             low_battery_action: params.i32_value("COM_LOW_BAT_ACT"),
-            battery_critical_share: params.f32_value("BAT_CRIT_THR"),
-            battery_low_share: params.f32_value("BAT_LOW_THR"),
+            battery_critical_charge: params.f32_value("BAT_CRIT_THR"),
+            battery_low_charge: params.f32_value("BAT_LOW_THR"),
         }
     }
 }

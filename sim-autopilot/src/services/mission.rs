@@ -1,5 +1,5 @@
 //! The mission protocol: missions, geofences and rally points are stored and can be read back; only
-//! missions have an effect (`itinerary`).
+//! missions have an effect (`mission_flight`).
 //!
 //! Upload: COUNT → items requested one by one, each again if it has not come after 0.25 s → ACK.
 //! Download: REQUEST_LIST → COUNT, then each item on request. Source: MAVLink guide, "Mission

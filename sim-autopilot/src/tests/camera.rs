@@ -162,7 +162,7 @@ fn a_reboot_forgets_the_distance_and_keeps_what_was_photographed() {
 fn it_turns_to_a_commanded_yaw_the_short_way_at_a_bounded_rate() {
     for autopilot in [SimulatedKind::Px4, SimulatedKind::Ardupilot] {
         let mut bench = hovering(autopilot);
-        let most = bench.autopilot.firmware.gains().heading_rate_max;
+        let most = bench.autopilot.software.gains().heading_rate_max;
         for yaw in [3.0_f32, -3.0, 0.5, -0.5] {
             // Position and yaw; position, velocity and yaw.
             for mask in [0x9F8, 0x9C0] {

@@ -2,7 +2,7 @@
 
 use companion::State;
 
-use super::oracle::Violation;
+use super::referee::Violation;
 use crate::setpoints::SetpointStats;
 
 /// How one meeting ended.

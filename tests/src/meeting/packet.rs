@@ -8,7 +8,7 @@ use planner_core::geo::frames::Geodetic;
 /// Origin of the mission frame.
 pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
-/// Content of a radio frame, decoded for the judge.
+/// Content of a radio frame, decoded for the referee.
 #[derive(Clone, Debug)]
 pub(super) enum RadioContent {
     /// GLOBAL_POSITION_INT: position (ENU metres), velocity (ENU m/s), `time_boot_ms`.

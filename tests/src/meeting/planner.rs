@@ -4,7 +4,7 @@ use planner_core::Point;
 use planner_core::detour::{DetourRequest, KeepOutZone, ZoneKind};
 use planner_core::flight::Path;
 
-use super::oracle;
+use super::referee;
 use super::scene::Plan;
 
 /// A detour in the open around the zones in `keep`: straight, or past one or two points beside and
@@ -19,11 +19,11 @@ pub(super) fn detour_in_the_open(
     let here = request.here;
     let clear = |from: Point, to: Point| {
         keep.iter().all(|k| {
-            let now_m = oracle::distance((here, here), (k.from, k.to));
+            let now_m = referee::distance((here, here), (k.from, k.to));
             let apart_m = k.radius_m.min((now_m - 0.002).max(0.0));
             let solid =
                 if k.kind == ZoneKind::LandingColumn { (k.from, k.from) } else { (k.from, k.to) };
-            oracle::distance((from, to), solid) >= apart_m
+            referee::distance((from, to), solid) >= apart_m
         })
     };
     let mut ways: Vec<Vec<Point>> = Vec::new();
@@ -42,7 +42,7 @@ pub(super) fn detour_in_the_open(
             }
         }
         let rests = |at: &Point| {
-            keep.iter().all(|k| oracle::distance((*at, *at), (k.from, k.to)) >= k.radius_m)
+            keep.iter().all(|k| referee::distance((*at, *at), (k.from, k.to)) >= k.radius_m)
         };
         let way = ways.into_iter().find(|way| {
             way.windows(2).all(|leg| clear(leg[0], leg[1])) && way.last().is_some_and(rests)
@@ -65,7 +65,7 @@ pub(super) fn detour_in_the_open(
     let way = ways.into_iter().find(|way| {
         way.iter().all(|p| p.z > 0.5)
             && way.windows(2).all(|leg| clear(leg[0], leg[1]))
-            && keep.iter().all(|k| oracle::distance((last, ground), (k.from, k.to)) >= k.radius_m)
+            && keep.iter().all(|k| referee::distance((last, ground), (k.from, k.to)) >= k.radius_m)
     })?;
     plan_along(&way, own, request.descent_m)
 }

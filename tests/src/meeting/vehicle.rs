@@ -7,8 +7,8 @@ use planner_core::Point;
 use planner_core::geo::frames::{self, Geodetic};
 
 use super::autopilot::{Autopilot, ControlSource};
-use super::oracle::{Heard, VehicleState};
 use super::packet::{ORIGIN, Packet};
+use super::referee::{Heard, VehicleState};
 use super::scene::{
     self, CLIMB_MPS, CRUISE_MPS, GATES, SAFETY_DISTANCE_M, Scene, VEHICLES, WAYPOINTS,
 };
@@ -147,7 +147,7 @@ impl MeetingVehicle {
         *longest_s = longest_s.max((now - *since).as_secs_f32());
     }
 
-    pub(super) fn state_for_judge(&self, now_s: f32) -> VehicleState {
+    pub(super) fn state_for_referee(&self, now_s: f32) -> VehicleState {
         let lately =
             |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s < DEAF_AFTER_S);
         // In the landing mode, or led down by setpoints.

@@ -30,7 +30,7 @@ const fn ticks(count: u64) -> Duration {
     Duration::from_secs(count)
 }
 
-type Whole = Fleet<MOST>;
+type ModelFleet = Fleet<MOST>;
 
 /// An error that the search must find.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -69,7 +69,7 @@ pub enum Flight {
 #[derive(Clone, PartialEq, Eq, Hash, Debug)]
 pub struct Vehicle {
     pub rank: usize,
-    pub fleet: Whole,
+    pub fleet: ModelFleet,
     pub flight: Flight,
     /// Number of divisions that its present part counts, and (`along`) waypoints of the part flown.
     pub division: usize,
@@ -327,7 +327,7 @@ impl FleetModel {
     fn dead(&self, rank: usize, taken: u32) -> Vehicle {
         Vehicle {
             rank,
-            fleet: Whole::new(rank, self.count, self.limits),
+            fleet: ModelFleet::new(rank, self.count, self.limits),
             flight: Flight::Dead,
             division: 0,
             along: 0,

@@ -67,7 +67,7 @@ pub struct CoverageHeader {
     /// direction across which the area is narrowest.
     pub lane_angle_deg: Option<f32>,
     /// Distance by which lanes begin and end beyond the area's edge, metres.
-    pub lane_overshoot_m: f32,
+    pub border_overshoot_m: f32,
     /// Heights of uneven ground; the mission then needs the field whose CRC is its `roadmap_crc`.
     /// `None` for level ground.
     pub ground: Option<UnevenGround>,
@@ -128,7 +128,7 @@ impl CoverageBlock<'_> {
             lane_m,
             waypoint_m,
             angle_deg,
-            h.lane_overshoot_m,
+            h.border_overshoot_m,
         ]
         .into_iter()
         .chain(h.ground.map_or([0.0; 4], |g| {
@@ -307,7 +307,7 @@ impl CoverageHeader {
                 max_waypoint_spacing_m: f32_at(head, 32),
             },
             lane_angle_deg: (!angle_deg.is_nan()).then_some(angle_deg),
-            lane_overshoot_m: f32_at(head, 40),
+            border_overshoot_m: f32_at(head, 40),
             ground: (head[44..60] != [0; 16]).then_some(UnevenGround {
                 min_height_above_ground_m,
                 height_tolerance_m,
@@ -334,7 +334,7 @@ impl CoverageHeader {
         if self.lane_angle_deg.is_some_and(|angle| !angle.is_finite()) {
             return refuse("angle_deg");
         }
-        if !(0.0..=MAX_VERTEX_COORDINATE_M).contains(&self.lane_overshoot_m) {
+        if !(0.0..=MAX_VERTEX_COORDINATE_M).contains(&self.border_overshoot_m) {
             return refuse("margin_m");
         }
         let sound = |ground: &UnevenGround| {

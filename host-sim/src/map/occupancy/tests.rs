@@ -82,10 +82,10 @@ fn unknown_is_what_the_user_chose() {
         |grid: &VoxelGrid<'_>| grid.words().iter().map(|w| u64::from(w.count_ones())).sum::<u64>();
     let blocked = map.to_voxel_map(UnknownSpace::Blocked);
     assert_eq!(ones(&blocked.grid()), counts.occupied + counts.unknown);
-    assert_eq!(ones(&blocked.never_sample_grid()), counts.occupied + counts.unknown);
+    assert_eq!(ones(&blocked.no_node_grid()), counts.occupied + counts.unknown);
     let free = map.to_voxel_map(UnknownSpace::Free);
     assert_eq!(ones(&free.grid()), counts.occupied);
-    assert_eq!(ones(&free.never_sample_grid()), counts.occupied + counts.unknown);
+    assert_eq!(ones(&free.no_node_grid()), counts.occupied + counts.unknown);
     assert_eq!((blocked.beyond_map, free.beyond_map), (Outside::Blocked, Outside::Free));
 }
 

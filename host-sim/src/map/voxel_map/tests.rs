@@ -20,7 +20,7 @@ fn nodes_lie_in_cells_that_are_entirely_inside_the_box() {
         for (low, high) in boxes {
             let fenced = map.with_nodes_inside(&low, &high);
             assert_eq!(fenced.grid().words(), map.grid().words());
-            let (never, before) = (fenced.never_sample_grid(), map.never_sample_grid());
+            let (never, before) = (fenced.no_node_grid(), map.no_node_grid());
             let [nx, ny, nz] = map.shape.dims;
             for (i, j, k) in
                 (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| (i, j, k))))

@@ -242,7 +242,7 @@ fn read_area(
         terrain: None,
         obstacles: None,
         lane_angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
-        lane_overrun_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
+        border_overshoot_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
         allows_battery_swaps: table.boolean("batteries")?,
         method: method.unwrap_or(CoverageMethod::PowellBinpat),
         heading: table.one_of(

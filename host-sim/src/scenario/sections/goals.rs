@@ -15,7 +15,7 @@ use super::{
     read_faults, read_fence_and_ground_stations, read_map, read_place, read_roadmap,
     read_unsupported, read_vehicles, unsupported_error,
 };
-use crate::capacity::VEHICLES;
+use crate::capacity::MAX_VEHICLES;
 use crate::files;
 use crate::margins;
 use crate::quote::{printable, printable_path};
@@ -143,7 +143,7 @@ fn read_mission(
         }
         (Some(list), None) => {
             let goals = list.items()?;
-            check_list_len(list, goals.len(), VEHICLES, "goals")?;
+            check_list_len(list, goals.len(), MAX_VEHICLES, "goals")?;
             goals
                 .iter()
                 .map(|v| Ok((read_place(v, origin)?, table.text.file_and_line(&v.span))))
@@ -198,7 +198,7 @@ fn read_goals_file(value: &TomlValue<'_>, folder: &Path) -> Result<Vec<(Point, S
             {
                 let place = format!("{}:{}", printable_path(&path), index + 1);
                 goals.push((Point::new(x, y, z), place));
-                check_list_len(value, goals.len(), VEHICLES, "goals")?;
+                check_list_len(value, goals.len(), MAX_VEHICLES, "goals")?;
             }
             _ => {
                 let place = format!("{}:{}", printable_path(&path), index + 1);

@@ -97,8 +97,8 @@ impl MapBesideArea {
         flown.check_climbs(text, &obstacles)?;
         let below_m = flown.clearance_below_m().max(clearance_m);
         let floor_m = area.heights.max_picture_height_m - below_m;
-        // Lanes extend beyond the border by the overrun, and lie up to half a picture beside it.
-        let beyond_m = area.lane_overrun_m + area.spacing.footprint.across_m / 2.0;
+        // Lanes extend beyond the border by the overshoot, and lie up to half a picture beside it.
+        let beyond_m = area.border_overshoot_m + area.spacing.footprint.across_m / 2.0;
         let pads = flown.vehicles.iter().map(|vehicle| vehicle.start.xy());
         let places: Vec<_> = area.vertices.iter().copied().chain(pads).collect();
         let own = area.rings_of(RingKind::NoFly).map(<[_]>::len).sum();

@@ -121,9 +121,9 @@ impl UnreadTerrain {
             [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)],
             |[low, high], place| [low.inf(place), high.sup(place)],
         );
-        // Lanes may begin outside the border, by the margin and half a footprint.
-        let half_footprint_m = area.spacing.footprint.across_m / 2.0;
-        let beyond = Flat::repeat(area.lane_overrun_m + half_footprint_m + PATHS_BESIDE_LANES_M);
+        // Lanes may begin outside the border, by the overshoot and half a footprint.
+        let lanes_beyond_m = area.border_overshoot_m + area.spacing.footprint.across_m / 2.0;
+        let beyond = Flat::repeat(lanes_beyond_m + PATHS_BESIDE_LANES_M);
         let own: Vec<VehicleSection> = vehicles.iter().map(|(v, _)| v.clone()).collect();
         let slope = own.iter().map(|vehicle| {
             let [climb_mps, descend_mps] = vehicle.climb_and_descent_mps();

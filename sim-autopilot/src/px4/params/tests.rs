@@ -37,7 +37,7 @@ fn every_parameter_that_acts_is_in_the_table() {
         t.disarm_after_landing_s,
         t.disarm_preflight_s,
         t.return_descend_height,
-        t.battery_low_share,
+        t.battery_low_charge,
         t.return_cone_tan,
     ] {
         assert!(value > 0.0);

@@ -142,11 +142,11 @@ fn ned_is_in_its_own_projection_about_its_own_origin() {
 }
 
 #[test]
-fn an_installer_sets_integers_of_either_firmware() {
+fn an_installer_sets_integers_of_either_autopilot() {
     for (config, name) in [(config(), "RTL_ALT"), (AutopilotConfig::default(), "COM_OBL_RC_ACT")] {
         let mut bench = Bench::with(&config);
         bench.autopilot.set_parameter(name, 5).unwrap();
-        assert_eq!(bench.autopilot.firmware.params().i32_value(name), 5);
+        assert_eq!(bench.autopilot.software.params().i32_value(name), 5);
         assert!(bench.autopilot.set_parameter("NO_SUCH", 5).is_err());
         assert!(bench.autopilot.set_parameter("GUID_TIMEOUT", 5).is_err(), "no integer");
     }

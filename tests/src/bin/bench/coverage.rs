@@ -297,7 +297,7 @@ fn our_times_us(vehicles: usize) -> [f64; 2] {
         black_box(&bench.points);
     });
     let last = left.waypoint_count() - 1;
-    assert_eq!(divide::original_waypoint_number(&done, last), bench.tracks.waypoint_count() - 1);
+    assert_eq!(divide::number_on_whole_path(&done, last), bench.tracks.waypoint_count() - 1);
     [plan_us, update_us]
 }
 

@@ -5,7 +5,7 @@
 //! vehicle takes the path that lands it first. Separation, speeds, climbs and the schedule's rules
 //! are those of the mission.
 
-use host_sim::capacity::WAYPOINTS;
+use host_sim::capacity::MAX_WAYPOINTS;
 use host_sim::mission::{HostPlan, PreparedMission};
 use planner_core::Point;
 use planner_core::flight::{Flight, Path};
@@ -42,7 +42,7 @@ pub fn last_landings(
     Some(LastLandings { alone_s: last(alone), planned_s: last(plan), ideal_s })
 }
 
-fn landing_time_s(mission: &PreparedMission, flight: &Flight<WAYPOINTS>) -> f32 {
+fn landing_time_s(mission: &PreparedMission, flight: &Flight<MAX_WAYPOINTS>) -> f32 {
     let over_goal_s = flight.path.waypoints().last().map_or(0.0, |w| w.leave_s);
     flight.depart_s + over_goal_s + flight.descent_m / mission.schedule().vertical_mps
 }
@@ -51,8 +51,8 @@ fn landing_time_s(mission: &PreparedMission, flight: &Flight<WAYPOINTS>) -> f32 
 /// clear.
 fn candidate_flights(
     mission: &PreparedMission,
-    flight: &Flight<WAYPOINTS>,
-) -> Option<Vec<Flight<WAYPOINTS>>> {
+    flight: &Flight<MAX_WAYPOINTS>,
+) -> Option<Vec<Flight<MAX_WAYPOINTS>>> {
     let waypoints = flight.path.waypoints();
     let (from, to) = (waypoints.first()?.position, waypoints.last()?.position);
     let (x_first, y_first) = (Point::new(to.x, from.y, from.z), Point::new(from.x, to.y, from.z));
@@ -88,7 +88,7 @@ fn best_last_landing_s(mission: &PreparedMission, plan: &HostPlan) -> Option<f32
     let mut order: Vec<usize> = (0..choices.len()).collect();
     let mut best_s = f32::INFINITY;
     for _ in 0..ORDERS {
-        let mut scheduled: Vec<Flight<WAYPOINTS>> = Vec::new();
+        let mut scheduled: Vec<Flight<MAX_WAYPOINTS>> = Vec::new();
         for &i in &order {
             let departs = choices[i].iter().filter_map(|flight| {
                 let cfg = mission.schedule();

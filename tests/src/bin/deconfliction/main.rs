@@ -6,8 +6,8 @@
 //! case of it and both methods fly that plan.
 
 mod cases;
-mod held;
 mod ideal;
+mod short_landings;
 
 use std::path::Path;
 use std::time::Instant;
@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use cases::Meeting;
-use held::{Cause, Struck};
+use short_landings::{Cause, Struck};
 
 const METHODS: [&str; 2] = ["priority", "algorithm2"];
 /// A separation so small that no vehicle waits for another one, metres.
@@ -338,12 +338,14 @@ fn note_causes(
     // A silent vehicle that waited on its pad until all others had landed may have flown its
     // mission then.
     let lies = struck.silent && !flight.result.vehicles[struck.index].reached;
-    if let Some([beside_m, along_m]) = held::rest_offsets_m(plan, flight, struck).filter(|_| lies) {
+    if let Some([beside_m, along_m]) =
+        short_landings::rest_offsets_m(plan, flight, struck).filter(|_| lies)
+    {
         row.lies_m = [row.lies_m[0].max(beside_m), row.lies_m[1].max(along_m)];
     }
     let held = |(i, v): &(usize, &VehicleResult)| !v.reached && *i != struck.index;
     for (index, vehicle) in flight.result.vehicles.iter().enumerate().filter(held) {
-        let cause = held::cause_of_short_landing(mission, plan, flight, struck, index);
+        let cause = short_landings::cause_of_short_landing(mission, plan, flight, struck, index);
         row.held_up_by[cause as usize] += 1;
         let (seed, by) = (flight.result.seed, flight.result.vehicles[struck.index].id);
         row.incidents.push(format!("seed {seed}, vehicle {} held up by {by}: {cause}", vehicle.id));

@@ -58,7 +58,7 @@ fn header() -> CoverageHeader {
             max_waypoint_spacing_m: 8.0,
         },
         lane_angle_deg: None,
-        lane_overshoot_m: 0.0,
+        border_overshoot_m: 0.0,
         ground: None,
     }
 }

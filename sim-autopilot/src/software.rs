@@ -8,7 +8,7 @@ use crate::link::wire::PayloadReader;
 use crate::physics::vehicle::Gains;
 use crate::platform::{FlightModeOutput, Platform, SensorReadings};
 use crate::px4;
-use crate::px4::firmware::Px4;
+use crate::px4::software::Px4;
 use crate::services::params::Params;
 use crate::status::AutopilotStatus;
 use crate::telemetry;
@@ -16,14 +16,14 @@ use crate::{GpsFix, SimulatedKind};
 
 /// The autopilot software of one vehicle.
 #[derive(Clone, Debug)]
-pub enum Firmware {
+pub enum AutopilotSoftware {
     /// PX4 1.17.
     Px4(Box<Px4>),
     /// ArduCopter 4.6.
     Copter(Box<Copter>),
 }
 
-impl Firmware {
+impl AutopilotSoftware {
     pub(super) fn new(config: &AutopilotConfig) -> Self {
         match config.autopilot {
             SimulatedKind::Px4 => Self::Px4(Box::new(Px4::new(config.system_id, &config.vehicle))),

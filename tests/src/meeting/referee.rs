@@ -1,5 +1,5 @@
-//! The judge of a meeting. It computes the sets of the safety filter by their definition, from the
-//! messages that a vehicle received and from true motion, without any of the companion's code.
+//! The referee of a meeting. It computes the sets of the safety filter by their definition, from
+//! the messages that a vehicle received and from true motion, without any of the companion's code.
 //!
 //! - *Own set*: 0.1 s at the present velocity, then a stop; the setpoint is ahead by the vehicle's
 //!   lag. In a landing the column to the floor.
@@ -151,7 +151,7 @@ impl ReachableSet {
     }
 }
 
-/// What the judge sees of a vehicle at one step.
+/// What the referee sees of a vehicle at one step.
 #[derive(Clone, Copy, Debug)]
 pub struct VehicleState {
     /// True position, ENU metres.
@@ -200,7 +200,7 @@ struct Approach {
 
 /// Watches and judges a meeting.
 #[derive(Debug)]
-pub struct Oracle {
+pub struct MeetingReferee {
     vehicle_count: usize,
     tracks: Vec<Vec<VehicleState>>,
     /// The latest approach of vehicle a to b, at index a · `vehicle_count` + b.
@@ -234,8 +234,8 @@ const MIN_CLOSING_MPS: f32 = 0.15;
 /// Distance beyond the safety distance at which an approach ends, metres.
 const APPROACH_ENDS_M: f32 = 0.1;
 
-impl Oracle {
-    /// A judge of `count` vehicles.
+impl MeetingReferee {
+    /// A referee of `count` vehicles.
     pub fn new(count: usize) -> Self {
         Self {
             vehicle_count: count,

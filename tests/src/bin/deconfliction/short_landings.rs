@@ -60,7 +60,7 @@ pub enum Cause {
     /// Vehicles that lie or stand block every route, even without the struck one.
     Others,
     /// A route was free: nothing kept the vehicle from its goal.
-    WayLeft,
+    RouteFree,
 }
 
 impl Cause {
@@ -71,7 +71,7 @@ impl Cause {
         Self::MayBeAtGoal,
         Self::MayBeOnRoute,
         Self::Others,
-        Self::WayLeft,
+        Self::RouteFree,
     ];
 }
 
@@ -83,7 +83,7 @@ impl fmt::Display for Cause {
             Self::MayBeAtGoal => "struck vehicle, silent, may lie at the goal",
             Self::MayBeOnRoute => "struck vehicle, silent, may lie on the only route",
             Self::Others => "others on the only route",
-            Self::WayLeft => "a way was left",
+            Self::RouteFree => "a way was left",
         })
     }
 }
@@ -110,10 +110,10 @@ pub fn cause_of_short_landing(
     let safety_m = mission.scenario.deconfliction.safety_distance_m;
     let apart_m = safety_m + DEVIATION_M;
     let Some((left_s, from)) = start_of_last_descent(&flight.tracks[held]) else {
-        return Cause::WayLeft;
+        return Cause::RouteFree;
     };
     let path = &plan.flights[held].path;
-    let Some(over) = path.waypoints().last().map(|w| w.position) else { return Cause::WayLeft };
+    let Some(over) = path.waypoints().last().map(|w| w.position) else { return Cause::RouteFree };
     let ground = over - Point::new(0.0, 0.0, plan.flights[held].descent_m);
     // A vehicle that never took off would have begun its path at the top of its climb.
     let from = if was_airborne(&flight.tracks[held]) { from } else { path.waypoints()[0].position };
@@ -149,7 +149,7 @@ pub fn cause_of_short_landing(
     if search.is_goal_blocked(&may) {
         return Cause::MayBeAtGoal;
     }
-    if search.finds_path(&with(&may)) { Cause::WayLeft } else { Cause::MayBeOnRoute }
+    if search.finds_path(&with(&may)) { Cause::RouteFree } else { Cause::MayBeOnRoute }
 }
 
 /// A point, and the distance to keep from it, metres.

@@ -24,12 +24,12 @@ impl<const L: usize, const N: usize> CoverageProblem<'_, L, N> {
         )
     }
 
-    /// Time in which a vehicle sinks from [`Heights::max_picture_height_m`] to the first waypoint
-    /// of a route, plus that in which it rises from the last one, seconds: for the route flown
-    /// forward, and flown backward.
+    /// Time in which a vehicle descends from [`Heights::max_picture_height_m`] to the first
+    /// waypoint of a route, plus that in which it climbs from the last one, seconds: for the route
+    /// flown forward, and flown backward.
     pub(super) fn extra_vertical_times_s(&self, vehicle: &Vehicle, ends: &RouteEnds) -> (f32, f32) {
         let (first_m, last_m) =
-            (self.extra_descent_m(&ends.first), self.extra_descent_m(&ends.last));
+            (self.extra_descent_m(&ends.lowest), self.extra_descent_m(&ends.highest));
         let time_s =
             |down_m: f32, up_m: f32| down_m / vehicle.descend_mps + up_m / vehicle.climb_mps;
         (time_s(first_m, last_m), time_s(last_m, first_m))

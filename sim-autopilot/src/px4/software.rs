@@ -12,7 +12,7 @@ use crate::link::port::Sender;
 use crate::link::wire::PayloadReader;
 use crate::physics::vehicle::AirframeParameters;
 use crate::platform::{FlightModeOutput, Platform, SensorReadings};
-use crate::services::itinerary::{LandedState, MissionLeg};
+use crate::services::mission_flight::{LandedState, MissionLeg};
 use crate::services::params::Params;
 use crate::status::AutopilotStatus;
 
