@@ -103,7 +103,7 @@ pub struct AttackedFlight {
     autopilot: Autopilot,
     now: Instant,
     started: bool,
-    framers: [Framer; 2],
+    framer: Framer,
     setpoint_check: SetpointCheck,
     /// Bytes that the autopilot sends to the companion in the next step.
     bytes: Vec<u8>,
@@ -177,7 +177,7 @@ impl AttackedFlight {
             ),
             now: Instant::ZERO,
             started: false,
-            framers: [Framer::new(), Framer::new()],
+            framer: Framer::new(),
             setpoint_check: SetpointCheck::new(limits),
             bytes: Vec::new(),
             command_sequence: 0,
@@ -348,7 +348,7 @@ impl AttackedFlight {
     /// Checks a frame to the autopilot against the rules.
     fn check_frame(&mut self, bytes: &[u8]) {
         let mut input = bytes;
-        let Some(frame) = self.framers[0].next(self.now, &mut input) else { return };
+        let Some(frame) = self.framer.next(self.now, &mut input) else { return };
         if let Some(command) = frame.decode::<COMMAND_LONG_DATA>() {
             let arms =
                 command.command == MavCmd::MAV_CMD_COMPONENT_ARM_DISARM && command.param1 == 1.0;

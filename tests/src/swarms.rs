@@ -319,8 +319,3 @@ pub fn end_arc_length_m(flight: &Flight<WAYPOINTS>) -> f32 {
         -flight.climb_m
     }
 }
-
-/// A number from the environment variable `name`, or `default`.
-pub fn number_from_env(name: &str, default: u64) -> u64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}

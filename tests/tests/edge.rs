@@ -6,7 +6,7 @@
 //! docs/safety.md, "Figures".
 
 use flockmate_tests::edge::RadioEdgeMission;
-use flockmate_tests::swarms::number_from_env;
+use flockmate_tests::number_from_env;
 use rayon::prelude::*;
 
 /// Number of flights with a fault per seed.

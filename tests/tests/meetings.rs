@@ -5,8 +5,8 @@
 use flockmate_tests::meeting::autopilot::Catch;
 use flockmate_tests::meeting::scene::MeetingEvent;
 use flockmate_tests::meeting::{self, Outcome, scene};
+use flockmate_tests::number_from_env;
 use flockmate_tests::setpoints::SetpointStats;
-use flockmate_tests::swarms::number_from_env;
 use rayon::prelude::*;
 
 /// Number of random meetings.

@@ -25,7 +25,8 @@
 
 use std::collections::{HashSet, VecDeque};
 
-use flockmate_tests::swarms::{self, Plan, Random, Swarm, end_arc_length_m, position_at};
+use flockmate_tests::number_from_env;
+use flockmate_tests::swarms::{Plan, Random, Swarm, end_arc_length_m, position_at};
 use planner_core::Point;
 use planner_core::flight::{Gate, MAX_REPORTED_PROGRESS_LAG_M};
 use rayon::prelude::*;
@@ -350,7 +351,7 @@ fn one(seed: u64, count: usize) -> Option<Sum> {
 }
 
 fn search(count: usize) {
-    let wanted = swarms::number_from_env("FLOCKMATE_MODELS", PLANS as u64) as usize;
+    let wanted = number_from_env("FLOCKMATE_MODELS", PLANS as u64) as usize;
     let mut all = Sum::default();
     let mut seed = 0;
     while all.plans < wanted {

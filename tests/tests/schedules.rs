@@ -11,8 +11,9 @@
 
 use std::collections::BTreeMap;
 
+use flockmate_tests::number_from_env;
 use flockmate_tests::swarms::{
-    self, OwnPlan, Plan, Random, Swarm, WAYPOINTS, end_arc_length_m, position_at,
+    OwnPlan, Plan, Random, Swarm, WAYPOINTS, end_arc_length_m, position_at,
 };
 use planner_core::flight::{Flight, Gate, MAX_REPORTED_PROGRESS_LAG_M};
 use planner_core::plan::PlanError;
@@ -251,8 +252,8 @@ fn one(seed: u64) -> Sum {
 #[test]
 fn random_swarms_stay_apart_and_arrive_by_gates_alone() {
     let (first, count) = (
-        swarms::number_from_env("FLOCKMATE_SCHEDULES_FROM", 1),
-        swarms::number_from_env("FLOCKMATE_SCHEDULES", SWARMS),
+        number_from_env("FLOCKMATE_SCHEDULES_FROM", 1),
+        number_from_env("FLOCKMATE_SCHEDULES", SWARMS),
     );
     let sums: Vec<Sum> = (first..first + count).into_par_iter().map(one).collect();
     let mut all = Sum::default();

@@ -74,17 +74,6 @@ impl Autopilot {
     fn report_each_second(&mut self, out: &mut Vec<u8>) {
         let armed =
             if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
-        if self.kind == AutopilotKind::Px4 {
-            let (pos_horiz_accuracy, pos_vert_accuracy) = (0.02, 0.03);
-            self.send(
-                &ESTIMATOR_STATUS_DATA {
-                    pos_horiz_accuracy,
-                    pos_vert_accuracy,
-                    ..Default::default()
-                },
-                out,
-            );
-        }
         let heartbeat = HEARTBEAT_DATA {
             custom_mode: self.mode,
             base_mode: armed | MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
