@@ -49,8 +49,8 @@ pub struct SimulatedVehicle {
     plan_requests: PlanRequests,
     /// How a plan request is answered.
     pub plan_answer: PlanAnswer,
-    /// Last warning text of the mission table since `Follow` was entered or `Aborted` was left.
-    pub last_warning: Option<&'static str>,
+    /// First and last warning of the mission table since `Follow` was entered or `Aborted` left.
+    warnings: Option<[&'static str; 2]>,
     /// When the vehicle first left the ground, seconds.
     pub took_off_s: Option<f64>,
     /// When the vehicle first stood on the ground again, disarmed, seconds; `None` for a vehicle
@@ -91,7 +91,7 @@ impl SimulatedVehicle {
             config,
             plan_requests: PlanRequests::new(),
             plan_answer: PlanAnswer::Correct,
-            last_warning: None,
+            warnings: None,
             took_off_s: None,
             landed_s: None,
             back_on_ground_s: None,
@@ -347,11 +347,8 @@ impl SimulatedVehicle {
                     log.push(report::LogEvent { t_s, vehicle, level: Level::Info, text });
                 }
                 Event::StateChanged { from, to, text, warning } => {
-                    self.update_last_warning(
-                        from,
-                        to,
-                        Some(text).filter(|t| warning && !t.is_empty()),
-                    );
+                    let warning = Some(text).filter(|t| warning && !t.is_empty());
+                    self.update_warnings(from, to, warning);
                     log.push(self.log_entry(now_us, from, to, text));
                 }
             }
@@ -402,11 +399,11 @@ impl SimulatedVehicle {
         self.power_cut || now_us < self.boots_until_us
     }
 
-    fn update_last_warning(&mut self, from: State, to: State, warning: Option<&'static str>) {
-        if warning.is_some() {
-            self.last_warning = warning;
+    fn update_warnings(&mut self, from: State, to: State, warning: Option<&'static str>) {
+        if let Some(last) = warning {
+            self.warnings = Some([self.warnings.map_or(last, |[first, _]| first), last]);
         } else if to == State::Follow || from == State::Aborted {
-            self.last_warning = None;
+            self.warnings = None;
         }
     }
 
@@ -426,11 +423,12 @@ impl SimulatedVehicle {
         }
     }
 
-    /// How the vehicle's flight ended: the state of its mission, and the warning that led there.
+    /// How the vehicle's flight ended: the state of its mission, and the warnings that led there.
     pub fn describe_end(&self) -> String {
-        match (self.power_cut, self.last_warning) {
+        match (self.power_cut, self.warnings) {
             (true, _) => "Killed".to_owned(),
-            (false, Some(cause)) => format!("{:?}: {cause}", self.state()),
+            (false, Some([first, last])) if first == last => format!("{:?}: {last}", self.state()),
+            (false, Some([first, last])) => format!("{:?}: {first}; {last}", self.state()),
             (false, None) => format!("{:?}", self.state()),
         }
     }
