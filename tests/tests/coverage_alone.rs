@@ -17,7 +17,7 @@ const NOTICED_S: f64 = 45.0 + 15.0;
 
 /// The scenario, and when the last fault strikes. Of two vehicles the one with the higher id is
 /// lost; of three two are lost, one long after the other. Of two the lower id continues
-/// (docs/coverage.md).
+/// (docs/coverage-losses.md).
 fn drawn(seed: u64) -> (String, f64) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = 2 + (seed % 2) as usize;

@@ -96,8 +96,8 @@ fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String, stretche
     assert!(wrong.is_empty() && flown >= count / 4, "{flown} flown, {} wrong", wrong.len());
 }
 
-/// The tracks of paper CPP, Tables A1 to A12, as docs/coverage.md derives them from the paper's
-/// times: east and north, metres.
+/// The tracks of paper CPP, Tables A1 to A12, as docs/coverage-checked.md derives them from the
+/// paper's times: east and north, metres.
 const TRACKS: [(&str, [u32; 2]); 2] = [("short", [150, 180]), ("long", [320, 420])];
 
 /// Scenario of one of these tracks: lanes 10 m apart, flown at 35 m height and 5 m/s as in the

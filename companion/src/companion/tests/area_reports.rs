@@ -62,7 +62,7 @@ fn rosters_go_out_twice_a_second_in_flight_and_five_times_while_dividing() {
         let (dividing, report) = counted_rosters(&mut b, Dividing);
         assert!(dividing.len().abs_diff(5 * COUNTED_S) <= 1, "{} at {swarm_hz} Hz", dividing.len());
         assert_eq!(report.entries[2].status, ShareStatus::Left);
-        // Length of a roster report of three vehicles by the table of docs/coverage.md.
+        // Length of a roster report of three vehicles by the table of docs/coverage-losses.md.
         assert!(flying.iter().chain(&dividing).all(|length| *length == 50), "{dividing:?}");
     }
 }

@@ -183,7 +183,7 @@ fn rosters_go_out_whatever_is_asked_and_are_counted() {
     assert!(air.bytes() <= 20 * most + MAX_BURST_BYTES + MAX_FRAME_LEN as u32, "{}", air.bytes());
 }
 
-/// The table of docs/coverage.md, and the reports of [`COVERAGE_STATE_BYTES_PER_S`].
+/// The table of docs/coverage-losses.md, and the reports of [`COVERAGE_STATE_BYTES_PER_S`].
 #[test]
 fn reports_of_a_coverage_mission_are_as_long_as_said() {
     let roster = |vehicles: usize| {
