@@ -8,9 +8,8 @@
 //! hash. Once all that live have reported the same hash and hold, the division is binding, and all
 //! fly on ([`Fleet::step`]). A vehicle photographs only while it has its lease: within [`LEASE`] a
 //! majority reported that they hear it. Others take its part no sooner than [`LOST_AFTER_SILENCE`]
-//! after each of them last heard it. Why no waypoint has two owners is in
-//! `docs/coverage-losses.md`, claim by claim; `tests/tests/fleet_model` searches for a
-//! counterexample.
+//! after each of them last heard it. Why no waypoint has two owners:
+//! `docs/coverage-losses.md`, claim by claim; `tests/tests/fleet_model` searches a counterexample.
 
 use heapless::Vec;
 use planner_core::file::CRC32;

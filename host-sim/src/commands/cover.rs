@@ -131,6 +131,7 @@ fn remove_stale_plan_files(dir: &Path, written: &[String]) -> anyhow::Result<()>
             let path = entry.path();
             fs::remove_file(&path)
                 .with_context(|| format!("cannot remove: {}", printable_path(&path)))?;
+            say!("removed    {}: of another plan", printable_path(&path));
         }
     }
     Ok(())
@@ -146,7 +147,7 @@ fn area_line(coverage: &CoverageResult, findings: &CoverageFindings) -> String {
         findings.cell_m,
         count_with_noun(coverage.waypoint_count as usize, "waypoint"),
         count_with_noun(coverage.lane_count, "lane"),
-        coverage.lane_angle_deg
+        coverage.lane_angle_deg.rem_euclid(180.0)
     )
 }
 

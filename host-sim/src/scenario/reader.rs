@@ -121,12 +121,14 @@ impl<'a> TomlValue<'a> {
 
     /// The value's string looked up in `words`: the meaning of that keyword.
     pub(super) fn one_of<T: Copy>(&self, words: &[(&str, T)]) -> Result<T> {
-        let given = self.str()?;
-        if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == given) {
+        let given = self.value.as_str();
+        if let Some((_, meaning)) = words.iter().find(|(word, _)| Some(*word) == given) {
             return Ok(*meaning);
         }
         let all: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
-        let error = self.error(&format!("must be one of {}", all.join(", ")));
+        let all = format!("one of {}", all.join(", "));
+        let Some(given) = given else { return Err(self.expected_error(&all)) };
+        let error = self.error(&format!("must be {all}"));
         Err(ScenarioError {
             hint: nearest_word_hint(given, words.iter().map(|(word, _)| *word)),
             ..error

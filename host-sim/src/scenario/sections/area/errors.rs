@@ -82,7 +82,10 @@ pub(super) fn area_hint(error: core_area::AreaError) -> &'static str {
         E::TooFewVertices { .. } | E::NoArea { .. } => {
             "a polygon has three corners or more that are not on one line"
         }
-        E::TooFar { .. } => "metres are about area.origin, and origin must be near the area",
+        E::TooFar { .. } => {
+            "without `coordinates = \"metres\"` numbers are degrees, longitude first; metres are about area.origin, \
+             which must be near the area"
+        }
         E::SelfCrossing { .. } => "give the corners in their order around the polygon",
         E::RingsCross { .. } => "draw one inside or outside the other",
         E::HoleOutside { .. } => "draw it inside the border, or leave it out",
