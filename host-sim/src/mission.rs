@@ -18,6 +18,7 @@ use planner_core::flight::{PathError, Task};
 use planner_core::plan::PlanError;
 use planner_core::schedule::ScheduleError;
 
+pub use self::coverage::flight_by_companion_s;
 use self::planner::GoalsWorkspace;
 use self::ready::schedule_config;
 pub use self::ready::{HostPlan, OwnPlan, PreparedMission, VERTICAL_MPS};
