@@ -346,10 +346,7 @@ fn what_cannot_be_flown_is_refused_by_name() {
     fence("[121, 100, 46]").expect("it is around all that is flown");
     for (first, why) in [
         ("start = [6, -10, 35]", "pictures are taken at 35.0 m"),
-        (
-            "start = [6, -10, 20]",
-            "flown: bad vehicle: asked:10: vehicle 7 starts 20.0 m above the ground",
-        ),
+        ("start = [6, -10, 20]", "bad vehicle: asked:10: vehicle 7 starts 20.0 m above the ground"),
         (
             "start = [6, -10, -20]",
             "bad vehicle: asked:10: vehicle 7 starts 20.0 m below the ground",
