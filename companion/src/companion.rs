@@ -56,7 +56,9 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) timers: Timers,
     pub(crate) links: Links,
     pub(crate) telemetry: Telemetry,
+    /// The other vehicles, as last heard; in a coverage mission the fleet too.
     pub(crate) neighbours: Neighbours<V>,
+    /// What blocks the path, and the detour that is requested or flown.
     pub(crate) detours: Detours,
     /// Requests to the autopilot, repeated until they take effect.
     pub(crate) handshake: Handshake,
@@ -84,6 +86,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         place.write(Self::from_checked(settings))
     }
 
+    /// The companion with these settings, before its first byte.
     #[inline(always)]
     fn from_checked(CheckedConfig { config, path_start: start }: CheckedConfig<V>) -> Self {
         const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };

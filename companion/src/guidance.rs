@@ -51,8 +51,8 @@ pub use self::scene::{GuidanceInputs, PathSource};
 pub use self::setpoint::Setpoint;
 pub use self::smoother::SetpointStats;
 
-/// A vehicle this near to its reference, or to the end of a climb or a path, counts as there,
-/// metres.
+/// A vehicle this near to its reference, its setpoint or the end of its path counts as there,
+/// metres. At the top of a climb it may be up to twice as far from its setpoint.
 const ARRIVED_WITHIN_M: f32 = 0.35;
 /// Speed below which the vehicle counts as standing at the end of its path, m/s.
 const AT_REST_MPS: f32 = 0.5;

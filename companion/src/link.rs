@@ -29,6 +29,7 @@ const RESERVED_QUEUE_ENTRIES: usize = 8;
 /// Further free entries below which no answer to another sender is queued: room for the answers to
 /// a ground station, a list of all parameters and two more.
 const RESERVED_FOR_GROUND_STATIONS: usize = 12;
+/// Both links, in the order of their indices.
 const BOTH_LINKS: [Link; 2] = [Link::Autopilot, Link::Swarm];
 
 /// A message that is made from the newest state when its link is polled, instead of waiting in a
@@ -59,14 +60,19 @@ pub(crate) enum OnDemandMessage {
 /// Both links, to the autopilot and to the swarm: framers, queues and rate limits.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Links {
+    /// Framer of each link, in the order of [`Link`].
     framers: [Framer; 2],
+    /// Queue of each link, in the order of [`Link`].
     outboxes: [Outbox; 2],
     /// For each link, the [`OnDemandMessage`]s that are due: bit n for the n-th variant.
     due_bits: [u16; 2],
     /// Limits the bytes that are sent to the radio beside the state messages.
     radio: RadioTokenBucket,
+    /// The intents sent last, for their echoes.
     sent_intents: SentIntents,
+    /// Limits the answers to requests.
     answer_buckets: AnswerTokenBuckets,
+    /// The commands answered last: a repeated one gets the same answer.
     command_history: CommandHistory,
 }
 

@@ -28,6 +28,7 @@ const PARAM_TYPE_REAL32: u8 = 9;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ReceivedFrame<'a> {
     pub(crate) link: Link,
+    /// What kind of station sent the frame.
     pub(crate) sender: SenderKind,
     pub(crate) frame: &'a Frame,
     /// When the frame was received.
@@ -75,6 +76,7 @@ pub(crate) struct Services {
     store: Option<Store>,
     /// The parameters, where there is no flash to keep them.
     parameters: Parameters,
+    /// The FTP server.
     ftp: Ftp,
     /// Cruise, climb and descent speed of the mission, m/s; the parameters may lower the speeds in
     /// use.
@@ -192,6 +194,7 @@ impl Services {
         }
     }
 
+    /// Answers a frame with the value of the parameter of this index, if there is one.
     fn send_parameter(&self, heard: &ReceivedFrame<'_>, index: usize, links: &mut Links) {
         if let Some((name, value)) = self.parameters().get(index) {
             let count = parameters::PARAMETER_COUNT as u16;

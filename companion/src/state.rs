@@ -334,7 +334,9 @@ impl State {
         matches!(self, Self::PilotReturned | Self::PositionLost)
     }
 
-    /// Whether a loss interrupts the mission: of the autopilot, of the position, or to a pilot.
+    /// Whether in this state the mission stands interrupted: the autopilot fell silent, the
+    /// position was lost, or a pilot took over (also after the pilot gave the vehicle back, until
+    /// it resumes).
     pub fn is_interrupted_by_loss(self) -> bool {
         matches!(self, Self::AutopilotSilent | Self::PositionLost) || self.is_left_to_pilot()
     }

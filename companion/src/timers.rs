@@ -71,6 +71,7 @@ const WAKING_TIMERS: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 /// For each timer the time at which it is due; at the start all are due.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Timers {
+    /// Time at which each timer is due, in the order of [`Timer`].
     due_at: [Instant; TIMER_COUNT],
     /// When [`Self::step_s`] was last called.
     stepped_at: Instant,

@@ -59,11 +59,13 @@ pub struct GrantResult {
 /// A board in a QEMU process; dropping it kills the process.
 #[derive(Debug)]
 pub struct EmulatedBoard {
+    /// The process.
     qemu: Child,
     /// QEMU's standard input, by which the host sends messages.
     input: ChildStdin,
     /// The board's answers, which a thread reads from QEMU's file descriptor 3.
     answers: Receiver<anyhow::Result<GrantResult>>,
+    /// The board's time since its start, as last answered, microseconds.
     now_us: u64,
 }
 

@@ -58,6 +58,7 @@ pub fn regular_file_len(path: &Path) -> io::Result<u64> {
 
 /// Result files that a command writes into one directory: all of them, or none.
 pub struct ResultFiles {
+    /// The directory of the results.
     dir: PathBuf,
     /// Directories that were created for the results, the innermost first; removed unless
     /// committed.

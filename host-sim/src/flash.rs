@@ -16,7 +16,9 @@ pub const HOST_FLASH_LAYOUT: FlashLayout = FlashLayout::H743;
 
 /// A simulated flash bank.
 pub struct HostFlash {
+    /// Content of the bank.
     bytes: Vec<u8>,
+    /// The file to which changes are written; `None` without one.
     file: Option<File>,
 }
 

@@ -164,6 +164,7 @@ impl LinkUrl {
     }
 }
 
+/// The first address of a host and port.
 fn resolve(at: &str) -> io::Result<SocketAddr> {
     at.to_socket_addrs()?
         .next()

@@ -184,6 +184,7 @@ impl PreparedMission {
         self.board.map_or(MAX_GATES, |board| board.gates)
     }
 
+    /// The error for the user, with a hint.
     fn describe_plan_error(&self, error: &PlanError) -> anyhow::Error {
         let path = &self.scenario.path;
         match error {

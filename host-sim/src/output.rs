@@ -91,6 +91,7 @@ pub fn print_slow_vehicles(scenario: &Scenario) {
     }
 }
 
+/// Prints the smallest distances, contacts, violations and deadlocks.
 fn print_safety(safety: &Safety) {
     let metres = |value: Option<f64>| value.map_or("-".to_owned(), |m| format!("{m:.2} m"));
     let under_pilot = match safety.wall_contacts_under_pilot {

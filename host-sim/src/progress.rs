@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 /// Makes progress bars on standard error if that is a terminal, else none.
 #[derive(Clone, Copy, Debug)]
 pub struct Progress {
+    /// Whether bars are shown.
     shown: bool,
 }
 
@@ -48,6 +49,7 @@ impl Progress {
 
 /// The progress bar of one stage; cleared from the terminal when dropped.
 pub struct Stage {
+    /// The bar; `None` if none is shown.
     bar: Option<ProgressBar>,
 }
 

@@ -227,6 +227,7 @@ pub struct Safety {
     pub deadlocks: u32,
 }
 
+/// Whether a count is 0: then it is left out of the file.
 fn is_zero(count: &u32) -> bool {
     *count == 0
 }

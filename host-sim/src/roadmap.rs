@@ -300,6 +300,7 @@ pub fn encode(roadmap: &BuiltRoadmap, header: &RoadmapHeader) -> anyhow::Result<
     Ok(bytes)
 }
 
+/// The error for the user.
 fn describe_prm_error(error: &PrmError) -> anyhow::Error {
     match error {
         PrmError::Config(name) => anyhow!("roadmap.{name} is out of range"),

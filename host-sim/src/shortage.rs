@@ -53,6 +53,7 @@ pub fn shortage_lines(mission: &PreparedMission, plan: &HostPlan) -> Vec<String>
 /// The mission, and what was found about it so far.
 struct ShortageFindings<'a> {
     mission: &'a PreparedMission,
+    /// Which goals the vehicles reach.
     reachability: Reachability,
     /// By vehicle index: [`widest_path_clearances_m`] from its start to all goals, computed on
     /// demand.
@@ -101,7 +102,9 @@ fn goal_line(asked: &mut ShortageFindings<'_>, goal: usize) -> String {
 /// lines do not repeat it.
 #[derive(Clone, Copy)]
 enum RemedyStatus {
+    /// The goals' lines name the remedy.
     Named,
+    /// No line has named it.
     Unnamed,
 }
 
@@ -197,6 +200,7 @@ impl Reachability {
         Self { joined: (0..vehicles).map(row).collect() }
     }
 
+    /// Whether the roadmap has a path from the vehicle to the goal; both by index.
     fn are_connected(&self, vehicle: usize, goal: usize) -> bool {
         self.joined[vehicle][goal]
     }

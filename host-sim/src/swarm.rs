@@ -128,11 +128,14 @@ struct SimulationRun<'a> {
     radio: Radio,
     referee: Referee<'a>,
     ground_station: GroundStation,
+    /// Link to a ground station outside; `None` without one.
     gateway: Option<Gateway>,
     divisions: DivisionLog,
     script: FaultScript<'a>,
     log: Vec<report::LogEvent>,
+    /// Waypoints that earlier flights have photographed.
     photographed_before: Vec<WaypointRange>,
+    /// True position of each vehicle after its last step, in the order of `vehicles`, ENU metres.
     true_positions: Vec<Point>,
     /// Smallest distance of each vehicle from its goal so far; in a coverage mission horizontally
     /// from its pad since it last came back there. Metres.

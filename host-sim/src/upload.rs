@@ -46,23 +46,31 @@ const ACK: u8 = 128;
 pub struct FtpClient {
     link: Box<dyn ByteLink>,
     framer: Framer,
+    /// When the client was made.
     began: Clock,
+    /// When the next HEARTBEAT is due.
     next_heartbeat_at: Clock,
     /// Sequence number of the next MAVLink frame.
     frame_sequence: u8,
+    /// MAVLink system id of the client.
     own_system: u8,
+    /// System id of the companion; `None` until one was heard.
     target_system: Option<u8>,
     /// FTP sequence number of the next request, and of the answer to the last one.
     sequence: u16,
     /// FTP session of the upload.
     session: u8,
+    /// Timeout and number of requests under way.
     retransmission: Retransmission,
 }
 
 /// A WRITE request that is not answered yet.
 struct PendingWrite {
+    /// Payload of the request, kept to send it again.
     request: [u8; PAYLOAD_LEN],
+    /// Number of bytes that the request writes.
     data_len: usize,
+    /// When the request was last sent.
     sent_at: Clock,
     /// Whether the request was sent more than once.
     repeated: bool,
@@ -70,9 +78,13 @@ struct PendingWrite {
 
 /// An answer of the companion: ACK or NAK.
 struct FtpReply {
+    /// FTP sequence number of the reply.
     sequence: u16,
+    /// FTP session.
     session: u8,
+    /// Whether it is an ACK.
     is_ack: bool,
+    /// Opcode of the request that is answered.
     request_opcode: u8,
     data: Vec<u8>,
 }
@@ -106,11 +118,13 @@ impl FtpClient {
         Self { own_system, ..self }
     }
 
+    /// Sends the bytes of a frame, and counts it.
     fn send_frame(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         self.frame_sequence = self.frame_sequence.wrapping_add(1);
         self.link.send(bytes).context("link lost")
     }
 
+    /// Header of the next frame.
     fn header(&self) -> Header {
         Header { system: self.own_system, component: COMPONENT_ID, sequence: self.frame_sequence }
     }
@@ -179,6 +193,7 @@ impl FtpClient {
         payload
     }
 
+    /// Sends the payload of a request as a frame.
     fn send_request(&mut self, payload: &[u8; PAYLOAD_LEN]) -> anyhow::Result<()> {
         let mut out = [0; frame::MAX_FRAME_LEN];
         let extra = frame::extra_crc(MESSAGE_ID).context("the dialect has FTP")?;

@@ -147,11 +147,14 @@ impl KeepOutZone {
 
 /// Bounding box of a zone, radius included, by which most legs are ruled out quickly.
 struct ZoneBox {
+    /// Least corner, ENU metres.
     low: Point,
+    /// Greatest corner, ENU metres.
     high: Point,
 }
 
 impl ZoneBox {
+    /// The box around a zone.
     fn of_zone(of: &KeepOutZone) -> Self {
         let (from, to) = (&of.from, &of.to);
         let radius = Point::repeat(of.radius_m);

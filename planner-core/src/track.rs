@@ -344,6 +344,7 @@ fn lead_limit_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
 /// A reference slower than this is about to stop, m/s.
 const ABOUT_TO_STOP_MPS: f32 = 0.05;
 
+/// The greater of two numbers.
 fn max_usize(a: usize, b: usize) -> usize {
     if a > b { a } else { b }
 }

@@ -34,8 +34,8 @@ use crate::platform::{FlightModeOutput, IntegralAction, Platform, SensorReadings
 use crate::services::mission_flight::MissionLeg;
 use crate::status::MotorState;
 
-/// Delay of the failsafe beyond `COM_OF_LOSS_T`, seconds: in recordings the failsafe started at
-/// most 1.23 s after the last setpoint, and gaps of 1.25 s started it.
+/// Delay of the failsafe beyond `COM_OF_LOSS_T` (1.0 s by default: 1.15 s in all), seconds. In
+/// recordings it started at most 1.23 s after the last setpoint, and gaps of 1.25 s started it.
 const LOSS_REACTION_S: f32 = 0.15;
 /// Fraction of the thrust ramp after which the land detector reports a take-off: in recordings
 /// after 0.9 to 1.0 s of 3 s, before the vehicle lifts.

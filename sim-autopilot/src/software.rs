@@ -177,7 +177,8 @@ impl AutopilotSoftware {
         }
     }
 
-    /// Sets an integer parameter; false if there is none of this name.
+    /// Sets an integer parameter, clamped to its type's range; false if this name has no parameter
+    /// or a float.
     pub(super) fn set_integer(&mut self, name: &str, value: i32) -> bool {
         let params = self.params();
         let Some((_, old)) = params.index(name).and_then(|index| params.get(index)) else {

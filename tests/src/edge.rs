@@ -42,7 +42,7 @@ pub struct RadioEdgeMission {
     rng: Random,
 }
 
-/// What happened in one flight with a fault.
+/// What happened in one flight in which a fault struck a vehicle near the edge of the radio range.
 #[derive(Debug, Default)]
 pub struct Outcome {
     /// Text: the radio range, the struck vehicle, when, and by which fault.

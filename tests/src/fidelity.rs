@@ -196,7 +196,8 @@ impl Recording {
     }
 }
 
-/// RMS and maximum of differences, metres; NaN if nothing was compared.
+/// RMS and maximum of the differences between simulated and recorded estimates over a part of a
+/// flight, metres; NaN if nothing was compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Difference {
     /// Root of the mean square, metres.

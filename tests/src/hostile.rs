@@ -479,10 +479,11 @@ fn attacks_in(phases: Range<usize>, seed: u64, frames: u64) -> AttackReport {
         .reduce(AttackReport::default, both)
 }
 
-/// The fuzzer's target: the first byte of `data` chooses the phase, the rest are forged frames.
+/// The fuzzer's target: the first byte of `data` chooses the phase of a flight with a goal, the
+/// rest are frames forged to its companion.
 ///
 /// # Panics
-/// The companion breaks a rule.
+/// The companion breaks a rule, or sends a setpoint that is unfit to be flown.
 pub fn attack_with_bytes(data: &[u8]) {
     use std::sync::OnceLock;
     static PHASES_REACHED: OnceLock<Vec<AttackedFlight>> = OnceLock::new();

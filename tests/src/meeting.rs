@@ -52,6 +52,7 @@ struct World<'a> {
     scene: &'a Scene,
     vehicles: Vec<MeetingVehicle>,
     now: Instant,
+    /// Draws for each radio frame and receiver whether it is lost, and its delay.
     dice: Dice,
     trace: Option<Vec<String>>,
 }

@@ -1,5 +1,5 @@
-//! Estimates with the recorded errors: the margin and separation that they require, and that these
-//! suffice by true motion.
+//! Position estimates with errors as in recorded flights (`estimator = "recorded"`): the margin
+//! and separation that they require, and that these suffice by true motion.
 
 use host_sim::margins;
 use host_sim::mission::PreparedMission;

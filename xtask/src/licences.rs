@@ -54,6 +54,7 @@ struct Package {
 
 #[derive(Deserialize)]
 struct Resolve {
+    /// The packages that are built for the target.
     nodes: Vec<Node>,
 }
 

@@ -1,6 +1,7 @@
-//! Calls every public function of `planner-core` with extreme and invalid arguments: numbers that
-//! are NaN, infinite, zero, negative or huge; indices out of range; memory that is too small. None
-//! may panic. The results go into a checksum, by which a test compares host and board.
+//! With the other `limits_*` files: calls every public function of `planner-core` with extreme and
+//! invalid arguments: numbers that are NaN, infinite, zero, negative or huge; indices out of range;
+//! memory that is too small. None may panic. The results go into a checksum, by which a test
+//! compares host and board.
 
 use heapless::Vec;
 use planner_core::Point;

@@ -22,8 +22,11 @@ const MAX_ARMING_TRIES: u8 = 2;
 /// Most different refusals (command and result) that are reported in one mission state.
 const MAX_REPORTED_REFUSALS: usize = 4;
 
+/// `MAV_CMD` number of NAV_TAKEOFF.
 const NAV_TAKEOFF: u16 = 22;
+/// `MAV_CMD` number of DO_SET_MODE.
 const DO_SET_MODE: u16 = 176;
+/// `MAV_CMD` number of COMPONENT_ARM_DISARM.
 const ARM_DISARM: u16 = 400;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;

@@ -38,6 +38,7 @@ const POSITION_STREAM_TIMEOUT: Duration = Duration::from_millis(1500);
 const STREAMS_RETRY_EVERY: Duration = Duration::from_millis(2000);
 /// Most streams requested in one step while connecting.
 const STREAM_REQUESTS_PER_STEP: usize = 5;
+/// Message id of GPS_GLOBAL_ORIGIN.
 const GPS_GLOBAL_ORIGIN: u16 = 49;
 /// Most PARAM_REQUEST_READ that are sent for all limit parameters together after one call of
 /// [`Handshake::begin_requesting_streams`].
@@ -60,6 +61,7 @@ const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct HandshakeContext {
     pub(crate) now: Instant,
+    /// State of this vehicle's mission.
     pub(crate) state: State,
     /// Time since the mission state was entered.
     pub(crate) time_in_state: Duration,
@@ -78,6 +80,7 @@ pub(crate) struct HandshakeContext {
 /// State of the requests to the autopilot.
 #[derive(Clone, Debug)]
 pub(crate) struct Handshake {
+    /// Requests to arm, to disarm and for flight modes.
     arming: ArmingHandshake,
     /// The limits that the autopilot's parameters set; its kind's defaults where none was read.
     limits: AutopilotLimits,

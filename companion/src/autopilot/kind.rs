@@ -16,7 +16,9 @@ pub enum AutopilotKind {
     ArduPilot,
 }
 
+/// PX4's value of `autopilot` in HEARTBEAT.
 const MAV_AUTOPILOT_PX4: u8 = 12;
+/// ArduPilot's value of `autopilot` in HEARTBEAT.
 const MAV_AUTOPILOT_ARDUPILOTMEGA: u8 = 3;
 
 impl AutopilotKind {

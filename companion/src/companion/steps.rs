@@ -32,8 +32,11 @@ const ROSTER_EVERY_DIVIDING: Duration = Duration::from_millis(200);
 /// How fast the accuracy of the position estimate lets the vehicle fly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum EstimatePace {
+    /// Not at all: a share of 0 of the nominal speed.
     Stop,
+    /// At a share of the nominal speed.
     Slower,
+    /// At nominal speed.
     Nominal,
 }
 

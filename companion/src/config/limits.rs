@@ -142,7 +142,7 @@ impl MotionLimits {
         Point::new(accel.x * share, accel.y * share, z)
     }
 
-    /// Greatest speed of a setpoint in any direction, m/s.
+    /// The greatest of the speed limits along the path, upwards and downwards, m/s.
     pub(crate) fn max_speed_mps(&self) -> f32 {
         fmaxf(self.speed_mps, fmaxf(self.climb_mps, self.descend_mps))
     }

@@ -27,10 +27,12 @@ pub struct Parameter {
     pub whole: bool,
 }
 
+/// A parameter with a real value from `least` to `most`.
 const fn real_parameter(name: &'static str, least: f32, most: f32, default: f32) -> Parameter {
     Parameter { name, min: least, max: most, default, whole: false }
 }
 
+/// A parameter with a whole value from `least` to `most`.
 const fn whole_parameter(name: &'static str, least: f32, most: f32, default: f32) -> Parameter {
     Parameter { name, min: least, max: most, default, whole: true }
 }

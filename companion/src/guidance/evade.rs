@@ -70,6 +70,7 @@ pub enum StepBack {
 /// Search for the nearest waiting place that is outside all landing columns, over several steps.
 #[derive(Clone, Debug, Default)]
 pub struct EvadeSearch {
+    /// Progress of the search along the path.
     scan: IncrementalScan,
     /// Place along the path where the search under way began, metres; `None` if there is none.
     search_from_m: Option<f32>,

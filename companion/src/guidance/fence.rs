@@ -34,14 +34,18 @@ const JERK_HALVINGS: usize = 8;
 /// A box that setpoints do not leave.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fence {
+    /// Least corner, ENU metres in the mission frame.
     low: Point,
+    /// Greatest corner, ENU metres in the mission frame.
     high: Point,
 }
 
 /// Acceleration and jerk with which an axis brakes.
 #[derive(Clone, Copy)]
 struct BrakingLimits {
+    /// Greatest deceleration, m/s².
     accel_mps2: f32,
+    /// Jerk with which the deceleration begins and ends, m/s³.
     jerk_mps3: f32,
 }
 
@@ -155,8 +159,11 @@ impl Fence {
 
 /// Interval of an axis in which a motion has to stop, and its braking.
 struct AxisBounds {
+    /// Lower end of the interval, metres.
     low: f32,
+    /// Upper end of the interval, metres.
     high: f32,
+    /// Acceleration and jerk with which the axis brakes.
     brake: BrakingLimits,
 }
 

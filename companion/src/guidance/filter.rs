@@ -48,6 +48,7 @@ const ABORT_DESCENT_AFTER: Duration = Duration::from_secs(1);
 
 /// A neighbour that may come nearer to this vehicle than the distance to be kept from it.
 struct FilterConflict {
+    /// System id of the neighbour.
     id: u8,
     /// Whether this vehicle yields to the neighbour.
     own_yields: bool,
@@ -105,16 +106,14 @@ pub(crate) struct SafetyFilter {
 /// Direction in which this vehicle flies or is about to fly.
 #[derive(Clone, Copy, PartialEq)]
 enum FlightDirection {
+    /// The vehicle keeps its place.
     Stands,
     /// Along the path.
     Ahead,
     /// Back along the path.
     Back,
     /// Straight up or down, to the height `to_m`.
-    Vertical {
-        to_m: f32,
-        speed_mps: f32,
-    },
+    Vertical { to_m: f32, speed_mps: f32 },
 }
 
 impl SafetyFilter {
@@ -224,8 +223,9 @@ impl SafetyFilter {
         *self = Self { stop_count: self.stop_count, ..Self::default() };
     }
 
-    /// [`Urgency::Urgent`] while the filter stops the vehicle in this step; passing a stranger
-    /// slowly it stops only while the sets conflict.
+    /// [`Urgency::Urgent`] in a step in which the filter stops the vehicle. Once it may pass a
+    /// stranger slowly, that is only while its reachable set conflicts with a neighbour's: else it
+    /// flies on.
     pub(super) fn urgency(&self, now: Instant) -> Urgency {
         match self.is_stopped() && (self.sets_conflict || !self.passes_stranger(now)) {
             true => Urgency::Urgent,

@@ -11,7 +11,8 @@
 
 use crate::time::{Duration, Instant};
 
-/// Time for which others rely on a reported hold: longer than three lost reports in a row.
+/// Time after its last report of a hold for which others rely on it and this vehicle must not move,
+/// besides the messages' delay: with `FLK_SWARM_HZ` 5, the default, longer than three lost reports.
 const HOLD_REPORT_LIFETIME: Duration = Duration::from_millis(1000);
 /// Time of standing after which a vehicle that yields reports that it holds.
 pub(super) const HOLD_AFTER_IF_YIELDING: Duration = Duration::from_millis(300);

@@ -6,8 +6,11 @@ use planner_core::{Length, Point};
 /// A moving point: place, velocity, acceleration.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Motion {
+    /// Place, ENU metres in the mission frame.
     pub(super) position: Point,
+    /// Velocity, ENU m/s.
     pub(super) velocity: Point,
+    /// Acceleration, ENU m/s².
     pub(super) acceleration: Point,
 }
 
@@ -17,6 +20,7 @@ impl Motion {
         Self { position, velocity: Point::zeros(), acceleration: Point::zeros() }
     }
 
+    /// Whether all nine numbers are finite.
     pub(super) fn is_finite(&self) -> bool {
         [self.position, self.velocity, self.acceleration]
             .iter()

@@ -12,7 +12,7 @@ pub struct GuidanceInputs<'a, const W: usize, const G: usize> {
     pub plan: Option<&'a VehiclePlan<W, G>>,
     /// Telemetry of the vehicle's autopilot.
     pub telemetry: &'a Telemetry,
-    /// Rank of the vehicle in the roster.
+    /// Index of the vehicle in the roster sorted by id, from 0, for Algorithm 2 of paper P3D.
     pub rank: u16,
     /// MAVLink system id of the vehicle.
     pub id: u8,

@@ -101,7 +101,9 @@ pub struct SetpointStats {
 /// The setpoint, and the curve along which it moves.
 #[derive(Clone, Debug)]
 pub struct SetpointSmoother {
+    /// Limits of the setpoint's speed, acceleration and jerk.
     limits: MotionLimits,
+    /// The geofence; `None` without one.
     fence: Option<Fence>,
     /// Window of each of the two averages, ticks.
     average_ticks: usize,

@@ -18,7 +18,9 @@ const WP_RADIUS_M: f32 = 0.4;
 /// The paper's `nWaypoint`, the index of the current waypoint, and whether the path is completed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Algorithm2Waypoints {
+    /// Index in the path of the waypoint that the vehicle flies to.
     current_index: usize,
+    /// Whether the last waypoint was reached.
     completed: bool,
 }
 

@@ -52,15 +52,20 @@ pub(crate) enum AnswerKind {
     Text,
 }
 
+/// Number of kinds of sender, [`SenderKind`].
 const SENDER_COUNT: usize = 3;
+/// Number of kinds of answer, [`AnswerKind`].
 const KIND_COUNT: usize = 5;
+/// Number of links.
 const LINK_COUNT: usize = 2;
 
 /// Settings of a token bucket: it allows `burst` answers at once, then one each `every_ms`
 /// milliseconds.
 #[derive(Clone, Copy, Debug)]
 struct TokenBucketConfig {
+    /// Time in which one more answer becomes allowed, milliseconds.
     every_ms: u64,
+    /// Number of answers that a full bucket allows at once.
     burst: u64,
 }
 

@@ -11,7 +11,9 @@
 use crate::link::frame::{COMPANION_COMPONENT, Frame};
 use crate::time::{Duration, Instant};
 
+/// Message id of COMMAND_INT.
 const COMMAND_INT: u32 = 75;
+/// Message id of COMMAND_LONG.
 const COMMAND_LONG: u32 = 76;
 
 /// `MAV_RESULT` of an accepted command.
@@ -136,12 +138,17 @@ const COMPARED_LEN: usize = 35;
 /// A received command frame and the `MAV_RESULT` it was answered with.
 #[derive(Clone, Copy, Debug)]
 struct AnsweredCommand {
+    /// System id and component id of the sender.
     from: (u8, u8),
+    /// Sequence number of the frame.
     sequence: u8,
+    /// Message id: that of COMMAND_INT or COMMAND_LONG.
     message: u32,
+    /// The part of the payload by which frames are compared.
     payload: [u8; COMPARED_LEN],
     /// `None`: the command was not answered.
     result: Option<u8>,
+    /// When the frame was received.
     at: Instant,
 }
 
@@ -149,6 +156,7 @@ struct AnsweredCommand {
 /// not act again. The same sequence number with other parameters is another command.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CommandHistory {
+    /// The frames; `None` in an entry not used yet.
     seen: [Option<AnsweredCommand>; 4],
     /// Index in `seen` of the entry that the next frame replaces, the oldest.
     next: usize,

@@ -56,20 +56,25 @@ pub(crate) struct ReportedPath {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SentIntent {
     sequence: u8,
+    /// When the intent was sent.
     pub(crate) at: Instant,
+    /// The path that the intent reports.
     pub(crate) path: ReportedPath,
 }
 
 /// Ring of the intents that this vehicle sent last.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SentIntents {
+    /// The intents; the n-th sent one, from 0, at n modulo the length.
     ring: [Option<SentIntent>; MAX_SENT_INTENTS],
+    /// Number of intents sent so far, which wraps around.
     count: usize,
     /// When the newest intent was sent that is known to have arrived.
     newest_arrived_sent_at: Instant,
 }
 
 impl SentIntents {
+    /// Keeps an intent that was sent at `now`, in place of the oldest.
     pub(crate) fn note_sent(&mut self, sequence: u8, path: ReportedPath, now: Instant) {
         self.ring[self.count % MAX_SENT_INTENTS] = Some(SentIntent { sequence, at: now, path });
         self.count = self.count.wrapping_add(1);
@@ -80,6 +85,7 @@ impl SentIntents {
         self.count
     }
 
+    /// The sent intent with the echoed sequence number; `None` if it is no longer kept.
     fn find(&self, echo: &IntentEcho) -> Option<SentIntent> {
         self.ring.iter().flatten().find(|sent| sent.sequence == echo.sequence).copied()
     }

@@ -36,8 +36,11 @@ pub const PARTIAL_LIFETIME: Duration = Duration::from_millis(100);
 /// Longest frame without its signature, bytes: 10 of header, 255 of payload, 2 of CRC.
 pub const MAX_FRAME_LEN: usize = 267;
 
+/// Start byte of a MAVLink 1 frame.
 const V1_START: u8 = 0xFE;
+/// Bit of a MAVLink 2 frame's `incompat_flags`: the frame has a signature.
 const FLAG_SIGNED: u8 = 0x01;
+/// Length of a signature, bytes.
 const SIGNATURE_LEN: usize = 13;
 /// Resolution of the times of arrival, microseconds: bytes received within one step count as
 /// received with the last of them.
@@ -64,7 +67,9 @@ pub struct Counters {
 /// Time of arrival: the bytes before `until` in the buffer were received at `at` or earlier.
 #[derive(Clone, Copy, Debug)]
 struct Arrival {
+    /// Index in the buffer of the first byte that was received later.
     until: usize,
+    /// Time by which the bytes were received.
     at: Instant,
 }
 
@@ -72,7 +77,9 @@ struct Arrival {
 /// in .bss.
 #[derive(Clone, Debug)]
 pub struct Framer {
+    /// Bytes received and not handled yet; in use are the first `len`.
     buf: [u8; MAX_FRAME_LEN],
+    /// Number of bytes in the buffer.
     len: usize,
     /// Times of arrival of the bytes in the buffer, oldest first; the last one covers the whole
     /// buffer.
@@ -80,6 +87,7 @@ pub struct Framer {
     /// Number of the next bytes that belong to a frame of unknown id or to a signature, so that
     /// they are not noise.
     not_noise_len: usize,
+    /// Counts of frames and faults since the framer was made.
     counters: Counters,
 }
 
@@ -259,6 +267,7 @@ impl Framer {
         self.counters.noise_bytes = self.counters.noise_bytes.wrapping_add(noise as u32);
     }
 
+    /// Removes the first `count` bytes from the buffer.
     fn remove_front(&mut self, count: usize) {
         self.buf.copy_within(count..self.len, 0);
         self.len -= count;
@@ -282,6 +291,7 @@ impl Framer {
     }
 }
 
+/// Whether a frame may begin with this byte.
 fn is_start(byte: u8) -> bool {
     byte == V1_START || byte == V2_START
 }

@@ -106,8 +106,11 @@ pub enum Outgoing {
 /// The queue of one link, and the sequence number of the link's frames.
 #[derive(Clone, Debug, Default)]
 pub struct Outbox {
+    /// Messages that wait to be sent, oldest first.
     queue: Deque<Outgoing, QUEUE_DEPTH>,
+    /// Sequence number of the next frame.
     sequence: u8,
+    /// Number of messages dropped since the start.
     dropped: u32,
 }
 
@@ -268,6 +271,7 @@ impl Outbox {
     }
 }
 
+/// The severity as MAVLink has it.
 fn mav_severity(severity: Severity) -> MavSeverity {
     match severity {
         Severity::Info => MavSeverity::MAV_SEVERITY_INFO,

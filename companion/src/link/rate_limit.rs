@@ -43,9 +43,11 @@ pub const fn state_bytes_per_s(swarm_hz: u8) -> u32 {
 pub(crate) struct RadioTokenBucket {
     /// Millionths of a byte; negative after a frame that took more than there were.
     tokens: i64,
+    /// When `tokens` was last increased.
     filled_at: Instant,
 }
 
+/// Tokens for one byte.
 const MICROBYTES_PER_BYTE: i64 = 1_000_000;
 
 impl Default for RadioTokenBucket {

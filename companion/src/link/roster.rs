@@ -30,6 +30,7 @@ pub const MAX_ENTRIES_PER_MESSAGE: usize = 22;
 const TUNNEL_HEADER_LEN: usize = 5;
 /// Bytes of the payload before its vehicles.
 const HEADER_LEN: usize = 18;
+/// Length of a vehicle's entry in the report, bytes.
 const ENTRY_LEN: usize = 5;
 /// Bits of byte 2 with the number of committed divisions.
 const DIVISIONS_MASK: u8 = 15;

@@ -37,6 +37,7 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     pilot_took_over_at: Instant,
     /// The states that a pause and a loss interrupted.
     interrupted: InterruptedStates,
+    /// Commands of the operator that the table has not carried out yet.
     pending: PendingCommands,
     /// The autopilot's `custom_mode` when the mission was started.
     mode_at_start: u32,
@@ -61,10 +62,12 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     imprecise_at_crawl_since: Option<Instant>,
     waits: Waits,
     task_commands: TaskCommands,
+    /// Waypoints of the area that are photographed.
     area_photographed: PhotographedWaypoints,
     /// Number of the fleet's committed divisions that the plan takes into account.
     division_count: usize,
-    /// Whether the plan after the last division has come and is not flown yet.
+    /// Whether the plan after the last division has come while the vehicle held for it
+    /// (`Dividing`), and is not flown yet.
     division_plan_ready: bool,
     /// Hash of the inputs of the division that the shell was asked for and has not answered.
     requested_division_hash: Option<u32>,
@@ -291,7 +294,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         (DetourGoal::Point { end: over, layer_z_m: layer_m }, descent_m)
     }
 
-    /// Whether the plan after the last division has come and is not flown yet.
+    /// Whether the plan after the last division has come while the vehicle held for it
+    /// (`Dividing`), and is not flown yet.
     pub(crate) fn is_division_plan_ready(&self) -> bool {
         self.division_plan_ready
     }

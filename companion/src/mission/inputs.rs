@@ -52,10 +52,11 @@ pub struct GuardInputs {
     pub left_out_set_changed: bool,
     /// Whether a neighbour that follows another plan of this mission was heard lately.
     pub plans_differ: bool,
-    /// Whether this vehicle stands at its commitment: where it is to wait for the division under
-    /// way.
+    /// Whether, in `Follow` or `Blocked`, the setpoint stands at this vehicle's commitment: the
+    /// place along its path where it holds until it has its plan of the division under way.
     pub holds_to_divide: bool,
-    /// Whether this vehicle's plan after the last division has come and is not flown yet.
+    /// Whether the plan after the last division has come while the vehicle held for it
+    /// (`Dividing`), and is not flown yet.
     pub division_plan_ready: bool,
     /// Whether no division is under way or outstanding, nor this vehicle's own plan after a detour.
     pub division_settled: bool,

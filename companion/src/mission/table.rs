@@ -8,6 +8,7 @@ use crate::state::State;
 use crate::state::interruption::TargetState;
 use crate::time::Duration;
 
+/// A whole number of seconds.
 pub(crate) const fn secs(secs: u64) -> Duration {
     Duration::from_secs(secs)
 }

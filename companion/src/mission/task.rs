@@ -19,6 +19,7 @@ use crate::timers::Timers;
 /// State of the commands of the vehicle's task.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct TaskCommands {
+    /// Commands to the camera.
     camera: CameraControl,
 }
 

@@ -34,13 +34,21 @@ pub(crate) const OPEN_FIELD_CLEARANCE_M: f32 = 10.0;
 
 /// Memory of the planner for areas of at most `X` vertices, `L` lanes and `K` vehicles.
 pub struct Workspace<const X: usize, const L: usize, const K: usize> {
+    /// Vertices of the area's rings, in the mission frame.
     vertices: Vec<Flat, X>,
+    /// Which of `vertices` each ring has.
     rings: Vec<Ring, MAX_RINGS>,
+    /// Memory of the lanes' computation.
     lane_workspace: tracks::LaneWorkspace<X>,
+    /// The area's lanes.
     tracks: Tracks<L>,
+    /// Memory of the division of the lanes among the vehicles.
     pack: PackWorkspace<K>,
+    /// The vehicles' routes.
     routes: RoutePlan<K>,
+    /// Memory of later divisions.
     losses: losses::LossesWorkspace<L, K>,
+    /// Of what the lanes and routes in this memory are.
     planned: PlanFingerprint,
 }
 
@@ -57,6 +65,7 @@ struct PlanFingerprint {
 }
 
 impl PlanFingerprint {
+    /// No plan yet.
     const NOTHING: Self = Self { plan_count: 0, inputs_crc: 0, plan_crc: 0 };
 }
 

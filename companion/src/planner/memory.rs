@@ -102,6 +102,7 @@ impl<const V: usize, const Z: usize> PlanInputs<V, Z> {
         }
     }
 
+    /// Forgets the inputs of an earlier request.
     pub(crate) fn clear(&mut self) {
         self.zones.clear();
         self.too_many_zones = false;
@@ -109,17 +110,20 @@ impl<const V: usize, const Z: usize> PlanInputs<V, Z> {
         self.divisions.clear();
     }
 
+    /// Adds waypoints that were photographed before.
     pub(crate) fn add_photographed(&mut self, ranges: &[WaypointRange]) {
         // Cannot overflow: it has the capacity of the companion's list.
         let _ = self.photographed.extend_from_slice(ranges);
     }
 
+    /// Adds the inputs of a division, after those of the earlier ones.
     pub(crate) fn add_division(&mut self, inputs: &[VehicleDivisionInput]) {
         // Cannot overflow: it has room for the divisions that the companion keeps and for the one
         // in progress.
         let _ = self.divisions.push(inputs.iter().copied().collect());
     }
 
+    /// Adds a keep-out zone of a detour.
     pub(crate) fn add_zone(&mut self, zone: KeepOutZone) {
         self.too_many_zones |= self.zones.push(zone).is_err();
     }

@@ -18,7 +18,9 @@ const SAME_OBSTACLE_M: f32 = 0.1;
 /// Reported obstacles; the first `avoided_count` of them are avoided by the detour that is flown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Obstacles {
+    /// The obstacles, in the order of their reports.
     known: Vec<KeepOutZone, MAX_OBSTACLES>,
+    /// Number of obstacles that the detour avoids.
     avoided_count: usize,
     /// Number of obstacles known when a detour was last requested: the detour does not avoid later
     /// ones.

@@ -14,17 +14,20 @@ use crate::time::Instant;
 
 /// The inputs of decisions about detours: references to parts of the companion.
 pub(crate) struct DetourView<'a, const V: usize, const W: usize, const G: usize> {
+    /// Time of the step.
     pub(crate) now: Instant,
     pub(crate) config: &'a Config<V>,
     pub(crate) mission: &'a Mission<W, G>,
     pub(crate) guidance: &'a Guidance,
     pub(crate) telemetry: &'a Telemetry,
     pub(crate) neighbours: &'a Neighbours<V>,
+    /// Inputs of guidance in this step.
     pub(crate) guidance_inputs: GuidanceInputs<'a, W, G>,
 }
 
 impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
-    /// Estimated height above the ground as far as the plan says, metres; NaN while unknown.
+    /// Estimated height above the ground that the plan gives ([`Guidance::planned_ground_m`]),
+    /// metres; NaN while unknown.
     // Not inlined: in each caller it would take a board's flash.
     #[inline(never)]
     pub(crate) fn height_above_ground_m(&self) -> f32 {
@@ -52,7 +55,9 @@ impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
 
 /// Position and velocity that this vehicle reports to the others, ENU metres and m/s.
 pub(crate) struct ReportedPlace {
+    /// Position in the mission frame, ENU metres.
     pub(crate) position: Point,
+    /// Velocity in the mission frame, ENU m/s.
     pub(crate) velocity: Point,
     /// When the position was measured; after a jump, when the state `PositionLost` was entered.
     pub(crate) measured_at: Instant,

@@ -49,7 +49,7 @@ const MAX_QUEUED_REQUESTS: usize = 6;
 /// Time without a request after which another client may take over the session.
 const SESSION_IDLE_AFTER: Duration = Duration::from_secs(10);
 
-/// A reply that waits to be sent.
+/// A reply that waits to be sent to the client `to`: system id and component id.
 #[derive(Clone, Copy, Debug)]
 struct Reply {
     /// Index of the link on which the request came.
@@ -65,7 +65,7 @@ enum Access {
     Write,
 }
 
-/// The open session: one file, used by one client.
+/// The open session: one file, used by one client (system id and component id).
 #[derive(Clone, Copy, Debug)]
 struct Session {
     id: u8,

@@ -45,11 +45,13 @@ const VERSION_WITHOUT_GROUND_STATIONS: u16 = 1;
 pub const MAX_BYTES: usize = 4096;
 /// Bytes of the file before its first vehicle.
 pub const HEADER_LEN: usize = 104;
+/// Length of the CRC-32 at the end, bytes.
 const CRC_LEN: usize = 4;
 /// Flag of a mission file that has a geofence.
 const FLAG_FENCED: u8 = 1;
 /// Kinds of mission: the value of the byte after the flags.
 const KIND_GOALS: u8 = 0;
+/// Kind of a mission with an area.
 const KIND_COVERAGE: u8 = 1;
 
 /// What the vehicles of a mission do, as read from its file.
@@ -131,7 +133,8 @@ pub fn write_mission(
     Ok(needed)
 }
 
-/// Writes the bytes before the first vehicle; `out` is the whole file.
+/// Writes the header: all bytes before the first vehicle. `out` is the whole file, since the header
+/// states its length.
 fn write_header(
     header: &MissionHeader,
     block: &MissionBlock<'_>,
@@ -189,10 +192,13 @@ fn write_header(
 /// A mission file whose bytes have been checked; it borrows them.
 #[derive(Clone, Copy, Debug)]
 pub struct MissionView<'a> {
+    /// The decoded header.
     header: MissionHeader,
     /// The CRC-32 at the end of the file.
     crc: u32,
+    /// The vehicles, as in the file.
     vehicles: &'a [[u8; VEHICLE_LEN]],
+    /// The goals, as in the file; empty in a coverage mission.
     goals: &'a [[u8; GOAL_LEN]],
     kind: MissionKind<'a>,
 }

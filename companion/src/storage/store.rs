@@ -47,20 +47,25 @@ pub(crate) type PhotographedRecord = heapless::Vec<u8, MAX_PROGRAM_LEN>;
 /// State of the flash store.
 #[derive(Clone, Debug)]
 pub struct Store {
+    /// Where slots and journal lie in the flash.
     layout: FlashLayout,
     /// Condition of each slot.
     slots: [AreaCondition; 2],
     /// Slot whose roadmap or field has been used since this start; `None` if there was none.
     slot_in_use: Option<usize>,
+    /// The journal's halves and records.
     journal: Journal,
+    /// The parameters in use.
     parameters: Parameters,
     /// Slots sealed with this sequence number or a lower one hold a removed file.
     removed_up_to_sequence: u32,
     /// Whether the parameters' record is still to be written.
     parameters_unsaved: bool,
+    /// Record of the photographed waypoints, as stored or to be stored.
     photographed: PhotographedRecord,
     /// Whether the photographed waypoints' record is still to be written.
     photographed_unsaved: bool,
+    /// Bytes of the upload that are not programmed yet.
     reassembly: UploadReassembly,
     /// The last upload, under way or ended.
     upload: Option<(File, UploadState)>,
@@ -251,6 +256,7 @@ impl Store {
         }
     }
 
+    /// Condition of a slot or of a half of the journal.
     fn condition_mut(&mut self, area: FlashArea) -> &mut AreaCondition {
         match area {
             FlashArea::Slot(i) => &mut self.slots[i],

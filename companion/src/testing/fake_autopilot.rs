@@ -113,7 +113,8 @@ pub struct Bench {
     pub acks: Vec<(u16, u8, u8, u8)>,
     /// ArduCopter: height above home that NAV_TAKEOFF requested, metres.
     pub takeoff_m: f32,
-    /// Where the vehicle flies to in the setpoint mode, true ENU metres.
+    /// Where the vehicle flies to in the setpoint mode, by the last setpoint or NAV_TAKEOFF, true
+    /// ENU metres; `None`: it stays, as after a setpoint of another type than the usual.
     target: Option<Point>,
     framers: [Framer; 2],
     sequence: u8,

@@ -4,6 +4,7 @@ use geojson::{GeoJson, Geometry, GeometryValue};
 
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
+/// The polygons of a GeoJSON text.
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     let file: GeoJson =
         text.parse().map_err(|error| AreaFileError::malformed("GeoJSON", &error))?;

@@ -9,6 +9,7 @@ use super::polygons::{AreaFileError, Polygons, RingXy};
 /// with more is refused before it is parsed.
 const MAX_FOLDERS: usize = 64;
 
+/// The polygons of a KML text.
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     // The parser recurses for each folder and geometry within another one.
     let nested = ["<Folder", "<Document", "<MultiGeometry"];

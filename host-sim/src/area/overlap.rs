@@ -66,6 +66,7 @@ fn first_overlapping_pair(rings: &[RingF64]) -> Option<(usize, usize)> {
 
 /// A ring in f64, and the least (`low`) and greatest (`high`) corner of its bounding box.
 struct RingF64 {
+    /// Vertices, metres.
     ring: Vec<[f64; 2]>,
     low: [f64; 2],
     high: [f64; 2],
@@ -79,6 +80,7 @@ struct RingRelation {
     has_part_outside: bool,
 }
 
+/// The rings in f64, with their bounding boxes.
 fn rings_to_f64(rings: &[&[Flat]]) -> Vec<RingF64> {
     let wide = |ring: &&[Flat]| {
         let ring: Vec<[f64; 2]> = ring.iter().map(|v| [f64::from(v.x), f64::from(v.y)]).collect();
@@ -95,14 +97,17 @@ fn rings_to_f64(rings: &[&[Flat]]) -> Vec<RingF64> {
 }
 
 impl RingF64 {
+    /// Both ends of each edge.
     fn edges(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '_ {
         self.ring.iter().copied().zip(self.ring.iter().copied().cycle().skip(1))
     }
 
+    /// Whether the bounding boxes meet, at a border too.
     fn boxes_intersect(&self, other: &Self) -> bool {
         (0..2).all(|axis| self.low[axis] <= other.high[axis] && other.low[axis] <= self.high[axis])
     }
 
+    /// The enclosed area, m².
     fn area_m2(&self) -> f64 {
         let base = self.ring[0];
         let at = |v: [f64; 2]| [v[0] - base[0], v[1] - base[1]];
@@ -110,6 +115,7 @@ impl RingF64 {
         (twice / 2.0).abs()
     }
 
+    /// Length of the ring, metres.
     fn perimeter_m(&self) -> f64 {
         self.edges().map(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1])).sum()
     }
@@ -172,6 +178,7 @@ impl RingF64 {
         })
     }
 
+    /// Whether a place is inside, by the number of edges that a ray from it crosses.
     fn contains(&self, place: [f64; 2]) -> bool {
         let crossed = |(a, b): &([f64; 2], [f64; 2])| {
             (a[1] <= place[1]) != (b[1] <= place[1])
@@ -181,6 +188,7 @@ impl RingF64 {
     }
 }
 
+/// Cross product of two vectors, positive if `b` points to the left of `a`.
 fn cross_product(a: [f64; 2], b: [f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }

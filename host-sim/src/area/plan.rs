@@ -13,6 +13,7 @@ const CIRCLE_CORNERS: usize = 32;
 /// Metres per degree of latitude, on the sphere on which QGroundControl draws circles.
 const M_PER_DEG: f64 = 111_319.49;
 
+/// A plan file; only what is read of it, as in the structs below.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct PlanFile {
@@ -23,20 +24,24 @@ struct PlanFile {
     geo_fence: PlanGeofence,
 }
 
+/// The plan's mission.
 #[derive(Deserialize)]
 struct PlanMission {
     #[serde(default)]
     items: Vec<PlanItem>,
 }
 
+/// An item of the mission, such as a survey.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct PlanItem {
+    /// Kind of a complex item, such as "survey"; `None` for a simple one.
     complex_item_type: Option<String>,
     /// Latitude and longitude of each vertex, degrees.
     polygon: Option<Vec<[f64; 2]>>,
 }
 
+/// The plan's geofence.
 #[derive(Deserialize, Default)]
 struct PlanGeofence {
     #[serde(default)]
@@ -45,6 +50,7 @@ struct PlanGeofence {
     circles: Vec<FenceCircle>,
 }
 
+/// A polygon of the geofence.
 #[derive(Deserialize)]
 struct FencePolygon {
     /// Whether vehicles have to stay inside; else they have to stay outside.
@@ -53,6 +59,7 @@ struct FencePolygon {
     polygon: Vec<[f64; 2]>,
 }
 
+/// A circle of the geofence.
 #[derive(Deserialize)]
 struct FenceCircle {
     inclusion: bool,
@@ -67,6 +74,7 @@ struct Circle {
     radius: f64,
 }
 
+/// The polygons of a plan of QGroundControl.
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     const FORMAT: &str = "a plan of QGroundControl";
     let file: PlanFile =

@@ -47,6 +47,7 @@ pub enum AreaFileError {
 }
 
 impl AreaFileError {
+    /// The error for a text that is not of this format, with the first line of `why`.
     pub(super) fn malformed(format: &'static str, why: &impl ToString) -> Self {
         Self::Malformed {
             format,

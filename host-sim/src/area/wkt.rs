@@ -10,6 +10,7 @@ use super::polygons::{AreaFileError, Polygons, RingXy};
 /// Most collections in a file: the parser recurses for each collection within another one.
 const MAX_COLLECTIONS: usize = 64;
 
+/// The polygons of a WKT text.
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     if text.to_ascii_uppercase().matches("COLLECTION").count() > MAX_COLLECTIONS {
         return Err(AreaFileError::malformed(

@@ -78,7 +78,9 @@ pub struct FlyArgs {
 /// How a running flight is shown: at what pace, and to which ground station.
 #[derive(Default)]
 struct FlightDisplay<'a> {
+    /// How fast simulated time passes.
     pace: Pace,
+    /// Link to a ground station, such as QGroundControl; `None` without one.
     qgc: Option<&'a LinkUrl>,
 }
 

@@ -193,6 +193,7 @@ fn does_leg_enter_zone(planned: &CoveragePlan<'_>, from: &Flat, to: &Flat) -> bo
     })
 }
 
+/// Whether a place is inside a ring, by the number of edges that a ray from it crosses.
 fn ring_contains(ring: &[[f64; 2]], place: [f64; 2]) -> bool {
     let mut inside = false;
     for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
@@ -211,10 +212,13 @@ struct CoverageCells {
     low_corner: [f64; 2],
     /// Side of a cell, metres.
     side_m: f64,
+    /// Numbers of columns (along the lanes) and of rows.
     column_row_counts: [usize; 2],
 }
 
 impl CoverageCells {
+    /// The grid with cells of a tenth of the lane spacing, or larger, so that there are at most
+    /// about [`MAX_CHECKED_CELLS`].
     fn new(planned: &CoveragePlan<'_>) -> Self {
         let along = planned.tracks.lane_direction();
         let along = [f64::from(along.x), f64::from(along.y)];
@@ -246,8 +250,8 @@ impl CoverageCells {
         Self::new(planned).halved_until_one_counts(planned, MAX_CHECKED_CELLS)
     }
 
-    /// The grid with its cells halved until one counts, or halving would give more than `most`
-    /// cells.
+    /// The grid with its cells halved until the centre of one lies in the area and outside no-fly
+    /// zones, or halving would give more than `most` cells.
     fn halved_until_one_counts(mut self, planned: &CoveragePlan<'_>, most: f64) -> Self {
         let fits = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= most;
         while !self.points_inside_area(planned, self.column_row_counts, 0.5).contains(&true)

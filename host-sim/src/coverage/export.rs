@@ -19,12 +19,19 @@ use super::{CoveragePlan, SortieFlight};
 use crate::scenario::AutopilotKind;
 use crate::scenario::coverage::{HeadingRule, Trigger};
 
+/// `MAV_CMD` number of NAV_WAYPOINT.
 const NAV_WAYPOINT: u16 = 16;
+/// `MAV_CMD` number of NAV_RETURN_TO_LAUNCH.
 const NAV_RETURN_TO_LAUNCH: u16 = 20;
+/// `MAV_CMD` number of NAV_TAKEOFF.
 const NAV_TAKEOFF: u16 = 22;
+/// `MAV_CMD` number of NAV_DELAY.
 const NAV_DELAY: u16 = 93;
+/// `MAV_CMD` number of DO_CHANGE_SPEED.
 const DO_CHANGE_SPEED: u16 = 178;
+/// `MAV_CMD` number of DO_DIGICAM_CONTROL.
 const DO_DIGICAM_CONTROL: u16 = 203;
+/// `MAV_CMD` number of DO_SET_CAM_TRIGG_DIST.
 const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 /// MAV_FRAME_GLOBAL_RELATIVE_ALT: frame of a mission item that has a position.
 const FRAME_RELATIVE: u8 = 3;

@@ -151,6 +151,7 @@ fn occupied_cells(map: &VoxelMap) -> impl Iterator<Item = [u32; 3]> + '_ {
     })
 }
 
+/// The polygon in f32.
 fn to_flat(polygon: &Polygon) -> Vec<Flat> {
     polygon.iter().map(|[x, y]| Flat::new(*x as f32, *y as f32)).collect()
 }
@@ -190,7 +191,9 @@ struct Columns {
     size: [usize; 2],
     /// South-western corner of the first column, metres.
     low: [f64; 2],
+    /// Side of a column, metres.
     cell_m: f64,
+    /// Horizontal distance that paths keep from obstacles, metres.
     clearance_m: f64,
     /// Columns with an obstacle that reaches up to where vehicles fly.
     blocked: Vec<bool>,
@@ -225,6 +228,7 @@ impl Columns {
         j * self.size[0] + i
     }
 
+    /// All columns, row by row from the south.
     fn all(&self) -> impl Iterator<Item = Column> + use<> {
         let [wide, tall] = self.size;
         (0..tall).flat_map(move |j| (0..wide).map(move |i| [i, j]))

@@ -68,6 +68,7 @@ pub fn cover_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) -> 
     }
 }
 
+/// Results of all vehicles, in the scenario's order.
 fn vehicle_results(planned: &CoveragePlan<'_>) -> Vec<VehicleResult> {
     let vehicles = planned.scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
         let route =
@@ -131,6 +132,7 @@ pub fn coverage_result(planned: &CoveragePlan<'_>, findings: &CoverageFindings) 
     }
 }
 
+/// Results of all routes, in the plan's order.
 fn route_results(planned: &CoveragePlan<'_>) -> Vec<RouteResult> {
     let heights = planned.area_settings.heights;
     let sortie = |sortie: &Sortie| SortieResult {

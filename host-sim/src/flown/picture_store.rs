@@ -19,7 +19,9 @@ type PictureRow = [f32; 5];
 
 /// The file of pictures, and the pictures that earlier flights left in it.
 pub struct PictureStore {
+    /// Path of the file.
     path: PathBuf,
+    /// The pictures of earlier flights.
     earlier_pictures: Vec<Picture>,
 }
 

@@ -17,6 +17,7 @@ type OpenLink = Box<dyn Fn() -> Option<Box<dyn ByteLink>> + Send>;
 pub struct ReconnectingLink {
     /// URL of the link, for messages.
     name: String,
+    /// Opens the link anew.
     open: OpenLink,
     /// The open link; `None` while it is lost.
     link: Option<Box<dyn ByteLink>>,
@@ -42,6 +43,7 @@ impl ReconnectingLink {
         self.link.as_mut()
     }
 
+    /// Reports that the link is lost, closes it, and makes the next attempt due in a second.
     fn handle_loss(&mut self, why: &io::Error) {
         eprintln!("link lost: {}: {why}; trying again every second", self.name);
         self.link = None;

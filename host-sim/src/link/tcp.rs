@@ -26,6 +26,7 @@ impl Connection {
         Ok(Self { stream, queue: Vec::new() })
     }
 
+    /// Reads the bytes that have arrived into `buffer`; returns their number.
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.stream.read(buffer) {
             Ok(0) => Err(io::Error::new(
@@ -37,6 +38,7 @@ impl Connection {
         }
     }
 
+    /// Sends bytes, and keeps what the peer does not accept yet.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.queue.extend_from_slice(bytes);
         let mut sent = 0;
@@ -83,6 +85,7 @@ impl ByteLink for Client {
 /// A TCP server that serves one client at a time.
 pub struct Server {
     listener: TcpListener,
+    /// The connected client; `None` without one.
     client: Option<Connection>,
 }
 

@@ -129,6 +129,7 @@ fn boxes_of_map(grid: &VoxelGrid<'_>) -> Vec<CellBox> {
 /// A bounding volume hierarchy over the obstacles of a map.
 #[derive(Debug)]
 pub struct BoxTree {
+    /// Place and size of the map.
     shape: GridShape,
     /// Whether the space beyond the map's faces is an obstacle.
     beyond_map: Outside,

@@ -58,6 +58,7 @@ struct BtHeader {
     nodes: u64,
     /// Offset of that number in the file, bytes.
     nodes_offset: usize,
+    /// Edge of the smallest cells, metres.
     resolution_m: f64,
 }
 
@@ -66,6 +67,7 @@ struct Reader<'a> {
     bytes: &'a [u8],
     /// Offset of the next byte to read.
     at: usize,
+    /// Path of the file, for errors.
     path: &'a Path,
     /// Inner nodes read so far; the inner children of one node follow each other.
     inner: Vec<InnerNode>,
@@ -74,6 +76,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
+    /// The error that at `offset` other bytes are found than expected.
     fn error_at(
         &self,
         offset: usize,

@@ -41,8 +41,11 @@ const LOBBY_X_M: [f32; 2] = [7.5, 31.0];
 
 /// An axis-aligned box of one occupancy, metres.
 struct Block {
+    /// Least corner.
     min: [f32; 3],
+    /// Greatest corner.
     max: [f32; 3],
+    /// Whether the box is solid or free.
     state: Occupancy,
 }
 
@@ -87,15 +90,18 @@ fn building_blocks(seed: u64) -> Vec<Block> {
 
 /// The boxes made so far, and the source of the random numbers for further ones.
 struct BlockList {
+    /// The boxes; where they overlap, the later one counts.
     blocks: Vec<Block>,
     rng: Pcg32,
 }
 
 impl BlockList {
+    /// Adds a solid box, metres.
     fn add_solid(&mut self, min: [f32; 3], max: [f32; 3]) {
         self.blocks.push(Block { min, max, state: Occupancy::Occupied });
     }
 
+    /// Adds a free box, metres.
     fn add_opening(&mut self, min: [f32; 3], max: [f32; 3]) {
         self.blocks.push(Block { min, max, state: Occupancy::Free });
     }

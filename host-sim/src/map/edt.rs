@@ -16,7 +16,9 @@ use rayon::prelude::*;
 /// obstacle.
 #[derive(Clone, Debug)]
 pub struct ClearanceField {
+    /// Place and size of the map.
     shape: GridShape,
+    /// Whether space beyond the map counts as an obstacle.
     beyond_map: Outside,
     /// Squared distances, cells²; in memory z varies fastest, then x, then y.
     squared_distances: Vec<u16>,

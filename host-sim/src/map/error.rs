@@ -51,6 +51,7 @@ pub enum MapError {
 }
 
 impl MapError {
+    /// The error that reading or writing (`action`) a file failed.
     pub(super) fn from_io(action: &'static str, file: &Path, source: std::io::Error) -> Self {
         Self::Io { action, file: file.into(), source }
     }

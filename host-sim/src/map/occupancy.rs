@@ -34,6 +34,7 @@ pub enum UnknownSpace {
 /// A map with three states per cell, two bits each, in the bricks of [`GridShape::word_and_mask`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct OccupancyMap {
+    /// Place and size of the map.
     shape: GridShape,
     /// Bits of the occupied cells.
     occupied: Vec<u64>,

@@ -37,7 +37,9 @@ pub(super) const INNER: u16 = 3;
 /// follow it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct InnerNode {
+    /// Codes of the children: those of octant i in bits 2 i and 2 i + 1.
     pub(super) child_codes: u16,
+    /// Index in the node list of the first child that is an inner node.
     pub(super) first_inner_child: u32,
 }
 
@@ -85,12 +87,14 @@ pub struct OctreeCounts {
 /// An occupancy octree whose inner nodes are stored in one list.
 #[derive(Clone, Debug)]
 pub struct Octree {
+    /// Edge of the smallest cells, metres.
     resolution_m: f64,
     /// Inner nodes; the root is the last. An empty octree has none.
     pub(super) inner: Vec<InnerNode>,
 }
 
 impl Octree {
+    /// The octree with these inner nodes, the root last.
     pub(super) fn from_parts(resolution_m: f64, inner: Vec<InnerNode>) -> Self {
         Self { resolution_m, inner }
     }
@@ -125,6 +129,7 @@ impl Octree {
         self.resolution_m
     }
 
+    /// The root; `None` for an empty octree.
     pub(super) fn root(&self) -> Option<InnerNode> {
         self.inner.last().copied()
     }
@@ -232,12 +237,15 @@ fn octant_corner(min: [u32; 3], size: u32, index: u32) -> [u32; 3] {
 
 /// An octant: a leaf or unknown space by its code, or an inner node.
 enum Child {
+    /// A leaf, or unknown space: its code.
     Leaf(u16),
+    /// An inner node.
     Inner(InnerNode),
 }
 
 /// Builds an octree from the states of the cells in a box.
 struct Builder<'a, F> {
+    /// Inner nodes made so far.
     inner: Vec<InnerNode>,
     /// Lowest keys of the box.
     min: [u32; 3],

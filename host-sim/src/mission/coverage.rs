@@ -366,6 +366,7 @@ impl PreparedMission {
         }
     }
 
+    /// The error for the user.
     fn explain_error(&self, error: &Error) -> anyhow::Error {
         let path = &self.scenario.path;
         match error {

@@ -26,7 +26,9 @@ pub(super) type HostAreaWorkspace =
 /// The workspaces that were needed so far.
 #[derive(Default)]
 struct HostWorkspaces {
+    /// Memory of missions with goals; `None` until it is needed.
     goals: Option<Box<GoalsWorkspace>>,
+    /// Memory of missions with an area; `None` until it is needed.
     area: Option<Box<HostAreaWorkspace>>,
 }
 
@@ -41,10 +43,12 @@ impl
         MAX_NO_FLY_CORNERS,
     > for HostWorkspaces
 {
+    /// The memory of missions with goals, made at the first call.
     fn for_goals(&mut self) -> &mut GoalsWorkspace {
         self.goals.get_or_insert_with(|| on_heap(GoalsWorkspace::new))
     }
 
+    /// The memory of missions with an area, made at the first call.
     fn for_area(&mut self) -> &mut HostAreaWorkspace {
         self.area.get_or_insert_with(|| on_heap(HostAreaWorkspace::new))
     }
@@ -56,6 +60,7 @@ pub struct HostPlanner<'a> {
     mission: &'a PreparedMission,
     /// Plan of the whole mission, which is the same for all companions.
     initial_plan: &'a HostPlan,
+    /// The files from which a board would plan.
     files: PlanFiles<'a>,
     workspaces: HostWorkspaces,
     /// Memory for the swarm's plan while a request is answered.

@@ -54,11 +54,13 @@ pub struct PreparedMission {
     /// Length of the landing at each goal, metres: from the goal down to the hull centre of a
     /// vehicle that stands on the ground below it, computed for the largest radius of all vehicles.
     pub descents_m: Vec<f32>,
+    /// Separations and nominal speeds by which flights are scheduled.
     pub(super) schedule: ScheduleConfig,
     /// Computing times of the steps done so far.
     pub timing: Timing,
     /// The board that the files have to fit; `None` if they are for the host.
     pub(super) board: Option<&'static BoardCapacity>,
+    /// Made by the method of this name at its first call.
     pub(super) clearance_field: OnceLock<ClearanceField>,
 }
 
@@ -214,10 +216,12 @@ impl PreparedMission {
     }
 }
 
+/// The roadmap in a file that we made.
 fn parse_roadmap(roadmap_file: &[u8]) -> RoadmapView<'_> {
     RoadmapView::parse(roadmap_file).expect("we wrote it ourselves")
 }
 
+/// How the planner is to give goals to vehicles.
 fn planner_mode(mission: &scenario::MissionSection) -> GoalMode {
     match (mission.mode, mission.objective) {
         (scenario::MissionMode::Labelled, _) => GoalMode::Labelled,

@@ -7,7 +7,7 @@ pub(super) struct FlightTimesTable {
     pub(super) name: &'static str,
     /// Whether the track is the long one, with lanes of 320 m; the short one has lanes of 150 m.
     pub(super) is_long_track: bool,
-    /// Name of the method, as in a scenario.
+    /// Name of the method by which the whole table was flown, as in a scenario.
     pub(super) method: &'static str,
     /// Flight times, seconds: for each of the table's six columns one value a vehicle.
     pub(super) times_s: [&'static [f64]; 6],

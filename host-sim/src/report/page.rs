@@ -4,11 +4,14 @@ use serde::Serialize;
 
 use super::data::{ReportData, vehicle_color};
 
+/// The page, with places for style, scripts and data.
 const TEMPLATE: &str = include_str!("../../assets/report/page.html");
+/// The page's style sheets.
 const STYLE: &str = concat!(
     include_str!("../../assets/vendor/uPlot.min.css"),
     include_str!("../../assets/report/style.css")
 );
+/// The libraries that the page's scripts use.
 const LIBRARIES: &str = concat!(
     include_str!("../../assets/vendor/three.iife.min.js"),
     "\n",
@@ -32,6 +35,7 @@ const SCRIPT: &str = concat!(
 /// The data as the scripts read it, as JSON.
 #[derive(Serialize)]
 struct PageData<'a> {
+    /// The flight or plan that is shown.
     #[serde(flatten)]
     data: &'a ReportData,
     /// [`vehicle_color`] of each vehicle, by index; used for a vehicle without a `color`.

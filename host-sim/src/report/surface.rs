@@ -86,6 +86,7 @@ struct DrawnCells {
     dims: [usize; 3],
     /// Distance in `filled` from a cell to the next one along each axis.
     stride: [usize; 3],
+    /// Whether each cell is drawn, the empty layer included.
     filled: Vec<bool>,
 }
 

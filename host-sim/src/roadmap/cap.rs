@@ -71,9 +71,11 @@ pub fn limit_edges(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<E
 /// A half-edge: an edge as seen from one of its two nodes.
 #[derive(Clone, Copy)]
 struct OutgoingEdge {
+    /// Index of the other node.
     to: u16,
     /// How many of [`CLEARANCE_CLASSES_M`] the edge's clearance exceeds.
     clearance_class: u8,
+    /// Length of the edge, metres.
     length_m: f32,
     /// Index of the edge.
     edge: u32,

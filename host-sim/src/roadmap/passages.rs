@@ -119,7 +119,9 @@ fn is_clear_with_slack(tree: &BoxTree, a: &Point, b: &Point, required_m: f32) ->
 struct CellSearch<'a> {
     shape: &'a GridShape,
     map: &'a VoxelMap,
+    /// Obstacles of the map.
     tree: &'a BoxTree,
+    /// Clearance that a cell's centre needs, metres.
     required_m: f32,
 }
 
@@ -137,11 +139,13 @@ impl<'a> CellSearch<'a> {
         (k as usize * ny + j as usize) * nx + i as usize
     }
 
+    /// Coordinates of the cell of this index.
     fn cell(&self, index: usize) -> [u32; 3] {
         let [nx, ny, _] = self.shape.dims.map(|d| d as usize);
         [index % nx, index / nx % ny, index / nx / ny].map(|c| c as u32)
     }
 
+    /// Centre of a cell, metres in the mission frame.
     fn centre(&self, cell: [u32; 3]) -> Point {
         let [i, j, k] = cell.map(|c| c as f32 + 0.5);
         self.shape.min + Point::new(i, j, k) * self.shape.resolution_m

@@ -16,11 +16,13 @@ use crate::quote::printable;
 
 /// Range of bytes in the scenario's text.
 pub(super) type TomlSpan = Range<usize>;
+/// Result of reading a part of a scenario.
 pub(super) type Result<T> = std::result::Result<T, ScenarioError>;
 
 /// The scenario's text, and its name for errors.
 #[derive(Clone, Copy)]
 pub(super) struct TomlText<'a> {
+    /// The file's name.
     pub(super) file: &'a str,
     pub(super) text: &'a str,
 }
@@ -31,6 +33,7 @@ impl TomlText<'_> {
         format!("{}:{}", self.file, SourcePlace::of(self.text, span).line)
     }
 
+    /// The error about the text at `span`.
     pub(super) fn error(&self, span: &TomlSpan, why: impl Into<String>) -> ScenarioError {
         ScenarioError {
             file: self.file.into(),
@@ -40,6 +43,7 @@ impl TomlText<'_> {
         }
     }
 
+    /// As [`Self::error`], with a hint.
     pub(super) fn error_with_hint(
         &self,
         span: &TomlSpan,
@@ -54,7 +58,9 @@ impl TomlText<'_> {
 #[derive(Clone)]
 pub(super) struct TomlValue<'a> {
     pub(super) text: TomlText<'a>,
+    /// Name of the value for errors.
     pub(super) name: String,
+    /// Where the value stands in the text.
     pub(super) span: TomlSpan,
     value: &'a DeValue<'a>,
 }
@@ -91,6 +97,7 @@ impl<'a> TomlValue<'a> {
         }
     }
 
+    /// The value as an integer; `None` if it is none, or too large.
     fn integer(&self) -> Option<i64> {
         let DeValue::Integer(integer) = self.value else { return None };
         i64::from_str_radix(integer.as_str(), integer.radix()).ok()
@@ -111,10 +118,12 @@ impl<'a> TomlValue<'a> {
         }
     }
 
+    /// The value as true or false.
     pub(super) fn boolean(&self) -> Result<bool> {
         self.value.as_bool().ok_or_else(|| self.expected_error("true or false"))
     }
 
+    /// The value as a string.
     pub(super) fn str(&self) -> Result<&'a str> {
         self.value.as_str().ok_or_else(|| self.expected_error("a string"))
     }
@@ -161,10 +170,12 @@ impl<'a> TomlValue<'a> {
         Ok([x.f64(&range)?, y.f64(&range)?, z.f64(&range)?])
     }
 
+    /// Whether the value is a table.
     pub(super) fn is_table(&self) -> bool {
         self.value.is_table()
     }
 
+    /// The value as a table.
     pub(super) fn table(&self) -> Result<Table<'a>> {
         match self.value {
             DeValue::Table(table) => {
@@ -179,7 +190,9 @@ impl<'a> TomlValue<'a> {
 /// never asked for.
 pub(super) struct Table<'a> {
     pub(super) text: TomlText<'a>,
+    /// Where the table stands in the text.
     pub(super) span: TomlSpan,
+    /// Name of the table for errors; empty for the whole file.
     name: String,
     table: &'a DeTable<'a>,
     /// Keys that were read or declared so far, given in the file or not.
@@ -228,6 +241,7 @@ impl<'a> Table<'a> {
         })
     }
 
+    /// The error that refuses a key.
     fn unknown_key_error(
         &self,
         key: &Spanned<DeString<'_>>,
@@ -255,6 +269,7 @@ impl<'a> Table<'a> {
         self.get(key).map_or(Ok(default), |v| v.f64(&range).map(|n| n as f32))
     }
 
+    /// A number of this range; `None` if the key is missing.
     pub(super) fn optional_f32(
         &self,
         key: &'static str,
@@ -263,6 +278,7 @@ impl<'a> Table<'a> {
         self.get(key).map(|v| v.f64(&range).map(|n| n as f32)).transpose()
     }
 
+    /// An integer of this range; `default` if the key is missing.
     pub(super) fn integer_in_range(
         &self,
         key: &'static str,
@@ -277,6 +293,7 @@ impl<'a> Table<'a> {
         self.get(key).map_or(Ok(false), |v| v.boolean())
     }
 
+    /// What a keyword of `words` stands for; `default` if the key is missing.
     pub(super) fn one_of<T: Copy>(
         &self,
         key: &'static str,

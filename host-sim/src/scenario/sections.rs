@@ -70,6 +70,7 @@ pub(super) fn read_root<T>(
 
 /// Settings that scenarios of every kind of mission have.
 struct CommonSettings {
+    /// Seed of all random numbers.
     seed: u64,
     deconfliction: Deconfliction,
     simulation: Simulation,
@@ -128,6 +129,7 @@ fn empty_table<'a>(text: TomlText<'a>, name: &str) -> Table<'a> {
     Table::new(text, name, 0..0, &EMPTY)
 }
 
+/// The error that refuses `what`, which no code uses yet.
 fn unsupported_error(text: TomlText<'_>, span: &TomlSpan, what: &str) -> ScenarioError {
     text.error(span, format!("not available yet: {what}"))
 }
@@ -147,6 +149,7 @@ fn read_unsupported(
     Ok(Some(UnsupportedTable { table }))
 }
 
+/// Reads a position by latitude, longitude and altitude.
 fn read_geodetic(value: &TomlValue<'_>) -> Result<Geodetic> {
     let table = value.table()?;
     let hint = "a position is { lat_deg = …, lon_deg = …, alt_m = … }";
@@ -299,6 +302,7 @@ fn read_place(value: &TomlValue<'_>, origin: Option<&Geodetic>) -> Result<Point>
     Ok(place)
 }
 
+/// Reads a box by its least and greatest corner.
 fn read_geofence(value: &TomlValue<'_>) -> Result<Geofence> {
     let table = value.table()?;
     let hint = "a geofence is { min = [x, y, z], max = [x, y, z] }";
@@ -395,6 +399,7 @@ fn read_vehicle(
     Ok((vehicle, spans))
 }
 
+/// Reads the URL of a link.
 fn read_link(value: &TomlValue<'_>) -> Result<LinkUrl> {
     let parsed = value.str()?.parse();
     parsed.map_err(|_| value.error("must be \"in-process\" or a URL such as \"tcp:HOST:PORT\""))

@@ -27,9 +27,13 @@ use crate::link::{ByteLink, LinkUrl};
 
 /// One companion on a board or in another process.
 pub struct RemoteCompanion {
+    /// Serial ports of the board, or links to the process.
     connection: BoardConnection,
+    /// Framer of the companion's bytes.
     framer: Framer,
+    /// State that the companion last reported.
     state: State,
+    /// Progress that the companion last reported, metres; `None` before its first intent.
     progress_m: Option<f32>,
 }
 

@@ -60,11 +60,13 @@ struct VehicleReport {
 /// The reports heard so far, and the divisions found in them.
 #[derive(Debug, Default)]
 pub struct DivisionLog {
+    /// What each vehicle last reported, by its system id.
     vehicles: HashMap<u8, VehicleReport>,
     /// Inputs of each division, by the hash that the vehicles reported for it.
     inputs_by_hash: HashMap<u32, Vec<VehicleDivisionInput>>,
     /// The agreement on each division, by its number.
     agreements: HashMap<u8, Agreement>,
+    /// The divisions as vehicles flew them, in order of time.
     flown: Vec<FlownDivision>,
 }
 

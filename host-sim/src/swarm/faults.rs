@@ -94,8 +94,11 @@ pub struct FaultTargets<'a> {
 /// Whether a fault has begun, and whether it is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum FaultStage {
+    /// The fault has not begun.
     Pending,
+    /// The fault acts.
     Active,
+    /// The fault is over.
     Ended,
 }
 

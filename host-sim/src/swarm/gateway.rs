@@ -26,6 +26,7 @@ const MAX_DATAGRAM: usize = 1400;
 /// A link to a ground station, and the datagram that is being filled for it.
 pub struct Gateway {
     link: Box<dyn ByteLink>,
+    /// Frames that are not sent yet.
     datagram: Vec<u8>,
 }
 
@@ -88,6 +89,7 @@ impl Gateway {
         Ok(())
     }
 
+    /// Sends the datagram if it is not empty.
     fn flush(&mut self) -> io::Result<()> {
         if !self.datagram.is_empty() {
             self.link.send(&self.datagram)?;

@@ -63,9 +63,11 @@ impl OperatorCommand {
 #[derive(Debug)]
 pub struct GroundStation {
     system_id: u8,
+    /// Sequence number of the next frame.
     sequence: u8,
     /// When a vehicle was first ready.
     first_ready_us: Option<u64>,
+    /// When MISSION_START was first sent, microseconds; `None` before.
     start_commanded_us: Option<u64>,
     /// When frames were last due, the start's first one or a repetition.
     last_sent_us: u64,
@@ -183,6 +185,7 @@ impl GroundStation {
         frames
     }
 
+    /// The frame of a command.
     fn command_frame(&mut self, command: &impl MessageData) -> Vec<u8> {
         let mut buffer = [0; frame::MAX_FRAME_LEN];
         let length = encode(command, self.system_id, self.sequence, &mut buffer);
@@ -207,10 +210,12 @@ pub fn encode_mission_start(
     encode(&command_long(START, target_system, 0.0), from, 0, out)
 }
 
+/// A COMMAND_LONG whose other parameters are 0.
 fn command_long(command: MavCmd, target_system: u8, param1: f32) -> COMMAND_LONG_DATA {
     COMMAND_LONG_DATA { command, target_system, param1, ..COMMAND_LONG_DATA::DEFAULT }
 }
 
+/// Writes the frame of a command to `out`; returns its length, bytes.
 fn encode(
     command: &impl MessageData,
     system: u8,

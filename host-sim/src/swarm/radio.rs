@@ -31,8 +31,11 @@ pub struct RadioOutage {
 /// A radio shared by several stations; time in microseconds since the start of the simulation.
 #[derive(Debug)]
 pub struct Radio {
+    /// Loss, delay and range.
     config: RadioConfig,
+    /// Source of losses and delays.
     rng: Pcg32,
+    /// Which directions of each station's radio have failed.
     outages: Vec<RadioOutage>,
     /// Packets on their way to each station, with the time of reception, microseconds.
     queues: Vec<VecDeque<(u64, Rc<[u8]>)>>,

@@ -76,9 +76,13 @@ pub struct DistanceSample {
 #[derive(Clone, Debug)]
 struct WatchedVehicle {
     id: u8,
+    /// Radius of the hull, metres.
     radius_m: f32,
+    /// True position at the last step, ENU metres; `None` before the first.
     last_position: Option<Point>,
+    /// Length of the track flown so far, metres.
     flown_m: f64,
+    /// Whether it touched an obstacle at the last step.
     in_contact: bool,
     /// Where the vehicle's distance to the nearest obstacle was last measured, and that distance,
     /// metres.
@@ -91,18 +95,22 @@ struct WatchedVehicle {
     last_progress_s: f64,
     /// Whether its present standstill was counted as a deadlock.
     in_deadlock: bool,
+    /// Recorded track: times in seconds, positions in ENU metres.
     track: Vec<(f32, Point)>,
 }
 
 /// Counts contacts, violations and deadlocks, and records the smallest distances.
 #[derive(Debug)]
 pub struct Referee<'a> {
+    /// The map.
     grid: VoxelGrid<'a>,
+    /// Lower bounds of the distance to the nearest obstacle.
     field: &'a ClearanceField,
     /// Height of uneven ground, which the grid does not hold; `None` over level ground.
     pub terrain: Option<&'a HeightGrid>,
     /// Obstacles of the map beside an area, which the grid does not hold; `None` without one.
     pub area_obstacles: Option<&'a MapObstacles>,
+    /// Distance that two vehicles keep, metres.
     safety_distance_m: f32,
     vehicles: Vec<WatchedVehicle>,
     /// By pair, at `i * n + j` for vehicles `j < i`: whether they are nearer than the safety
@@ -110,6 +118,7 @@ pub struct Referee<'a> {
     too_near: Vec<bool>,
     /// By pair as above: whether they touch, if neither falls or is a wreck.
     touching: Vec<bool>,
+    /// When the last sample was recorded, seconds.
     last_recorded_s: f64,
     /// Smallest distances since the last sample.
     sample_so_far: DistanceSample,
@@ -461,12 +470,14 @@ fn touches_cell_beside(grid: &VoxelGrid<'_>, position: &Point, radius_m: f32) ->
     })
 }
 
+/// What the log says of a deadlock.
 fn no_progress_text() -> String {
     format!("no progress for {DEADLOCK_S} s")
 }
 
 /// Greatest clearance to an obstacle that is measured exactly, metres.
 const MAX_MEASURED_CLEARANCE_M: f32 = 3.0;
+/// A sample before any distance was measured.
 const EMPTY_SAMPLE: DistanceSample =
     DistanceSample { t_s: 0.0, min_separation_m: f32::INFINITY, min_clearance_m: f32::INFINITY };
 

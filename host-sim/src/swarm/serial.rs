@@ -30,6 +30,7 @@ const BAUDS: [u64; 8] = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800
 #[derive(Debug)]
 pub struct SerialLink {
     config: SimulatedSerialConfig,
+    /// Source of the changed bytes.
     rng: Pcg32,
     /// When the last bit of all writes so far leaves the transmitter.
     busy_until_us: u64,
@@ -37,6 +38,7 @@ pub struct SerialLink {
     bytes: VecDeque<u8>,
     /// Time of arrival (microseconds) and length of each write under way.
     writes: VecDeque<(u64, usize)>,
+    /// Until when nothing is delivered.
     stalled_until_us: u64,
     /// Bytes given to [`Self::write`] so far.
     pub offered_bytes: u64,

@@ -70,6 +70,7 @@ pub struct SimulatedVehicle {
     companion_started_us: u64,
     /// Simulation time until which the autopilot boots, microseconds.
     boots_until_us: u64,
+    /// Whether the vehicle has lost all power.
     power_cut: bool,
     wrecked: bool,
 }
@@ -195,7 +196,8 @@ impl SimulatedVehicle {
         Ok(())
     }
 
-    /// No byte passes between companion and autopilot until `until_us`.
+    /// Until `until_us` bytes between companion and autopilot are held back, not delivered; what
+    /// does not fit the transmit buffer meanwhile is lost.
     pub fn stall_serial(&mut self, until_us: u64) {
         self.to_companion.stall(until_us);
         self.to_autopilot.stall(until_us);

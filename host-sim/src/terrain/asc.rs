@@ -13,6 +13,7 @@ use crate::files;
 /// Name of the format in errors.
 const FORMAT: &str = "an ESRI grid";
 
+/// Reads an ASCII grid file.
 pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     let length = files::regular_file_len(path)?;
     if length > MAX_BYTES {
@@ -111,6 +112,7 @@ impl GridHeader {
     }
 }
 
+/// Reads the text of an ASCII grid with these coordinates.
 pub(super) fn parse(text: &str, crs: Crs) -> Result<Raster, TerrainError> {
     let bad = |why: &str| TerrainError::malformed(FORMAT, &why);
     let mut words = text.split_ascii_whitespace().peekable();

@@ -35,6 +35,7 @@ const RETURNS_PER_BATCH: u64 = 4096;
 /// Classes of returns that are measurement errors.
 const NOISE_CLASSES: [Classification; 2] = [Classification::LowPoint, Classification::HighNoise];
 
+/// Reads the ground's heights from a LAS or LAZ file.
 pub(super) fn read(path: &Path, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError> {
     let length = files::regular_file_len(path)?;
     if length > MAX_BYTES {
@@ -43,10 +44,12 @@ pub(super) fn read(path: &Path, frame: &TerrainFrame<'_>) -> Result<HeightGrid, 
     decode(BufReader::new(File::open(path)?), frame)
 }
 
+/// The error for a file that is no sound point cloud.
 fn malformed(why: &impl ToString) -> TerrainError {
     TerrainError::malformed(FORMAT, why)
 }
 
+/// As [`read`], from an open file.
 pub(super) fn decode<R>(mut file: R, frame: &TerrainFrame<'_>) -> Result<HeightGrid, TerrainError>
 where
     R: Read + Seek + Send + Sync + 'static,

@@ -26,7 +26,9 @@ pub(super) enum Crs {
 /// A coordinate system that a file states.
 #[derive(Debug)]
 pub(super) struct CoordinateSystem {
+    /// The system itself.
     proj: Proj,
+    /// WGS84 latitude and longitude, into which places are converted.
     wgs84: Proj,
     /// Metres in a unit of its horizontal coordinates; `None` if these are degrees.
     pub unit_m: Option<f64>,

@@ -27,6 +27,7 @@ pub(super) fn check_declared_sizes<R: Read + Seek>(
 /// Reads little-endian numbers at byte offsets of a file.
 struct NumberReader<'a, R> {
     file: &'a mut R,
+    /// Length of the file, bytes.
     length: u64,
 }
 

@@ -49,6 +49,7 @@ pub(super) const WARP_HINT: &str =
     "convert it: gdalwarp -t_srs EPSG:32630, with your zone, or pdal translate";
 
 impl TerrainError {
+    /// The error for a file that is not of this format, with the first line of `why`.
     pub(super) fn malformed(format: &'static str, why: &impl ToString) -> Self {
         Self::Malformed {
             format,
@@ -56,6 +57,7 @@ impl TerrainError {
         }
     }
 
+    /// The error for a coordinate system that cannot be used, with a hint.
     pub(super) fn unusable_crs(what: &str) -> Self {
         Self::UnusableCrs { what: printable(what), hint: WARP_HINT }
     }

@@ -41,6 +41,7 @@ impl GeoKeys {
         Self(entries.filter(|entry| entry[1] == 0).map(|entry| (entry[0], entry[3])).collect())
     }
 
+    /// Value of a key; `None` if the file does not have it.
     fn get(&self, key: u16) -> Option<u16> {
         self.0.iter().find(|(own, _)| *own == key).map(|(_, value)| *value)
     }

@@ -20,6 +20,7 @@ const FORMAT: &str = "a GeoTIFF";
 /// Longest strip or tile that is decoded, bytes.
 const MAX_CHUNK_BYTES: usize = 1 << 27;
 
+/// Reads a GeoTIFF file.
 pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     let length = files::regular_file_len(path)?;
     if length > MAX_BYTES {
@@ -28,6 +29,7 @@ pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     decode(BufReader::new(File::open(path)?))
 }
 
+/// The error for a file that is no sound GeoTIFF.
 fn bad_file(why: &impl ToString) -> TerrainError {
     TerrainError::malformed(FORMAT, why)
 }
@@ -42,6 +44,7 @@ fn tiff_error(error: TiffError) -> TerrainError {
     }
 }
 
+/// As [`read`], from an open file.
 pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     let mut limits = Limits::default();
     limits.decoding_buffer_size = MAX_CHUNK_BYTES;
@@ -166,6 +169,7 @@ fn georeference<R: Read + Seek>(
     Ok((corner, cell))
 }
 
+/// The decoded numbers as f64.
 fn values_as_f64(values: DecodingResult) -> Result<Box<dyn Iterator<Item = f64>>, TerrainError> {
     Ok(match values {
         DecodingResult::U8(v) => Box::new(v.into_iter().map(f64::from)),

@@ -10,6 +10,7 @@ use super::limits::MAX_CELLS;
 pub struct HeightGrid {
     /// South-western corner of the grid, metres east and north.
     low: Flat,
+    /// Side of a cell, metres.
     cell_m: f32,
     /// Numbers of columns and of rows.
     size: [usize; 2],

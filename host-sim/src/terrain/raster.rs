@@ -16,8 +16,11 @@ use super::grid::HeightGrid;
 /// Heights as a file has them, in its own coordinates.
 #[derive(Debug)]
 pub(super) struct Raster {
+    /// Coordinate system of the file.
     pub crs: Crs,
+    /// Number of columns, from west to east.
     pub columns: usize,
+    /// Number of rows, from north to south.
     pub rows: usize,
     /// Outer corner of the first cell, the north-western one, in the file's coordinates.
     pub north_west_corner: [f64; 2],

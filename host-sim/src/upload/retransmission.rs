@@ -28,9 +28,11 @@ const MAX_UNDER_WAY: usize = 4;
 pub struct Retransmission {
     /// Smoothed round trip time and its deviation, seconds; `None` before the first one.
     round_trip: Option<(f32, f32)>,
+    /// Time without an answer after which a request is sent again.
     timeout: Duration,
     /// When the timeout last doubled: requests sent before that do not double it again.
     doubled_at: Clock,
+    /// Most requests under way at once.
     window: usize,
 }
 

@@ -202,6 +202,8 @@ struct TwoCheapestColumns {
 }
 
 impl TwoCheapestColumns {
+    /// The two columns of least reduced cost in a row, `line`: its costs; `price`: the columns'
+    /// prices.
     fn of_row(line: &[f32], price: &[f64]) -> Self {
         let mut two = Self {
             least: f64::INFINITY,

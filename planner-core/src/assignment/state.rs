@@ -23,12 +23,14 @@ pub(super) struct MatchingState<'w> {
 }
 
 impl MatchingState<'_> {
+    /// Clears prices and matching.
     pub(super) fn reset(&mut self) {
         self.price.fill(0.0);
         self.row_of_col.fill(UNASSIGNED);
         self.col_of_row.fill(UNASSIGNED);
     }
 
+    /// Matches a row and a column; does not release earlier partners.
     pub(super) fn match_pair(&mut self, row: u16, col: u16) {
         self.row_of_col[usize::from(col)] = row;
         self.col_of_row[usize::from(row)] = col;

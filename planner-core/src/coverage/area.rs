@@ -100,6 +100,7 @@ pub enum AreaError {
 /// Checked rings over borrowed vertices.
 #[derive(Clone, Copy, Debug)]
 pub struct Area<'a> {
+    /// Vertices of all rings, ring by ring.
     vertices: &'a [Flat],
     rings: &'a [Ring],
 }
@@ -302,6 +303,7 @@ fn perimeter(ring: &[Flat]) -> f64 {
     edges_of(ring).map(|(a, b)| f64::from((b - a).length())).sum()
 }
 
+/// Cross product of two vectors, positive if `b` points to the left of `a`.
 fn cross_product(a: &Flat, b: &Flat) -> f64 {
     f64::from(a.x) * f64::from(b.y) - f64::from(a.y) * f64::from(b.x)
 }

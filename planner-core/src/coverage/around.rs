@@ -44,9 +44,13 @@ const SIDESTEP_DIRECTIONS: usize = 16;
 
 /// Fence, no-fly zones, terrain and keep-out zones that legs have to respect.
 struct LegConstraints<'a, 't, const N: usize> {
+    /// The area's no-fly zones, and the ways around them.
     transit: &'a TransitGraph<'t, N>,
+    /// Heights of the ground; `None` if it is level.
     field: Option<FieldView<'a>>,
+    /// Keep-out zones.
     obstacles: &'a [KeepOutZone],
+    /// The detour that is sought, with the fence.
     request: &'a DetourRequest,
 }
 
@@ -170,6 +174,7 @@ fn nearest_reachable_place<const N: usize>(clear: &LegConstraints<'_, '_, N>) ->
 /// Nodes at one height, and the state of the search for the shortest path from the first to the
 /// second.
 struct VisibilityGraph {
+    /// Places of the nodes, metres in the mission frame.
     nodes: Vec<Flat, MAX_GRAPH_NODES>,
     /// Length of the shortest path so far from the start to each node, metres.
     distance_m: [f32; MAX_GRAPH_NODES],
@@ -180,6 +185,7 @@ struct VisibilityGraph {
 }
 
 impl VisibilityGraph {
+    /// A graph without nodes.
     const EMPTY: Self = Self {
         nodes: Vec::new(),
         distance_m: [0.0; MAX_GRAPH_NODES],

@@ -71,6 +71,7 @@ pub fn lower_bound_s<const L: usize, const N: usize>(
 
 /// The largest values inserted so far, in descending order.
 struct LargestValues {
+    /// The values; 0 where none was inserted.
     values: [f32; MAX_VEHICLES],
 }
 

@@ -97,7 +97,9 @@ pub fn plan_exact<const L: usize, const N: usize, const K: usize>(
 struct DivisionTable<'t, 'w, 'm, const L: usize, const N: usize> {
     problem: &'t CoverageProblem<'w, L, N>,
     ws: &'t mut ExactWorkspace<'m>,
+    /// Number of vehicles among which the waypoints are divided.
     vehicle_count: usize,
+    /// Number of waypoints of all lanes.
     waypoint_count: usize,
 }
 

@@ -446,6 +446,7 @@ fn flight_home<const L: usize, const N: usize, const W: usize>(
 struct ReturnInputs<'a> {
     /// Height of the transit layer, metres up in the mission frame.
     layer_z_m: f32,
+    /// The vehicle that flies home.
     vehicle: &'a Vehicle,
     /// The pictures of the whole flight.
     photographs: PicturePlan,

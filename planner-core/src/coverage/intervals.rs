@@ -10,6 +10,7 @@ pub(super) type Interval = [f32; 2];
 /// A set of real numbers, of at most `N` intervals.
 #[derive(Default)]
 pub(super) struct Intervals<const N: usize> {
+    /// The intervals in ascending order, none of which touches another.
     spans: Vec<Interval, N>,
 }
 
@@ -18,6 +19,7 @@ impl<const N: usize> Intervals<N> {
         Self { spans: Vec::new() }
     }
 
+    /// Removes all intervals.
     pub(super) fn clear(&mut self) {
         self.spans.clear();
     }

@@ -43,6 +43,7 @@ pub struct LossesWorkspace<const L: usize, const K: usize> {
     remaining: Tracks<L>,
     /// All vehicles, lost ones too, with the places from which they continue; `pads` alike.
     vehicles: Vec<Vehicle, K>,
+    /// Pads of `vehicles`, in the same order.
     pads: Vec<Pad, K>,
     /// The division's routes; their vehicle indices count only the vehicles that continue.
     survivor_routes: RoutePlan<K>,

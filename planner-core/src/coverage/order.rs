@@ -64,7 +64,9 @@ fn is_shorter_with_first_reversed(lanes: &[Lane]) -> bool {
 
 /// Local search over orders, with the lengths of links in the lanes ([`Lane::link_to_next_m`]).
 struct LaneOrderSearch<'t, 'a, const N: usize> {
+    /// Lengths of links around no-fly zones.
     transit: &'t TransitGraph<'a, N>,
+    /// Number of steps that may still be made.
     steps_left: u32,
 }
 
@@ -238,7 +240,10 @@ impl<const N: usize> LaneOrderSearch<'_, '_, N> {
 /// The best insertion so far: by how much it lengthens the path, before which lane, and whether the
 /// inserted lanes are reversed.
 struct Insertion {
+    /// By how much the path becomes longer, metres.
     added_length_m: f32,
+    /// Index of the lane before which it is, and whether the lanes are reversed; `None` before the
+    /// first is found.
     at: Option<(usize, bool)>,
 }
 

@@ -52,8 +52,9 @@ pub(super) fn lay_missing_lanes<const L: usize, const V: usize>(
     Ok(())
 }
 
-/// Adds lanes for an eighth of a strip, `span`, until no ground of it is left or all lines are
-/// tried. `border` is the strip's border nearer to the eighth.
+/// Adds lanes for an eighth of a strip, from `span[0]` to `span[1]` across the lanes, until no
+/// ground of it is left or all lines are tried: first `border`, the strip's border nearer to the
+/// eighth.
 fn lay_missing_lanes_in_part<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     (strip, border): (u16, f32),

@@ -124,7 +124,9 @@ pub fn powell<const L: usize, const N: usize, const K: usize>(
 /// The running search; `out` has the plan with the cost `least_cost_s`, the best so far.
 struct ShareSearch<'s, 'w, const L: usize, const N: usize, const K: usize> {
     problem: &'s CoverageProblem<'w, L, N>,
+    /// Number of evaluations that may still be made.
     evaluations_left: u32,
+    /// Cost of the best plan so far, seconds.
     least_cost_s: f32,
     ws: &'s mut PowellWorkspace<K>,
     out: &'s mut RoutePlan<K>,

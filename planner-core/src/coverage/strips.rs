@@ -21,6 +21,7 @@ pub(super) const WIDTH_ROUNDING_SHARE: f32 = 1e-4;
 pub struct LaneWorkspace<const V: usize> {
     /// First the convex hull, then the area's vertices in the lane frame.
     pub(super) vertices: Vec<Flat, V>,
+    /// Intervals along the lanes.
     pub(super) sets: LaneIntervalSets<V>,
 }
 
@@ -58,7 +59,9 @@ impl<const V: usize> Default for LaneWorkspace<V> {
 /// The lane frame: `u` along the lanes and `v` across them, metres from `origin`. A [`Flat`] in
 /// this frame has `u` as x and `v` as y.
 pub(super) struct LaneFrame {
+    /// Origin of the lane frame, metres in the mission frame.
     pub(super) origin: Flat,
+    /// Direction of `u`.
     pub(super) direction: LaneDirection,
 }
 
@@ -82,10 +85,13 @@ impl LaneFrame {
 
 /// An area cut into strips. The area, and the lanes that are laid, are in the lane frame.
 pub(super) struct Strips<'a> {
+    /// The area, in the lane frame.
     pub(super) area: Area<'a>,
+    /// Spacing of lanes and pictures.
     pub(super) pattern: LanePattern,
     /// Least `v` of the outer rings: the lower border of the first strip.
     low_v_m: f32,
+    /// Width of each strip, metres.
     pub(super) strip_width_m: f32,
     /// Number of strips.
     pub(super) count: usize,

@@ -23,6 +23,7 @@ pub const LANE_AND_TURN_CLEARANCE_M: f32 = 0.25;
 /// At most `N` corners; 4 · N² bytes.
 pub struct TransitGraph<'a, const N: usize> {
     area: Area<'a>,
+    /// Convex corners of the no-fly zones, moved out by the clearance.
     corners: Vec<Flat, N>,
     /// Length of the shortest path between each two corners, metres; infinite if there is none.
     corner_distances_m: [[f32; N]; N],

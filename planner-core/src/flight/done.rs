@@ -16,6 +16,7 @@ pub struct WaypointRange {
 /// touch. No single waypoint is ever removed: the set only grows until it is cleared.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct WaypointSet<const N: usize> {
+    /// The ranges, in ascending order.
     ranges: Vec<WaypointRange, N>,
 }
 

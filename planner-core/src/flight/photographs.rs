@@ -60,8 +60,11 @@ pub struct PictureStretch<'p> {
 /// over ground, metres.
 #[derive(Clone, Copy)]
 struct StraightSegment {
+    /// Arc length of the beginning, metres.
     begin_m: f32,
+    /// Length along the path, metres.
     length_m: f32,
+    /// Length over ground, metres.
     ground_length_m: f32,
 }
 

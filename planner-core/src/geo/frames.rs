@@ -48,6 +48,7 @@ impl Geodetic {
         self.sin_cos().ecef(self.alt_m)
     }
 
+    /// Sines and cosines of latitude and longitude.
     fn sin_cos(&self) -> LatLonSinCos {
         let (lat, lon) = (self.lat_deg.to_radians(), self.lon_deg.to_radians());
         LatLonSinCos { sin_lat: sin(lat), cos_lat: cos(lat), sin_lon: sin(lon), cos_lon: cos(lon) }

@@ -54,6 +54,7 @@ impl FieldShape {
         HEADER_LEN + 2 * self.node_count() + CRC_LEN
     }
 
+    /// Checks the numbers and places of the nodes.
     fn check(&self) -> Result<(), FileError> {
         if self.columns < 2 || self.rows < 2 || self.node_count() > MAX_NODES {
             return Err(FileError::Header("number of nodes"));
@@ -73,6 +74,7 @@ impl FieldShape {
 /// A checked height field over borrowed bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldView<'a> {
+    /// Place, spacing and numbers of the nodes.
     shape: FieldShape,
     /// Height of each node in the file's encoding: little-endian i16, decimetres; row by row from
     /// the south, each row from west to east.

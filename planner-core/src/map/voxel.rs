@@ -142,7 +142,9 @@ pub enum Outside {
 #[derive(Clone, Copy, Debug)]
 pub struct VoxelGrid<'a> {
     shape: GridShape,
+    /// What the space beyond the map's faces counts as.
     beyond_map: Outside,
+    /// The cells' bits, in the order of [`GridShape::word_and_mask`].
     words: &'a [u64],
 }
 

@@ -69,7 +69,7 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     failed
 }
 
-/// Order in which vehicles are scheduled in the first round.
+/// Order in which vehicles are scheduled in the first round, by the lengths of their paths.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum InitialOrder {
     LongestFirst,
@@ -422,7 +422,9 @@ impl<const V: usize> ParkedVehicles<V> {
 /// The vehicle that a path is for, and the roadmap nodes of its start and its goal.
 struct PathEnds<'a> {
     vehicle: &'a VehicleTask,
+    /// Index of the start's node.
     from: u16,
+    /// Index of the goal's node.
     to: u16,
 }
 

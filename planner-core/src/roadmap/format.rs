@@ -247,14 +247,17 @@ pub(super) fn u16_at(head: &[u8; HEADER_LEN], at: usize) -> u16 {
     u16::from_le_bytes([head[at], head[at + 1]])
 }
 
+/// The little-endian u32 at byte `at` of the header.
 pub(super) fn u32_at(head: &[u8; HEADER_LEN], at: usize) -> u32 {
     u32::from(u16_at(head, at)) | u32::from(u16_at(head, at + 2)) << 16
 }
 
+/// The little-endian f32 at byte `at` of the header.
 pub(super) fn f32_at(head: &[u8; HEADER_LEN], at: usize) -> f32 {
     f32::from_bits(u32_at(head, at))
 }
 
+/// The little-endian f64 at byte `at` of the header.
 pub(super) fn f64_at(head: &[u8; HEADER_LEN], at: usize) -> f64 {
     f64::from_bits(u64::from(u32_at(head, at)) | u64::from(u32_at(head, at + 4)) << 32)
 }

@@ -111,6 +111,7 @@ fn passes_bridge_test(grid: &VoxelGrid<'_>, config: &PrmConfig, p: &Point, draw:
 struct SampleSequence {
     /// Source of [`Sampling::Uniform`] and [`Sampling::Bridge`].
     rng: Pcg32,
+    /// How the points are drawn.
     sampling: Sampling,
     /// Number of Halton points drawn so far.
     halton_index: u32,

@@ -54,6 +54,7 @@ pub struct SearchWorkspace<const N: usize> {
     distance: [f32; N],
     /// Node before each node on that path; the source is its own parent.
     parent: [u16; N],
+    /// Nodes reached and not settled, by distance plus heuristic.
     heap: Heap<N>,
 }
 
@@ -362,6 +363,7 @@ fn target_index<const N: usize>(half_edge: &[u8; 4]) -> usize {
     if N.is_power_of_two() { target & (N - 1) } else { target }
 }
 
+/// Refuses a node that the roadmap does not have.
 fn check_node(view: &RoadmapView<'_>, node: u16) -> Result<(), SearchError> {
     if usize::from(node) < view.node_count() { Ok(()) } else { Err(SearchError::BadNode(node)) }
 }

@@ -124,6 +124,7 @@ impl BoundingBox {
         (self.0, self.1) = (self.0.add_scalar(-reach_m), self.1.add_scalar(reach_m));
     }
 
+    /// Whether the boxes meet, at a face too.
     fn overlaps(&self, other: &Self) -> bool {
         (0..3).all(|axis| self.0[axis] <= other.1[axis] && other.0[axis] <= self.1[axis])
     }

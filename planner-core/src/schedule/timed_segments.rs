@@ -25,7 +25,9 @@ pub(super) const MIN_PAD_HOLD_S: f32 = 0.05;
 /// the landing place to +∞.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct TimedSegment {
+    /// Beginning, ENU metres in the mission frame.
     pub(super) from: Point,
+    /// End, ENU metres in the mission frame.
     pub(super) to: Point,
     /// Arc length at which the vehicle would wait before it enters this segment, metres. That is
     /// the segment's beginning, or for a segment of a climb or descent the beginning of the whole
@@ -276,7 +278,9 @@ pub(super) enum WaitingPlaces {
 /// after take-off or after the beginning of the leg.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Leg {
+    /// Beginning, ENU metres in the mission frame.
     pub(super) from: Point,
+    /// End, ENU metres in the mission frame.
     pub(super) to: Point,
     pub(super) length_m: f32,
     pub(super) from_s: f32,

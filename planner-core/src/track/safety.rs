@@ -105,7 +105,7 @@ impl MotionBounds {
             ("accel_mps2", self.braking.accel_mps2),
             ("jerk_mps3", self.braking.jerk_mps3),
             ("speed_max_mps", self.speed_max_mps),
-            ("silent_s", self.stopped_when_unheard_for_s),
+            ("stopped_when_unheard_for_s", self.stopped_when_unheard_for_s),
         ])
     }
 }

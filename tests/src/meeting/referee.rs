@@ -205,8 +205,9 @@ pub struct MeetingReferee {
     tracks: Vec<Vec<VehicleState>>,
     /// The latest approach of vehicle a to b, at index a · `vehicle_count` + b.
     approaches: Vec<Option<Approach>>,
-    /// For each pair that is too near: when its sets came too near, the step at which the pair was
-    /// nearest, and that distance.
+    /// For each pair a < b (index a · `vehicle_count` + b) that is too near: the step from which
+    /// each vehicle's own set was too near the other's, if it was; the step at which the pair was
+    /// nearest; and that distance.
     ongoing: Vec<Option<OngoingViolation>>,
     /// Approaches below the safety distance that have ended.
     pub violations: Vec<Violation>,

@@ -186,6 +186,7 @@ impl Watch {
         assert!(!self.ends || !(flies || state == Dividing), "an order is forgotten: {said}");
     }
 
+    /// Makes `what` happen to the bench or to vehicle 77, and logs it.
     fn happen(&mut self, b: &mut Bench, what: Happens) {
         use Happens::*;
         self.log.push(format!(

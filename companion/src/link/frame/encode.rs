@@ -4,6 +4,7 @@ use crc::{CRC_16_MCRF4XX, Crc, Table};
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData};
 
+/// Start byte of a MAVLink 2 frame.
 pub(super) const V2_START: u8 = 0xFD;
 /// A deprecated message, the only one of the dialect whose CRC_EXTRA is 0.
 const COMPONENT_INFORMATION: u32 = 395;

@@ -19,7 +19,9 @@ pub struct Frame {
     pub message_id: u32,
     /// Whether the frame has a signature; it is not verified.
     pub signed: bool,
+    /// Length of the payload as received, bytes.
     pub(super) len: u8,
+    /// The payload, padded with zeros beyond `len`.
     pub(super) payload: [u8; 255],
 }
 

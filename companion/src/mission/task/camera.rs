@@ -37,7 +37,9 @@ const ACCEPTED: u8 = 0;
 /// Shortest horizontal length of a stretch from which a heading is computed, metres.
 const MIN_HEADING_STRETCH_M: f32 = 0.1;
 
+/// `MAV_CMD` number of DO_DIGICAM_CONTROL.
 const DO_DIGICAM_CONTROL: u16 = 203;
+/// `MAV_CMD` number of DO_SET_CAM_TRIGG_DIST.
 const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 
 /// A camera command to the autopilot.
@@ -53,6 +55,7 @@ enum CameraCommand {
 }
 
 impl CameraCommand {
+    /// The command's `MAV_CMD` number.
     fn mav_command(self) -> u16 {
         match self {
             Self::Every(_) | Self::Off => DO_SET_CAM_TRIGG_DIST,
@@ -60,6 +63,7 @@ impl CameraCommand {
         }
     }
 
+    /// The command as a message to the autopilot.
     fn to_message(self) -> Outgoing {
         match self {
             Self::Every(step_m) => Outgoing::TriggerEvery { step_m, at_once: true },
@@ -83,6 +87,7 @@ pub(super) struct CameraControl {
     /// The trigger in use from the first picture of a stretch or detour to the last; with
     /// [`Trigger::Distance`] the autopilot's trigger is on. `None` elsewhere.
     running_trigger: Option<Trigger>,
+    /// Commands that are to be sent or wait for their answers, oldest first.
     commands: Deque<CameraCommand, MAX_COMMANDS>,
     /// Number of commands sent since the last answer, repetitions included.
     tries: u8,
@@ -225,6 +230,7 @@ impl CameraControl {
         }
     }
 
+    /// Adds a command to the queue.
     fn queue_command(&mut self, order: CameraCommand) {
         // The queue is full while the autopilot is silent: drop the oldest command, whose place is
         // farthest away. Its tries count for the next command, so that the silence is reported.
@@ -265,6 +271,7 @@ impl CameraControl {
         timers.set(Timer::CameraCommand, now + REPEAT_EVERY);
     }
 
+    /// Removes the first command from the queue, answered or not.
     fn drop_current_command(&mut self) {
         self.commands.pop_front();
         (self.tries, self.current_sent) = (0, false);

@@ -35,7 +35,8 @@ const BEYOND_STOP_HYSTERESIS_M: f32 = 4.0;
 /// distance, and no further along it from where the vehicle can stop.
 pub(super) const BLOCKED_BESIDE_AND_BEYOND_STOP_M: [f32; 2] =
     [BLOCKED_BEYOND_SAFETY_DISTANCE_M, BLOCKED_BEYOND_STOP_M];
-/// As [`BLOCKED_BESIDE_AND_BEYOND_STOP_M`], of a path that is blocked already, metres.
+/// As [`BLOCKED_BESIDE_AND_BEYOND_STOP_M`], once the path is blocked, metres: both are greater,
+/// since a hovering vehicle sways and may have stopped sooner than expected.
 pub(super) const STAYS_BLOCKED_BESIDE_AND_BEYOND_STOP_M: [f32; 2] =
     [DETOUR_MARGIN_M, BLOCKED_BEYOND_STOP_M + BEYOND_STOP_HYSTERESIS_M];
 /// Reach of the search for the place where a detour returns to the path, metres: from the vehicle
@@ -89,9 +90,10 @@ fn neighbour_zone_index_count<const V: usize, const W: usize, const G: usize>(
 }
 
 /// Passes to `visit` the keep-out zones number `index` in a coverage mission. With n neighbours
-/// these are, below n, the zones of neighbour `index`'s places; from n on the column in which
-/// neighbour `index − n` may come down, if it is in the air off the plan. Reported obstacles are
-/// not among them.
+/// these are, below n, the zones where neighbour `index` stands or rests; from n on the columns in
+/// which neighbour `index − n`, in the air, may land without avoiding others: it is silent for 3 s,
+/// or off the plan without a detour (not if it has left the plan for good or counts as dead).
+/// Reported obstacles are not among them.
 fn visit_neighbour_zones<const V: usize, const W: usize, const G: usize>(
     view: &DetourView<'_, V, W, G>,
     index: usize,

@@ -422,8 +422,9 @@ fn only_hovering_vehicles_are_passed_nearer_after_a_search_that_counts() {
     assert_eq!(detours.keep_out_radii_m(goal, 0.0, 1.5), [2.0, 1.75, 1.75]);
 }
 
-/// Asserts that a search for a detour to the goal which follows one that failed here passes
-/// `nearer_m` nearer to a hovering vehicle with these flags, silent for `silent_s` seconds.
+/// Asserts that a search for a detour to the goal, if the last one failed at about the same place,
+/// keeps `nearer_m` less from a hovering vehicle with these flags, silent for `silent_s` seconds;
+/// any other search keeps the full distance.
 fn assert_next_search_passes_nearer(flags: u8, silent_s: f32, nearer_m: f32) {
     let mut rng = Pcg32::seed_from_u64(6);
     let mut bench = Bench::started_with_neighbour(two_vehicles());

@@ -9,9 +9,13 @@ pub const PACKETS_PER_BURST: u8 = 16;
 /// A burst under way: the request, and offset and sequence number of its next packet.
 #[derive(Clone, Copy, Debug)]
 pub struct FtpBurst {
+    /// The client's request for the burst.
     request: FtpRequest,
+    /// Offset in the file of the next packet, bytes.
     offset: u32,
+    /// FTP sequence number of the request that the next packet answers.
     sequence: u16,
+    /// Number of packets still to be sent.
     packets_left: u8,
 }
 

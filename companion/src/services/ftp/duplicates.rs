@@ -15,14 +15,17 @@ const CLOSED_SESSION_WINDOW: Duration = Duration::from_secs(10);
 /// Most answered requests that are remembered.
 const MAX_REMEMBERED: usize = 8;
 
+/// Whether a request was granted, or with which error it was refused.
 type Outcome = Result<(), NakError>;
 
 /// The last answered requests and the last closed session, with their outcomes.
 #[derive(Clone, Debug, Default)]
 pub struct DuplicateDetection {
+    /// The requests; `None` in an entry not used yet.
     answered: [Option<AnsweredRequest>; MAX_REMEMBERED],
     /// Index in `answered` of the entry that is replaced next, the oldest.
     next: usize,
+    /// The session closed last; `None` before the first.
     closed: Option<ClosedSession>,
 }
 
@@ -31,15 +34,19 @@ pub struct DuplicateDetection {
 struct AnsweredRequest {
     request: RequestFingerprint,
     outcome: Outcome,
+    /// When the request was answered.
     at: Instant,
 }
 
 /// The session that was closed last, and the outcome of closing it.
 #[derive(Clone, Copy, Debug)]
 struct ClosedSession {
+    /// System id and component id of the client.
     client: (u8, u8),
+    /// Id of the session.
     session: u8,
     outcome: Outcome,
+    /// When the session was closed.
     at: Instant,
 }
 

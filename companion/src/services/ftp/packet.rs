@@ -50,7 +50,9 @@ pub enum NakError {
     NotFound,
 }
 
+/// `errno` of an input or output error.
 pub const EIO: u8 = 5;
+/// `errno` of a file that is too large.
 pub const EFBIG: u8 = 27;
 
 impl From<UploadError> for NakError {
@@ -65,7 +67,7 @@ impl From<UploadError> for NakError {
 /// A STATUSTEXT for the operator: its severity, and the text.
 pub type Text = (Severity, &'static str);
 
-/// All STATUSTEXTs of the FTP server.
+/// All STATUSTEXTs of the FTP server. A field is the file with the heights of the ground.
 pub const FTP_TEXTS: [Text; 9] = [
     (Severity::Info, "Roadmap stored: used from the next start"),
     (Severity::Info, "Mission stored: used from the next start"),
@@ -102,15 +104,22 @@ pub struct FtpRequest {
     pub link: usize,
     /// System id and component id.
     pub client: (u8, u8),
+    /// FTP sequence number.
     pub sequence: u16,
+    /// Id of the session.
     pub session: u8,
+    /// Opcode, as MAVLink numbers them.
     pub opcode: u8,
+    /// Number of bytes of `data`, or that are to be read.
     pub size: u8,
+    /// Offset in the file, bytes.
     pub offset: u32,
+    /// The data; beyond `size` of no meaning.
     pub data: [u8; MAX_DATA],
 }
 
 impl FtpRequest {
+    /// Decodes a FILE_TRANSFER_PROTOCOL frame that came on this link.
     pub fn from_frame(link: usize, frame: &Frame) -> Self {
         let p = &frame.padded_payload()[3..];
         let mut data = [0; MAX_DATA];
@@ -163,6 +172,8 @@ pub fn opens_session(request: &FtpRequest) -> bool {
 /// both begin at the same sequence number: session and data can distinguish them.
 pub type RequestFingerprint = ((u8, u8), u16, (u8, u8), u32, u32);
 
+/// What tells a request from others: client, sequence number, session and opcode, offset, CRC-32 of
+/// the data.
 pub fn request_fingerprint(request: &FtpRequest) -> RequestFingerprint {
     let FtpRequest { client, sequence, session, opcode, offset, .. } = *request;
     (client, sequence, (session, opcode), offset, crc32(request.bytes()))

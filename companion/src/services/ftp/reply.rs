@@ -15,6 +15,7 @@ impl Ftp {
         self.respond(request, result);
     }
 
+    /// Answers with an ACK without data, or with a NAK.
     pub(super) fn respond(&mut self, request: &FtpRequest, result: Result<(), NakError>) {
         match result {
             Ok(()) => self.ack(request, &[]),
@@ -22,10 +23,12 @@ impl Ftp {
         }
     }
 
+    /// Answers with an ACK and these data.
     pub(super) fn ack(&mut self, request: &FtpRequest, data: &[u8]) {
         self.set_reply(request, ACK, 0, data);
     }
 
+    /// Answers with a NAK.
     pub(super) fn nak(&mut self, request: &FtpRequest, error: NakError) {
         let code = match error {
             NakError::Errno(errno) => return self.set_reply(request, NAK, 0, &[2, errno]),

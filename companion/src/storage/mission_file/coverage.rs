@@ -165,9 +165,13 @@ pub const fn encoded_len(vehicles: usize, rings: usize, vertices: usize) -> usiz
 /// [`planner_core::coverage::area::Area::new`] checks whether its rings form an area.
 #[derive(Clone, Copy, Debug)]
 pub struct CoverageView<'a> {
+    /// The decoded numbers at the block's beginning.
     header: CoverageHeader,
+    /// The vehicles' shares, as in the file and in the order of its vehicles.
     shares: &'a [[u8; SHARE_LEN]],
+    /// The rings, as in the file.
     rings: &'a [[u8; RING_LEN]],
+    /// The vertices of all rings, as in the file.
     vertices: &'a [[u8; VERTEX_LEN]],
 }
 
@@ -259,6 +263,7 @@ impl<'a> CoverageView<'a> {
 }
 
 impl VehicleShare {
+    /// Whether weight and speeds are in range.
     fn is_valid(&self) -> bool {
         self.weight >= 0.0
             && self.weight.is_finite()
@@ -319,6 +324,7 @@ impl CoverageHeader {
         Ok(header)
     }
 
+    /// Checks all values of the header; the error names the first that is wrong.
     fn check(&self) -> Result<(), MissionError> {
         let refuse = |name| Err(FileError::Header(name).into());
         if self.spacing.check().is_err() {

@@ -39,6 +39,7 @@ pub struct MissionHeader {
 }
 
 impl MissionHeader {
+    /// Checks all values; the error names the first that is wrong.
     pub(super) fn check(&self) -> Result<(), MissionError> {
         let refuse = |name| Err(FileError::Header(name).into());
         if !self.origin.is_valid() {

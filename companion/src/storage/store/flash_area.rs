@@ -21,9 +21,11 @@ const USED_OFFSET: u32 = WORD_LEN as u32;
 /// Offset of the seal from the area's first byte.
 const SEAL_OFFSET: u32 = 2 * WORD_LEN as u32;
 
-/// The marks "clean" and "used", and the first bytes of a seal.
+/// Mark of an area that was erased and may be written.
 const CLEAN: [u8; WORD_LEN] = *b"FLKCLEAN: erased, may be written";
+/// Mark of an area that was written to.
 const USED: [u8; WORD_LEN] = *b"FLKUSED:  written to, seal ahead";
+/// First bytes of a seal.
 const SEAL_MAGIC: [u8; 4] = *b"FLKS";
 
 /// One of the four areas of the storage bank.
@@ -96,6 +98,7 @@ pub struct Seal {
 }
 
 impl Seal {
+    /// The seal as a word of flash, with its CRC.
     fn to_bytes(self) -> [u8; WORD_LEN] {
         let mut word = [0; WORD_LEN];
         word[..4].copy_from_slice(&SEAL_MAGIC);
@@ -107,6 +110,7 @@ impl Seal {
         word
     }
 
+    /// The seal in a word of flash; `None` if the word is no sound seal.
     fn from_bytes(word: &[u8; WORD_LEN]) -> Option<Self> {
         (word[..4] == SEAL_MAGIC && has_valid_word_crc(word)).then(|| Self {
             sequence: u32_at(word, 4),

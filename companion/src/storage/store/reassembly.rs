@@ -21,6 +21,7 @@ pub enum PieceOutcome {
 /// The reassembly window. All zero when new.
 #[derive(Clone, Debug)]
 pub struct UploadReassembly {
+    /// Content of the window; of no meaning where nothing was received.
     bytes: [u8; WINDOW_LEN],
     /// One bit for each byte of the window: whether it was received.
     received_bits: [u64; WINDOW_LEN / 64],

@@ -23,6 +23,7 @@ pub(super) const MAX_JOURNAL_TRIES: u8 = 4;
 /// A record of the journal that is being written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JournalRecord {
+    /// What the record keeps.
     pub(super) kind: RecordKind,
     /// Offset of the record's head in the storage bank.
     pub(super) at: u32,
@@ -30,7 +31,9 @@ pub struct JournalRecord {
     pub(super) len: u32,
     /// CRC-32 of the data.
     pub(super) crc: u32,
+    /// Where the data come from.
     pub(super) source: RecordSource,
+    /// The step that is under way.
     pub(super) step: RecordStep,
     /// Bytes that the present step has processed: of the data; when read back, head included.
     pub(super) done: u32,

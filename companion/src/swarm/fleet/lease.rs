@@ -100,7 +100,9 @@ impl<const V: usize> Fleet<V> {
         self.any_missing
     }
 
-    /// Gives the status [`ShareStatus::Lost`] to those with a part that were silent for too long.
+    /// Raises the status of vehicles with a part to [`ShareStatus::Lost`] if for
+    /// [`FleetTimeouts::lost_after`] neither this vehicle nor one that it hears has heard them. One
+    /// that has left or finished keeps its status.
     pub(super) fn count_silent_as_lost(&mut self, now: Instant) {
         let silent = self.limits.lost_after;
         let is_lost = |v: &&mut FleetVehicle| v.has_part && now - v.heard_at >= silent;

@@ -24,7 +24,7 @@ pub struct FleetTimeouts {
 }
 
 impl FleetTimeouts {
-    /// Time limits of a flight in which a vehicle that no other vehicle hears is down after
+    /// The constant limits ([`LEASE`], [`LEASE_HEARD_WITHIN`], [`LOST_AFTER_SILENCE`]), with this
     /// `down_after`.
     pub const fn of_flight(down_after: Duration) -> Self {
         Self {

@@ -98,7 +98,8 @@ pub(crate) struct NeighbourEntry {
     /// Place where the neighbour, out of the plan, rested when the present detour was planned; NaN
     /// for none.
     pub(super) avoided_place: Point,
-    /// State as last heard, as the advice uses it; its age and [`OUT_OF_PLAN`] are not kept here.
+    /// State as last heard, for `deconflict::advise`. `age_s`, `out_of_plan` and `on_detour` are
+    /// not kept in it: [`super::Neighbours::states_with_age`] computes them.
     pub(super) state: Neighbour,
 }
 

@@ -64,6 +64,7 @@ const AGE_TICK_US: u64 = 100_000;
 /// flies on though no other vehicle hears it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct RelayedProgress {
+    /// Rank of the vehicle.
     rank: u8,
     /// Age of the report, in units of 0.1 s.
     age_ticks: u8,
@@ -82,10 +83,12 @@ pub(crate) struct Relay {
     pub(crate) mission_crc: u32,
     /// CRC-32 of the swarm's plan that the sender has.
     pub(crate) plan_crc: u32,
+    /// The reports.
     items: Vec<RelayedProgress, MAX_RELAYED>,
 }
 
 impl Relay {
+    /// Whether the message has no report.
     pub(crate) fn is_empty(&self) -> bool {
         self.items.is_empty()
     }

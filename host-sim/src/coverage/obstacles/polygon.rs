@@ -3,10 +3,12 @@
 /// The corners of a polygon, east and north, metres.
 pub(super) type Polygon = Vec<[f64; 2]>;
 
+/// The vector from `b` to `a`.
 fn minus(a: &[f64; 2], b: &[f64; 2]) -> [f64; 2] {
     [a[0] - b[0], a[1] - b[1]]
 }
 
+/// Cross product, positive if `b` points to the left of `a`.
 fn cross(a: &[f64; 2], b: &[f64; 2]) -> f64 {
     a[0] * b[1] - a[1] * b[0]
 }

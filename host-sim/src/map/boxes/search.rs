@@ -42,6 +42,7 @@ impl Node {
         child_offsets: [LEAF; BOXES_PER_NODE],
     };
 
+    /// Whether the node has boxes, not nodes, as its children.
     fn is_leaf(&self) -> bool {
         self.child_offsets[0] == LEAF
     }
@@ -50,6 +51,7 @@ impl Node {
 /// A node that waits to be opened, and a lower bound of the squared distance to its boxes.
 #[derive(Clone, Copy, Default)]
 struct OpenNode {
+    /// Lower bound of the squared distance, cells².
     min_distance_sq: f32,
     /// Index in the node list.
     node: u32,
@@ -61,8 +63,11 @@ struct OpenNode {
 pub(super) struct BoxSearch<'a> {
     /// All nodes of the tree; the root is the first.
     pub(super) nodes: &'a [Node],
+    /// The segment whose distance is sought.
     pub(super) segment: &'a CellSegment,
+    /// Upper bound of the result, cells².
     pub(super) bound_sq: f32,
+    /// Squared distance at which the search stops, cells².
     pub(super) enough_sq: f32,
 }
 
@@ -137,6 +142,7 @@ impl CellSegment {
         }
     }
 
+    /// Whether all numbers are finite.
     pub(super) fn is_finite(&self) -> bool {
         self.d.iter().chain(&self.a).all(|x| x.is_finite())
     }

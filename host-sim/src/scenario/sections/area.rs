@@ -46,7 +46,9 @@ const MAX_EXTENT_AS_DEGREES_M: f64 = 0.5;
 /// Whether the numbers of a polygon are degrees or metres.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Coordinates {
+    /// Longitude and latitude, degrees.
     Wgs84,
+    /// Metres east and north of the mission's origin.
     Metres,
 }
 

@@ -11,8 +11,11 @@ use crate::scenario::{
 
 /// Where the keys of a vehicle stand in the scenario, for errors.
 pub(super) struct VehicleSpans {
+    /// Where `start` stands.
     pub(super) start: TomlSpan,
+    /// Where `goal` stands; `None` without a goal.
     pub(super) goal: Option<TomlSpan>,
+    /// Where the vehicle's table stands.
     pub(super) table: TomlSpan,
 }
 

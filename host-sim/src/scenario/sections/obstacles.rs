@@ -29,6 +29,7 @@ pub(super) struct MapBesideArea {
 /// Settings of the scenario on which the distance between paths and obstacles depends.
 pub(super) struct FlightSettings<'a> {
     pub(super) vehicles: &'a [VehicleSection],
+    /// Where the keys of `vehicles` stand, in the same order.
     pub(super) spans: &'a [VehicleSpans],
     pub(super) simulation: &'a Simulation,
     pub(super) deconfliction: &'a Deconfliction,
@@ -143,6 +144,7 @@ impl FlightSettings<'_> {
         self.largest_radius_m() + CRUISE_TRACKING_ERROR_M + lower_m
     }
 
+    /// Greatest radius of a vehicle, metres.
     fn largest_radius_m(&self) -> f32 {
         self.vehicles.iter().map(|vehicle| vehicle.radius_m).fold(0.0, f32::max)
     }

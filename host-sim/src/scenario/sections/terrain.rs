@@ -25,9 +25,12 @@ const PATHS_BESIDE_LANES_M: f32 = 5.0;
 
 /// The file of heights that `[area]` names, not yet read.
 pub(super) struct UnreadTerrain {
+    /// Path of the file.
     path: PathBuf,
+    /// Where the file's name stands, for errors.
     span: TomlSpan,
     tolerance_m: f32,
+    /// What holds for a file without a coordinate system.
     without_crs: WithoutCrs,
 }
 
@@ -54,11 +57,14 @@ impl UnreadTerrain {
         }))
     }
 
+    /// Reads the heights of the ground in `window`: its south-western and north-eastern corner,
+    /// metres.
     fn read(&self, text: TomlText<'_>, origin: &Geodetic, window: [Flat; 2]) -> Result<HeightGrid> {
         let frame = TerrainFrame { origin, without_crs: self.without_crs, window: Some(window) };
         terrain::read(&self.path, &frame).map_err(|error| self.terrain_error(text, &error))
     }
 
+    /// The error about the file, at its name in the scenario.
     fn terrain_error(&self, text: TomlText<'_>, error: &TerrainError) -> ScenarioError {
         let path = printable_path(&self.path);
         match error {

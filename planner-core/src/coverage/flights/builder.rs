@@ -16,10 +16,13 @@ pub(super) fn point_at_height(place: &Flat, height_m: f32) -> Point {
 
 /// A flight path that is extended leg by leg.
 pub(super) struct FlightPathBuilder<'a, const N: usize, const W: usize> {
+    /// The path so far.
     pub(super) path: Path<W>,
+    /// The way around no-fly zones.
     transit: &'a TransitGraph<'a, N>,
-    /// Clearance that every leg is taken to have, metres.
-    clearance_m: f32,
+    /// Clearance with which every leg is recorded, metres: there are no walls.
+    assumed_clearance_m: f32,
+    /// How lanes follow the ground; `None` if it is level.
     following: Option<TerrainFollowing<'a>>,
     /// Last point of the path so far.
     pub(super) here: Point,
@@ -29,16 +32,16 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
     /// A path without waypoints; the caller adds the first one, at `here`.
     pub(super) const fn new(
         transit: &'a TransitGraph<'a, N>,
-        clearance_m: f32,
+        assumed_clearance_m: f32,
         following: Option<TerrainFollowing<'a>>,
         here: Point,
     ) -> Self {
-        Self { path: Path::new(), transit, clearance_m, following, here }
+        Self { path: Path::new(), transit, assumed_clearance_m, following, here }
     }
 
     /// Appends a straight leg to `place`. Returns the index of the waypoint at the leg's end.
     pub(super) fn add_straight_leg(&mut self, place: Point) -> Result<usize, PathError> {
-        self.path.push(place, self.clearance_m)?;
+        self.path.push(place, self.assumed_clearance_m)?;
         self.here = place;
         self.path.last_index().ok_or(PathError::NotFinite)
     }

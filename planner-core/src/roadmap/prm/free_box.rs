@@ -38,10 +38,13 @@ struct FreeBox {
 
 /// Line-of-sight checks from one node, `here`, to others.
 pub(super) struct NodeVisibility<'g, 'a> {
+    /// The map.
     grid: &'g VoxelGrid<'a>,
+    /// The required clearance, metres.
     clearance_m: f32,
     /// The required clearance, in cells.
     clearance_cells: f32,
+    /// Number of cells in a metre.
     cells_per_m: f32,
     /// Most cells by which a free box is grown from its node's cell in each direction.
     max_growth_cells: i32,

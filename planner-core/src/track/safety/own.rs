@@ -32,6 +32,7 @@ pub type Legs<'a> = Vec<SetLeg<'a>, MAX_SET_POINTS>;
 pub struct SetLeg<'a> {
     from: &'a Point,
     to: &'a Point,
+    /// Midpoint of the leg, ENU metres.
     middle: Point,
     /// Upper bound of half the leg's length, at most 7 % above it, metres.
     half_length_bound_m: f32,
@@ -67,6 +68,7 @@ impl<'a> SetLeg<'a> {
 /// The own vehicle's reachable set with its legs and its bounding box.
 #[derive(Clone, Debug)]
 pub struct OwnSet<'a> {
+    /// The vehicle's reachable set.
     set: &'a ReachableSet,
     /// The legs of the set's polyline.
     legs: &'a [SetLeg<'a>],

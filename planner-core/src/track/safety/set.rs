@@ -86,7 +86,8 @@ impl ReachableSet {
         self.column_bottom = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
     }
 
-    /// Legs of the set, at least one, and the column.
+    /// Iterates over the lines around which the set lies: its legs (for a set of one point a leg of
+    /// length 0), then the column below its first point, if there is one.
     #[inline]
     pub(super) fn segments(&self) -> Segments<'_> {
         let first = &self.points[0];
@@ -103,6 +104,7 @@ impl ReachableSet {
 pub(super) struct Segments<'a> {
     /// Beginning of the next leg.
     from: &'a Point,
+    /// Ends of the legs that are still to come.
     next: core::slice::Iter<'a, Point>,
     /// Upper and lower end of the column, until it was returned.
     column: Option<(&'a Point, &'a Point)>,

@@ -47,6 +47,7 @@ struct Args {
     steps_beside: Option<usize>,
 }
 
+/// Measures the groups that `--only` selects, and prints our times beside those of other programs.
 fn main() -> Result<()> {
     let args = Args::parse();
     if let Some(neighbours) = args.steps_beside {

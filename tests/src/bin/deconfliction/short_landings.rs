@@ -25,8 +25,9 @@ const JOIN_WITHIN_M: f32 = 1.0;
 const ALOFT_M: f32 = 1.0;
 /// How far along its path a vehicle whose radio fails comes to rest at most, metres.
 const MAX_REST_STRETCH_M: f32 = 4.6;
-/// Time for which such a vehicle flies on at least, seconds, its hardest stop then, m/s², and the
-/// time that a fall takes at least, seconds.
+/// For the least way that such a vehicle makes, the shorter of a stop and a fall: time for which it
+/// flies on before the hardest stop, seconds, that stop, m/s², and the least time in which one
+/// without power falls to the ground, seconds.
 const MIN_FLY_ON_S: f32 = 0.3;
 const MAX_STOP_MPS2: f32 = 3.0;
 const MIN_FALL_S: f32 = 0.6;
@@ -186,7 +187,7 @@ fn place_at(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
 }
 
 /// How far a silent vehicle lies beside its path, and how far along its path from where its radio
-/// failed, metres.
+/// failed, metres. `None` without a track or a path.
 pub fn rest_offsets_m(plan: &HostPlan, flight: &SwarmFlight, struck: Struck) -> Option<[f32; 2]> {
     let track = &flight.tracks[struck.index];
     let path = &plan.flights[struck.index].path;

@@ -164,6 +164,7 @@ impl Watch {
         self.landing &= state != State::Aborted && state != State::Failsafe && state != State::Done;
     }
 
+    /// Makes `what` happen to the bench, and logs it.
     fn happen(&mut self, b: &mut Bench, what: Happens) {
         use Happens::*;
         let state = b.state();

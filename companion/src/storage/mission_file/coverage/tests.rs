@@ -108,8 +108,9 @@ fn forged(at: usize, bytes: &[u8]) -> List<u8> {
     sealed(file)
 }
 
-/// A file with this [`UnevenGround`]: height, tolerance, lowest and highest ground, metres.
-fn above(ground: [f32; 4]) -> List<u8> {
+/// A file with this [`UnevenGround`]: least height above the ground, height of the band of paths
+/// above that, lowest and highest ground, metres.
+fn file_above_ground(ground: [f32; 4]) -> List<u8> {
     let bytes: List<u8> = ground.into_iter().flat_map(f32::to_le_bytes).collect();
     forged(44, &bytes)
 }
@@ -202,7 +203,7 @@ fn above_uneven_ground_only_the_field_of_the_mission_is_planned_on() {
     let mut field = vec![0; shape.encoded_len()];
     field::write(&shape, &nodes, &mut field).unwrap();
     let field = FieldView::parse(&field).unwrap();
-    let mut file = above([18.0, 3.0, 0.0, 4.0]);
+    let mut file = file_above_ground([18.0, 3.0, 0.0, 4.0]);
     let mut with = |crc: u32, field: Option<FieldView<'_>>| {
         file[16..20].copy_from_slice(&crc.to_le_bytes());
         let file = sealed(file.clone());
@@ -257,9 +258,9 @@ fn what_is_not_sound_is_refused_by_name() {
         (forged(40, &(-1.0f32).to_le_bytes()), FileError::Header("margin_m").into()),
         (forged(44, &nan), FileError::Header("ground").into()),
         (forged(48, &1.0f32.to_le_bytes()), FileError::Header("ground").into()),
-        (above([20.0, 3.0, 9.0, 4.0]), FileError::Header("ground").into()),
-        (above([20.0, 3.0, 1.0, 6.0]), FileError::Header("ground").into()),
-        (above([20.0, 0.0, 1.0, 4.0]), FileError::Header("ground").into()),
+        (file_above_ground([20.0, 3.0, 9.0, 4.0]), FileError::Header("ground").into()),
+        (file_above_ground([20.0, 3.0, 1.0, 6.0]), FileError::Header("ground").into()),
+        (file_above_ground([20.0, 0.0, 1.0, 4.0]), FileError::Header("ground").into()),
         (forged(60, &nan), MissionError::InvalidVehicle(0)),
         (forged(72 + 4, &0.0f32.to_le_bytes()), MissionError::InvalidVehicle(1)),
         (forged(84 + 2, &[3]), FileError::Header("rings").into()),

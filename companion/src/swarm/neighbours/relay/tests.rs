@@ -103,7 +103,8 @@ impl Swarm {
         }
     }
 
-    /// The progress of vehicle `other` that vehicle `of` believes.
+    /// Progress, metres, that vehicle `of` takes vehicle `other` to have surely made; both by rank.
+    /// `None` if it has heard of none.
     fn believed_m(&mut self, of: usize, other: usize) -> Option<f32> {
         let (now, id) = (self.now, other as u8 + 1);
         self.tables[of].states_with_age(now).iter().find(|n| n.id == id).and_then(|n| n.progress_m)

@@ -33,6 +33,7 @@ pub(super) fn read_camera(value: &TomlValue<'_>) -> Result<Camera> {
     Ok(camera)
 }
 
+/// Reads a list of two values.
 fn read_pair<T: Copy>(
     value: &TomlValue<'_>,
     item: impl Fn(&TomlValue<'_>) -> Result<T>,
@@ -121,6 +122,7 @@ pub(super) fn read_spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result
     }
 }
 
+/// The error for a spacing that cannot be used.
 fn spacing_error(table: &Table<'_>, error: &CoverageError) -> ScenarioError {
     table.text.error(&table.span, format!("area: {error:?}"))
 }
