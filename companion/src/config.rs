@@ -83,12 +83,14 @@ pub struct Config<const V: usize> {
     /// Rate at which this vehicle sends its position and its intent to the swarm, Hz.
     pub swarm_hz: u8,
     /// Geofence: minimum and maximum corner of the box that this vehicle may be in, ENU metres.
+    /// `None` without one.
     pub geofence: Option<(Point, Point)>,
     /// In a coverage mission, whose area is divided again after the loss of a vehicle: the longest
     /// time from when a vehicle was last heard until it is down, seconds. `None` in a mission with
     /// goals.
     pub lost_vehicle_down_after_s: Option<f32>,
-    /// Height range of the ground below a coverage mission whose ground is not level.
+    /// Height range of the ground below a coverage mission whose ground is not level. `None` over
+    /// level ground, and in other missions.
     pub ground: Option<UnevenGround>,
     /// Whether a coverage mission that starts again leaves out the waypoints that are photographed
     /// already.

@@ -19,7 +19,7 @@ impl Deref for LentFlash {
 /// Keeps track of the lent range of a flash; at most one range is lent at a time.
 #[derive(Debug, Default)]
 pub struct FlashLender {
-    /// Offsets of the lent bytes in the flash.
+    /// Offsets of the lent bytes in the flash; `None` while none are lent.
     lent: Option<Range<u32>>,
 }
 

@@ -97,6 +97,7 @@ type UartEnds = (Receiver, Transmitter);
 struct StartReport {
     /// Text about the last run's end; `None` if there is nothing to report.
     crashed: Option<String<50>>,
+    /// Warnings, in the order in which they are sent.
     warnings: Vec<&'static str, MAX_WARNINGS>,
 }
 
@@ -208,7 +209,7 @@ struct FoundMission {
     /// Whether the mission is not used because reading or planning it brought three starts in a row
     /// down.
     set_aside: bool,
-    /// Parse error of the stored mission.
+    /// Parse error of the stored mission; `None` if it has none.
     parse_error: Option<MissionError>,
 }
 
@@ -242,6 +243,7 @@ fn find_mission(
     FoundMission { mission, files_checksum: files, parse_error, set_aside: false }
 }
 
+/// Starts the tasks that receive from and transmit to both links.
 fn spawn_link_tasks(
     links: SendSpawner,
     shell: &'static Shell,

@@ -35,11 +35,15 @@ pub struct WorkspaceOverlay {
 /// Use of the overlay's memory.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum OverlayUse {
+    /// Planning on a roadmap.
     RoadmapPlan,
+    /// Building a roadmap.
     RoadmapBuild,
+    /// Planning for an area.
     CoveragePlan,
 }
 
+/// The memory; `OverlayUse` tells which field is in use.
 union Memory {
     plan: ManuallyDrop<PlannerWorkspace>,
     build: ManuallyDrop<RoadmapBuilder>,
@@ -119,9 +123,12 @@ impl Default for WorkspaceOverlay {
 
 /// A roadmap that is being built on board: nodes and edges.
 pub struct RoadmapBuilder {
+    /// The nodes, metres in the mission frame; in use are the first `node_count`.
     nodes: [Point; ROADMAP_NODES],
     node_count: usize,
+    /// The nodes by place.
     node_grid: prm::NodeGrid<ROADMAP_NODES, ROADMAP_CUBES>,
+    /// The edges; in use are the first `edge_count`.
     edges: [Edge; HALF_EDGES / 2],
     edge_count: usize,
 }

@@ -108,7 +108,8 @@ pub struct Reference {
     pub position: Point,
     /// Arc length of the position, metres.
     pub along_m: f32,
-    /// Greatest distance of the vehicle behind the reference that is allowed here, metres.
+    /// Greatest distance of the vehicle behind the reference that is allowed at this position,
+    /// metres.
     pub lead_limit_m: f32,
     /// Whether the reference has reached the end of the path.
     pub finished: bool,

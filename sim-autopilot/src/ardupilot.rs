@@ -108,16 +108,22 @@ enum Failsafe {
 /// A take-off in progress: time of the command, and target height (ENU up), metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct TakeOff {
+    /// Time of the command, microseconds since boot.
     since_us: u64,
+    /// Target height, ENU up, metres.
     up: f32,
 }
 
 /// Leg of a return; `up` is its height, ENU metres (NaN: not computed yet).
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum RtlLeg {
+    /// Straight up to `up`.
     Climb { up: f32 },
+    /// At height `up` to above home.
     Cross { up: f32 },
+    /// Above home, since `since_us`, microseconds since boot.
     Wait { since_us: u64, up: f32 },
+    /// Straight down.
     Land,
 }
 
@@ -154,14 +160,19 @@ pub struct Copter {
     controller_starts: bool,
     landed: bool,
     mode: CopterMode,
+    /// The failsafe that acts; `None` without one.
     failsafe: Option<Failsafe>,
     has_gps_fix: bool,
-    /// When the loss of the position was noticed in a mode that needs one, microseconds since boot.
+    /// When the loss of the position was noticed in a mode that needs one, microseconds since boot;
+    /// else `None`.
     position_lost_us: Option<u64>,
+    /// When the ground station was last heard, microseconds since boot; `None` before.
     last_gcs_heartbeat_us: Option<u64>,
+    /// The take-off in progress; `None` without one.
     takeoff: Option<TakeOff>,
     /// Goal of Guided; other modes compute theirs in each step.
     goal: GuidedGoal,
+    /// When `goal` was set, microseconds since boot.
     goal_set_us: u64,
     reference: CopterReference,
     /// Horizontal speed limit by DO_CHANGE_SPEED, m/s; `None`: `WPNAV_SPEED`.
@@ -441,6 +452,7 @@ impl Copter {
         }
     }
 
+    /// Disarms after a landing, and when the vehicle idles on the ground.
     fn disarm_if_due(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         let since = |start: u64| sensors.now_us.saturating_sub(start);
         if !self.landed || self.takeoff.is_some() {
@@ -460,6 +472,7 @@ impl Copter {
         }
     }
 
+    /// Updates whether the vehicle counts as landed.
     fn detect_landing(&mut self, sensors: &SensorReadings, demand: &Demand) {
         let climbing = demand.velocity.z > 0.05;
         if !sensors.touching || climbing {

@@ -43,7 +43,8 @@ pub struct Photo {
 pub struct CameraTrigger {
     /// Distance between pictures while the camera triggers by distance, metres; else `None`.
     trigger_distance_m: Option<f32>,
-    /// Estimated position (east, north; metres) from which the distance is measured.
+    /// Estimated position (east, north; metres) from which the distance is measured. `None` until
+    /// it is first measured.
     measured_from: Option<[f32; 2]>,
     /// Whether a single picture was requested.
     picture_requested: bool,

@@ -66,7 +66,9 @@ use self::telemetry::snapshot::Snapshot;
 /// One simulated vehicle with its autopilot and MAVLink ports.
 #[derive(Clone, Debug)]
 pub struct Autopilot {
+    /// What does not depend on the kind of autopilot.
     platform: Platform,
+    /// PX4 or ArduCopter.
     software: AutopilotSoftware,
     /// Buffer for the message ids that are due at one port in one step; empty between steps.
     due_messages: Vec<u32>,

@@ -96,7 +96,9 @@ pub struct Platform {
     pub(super) imposed_height_error_rate: f32,
     /// Whether GPS has a fix.
     pub(super) gps_ok: bool,
+    /// Conversions between the autopilot's frame and the mission frame.
     pub(super) frame: LocalFrame,
+    /// Home position.
     pub(super) home: Geodetic,
     /// Home position, ENU metres in the mission frame.
     pub(super) home_enu: Point,
@@ -107,7 +109,9 @@ pub struct Platform {
     /// Demand of the last step; `None` while disarmed.
     pub(super) last_demand: Option<Demand>,
     pub(super) ports: Vec<Port>,
+    /// Stored missions, and the progress of the one that is flown.
     pub(super) missions: Missions,
+    /// The camera and its trigger.
     pub(super) camera: CameraTrigger,
     /// Time of the commanded reboot, microseconds since boot; `None` without one.
     pub(super) reboot_us: Option<u64>,
@@ -169,6 +173,7 @@ impl Platform {
             self.vehicle.state().position.z - ground_up_m - self.config.vehicle.radius_m;
     }
 
+    /// What the autopilot estimates and measures now.
     pub(super) fn sensors(&self) -> SensorReadings {
         let state = self.vehicle.state();
         SensorReadings {

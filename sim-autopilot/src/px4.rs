@@ -92,7 +92,7 @@ pub struct Commander {
     intended_mode: Px4Mode,
     /// Mode that replaces Return, Takeoff or Land when the vehicle is disarmed.
     mode_after_disarm: Px4Mode,
-    /// Mode that the active failsafe flies.
+    /// Mode that the active failsafe flies; `None` without one.
     failsafe: Option<Px4Mode>,
     phase: FlightPhase,
     armed_us: u64,

@@ -203,6 +203,7 @@ impl AutopilotSoftware {
         }
     }
 
+    /// Sets GPS's fix.
     pub(super) fn set_gps_fix(&mut self, fix: GpsFix) {
         match self {
             Self::Px4(px4) => px4.commander.set_gps_fix(fix),

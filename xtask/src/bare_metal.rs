@@ -102,6 +102,7 @@ impl Board {
         }
     }
 
+    /// Rust's target for the board.
     fn target(self) -> &'static str {
         match self {
             Self::Qemu | Self::NucleoH743 => "thumbv7em-none-eabihf",
@@ -109,6 +110,7 @@ impl Board {
         }
     }
 
+    /// The compiler's name for the board's processor.
     fn cpu(self) -> &'static str {
         match self {
             Self::Qemu | Self::NucleoH743 => "cortex-m7",
@@ -209,6 +211,7 @@ fn cargo_target_variable(target: &str, name: &str) -> String {
     format!("CARGO_TARGET_{}_{name}", target.to_uppercase().replace(['-', '.'], "_"))
 }
 
+/// Whether rustup has installed the target.
 fn rustup_has_target(target: &str) -> bool {
     let installed = command("rustup").args(["target", "list", "--installed"]).output();
     installed

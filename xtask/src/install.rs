@@ -37,6 +37,7 @@ pub const CPP_BASELINE: &[Package] = &[
 /// The program that counts instructions on the host.
 pub const INSTRUCTION_COUNTER: &[Package] =
     &[Package { name: "valgrind", file: "/usr/bin/valgrind" }];
+/// Python packages with the MAVLink clients that tests fly with.
 const PYTHON_CLIENTS: &[&str] = &["mavsdk<4", "pymavlink", "MAVProxy"];
 
 /// Installs those of `packages` that are missing, if root on Debian; otherwise the error names
@@ -62,6 +63,7 @@ pub fn install_missing(packages: &[Package]) -> Result<()> {
     apt(&[&["install", "-y", "-qq", "--no-install-recommends"], missing.as_slice()].concat())
 }
 
+/// Whether this program runs as root.
 fn is_root() -> bool {
     let id = command("id").arg("-u").output();
     id.is_ok_and(|out| out.stdout.trim_ascii() == b"0")

@@ -13,17 +13,23 @@ use crate::shell::cargo;
 /// What is read of `deny.toml`.
 #[derive(Deserialize)]
 struct Deny {
+    /// Which targets are built.
     graph: Graph,
+    /// Which licences are allowed.
     licenses: Licences,
 }
 
+/// Section `graph` of `deny.toml`.
 #[derive(Deserialize)]
 struct Graph {
+    /// Rust's names of the targets.
     targets: Vec<String>,
 }
 
+/// Section `licenses` of `deny.toml`.
 #[derive(Deserialize)]
 struct Licences {
+    /// SPDX ids of the licences that every crate may have.
     allow: Vec<String>,
     exceptions: Vec<Exception>,
 }
@@ -33,6 +39,7 @@ struct Licences {
 struct Exception {
     #[serde(rename = "crate")]
     name: String,
+    /// SPDX ids of the further licences.
     allow: Vec<String>,
 }
 
@@ -43,21 +50,25 @@ struct Metadata {
     resolve: Resolve,
 }
 
+/// A crate.
 #[derive(Deserialize)]
 struct Package {
     id: String,
     name: String,
+    /// Licence as an SPDX expression; `None` if the crate states none.
     license: Option<String>,
     /// `None` for a crate of this workspace.
     source: Option<String>,
 }
 
+/// The dependencies as they are resolved.
 #[derive(Deserialize)]
 struct Resolve {
     /// The packages that are built for the target.
     nodes: Vec<Node>,
 }
 
+/// A resolved package.
 #[derive(Deserialize)]
 struct Node {
     id: String,

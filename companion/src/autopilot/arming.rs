@@ -36,7 +36,7 @@ const IN_PROGRESS: u8 = 5;
 /// State of arming, disarming and flight modes between the companion and its autopilot.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ArmingHandshake {
-    /// When arming was last requested.
+    /// When arming was last requested; `None` before.
     requested_at: Option<Instant>,
     /// Arming requests since the last COMMAND_ACK that denied one.
     unanswered_requests: u8,

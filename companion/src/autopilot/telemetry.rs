@@ -107,9 +107,9 @@ pub enum OriginRange {
 pub struct Telemetry {
     sequence: SequenceFilter,
     /// Kind of autopilot by the first HEARTBEAT; HEARTBEATs of another kind are ignored from then
-    /// on.
+    /// on. `None` before.
     pub kind: Option<AutopilotKind>,
-    /// When the last HEARTBEAT was received.
+    /// When the last HEARTBEAT was received; `None` before.
     pub heartbeat_at: Option<Instant>,
     /// When the first HEARTBEAT after the last gap of more than 4.5 s was received.
     heartbeats_since: Instant,
@@ -125,7 +125,7 @@ pub struct Telemetry {
     pub(super) landed: Option<LandedReport>,
     /// Battery charge in percent, −1 unknown.
     pub battery_percent: i8,
-    /// When the charge was last reported.
+    /// When the charge was last reported; `None` before.
     pub(crate) battery_at: Option<Instant>,
     /// Height above home, metres; ArduCopter's NAV_TAKEOFF takes its height from there.
     pub above_home_m: f32,
@@ -152,7 +152,7 @@ pub struct Telemetry {
     pub position: Point,
     /// Velocity in the mission frame, ENU m/s.
     pub velocity: Point,
-    /// The last COMMAND_ACK, until it is taken.
+    /// The last COMMAND_ACK, until it is taken; else `None`.
     ack: Option<Ack>,
     /// When each stream of [`AutopilotKind::streams`] that is on was last received, in that order;
     /// `Instant::ZERO` for never.

@@ -215,7 +215,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether this vehicle flies home, back along its path, or aside without a way back, or seeks
-    /// such a path: it lands at the end.
+    /// a path for one of these: it lands at the end.
     fn will_land_off_plan(&self) -> bool {
         let home = self.guidance.returning || self.detours.is_homeward();
         home || (self.guidance.ends_away_from_goal && !self.detours.is_beside_plan())

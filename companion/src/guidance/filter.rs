@@ -62,9 +62,10 @@ struct FilterConflict {
 /// State of the safety filter after the last step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct SafetyFilter {
-    /// Since when the filter has kept the vehicle stopped.
+    /// Since when the filter has kept the vehicle stopped; `None` while it does not.
     stopped_since: Option<Instant>,
-    /// Since when, in this stop, the path ahead has been free.
+    /// Since when, in this stop, the path ahead has been free; `None` while it is not, or without a
+    /// stop.
     path_clear_since: Option<Instant>,
     /// MAVLink system id of the neighbour that the filter stops for; 0 for none.
     blocker_id: u8,
@@ -82,9 +83,10 @@ pub(crate) struct SafetyFilter {
     /// Whether no other vehicle may be in the column to the ground, or before take-off to the top
     /// of the climb; true where no column is checked.
     column_clear: bool,
-    /// Since when `column_clear` has had its value.
+    /// Since when `column_clear` has had its value; `None` before the first check.
     column_clear_changed_at: Option<Instant>,
-    /// Since when a vehicle that is on the ground, or lost, has been in that column.
+    /// Since when a vehicle that is on the ground, or lost, has been in that column; `None` while
+    /// none is.
     column_blocked_for_good_since: Option<Instant>,
     /// Since when this landing has been waiting for a free column; times at which the column was
     /// free do not end the wait.

@@ -27,7 +27,7 @@ pub(crate) struct Hold {
     standing_since: Option<Instant>,
     /// Whether the hold has begun: from then on the vehicle's intents report it.
     active: bool,
-    /// When the hold was last sent in an intent.
+    /// When the hold was last sent in an intent; `None` before.
     reported_at: Option<Instant>,
     /// Delay with which others hear an intent.
     message_delay: Duration,

@@ -89,7 +89,8 @@ pub struct Intent {
     /// Whether the sender may come down from its place: it climbs, descends or lands, or a pilot or
     /// failsafe flies it.
     pub may_come_down: bool,
-    /// Echo of another vehicle's intent, by which that vehicle measures the radio's delay.
+    /// Echo of another vehicle's intent, by which that vehicle measures the radio's delay. `None`
+    /// without one.
     pub echo: Option<IntentEcho>,
     /// Points that the sender flies along next, in the mission frame: first to where it will stop
     /// for now, then as far as it flies on if no other vehicle hears it. Empty while a pilot or a

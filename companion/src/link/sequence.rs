@@ -9,7 +9,8 @@ const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
 /// for 1 s after it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SequenceFilter {
-    /// Sequence number of the last accepted frame, and when it was received.
+    /// Sequence number of the last accepted frame, and when it was received. `None` before the
+    /// first.
     last: Option<(u8, Instant)>,
 }
 

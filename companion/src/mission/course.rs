@@ -359,7 +359,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Sends the task's commands to the autopilot that are due at this place of the path. Returns
-    /// whether the vehicle leaves its path here, and takes no more pictures.
+    /// whether the vehicle leaves its path at this place, and takes no more pictures.
     pub(crate) fn step_task(
         &mut self,
         along: PathProgress,

@@ -70,7 +70,7 @@ pub(crate) struct PhotographedWaypoints {
     planned_round: u8,
     /// Whether the vehicle has left its pad since the plan was requested.
     has_left_pad: bool,
-    /// When a vehicle in flight last reported what its plan leaves out.
+    /// When a vehicle in flight last reported what its plan leaves out; `None` before.
     flight_report_at: Option<Instant>,
     /// Index of the first range of the next report, in the set that is reported.
     next_range: usize,

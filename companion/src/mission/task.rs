@@ -30,7 +30,7 @@ impl TaskCommands {
     }
 
     /// Queues the task's commands to the autopilot that are due at this place of the path. Returns
-    /// whether the vehicle leaves its path here, and takes no more pictures.
+    /// whether the vehicle leaves its path at this place, and takes no more pictures.
     pub(crate) fn step<const W: usize>(
         &mut self,
         task: &Task,

@@ -19,11 +19,12 @@ use crate::swarm::fleet::{DivisionInputs, MAX_DIVISIONS, VehicleDivisionInput};
 /// every request fails.
 #[derive(Clone, Copy, Default)]
 pub struct PlanFiles<'a> {
-    /// Mission to plan.
+    /// Mission to plan. `None` without a valid one.
     pub mission: Option<MissionView<'a>>,
-    /// Roadmap on which the routes of a mission with goals are searched.
+    /// Roadmap on which the routes of a mission with goals are searched. `None` without a valid
+    /// one.
     pub roadmap: Option<RoadmapView<'a>>,
-    /// Field of heights that a coverage mission's flights keep above.
+    /// Field of heights that a coverage mission's flights keep above. `None` without a valid one.
     pub field: Option<FieldView<'a>>,
 }
 

@@ -120,15 +120,15 @@ pub(crate) struct Detours {
     failed_at: Instant,
     /// Number of detours in a row on which the vehicle made no progress.
     detours_without_progress: u8,
-    /// When a search for a path aside last failed.
+    /// When a search for a path aside last failed; `None` before.
     aside_search_failed_at: Option<Instant>,
     /// Place from before a jump of the position, and the time of the jump; `None` without a jump.
     place_before_jump: Option<(Point, Instant)>,
     /// Since when all other vehicles have been standing, by `Neighbours::are_all_standing`.
     all_standing_since: Option<Instant>,
-    /// Since when this vehicle claims the turn to fly a detour.
+    /// Since when this vehicle claims the turn to fly a detour; `None` while it does not.
     claimed_since: Option<Instant>,
-    /// When the scan under way began.
+    /// When the scan under way began; `None` without one.
     scan_began: Option<Instant>,
     /// Progress of the scan under way, and whether the last one found an obstacle on the path.
     scan: IncrementalScan,

@@ -67,7 +67,7 @@ pub struct Store {
     photographed_unsaved: bool,
     /// Bytes of the upload that are not programmed yet.
     reassembly: UploadReassembly,
-    /// The last upload, under way or ended.
+    /// The last upload, under way or ended; `None` before the first.
     upload: Option<(File, UploadState)>,
     /// The job under way.
     job: FlashJob,

@@ -79,13 +79,13 @@ pub struct OwnReport {
 /// Reception of another vehicle: whether this one and others hear it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct VehicleReception {
-    /// When this vehicle last received an intent from the other one.
+    /// When this vehicle last received an intent from the other one; `None` before.
     pub heard_at: Option<Instant>,
     /// Whether the other vehicle lately reported that it hears this one.
     pub hears_us: bool,
     /// Whether a vehicle heard by this one lately reported that it hears the other one.
     pub heard_by_others: bool,
-    /// Ranks of the vehicles that the other one reported to hear, as bits.
+    /// Ranks of the vehicles that the other vehicle reported to hear, as bits.
     pub heard_bits: u32,
 }
 

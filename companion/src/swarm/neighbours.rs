@@ -51,7 +51,7 @@ pub struct Neighbours<const V: usize> {
     roster_count: usize,
     /// Number of positions dropped because the table had no room for their sender.
     dropped_positions: u16,
-    /// When a vehicle of the roster last reported that it hears this one.
+    /// When a vehicle of the roster last reported that it hears this one; `None` before.
     reported_heard_at: Option<Instant>,
     /// When the last scan began that found no vehicle out of the plan on the path.
     path_clear_at: Instant,
@@ -72,7 +72,7 @@ pub struct Neighbours<const V: usize> {
     /// State by which the vehicles of a coverage mission agree how to divide what a vehicle leaves;
     /// `None` in other missions.
     fleet: Option<Fleet<V>>,
-    /// Heights of the ground of an area that is not level.
+    /// Heights of the ground of an area that is not level; `None` if it is level.
     ground: Option<UnevenGround>,
     /// Silence after which a lost vehicle is assumed to be on the ground.
     down_after: Duration,

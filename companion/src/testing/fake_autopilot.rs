@@ -119,7 +119,7 @@ pub struct Bench {
     framers: [Framer; 2],
     sequence: u8,
     gcs_sequence: u8,
-    /// When the vehicle touched down in the landing mode.
+    /// When the vehicle touched down in the landing mode; `None` in other modes and in the air.
     landed_at: Option<Instant>,
     /// Since when the vehicle has stood armed on the ground without a take-off.
     idle_since: Option<Instant>,

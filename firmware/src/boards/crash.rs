@@ -26,6 +26,7 @@ fn read_record() -> Option<CrashRecord> {
     })
 }
 
+/// Writes the record to the memory that outlasts a restart.
 fn write_record(kept: &CrashRecord) {
     // SAFETY: as in `read_record`.
     unsafe { (&raw mut RECORD).cast::<[u32; RECORD_WORDS]>().write_volatile(kept.to_words()) };

@@ -44,7 +44,9 @@ pub use transmitter::Transmitter;
 
 pub use super::sections::zero_sections;
 
+/// Baud rate of the autopilot's UART.
 const AUTOPILOT_BAUD: u32 = 921_600;
+/// Baud rate of the radio's UART.
 const RADIO_BAUD: u32 = 460_800;
 /// Bytes of the ring buffer that DMA fills: 22 ms at the autopilot's baud rate. `memory.x` places
 /// the statics named `DMA_…` in SRAM3, which DMA reaches and which is not cached.
@@ -142,6 +144,7 @@ pub fn start() -> Parts {
 /// The independent watchdog, and the LED that toggles each time it is fed.
 pub struct Watchdog {
     device: IndependentWatchdog<'static, peripherals::IWDG1>,
+    /// Toggles each time the watchdog is fed.
     led: Output<'static>,
 }
 

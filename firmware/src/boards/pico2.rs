@@ -39,7 +39,9 @@ bind_interrupts!(struct Irqs {
     UART1_IRQ => BufferedInterruptHandler<peripherals::UART1>;
 });
 
+/// Baud rate of the autopilot's UART.
 const AUTOPILOT_BAUD: u32 = 921_600;
+/// Baud rate of the radio's UART.
 const RADIO_BAUD: u32 = 460_800;
 /// Bytes of a UART's ring buffer: 22 ms at the autopilot's baud rate.
 const UART_RING_LEN: usize = 2048;
@@ -210,6 +212,7 @@ impl crate::flash::Flash for Flash {
 /// The watchdog, and the LED that toggles each time it is fed.
 pub struct Watchdog {
     device: watchdog::Watchdog,
+    /// Toggles each time the watchdog is fed.
     led: Output<'static>,
 }
 

@@ -37,7 +37,7 @@ struct PlanMission {
 struct PlanItem {
     /// Kind of a complex item, such as "survey"; `None` for a simple one.
     complex_item_type: Option<String>,
-    /// Latitude and longitude of each vertex, degrees.
+    /// Latitude and longitude of each vertex, degrees. `None` for an item without a polygon.
     polygon: Option<Vec<[f64; 2]>>,
 }
 

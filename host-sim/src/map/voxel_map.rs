@@ -14,6 +14,7 @@ pub struct VoxelMap {
     /// `obstacle_words` holds no unknown cells.
     pub occupied_words: Option<Vec<u64>>,
     /// Bits of the cells in which no roadmap node may lie, if these are more than the obstacles.
+    /// `None` if not.
     pub no_node_words: Option<Vec<u64>>,
     /// Whether the space beyond the map's faces is an obstacle.
     pub beyond_map: Outside,

@@ -172,7 +172,8 @@ pub struct VehicleSection {
     /// Where the vehicle's path begins, ENU metres; in a coverage mission, as read, its pad on the
     /// ground.
     pub start: Point,
-    /// Index (from 0) into [`MissionSection::goals`], for labelled missions.
+    /// Index (from 0) into [`MissionSection::goals`], for labelled missions. `None` in other
+    /// missions.
     pub goal_index: Option<usize>,
     /// Radius of the vehicle's hull, metres.
     pub radius_m: f32,

@@ -35,11 +35,11 @@ pub struct FlownDivision {
 /// When vehicles agree on a division.
 #[derive(Clone, Debug, Default)]
 struct Agreement {
-    /// When a vehicle first reported a commitment, seconds.
+    /// When a vehicle first reported a commitment, seconds. `None` before.
     first_commitment_s: Option<f32>,
     /// Ids of the vehicles that reported that all have the same division.
     agreeing: BTreeSet<u8>,
-    /// When the last of them did, seconds.
+    /// When the last of them did, seconds. `None` before.
     agreed_s: Option<f32>,
 }
 

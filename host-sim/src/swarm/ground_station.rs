@@ -65,7 +65,7 @@ pub struct GroundStation {
     system_id: u8,
     /// Sequence number of the next frame.
     sequence: u8,
-    /// When a vehicle was first ready.
+    /// When a vehicle was first ready. `None` before.
     first_ready_us: Option<u64>,
     /// When MISSION_START was first sent, microseconds; `None` before.
     start_commanded_us: Option<u64>,

@@ -85,7 +85,7 @@ struct WatchedVehicle {
     /// Whether it touched an obstacle at the last step.
     in_contact: bool,
     /// Where the vehicle's distance to the nearest obstacle was last measured, and that distance,
-    /// metres.
+    /// metres. `None` before.
     measured_clearance: Option<(Point, f32)>,
     /// Greatest arc length along its present path so far, metres.
     best_progress_m: f32,

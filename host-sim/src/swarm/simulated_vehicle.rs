@@ -51,14 +51,14 @@ pub struct SimulatedVehicle {
     pub plan_answer: PlanAnswer,
     /// First and last warning of the mission table since `Follow` was entered or `Aborted` left.
     warnings: Option<[&'static str; 2]>,
-    /// When the vehicle first left the ground, seconds.
+    /// When the vehicle first left the ground, seconds. `None` before.
     pub took_off_s: Option<f64>,
     /// When the vehicle first stood on the ground again, disarmed, seconds; `None` for a vehicle
     /// that lost its power before.
     pub landed_s: Option<f64>,
     /// When the vehicle first stood or lay on the ground again, its motors off, seconds.
     pub back_on_ground_s: Option<f64>,
-    /// When the vehicle lost its power, or its motors in the air, seconds.
+    /// When the vehicle lost its power, or its motors in the air, seconds. `None` if it did not.
     pub power_lost_at_s: Option<f64>,
     config: Config<MAX_VEHICLES>,
     to_companion: SerialLink,

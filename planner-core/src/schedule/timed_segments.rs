@@ -90,13 +90,13 @@ impl<const W: usize> Flight<W> {
 /// be missing; a leg of length 0 has no segments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StraightPart {
-    /// The stay on the pad, or the hover at the waypoint where the leg begins.
+    /// The stay on the pad, or the hover at the waypoint where the leg begins. `None` without one.
     stay_before: Option<TimedSegment>,
     pub(super) leg: Leg,
     /// Arc lengths of the leg's beginning and end, metres.
     from_m: f32,
     to_m: f32,
-    /// The stay at the landing place.
+    /// The stay at the landing place. `None` without one.
     stay_after: Option<TimedSegment>,
 }
 

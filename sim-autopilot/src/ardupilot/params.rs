@@ -80,6 +80,7 @@ pub fn default_params(system_id: u8, airframe: &AirframeParameters) -> Params {
     Params::new(DEFAULTS, Encoding::Cast, &own)
 }
 
+/// No demand on any axis.
 const NO_DEMAND: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 
 /// Values of the parameters that have an effect, each named by its effect. Metres, seconds, m/s.
@@ -87,13 +88,21 @@ const NO_DEMAND: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 #[expect(missing_docs, reason = "each is the parameter it is read from, in `CopterTuning::new`")]
 pub struct CopterTuning {
     pub gains: Gains,
+    /// Horizontal speed limit, m/s.
     pub speed_max: f32,
+    /// Climb limit, m/s.
     pub climb_max: f32,
+    /// Descent limit, m/s.
     pub descend_max: f32,
+    /// Horizontal acceleration limit, m/s².
     pub acceleration_max: f32,
+    /// Vertical acceleration limit, m/s².
     pub acceleration_max_z: f32,
+    /// Horizontal jerk limit, m/s³.
     pub jerk_max: f32,
+    /// Vertical jerk limit, m/s³.
     pub jerk_max_z: f32,
+    /// Descent rate of a landing near the ground, m/s.
     pub land_speed: f32,
     /// Height above home at which a landing has slowed down to `land_speed`, metres.
     pub land_slow_below: f32,

@@ -63,6 +63,7 @@ impl ReceivedCommand {
     }
 }
 
+/// Parameters 1 to 4 of a command message.
 fn params_1_to_4(fields: &PayloadReader<'_>) -> [f32; 4] {
     [fields.f32(0), fields.f32(4), fields.f32(8), fields.f32(12)]
 }

@@ -19,7 +19,9 @@ pub const MAX_FRAME_LEN: usize = 267;
 
 const V1_START: u8 = 0xFE;
 const V2_START: u8 = 0xFD;
+/// Length of a MAVLink 1 header, bytes.
 const V1_HEADER: usize = 6;
+/// Length of a MAVLink 2 header, bytes.
 const V2_HEADER: usize = 10;
 /// Incompatibility flag of a MAVLink 2 frame: a signature follows. A frame with any other flag is
 /// not read.
@@ -41,6 +43,7 @@ pub struct CheckedFrame {
     pub message_id: u32,
     /// Length of the received payload, bytes.
     len: usize,
+    /// The payload, padded with zeros beyond `len`.
     payload: [u8; 255],
 }
 
@@ -124,6 +127,7 @@ enum ParsedFront {
 /// Finds frames in the bytes received at one port.
 #[derive(Clone, Debug, Default)]
 pub struct PortFramer {
+    /// Bytes that belong to no complete frame yet, oldest first.
     bytes: Vec<u8>,
     /// Time at which each byte arrived, microseconds since boot.
     arrival_us: Vec<u64>,
@@ -152,6 +156,7 @@ impl PortFramer {
         }
     }
 
+    /// Removes the first `count` bytes.
     fn drop_first(&mut self, count: usize) {
         self.bytes.drain(..count);
         self.arrival_us.drain(..count);
@@ -177,6 +182,7 @@ fn parse_front(bytes: &[u8]) -> ParsedFront {
     }
 }
 
+/// Length of the header that begins with these bytes.
 fn header_len(bytes: &[u8]) -> usize {
     if bytes[0] == V1_START { V1_HEADER } else { V2_HEADER }
 }

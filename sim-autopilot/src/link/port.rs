@@ -58,7 +58,9 @@ pub struct PendingAck {
 pub(crate) struct Sender {
     /// Index of the port.
     pub(crate) port: usize,
+    /// System id.
     pub(crate) system: u8,
+    /// Component id.
     pub(crate) component: u8,
 }
 
@@ -73,11 +75,13 @@ impl Sender {
 #[derive(Clone, Debug)]
 pub struct Port {
     framer: PortFramer,
+    /// System id of the autopilot.
     system_id: u8,
     /// Sequence number of the next frame.
     sequence: u8,
     /// Encoded frames; the first `sent_bytes` bytes have been fetched already.
     queue: Vec<u8>,
+    /// Number of bytes of `queue` that have been fetched.
     sent_bytes: usize,
     /// Number of messages dropped because the send queue was full.
     pub dropped_messages: u64,
@@ -89,7 +93,8 @@ pub struct Port {
     pub pending_acks: Vec<(u64, PendingAck)>,
     /// Ids of messages to be sent once, at the end of the step.
     pub requested_once: Vec<u32>,
-    /// Index of the next parameter of a PARAM_REQUEST_LIST that is being answered.
+    /// Index of the next parameter of a PARAM_REQUEST_LIST that is being answered. `None` without
+    /// one.
     pub param_cursor: Option<usize>,
     /// Number of PING messages sent.
     pub pings: u32,

@@ -16,6 +16,7 @@ impl<'a> PayloadReader<'a> {
         Self(frame.padded_payload())
     }
 
+    /// `N` bytes from index `at` on.
     fn bytes<const N: usize>(&self, at: usize) -> [u8; N] {
         let mut bytes = [0; N];
         bytes.copy_from_slice(&self.0[at..at + N]);

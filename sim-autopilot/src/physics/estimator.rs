@@ -32,18 +32,21 @@ impl EstimatorErrors {
     }
 }
 
-/// Model of one axis: standard deviation of the velocity error (m/s), its time constant (s), time
-/// constant with which GPS reduces the position error (s), and limit of the position error (m; of
-/// both horizontal axes together).
+/// Model of one axis.
 #[derive(Clone, Copy, Debug)]
 struct ErrorModel {
+    /// Standard deviation of the velocity error, m/s.
     sigma_mps: f32,
+    /// Time constant of the velocity error, seconds.
     tau_s: f32,
+    /// Time constant with which GPS reduces the position error, seconds.
     gps_pull_tau_s: f32,
+    /// Limit of the position error, metres; of both horizontal axes together.
     max_error_m: f32,
 }
 
 impl ErrorModel {
+    /// No error.
     const NONE: Self = Self { sigma_mps: 0.0, tau_s: 1.0, gps_pull_tau_s: 1.0, max_error_m: 0.0 };
 }
 
@@ -77,9 +80,11 @@ fn error_models(
 #[derive(Clone, Debug)]
 pub struct EstimateErrorState {
     random: Gaussian,
+    /// Models of the axes: east, north, up.
     axes: [ErrorModel; 3],
     /// Position error without the constant height error, ENU metres.
     position_drift: Point,
+    /// Constant error of the height, metres.
     height_bias_m: f32,
     /// Position error, ENU metres.
     pub position: Point,

@@ -23,12 +23,17 @@ const SLOPE_HALF_SPAN_M: f64 = 64.0;
 /// Conversions between one autopilot's frame (EKF origin and projection) and the mission frame.
 #[derive(Clone, Debug)]
 pub struct LocalFrame {
+    /// Projection that the autopilot uses.
     projection: Projection,
+    /// Origin of the mission frame.
     world_origin: Geodetic,
+    /// Origin of the autopilot's frame.
     ekf_origin: Geodetic,
-    /// Point about which the conversions are linear, ENU metres; the next two are the same point.
+    /// Point about which the conversions are linear, ENU metres in the mission frame.
     centre: Vector3<f64>,
+    /// `centre` in the autopilot's frame, NED metres.
     centre_ned: Vector3<f64>,
+    /// `centre` by latitude, longitude and altitude.
     centre_geodetic: Geodetic,
     /// Change of NED for each metre of ENU.
     ned_slope: Matrix3<f64>,

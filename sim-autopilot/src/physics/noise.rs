@@ -52,6 +52,7 @@ impl Gaussian {
         (sum as f32 - 131_070.0) * (1.732_050_8 / 65_536.0)
     }
 
+    /// Three samples of N(0, 1).
     fn sample_vector(&mut self) -> Point {
         Point::new(self.sample(), self.sample(), self.sample())
     }
@@ -60,6 +61,7 @@ impl Gaussian {
 /// An Ornstein–Uhlenbeck process on three axes, stationary from its first value on.
 #[derive(Clone, Debug)]
 struct OrnsteinUhlenbeck {
+    /// Value now.
     value: Point,
     /// Factor on the value in each update.
     decay: f32,
@@ -83,11 +85,16 @@ impl OrnsteinUhlenbeck {
 /// Random wind and estimate errors of one vehicle.
 #[derive(Clone, Debug)]
 pub struct Disturbance {
+    /// Source of all random numbers.
     random: Gaussian,
+    /// Gusts, ENU m/s, before they are clamped; `None` without gusts.
     gust: Option<OrnsteinUhlenbeck>,
+    /// Largest gust beyond the mean wind, m/s.
     gust_peak_mps: f32,
-    /// Slow position error, fast position error (metres), and velocity error (m/s).
+    /// Slow position error, fast position error (metres), and velocity error (m/s). `None` without
+    /// noise.
     errors: Option<[OrnsteinUhlenbeck; 3]>,
+    /// Mean wind, ENU m/s.
     mean_wind: Point,
     /// Wind now: mean and gust, ENU m/s.
     pub wind: Point,
@@ -144,6 +151,7 @@ impl Disturbance {
         self.update_outputs();
     }
 
+    /// Computes wind and errors from the processes' values.
     fn update_outputs(&mut self) {
         if let Some(gust) = &self.gust {
             self.wind = self.mean_wind + clamp_gust(&gust.value, self.gust_peak_mps);

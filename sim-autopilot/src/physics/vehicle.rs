@@ -307,6 +307,7 @@ impl Multicopter {
         self.update_heading(demand, gains, dt);
     }
 
+    /// Turns the heading towards the demand for `dt` seconds.
     fn update_heading(&mut self, demand: &Demand, gains: &Gains, dt: f32) {
         let max = gains.heading_rate_max;
         let rate = if demand.heading.is_nan() {

@@ -107,11 +107,13 @@ impl Px4 {
             || telemetry::PX4_STREAMS.iter().any(|stream| stream.0 == id)
     }
 
+    /// Requests a flight mode.
     fn change_mode(&mut self, platform: &Platform, mode: Px4Mode) -> CommandOutcome {
         let sensors = platform.sensors();
         self.commander.request_mode(mode, &sensors, &self.tuning)
     }
 
+    /// Carries out COMPONENT_ARM_DISARM; returns the MAV_RESULT, as the next functions.
     fn arm_or_disarm(&mut self, platform: &mut Platform, command: &ReceivedCommand) -> u8 {
         let arming = Arming::commanded_by(command);
         if command.param[0] == 1.0 {

@@ -118,6 +118,7 @@ pub fn default_params(system_id: u8, airframe: &AirframeParameters) -> Params {
     Params::new(DEFAULTS, Encoding::Bytewise, &own)
 }
 
+/// No demand on any axis.
 const NO_DEMAND: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 
 /// Values of the parameters that have an effect, each named by its effect. Metres, seconds, m/s.
@@ -125,21 +126,29 @@ const NO_DEMAND: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 #[expect(missing_docs, reason = "each is the parameter it is read from, in `Px4Tuning::new`")]
 pub struct Px4Tuning {
     pub gains: Gains,
+    /// Horizontal speed limit of manual and Offboard flight, m/s.
     pub speed_max: f32,
+    /// Climb limit of manual and Offboard flight, m/s.
     pub climb_max: f32,
+    /// Descent limit of manual and Offboard flight, m/s.
     pub descend_max: f32,
+    /// Horizontal speed of the automatic modes, m/s.
     pub cruise_speed: f32,
     /// Climb limit of the automatic modes, m/s.
     pub auto_climb_max: f32,
+    /// Descent limit of the automatic modes, m/s.
     pub auto_descend_max: f32,
     /// Descent rate below the second height of `land_slow_below`, m/s.
     pub land_speed: f32,
     /// Heights above home between which a landing slows down, the upper first, metres.
     pub land_slow_below: [f32; 2],
+    /// Descent rate below `land_crawl_below`, m/s.
     pub land_crawl_speed: f32,
     /// Distance to the ground below which a landing with a distance sensor crawls, metres.
     pub land_crawl_below: f32,
+    /// Jerk limit of the automatic modes, m/s³.
     pub auto_jerk: f32,
+    /// Downward acceleration limit of the automatic modes, m/s².
     pub auto_acceleration_down: f32,
     pub takeoff_speed: f32,
     /// Duration of the thrust's rise in a take-off, seconds.

@@ -36,7 +36,9 @@ pub(crate) type MissionItem = [u8; 37];
 /// An upload in progress.
 #[derive(Clone, Debug)]
 struct MissionUpload {
+    /// Sender of the upload.
     from: Sender,
+    /// MAV_MISSION_TYPE: mission 0, geofence 1, rally points 2.
     mission_type: u8,
     /// Number of items that COUNT announced.
     count: u16,
@@ -44,6 +46,7 @@ struct MissionUpload {
     items: Vec<MissionItem>,
     /// Time of the last item request, microseconds since boot.
     requested_us: u64,
+    /// Number of times that the present item was requested again.
     retries: u32,
 }
 
@@ -52,9 +55,10 @@ struct MissionUpload {
 pub(crate) struct MissionProgress {
     /// Number of the current item; the number of items when all are completed.
     pub current_item: u16,
-    /// Time at which the current item began, microseconds since boot.
+    /// Time at which the current item began, microseconds since boot. `None` before.
     pub(crate) item_begun_us: Option<u64>,
     /// Time at which the vehicle first was at the current item's place, microseconds since boot.
+    /// `None` before.
     pub(crate) arrived_us: Option<u64>,
 }
 
@@ -97,6 +101,7 @@ impl MissionProgress {
 pub struct Missions {
     /// Items of each mission type: mission, geofence, rally points.
     stored: [Vec<MissionItem>; MISSION_TYPES],
+    /// The upload in progress; `None` without one.
     upload: Option<MissionUpload>,
     /// Progress of the mission that is flown.
     pub(crate) progress: MissionProgress,
@@ -132,6 +137,7 @@ impl Missions {
 }
 
 impl MissionUpload {
+    /// Requests the next item.
     fn request_item(&mut self, now_us: u64, port: &mut Port) {
         self.requested_us = now_us;
         let [low, high] = (self.items.len() as u16).to_le_bytes();
@@ -263,6 +269,7 @@ impl Missions {
     }
 }
 
+/// Sends a MISSION_ACK.
 fn send_mission_ack(port: &mut Port, from: Sender, result: u8, kind: u8) {
     port.send_raw(ACK, &[from.system, from.component, result, kind]);
 }

@@ -84,14 +84,17 @@ pub(crate) fn interpolate_height(
     (from.z + up * share, rate)
 }
 
+/// The f32 at byte `at` of an item.
 fn item_f32(item: &MissionItem, at: usize) -> f32 {
     f32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]])
 }
 
+/// The i32 at byte `at` of an item.
 fn item_i32(item: &MissionItem, at: usize) -> i32 {
     i32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]])
 }
 
+/// The item's `MAV_CMD` number.
 fn item_command(item: &MissionItem) -> u16 {
     u16::from_le_bytes([item[30], item[31]])
 }

@@ -70,8 +70,11 @@ impl ParamValue {
 /// The parameter table of one vehicle, sorted by name.
 #[derive(Clone, Debug)]
 pub struct Params {
+    /// Names and defaults, sorted by name.
     table: &'static [(&'static str, ParamValue)],
+    /// How integers are sent.
     encoding: Encoding,
+    /// The values, in the order of `table`.
     values: Vec<ParamValue>,
 }
 

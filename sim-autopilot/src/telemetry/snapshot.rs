@@ -88,6 +88,7 @@ pub fn attitude_from_specific_force(force: &Vector3<f32>, heading: f32) -> Attit
 }
 
 impl Snapshot {
+    /// The attitude, computed at the first call.
     pub(crate) fn attitude(&self) -> &Attitude {
         self.attitude.get_or_init(|| {
             attitude_from_specific_force(&self.specific_force, self.heading_and_rate.0)
@@ -98,15 +99,18 @@ impl Snapshot {
         self.status.autopilot == SimulatedKind::Px4
     }
 
+    /// Time since boot, milliseconds.
     pub(crate) fn boot_ms(&self) -> u32 {
         (self.time_us / 1000) as u32
     }
 
+    /// Voltage of the battery.
     pub(crate) fn battery_volts(&self) -> f32 {
         // Four cells, each from BAT1_V_EMPTY (3.6 V) to BAT1_V_CHARGED (4.05 V).
         4.0 * (3.6 + 0.45 * self.battery)
     }
 
+    /// Heading, degrees from 0 to 360.
     pub(crate) fn heading_deg(&self) -> f32 {
         let degrees = self.heading_and_rate.0.to_degrees();
         if degrees < 0.0 { degrees + 360.0 } else { degrees }

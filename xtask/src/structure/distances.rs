@@ -21,7 +21,9 @@ use syn::{Attribute, Expr, ExprLit, GenericArgument, Ident, Item, Lit, Meta, Pat
 
 use super::sources::{Source, Tree};
 
+/// The page.
 const PAGE: &str = "docs/margins.md";
+/// Crates whose constants the page lists.
 const CRATES: [&str; 3] = ["planner-core", "companion", "host-sim"];
 /// Published figures that the plans are compared with: nothing is decided by them.
 const PUBLISHED_FIGURES: &str = "host-sim/src/paper/";
@@ -57,6 +59,7 @@ not here.
 
 /// What the page shows of a constant.
 struct PageRow {
+    /// The value as the source has it.
     value: String,
     unit: &'static str,
     /// Its doc comment.
@@ -108,6 +111,7 @@ pub fn check_margins_page() -> Result<Vec<String>> {
 /// What was found in the files so far.
 #[derive(Default)]
 struct Listing {
+    /// The rows of the page.
     rows: RowsByFileAndName,
     /// The file of each name.
     files: BTreeMap<String, String>,
@@ -138,6 +142,7 @@ impl Listing {
 struct Constant {
     name: String,
     unit: &'static str,
+    /// The doc comment.
     reason: String,
     /// The value of a `Duration` in seconds, if a whole number makes it.
     seconds: Option<String>,
@@ -258,6 +263,7 @@ impl<'a> Visit<'a> for UsedNames {
     }
 }
 
+/// The text on one line, with single spaces.
 fn in_one_line(text: &str) -> String {
     let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
     line.replace("[ ", "[").replace(", ]", "]").replace(" ]", "]")
@@ -280,11 +286,13 @@ fn doc_comment_line(attributes: &[Attribute]) -> String {
         .replace("`]", "`")
 }
 
+/// Path of the file in its crate's `src`.
 fn path_in_crate(source: &Source) -> String {
     let path = source.path.display().to_string();
     path.split_once("/src/").map_or(path.clone(), |(_, file)| file.to_owned())
 }
 
+/// The page with these rows.
 fn page_text(found: &RowsByFileAndName) -> String {
     let mut page = PAGE_HEAD.to_owned();
     let mut before = "";

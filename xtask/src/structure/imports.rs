@@ -56,6 +56,7 @@ fn reachable_files(imports: &[BTreeSet<usize>], from: usize) -> BTreeSet<usize> 
     reached
 }
 
+/// Files, by index, that the file `at` imports.
 fn files_imported_by(tree: &Tree, at: usize) -> BTreeSet<usize> {
     let file = |import| match import {
         Import::File(file) => Some(file),
@@ -87,7 +88,9 @@ pub fn imports_of(tree: &Tree, at: usize) -> BTreeSet<Import> {
 
 /// Collects the item paths in a file, each with the module in which it stands.
 struct ItemPaths {
+    /// The module at which the visit is.
     module: Vec<String>,
+    /// Module and path of each path found.
     found: Vec<(Vec<String>, Vec<String>)>,
 }
 

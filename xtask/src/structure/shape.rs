@@ -170,6 +170,7 @@ pub fn unused_exceptions(found: &[String]) -> Vec<String> {
 
 /// Collects what is beyond the limits in one file after the other.
 struct ShapeVisitor {
+    /// Path of the file that is visited.
     file: String,
     found: Vec<(String, Option<&'static str>)>,
 }
@@ -188,6 +189,7 @@ impl ShapeVisitor {
         }
     }
 
+    /// Notes a function with too many lines or arguments.
     fn judge_function(&mut self, signature: &Signature, lines: usize) {
         let name = signature.ident.to_string();
         let arguments =

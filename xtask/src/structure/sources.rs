@@ -40,6 +40,7 @@ impl Tree {
         roots.iter().filter(|root| root.exists()).map(|root| Self::from_root(root)).collect()
     }
 
+    /// All files of the crate with this root.
     fn from_root(root: &Path) -> Result<Self> {
         let mut tree = Self { sources: Vec::new(), modules: BTreeMap::new() };
         let folder = root.parent().context("a root lies in a folder")?;
@@ -94,6 +95,7 @@ impl Tree {
     }
 }
 
+/// Attributes of an item.
 fn attributes(item: &Item) -> &[Attribute] {
     match item {
         Item::Mod(item) => &item.attrs,

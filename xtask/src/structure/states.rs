@@ -29,6 +29,7 @@ pub fn state_names() -> Result<BTreeSet<String>> {
     Ok(variant_names(states.context(STATE_FILE)?))
 }
 
+/// Names of an enum's variants.
 fn variant_names(item: &ItemEnum) -> BTreeSet<String> {
     item.variants.iter().map(|variant| variant.ident.to_string()).collect()
 }
@@ -58,7 +59,9 @@ fn lines_of_state_sets(items: &[Item], names: &BTreeSet<String>) -> Vec<usize> {
 
 /// Collects the lines of patterns that name two or more states.
 struct StateSetVisitor<'a> {
+    /// Names of all states.
     names: &'a BTreeSet<String>,
+    /// Lines of the patterns found so far.
     lines: Vec<usize>,
 }
 

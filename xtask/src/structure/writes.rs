@@ -121,7 +121,9 @@ fn public_modules(tree: &Tree) -> BTreeSet<Vec<String>> {
 
 /// Collects the structs' fields of a file.
 struct FieldCollector {
+    /// The module at which the visit is.
     module: Vec<String>,
+    /// Whether that module is public.
     is_public: bool,
     /// Names that `pub use` gives to other crates.
     exported: BTreeSet<String>,

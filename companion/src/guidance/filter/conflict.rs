@@ -17,8 +17,8 @@ use crate::time::{Duration, Instant};
 /// Flight time along the other vehicle's points that has to be free before a vehicle that yields
 /// continues, seconds.
 const YIELD_LOOK_AHEAD_S: f32 = 3.0;
-/// Maximum number of neighbours whose sets are compared in one step: with more nearby the vehicle
-/// stops.
+/// Maximum number of neighbours whose reachable sets are compared in one step: with more nearby the
+/// vehicle stops.
 const MAX_NEAR_COMPARED: usize = 4;
 /// Overshoot of two vehicles in the air beyond their stops, together, metres; the schedule leaves
 /// 0.5 m for this and for tracking errors.
@@ -36,9 +36,9 @@ const STOPPING_SWAY_MPS: f32 = 0.3;
 const LATE_LANDING_AFTER: Duration = Duration::from_secs(40);
 
 impl Guidance {
-    /// Extends the set by the stretch of path that the vehicle flies at least before it stops, and
-    /// by `extra_m`. The set begins at the setpoint, not at the vehicle, which flies on to its
-    /// setpoint in any case.
+    /// Extends this vehicle's reachable set by the stretch of path that the vehicle flies at least
+    /// before it stops, and by `extra_m`. The set begins at the setpoint, not at the vehicle, which
+    /// flies on to its setpoint in any case.
     pub(super) fn extend_own_set<const W: usize>(
         &self,
         set: &mut ReachableSet,

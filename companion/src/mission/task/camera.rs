@@ -101,8 +101,8 @@ pub(super) struct CameraControl {
 }
 
 impl CameraControl {
-    /// Queues the camera commands that are due at this place. Returns whether the vehicle leaves
-    /// its path here, and takes no more pictures.
+    /// Queues the camera commands that are due at this place of the path. Returns whether the
+    /// vehicle leaves its path at this place, and takes no more pictures.
     pub(super) fn step<const W: usize>(
         &mut self,
         photographs: &PicturePlan,

@@ -271,9 +271,9 @@ impl Detours {
 
     /// Radius of the zones of vehicles in the air, of those among them that are heard and on plan,
     /// and of those on the ground, with the safety distance `apart_m`, metres. Between two that
-    /// hover, the full margin may leave no way: a search after one that found none here keeps a
-    /// smaller one from them until another vehicle moves. On the ground a zone is only as wide as
-    /// what blocks a path, so that a goal planned beside it can be reached.
+    /// hover, the full margin may leave no way: a search after one that found none from about the
+    /// same place keeps a smaller margin from them until another vehicle moves. On the ground a
+    /// zone is only as wide as what blocks a path, so that a goal planned beside it can be reached.
     pub(super) fn keep_out_radii_m(
         &self,
         requested: DetourPurpose,

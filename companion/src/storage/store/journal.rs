@@ -31,7 +31,7 @@ pub struct Journal {
     pub(super) mission_record_crc: u32,
     /// Whether the mission file was removed and no record says so yet.
     pub(super) mission_removal_unsaved: bool,
-    /// The compaction under way: the other half is being filled.
+    /// The compaction under way: the other half is being filled. `None` without one.
     pub(super) compacting: Option<Compaction>,
     /// Failed attempts in a row to write a record or a half.
     pub(super) consecutive_failures: u8,

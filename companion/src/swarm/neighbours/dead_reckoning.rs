@@ -16,7 +16,7 @@ use crate::time::{Duration, Instant};
 /// may be nearer than estimated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct AreaGround {
-    /// Heights of the ground, where it is not level.
+    /// Heights of the ground, where it is not level; `None` where it is.
     pub(super) ground: Option<UnevenGround>,
     /// Silence after which a vehicle is on the ground.
     pub(super) down_after: Duration,

@@ -21,29 +21,32 @@ pub(crate) struct NeighbourEntry {
     pub(super) rank: u16,
     /// Rejects intents that are no newer than the last one.
     pub(super) sequence: SequenceFilter,
-    /// When a valid position, or an intent of our mission, was last heard.
+    /// When a valid position, or an intent of our mission, was last heard; `None` before.
     pub(super) heard_at: Option<Instant>,
-    /// When a valid position was last heard.
+    /// When a valid position was last heard; `None` before.
     pub(super) position_at: Option<Instant>,
     /// `time_boot_ms` of that position.
     pub(super) position_boot_ms: u32,
     /// Flags of the last intent, such as [`OUT_OF_PLAN`].
     pub(super) flags: u8,
-    /// Since when the neighbour has reported that it is out of the plan, with its position known.
+    /// Since when the neighbour has reported that it is out of the plan, with its position known;
+    /// `None` while it does not.
     pub(super) out_of_plan_since: Option<Instant>,
-    /// When the neighbour last reported that it hears this vehicle.
+    /// When the neighbour last reported that it hears this vehicle; `None` before.
     pub(super) hears_us_at: Option<Instant>,
     /// Vehicles that the neighbour hears, by its last intent, a bit for each rank.
     pub(super) heard_bits: u32,
-    /// The neighbour's progress along the shared plan as others relayed it, metres.
+    /// The neighbour's progress along the shared plan as others relayed it, metres; `None` without
+    /// a relay for the present plan.
     pub(super) relayed_progress_m: Option<f32>,
-    /// When the neighbour made the newest report that others relayed.
+    /// When the neighbour made the newest report that others relayed; `None` as
+    /// `relayed_progress_m`.
     pub(super) relayed_report_at: Option<Instant>,
     /// Sequence number of the neighbour's last intent.
     pub(super) intent_sequence: u8,
     /// Estimated one-way delay of the neighbour's messages.
     pub(super) message_delay: MessageDelay,
-    /// When the neighbour's last intent of our mission was heard.
+    /// When the neighbour's last intent of our mission was heard; `None` before.
     pub(super) intent_at: Option<Instant>,
     /// Points that the neighbour flies along next, by its last intent.
     pub(super) points: Vec<Point, MAX_POINTS>,
@@ -93,7 +96,8 @@ pub(crate) struct NeighbourEntry {
     /// Greatest progress that is believed of the neighbour, metres along its path, at an instant;
     /// the bound grows from then on. `None` before the first report of progress.
     pub(super) max_progress: Option<(f32, Instant)>,
-    /// The neighbour's place before its take-off: its autopilot may fly it back there.
+    /// The neighbour's place before its take-off: its autopilot may fly it back there. `None` if it
+    /// was not heard on the ground with a position.
     pub(super) pad: Option<Point>,
     /// Place where the neighbour, out of the plan, rested when the present detour was planned; NaN
     /// for none.

@@ -64,8 +64,8 @@ impl<'a> FilterNeighbour<'a> {
         self.motion.rests_within_m = 0.0;
     }
 
-    /// Limits the set of the neighbour, whose entry is `entry`, to the points that it reported, if
-    /// it has been silent for longer than a stop takes.
+    /// Limits the reachable set of the neighbour, whose entry is `entry`, to the points that it
+    /// reported, if it has been silent for longer than a stop takes.
     pub(crate) fn limit_to_points(&mut self, entry: &'a NeighbourEntry, bounds: &MotionBounds) {
         entry.limit_to_points(&mut self.motion, bounds);
     }

@@ -30,8 +30,8 @@ impl<const V: usize> Neighbours<V> {
     /// Distance along its points that a neighbour may have flown since it was last heard, metres,
     /// from the first place on them where it may have been: that of a stop; in a coverage mission,
     /// after [`UNHEARD_LANDING_AFTER`] of silence, all of them. If this vehicle hears nobody, its
-    /// own radio has more likely failed: then the others fly on to places unknown here, and only a
-    /// stop is assumed.
+    /// own radio has more likely failed: then the others fly on to places that this vehicle does
+    /// not know, and only a stop is assumed.
     #[inline(never)]
     fn max_unheard_flown_m(&self, entry: &NeighbourEntry, now: Instant) -> f32 {
         let lands = !entry.heard_within(now, UNHEARD_LANDING_AFTER);

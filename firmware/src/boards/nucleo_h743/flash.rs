@@ -57,6 +57,7 @@ pub const LAYOUT: FlashLayout = FlashLayout::H743;
 /// Driver of bank 2; there is one instance.
 pub struct Flash {
     device: Device<'static, Async>,
+    /// Keeps track of the lent range.
     lender: FlashLender,
 }
 

@@ -30,9 +30,11 @@ const INTSTATUS: usize = 12;
 const ENABLE: u32 = 1;
 const INTERRUPT: u32 = 8;
 
+/// The clock by timer 0, and the tasks that wait for a time.
 struct Clock {
     /// Number of times that timer 0 has wrapped round.
     timer0_wraps: Mutex<Cell<u32>>,
+    /// Tasks that wait, by their times.
     queue: Mutex<RefCell<Queue>>,
     /// Counts that lock step has skipped while the processor slept; timer 0 did not count them.
     skipped_counts: Mutex<Cell<u64>>,

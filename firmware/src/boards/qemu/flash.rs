@@ -17,7 +17,9 @@ const WORD_MARKS_ADDRESS: usize = 0x6020_0000;
 /// Address of the word that holds `MAGIC` once bank and marks are initialized; QEMU's memory is
 /// zero at power-on.
 const BANK_INITIALISED_ADDRESS: usize = 0x6030_0000;
+/// Value at [`BANK_INITIALISED_ADDRESS`] once the bank has been initialised.
 const MAGIC: u32 = 0x464c_4153;
+/// Length of the bank, bytes.
 const BANK_LEN: usize = LAYOUT.len() as usize;
 /// Marks of a word: erased, programmed, its erasure or programming not completed.
 const ERASED: u8 = 0;
@@ -130,11 +132,13 @@ impl ReadFlash for Flash {
     }
 }
 
+/// The mark of a word, by its number in the bank.
 fn word_mark(word: usize) -> u8 {
     // SAFETY: callers pass the number of a word of the bank, and each word has a mark.
     unsafe { ((WORD_MARKS_ADDRESS + word) as *const u8).read_volatile() }
 }
 
+/// Sets the mark of a word, by its number in the bank.
 fn set_mark(word: usize, mark: u8) {
     // SAFETY: as in `word_mark`.
     unsafe { ((WORD_MARKS_ADDRESS + word) as *mut u8).write_volatile(mark) }

@@ -44,7 +44,9 @@ const ONE_SHOT: u32 = 0b1110_0011;
 
 /// Connection to the host's simulation, by semihosting files.
 struct SimulationLink {
+    /// File from which the simulation's messages are read.
     input: File,
+    /// File to which records are written.
     output: File,
     /// Length of the current message, and how many of its bytes are executed (`executed_len`),
     /// bytes.
@@ -153,6 +155,7 @@ impl SimulationLink {
         Some(ToBoard::from_bytes(head).expect("the host sends records"))
     }
 
+    /// The current message.
     fn message_bytes(&self) -> &'static [u8] {
         // SAFETY: memory of this board that no other code uses; only `read_message` changes it, and
         // no slice of it is alive there.

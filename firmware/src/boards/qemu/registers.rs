@@ -12,11 +12,13 @@ impl Register {
         Self(base + offset)
     }
 
+    /// Reads the register.
     pub fn read(self) -> u32 {
         // SAFETY: `new` is only given addresses of registers, which are aligned and always present.
         unsafe { (self.0 as *const u32).read_volatile() }
     }
 
+    /// Writes the register.
     pub fn write(self, value: u32) {
         // SAFETY: as above; no register used here makes a device write to memory.
         unsafe { (self.0 as *mut u32).write_volatile(value) }

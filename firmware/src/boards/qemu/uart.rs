@@ -69,6 +69,7 @@ impl Uart {
         Self { base, port, transmit_irq, received: Pipe::new(), sent: Pipe::new(), counters }
     }
 
+    /// The register at this offset.
     fn register(&self, offset: usize) -> Register {
         Register::new(self.base, offset)
     }

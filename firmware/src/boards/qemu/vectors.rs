@@ -7,6 +7,7 @@ use super::interrupts::{self, Irq};
 use super::{clock, grants, uart};
 use crate::boards::executors;
 
+/// An interrupt's handler; `None` for an interrupt that is not used.
 type Handler = Option<unsafe extern "C" fn()>;
 
 /// One entry for each of AN500's interrupts; cortex-m-rt places the table after the exceptions.

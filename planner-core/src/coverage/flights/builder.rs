@@ -46,7 +46,7 @@ impl<'a, const N: usize, const W: usize> FlightPathBuilder<'a, N, W> {
         self.path.last_index().ok_or(PathError::NotFinite)
     }
 
-    /// Writes the corners of the path from here to `to` around no-fly zones to `corners`.
+    /// Writes the corners of the path from `here` to `to` around no-fly zones to `corners`.
     #[inline(never)]
     fn find_corners_around_zones(&self, to: &Flat, corners: &mut Vec<Flat, N>) {
         // The routes have finite lengths, so there is a path between all their points, and no

@@ -56,7 +56,7 @@ pub(super) struct NodeVisibility<'g, 'a> {
     here: [f32; 3],
     /// `here` in cells, relative to the grid's minimum corner.
     here_cells: [f32; 3],
-    /// `here` on the lattice of the exact check.
+    /// `here` on the lattice of the exact check; `None` if it lies too far outside the grid.
     here_snapped: Option<Snapped>,
     /// The free box around `here`; `None` where the box cannot be used, and all segments go to the
     /// exact check.

@@ -27,7 +27,7 @@ fn sqrt_upper_bound(square: f32) -> f32 {
 /// Memory for the legs of a set, which the caller lends to [`OwnSet::new`].
 pub type Legs<'a> = Vec<SetLeg<'a>, MAX_SET_POINTS>;
 
-/// A leg of the own set, with its midpoint and an upper bound of half its length.
+/// A leg of the own reachable set, with its midpoint and an upper bound of half its length.
 #[derive(Clone, Copy, Debug)]
 pub struct SetLeg<'a> {
     from: &'a Point,
@@ -123,8 +123,8 @@ impl<'a> OwnSet<'a> {
         apart(0) || apart(1) || apart(2)
     }
 
-    /// Square of the least distance between the polylines of both sets, and the segment of the
-    /// other set at that distance; `None` if the sets are no nearer than `most_m`.
+    /// Square of the least distance between the polylines of both reachable sets, and the segment
+    /// of the other set at that distance; `None` if the sets are no nearer than `most_m`.
     #[inline(always)]
     fn nearest_segment<'o>(
         &self,
