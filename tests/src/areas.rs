@@ -69,6 +69,7 @@ fn convex_polygon(random: &mut impl Rng, size: Corner, corners: usize) -> Vec<Co
     angles.into_iter().map(corner).collect()
 }
 
+/// The rings as a TOML list.
 fn toml_rings(rings: &[Vec<Corner>]) -> String {
     let ring = |ring: &Vec<Corner>| {
         let corners: Vec<String> = ring.iter().map(|[x, y]| format!("[{x:.3}, {y:.3}]")).collect();

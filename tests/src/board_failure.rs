@@ -11,6 +11,7 @@ use object::{Object, ObjectSymbol, Symbol};
 const NO_MEMORY_ADDRESS: u32 = 0xF000_0000;
 /// Lowest address of the stack, which no stack use reaches; code is put a little above it.
 const STACK_END: u32 = 0x2008_A000;
+/// Address of memory that nothing else uses.
 const SPARE_ADDRESS: u32 = STACK_END + 0x100;
 /// Bytes left on the stack: less than an interrupt pushes.
 const STACK_BYTES_LEFT: u32 = 8;
@@ -18,6 +19,7 @@ const STACK_BYTES_LEFT: u32 = 8;
 const PANIC_FUNCTION_END: &str = "panic_const_div_by_zero";
 /// File name in that location, which the panic message shows.
 const PANIC_FILE: &[u8] = b"board_failure.rs";
+/// Line that the panic names.
 const PANIC_LINE: u32 = 7;
 /// End of the name of the firmware's function that computes a plan.
 const PLAN_FUNCTION_END: &str = "Planner4plan";

@@ -35,6 +35,7 @@ pub const FAULT_SCRIPTS: [&str; 9] = [
 pub struct RadioEdgeMission {
     /// Radio range of the mission, metres.
     pub range_m: f32,
+    /// The mission, with this range.
     mission: PreparedMission,
     plan: Box<HostPlan>,
     /// Each time, seconds, at which a vehicle leaves the range of all others, and its index.
@@ -108,6 +109,7 @@ impl RadioEdgeMission {
         Ok(Some(Outcome { description: what, ..judge_flight(&flight, id) }))
     }
 
+    /// The fault of this script that strikes vehicle `id` at `at_s`.
     fn parse_fault(
         &self,
         script: &str,

@@ -12,8 +12,11 @@ const HALF_SIDE_M: f64 = 600.0;
 
 /// A square height map of random hills and noise, centred on the origin.
 pub struct Hills {
+    /// Side of a cell, metres.
     cell_m: f64,
+    /// Number of cells along a side.
     cells_per_side: usize,
+    /// Height of each cell, metres.
     heights_m: Vec<f64>,
 }
 

@@ -54,6 +54,7 @@ struct World<'a> {
     now: Instant,
     /// Draws for each radio frame and receiver whether it is lost, and its delay.
     dice: Dice,
+    /// Log of what happened; `None` if none is kept.
     trace: Option<Vec<String>>,
 }
 

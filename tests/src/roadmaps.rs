@@ -53,6 +53,7 @@ const LANDMARK_ROW_BYTES: usize = WORD_BYTES * LANDMARK_COUNT;
 
 /// Forges files from one random roadmap, one after the other.
 pub struct Forger {
+    /// The file that is changed.
     original: Vec<u8>,
     search: Box<SearchWorkspace<MAX_NODES>>,
     sipp: Box<SippWorkspace<MAX_NODES, 8>>,

@@ -109,11 +109,15 @@ impl std::fmt::Display for SetpointStats {
 /// The last setpoint, and what it and those before it without a gap demanded.
 #[derive(Clone, Copy, Debug)]
 struct LastSetpoint {
+    /// When it came, seconds.
     at_s: f64,
     /// Time from the setpoint before to this one, and the time between the two before, seconds.
     dt_s: [f32; 2],
+    /// Place, NED metres.
     position: Vector3<f32>,
+    /// Velocity, NED m/s; `None` if it gives none.
     velocity: Option<Vector3<f32>>,
+    /// Acceleration, NED m/s²; `None` if it gives none.
     accel: Option<Vector3<f32>>,
     jerk_mps3: f32,
     /// Number of setpoints since the last one in a stop by the safety filter; 0 in the stop.

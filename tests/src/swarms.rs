@@ -56,12 +56,14 @@ impl Random {
 /// Free space as the union of overlapping boxes.
 #[derive(Debug)]
 struct Space {
+    /// Least and greatest corner of each box, metres.
     boxes: Vec<(Point, Point)>,
     /// Longest edge of a roadmap in this space, metres.
     edge_max_m: f32,
 }
 
 impl Space {
+    /// A random space.
     fn random(rng: &mut Random) -> Self {
         let height = rng.uniform(1.0, 3.0);
         let boxes = match rng.below(13) {
@@ -105,6 +107,7 @@ impl Space {
         Self { boxes, edge_max_m: 8.0 }
     }
 
+    /// A random small space.
     fn small(rng: &mut Random) -> Self {
         let height = rng.uniform(0.2, 2.0);
         let boxes = if rng.one_in(2) {
@@ -118,6 +121,7 @@ impl Space {
         Self { boxes, edge_max_m: 8.0 }
     }
 
+    /// A random place in one of the boxes.
     fn point(&self, rng: &mut Random) -> Point {
         let (low, high) = self.boxes[rng.below(self.boxes.len())];
         Point::new(
@@ -127,6 +131,7 @@ impl Space {
         )
     }
 
+    /// Whether a place is in one of the boxes.
     fn contains(&self, p: &Point) -> bool {
         let inside =
             |(low, high): &(Point, Point)| (0..3).all(|a| low[a] <= p[a] && p[a] <= high[a]);
@@ -143,6 +148,7 @@ impl Space {
 /// A swarm, and the roadmap that it is planned on.
 #[derive(Debug)]
 pub struct Swarm {
+    /// The roadmap file.
     roadmap: Vec<u8>,
     /// Tasks of its vehicles.
     pub tasks: Vec<VehicleTask>,
@@ -162,6 +168,7 @@ struct SwarmParameters {
     goals: usize,
     /// Greatest height of a climb or descent, metres.
     max_climb_m: f32,
+    /// Safety distance, metres.
     safety_m: f32,
 }
 

@@ -24,6 +24,7 @@ use sim_autopilot::{Autopilot, AutopilotConfig};
 
 use crate::board_failure::{self, BoardFailure};
 
+/// Time of a step.
 const STEP: Duration = Duration::from_millis(4);
 /// Longest wait for an event, vehicle's time: a megabyte of garbage takes 100 s.
 const PATIENCE: Duration = Duration::from_secs(400);
@@ -57,6 +58,7 @@ pub struct BoardMessages {
     /// Number of frames missing on each port, by their sequence numbers. A companion that restarts
     /// counts from zero, which shows here too.
     pub missing_frames: [u32; 2],
+    /// Sequence number of the last frame on each port; `None` before the first.
     last_sequence: [Option<u8>; 2],
 }
 
@@ -72,14 +74,17 @@ pub struct Vehicle {
     pub radio_bytes: Vec<u8>,
     /// Simulated time so far.
     pub time: Duration,
+    /// The firmware.
     program: PathBuf,
     folder: tempfile::TempDir,
     /// Simulated time at which the board last started.
     board_started: Duration,
+    /// Whether each port is connected.
     is_plugged_in: [bool; 2],
     /// Bytes that the board receives with the next step.
     pending_bytes: Vec<PortBytes>,
     framers: [Framer; 2],
+    /// Height of the ground, ENU metres.
     ground_m: f32,
     sequence: u8,
 }

@@ -68,8 +68,9 @@ fn direct_m(planned: &CoveragePlan<'_>, a: &Flat, b: &Flat) -> f64 {
 
 /// All that costs depend on: lengths in metres, by vehicle and waypoint.
 struct Lengths {
-    /// From the vehicle's place to each waypoint, and (`home_m`) from each waypoint home.
+    /// From the vehicle's place to each waypoint.
     out_m: Vec<Vec<f64>>,
+    /// From each waypoint to the vehicle's home.
     home_m: Vec<Vec<f64>>,
     /// From each waypoint to the next.
     steps_m: Vec<f64>,

@@ -22,6 +22,7 @@ const MISSIONS: u64 = 6;
 #[derive(Debug)]
 struct Outcome {
     seed: u64,
+    /// Kind of the first fault.
     kind: &'static str,
     /// Share of the area that is photographed.
     covered: f64,
@@ -45,6 +46,7 @@ struct Outcome {
     /// Whether each vehicle counted in `landed_short` logged a reason, and what is missing has one
     /// too.
     explained: bool,
+    /// The log.
     text: String,
 }
 
@@ -58,7 +60,7 @@ struct Draw {
     area: fn(&mut Pcg32, Shape, usize, f32) -> String,
     /// Kinds of fault, by seed modulo 6.
     kinds: [&'static str; 6],
-    /// Faults strike within this time after 20 s, seconds.
+    /// Faults strike from 20 s on, within this time, seconds.
     strike_within_s: u32,
     /// Number of vehicles struck at once.
     struck: usize,
@@ -79,6 +81,7 @@ const START_BARRED_S: f64 = 20.0 + 180.0 + 20.0;
 /// What the radio does besides losing single messages.
 #[derive(Clone, Copy, PartialEq)]
 enum Radio {
+    /// Nothing else.
     Even,
     /// Vehicles hear and send nothing for seconds, or send without hearing, or hear without being
     /// heard.

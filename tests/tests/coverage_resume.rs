@@ -83,7 +83,10 @@ struct Outcome {
     seed: u64,
     /// Number of starts until the area was whole; `None` if it never was.
     starts: Option<usize>,
+    /// Number of waypoints photographed more than once.
     twice: u64,
+    /// Whether a wall was touched, vehicles came too near, or a vehicle did not come home in a
+    /// start without a fault.
     broken: bool,
     said: String,
 }

@@ -27,7 +27,9 @@ use crate::storage::mission_file::{
 use crate::swarm::fleet::VehicleDivisionInput;
 
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+/// Beginnings of both vehicles' paths, ENU metres.
 const STARTS: [Point; 2] = [Point::new(0.0, 0.0, 2.0), Point::new(0.0, 8.0, 2.0)];
+/// Goals, ENU metres.
 const GOALS: [Point; 2] = [Point::new(20.0, 0.0, 2.0), Point::new(20.0, 8.0, 2.0)];
 /// A node of the roadmap on the way around what lies between the first start and the first goal.
 const BESIDE: Point = Point::new(10.0, 4.0, 2.0);

@@ -23,6 +23,7 @@ struct Ground {
     sequence: u8,
 }
 
+/// System id and component id of the ground station.
 const GROUND: (u8, u8) = (255, 190);
 
 impl Ground {

@@ -27,15 +27,19 @@ mod telemetry;
 
 pub(crate) use self::mission::*;
 
+/// The companion under test.
 pub type BenchCompanion = Companion<4, WAYPOINTS, GATES>;
 /// A plan for the bench's companion.
 pub type Plan = VehiclePlan<WAYPOINTS, GATES>;
+/// Most waypoints of its plan.
 pub const WAYPOINTS: usize = 32;
+/// Most gates of its plan.
 pub const GATES: usize = 8;
 
 /// Test bench: the companion, its scripted autopilot, and a ground station and a neighbour on the
 /// radio.
 pub struct Bench {
+    /// The autopilot that is played.
     pub kind: AutopilotKind,
     /// ArduCopter: message ids whose streams the companion has requested.
     pub streams: Vec<u16>,
@@ -51,11 +55,13 @@ pub struct Bench {
     /// TIMESYNC answers of the companion on the autopilot's link: `tc1` and `ts1`.
     pub timesyncs: Vec<(i64, i64)>,
     pub companion: BenchCompanion,
+    /// Time on the companion's clock.
     pub now: Instant,
     /// True position of the vehicle in the mission frame, ENU metres.
     pub enu: Point,
     /// The autopilot's `custom_mode`.
     pub mode: u32,
+    /// Whether the motors are armed.
     pub armed: bool,
     /// From 5 on HEARTBEAT reports `MAV_STATE_CRITICAL`, below 5 `MAV_STATE_ACTIVE`.
     pub status: u8,
@@ -98,6 +104,7 @@ pub struct Bench {
     pub step_m: f32,
     /// Whether the vehicle does not come down in the landing mode.
     pub never_lands: bool,
+    /// Events that the companion gave the shell.
     pub events: Vec<Event>,
     /// Setpoints received: when, place in the true mission frame (ENU metres), `type_mask`.
     pub setpoints: Vec<(Instant, Point, u16)>,
@@ -106,6 +113,7 @@ pub struct Bench {
     pub headings: Vec<Option<f32>>,
     /// Commands to the autopilot: `MAV_CMD`, parameters 1 to 3.
     pub commands: Vec<(u16, f32, f32, f32)>,
+    /// STATUSTEXTs of the companion.
     pub texts: Vec<std::string::String>,
     /// Frames sent to the radio.
     pub swarm: Vec<Frame>,
@@ -116,8 +124,11 @@ pub struct Bench {
     /// Where the vehicle flies to in the setpoint mode, by the last setpoint or NAV_TAKEOFF, true
     /// ENU metres; `None`: it stays, as after a setpoint of another type than the usual.
     target: Option<Point>,
+    /// Framers of what the companion sends, in the order of `Link`.
     framers: [Framer; 2],
+    /// Sequence number of the autopilot's next frame.
     sequence: u8,
+    /// Sequence number of the ground station's next frame.
     gcs_sequence: u8,
     /// When the vehicle touched down in the landing mode; `None` in other modes and in the air.
     landed_at: Option<Instant>,
@@ -135,8 +146,11 @@ pub struct Bench {
     /// Times that the shell's planner takes for its answers, in turn and again from the first;
     /// empty: it answers at once.
     pub planner_takes: Vec<Duration>,
+    /// Plans that the companion has requested and not got yet.
     plan_requests: PlanRequests,
+    /// The answer that the planner works on; `None` without one.
     answer_under_way: Option<planner::Answer>,
+    /// Number of answers begun.
     answer_count: usize,
     /// The vehicle's plan before it requested a detour.
     own_plan: Option<Plan>,
@@ -154,6 +168,7 @@ pub struct Bench {
     pub neighbour_echoes: Option<usize>,
     /// How long ago the neighbour received the intent that it echoes, in units of 10 ms.
     pub neighbour_held: u8,
+    /// Sequence number of the neighbour's next frame.
     neighbour_sequence: u8,
 }
 
@@ -225,6 +240,7 @@ impl Bench {
         }
     }
 
+    /// State of the companion's mission.
     pub fn state(&self) -> crate::State {
         self.companion.state()
     }
@@ -235,6 +251,7 @@ impl Bench {
         frames::geodetic_to_ned(self.kind.projection(), &self.origin, &place)
     }
 
+    /// The frame of a message from the autopilot.
     pub fn bytes<M: MessageData>(&mut self, message: &M) -> Vec<u8> {
         let mut out = [0; MAX_FRAME_LEN];
         let header = Header { system: SYSTEM, component: 1, sequence: self.sequence };
@@ -243,6 +260,7 @@ impl Bench {
         out[..len].to_vec()
     }
 
+    /// Gives the companion a message from the autopilot.
     pub fn send<M: MessageData>(&mut self, message: &M) {
         let bytes = self.bytes(message);
         self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
@@ -266,10 +284,12 @@ impl Bench {
         self.drain();
     }
 
+    /// Sends MISSION_START from the ground station.
     pub fn start(&mut self) {
         self.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
     }
 
+    /// Receives all that the companion sends.
     pub fn drain(&mut self) {
         for link in [Link::Autopilot, Link::Swarm] {
             let mut out = [0; MAX_FRAME_LEN];
@@ -314,6 +334,7 @@ impl Bench {
         self.report();
     }
 
+    /// Runs the bench for this time.
     pub fn run(&mut self, seconds: f32) {
         for _ in 0..(seconds * 20.0) as u32 {
             self.tick();

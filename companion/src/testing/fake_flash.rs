@@ -36,7 +36,9 @@ pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700
 #[derive(Debug)]
 pub struct PowerLoss;
 
+/// A storage bank in memory whose power can be lost.
 pub struct Flash {
+    /// Content of the bank.
     pub bytes: Vec<u8>,
     /// Indices of the words that are unreadable.
     pub torn: HashSet<u32>,
@@ -88,6 +90,7 @@ impl Flash {
         }
     }
 
+    /// Erases the sector at this offset.
     pub fn erase(&mut self, at: u32) -> Result<(), PowerLoss> {
         assert_eq!(at % LAYOUT.sector_len, 0);
         let words = LAYOUT.sector_len as usize / WORD_LEN;
@@ -104,6 +107,7 @@ impl Flash {
         if goes { Err(PowerLoss) } else { Ok(()) }
     }
 
+    /// Programs whole words at this offset.
     pub fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), PowerLoss> {
         assert!(
             (at as usize).is_multiple_of(WORD_LEN)
@@ -186,6 +190,7 @@ pub fn started(flash: &mut Flash) -> Store {
     store
 }
 
+/// A roadmap file with a chain of this many nodes.
 pub fn roadmap(nodes: usize) -> Vec<u8> {
     let points: Vec<Point> =
         (0..nodes).map(|i| Point::new(i as f32, (i % 7) as f32, 2.0)).collect();
@@ -208,6 +213,7 @@ pub fn roadmap(nodes: usize) -> Vec<u8> {
     bytes
 }
 
+/// A mission file with this many vehicles.
 pub fn mission(vehicles: u8) -> Vec<u8> {
     let header = MissionHeader {
         roadmap_crc: 1,
@@ -240,6 +246,7 @@ pub fn mission(vehicles: u8) -> Vec<u8> {
     bytes
 }
 
+/// The bytes of this range of offsets.
 pub fn bytes_at(flash: &Flash, extent: Option<Range<u32>>) -> Option<&[u8]> {
     extent.map(|extent| &flash.bytes[extent.start as usize..extent.end as usize])
 }

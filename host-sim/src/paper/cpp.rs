@@ -289,6 +289,7 @@ fn table_6(tables: &mut Tables) -> anyhow::Result<()> {
     Ok(())
 }
 
+/// Prints the costs of all tables.
 fn print_costs(tables: &Tables) {
     say!(
         "Costs; areas and places are ours. Theirs in A1 to A12 were flown in Gazebo, in 6 in the field; ours are planned."
@@ -315,6 +316,7 @@ fn print_costs(tables: &Tables) {
     }
 }
 
+/// Prints planning times: ours by method and number of vehicles, beside Table 3.
 fn print_planning(ours: &[[f64; 6]; 3]) {
     say!();
     say!(

@@ -143,6 +143,7 @@ impl ValueSource {
     const BOTH: [(Self, &'static str); 2] =
         [(Self::Ours, "ours, planned"), (Self::Theirs, "theirs, flown in Gazebo")];
 
+    /// The row's summary of these values; `None` without one.
     fn summary_of(self, row: &TableRow) -> Option<ValueSummary> {
         match self {
             Self::Ours => row.ours_summary,

@@ -12,6 +12,7 @@ pub(super) struct TableRow {
     /// `short` or `long` in a row of Tables A1 to A12, `None` in any other.
     #[serde(skip)]
     pub(super) track: Option<&'static str>,
+    /// Name of the method, as in a scenario.
     pub(super) method: &'static str,
     /// Distance between lanes, metres; 0 in Table 5.
     pub(super) lane_m: f64,

@@ -18,11 +18,14 @@ pub struct Sample {
 /// A setpoint that the recorded companion sent: NED from the EKF origin, metres and seconds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Setpoint {
+    /// Time at which it was sent, seconds.
     pub(super) t_s: f64,
+    /// `type_mask`: which numbers do not count.
     pub(super) mask: u16,
     pub(super) position: [f32; 3],
     pub(super) velocity: [f32; 3],
     pub(super) acceleration: [f32; 3],
+    /// Heading, radians clockwise from north.
     pub(super) yaw: f32,
 }
 
@@ -54,6 +57,7 @@ pub struct Recording {
     pub armed_span_s: (f64, f64),
     /// When the mission began to follow its path, and when it began to land, seconds.
     pub follow_span_s: (f64, f64),
+    /// The setpoints, in order of time.
     pub(super) setpoints: Vec<Setpoint>,
     /// Each with the time at which it was sent, seconds.
     pub(super) messages: Vec<(f64, Message)>,

@@ -14,6 +14,7 @@ use super::{Correction, EstimateErrors};
 
 /// Simulated seconds per second of the wall clock: PX4's SIH ran 0.4 to 1.1 % slow when recorded.
 const PX4_CLOCK_RATE: f64 = 0.9925;
+/// Time of a step, seconds.
 const STEP_S: f64 = 0.004;
 /// Simulated time before the first record, seconds: by then ArduCopter has booted and has a
 /// position.
@@ -148,6 +149,7 @@ impl Recording {
     }
 }
 
+/// The NED place of an ENU one.
 fn ned(enu: &Point) -> Vector3<f64> {
     Vector3::new(f64::from(enu.y), f64::from(enu.x), -f64::from(enu.z))
 }

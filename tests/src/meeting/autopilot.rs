@@ -65,6 +65,7 @@ pub enum ControlSource {
 #[derive(Clone, Copy, Debug)]
 struct Target {
     at: Instant,
+    /// Place; `None` if the setpoint gives none.
     position: Option<Point>,
     velocity: Point,
     acceleration: Point,
@@ -75,6 +76,7 @@ struct Target {
 pub struct Autopilot {
     /// Which autopilot it is.
     pub kind: AutopilotKind,
+    /// System id of the vehicle.
     id: u8,
     mission_origin: Geodetic,
     ekf_origin: Geodetic,
@@ -82,12 +84,15 @@ pub struct Autopilot {
     pub position: Point,
     /// True velocity of the vehicle, ENU m/s.
     pub velocity: Point,
+    /// True acceleration of the vehicle, ENU m/s².
     acceleration: Point,
+    /// The vehicle's pad, ENU metres.
     home: Point,
     /// Custom mode of HEARTBEAT.
     pub mode: u32,
     /// Whether the motors are on.
     pub armed: bool,
+    /// Whether a failsafe flies the vehicle.
     in_failsafe: bool,
     /// Whether the companion has commanded the mode of landing.
     landing_commanded: bool,
@@ -108,12 +113,15 @@ pub struct Autopilot {
     lifted_at: Option<Instant>,
     /// Since when the vehicle rests on the ground as the land detector detects it.
     grounded_since: Option<Instant>,
+    /// When the motors were last armed.
     armed_at: Instant,
     /// What holds the vehicle, and where; `None`: it is free.
     caught: Option<(Catch, Point)>,
+    /// Value of `GUID_TIMEOUT`, seconds.
     guid_timeout_s: f32,
     /// Ids of the messages that the companion requested as streams.
     streams: BTreeSet<u16>,
+    /// Sequence number of the next frame.
     sequence: u8,
     framer: Framer,
     /// Shift of the telemetry streams, in steps of 25 ms.
@@ -247,6 +255,7 @@ impl Autopilot {
         self.takeoff_z = None;
     }
 
+    /// Time since the last setpoint, seconds; infinite before the first.
     fn setpoint_age_s(&self, now: Instant) -> f32 {
         self.target.map_or(f32::INFINITY, |target| (now - target.at).as_secs_f32())
     }

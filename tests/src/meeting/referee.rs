@@ -45,7 +45,9 @@ pub struct Heard {
 /// Where a vehicle can be: segments widened by a radius.
 #[derive(Clone, Debug, Default)]
 pub struct ReachableSet {
+    /// Ends of each segment, ENU metres.
     segments: Vec<(Point, Point)>,
+    /// Distance by which segments are widened, metres.
     radius_m: f32,
 }
 
@@ -191,7 +193,7 @@ impl Violation {
     }
 }
 
-/// First and last step at which one vehicle's own set was too near that of another one.
+/// First and last step at which one vehicle's own reachable set was too near that of another one.
 #[derive(Clone, Copy, Debug, Default)]
 struct Approach {
     first_step: usize,
@@ -202,6 +204,7 @@ struct Approach {
 #[derive(Debug)]
 pub struct MeetingReferee {
     vehicle_count: usize,
+    /// State of each vehicle at each step.
     tracks: Vec<Vec<VehicleState>>,
     /// The latest approach of vehicle a to b, at index a · `vehicle_count` + b.
     approaches: Vec<Option<Approach>>,
@@ -211,6 +214,7 @@ pub struct MeetingReferee {
     ongoing: Vec<Option<OngoingViolation>>,
     /// Approaches below the safety distance that have ended.
     pub violations: Vec<Violation>,
+    /// For each pair a < b, at index a · `vehicle_count` + b: whether they touch.
     touching: Vec<bool>,
     /// Touches: time in seconds, index of the vehicle that moved toward the other one, index of the
     /// other one, distance in metres.
@@ -221,10 +225,15 @@ pub struct MeetingReferee {
     pub min_distance_m: f32,
 }
 
+/// A pair that is too near, as `MeetingReferee::ongoing` has it.
 #[derive(Clone, Copy, Debug)]
 struct OngoingViolation {
+    /// Step from which each vehicle's own reachable set was too near the other's; `None` if it was
+    /// not.
     sets_near_since: [Option<usize>; 2],
+    /// Step at which the pair was nearest.
     nearest_step: usize,
+    /// Distance of the centres then, metres.
     min_distance_m: f32,
 }
 

@@ -39,10 +39,15 @@ pub(super) struct MeetingVehicle {
     pub(super) heard: Vec<Heard>,
     /// Reads the frames that its companion sends by radio.
     pub(super) framer: Framer,
+    /// Whether the companion computes and sends nothing.
     pub(super) companion_dead: bool,
+    /// Whether the radio sends.
     pub(super) radio_sends: bool,
+    /// Whether the radio receives.
     pub(super) radio_hears: bool,
+    /// Bytes that the companion receives from its autopilot in the next step.
     pub(super) bytes_to_companion: Vec<u8>,
+    /// Sequence number of the ground station's next command to it.
     pub(super) command_sequence: u8,
     /// Number of stops by the safety filter.
     pub(super) filter_stops: u32,
@@ -51,9 +56,9 @@ pub(super) struct MeetingVehicle {
     /// Since when the present stop lasts, and whether the neighbour that the filter stops for was
     /// silent for longer than [`HEARD_WITHIN_S`] in it.
     pub(super) stop_since: Option<(Instant, bool)>,
-    /// Longest stop by the safety filter for a neighbour that was heard, seconds, and the longest
-    /// one for one that was silent.
+    /// Longest stop by the safety filter for a neighbour that was heard, seconds.
     pub(super) longest_stop_s: f32,
+    /// Longest stop by the safety filter for a neighbour that was silent, seconds.
     pub(super) longest_unheard_stop_s: f32,
     /// Number of times that its companion found its path blocked.
     pub(super) blocked_count: u32,

@@ -18,6 +18,7 @@ const BESIDE_M: f32 = 0.4;
 /// What interrupts the flight.
 #[derive(Clone, Copy, Debug)]
 enum Interruption {
+    /// A pause by the operator.
     Pause,
     /// The vehicle stops this far ahead, metres.
     Halt(f32),
@@ -111,10 +112,13 @@ struct Flight {
     bench: Bench,
     path: Path<WAYPOINTS>,
     reference: Reference,
+    /// Greatest error ahead.
     early_m: f32,
+    /// Greatest error behind.
     late_m: f32,
     /// Greatest change of the place in a step beyond the distance flown at cruise speed, metres.
     jump_m: f32,
+    /// Number of steps checked.
     checked: u32,
 }
 

@@ -18,6 +18,7 @@ use crate::link::frame::{self, Frame, Header, MAX_FRAME_LEN};
 const YAW_IGNORED: u16 = 0x400;
 
 impl Bench {
+    /// Handles a frame that the companion sent on this link.
     pub(super) fn receive(&mut self, link: Link, frame: Frame) {
         let p = frame.padded_payload();
         if frame.message_id == COMMAND_ACK_DATA::ID {
@@ -41,6 +42,7 @@ impl Bench {
         }
     }
 
+    /// Takes a setpoint as the target.
     fn handle_setpoint(&mut self, s: &SET_POSITION_TARGET_LOCAL_NED_DATA) {
         assert_eq!((s.target_system, s.target_component), (SYSTEM, 1));
         assert_eq!(s.coordinate_frame, MavFrame::MAV_FRAME_LOCAL_NED);
@@ -56,6 +58,7 @@ impl Bench {
         self.headings.push((mask & YAW_IGNORED == 0).then_some(FRAC_PI_2 - s.yaw));
     }
 
+    /// Carries out a command, or refuses it.
     fn handle_command(&mut self, c: &COMMAND_LONG_DATA) {
         assert_eq!((c.target_system, c.target_component), (SYSTEM, 1));
         let number = c.command as u16;

@@ -12,15 +12,20 @@ use super::Plan;
 use crate::planner::coverage::OPEN_FIELD_CLEARANCE_M;
 use crate::{Config, RosterEntry};
 
+/// Origin of the mission frame.
 pub(crate) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 /// EKF origin 300 m from the mission's origin and 20 m above it: code that confuses the two frames
 /// flies into the ground.
 pub(crate) const EKF_ORIGIN: Geodetic =
     Geodetic { lat_deg: 40.3350, lon_deg: -3.7640, alt_m: 720.0 };
+/// System id of the vehicle.
 pub(crate) const SYSTEM: u8 = 42;
+/// Beginning of the vehicle's path, ENU metres.
 pub(crate) const START: Point = Point::new(8.0, 12.0, 1.5);
+/// End of the vehicle's path, ENU metres.
 pub(crate) const GOAL: Point = Point::new(16.0, 12.0, 3.5);
 
+/// Settings of a vehicle alone.
 pub(crate) fn config() -> Config<4> {
     let mut config = Config::new(SYSTEM, START, ORIGIN);
     config.method = Method::Priority;
@@ -28,6 +33,7 @@ pub(crate) fn config() -> Config<4> {
     config
 }
 
+/// Settings with vehicle 77 in the roster too.
 pub(crate) fn two_vehicles() -> Config<4> {
     let mut config = config();
     config

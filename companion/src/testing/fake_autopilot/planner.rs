@@ -17,6 +17,7 @@ use crate::{Duration, Instant, PlanFailure, PlanKind};
 /// An answer whose plan is made and that is sent when `due`.
 pub(super) struct Answer {
     due: Instant,
+    /// Which plan was requested.
     wanted: PlanKind,
     plan: Result<Plan, PlanFailure>,
 }

@@ -8,7 +8,9 @@ use super::*;
 use crate::coverage::area::{Area, Ring, RingKind};
 use crate::detour::ZoneKind;
 
+/// Place above the pad at which detours home end, ENU metres.
 const OVER: Point = Point::new(5.0, 5.0, 12.0);
+/// Height of the transit layer, metres.
 const LAYER_M: f32 = 40.0;
 
 fn request(here: Point) -> DetourRequest {

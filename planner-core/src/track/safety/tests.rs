@@ -12,6 +12,7 @@ use super::*;
 const BRAKING: Braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
 const BOUNDS: MotionBounds =
     MotionBounds { braking: BRAKING, speed_max_mps: 2.0, stopped_when_unheard_for_s: 3.0 };
+/// Safety distance, metres.
 const APART_M: f32 = 1.5;
 
 fn point() -> impl Strategy<Value = Point> {
@@ -186,9 +187,11 @@ fn a_fast_vehicle_behind_its_setpoint_stays_inside_its_set_around_a_corner() {
     }
 }
 
-/// A vehicle that flies along a polyline and stops where its set conflicts.
+/// A vehicle that flies along a polyline and stops where its reachable set conflicts.
 struct Flier {
+    /// Points of the polyline, ENU metres.
     path: StdVec<Point>,
+    /// Arc length of the vehicle, metres.
     along_m: f32,
     speed_mps: f32,
     /// What the other vehicle heard last: place, velocity, time, and index of the path point that

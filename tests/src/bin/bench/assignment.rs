@@ -26,6 +26,7 @@ pub fn rows() -> Vec<Row> {
     rows
 }
 
+/// Kind of the costs.
 #[derive(Clone, Copy)]
 enum Kind {
     Real,

@@ -42,6 +42,7 @@ const RUNS: usize = 301;
 const ROUNDS: usize = 5;
 const LANES: usize = 512;
 const VEHICLES: usize = 32;
+/// The area, metres.
 const AREA_VERTICES: [[f32; 2]; 5] =
     [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
 
@@ -156,6 +157,7 @@ fn build_cpp_binpat(checkout: &Path) -> Result<tempfile::TempPath> {
     Ok(program)
 }
 
+/// Times of the C++ BINPAT, microseconds.
 fn their_times_us(program: &Path, vehicles: usize) -> Result<[f64; 2]> {
     let output = Command::new(program).args([vehicles.to_string(), RUNS.to_string()]).output()?;
     let text = String::from_utf8_lossy(&output.stdout);
@@ -172,6 +174,7 @@ struct CoverageBench {
     workspace: Box<tracks::LaneWorkspace<64>>,
     pack: Box<PackWorkspace<VEHICLES>>,
     plan: RoutePlan<VEHICLES>,
+    /// Points of the flights.
     points: Vec<[f32; 3]>,
 }
 
@@ -301,6 +304,7 @@ fn our_times_us(vehicles: usize) -> [f64; 2] {
     [plan_us, update_us]
 }
 
+/// Median time of our POWELL-BINPAT, microseconds.
 fn our_powell_time_us() -> f64 {
     let mut bench = CoverageBench::new(3);
     bench.plan();

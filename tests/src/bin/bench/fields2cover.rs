@@ -189,10 +189,14 @@ fn ring_contains(ring: &[Flat], at: &Flat) -> bool {
 
 /// Our route over a field: lengths, planning time, and number of legs that cross an obstacle.
 struct OurRoute {
+    /// Length of the lanes, metres.
     lanes_m: f64,
+    /// Length of the route, metres.
     total_m: f64,
     time_us: f64,
+    /// Number of legs that cross an obstacle.
     crossings: usize,
+    /// Both ends of each lane, metres.
     lanes: Vec<[EastNorth; 2]>,
 }
 

@@ -37,9 +37,13 @@ use serde::Deserialize;
 
 use crate::row::Row;
 
+/// Edge of a cell, metres.
 const RESOLUTION_M: f32 = 0.25;
+/// Number of random nodes.
 const NODES: usize = 2300;
+/// Least length of an edge, metres.
 const EDGE_MIN_M: f32 = 0.5;
+/// Greatest length of an edge, metres.
 const EDGE_MAX_M: f32 = 8.0;
 const VEHICLES: usize = 10;
 /// Rounds, each of one run of theirs and [`REPEATS`] of ours on one core and on two.

@@ -10,6 +10,7 @@ use host_sim::map::{Occupancy, OccupancyMap, bt};
 use planner_core::Point;
 use planner_core::map::voxel::GridShape;
 
+/// Cruise speed of all vehicles, m/s.
 const CRUISE_MPS: f32 = 2.0;
 /// Edge of a cell of most maps, metres.
 const RESOLUTION_M: f32 = 0.25;
@@ -29,15 +30,21 @@ pub struct Meeting {
     /// Id of the vehicle that faults strike when it has taken off; `None`: a different vehicle for
     /// each seed, somewhere on its path.
     struck_vehicle: Option<u8>,
+    /// Path of the map file.
     map: PathBuf,
     /// Start and goal of each vehicle, ENU metres.
     vehicles: Vec<(Point, Point)>,
+    /// Edge of a cell, metres.
     resolution_m: f32,
+    /// Number of random nodes of the roadmap.
     nodes: usize,
+    /// Greatest length of an edge of the roadmap, metres.
     edge_max_m: f32,
     safety_margin_m: f32,
+    /// How nodes are drawn, as in a scenario.
     sampling: &'static str,
     safety_distance_m: f32,
+    /// Time limit of a flight, seconds.
     time_limit_s: f32,
     /// Most seeds with which this meeting is flown.
     pub max_seeds: u64,

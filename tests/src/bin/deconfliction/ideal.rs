@@ -42,6 +42,7 @@ pub fn last_landings(
     Some(LastLandings { alone_s: last(alone), planned_s: last(plan), ideal_s })
 }
 
+/// Time at which the vehicle stands on the ground, seconds after the start.
 fn landing_time_s(mission: &PreparedMission, flight: &Flight<MAX_WAYPOINTS>) -> f32 {
     let over_goal_s = flight.path.waypoints().last().map_or(0.0, |w| w.leave_s);
     flight.depart_s + over_goal_s + flight.descent_m / mission.schedule().vertical_mps

@@ -60,13 +60,17 @@ struct Args {
 /// Results of one method in one case, over all seeds.
 #[derive(Clone, Debug, Serialize)]
 struct Row {
+    /// Name of the case.
     name: &'static str,
+    /// Name of the method.
     method: &'static str,
+    /// Number of seeds flown.
     seeds: u64,
     /// Number of missions that ended complete and clean.
     complete: u64,
     /// Number of missions for which no plan was found.
     unplanned: u64,
+    /// Number of approaches below the safety distance.
     violations: u32,
     /// Number of contacts with walls, without those of a vehicle under its pilot.
     wall_contacts: u32,
@@ -74,6 +78,7 @@ struct Row {
     wall_contacts_under_pilot: u32,
     /// Number of missions that were complete and clean but for such contacts.
     complete_but_for_pilot: u64,
+    /// Number of deadlocks.
     deadlocks: u32,
     /// Number of vehicles without a fault that did not reach their goals.
     held_up: usize,

@@ -240,6 +240,7 @@ fn possible_rest_places(
 /// A search for a path from `from` to `over`, with a descent from there to `ground`.
 struct PathSearch<'a> {
     mission: &'a PreparedMission,
+    /// Clearance that the path needs, metres.
     required_m: f32,
     from: Point,
     over: Point,

@@ -12,6 +12,7 @@ use super::{ARDUPILOT_LOITER, Autopilot, Catch, PX4_POSITION, STEP_S};
 const MIN_SINK_MPS: f32 = 0.275;
 /// Amplitude of the swing of a vehicle in a net, metres, and its angular speed, 1/s: up to 0.7 m/s.
 const SWING_M: f32 = 0.25;
+/// Angular frequency of the swing, rad/s.
 const SWING_RAD_PER_S: f32 = 2.8;
 /// Speed at which the wind carries a vehicle off, m/s.
 const WIND_MPS: f32 = 0.7;

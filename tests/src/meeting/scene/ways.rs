@@ -16,10 +16,13 @@ pub(super) const KINDS: [&str; 6] =
 /// The path of a vehicle: its pad on the ground, the points, and the goal's ground height.
 pub(super) struct PathWithPads {
     pub(super) pad: Point,
+    /// Points of the path, ENU metres.
     pub(super) points: Vec<Point>,
+    /// Height of the ground at the goal, ENU up, metres.
     pub(super) goal_ground_z: f32,
 }
 
+/// The place at height `z`.
 pub(super) fn at_height(place: Point, z: f32) -> Point {
     Point::new(place.x, place.y, z)
 }
@@ -146,8 +149,11 @@ fn with_pads_below(mut points: Vec<Point>, dice: &mut Dice) -> PathWithPads {
 /// Where a geometry lies: centre, direction as a vector and an angle, and height.
 pub(super) struct Placement {
     pub(super) middle: Point,
+    /// Direction as a unit vector.
     pub(super) along: Point,
+    /// Direction, radians from east, counter-clockwise.
     pub(super) angle: f32,
+    /// Height, ENU up, metres.
     pub(super) z: f32,
 }
 

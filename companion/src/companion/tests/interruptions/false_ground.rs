@@ -6,7 +6,9 @@ use super::*;
 /// What the landing detector has reported since the pad.
 #[derive(Clone, Copy, PartialEq)]
 enum Reported {
+    /// Flight, at least once.
     Flight,
+    /// Ground all the time.
     OnlyGround,
 }
 

@@ -41,6 +41,7 @@ struct Watch {
     /// Whether the start that a pause on the pad ended was resumed before the disarming: the next
     /// arming request after the disarming is the resume's.
     resumed: bool,
+    /// What happened so far, for the message of a failure.
     log: Vec<String>,
 }
 

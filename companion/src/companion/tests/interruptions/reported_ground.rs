@@ -6,6 +6,7 @@ use std::string::String;
 use super::*;
 use crate::link::intent::{FLYING, Intent};
 
+/// A name, and what makes the vehicle fall or come down.
 type Cause = (&'static str, fn(&mut Fall));
 
 /// Causes of a landing or of an aborted mission.
@@ -101,11 +102,15 @@ fn high_bench(kind: AutopilotKind, up_m: f32, error_m: f32) -> Bench {
 
 /// A flight whose landing detector reports ground, at any height, from `ground_from` on.
 struct Fall {
+    /// The companion and its autopilot.
     b: Bench,
+    /// From when on ground is reported.
     ground_from: Instant,
     /// Distance that the vehicle sinks in one tick of the landing mode, metres.
     sinks_m: f32,
+    /// Number of the companion's commands seen so far.
     seen: usize,
+    /// What happened so far, for the message of a failure.
     log: Vec<String>,
 }
 

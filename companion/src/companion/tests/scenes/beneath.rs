@@ -24,15 +24,23 @@ const FLIGHT_OVER_BY_S: f32 = 500.0;
 
 /// The vehicle that comes down, heard five times a second, late and with losses.
 struct Faller {
+    /// Its system id.
     id: u8,
+    /// True position, ENU metres.
     place: Point,
     /// Flags of its intent before it comes down.
     flags: u8,
+    /// Speed at which it comes down, m/s.
     falls_mps: f32,
+    /// Share of its messages that are lost.
     loss: f32,
+    /// Delay of its messages, seconds.
     delay_s: f32,
+    /// Sequence number of its next frame.
     sequence: u8,
+    /// Frames under way: time of arrival and bytes.
     under_way: VecDeque<(Instant, Vec<u8>)>,
+    /// The last detour that the vehicle below requested; `None` before.
     asked: Option<DetourRequest>,
     /// Whether the vehicle below has a planner.
     answers: bool,

@@ -8,6 +8,7 @@ use std::vec::Vec;
 use super::State::*;
 use super::*;
 
+/// The shell's answer that there is no detour.
 pub(super) const NO_WAY: Option<Result<(), PlanFailure>> = Some(Err(PlanFailure::Unreachable));
 
 /// Another vehicle lies below the path from now on.

@@ -15,7 +15,9 @@ use rand_pcg::Pcg32;
 use super::*;
 use crate::link::frame::{Frame, Framer};
 
+/// Time of a step, seconds.
 const STEP_S: f32 = 0.05;
+/// Speed of the vehicle, m/s.
 const MPS: f32 = 5.0;
 /// Distance flown from a picture's place until a step finds it passed and the command has arrived,
 /// metres.
@@ -48,6 +50,7 @@ struct Fake {
     step_m: f32,
     /// Place along the path of the last picture, or where the trigger was last set, metres.
     last_m: f32,
+    /// Places along the path of the pictures taken, metres.
     pictures_m: Vec<f32>,
 }
 

@@ -15,7 +15,9 @@ use crate::link::frame::{self, Framer, Header};
 use crate::storage::store::MAX_READ_LEN;
 use crate::testing::fake_flash::{Flash, execute, started};
 
+/// System id and component id of the server.
 const US: (u8, u8) = (7, crate::COMPANION_COMPONENT);
+/// Index of the link by which the client sends.
 const LINK: usize = 1;
 
 /// A reply of the server; `answers` is the request's opcode, `last` whether the burst is complete.
@@ -30,6 +32,7 @@ pub(super) struct Packet {
     pub(super) data: Vec<u8>,
 }
 
+/// The server with its flash, and a client behind a lossy link.
 pub(super) struct World {
     pub(super) flash: Flash,
     pub(super) store: Store,
@@ -37,13 +40,17 @@ pub(super) struct World {
     pub(super) erasing: ErasePermission,
     pub(super) now: Instant,
     pub(super) rng: Pcg32,
-    /// Share of frames lost, and share repeated, in 256ths.
+    /// Share of frames lost, in 256ths.
     pub(super) loss: u32,
+    /// Share of frames repeated, in 256ths.
     pub(super) repeats: u32,
-    /// Requests under way to the server, and replies that arrived at the client.
+    /// Requests under way to the server.
     pub(super) under_way: Vec<Vec<u8>>,
+    /// Replies that arrived at the client.
     pub(super) heard: Vec<Packet>,
+    /// STATUSTEXTs of the server.
     pub(super) texts: Vec<&'static str>,
+    /// System id and component id.
     pub(super) client: (u8, u8),
     pub(super) sequence: u16,
 }

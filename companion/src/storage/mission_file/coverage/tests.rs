@@ -306,14 +306,18 @@ proptest! {
     }
 }
 
-/// A change between two plans: a further division, another one in place of the last, the last one
-/// withdrawn, a new start, another mission file.
+/// A change between two plans.
 #[derive(Clone, Copy)]
 enum Step {
+    /// A further division.
     Further,
+    /// Another division in place of the last one.
     Other,
+    /// The last division is withdrawn.
     Withdrawn,
+    /// A new start.
     Restarted,
+    /// Another mission file.
     OtherFile,
 }
 

@@ -15,9 +15,13 @@ use crate::config::RosterEntry;
 use crate::link::intent::{Intent, ON_PLAN};
 use crate::time::Duration;
 
+/// CRC of the mission file.
 const MISSION: u32 = 7;
+/// CRC of the plan.
 const PLAN: u32 = 9;
+/// Time of a step, milliseconds.
 const STEP_MS: u64 = 200;
+/// Time of a step, seconds.
 const STEP_S: f32 = 0.2;
 const CRUISE_MPS: f32 = 2.0;
 /// Distance between a vehicle's gates, metres.
@@ -25,14 +29,19 @@ const GATES_M: f32 = 1.4;
 /// A gate opens once the vehicle ahead has passed it by this distance, metres.
 const AHEAD_M: f32 = 3.0;
 
-/// The row: tables, true progress and gates of each.
+/// A row of vehicles.
 struct Row {
+    /// What each vehicle knows of the others.
     tables: List<Neighbours<8>>,
+    /// Cruise speed of each.
     cruise_mps: List<f32>,
+    /// True progress of each, metres.
     flown_m: List<f32>,
     /// Present speed of each, which changes at random.
     pace_mps: List<f32>,
+    /// Gates of each.
     gates: List<List<Gate>>,
+    /// Length of each path, metres.
     length_m: f32,
     now: Instant,
     rng: Pcg32,

@@ -13,7 +13,9 @@ use crate::config::RosterEntry;
 use crate::link::intent::{Intent, ON_PLAN};
 use planner_core::Point;
 
+/// CRC of the mission file.
 const MISSION: u32 = 7;
+/// CRC of the plan.
 const PLAN: u32 = 9;
 /// Time of one step of [`Swarm`].
 const STEP_MS: u64 = 200;
@@ -66,6 +68,7 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
 /// A swarm in a row: each vehicle hears only those next to it; the progress of each grows with
 /// time.
 struct Swarm {
+    /// What each vehicle knows of the others, by rank.
     tables: List<Neighbours<8>>,
     now: Instant,
 }
