@@ -202,7 +202,9 @@ fn random_neighbour(rng: &mut Pcg32, k: usize, around: &Point, reach_m: f32) -> 
 /// neighbours.
 pub struct StepCase {
     cfg: DeconflictConfig,
+    /// Own position, ENU metres.
     position: Point,
+    /// Own progress along `path`, metres.
     along_m: f32,
     path: Path<WAYPOINTS>,
     gates: Vec<Gate, GATES>,

@@ -86,6 +86,7 @@ struct FtpReply {
     is_ack: bool,
     /// Opcode of the request that is answered.
     request_opcode: u8,
+    /// Data of the reply.
     data: Vec<u8>,
 }
 

@@ -26,8 +26,11 @@ pub type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 /// Vehicles in the plans for which the bench sets a limit of instructions.
 pub(super) const SMALL_SWARM_VEHICLES: usize = 3;
 pub(super) const HEIGHTS: Heights = Heights { max_picture_height_m: 35.0, layer_spacing_m: 5.0 };
+/// Cruise speed, m/s.
 pub(super) const CRUISE_MPS: f32 = 5.0;
+/// Climb speed, m/s.
 pub(super) const CLIMB_MPS: f32 = 3.0;
+/// Descent speed, m/s.
 pub(super) const DESCEND_MPS: f32 = 1.0;
 pub(super) const SCHEDULE: ScheduleConfig = ScheduleConfig {
     separation_m: 2.0,
@@ -77,6 +80,7 @@ pub(super) fn rings(corners: usize, zones: usize) -> Vec<Ring, 4> {
     core::iter::once(outer).chain((0..zones).map(zone)).collect()
 }
 
+/// Spacing with lanes this far apart.
 pub(super) fn spacing(lane_m: f32) -> Spacing {
     Spacing {
         footprint: Footprint { along_m: lane_m, across_m: lane_m },
@@ -129,7 +133,9 @@ pub(super) fn measure_plan_parts(
 /// An area, the direction and spacing of its lanes, and the number of vehicles.
 struct Case<'a> {
     area: Area<'a>,
+    /// Angle of the lanes, degrees; `None`: the planner chooses it.
     angle_deg: Option<f32>,
+    /// Spacing of the lanes, metres.
     lane_m: f32,
     vehicle_count: usize,
 }

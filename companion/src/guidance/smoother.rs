@@ -111,6 +111,7 @@ pub struct SetpointSmoother {
     newest_raw_point: Point,
     /// The last differences between raw points, a ring; `newest_step_index` is the newest.
     raw_steps: [Point; HISTORY_LEN],
+    /// Index in `raw_steps` of the newest difference.
     newest_step_index: usize,
     /// Newest value of the averages.
     averaged_point: Point,

@@ -69,6 +69,7 @@ struct TokenBucketConfig {
     burst: u64,
 }
 
+/// The bucket with these settings.
 const fn token_bucket(every_ms: u64, burst: u64) -> TokenBucketConfig {
     TokenBucketConfig { every_ms, burst }
 }
@@ -105,6 +106,7 @@ const TOKEN_BUCKETS: [[TokenBucketConfig; KIND_COUNT]; SENDER_COUNT] = [
 /// The time at which each token bucket (link, kind of sender, kind of answer) is full again.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AnswerTokenBuckets {
+    /// The times, by link, kind of sender and kind of answer.
     full_at: [[[Instant; KIND_COUNT]; SENDER_COUNT]; LINK_COUNT],
 }
 

@@ -200,6 +200,7 @@ pub struct MissionView<'a> {
     vehicles: &'a [[u8; VEHICLE_LEN]],
     /// The goals, as in the file; empty in a coverage mission.
     goals: &'a [[u8; GOAL_LEN]],
+    /// Whether the vehicles fly to goals or over an area.
     kind: MissionKind<'a>,
 }
 

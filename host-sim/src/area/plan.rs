@@ -66,6 +66,7 @@ struct FenceCircle {
     circle: Circle,
 }
 
+/// Centre and radius.
 #[derive(Deserialize)]
 struct Circle {
     /// Latitude and longitude, degrees.

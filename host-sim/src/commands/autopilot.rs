@@ -59,11 +59,13 @@ pub struct AutopilotArgs {
     pub origin: Option<GeodeticArgument>,
 }
 
+/// Parses the name of an autopilot.
 fn autopilot_kind_parser() -> impl TypedValueParser<Value = SimulatedKind> {
     let names = PossibleValuesParser::new(["px4", "ardupilot"]);
     names.map(|name| if name == "px4" { SimulatedKind::Px4 } else { SimulatedKind::Ardupilot })
 }
 
+/// Parses a time from 0 to 3600 s.
 fn parse_seconds(text: &str) -> Result<f32, String> {
     let sound = text.parse().ok().filter(|s| (0.0..=3600.0).contains(s));
     sound.ok_or_else(|| "expected a number of seconds from 0 to 3600".to_owned())

@@ -156,6 +156,7 @@ fn count_with_noun(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
+/// Prints the plan: vehicles, area, faults found.
 fn print(result: &CoverResult, findings: &CoverageFindings, dir: &std::path::Path) {
     let coverage = &result.coverage;
     say!("vehicle  waypoints         layer m  leaves s   cost s   cost m");
@@ -238,6 +239,7 @@ fn print_unchecked_batteries(planned: &CoveragePlan<'_>) {
     }
 }
 
+/// Prints how lanes lie above uneven ground.
 fn print_terrain(coverage: &CoverageResult) {
     if let Some(terrain) = &coverage.terrain {
         say!(

@@ -41,10 +41,12 @@ fn parse_number(text: &str, most: f64) -> Result<f64, String> {
     sound.ok_or_else(|| format!("expected a number from 0 to {most}"))
 }
 
+/// Parses a share from 0 to 1.
 fn parse_share(text: &str) -> Result<f64, String> {
     parse_number(text, 1.0)
 }
 
+/// Parses a time from 0 to 60 s.
 fn parse_seconds(text: &str) -> Result<f64, String> {
     parse_number(text, 60.0)
 }

@@ -73,6 +73,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
+/// Prints numbers of the roadmap.
 fn print(view: &RoadmapView<'_>) {
     let header = view.header();
     let edges = || (0..view.node_count() as u16).flat_map(|n| view.half_edges(n));

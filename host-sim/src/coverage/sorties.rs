@@ -142,6 +142,7 @@ pub fn cut_route(
 
 /// The lanes of a route, the first and the last of them possibly only in part.
 struct RouteLanes<'a> {
+    /// The plan that the route belongs to.
     planned: &'a CoveragePlan<'a>,
     route: &'a Route,
     /// First waypoint of each lane within the route, and the end of the route (exclusive).

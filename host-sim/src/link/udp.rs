@@ -22,6 +22,7 @@ fn transmit(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) -> io::Result<()> 
 /// A UDP socket with one fixed peer; datagrams of other senders are dropped.
 pub struct UdpPeer {
     socket: UdpSocket,
+    /// Address of the peer.
     peer: SocketAddr,
 }
 

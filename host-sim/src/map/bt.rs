@@ -64,6 +64,7 @@ struct BtHeader {
 
 /// Reads the bytes of a file from front to back.
 struct Reader<'a> {
+    /// The whole file.
     bytes: &'a [u8],
     /// Offset of the next byte to read.
     at: usize,

@@ -45,6 +45,7 @@ pub(super) fn track<S: Serializer>(track: &[TrackPoint], serializer: S) -> Resul
     base64(floats.flat_map(f32::to_le_bytes), serializer)
 }
 
+/// Writes the numbers of each footprint as [`floats`].
 pub(super) fn footprints<S: Serializer>(
     all: &[PictureFootprint],
     serializer: S,

@@ -188,6 +188,7 @@ fn read_map(table: &Table<'_>, folder: &Path) -> Result<(MapSection, bool)> {
     Ok((map, origin.is_some()))
 }
 
+/// Reads `[roadmap]`.
 fn read_roadmap(table: &Table<'_>) -> Result<RoadmapSection> {
     let edge_max = table.get("edge_max_m");
     let shares = [("edge_min_share", "edge_min_m"), ("edge_max_share", "edge_max_m")];

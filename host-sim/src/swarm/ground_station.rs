@@ -62,6 +62,7 @@ impl OperatorCommand {
 /// A ground station that starts the swarm (MISSION_START) and commands single vehicles.
 #[derive(Debug)]
 pub struct GroundStation {
+    /// System id of the ground station.
     system_id: u8,
     /// Sequence number of the next frame.
     sequence: u8,

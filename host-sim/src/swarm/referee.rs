@@ -75,6 +75,7 @@ pub struct DistanceSample {
 /// What the referee remembers of one vehicle.
 #[derive(Clone, Debug)]
 struct WatchedVehicle {
+    /// System id.
     id: u8,
     /// Radius of the hull, metres.
     radius_m: f32,

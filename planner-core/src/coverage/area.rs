@@ -102,6 +102,7 @@ pub enum AreaError {
 pub struct Area<'a> {
     /// Vertices of all rings, ring by ring.
     vertices: &'a [Flat],
+    /// The rings, by the ends of their vertices.
     rings: &'a [Ring],
 }
 

@@ -129,6 +129,7 @@ struct ShareSearch<'s, 'w, const L: usize, const N: usize, const K: usize> {
     /// Cost of the best plan so far, seconds.
     least_cost_s: f32,
     ws: &'s mut PowellWorkspace<K>,
+    /// The best plan so far.
     out: &'s mut RoutePlan<K>,
 }
 

@@ -282,6 +282,7 @@ pub(super) struct Leg {
     pub(super) from: Point,
     /// End, ENU metres in the mission frame.
     pub(super) to: Point,
+    /// Length, metres.
     pub(super) length_m: f32,
     pub(super) from_s: f32,
     pub(super) to_s: f32,

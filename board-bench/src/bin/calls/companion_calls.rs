@@ -231,6 +231,7 @@ fn measure_fleet_agreement(meter: &mut impl Meter) {
     }
 }
 
+/// Measures requests for parameters.
 #[inline(never)]
 fn measure_parameters(meter: &mut impl Meter) {
     let mut values = Parameters::default();
@@ -266,7 +267,9 @@ struct GroundedCompanion<'a, M> {
     flash: RamFlash,
     meter: &'a mut M,
     now: Instant,
+    /// Sequence number of the next frame.
     sequence: u8,
+    /// FTP sequence number of the next request.
     ftp_sequence: u16,
 }
 

@@ -38,6 +38,7 @@ pub struct MissionGoal {
 }
 
 impl MissionVehicle {
+    /// Whether all numbers are in range, and the goal is one of `goals`.
     pub(super) fn is_valid(&self, goals: usize) -> bool {
         let task = &self.task;
         task.id != 0
@@ -49,6 +50,7 @@ impl MissionVehicle {
             && is_positive_up_to(self.speed_max_mps, MAX_SPEED_MPS)
     }
 
+    /// The vehicle in these bytes of the file.
     pub(super) fn from_bytes(b: &[u8; VEHICLE_LEN]) -> Self {
         let goal = u16_at(b, 2);
         Self {
@@ -64,6 +66,7 @@ impl MissionVehicle {
         }
     }
 
+    /// The vehicle as in the file.
     pub(super) fn to_bytes(self) -> [u8; VEHICLE_LEN] {
         let mut b = [0; VEHICLE_LEN];
         b[0] = self.task.id;
@@ -76,10 +79,12 @@ impl MissionVehicle {
 }
 
 impl MissionGoal {
+    /// Whether all numbers are in range.
     pub(super) fn is_valid(&self) -> bool {
         in_range(&self.position) && (0.0..=MAX_COORDINATE_M).contains(&self.descent_m)
     }
 
+    /// The goal in these bytes of the file.
     pub(super) fn from_bytes(b: &[u8; GOAL_LEN]) -> Self {
         Self { position: point_at(b, 0), descent_m: f32_at(b, 12) }
     }

@@ -43,6 +43,7 @@ pub(crate) fn two_vehicles() -> Config<4> {
     config
 }
 
+/// A plan from [`START`] to [`GOAL`].
 pub(crate) fn plan() -> Plan {
     let mut path = Path::new();
     for point in [START, Point::new(16.0, 12.0, 1.5), GOAL] {

@@ -28,6 +28,7 @@ impl Bench {
         self.bytes(&data)
     }
 
+    /// Sends GPS_GLOBAL_ORIGIN.
     pub(crate) fn send_origin(&mut self) {
         let origin = GPS_GLOBAL_ORIGIN_DATA {
             latitude: (self.origin.lat_deg * 1e7).round() as i32,
@@ -43,6 +44,7 @@ impl Bench {
         self.kind == AutopilotKind::Px4 || self.streams.contains(&id)
     }
 
+    /// Sends the messages that only ArduCopter sends.
     fn report_ardupilot(&mut self) {
         if self.sends(193) {
             let flags = EkfStatusFlags::from_bits_retain(self.ekf_flags);

@@ -29,6 +29,7 @@ pub(super) struct UnreadTerrain {
     path: PathBuf,
     /// Where the file's name stands, for errors.
     span: TomlSpan,
+    /// Height of the band of paths above the ground, metres.
     tolerance_m: f32,
     /// What holds for a file without a coordinate system.
     without_crs: WithoutCrs,

@@ -6,6 +6,7 @@ use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Table, TomlValue};
 
+/// Reads `camera`.
 pub(super) fn read_camera(value: &TomlValue<'_>) -> Result<Camera> {
     let table = value.table()?;
     let sensor = table.get("sensor_mm");
