@@ -40,8 +40,9 @@ use crate::scenario::{Scenario, VehicleSection};
 /// Most changes of the lanes' order that the host tries while it shortens the path.
 pub const HOST_SEARCH_STEPS: u32 = 20_000_000;
 
-/// Greatest height of a start above or below the ground, metres.
-const MAX_START_OFF_GROUND_M: f32 = 1.5;
+/// Heights of a start above the ground that are accepted, metres. A companion takes off only near
+/// the height of its start, and a simulated vehicle cannot leave the ground from far below it.
+const START_HEIGHTS_M: std::ops::RangeInclusive<f32> = -1.0..=1.5;
 
 /// A sortie, its points, and the time at which each point is passed, seconds after the mission's
 /// start.
@@ -316,7 +317,7 @@ fn build_tracks(
     Ok(tracks)
 }
 
-/// Checks that every vehicle starts at most 1.5 m above or below the ground: with a greater error
+/// Checks that every vehicle starts at most 1.5 m above and 1 m below the ground: with more error
 /// of its height a companion does not take off, and heights in written plans count from the pad.
 ///
 /// # Errors
@@ -324,9 +325,7 @@ fn build_tracks(
 pub fn check_starts_on_ground(scenario: &Scenario) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
     let above_m = |v: &VehicleSection| v.start.z - area.ground_height_m(&v.start.xy());
-    let stray = |v: &VehicleSection| {
-        !(-MAX_START_OFF_GROUND_M..=MAX_START_OFF_GROUND_M).contains(&above_m(v))
-    };
+    let stray = |v: &VehicleSection| !START_HEIGHTS_M.contains(&above_m(v));
     if let Some(index) = scenario.vehicles.iter().position(stray) {
         let vehicle = &scenario.vehicles[index];
         bail!(

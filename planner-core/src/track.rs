@@ -299,7 +299,7 @@ pub fn advance<const W: usize>(
 const BRAKING_LEGS: usize = 6;
 
 /// Distance that the reference still flies if it is to stop now, metres: exact if it stops within
-/// [`BRAKING_LEGS`] legs, each of which has its own acceleration limit, else an upper bound.
+/// six legs, each of which has its own acceleration limit, else an upper bound.
 pub fn braking_distance_m<const W: usize>(
     cfg: &TrackConfig,
     path: &Path<W>,

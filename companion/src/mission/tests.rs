@@ -422,3 +422,37 @@ fn every_text_is_explained() {
         assert!(page.contains(&std::format!("\n| {text} | ")), "{text}");
     }
 }
+
+/// Texts that follow a severity in a source file: `Severity::Warning, "…"`.
+fn texts_with_severity(source: &str) -> impl Iterator<Item = &str> {
+    source.split("Severity::").skip(1).filter_map(|after| {
+        let (name, rest) = after.split_once(',')?;
+        let literal = rest.trim_start().strip_prefix('"')?;
+        name.chars()
+            .all(char::is_alphabetic)
+            .then(|| literal.split_once('"'))?
+            .map(|(text, _)| text)
+    })
+}
+
+#[test]
+fn every_text_outside_the_table_is_explained() {
+    let page = include_str!("../../../docs/companion.md");
+    let mut folders = std::vec![std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("src")];
+    let mut texts = 0;
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if !path.ends_with("tests.rs") {
+                let source = std::fs::read_to_string(&path).unwrap();
+                for text in texts_with_severity(&source) {
+                    texts += 1;
+                    assert!(page.contains(&std::format!("\n| {text} | ")), "{text}");
+                }
+            }
+        }
+    }
+    assert!(texts > 20, "{texts}");
+}

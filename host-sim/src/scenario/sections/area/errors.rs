@@ -87,7 +87,9 @@ pub(super) fn area_hint(error: core_area::AreaError) -> &'static str {
              which must be near the area"
         }
         E::SelfCrossing { .. } => "give the corners in their order around the polygon",
-        E::RingsCross { .. } => "draw one inside or outside the other",
+        E::RingsCross { .. } => {
+            "holes lie inside the border and apart from each other; draw two that cross as one"
+        }
         E::HoleOutside { .. } => "draw it inside the border, or leave it out",
         E::OuterInside { .. } => "draw the two as one, or give the inner one as a hole",
         E::Duplicate { .. } => "leave one of the two out",
