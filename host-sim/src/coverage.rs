@@ -7,6 +7,7 @@ pub mod check;
 pub mod export;
 pub mod flight;
 pub mod heights;
+mod methods;
 pub mod obstacles;
 pub mod page;
 mod planned;
@@ -22,15 +23,14 @@ use anyhow::bail;
 use planner_core::Point;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::bound::lower_bound_s;
-use planner_core::coverage::pack::{
-    CoverageProblem, PackWorkspace, Route, RoutePlan, TrackUnit, Vehicle, binpat, binpat_by_shares,
-};
+use planner_core::coverage::pack::{CoverageProblem, Route, RoutePlan, TrackUnit, Vehicle};
 use planner_core::coverage::tracks::{self, LanePattern, Tracks};
 use planner_core::coverage::transit::TransitGraph;
-use planner_core::coverage::{CoverageError, Flat, exact, powell};
+use planner_core::coverage::{CoverageError, Flat, exact};
 use planner_core::geo::frames::{Geodetic, enu_to_geodetic};
 use planner_core::map::field::follow::TerrainFollowing;
 
+pub use self::methods::divide_by_method;
 pub use self::planned::{CoveragePlan, MAX_AREA_VEHICLES, MAX_LANES, MAX_NO_FLY_CORNERS};
 use self::sorties::{BATTERY_SWAP_S, LaneTooLong, Sortie, USABLE_CHARGE};
 use crate::area::MAX_VERTICES;
@@ -386,73 +386,6 @@ fn planner_vehicle(vehicle: &VehicleSection, scenario: &Scenario) -> Vehicle {
         descend_mps,
         weight: vehicle.weight.unwrap_or(1.0),
     }
-}
-
-/// Least share of the path for one vehicle, metres: far below any spacing of waypoints.
-const MIN_SHARE_M: f32 = 1e-3;
-
-/// Divides the path among vehicles by a method. Returns the shares by which BINPAT makes the same
-/// division on companions; `None` if there are none.
-///
-/// # Errors
-/// As the method's planner.
-pub fn divide_by_method<const L: usize, const N: usize, const K: usize>(
-    work: &CoverageProblem<'_, L, N>,
-    method: CoverageMethod,
-    plan: &mut RoutePlan<K>,
-) -> Result<Option<Vec<f32>>, CoverageError> {
-    let own = || Some(work.vehicles.iter().map(|vehicle| vehicle.weight).collect());
-    match method {
-        CoverageMethod::SimpleBinpat | CoverageMethod::Binpat => {
-            binpat(work, &mut PackWorkspace::<K>::new(), plan).map(|()| own())
-        }
-        CoverageMethod::PowellBinpat => {
-            let mut ws = powell::PowellWorkspace::<K>::new();
-            powell::powell(work, &powell::PowellConfig::USUAL, &mut ws, plan)?;
-            Ok(Some(ws.pack.shares()[..work.vehicles.len()].to_vec()))
-        }
-        CoverageMethod::Exact => {
-            let count = work.tracks.waypoint_count() as usize;
-            let [ways, reaches, states] =
-                exact::ExactWorkspace::required_lengths(work.vehicles.len(), count);
-            let (mut ways_m, mut reaches) = (vec![0.0; ways], vec![0; reaches]);
-            let mut states = vec![(0, 0); states];
-            let mut ws = exact::ExactWorkspace {
-                transit_lengths_m: &mut ways_m,
-                reachable_ends: &mut reaches,
-                states: &mut states,
-            };
-            exact::plan_exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)?;
-            imitate_exact_plan(work, plan)
-        }
-    }
-}
-
-/// Shares with which BINPAT cuts the path where the exact division does; `exact` then becomes
-/// BINPAT's plan. `None` if BINPAT cuts elsewhere, or assigns the parts to vehicles so that they
-/// take longer: companions plan by shares alone, so they cannot fly the exact plan.
-fn imitate_exact_plan<const L: usize, const N: usize, const K: usize>(
-    work: &CoverageProblem<'_, L, N>,
-    exact: &mut RoutePlan<K>,
-) -> Result<Option<Vec<f32>>, CoverageError> {
-    let mut shares = vec![0.0; work.vehicles.len()];
-    let mut packed_m = 0.0;
-    for (share, route) in shares.iter_mut().zip(&exact.routes) {
-        let end_m = work.tracks.distance_to_waypoint_m(route.waypoint_end - 1);
-        // A share of length 0 would get no waypoint, but a route of the path's first waypoint alone
-        // has length 0.
-        *share = (end_m - packed_m).max(MIN_SHARE_M);
-        packed_m = end_m;
-    }
-    let mut plan = RoutePlan::new();
-    binpat_by_shares(work, &shares, &mut PackWorkspace::<K>::new(), &mut plan)?;
-    let waypoints = |route: &Route| (route.lowest_waypoint, route.waypoint_end);
-    let alike = plan.routes.iter().map(waypoints).eq(exact.routes.iter().map(waypoints));
-    if !alike || plan.max_cost_s() > exact.max_cost_s() {
-        return Ok(None);
-    }
-    *exact = plan;
-    Ok(Some(shares))
 }
 
 /// The error text for a coverage plan that failed, with the place in the scenario.

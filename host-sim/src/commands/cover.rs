@@ -147,7 +147,7 @@ fn area_line(coverage: &CoverageResult, findings: &CoverageFindings) -> String {
         findings.cell_m,
         count_with_noun(coverage.waypoint_count as usize, "waypoint"),
         count_with_noun(coverage.lane_count, "lane"),
-        coverage.lane_angle_deg.rem_euclid(180.0)
+        ((10.0 * coverage.lane_angle_deg).round() / 10.0).rem_euclid(180.0) + 0.0
     )
 }
 

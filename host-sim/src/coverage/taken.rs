@@ -87,20 +87,30 @@ pub fn count_missed_and_repeated(planned: &CoveragePlan<'_>, pictures: &[Picture
     (left, count_repeated(lanes, planned.tracks.waypoint_count(), &passes))
 }
 
-/// Of the points of tracks, all given as pictures, those within a quarter of a spacing of a
-/// waypoint from which the vehicle flies along the lanes. The others may be on a transit at the
-/// height of the lanes.
+/// Greatest distance of two points of a track, metres: those of another flight are further away.
+const MAX_TRACK_STEP_M: f32 = 10.0;
+
+/// Of the tracks whose points are all given as pictures, the places within a quarter of a spacing
+/// of a waypoint at which the vehicle flies along the lanes; between two points of a track, places
+/// half as far apart as that. The others may be on a transit at the height of the lanes.
 fn track_points_at_waypoints(planned: &CoveragePlan<'_>, points: &[Picture]) -> Vec<Picture> {
     let (lanes, along) = (planned.tracks.lanes(), planned.tracks.lane_direction());
     let spacing = planned.area_settings.spacing;
     let near_m = 0.25 * spacing.max_waypoint_spacing_m.min(spacing.max_lane_spacing_m);
-    let is_pass = |ends: &&[Picture]| {
-        let (place, flown) = (ends[0].position.xy(), (ends[1].position - ends[0].position).xy());
-        ends[0].vehicle == ends[1].vehicle
-            && flown.perp(&along).abs() < 0.2 * flown.dot(&along).abs()
-            && nearest_waypoint(lanes, &place).is_some_and(|(_, distance_m)| distance_m < near_m)
+    let passes = |ends: &[Picture]| {
+        let (begin, flown) = (ends[0], ends[1].position - ends[0].position);
+        let across = flown.xy().perp(&along).abs();
+        let is_along = across < 0.2 * flown.xy().dot(&along).abs();
+        let is_one_track = ends[0].vehicle == ends[1].vehicle && flown.norm() < MAX_TRACK_STEP_M;
+        let flies_lane = is_one_track && is_along;
+        let places = if flies_lane { (2.0 * flown.xy().norm() / near_m).ceil() as u32 } else { 0 };
+        (0..places).filter_map(move |place| {
+            let position = begin.position + flown * (place as f32 / places as f32);
+            let (_, distance_m) = nearest_waypoint(lanes, &position.xy())?;
+            (distance_m < near_m).then_some(Picture { position, ..begin })
+        })
     };
-    points.windows(2).filter(is_pass).map(|ends| ends[0]).collect()
+    points.windows(2).flat_map(passes).collect()
 }
 
 /// Distance of a point along a lane from its first waypoint, and distance beside the lane, metres.

@@ -13,7 +13,7 @@ use companion::storage::mission_file::{MissionBlock, MissionKind};
 use companion::swarm::fleet::VehicleDivisionInput;
 use planner_core::Point;
 use planner_core::coverage::area::Area;
-use planner_core::coverage::flights::MAX_PATH_LENGTH_M;
+use planner_core::coverage::flights::{MAX_PATH_LENGTH_M, PLANNED_ACCEL_MPS2};
 use planner_core::coverage::pack::{Route, TrackUnit};
 use planner_core::coverage::transit::TransitGraph;
 use planner_core::flight::{PathError, WaypointRange};
@@ -105,31 +105,42 @@ pub(super) fn prepare(
     Ok(mission)
 }
 
-/// Time at each stop, seconds per m/s of cruise speed above [`SETTLES_AT_ONCE_MPS`], in which a
-/// vehicle settles at its setpoint: PX4 overshoots the end of a fast lane and creeps back, in
-/// simulated flights for 2 s at 8 m/s and 3.4 s at 12 m/s; ArduCopter for 0 and 1.2 s.
-const fn settling_s_per_mps(autopilot: AutopilotKind) -> f32 {
-    match autopilot {
-        AutopilotKind::Px4 => 0.5,
-        AutopilotKind::ArduPilot => 0.15,
-    }
+/// Time in which a vehicle settles at its setpoint after a stop from this speed, seconds, as
+/// simulated flights over level lanes of 100 to 400 m take: PX4 overshoots and creeps back.
+fn settling_s(autopilot: AutopilotKind, speed_mps: f32) -> f32 {
+    let (at_once_mps, s_per_mps) = match autopilot {
+        AutopilotKind::Px4 => (4.0, 2.0),
+        AutopilotKind::ArduPilot => (8.0, 0.8),
+    };
+    (s_per_mps * (speed_mps - at_once_mps)).clamp(0.0, MAX_SETTLING_S)
 }
-/// Cruise speed up to which a vehicle stops at its setpoint without overshoot, m/s.
-const SETTLES_AT_ONCE_MPS: f32 = 4.0;
+
+/// Greatest value of [`settling_s`].
+const MAX_SETTLING_S: f32 = 8.5;
 
 /// Time of a route flown by a companion, seconds, without waiting at gates: as
-/// [`sorties::route_duration_s`], and the vehicle settles at both ends of each lane and in its
-/// layer.
+/// [`sorties::route_duration_s`], and after each lane and each step to the next one the vehicle
+/// settles.
 pub fn flight_by_companion_s(planned: &CoveragePlan<'_>, route: &Route) -> f32 {
     let index = usize::from(route.vehicle_index);
-    let cruise_mps = planned.vehicles[index].cruise_mps;
+    let (cruise_mps, autopilot) =
+        (planned.vehicles[index].cruise_mps, planned.scenario.vehicles[index].autopilot);
+    // A leg from rest to rest may be too short to reach cruise speed.
+    let after_leg_s = |length_m: f32| {
+        settling_s(autopilot, cruise_mps.min((PLANNED_ACCEL_MPS2 * length_m).sqrt()))
+    };
     let [first, last] = [route.lowest_waypoint, route.waypoint_end - 1]
         .map(|number| planned.tracks.lane_of(number));
-    let stops = 2.0 * (last - first + 1) as f32 + 2.0;
-    let settling_s = settling_s_per_mps(planned.scenario.vehicles[index].autopilot)
-        * (cruise_mps - SETTLES_AT_ONCE_MPS).max(0.0);
-    sorties::route_duration_s(planned, route) + stops * settling_s
+    let step_s = after_leg_s(planned.area_settings.spacing.max_lane_spacing_m);
+    let lanes = &planned.tracks.lanes()[first..=last];
+    let settling_s: f32 = lanes.iter().map(|lane| after_leg_s(lane.length_m()) + step_s).sum();
+    sorties::route_duration_s(planned, route) + settling_s + 2.0 * after_leg_s(f32::INFINITY)
 }
+
+/// Share of its battery charge that the plan of a vehicle may need: 7 % less than
+/// [`USABLE_CHARGE`], since flights take up to that much longer, most where they are divided into
+/// stretches.
+const MAX_PLANNED_CHARGE: f32 = 0.93 * USABLE_CHARGE;
 
 /// Refuses a route that would use more than the usable share of the vehicle's simulated battery:
 /// companions fly a route without a battery swap.
@@ -142,7 +153,7 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
         let takes_s = flight_by_companion_s(planned, route)
             + beyond_hover * route.ground_length_m / cruise_mps;
         let lasts_s = vehicle.battery_hover_s();
-        if takes_s > USABLE_CHARGE * lasts_s {
+        if takes_s > MAX_PLANNED_CHARGE * lasts_s {
             let hint = match planned.area_settings.allows_battery_swaps {
                 true => {
                     "`cover` writes a plan for each sortie, which autopilots fly without a companion"
@@ -153,11 +164,11 @@ fn check_batteries(planned: &CoveragePlan<'_>) -> anyhow::Result<()> {
             };
             bail!(
                 "area too large: {}: vehicle {} would need the charge of {:.0} s in a hover; its battery lasts {lasts_s:.0} s, \
-                 and {:.0} % of that are for the landing\nhint: more vehicles, wider lanes, a higher cruise_mps and speed_max_mps take less time; {hint}",
+                 and {:.0} % of that are kept for delays and the landing\nhint: more vehicles, wider lanes, a higher cruise_mps and speed_max_mps take less time; {hint}",
                 planned.scenario.vehicle_file_lines[index],
                 vehicle.id,
                 takes_s,
-                100.0 * (1.0 - USABLE_CHARGE)
+                100.0 * (1.0 - MAX_PLANNED_CHARGE)
             );
         }
     }

@@ -83,8 +83,8 @@ pub(super) fn area_hint(error: core_area::AreaError) -> &'static str {
             "a polygon has three corners or more that are not on one line"
         }
         E::TooFar { .. } => {
-            "without `coordinates = \"metres\"` numbers are degrees, longitude first; metres are about area.origin, \
-             which must be near the area"
+            "`coordinates` says whether numbers are degrees, longitude first, or metres about area.origin, which must \
+             be near the area"
         }
         E::SelfCrossing { .. } => "give the corners in their order around the polygon",
         E::RingsCross { .. } => {
