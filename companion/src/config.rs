@@ -178,7 +178,8 @@ impl<const V: usize> Config<V> {
     }
 }
 
-/// Heights of ground that is not level, below a coverage mission.
+/// Where the ground below a coverage mission is not level: the range of heights above it in which
+/// paths lie, and the heights of its lowest and highest points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnevenGround {
     /// Least height above the ground from which pictures are taken, metres.

@@ -14,7 +14,7 @@ use crate::time::{Duration, Instant};
 pub(crate) enum Timer {
     /// A step of the control loop: guidance, mission table, setpoint.
     Step,
-    /// HEARTBEAT on both links.
+    /// HEARTBEAT to the autopilot and to the swarm.
     Heartbeat,
     /// Position and intent of this vehicle, to the swarm.
     Swarm,

@@ -58,7 +58,8 @@ pub fn printable_message(text: &str) -> String {
     lines.join("\n")
 }
 
-/// An error message about the command line; each of the arguments that appears in it is printable.
+/// An error message about the command line, as [`printable_message`] gives it, in which each
+/// argument, and the value after its `=`, was replaced by its [`printable`] form.
 pub fn with_printable_arguments(text: &str, arguments: impl Iterator<Item = String>) -> String {
     let mut text = text.to_owned();
     for argument in arguments {

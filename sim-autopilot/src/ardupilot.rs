@@ -172,7 +172,8 @@ pub struct Copter {
     takeoff: Option<TakeOff>,
     /// Goal of Guided; other modes compute theirs in each step.
     goal: GuidedGoal,
-    /// When `goal` was set, microseconds since boot.
+    /// When a setpoint or DO_REPOSITION last set `goal`, microseconds since boot; `GUID_TIMEOUT`
+    /// counts from then.
     goal_set_us: u64,
     reference: CopterReference,
     /// Horizontal speed limit by DO_CHANGE_SPEED, m/s; `None`: `WPNAV_SPEED`.

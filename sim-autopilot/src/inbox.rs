@@ -15,7 +15,7 @@ use crate::services::params::Encoding;
 use crate::{Autopilot, telemetry};
 
 impl Autopilot {
-    /// Handles a message that arrived at `port`, and queues its answer.
+    /// Handles a message that arrived at `port`, and queues its answer, if it has one.
     pub(super) fn handle_frame(&mut self, port: usize, frame: &CheckedFrame) {
         let fields = PayloadReader::new(frame);
         let system_id = self.platform.config.system_id;

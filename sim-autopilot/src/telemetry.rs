@@ -256,7 +256,8 @@ impl Snapshot {
     }
 }
 
-/// Encodes the payload of PING, whose type is deprecated in the crate.
+/// Encodes the payload of PING, whose type is deprecated in the crate; system and component are the
+/// target's, both 0 in a request.
 pub fn ping_payload(time_us: u64, seq: u32, system: u8, component: u8) -> [u8; 14] {
     let mut payload = [0; 14];
     payload[..8].copy_from_slice(&time_us.to_le_bytes());

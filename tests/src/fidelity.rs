@@ -177,7 +177,8 @@ impl Recording {
             .sqrt()
     }
 
-    /// Replays the flight, and compares the simulated with the recorded estimates.
+    /// Replays the recorded setpoints and commands into a simulated autopilot, with these errors of
+    /// its estimate, and compares its estimated positions with the recorded ones.
     pub fn compare(&self, estimator: EstimateErrors<'_>, correction: Correction) -> Comparison {
         let simulated = self.replay(estimator, correction);
         let pairs: Vec<_> = self.flown_estimates().zip(&simulated).collect();

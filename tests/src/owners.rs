@@ -25,7 +25,8 @@ pub struct FlownMission {
     pub result: MissionResult,
     /// Its log, by [`covered::log_lines`].
     pub log: String,
-    /// What is wrong with the ownership of waypoints ([`Owners::faults`]).
+    /// What is wrong with the ownership of waypoints: two owners at once, a division that vehicles
+    /// disagree on, a waypoint that two of its owners photographed ([`Owners::faults`]).
     pub ownership_faults: Vec<String>,
     /// How long the vehicles took to agree on each division, seconds; `None` where not all that
     /// took part at first reported it.

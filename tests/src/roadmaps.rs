@@ -222,7 +222,8 @@ fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
         // file implies.
         let part = [0, 1, 2, 3, 4, 4, 4, 4, 5][(choice % 9) as usize];
         let begin: usize = sizes[..part].iter().sum();
-        // Without heights this word is the CRC, which is corrected afterwards.
+        // In a file without heights the last part is empty: a change of it hits the CRC, which is
+        // corrected afterwards.
         let at = begin + (choice >> 32) as usize % (sizes[part] / WORD_BYTES).max(1) * WORD_BYTES;
         let (old, share) = (u32_at(bytes, at), (value >> 40) as f32 / (1 << 24) as f32);
         let new = match (choice >> 8) % 8 {

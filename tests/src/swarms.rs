@@ -63,7 +63,8 @@ struct Space {
 }
 
 impl Space {
-    /// A random space.
+    /// Random free space: a room, a corridor with up to two side rooms, a shaft with rooms beside
+    /// it, or a long hall.
     fn random(rng: &mut Random) -> Self {
         let height = rng.uniform(1.0, 3.0);
         let boxes = match rng.below(13) {
@@ -107,7 +108,7 @@ impl Space {
         Self { boxes, edge_max_m: 8.0 }
     }
 
-    /// A random small space.
+    /// Small random free space: a room, or a corridor with a side room.
     fn small(rng: &mut Random) -> Self {
         let height = rng.uniform(0.2, 2.0);
         let boxes = if rng.one_in(2) {

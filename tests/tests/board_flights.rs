@@ -307,6 +307,8 @@ impl ByteLink for Radio {
         self.now
     }
 
+    /// Ends the client's turn: passes on what it sent, and waits until the vehicle's thread gives
+    /// the next turn, with its time and the bytes received.
     fn wait_briefly(&mut self) {
         // The vehicle's thread has ended once the vehicle has landed.
         let _ = self.sends.send(core::mem::take(&mut self.sent));

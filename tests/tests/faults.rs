@@ -49,7 +49,9 @@ struct Case {
     says: &'static [&'static str],
 }
 
-const STOPPED: &str = "Autopilot failsafe: setpoints stopped";
+/// The companion's text when the autopilot's own failsafe acts: the companion stops sending
+/// setpoints.
+const FAILSAFE_ACTS: &str = "Autopilot failsafe: setpoints stopped";
 const FOUND: &str = "Found in flight: no mission";
 const AT_GOAL: &str = "At the goal: landing";
 /// Distance from starts and goals to the geofence around them, metres: what the roadmap requires,
@@ -78,8 +80,8 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'position-jump'", then: Out, says: &["Position is elsewhere: landing"] },
     Case { script: "kind = 'position-jump'\noffset_m = [0, 0, -5]", then: Out, says: &["Position is elsewhere: landing"] },
     Case { script: "kind = 'origin-change'", then: Out, says: &["EKF origin moved: landing"] },
-    Case { script: "kind = 'gps-loss'", then: Out, says: &[STOPPED, "Position still lost: landing"] },
-    Case { script: "kind = 'gps-loss'\nduration_s = 0.5", then: Out, says: &[STOPPED, AT_GOAL] },
+    Case { script: "kind = 'gps-loss'", then: Out, says: &[FAILSAFE_ACTS, "Position still lost: landing"] },
+    Case { script: "kind = 'gps-loss'\nduration_s = 0.5", then: Out, says: &[FAILSAFE_ACTS, AT_GOAL] },
     Case { script: "kind = 'battery-low'", then: Out, says: &["Battery low: landing", "Battery critical: landing", AT_GOAL] },
     Case { script: "kind = 'pilot-takeover'", then: Out, says: &["Pilot has control: mission stopped"] },
     Case { script: "kind = 'pilot-takeover'\nduration_s = 8", then: GoesOn, says: &["Resumed after the pilot"] },

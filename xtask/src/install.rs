@@ -12,7 +12,7 @@ use crate::shell::{command, find_on_path, run, target_dir};
 pub struct Package {
     /// Name of the package.
     pub name: &'static str,
-    /// A file that the package installs.
+    /// Path of a file that the package installs; the package counts as installed if it exists.
     pub file: &'static str,
 }
 

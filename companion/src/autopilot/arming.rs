@@ -24,7 +24,7 @@ const MAX_REPORTED_REFUSALS: usize = 4;
 
 /// `MAV_CMD` number of NAV_TAKEOFF.
 const NAV_TAKEOFF: u16 = 22;
-/// `MAV_CMD` number of DO_SET_MODE.
+/// `MAV_CMD` number of DO_SET_MODE, as COMMAND_ACK reports it.
 const DO_SET_MODE: u16 = 176;
 /// `MAV_CMD` number of COMPONENT_ARM_DISARM.
 const ARM_DISARM: u16 = 400;
@@ -58,7 +58,7 @@ pub(crate) struct ArmingHandshake {
     /// Estimated height in the mission frame at which the vehicle was last known to be disarmed,
     /// metres.
     disarmed_z_m: f32,
-    /// Refusals reported in this state: `MAV_CMD` and `MAV_RESULT`.
+    /// Refusals already reported by a text in this mission state: `MAV_CMD` and `MAV_RESULT`.
     reported_refusals: [Option<(u16, u8)>; MAX_REPORTED_REFUSALS],
 }
 

@@ -312,7 +312,7 @@ impl Handshake {
     }
 
     /// Requests, in `Land`, the landing mode or, in `LandingHeld`, the mode that follows setpoints:
-    /// at most four times while HEARTBEAT is silent.
+    /// at most four times from when HEARTBEAT falls silent until it is heard again.
     fn request_mode_while_silent(
         &mut self,
         kind: AutopilotKind,

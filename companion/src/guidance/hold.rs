@@ -50,7 +50,7 @@ impl Hold {
         core::mem::take(&mut self.active)
     }
 
-    /// Whether the vehicle's intents report the hold.
+    /// Whether the hold has begun: the vehicle's intents then report that it stops at its setpoint.
     pub(crate) fn is_reported(&self) -> bool {
         self.active
     }

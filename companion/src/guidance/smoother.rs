@@ -172,7 +172,8 @@ impl SetpointSmoother {
         }
     }
 
-    /// Sets the limits; to be called only while the setpoint stands.
+    /// Sets the limits and the fence, and restarts the curve at the setpoint; to be called only
+    /// while the setpoint stands still.
     pub(crate) fn set_limits(&mut self, limits: MotionLimits, fence: Option<(Point, Point)>) {
         (self.limits, self.fence, self.average_ticks) =
             (limits, fence.map(Fence::new), ticks_per_average(&limits));

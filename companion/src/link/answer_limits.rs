@@ -37,7 +37,8 @@ impl SenderKind {
     }
 }
 
-/// Kinds of answers, each with token buckets of its own.
+/// Kinds of answers to what others send; each has its own token bucket for each link and kind of
+/// sender.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum AnswerKind {
     /// COMMAND_ACK.

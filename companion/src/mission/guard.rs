@@ -159,10 +159,11 @@ pub enum Guard {
     ReturnCommanded,
     /// NAV_RETURN_TO_LAUNCH before the climb is done.
     ReturnInClimb,
-    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where a path home may be requested.
+    /// NAV_RETURN_TO_LAUNCH in a coverage mission, and a path home may be requested
+    /// ([`GuardInputs::may_seek_path_home`]).
     ReturnInCoverage,
     /// In a coverage mission: the path is blocked, was first found blocked here the limit ago or
-    /// earlier, and a path home may be requested.
+    /// earlier, and a path home may be requested and is not sought yet.
     BlockedInCoverage,
     /// In a coverage mission: the path has been blocked for the limit, and the vehicle may fly
     /// around the obstacle and back to its path.
@@ -175,13 +176,13 @@ pub enum Guard {
     /// planned.
     OwnPlanLost,
     /// In a coverage mission, before the last descent: the safety filter has made the vehicle yield
-    /// for the limit, and a path home may be requested.
+    /// for the limit, and a path home may be requested and is not sought yet.
     YieldedInCoverage,
     /// In a coverage mission, before the last descent: the safety filter has kept the vehicle from
-    /// moving on for the limit, and a path home may be requested.
+    /// moving on for the limit, and a path home may be requested and is not sought yet.
     HinderedInCoverage,
     /// In a coverage mission: no progress along the path for the limit, and a path home may be
-    /// requested.
+    /// requested and is not sought yet.
     StalledInCoverage,
     /// The vehicle seeks a path home, stands, and may request it from the shell.
     StandsToReturn,
@@ -265,7 +266,7 @@ pub enum Guard {
     /// For longer than the limit the vehicle has waited below one that lands, without a place along
     /// its path to evade to.
     BelowLandingVehicle,
-    /// Setpoint and vehicle stand.
+    /// Setpoint and vehicle stand, outside a descent ([`GuardInputs::standing`]).
     Standing,
     /// Others have divided this vehicle's share of the area, or count this vehicle as lost.
     Excluded,

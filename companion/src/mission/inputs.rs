@@ -90,8 +90,8 @@ pub struct GuardInputs {
     pub start_pending: bool,
     /// Whether DO_PAUSE_CONTINUE 0 is pending.
     pub pause_pending: bool,
-    /// Whether the climb has only begun: the vehicle is less than 1 m, and less than half the
-    /// climb, above its pad.
+    /// Whether, in `Climb`, the vehicle is less than 1 m, and less than half the climb, above its
+    /// pad: a pause then waits, unless the vehicle has not left the ground.
     pub climb_just_begun: bool,
     /// Whether DO_PAUSE_CONTINUE 1 is pending.
     pub resume_pending: bool,
@@ -244,7 +244,8 @@ pub struct GuardInputs {
     /// Time for which the vehicle has waited below one that lands, without a place along its path
     /// to evade to.
     pub waited_below_landing_for: Duration,
-    /// Whether setpoint and vehicle stand: the vehicle is slower than a hovering one that sways.
+    /// Whether, outside a descent, setpoint and vehicle stand: the vehicle is slower than a
+    /// hovering one that sways.
     pub standing: bool,
 }
 

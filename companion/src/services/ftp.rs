@@ -49,12 +49,13 @@ const MAX_QUEUED_REQUESTS: usize = 6;
 /// Time without a request after which another client may take over the session.
 const SESSION_IDLE_AFTER: Duration = Duration::from_secs(10);
 
-/// A reply that waits to be sent to the client `to`: system id and component id.
+/// A reply that waits to be sent to the client.
 #[derive(Clone, Copy, Debug)]
 struct Reply {
     /// Index of the link on which the request came.
     link: usize,
-    to: (u8, u8),
+    /// System id and component id of the client.
+    client: (u8, u8),
     packet: [u8; HEADER_LEN + MAX_DATA],
 }
 
@@ -121,8 +122,8 @@ impl Default for Ftp {
 }
 
 impl Ftp {
-    /// Queues a request. One that is queued or executed already, or finds the queue full, is
-    /// dropped: the client repeats it.
+    /// Queues a request. One that is in the queue or being executed is dropped. So is one that
+    /// finds the queue full: the client repeats it.
     pub fn queue_request(&mut self, link: usize, now: Instant, frame: &Frame) {
         self.now = now;
         let request = FtpRequest::from_frame(link, frame);
@@ -142,9 +143,9 @@ impl Ftp {
 
     /// The reply to be sent on a link: the whole payload of a FILE_TRANSFER_PROTOCOL.
     pub fn poll_reply(&mut self, link: usize) -> Option<[u8; PAYLOAD_LEN]> {
-        let Reply { to, packet, .. } = self.reply.take_if(|reply| reply.link == link)?;
+        let Reply { client, packet, .. } = self.reply.take_if(|reply| reply.link == link)?;
         let mut payload = [0; PAYLOAD_LEN];
-        (payload[1], payload[2]) = to;
+        (payload[1], payload[2]) = client;
         payload[3..].copy_from_slice(&packet);
         Some(payload)
     }

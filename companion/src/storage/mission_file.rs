@@ -189,7 +189,7 @@ fn write_header(
     );
 }
 
-/// A mission file whose bytes have been checked; it borrows them.
+/// A mission file whose bytes have been checked: header and CRC decoded, the rest borrowed.
 #[derive(Clone, Copy, Debug)]
 pub struct MissionView<'a> {
     /// The decoded header.

@@ -217,8 +217,9 @@ impl<const V: usize> Fleet<V> {
     }
 
     /// Forgets what is known of the fleet, and takes part again under this incarnation number, by
-    /// the plan that this vehicle holds. When each other one was heard last stays known: otherwise
-    /// all would count as lost.
+    /// the plan that this vehicle holds. Called for a new flight or plan, when a vehicle that left
+    /// could start again, and after a restart. When each other one was heard last stays known:
+    /// otherwise all would count as lost.
     fn rejoin(&mut self, incarnation: u8) {
         let fresh = FleetVehicle { has_part: true, ..FleetVehicle::default() };
         for vehicle in &mut self.vehicles {
@@ -439,8 +440,7 @@ impl<const V: usize> Fleet<V> {
             && self.is_majority(|rank, _| self.vehicle_takes_part(rank))
     }
 
-    /// Makes the division under way binding: vehicles that were not alive in it have no part any
-    /// more.
+    /// Makes the division under way binding: vehicles not alive in it have no part any more.
     fn commit_division(&mut self) {
         let inputs = core::mem::take(&mut self.pending_inputs);
         self.committed_hash = self.pending_hash;

@@ -64,7 +64,7 @@ pub fn begin_work(work: FileWork, files: u32) -> bool {
     update_record(|kept| kept.begin_work(work, files))
 }
 
-/// Records that the work that runs has ended without a crash.
+/// Records that the work on files that [`begin_work`] recorded has ended without a crash.
 pub fn finish_work() {
     update_record(CrashRecord::finish_work);
 }

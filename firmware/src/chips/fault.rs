@@ -3,13 +3,13 @@
 
 use core::ops::Range;
 
-/// CFSR bits: DACCVIOL is a data access that the MPU refused, its address in MMFAR if MMARVALID is
-/// set; MSTKERR is a refused push of registers at an exception's entry, without an address.
+/// CFSR bit: a data access that the MPU refused; its address is in MMFAR if MMARVALID is set.
 const DACCVIOL: u32 = 1 << 1;
+/// CFSR bit: a refused push of registers at an exception's entry, without an address.
 const MSTKERR: u32 = 1 << 4;
-/// CFSR bits: MLSPERR is a refused access while the floating-point registers were pushed; MMARVALID
-/// says that MMFAR holds an address.
+/// CFSR bit: a refused access while the floating-point registers were pushed.
 const MLSPERR: u32 = 1 << 5;
+/// CFSR bit: MMFAR holds an address.
 const MMARVALID: u32 = 1 << 7;
 /// CFSR bit of ARMv8-M alone: the stack pointer went below MSPLIM.
 const STKOF: u32 = 1 << 20;

@@ -17,7 +17,7 @@ pub struct Args {
     out: PathBuf,
 }
 
-/// Papers by their short names.
+/// Papers by their short names (docs/papers.md); only cpp can be run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum Paper {
     /// Madridano 2020

@@ -28,10 +28,10 @@ pub struct DepartureFlight<'a> {
     pub times_s: &'a [f32],
 }
 
-/// Departure time of each flight, seconds after the round begins, and the least distance between
-/// any two vehicles from the first departure to the last landing of both, metres; infinite for one
-/// vehicle. `None` if some flight has no departure within `MAX_GROUND_WAIT_S` that keeps the
-/// separation.
+/// Departure time of each flight of a round (one sortie of each vehicle), seconds after the round
+/// begins, and the least distance between any two vehicles from the first departure of the two to
+/// the last landing of the two, pads included, metres; infinite for one vehicle. `None` if some
+/// flight has no departure within `MAX_GROUND_WAIT_S` that keeps the separation.
 pub fn plan_departures(
     flights: &[DepartureFlight<'_>],
     separation_m: f32,

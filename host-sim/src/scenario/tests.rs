@@ -3,6 +3,7 @@ use planner_core::Point;
 use super::*;
 use crate::map::UnknownSpace;
 
+/// A valid scenario; tests replace parts of it.
 const GOOD: &str = r#"
 [map]
 file = "builtin:building"
@@ -399,8 +400,7 @@ fn wrong_files_of_an_area_are_named_with_key_place_and_remedy() {
     }
 }
 
-/// Asserts that the map loads and that starts and goals are farther from all obstacles than the
-/// required clearance.
+/// Asserts that the map loads, and that starts and goals have more than the required clearance.
 fn check_places(scenario: &Scenario) {
     let map = crate::map::load(&scenario.map.file, scenario.map.resolution_m).unwrap();
     let voxels = map.to_voxel_map(scenario.map.unknown);

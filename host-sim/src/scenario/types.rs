@@ -124,7 +124,8 @@ pub struct MissionSection {
     pub ground_stations: [u8; MAX_GROUND_STATIONS],
 }
 
-/// How goals are assigned to vehicles, or which other kind of mission it is.
+/// How goals are assigned to vehicles, or that the mission has none: an area to photograph, or a
+/// formation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissionMode {
     /// Any vehicle may fly to any goal: the assignment decides.

@@ -42,7 +42,7 @@ pub struct SerialLink {
     stalled_until_us: u64,
     /// Bytes given to [`Self::write`] so far.
     pub offered_bytes: u64,
-    /// Bytes lost so far because the transmit buffer was full.
+    /// Bytes lost so far: those of all writes that did not fit the transmit buffer.
     pub overrun_bytes: u64,
     /// Number of writes so far, lost ones included.
     pub writes_offered: u64,

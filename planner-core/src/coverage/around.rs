@@ -1,5 +1,5 @@
-//! One vehicle's detour over a height field, without a roadmap: home, or to a place aside to land
-//! there. It leads around no-fly zones and vehicles that are out of the plan.
+//! One vehicle's detour over level ground or a height field, without a roadmap: home, or to a place
+//! aside to land there. It leads around no-fly zones and vehicles that are out of the plan.
 //!
 //! Home: the path leads vertically to the vehicle's own layer, in the layer on the shortest path to
 //! above its pad, and down. Obstacles in the layer are flown around: a visibility graph over the
@@ -8,7 +8,7 @@
 //! no path in the layer, the same is tried at the height at which the vehicle hovers. Aside: the
 //! path leads straight to the nearest free point on rings around the vehicle.
 //!
-//! No leg leaves the request's fence. ENU metres. Cost for n nodes: at most n² / 2 visibility
+//! No leg ends outside the request's fence. ENU metres. Cost for n nodes: at most n² / 2 visibility
 //! checks, each against all edges of zones and all [`KeepOutZone`]s.
 
 use heapless::Vec;

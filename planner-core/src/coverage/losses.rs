@@ -142,6 +142,9 @@ impl From<PlanError> for LossesError {
 /// Divides the remaining waypoints. On entry `routes` and `out` are the routes and flights of the
 /// plan before; on success they are those of the division.
 ///
+/// Room for `L` lanes, `N` corners of no-fly zones and `K` vehicles; `out` holds at most `V`
+/// flights of at most `W` waypoints each.
+///
 /// Where no take-off times keep the vehicles apart, they exchange their routes, at most three
 /// times.
 ///

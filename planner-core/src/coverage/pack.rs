@@ -48,8 +48,8 @@ pub struct Vehicle {
 /// Heights of a coverage mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heights {
-    /// The paper's h_m: height at which pictures are taken, metres up in the mission frame; above
-    /// terrain the greatest of them.
+    /// h_m of paper CPP: height at which pictures are taken, metres up in the mission frame; above
+    /// terrain the greatest that paths may have.
     pub max_picture_height_m: f32,
     /// Vertical distance between neighbouring transit layers, metres.
     pub layer_spacing_m: f32,

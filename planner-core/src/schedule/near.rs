@@ -32,7 +32,7 @@ pub(super) struct SegmentGrid {
 
 impl SegmentGrid {
     pub(super) const fn new() -> Self {
-        // All zero; `sort_into_cells` sets the size before the first search.
+        // All zero; `sort_into_cells` sets all fields before the first search.
         Self {
             min: [0.0; 2],
             cell_m: 0.0,

@@ -99,7 +99,8 @@ impl Copter {
         self.auto.leg = leg;
     }
 
-    /// The goal of the mission's current leg.
+    /// Where AUTO flies to now: the goal of the take-off or of the mission's current leg, or the
+    /// point to hold. On a leg to a waypoint it also updates heading and hold point.
     pub(super) fn auto_goal(&mut self, sensors: &SensorReadings) -> GuidedGoal {
         if self.takeoff.is_some() {
             return self.take_off_goal();

@@ -124,7 +124,7 @@ enum ParsedFront {
     Whole(usize),
 }
 
-/// Finds frames in the bytes received at one port.
+/// Finds frames with a correct checksum in the bytes received at one port.
 #[derive(Clone, Debug, Default)]
 pub struct PortFramer {
     /// Bytes that belong to no complete frame yet, oldest first.

@@ -101,7 +101,7 @@ impl Px4 {
         }
     }
 
-    /// Whether PX4 sends this message on request.
+    /// Whether PX4 sends this message when REQUEST_MESSAGE asks for it.
     fn has_message(&self, id: u32) -> bool {
         matches!(id, msg::AUTOPILOT_VERSION | msg::PROTOCOL_VERSION)
             || telemetry::PX4_STREAMS.iter().any(|stream| stream.0 == id)

@@ -36,7 +36,7 @@ type ModelFleet = Fleet<MOST>;
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum Planted {
     Nothing,
-    /// Vehicles photograph without their lease.
+    /// Vehicles whose lease has run out photograph on, and do not land.
     LeaseIgnored,
     /// Others take a part over after four ticks of silence.
     TakenOverEarly,

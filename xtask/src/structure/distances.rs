@@ -108,14 +108,14 @@ pub fn check_margins_page() -> Result<Vec<String>> {
     Ok(wrong)
 }
 
-/// What was found in the files so far.
+/// The constants for docs/margins.md found in the files so far, and what is wrong with them.
 #[derive(Default)]
 struct Listing {
     /// The rows of the page.
     rows: RowsByFileAndName,
     /// The file of each name.
     files: BTreeMap<String, String>,
-    /// A line for each fault.
+    /// A line for each constant without a doc comment, or with the name of another one.
     faults: Vec<String>,
 }
 

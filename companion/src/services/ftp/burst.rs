@@ -13,7 +13,8 @@ pub struct FtpBurst {
     request: FtpRequest,
     /// Offset in the file of the next packet, bytes.
     offset: u32,
-    /// FTP sequence number of the request that the next packet answers.
+    /// FTP sequence number that a request for the next packet alone would have: that of the burst's
+    /// request, plus one for each packet read so far.
     sequence: u16,
     /// Number of packets still to be sent.
     packets_left: u8,

@@ -64,6 +64,6 @@ impl Ftp {
         ]);
         packet[8..12].copy_from_slice(&request.offset.to_le_bytes());
         packet[HEADER_LEN..HEADER_LEN + data.len()].copy_from_slice(data);
-        self.reply = Some(Reply { link: request.link, to: request.client, packet });
+        self.reply = Some(Reply { link: request.link, client: request.client, packet });
     }
 }

@@ -21,9 +21,11 @@ const BANK_INITIALISED_ADDRESS: usize = 0x6030_0000;
 const MAGIC: u32 = 0x464c_4153;
 /// Length of the bank, bytes.
 const BANK_LEN: usize = LAYOUT.len() as usize;
-/// Marks of a word: erased, programmed, its erasure or programming not completed.
+/// Mark of a word that is erased.
 const ERASED: u8 = 0;
+/// Mark of a word that is programmed.
 const WHOLE: u8 = 1;
+/// Mark of a word whose erasure or programming was not completed: it cannot be read.
 const TORN: u8 = 2;
 /// Time to erase a sector of 128 kB; the data sheet gives 1.1 s (64-bit parallelism) to 4 s
 /// (8-bit).

@@ -9,6 +9,7 @@ use super::super::footprint::Footprint;
 use super::super::tracks::{self, LanePattern, LaneWorkspace};
 use super::*;
 
+/// Side of the square footprint, and greatest spacing of lanes and of waypoints, metres.
 const LANE_M: f32 = 7.0;
 
 fn spacing() -> Spacing {

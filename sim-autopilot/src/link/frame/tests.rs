@@ -8,7 +8,8 @@ use proptest::sample::select;
 
 use super::*;
 
-/// Any message id, known to the dialect or not, with any sender and payload.
+/// A message id below 260 or one known to the dialect, any sender (system, component, sequence
+/// number), and any payload.
 fn any_frame() -> impl Strategy<Value = (u32, (u8, u8, u8), Vec<u8>)> {
     let known: Vec<u32> = (0..=u32::from(u16::MAX)).filter(|&id| crc_extra(id).is_some()).collect();
     // Half of the bytes are zero, as at the end of many payloads.

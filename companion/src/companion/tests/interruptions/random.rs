@@ -217,9 +217,10 @@ impl Watch {
     }
 }
 
-/// Flies a mission to which the events of `script` happen, each followed by a number of ticks, and
-/// lets all faults end: the vehicle is then down and disarmed.
-fn fly(px4: bool, begin: u32, script: &[(usize, u32)]) {
+/// Flies a mission for `ticks_before` ticks, then makes the events of `script` happen (index in
+/// `ALL`), each followed by a number of ticks, and lets all faults end: the vehicle is then down
+/// and disarmed.
+fn fly(px4: bool, ticks_before: u32, script: &[(usize, u32)]) {
     let mut b = bench(if px4 { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot });
     b.start();
     let mut watch = Watch {
@@ -236,7 +237,7 @@ fn fly(px4: bool, begin: u32, script: &[(usize, u32)]) {
         resumed: false,
         log: Vec::new(),
     };
-    (0..begin).for_each(|_| watch.tick(&mut b));
+    (0..ticks_before).for_each(|_| watch.tick(&mut b));
     for &(what, ticks) in script {
         watch.happen(&mut b, ALL[what]);
         (0..ticks).for_each(|_| watch.tick(&mut b));
@@ -276,18 +277,18 @@ proptest::proptest! {
     #[test]
     fn whatever_happens_somebody_flies_and_nothing_accepted_is_forgotten(
         px4 in proptest::prelude::any::<bool>(),
-        begin in 0u32..400,
+        ticks_before in 0u32..400,
         script in proptest::collection::vec((0..WHOLE, 1u32..80), 1..16),
     ) {
-        fly(px4, begin, &script);
+        fly(px4, ticks_before, &script);
     }
 
     #[test]
     fn whatever_single_message_is_lost_somebody_flies_and_nothing_is_forgotten(
         px4 in proptest::prelude::any::<bool>(),
-        begin in 0u32..400,
+        ticks_before in 0u32..400,
         script in proptest::collection::vec((0..ALL.len(), 1u32..80), 1..16),
     ) {
-        fly(px4, begin, &script);
+        fly(px4, ticks_before, &script);
     }
 }
