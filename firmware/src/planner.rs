@@ -1,5 +1,5 @@
 //! The planner on board: [`planner::answer_plan_request`] on the files in flash, in the board's
-//! memory. A file that brought it down in three starts is refused.
+//! memory. Files whose planning crashed the board in three starts in a row are refused.
 
 use companion::planner::{self, PlanFiles, RequestedPlan};
 use companion::{PlanFailure, PlanKind};

@@ -123,7 +123,7 @@ impl AutopilotConfig {
     }
 }
 
-/// Reason why an [`AutopilotConfig`] is rejected.
+/// Reason why an [`AutopilotConfig`] or a parameter's name is rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum AutopilotConfigError {
     /// A position with a latitude, longitude or altitude out of range.
@@ -134,7 +134,8 @@ pub enum AutopilotConfigError {
     /// A number that is not finite, or negative where it must not be.
     #[error("{0} must be finite and not negative")]
     NotFiniteOrNegative(&'static str),
-    /// An integer parameter that the autopilot does not have.
+    /// The name given to [`crate::Autopilot::set_parameter`] is not that of an integer parameter
+    /// that the autopilot has.
     #[error("no integer parameter `{0}`")]
     NoIntegerParameter(&'static str),
     /// System id 0, which MAVLink uses for broadcasts.

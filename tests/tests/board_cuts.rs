@@ -58,7 +58,7 @@ const SEAL: usize = 2;
 const DATA: usize = 8;
 /// Most board time between two looks for a torn word, microseconds.
 const MOVE_US: u32 = 150;
-/// As the companion's `NO_AUTOPILOT_AFTER`, microseconds.
+/// As the companion's `ERASE_WITHOUT_AUTOPILOT_AFTER`, microseconds.
 const ALONE_AFTER_US: u64 = 10_000_000;
 /// Erasing begins within this time after `ALONE_AFTER_US`, microseconds.
 const ERASES_WITHIN_US: u64 = 5_000_000;

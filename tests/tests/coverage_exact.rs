@@ -145,7 +145,7 @@ fn brute_force(
     best
 }
 
-/// A random area of few waypoints.
+/// A random area, photographed from 100 m higher than drawn, so that it mostly has few waypoints.
 fn drawn(seed: u64, shape: Shape) -> String {
     let mut random = Pcg32::seed_from_u64(seed);
     let text = areas::scenario(&mut random, shape, 1 + (seed % 3) as usize);

@@ -64,7 +64,8 @@ const MAX_CONTINUED_GAP_S: f32 = 0.3;
 const FOLLOWED_VELOCITY_GAIN: f32 = 0.25;
 /// Greatest velocity after following a vehicle, as a multiple of the followed velocity.
 const MAX_SPEED_TO_FOLLOWED_RATIO: f32 = 1.5;
-/// Distance outside the fence up to which a raw point is moved inside without a report, metres.
+/// Distance outside the fence up to which a raw point is moved inside and still counts as sound,
+/// metres: beyond it `make_setpoint` returns false.
 const FENCE_SLACK_M: f32 = 0.01;
 /// Distance by which a raw step may exceed the speed limit, metres: rounding at a kilometre from
 /// the origin.
@@ -93,8 +94,9 @@ pub struct SetpointStats {
     pub max_jerk_mps3: f32,
     /// Greatest jerk in a stop by the safety filter, m/s³.
     pub max_urgent_jerk_mps3: f32,
-    /// Steps whose raw points were not finite, outside the geofence or too far from the last: the
-    /// smoother held instead of following them.
+    /// Steps with a raw point that was not finite or too far from the last, which the smoother did
+    /// not follow, or more than 1 cm outside the geofence, which it moved inside; or with a curve
+    /// that was not finite.
     pub hold_count: u32,
 }
 
@@ -137,7 +139,8 @@ pub struct SetpointSmoother {
     urgency: Urgency,
     /// Whether all raw points of the step under way were sound.
     raw_points_valid: bool,
-    /// Acceleration of the curve at the last setpoint.
+    /// Acceleration with which the clock moved along the curve at the last setpoint; `run_clock`
+    /// limits the change from it.
     curve_acceleration: Point,
     /// Place, velocity and acceleration of the setpoint.
     motion: Motion,

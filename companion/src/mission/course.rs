@@ -174,8 +174,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.plan_failure
     }
 
-    /// Whether the plan's departure time, and `later_by` beyond it, has come. Until then the
-    /// vehicle waits on its pad; later waits are at gates in the air.
+    /// Whether `later_by` (0 unless a neighbour is late) has passed since the plan's departure
+    /// time. Until then the vehicle waits on its pad; later waits are at gates in the air.
     pub(crate) fn departure_due(&self, now: Instant, later_by: Duration) -> bool {
         let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
         (now - self.started_at).as_secs_f32() >= depart_s + later_by.as_secs_f32()

@@ -278,9 +278,10 @@ pub enum Guard {
     /// The state has lasted for the limit without a committed division, and the last lost vehicle
     /// must have been down for a minute.
     NotDivided,
-    /// A pause is commanded in a climb that has not left the ground: the landing detector has not
-    /// reported flight, and the vehicle has not risen. Later a report of ground may be false, and
-    /// the vehicle would fall when disarmed.
+    /// A pause is commanded in a climb that has not left the ground, so that the vehicle can be
+    /// disarmed: the landing detector reports the ground and has not reported flight, and the
+    /// vehicle has not risen and does not move up or down. Later a report of ground may be false,
+    /// and the vehicle would fall when disarmed.
     PausedBeforeLiftOff,
     /// The safety filter has barred for the limit a climb that has not left the ground, as in
     /// [`Guard::PausedBeforeLiftOff`].

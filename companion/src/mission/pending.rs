@@ -15,7 +15,7 @@ pub(crate) struct PendingCommands {
     /// DO_PAUSE_CONTINUE 0, until the operator resumes or turns the vehicle back, it lands, or its
     /// mission or start ends. On the pad it prevents the take-off.
     pub(crate) pause: bool,
-    /// DO_PAUSE_CONTINUE 1, until the mission changes its state.
+    /// DO_PAUSE_CONTINUE 1, until the next row of the mission table is taken, whichever it is.
     pub(crate) resume: bool,
     /// NAV_LAND, until the vehicle stops to land, lands, or is flown by its pilot or a failsafe.
     pub(crate) land: bool,

@@ -82,8 +82,10 @@ const ARMED_BIT_TIMEOUT: Duration = Duration::from_millis(2500);
 /// Time for which the column above the pad may be occupied after the gates have opened, before
 /// arming; then the start goes back to waiting. Meanwhile arming is not requested.
 const MAX_PAD_COLUMN_BLOCKED: Duration = Duration::from_millis(200);
-/// Longest time for which the setpoint stands and the vehicle does not come to it; then something
-/// holds the vehicle or carries it away, and it lands.
+/// Longest time for which the setpoint stands (advances by at most 0.35 m, `ARRIVED_WITHIN_M`) and
+/// the vehicle does not come that near to it; then something holds the vehicle or carries it away,
+/// and it lands. While the vehicle is within 2 m of the setpoint in a coverage mission, it has
+/// `EXTRA_UNFOLLOWED_IN_SWAY` more.
 pub(crate) const MAX_UNFOLLOWED: Duration = secs(20);
 /// Time for which the start of a vehicle in a coverage mission may be barred; then it leaves its
 /// share to those that fly. A lost vehicle that may come down above its pad is down sooner.
@@ -135,7 +137,8 @@ pub(crate) const FLYING_WITH_POSITION: &[State] = &[
 pub(crate) const ON_PATH_WITH_POSITION: &[State] =
     &[Follow, Paused, SwarmLinkLost, Blocked, Replanning, Dividing];
 
-/// States of [`FLYING_WITH_POSITION`] in which no landing has begun.
+/// States of [`FLYING_WITH_POSITION`] except `LandingHeld`. The descent at the path's end, in
+/// `Follow`, does not count as a landing yet.
 pub(crate) const FLYING_BEFORE_LANDING: &[State] =
     &[TakeOff, Climb, Follow, Paused, SwarmLinkLost, Blocked, Replanning, Dividing, Stopping];
 

@@ -47,7 +47,8 @@ impl<const V: usize, const W: usize, const G: usize> DetourView<'_, V, W, G> {
                 || self.height_above_ground_m() < MAX_HEIGHT_ERROR_ON_GROUND_M)
     }
 
-    /// Whether a pilot flies the vehicle again after its mission has ended with a landing.
+    /// Whether a pilot flies the vehicle although its mission is over (`Done`): it is armed and not
+    /// on the ground.
     pub(crate) fn is_piloted_after_mission(&self) -> bool {
         self.mission.state() == State::Done && self.telemetry.armed && !self.is_on_ground()
     }

@@ -12,7 +12,7 @@ use crate::flash::{HOST_FLASH_LAYOUT, HostFlash};
 /// Address of flash bank 2 on the emulated board.
 pub const FLASH_BANK2_ADDRESS: u32 = 0x6000_0000;
 /// Address of the word marks, one byte for each flash word: [`ERASED`], [`PROGRAMMED`], or [`TORN`]
-/// while the word is being programmed or erased.
+/// from the beginning of the word's programming or erasure to its end.
 pub const WORD_MARKS_ADDRESS: u32 = 0x6020_0000;
 /// Mark of a flash word that is erased.
 pub const ERASED: u8 = 0;

@@ -88,7 +88,8 @@ impl EmulatedBoard {
         self.write_memory(BANK_IMAGE_MARK_ADDRESS, &BANK_IMAGE_MARK.to_le_bytes())
     }
 
-    /// Indices of the flash words that are being programmed or erased now.
+    /// Indices of the flash words whose programming or erasure has begun and not ended: it runs
+    /// now, or a reset cut it off.
     ///
     /// # Errors
     /// The QEMU process has ended.

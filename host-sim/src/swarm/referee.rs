@@ -68,7 +68,8 @@ pub struct DistanceSample {
     /// Smallest distance between two centres, not both on the ground and neither of a falling
     /// vehicle or a wreck, metres; infinite if no such pair.
     pub min_separation_m: f32,
-    /// Smallest distance of a flying centre to an obstacle, metres; infinite if none was near.
+    /// Smallest distance of a flying centre to an obstacle of a map, or its height above uneven
+    /// ground, metres; infinite if no obstacle was near and no ground is uneven.
     pub min_clearance_m: f32,
 }
 
@@ -138,7 +139,9 @@ pub struct Referee<'a> {
     /// Number of times that a vehicle made no progress in flight for 20 s; without those that
     /// ended, if [`Self::retracts_ended_deadlocks`] or [`Self::retracts_out_of_range_waits`].
     pub deadlocks: u32,
-    /// Smallest distance of a flying centre to an obstacle in the whole flight, metres.
+    /// Smallest distance of a flying centre to an obstacle of a map, or its height above uneven
+    /// ground, in the whole flight, metres; an obstacle counts only where it is nearer than 3 m
+    /// (`MAX_MEASURED_CLEARANCE_M`). Infinite if nothing counted.
     pub min_clearance_m: f32,
     /// Smallest distance between two centres, not both on the ground and neither of a falling
     /// vehicle or a wreck, in the whole flight, metres.

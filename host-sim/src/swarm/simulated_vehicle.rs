@@ -489,7 +489,7 @@ impl SimulatedVehicle {
     }
 }
 
-/// Whether a vehicle in this state was started, so that it may get a part of an area later.
+/// Whether a vehicle in this state was started: without a part of the area it may wait for one.
 pub fn is_started(state: State) -> bool {
     !state.is_before_start()
 }

@@ -364,7 +364,8 @@ enum AvoidedParking {
     WaitingPads,
     /// The pads and landing places of all other vehicles: then waiting on the pad is always enough.
     AllPlaces,
-    /// No parked vehicle: one that is parked on the path has to leave first.
+    /// No parked vehicle: the times have to let one whose pad is on the path leave first, and one
+    /// whose landing place is on it land afterwards.
     Nothing,
 }
 

@@ -29,7 +29,7 @@ pub struct Snapshot {
     pub ned: Vector3<f64>,
     /// Estimated velocity, NED m/s.
     pub velocity: Vector3<f64>,
-    /// Estimated latitude, longitude and altitude.
+    /// Estimated latitude, longitude and altitude above mean sea level.
     pub geodetic: Geodetic,
     /// GPS receiver: position error north and east beyond the estimate's (metres), and whether it
     /// has a fix.

@@ -176,7 +176,8 @@ impl Autopilot {
         }
     }
 
-    /// Whether the vehicle is off the ground, as the land detector has it.
+    /// Whether the vehicle is off the ground, as the land detector has it: from a height of 0.12 m
+    /// on, until the detector has found it at rest on the ground for 0.6 s.
     pub fn is_airborne(&self) -> bool {
         self.airborne
     }

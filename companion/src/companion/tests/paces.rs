@@ -7,7 +7,8 @@ use proptest::prelude::ProptestConfig;
 use super::*;
 use crate::autopilot::AutopilotKind;
 
-/// The plan of a flight over four lanes, `apart_m` metres apart.
+/// The plan of a flight over four lanes, `apart_m` metres apart, from 10 m to `long_m` metres east
+/// of the start.
 fn lanes(long_m: f32, apart_m: f32) -> Plan {
     let mut path = Path::new();
     path.push(START, 1.2).unwrap();

@@ -1,6 +1,6 @@
 use super::*;
 
-/// What a file of this text adds to the page, and what is wrong with it.
+/// What a file of this text adds to docs/margins.md, and what is wrong with it.
 fn listing(text: &str) -> Listing {
     let mut listing = Listing::default();
     listing.add("a.rs", &syn::parse_file(text).expect("it parses").items, text);

@@ -285,7 +285,8 @@ fn the_unheard_stretch_begins_on_the_points_only_in_level_flight_near_them() {
 }
 
 /// Where a vehicle's points lead back beside themselves, it may be on either leg: the stretch
-/// begins where the vehicle was heard, and reaches as far as from its furthest possible place.
+/// begins where the vehicle was heard, leads on along the points from the first leg, and is longer
+/// by the way along the points from the first to the last place where it may be.
 #[test]
 fn an_unheard_vehicle_at_a_hairpin_is_kept_off_on_both_legs() {
     let points =
