@@ -311,7 +311,7 @@ pub fn braking_distance_m<const W: usize>(
     let speed_mps = fmaxf(reference.speed_mps, 0.0);
     let least_accel = fminf(cfg.accel_mps2, cfg.accel_z_mps2);
     let (mut speed_sq, mut from_m, mut accel) =
-        (speed_mps * speed_mps, reference.along_m, least_accel);
+        (speed_mps * speed_mps, reference.along_m, f32::INFINITY);
     for (i, ends) in points.windows(2).skip(leg - 1).enumerate() {
         let [from, to] = ends else { break };
         if i == BRAKING_LEGS {

@@ -20,6 +20,10 @@ fn a_stop_that_is_advised_too_late_is_as_long_as_flown() {
     }
     let flown_m = state.along_m - from_m;
     assert!(flown_m > 10.0 && (brakes_m - flown_m).abs() < 0.3, "{brakes_m} {flown_m}");
+    let mut place = Path::<2>::new();
+    place.push(Point::zeros(), 10.0).unwrap();
+    let moving = ReferenceState { along_m: 0.0, speed_mps: 2.0 };
+    assert_eq!(braking_distance_m(&cfg, &place, &moving), 0.0, "a path of one place has no way");
 }
 
 proptest! {
