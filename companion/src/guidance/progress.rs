@@ -174,6 +174,7 @@ impl Guidance {
 
     /// Height of the ground below the vehicle as far as the plan says, ENU up, metres: that of the
     /// pad before the path, that of the goal at its end, and between them the lowest that is known.
+    /// A path that begins in the air has no pad at its start, also where the vehicle returns there.
     // Not inlined: it has many callers, and in each it would take a board's flash.
     #[inline(never)]
     pub(crate) fn planned_ground_m<const W: usize, const G: usize>(
@@ -183,9 +184,11 @@ impl Guidance {
         let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
         let end_m =
             plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);
+        let lowest_m = end_m.min(self.lowest_ground_m);
+        let begin_m = if self.path_begins_above_pad { pad_m } else { lowest_m };
         match self.has_begun_path {
-            true if self.is_reference_at_end_of(&plan.path) => end_m,
-            true => pad_m.min(end_m).min(self.lowest_ground_m),
+            true if self.is_reference_at_end_of(&plan.path) && !self.returning => end_m,
+            true => begin_m.min(lowest_m),
             false => pad_m,
         }
     }
