@@ -43,7 +43,7 @@ enum OverlayUse {
     CoveragePlan,
 }
 
-/// The memory; `OverlayUse` tells which field is in use.
+/// The memory; `OverlayUse` says which field is in use.
 union Memory {
     plan: ManuallyDrop<PlannerWorkspace>,
     build: ManuallyDrop<RoadmapBuilder>,

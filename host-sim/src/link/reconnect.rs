@@ -17,7 +17,7 @@ type OpenLink = Box<dyn Fn() -> Option<Box<dyn ByteLink>> + Send>;
 pub struct ReconnectingLink {
     /// URL of the link, for messages.
     name: String,
-    /// Opens the link anew.
+    /// Opens the link again.
     open: OpenLink,
     /// The open link; `None` while it is lost.
     link: Option<Box<dyn ByteLink>>,

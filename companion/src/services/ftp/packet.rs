@@ -172,8 +172,8 @@ pub fn opens_session(request: &FtpRequest) -> bool {
 /// both begin at the same sequence number: session and data can distinguish them.
 pub type RequestFingerprint = ((u8, u8), u16, (u8, u8), u32, u32);
 
-/// What tells a request from others: client, sequence number, session and opcode, offset, CRC-32 of
-/// the data.
+/// What distinguishes a request from others: client, sequence number, session and opcode, offset,
+/// CRC-32 of the data.
 pub fn request_fingerprint(request: &FtpRequest) -> RequestFingerprint {
     let FtpRequest { client, sequence, session, opcode, offset, .. } = *request;
     (client, sequence, (session, opcode), offset, crc32(request.bytes()))
