@@ -337,7 +337,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let near = |place: Point| (position - place).length() < AT_HOLD_WITHIN_M;
         let meets = back.is_some_and(near) && here.is_some_and(near);
         if meets {
+            let ground_m = self.planned_ground_m();
             let left = self.mission.resume_own_path(plan, self.detours.left_at_m(), back_m);
+            self.mission.note_ground_below_start(ground_m);
             if left > 0 {
                 self.links.send_text_with_numbers(
                     Severity::Warning,
@@ -399,7 +401,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let own = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
                 let here = self.detours.rejoin_place().map(|back| back.position).or(own);
                 let place = here.filter(|_| in_air).unwrap_or(self.mission.path_start());
+                let ground_m = self.planned_ground_m();
                 if self.mission.accept_division_plan(plan, &place, division) {
+                    self.mission.note_ground_below_start(ground_m);
                     self.neighbours.forget_plan();
                     self.detours.forget_plan(&mut self.timers);
                     // From now on places are measured along the new path.

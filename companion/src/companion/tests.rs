@@ -24,6 +24,7 @@ mod hostile;
 mod interruptions;
 mod paces;
 mod promises;
+mod roster_lies;
 mod scenes;
 mod setpoint_place;
 mod unheard;

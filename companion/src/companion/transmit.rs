@@ -300,6 +300,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 || self.guidance.evading)
     }
 
+    /// Height of the ground below this vehicle as far as its plan says, ENU up, metres. Without a
+    /// plan it stands on its pad: its own height, or that of its path's first point if less.
+    pub(super) fn planned_ground_m(&self) -> f32 {
+        let on_pad = || libm::fminf(self.mission.path_start().z, self.telemetry.position.z);
+        self.mission.plan().map_or_else(on_pad, |plan| self.guidance.planned_ground_m(plan))
+    }
+
     /// This vehicle's intent, as it is reported to the swarm now.
     pub(super) fn own_intent(&self) -> Intent {
         let plan = self.mission.plan();
@@ -323,8 +330,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             heard_bits: self.neighbours.heard_bits(self.now),
             gates_open_up_to_m: clear_m,
             unheard_flight_delay_s: clear_in_s,
-            ground_m: plan
-                .map_or(self.mission.path_start().z, |plan| self.guidance.planned_ground_m(plan)),
+            ground_m: self.planned_ground_m(),
             may_come_down: column,
             echo: self.neighbours.next_echo(self.links.intents_sent(), self.now),
             points,

@@ -174,23 +174,26 @@ impl Guidance {
 
     /// Height of the ground below the vehicle as far as the plan says, ENU up, metres: that of the
     /// pad before the path, that of the goal at its end, and between them the lowest that is known.
-    /// A path that begins in the air has no pad at its start, also where the vehicle returns there.
     // Not inlined: it has many callers, and in each it would take a board's flash.
     #[inline(never)]
     pub(crate) fn planned_ground_m<const W: usize, const G: usize>(
         &self,
         plan: &VehiclePlan<W, G>,
     ) -> f32 {
-        let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
-        let end_m =
-            plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);
-        let lowest_m = end_m.min(self.lowest_ground_m);
-        let begin_m = if self.path_begins_above_pad { pad_m } else { lowest_m };
         match self.has_begun_path {
-            true if self.is_reference_at_end_of(&plan.path) && !self.returning => end_m,
-            true => begin_m.min(lowest_m),
-            false => pad_m,
+            true if self.is_reference_at_end_of(&plan.path) => planned_grounds_m(plan)[1],
+            true => self.lowest_planned_ground_m(plan),
+            false => planned_grounds_m(plan)[0],
         }
+    }
+
+    /// Lowest height of the ground that the plan or the mission gives, ENU up, metres.
+    pub(crate) fn lowest_planned_ground_m<const W: usize, const G: usize>(
+        &self,
+        plan: &VehiclePlan<W, G>,
+    ) -> f32 {
+        let [start_m, end_m] = planned_grounds_m(plan);
+        start_m.min(end_m).min(self.lowest_ground_m)
     }
 
     /// Whether the climb is done: the setpoint stands at its top, and the vehicle is there.
@@ -387,4 +390,11 @@ impl Guidance {
     pub(crate) fn is_in_descent(&self) -> bool {
         self.phase == Phase::Descent
     }
+}
+
+/// Heights of the ground below the two ends of the plan's path, ENU up, metres.
+fn planned_grounds_m<const W: usize, const G: usize>(plan: &VehiclePlan<W, G>) -> [f32; 2] {
+    let below = |along_m: f32, by_m: f32| plan.path.point_at(along_m).map(|p| p.z - by_m);
+    let start_m = below(0.0, plan.climb_m).unwrap_or(0.0);
+    [start_m, below(plan.path.length_m(), plan.descent_m).unwrap_or(start_m)]
 }

@@ -438,23 +438,23 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     }
 
     /// Puts the detour `way` in place of the plan's path, which the vehicle leaves `along_m` metres
-    /// along it. Gates and departure time are cleared. The climb becomes the height of the detour's
-    /// start above the ground at `ground_m` (up in the mission frame), if that is given.
-    pub(crate) fn switch_to_detour(
-        &mut self,
-        way: &VehiclePlan<W, G>,
-        along_m: f32,
-        ground_m: Option<f32>,
-    ) {
+    /// along it. Gates and departure time are cleared.
+    pub(crate) fn switch_to_detour(&mut self, way: &VehiclePlan<W, G>, along_m: f32) {
         self.note_path_left(along_m);
         if let Some(plan) = &mut self.plan {
             plan.path = way.path.clone();
-            plan.descent_m = way.descent_m;
-            if let (Some(first), Some(ground_m)) = (way.path.waypoints().first(), ground_m) {
-                plan.climb_m = libm::fmaxf(first.position.z - ground_m, 0.0);
-            }
+            (plan.climb_m, plan.descent_m) = (way.climb_m, way.descent_m);
             plan.gates.clear();
             plan.depart_s = 0.0;
+        }
+    }
+
+    /// If the plan has no climb, so that its path begins in the air: takes for it the height of the
+    /// first point above the ground at `ground_m`, ENU up, metres. The vehicle may land there.
+    pub(crate) fn note_ground_below_start(&mut self, ground_m: f32) {
+        if let Some(plan) = self.plan.as_mut().filter(|plan| plan.climb_m == 0.0) {
+            let first_z_m = plan.path.waypoints().first().map_or(ground_m, |w| w.position.z);
+            plan.climb_m = libm::fmaxf(first_z_m - ground_m, 0.0);
         }
     }
 

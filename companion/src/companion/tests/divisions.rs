@@ -23,12 +23,11 @@ use crate::{Link, RosterEntry};
 pub(super) const FAR_AWAY: Option<(Point, u8, f32, u32)> =
     Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
 
-/// Place 2.5 m ahead on the vehicle's path, at this height.
-fn ahead(b: &Bench, height_m: f32) -> Point {
+/// Place 2.5 m ahead on the vehicle's path.
+fn ahead(b: &Bench) -> Point {
     let (plan, along_m) = (b.companion.mission.plan(), b.companion.guidance.reference_along_m());
     let place = plan.and_then(|plan| plan.path.point_at(along_m.max(0.0) + 2.5));
-    let place = place.unwrap_or(GOAL);
-    Point::new(place.x, place.y, height_m)
+    place.unwrap_or(GOAL)
 }
 
 /// A coverage mission of three vehicles: this one flies the path of `field_plan`, 77 is heard, 78
@@ -39,18 +38,24 @@ pub(super) fn over_a_field(kind: AutopilotKind) -> Bench {
 
 /// As [`over_a_field`], with settings changed by `set`.
 pub(super) fn over_a_field_with(kind: AutopilotKind, set: impl Fn(&mut Config<4>)) -> Bench {
+    over_a_field_at(kind, 0.0, set)
+}
+
+/// As [`over_a_field_with`], with paths `up_m` metres higher.
+fn over_a_field_at(kind: AutopilotKind, up_m: f32, set: impl Fn(&mut Config<4>)) -> Bench {
     let mut config = two_vehicles();
     config
         .roster
         .push(RosterEntry { system_id: 78, path_start: Point::new(8.0, 28.0, 1.5) })
         .unwrap();
     config.lost_vehicle_down_after_s = Some(60.0);
+    config.roster.iter_mut().for_each(|entry| entry.path_start.z += up_m);
     set(&mut config);
     let mut bench = match kind {
         AutopilotKind::Px4 => Bench::new(config),
         AutopilotKind::ArduPilot => Bench::ardupilot(config),
     };
-    bench.answer_plan = Some(Ok(field_plan()));
+    bench.answer_plan = Some(Ok(raised(field_plan(), up_m)));
     bench.neighbour = FAR_AWAY;
     bench.run_until(Ready, 6.0);
     bench
@@ -144,7 +149,7 @@ impl Other {
 
 happens! {
     Pause, Resume, Pilot, Back, NoPosition, Position, Silent, Heard, Mute, MuteLong, Hears,
-    NoAnswer, Answers, LiesAhead, HoversAhead, GoesAway, Land, Return, Battery
+    NoAnswer, Answers, LiesAhead, HoversAhead, GoesAway, Land, Return, Battery, NoWay, Ways
 }
 
 struct Watch {
@@ -184,6 +189,14 @@ impl Watch {
         self.returns = if halted { self.returns + 1 } else { 0 };
         assert!(self.returns < 20, "waits on its way back: {said}");
         assert!(!self.ends || !(flies || state == Dividing), "an order is forgotten: {said}");
+        let intent = b.companion.own_intent();
+        assert!(intent.ground_m < 0.1, "its ground is at {} m: {said}", intent.ground_m);
+        // The ground is level at 0: a column reaches it.
+        let descends =
+            state.lands_or_landing_is_held() || (state == Follow && guidance.is_in_descent());
+        let lowest_m = intent.points.iter().fold(f32::INFINITY, |least, p| least.min(p.z));
+        let down = !descends || !intent.may_come_down || b.enu.z < 0.3;
+        assert!(down || lowest_m < 0.1, "its column ends {lowest_m} m up: {said}");
     }
 
     /// Makes `what` happen to the bench or to vehicle 77, and logs it.
@@ -219,14 +232,23 @@ impl Watch {
             Hears => {
                 (b.neighbour, self.other.mute) = (FAR_AWAY, false);
             }
-            LiesAhead => b.neighbour = Some((ahead(b, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5)),
-            HoversAhead => b.neighbour = Some((ahead(b, 4.0), FLYING | OUT_OF_PLAN, 0.0, 5)),
+            LiesAhead => {
+                let ahead = ahead(b);
+                let low = Point::new(ahead.x, ahead.y, 1.0);
+                b.neighbour = Some((low, GROUNDED | OUT_OF_PLAN, 0.0, 5));
+            }
+            HoversAhead => {
+                let above = ahead(b) + Point::new(0.0, 0.0, 2.5);
+                b.neighbour = Some((above, FLYING | OUT_OF_PLAN, 0.0, 5));
+            }
             GoesAway => b.neighbour = FAR_AWAY,
             NoAnswer => b.answer_division = false,
             Answers => b.answer_division = true,
             Land => self.ends |= order(b, MavCmd::MAV_CMD_NAV_LAND, 0.0),
             Return => self.ends |= order(b, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
             Battery => b.battery = 2,
+            NoWay => b.answer_detour = Some(Err(crate::PlanFailure::Unreachable)),
+            Ways => b.answer_detour = Some(Ok(())),
         }
         self.near |= matches!(what, LiesAhead | HoversAhead);
         let ticks = if matches!(what, MuteLong) { 420 } else { 0 };
@@ -239,12 +261,13 @@ proptest::proptest! {
     #[test]
     fn whatever_interrupts_a_division_no_part_is_flown_that_is_anothers(
         px4 in any::<bool>(),
+        up_m in proptest::prop_oneof![proptest::prelude::Just(0.0), 0.0f32..40.0],
         (lead, waits, counts_after) in (0u32..160, any::<bool>(), 0u32..100),
         planner_takes_ms in proptest::collection::vec(0u64..8000, 0..4),
         script in proptest::collection::vec((0usize..ALL.len(), 1u32..200), 1..14),
     ) {
         let kind = if px4 { AutopilotKind::Px4 } else { AutopilotKind::ArduPilot };
-        let mut b = over_a_field(kind);
+        let mut b = over_a_field_at(kind, up_m, |_| {});
         b.planner_takes = planner_takes_ms.into_iter().map(Duration::from_millis).collect();
         let mut watch = Watch {
             other: Other { mute: true, counts_after, ..Other::default() },
@@ -255,7 +278,7 @@ proptest::proptest! {
         };
         if !waits {
             b.start();
-            b.run_until(Follow, 30.0);
+            b.run_until(Follow, 60.0);
         }
         (0..lead).for_each(|_| watch.tick(&mut b));
         watch.other.mute = false;
@@ -363,116 +386,6 @@ fn a_vehicle_flies_around_what_lies_on_its_path_while_another_is_silent() {
     assert!(b.companion.detours.is_beside_plan(), "{:?}", b.texts);
     b.run_until(Follow, 5.0);
     assert!(b.texts.iter().any(|text| text == "Flown around: on its path again"), "{:?}", b.texts);
-}
-
-/// A false roster report: a true one with some fields replaced.
-#[derive(Clone, Debug)]
-struct Lie {
-    system_id: u8,
-    crc: bool,
-    divisions: Option<u8>,
-    first: Option<u8>,
-    counted: Option<u32>,
-    hash: Option<u32>,
-    entries: Vec<(usize, u8, u8, u16, Option<u16>, bool)>,
-}
-
-fn lie() -> impl proptest::strategy::Strategy<Value = Lie> {
-    use proptest::prelude::{Just, Strategy, prop_oneof};
-    let id = prop_oneof![4 => Just(77u8), 1 => Just(78), 1 => Just(SYSTEM), 1 => any::<u8>()];
-    let crc = prop_oneof![4 => Just(true), 1 => Just(false)];
-    let divisions =
-        prop_oneof![3 => Just(None), 1 => any::<u8>().prop_map(Some), 1 => (0u8..7).prop_map(Some)];
-    let first = prop_oneof![6 => Just(None), 1 => any::<u8>().prop_map(Some)];
-    let entry = (0usize..3, 0u8..8, 0u8..4, any::<u16>(), any::<Option<u16>>(), any::<bool>());
-    let entries = proptest::collection::vec(entry, 0..4);
-    (id, crc, divisions, first, any::<Option<u32>>(), any::<Option<u32>>(), entries).prop_map(
-        |(system_id, crc, divisions, first, counted, hash, entries)| Lie {
-            system_id,
-            crc,
-            divisions,
-            first,
-            counted,
-            hash,
-            entries,
-        },
-    )
-}
-
-impl Lie {
-    fn reported(&self, b: &Bench) -> RosterReport {
-        const ALL: [ShareStatus; 4] =
-            [ShareStatus::Alive, ShareStatus::Lost, ShareStatus::Left, ShareStatus::Finished];
-        let mut roster = own_roster(b);
-        roster.system_id = self.system_id;
-        roster.mission_crc = if self.crc { roster.mission_crc } else { 7 };
-        roster.division_count = self.divisions.unwrap_or(roster.division_count);
-        roster.first_rank = self.first.unwrap_or(roster.first_rank);
-        roster.committed_hash = self.counted.unwrap_or(roster.pending_hash);
-        roster.pending_hash = self.hash.unwrap_or(roster.pending_hash);
-        for &(rank, incarnation, standing, done_dm, promise_dm, holds) in &self.entries {
-            let standing = ALL[usize::from(standing)];
-            roster.entries[rank] = RosterReportEntry {
-                incarnation,
-                status: standing,
-                progress_dm: done_dm,
-                commitment_dm: promise_dm,
-                holds,
-                agrees: holds,
-            };
-        }
-        roster
-    }
-}
-
-proptest::proptest! {
-    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 200 } else { 5000 }))]
-    /// Roster reports of unknown ids, of another mission or with this vehicle's own id change
-    /// nothing. False reports of one vehicle of the roster may make this one land, but never move
-    /// it off its path.
-    #[test]
-    fn lies_of_a_roster_land_a_vehicle_at_worst(
-        waits in any::<bool>(),
-        lies in proptest::collection::vec((lie(), 0u32..60), 1..20),
-    ) {
-        let mut b = over_a_field(AutopilotKind::Px4);
-        if !waits {
-            b.start();
-            b.run_until(Follow, 30.0);
-        }
-        for (i, (lie, ticks)) in lies.iter().enumerate() {
-            let before = std::boxed::Box::new(b.companion.neighbours.fleet().cloned());
-            b.companion.handle_bytes(Link::Swarm, b.now, &bytes(&lie.reported(&b), i as u8));
-            let of_roster = lie.crc && matches!(lie.system_id, 77 | 78);
-            proptest::prop_assert!(
-                of_roster || *before == b.companion.neighbours.fleet().cloned(),
-                "{lie:?}"
-            );
-            b.drain();
-            (0..*ticks).for_each(|_| b.tick());
-            let y_m = (b.enu.y - START.y).abs();
-            proptest::prop_assert!(
-                y_m < 0.3 && b.enu.z < GOAL.z + 0.3,
-                "off its path: {:?} {lies:?}",
-                b.enu
-            );
-        }
-        if b.state() == Ready {
-            b.start();
-        }
-        for _ in 0..700 {
-            b.run(1.0);
-            if !b.armed && b.on_ground() {
-                break;
-            }
-        }
-        proptest::prop_assert!(
-            !b.armed && b.on_ground(),
-            "{:?} {:?} {lies:#?}",
-            b.state(),
-            b.texts
-        );
-    }
 }
 
 /// In a coverage mission the lease limits how far an unheard vehicle flies on, not the radio range.

@@ -4,7 +4,7 @@
 //! Cost: a request lists every known keep-out zone.
 
 use planner_core::detour::{DetourGoal, DetourRequest, KeepOutZone};
-use planner_core::flight::Waypoint;
+use planner_core::flight::{VehiclePlan, Waypoint};
 use planner_core::{Length, Point};
 
 use super::beside::{self, BLOCKED_BEYOND_SAFETY_DISTANCE_M, DETOUR_MARGIN_M, REJOIN_SEARCH_PAUSE};
@@ -197,23 +197,8 @@ impl Detours {
                 visit,
             );
         }
-        let (goal, descent_m) = match view.config.lost_vehicle_down_after_s {
-            Some(_) => match requested.rejoin_place() {
-                Some(back) => {
-                    let (over, ground_m) = (back.position, view.guidance.planned_ground_m(plan));
-                    let goal = DetourGoal::Point { end: over, layer_z_m: over.z };
-                    (goal, (over.z - ground_m).max(0.0))
-                }
-                None => view.mission.home_goal(),
-            },
-            None => match plan.task.goal() {
-                Some(goal) => (DetourGoal::RoadmapGoal(goal), plan.descent_m),
-                // The flight ends over the vehicle's own pad.
-                None if plan.task.leaves_pad() => view.mission.home_goal(),
-                None => return None,
-            },
-        };
         let here = self.start_of_detour(view)?;
+        let (goal, descent_m) = goal_and_descent_m(requested, view, plan, &here)?;
         let off_m = plan.path.point_at(along_m).map_or(0.0, |on| (on - here).length());
         let over_area = view.config.lost_vehicle_down_after_s.is_some();
         // From beside the leg the first way to its end has that much less room.
@@ -335,4 +320,34 @@ impl Detours {
         let often = long && self.failed_searches_here >= MAX_FAILED_SEARCHES - 1;
         self.no_retry = often || outlook == RetryOutlook::NoneWillMove;
     }
+}
+
+/// The goal of the path requested from `here`, and the depth of the descent at its end, metres;
+/// `None` if there is no goal.
+fn goal_and_descent_m<const V: usize, const W: usize, const G: usize>(
+    requested: DetourPurpose,
+    view: &DetourView<'_, V, W, G>,
+    plan: &VehiclePlan<W, G>,
+    here: &Point,
+) -> Option<(DetourGoal, f32)> {
+    let height_m = |place: &Point, ground_m: f32| libm::fmaxf(place.z - ground_m, 0.0);
+    let (goal, descent_m) = match view.config.lost_vehicle_down_after_s {
+        Some(_) => match requested.rejoin_place() {
+            Some(back) => {
+                let over = back.position;
+                let goal = DetourGoal::Point { end: over, layer_z_m: over.z };
+                (goal, height_m(&over, view.guidance.planned_ground_m(plan)))
+            }
+            None => view.mission.home_goal(),
+        },
+        None => match plan.task.goal() {
+            Some(goal) => (DetourGoal::RoadmapGoal(goal), plan.descent_m),
+            // The flight ends over the vehicle's own pad.
+            None if plan.task.leaves_pad() => view.mission.home_goal(),
+            None => return None,
+        },
+    };
+    // A place aside is at the vehicle's height, not at the goal's, and over any ground.
+    let ground_m = view.guidance.lowest_planned_ground_m(plan);
+    Some((goal, if requested.is_aside() { height_m(here, ground_m) } else { descent_m }))
 }

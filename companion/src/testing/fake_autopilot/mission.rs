@@ -81,3 +81,13 @@ pub(crate) fn field_plan() -> Plan {
     photographs.add_stretch(1, 1, WaypointRange { first: 0, end: 1 }).unwrap();
     VehiclePlan { task: Task::Photograph(photographs), path, descent_m: 1.5, ..plan() }
 }
+
+/// The plan with its path `up_m` metres higher; its pads stay.
+pub(crate) fn raised(plan: Plan, up_m: f32) -> Plan {
+    let mut path = Path::new();
+    for waypoint in plan.path.waypoints() {
+        path.push(waypoint.position + Point::new(0.0, 0.0, up_m), waypoint.leg_clearance_m)
+            .unwrap();
+    }
+    VehiclePlan { path, climb_m: plan.climb_m + up_m, descent_m: plan.descent_m + up_m, ..plan }
+}

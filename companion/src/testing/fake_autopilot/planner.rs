@@ -83,12 +83,17 @@ impl Bench {
                     &mut path,
                 )
                 .map_err(|_| PlanFailure::Unreachable)?;
-                return Ok(VehiclePlan { path, descent_m: request.descent_m, ..plan() });
+                return Ok(VehiclePlan {
+                    path,
+                    climb_m: 0.0,
+                    descent_m: request.descent_m,
+                    ..plan()
+                });
             }
             path.push(request.here, 1.2).unwrap();
             path.push(Point::new(13.0, 16.0, 2.0), 1.2).unwrap();
             path.push(GOAL, 1.2).unwrap();
-            Ok(VehiclePlan { path, ..plan() })
+            Ok(VehiclePlan { path, climb_m: 0.0, ..plan() })
         };
         self.answer_detour.map(|answer| answer.and_then(found))
     }
@@ -118,7 +123,10 @@ impl Bench {
         for waypoint in plan.path.waypoints().iter().filter(|w| w.along_m > held_m) {
             path.push(waypoint.position, waypoint.leg_clearance_m).unwrap();
         }
-        (plan.path, plan.climb_m, plan.swarm_plan_crc) = (path, 0.0, plan.swarm_plan_crc + 1);
+        if held_m > 0.0 {
+            plan.climb_m = 0.0;
+        }
+        (plan.path, plan.swarm_plan_crc) = (path, plan.swarm_plan_crc + 1);
         Some(Ok(plan))
     }
 }

@@ -83,6 +83,22 @@ impl Watch {
             "may come down unsaid in {state:?}: {intent:?} {:#?}",
             self.log
         );
+        assert!(
+            intent.ground_m < 0.1,
+            "its ground is at {} m in {state:?}: {:#?} {:?}",
+            intent.ground_m,
+            self.log,
+            b.texts
+        );
+        let descends = state.lands_or_landing_is_held()
+            || (state == State::Follow && b.companion.guidance.is_in_descent());
+        let lowest_m = intent.points.iter().fold(f32::INFINITY, |least, p| least.min(p.z));
+        assert!(
+            !descends || !intent.may_come_down || b.enu.z < 0.3 || lowest_m < 0.1,
+            "its column ends {lowest_m} m up in {state:?}: {:#?} {:?}",
+            self.log,
+            b.texts
+        );
         let foreign = !ours && b.mode != b.kind.land_mode() && b.armed && !unheard;
         let foreign_unheard = !ours && b.mode != b.kind.land_mode() && b.armed;
         self.piloted = if foreign { self.piloted + 1 } else { 0 };

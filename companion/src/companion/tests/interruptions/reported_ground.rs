@@ -82,20 +82,12 @@ fn high_bench(kind: AutopilotKind, up_m: f32, error_m: f32) -> Bench {
         mission_crc: usual.mission_crc,
         ..Config::new(SYSTEM, start, ORIGIN)
     };
-    let mut plan = plan();
-    let mut path = planner_core::flight::Path::new();
-    for waypoint in plan.path.waypoints() {
-        path.push(waypoint.position + Point::new(0.0, 0.0, up_m), waypoint.leg_clearance_m)
-            .unwrap();
-    }
-    plan.path = path;
-    (plan.climb_m, plan.descent_m) = (plan.climb_m + up_m, plan.descent_m + up_m);
     let mut b = match kind {
         AutopilotKind::Px4 => Bench::new(config),
         AutopilotKind::ArduPilot => Bench::ardupilot(config),
     };
     b.spool = Duration::from_millis(2000);
-    (b.height_error_m, b.answer_plan) = (error_m, Some(Ok(plan)));
+    (b.height_error_m, b.answer_plan) = (error_m, Some(Ok(raised(plan(), up_m))));
     b.run_until(State::Ready, 6.0);
     b
 }
