@@ -118,6 +118,14 @@ pub fn min_pad_distance_m(
         + vehicles.iter().map(own).fold(0.0, f32::max)
 }
 
+/// Greatest horizontal distance from its pad at which a vehicle touches down, metres.
+pub fn max_touchdown_offset_m(simulation: &Simulation, vehicle: &VehicleSection) -> f32 {
+    DEVIATION_BESIDE_PARKED_M
+        + DEVIATION_PER_GUST_S * simulation.gust_peak_mps
+        + estimate_error_margin_m(simulation.estimator, vehicle.autopilot)
+        + touchdown_extra_m(simulation.gust_peak_mps, vehicle.autopilot)
+}
+
 /// Distance by which a touchdown may be further off the pad than a flying vehicle off its path,
 /// metres. A PX4 that arrives over its pad fast, or in wind, has wound up the integrator of its
 /// controller, which carries it on once the companion stops holding it.

@@ -10,6 +10,10 @@ use crate::areas;
 /// Half the side of a height map, metres.
 const HALF_SIDE_M: f64 = 600.0;
 
+/// How far around each start the ground is level, metres: scenarios with a step nearer to a start
+/// are refused.
+const LEVEL_M: f64 = 3.0;
+
 /// A square height map of random hills and noise, centred on the origin.
 pub struct Hills {
     /// Side of a cell, metres.
@@ -83,24 +87,53 @@ impl Hills {
         text
     }
 
-    /// Writes these hills to `path`. Returns the scenario `text` with that file as its terrain and
-    /// its vehicles' starts on that ground.
+    /// Writes these hills, levelled around the starts of the scenario `text`, to `path`. Returns
+    /// the scenario with that file as its terrain and its vehicles' starts on that ground.
     pub fn put_under_scenario(&self, text: &str, path: &Path, tolerance_m: f64) -> String {
-        std::fs::write(path, self.to_ascii_grid()).expect("there is room");
+        let starts: Vec<[f64; 2]> = text.lines().filter_map(start_of_line).collect();
+        let levelled = self.levelled_around(&starts);
+        std::fs::write(path, levelled.to_ascii_grid()).expect("there is room");
         let terrain = format!(
             "terrain = \"{}\"\nterrain_tolerance_m = {tolerance_m:.1}\ncamera = ",
             path.display()
         );
-        let origin_m = self.height_at(0.0, 0.0);
-        let stand = |line: &str| match line.strip_prefix("start = [") {
-            Some(numbers) => {
-                let numbers = numbers.trim_end_matches(']').split(", ").map(str::parse);
-                let place: Vec<f64> = numbers.map(|number| number.expect("a number")).collect();
-                let up_m = self.height_at(place[0], place[1]) - origin_m;
-                format!("start = [{}, {}, {up_m:.2}]\n", place[0], place[1])
+        let origin_m = levelled.height_at(0.0, 0.0);
+        let stand = |line: &str| match start_of_line(line) {
+            Some([x, y]) => {
+                let up_m = levelled.height_at(x, y) - origin_m;
+                format!("start = [{x}, {y}, {up_m:.2}]\n")
             }
             None => format!("{line}\n"),
         };
         text.replace("camera = ", &terrain).lines().map(stand).collect()
     }
+
+    /// These hills with level ground within [`LEVEL_M`] of each place. Places so near to each other
+    /// that they share cells have one height.
+    fn levelled_around(&self, places: &[[f64; 2]]) -> Self {
+        let mut heights_m = self.heights_m.clone();
+        let share_m = 2.0 * (LEVEL_M + self.cell_m);
+        let mut levels: Vec<([f64; 2], f64)> = Vec::new();
+        for &[x, y] in places {
+            let near = |([at_x, at_y], _): &&([f64; 2], f64)| (at_x - x).hypot(at_y - y) < share_m;
+            let level_m = levels.iter().find(near).map_or(self.height_at(x, y), |level| level.1);
+            levels.push(([x, y], level_m));
+            let range = |at: f64| {
+                let cell = |at: f64| ((at + HALF_SIDE_M) / self.cell_m) as usize;
+                cell(at - LEVEL_M)..=cell(at + LEVEL_M)
+            };
+            for (row, column) in range(y).flat_map(|row| range(x).map(move |column| (row, column)))
+            {
+                heights_m[row * self.cells_per_side + column] = level_m;
+            }
+        }
+        Self { heights_m, ..*self }
+    }
+}
+
+/// The place, metres, if `line` is a vehicle's start.
+fn start_of_line(line: &str) -> Option<[f64; 2]> {
+    let numbers = line.strip_prefix("start = [")?.trim_end_matches(']').split(", ");
+    let place: Vec<f64> = numbers.map(|number| number.parse().expect("a number")).collect();
+    Some([place[0], place[1]])
 }

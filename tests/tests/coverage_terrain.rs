@@ -277,6 +277,48 @@ fn plans_above_real_terrain_keep_their_heights() {
     }
 }
 
+/// A pad near a step of the ground is refused, and accepted where the hint moves it.
+#[test]
+fn a_pad_beside_a_step_is_refused_and_its_hint_leads_to_a_level_place() {
+    let folder = tempfile::tempdir().unwrap();
+    let heights: String = (0..60)
+        .map(|_| {
+            (0..60).map(|column| if column < 30 { "300 " } else { "302 " }).collect::<String>()
+                + "\n"
+        })
+        .collect();
+    let grid = format!("ncols 60\nnrows 60\nxllcorner -150\nyllcorner -150\ncellsize 5\n{heights}");
+    let file = folder.path().join("step.asc");
+    std::fs::write(&file, grid).unwrap();
+    let scenario = |x: f64| {
+        let up_m = if x < 0.0 { 0.0 } else { 2.0 };
+        let text = format!(
+            "[area]\npolygon = [[-60, 20], [60, 20], [60, 80], [-60, 80]]\ncoordinates = \"metres\"\n\
+             origin = {{ lat_deg = 40.0, lon_deg = -3.7, alt_m = 300.0 }}\nterrain = \"{}\"\n\
+             camera = {{ fov_deg = 73.7, aspect = 1.5 }}\nheight_m = 40.0\n[mission]\ncruise_mps = 5.0\n\
+             [[vehicles]]\nid = 1\nstart = [{x:.2}, 0, {up_m}]\n",
+            file.display()
+        );
+        scenario::parse(&text, "step")
+    };
+    let mut random = Pcg32::seed_from_u64(7);
+    let (mut refused, mut farthest_m) = (0, 0.0f64);
+    for _ in 0..200 {
+        let x = 6.0 * areas::unit_random(&mut random) - 3.0;
+        let Err(error) = scenario(x) else {
+            assert!(x.abs() > 0.5, "{x} m from the step");
+            continue;
+        };
+        assert!(error.to_string().contains("a step of 2.0 m"), "{error}");
+        (refused, farthest_m) = (refused + 1, farthest_m.max(x.abs()));
+        let hint = error.hint.expect("a hint");
+        let by_m: f64 = hint.split(' ').find_map(|word| word.parse().ok()).expect("a number");
+        assert!(scenario(x + by_m).is_ok(), "{x}: {hint}");
+    }
+    println!("{refused} of 200 refused, up to {farthest_m} m from the step");
+    assert!(refused > 20 && farthest_m < 2.5);
+}
+
 #[test]
 fn what_cannot_be_planned_or_flown_is_refused_by_name() {
     let folder = tempfile::tempdir().unwrap();

@@ -104,6 +104,26 @@ impl HeightGrid {
         }
     }
 
+    /// Lowest and highest height ([`Self::height_at`]) within `radius_m` of a place, metres; `None`
+    /// if there is none.
+    pub fn height_range_around_m(&self, place: &Flat, radius_m: f32) -> Option<[f32; 2]> {
+        let index = |at_m: f32, axis: usize| {
+            let most = self.size[axis] as f32 - 1.0;
+            ((at_m - self.low[axis]) / self.cell_m).floor().clamp(0.0, most) as usize
+        };
+        let range =
+            |axis: usize| index(place[axis] - radius_m, axis)..=index(place[axis] + radius_m, axis);
+        let cells = range(1).flat_map(|row| range(0).map(move |column| [column, row]));
+        let near = cells.map(|cell| self.cell_centre(cell)).filter(|centre| {
+            let half = Flat::repeat(self.cell_m / 2.0);
+            (place.sup(&(centre - half)).inf(&(centre + half)) - place).norm() <= radius_m
+        });
+        let heights = near.filter_map(|centre| self.height_at(&centre));
+        heights
+            .map(|height_m| [height_m; 2])
+            .reduce(|[low, high], [other, _]| [low.min(other), high.max(other)])
+    }
+
     /// Keeps the heights so far as those at the cells' centres; cells may then be raised above
     /// them.
     pub(super) fn save_centre_heights(&mut self) {

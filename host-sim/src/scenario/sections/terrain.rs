@@ -20,6 +20,14 @@ use crate::terrain::{
 
 /// Greatest difference between a start's given height and the ground below it, metres.
 const MAX_PAD_HEIGHT_ERROR_M: f32 = 5.0;
+/// Greatest step of the ground near a pad, metres.
+const MAX_STEP_AT_PAD_M: f32 = 1.0;
+/// Number of rings around a pad beside a step on which a level place is sought, for the hint.
+const PLACE_SEARCH_STEPS: usize = 40;
+/// Distance of these rings from each other, metres.
+const PLACE_SEARCH_STEP_M: f32 = 0.5;
+/// Number of places on each ring.
+const PLACE_SEARCH_DIRECTIONS: usize = 16;
 /// How far beside lanes and around corners paths may lead, metres.
 const PATHS_BESIDE_LANES_M: f32 = 5.0;
 
@@ -150,20 +158,9 @@ impl UnreadTerrain {
             text.error_with_hint(&self.span, why, hint)
         })?;
         for (vehicle, spans) in vehicles {
-            let ground_m = grid.height_at(&vehicle.start.xy()).unwrap_or(0.0);
-            if (vehicle.start.z - ground_m).abs() > MAX_PAD_HEIGHT_ERROR_M {
-                let why = format!(
-                    "vehicle {} starts {:.1} m from the ground of area.terrain",
-                    vehicle.id,
-                    vehicle.start.z - ground_m
-                );
-                let up = format!(
-                    "there the ground is {ground_m:.1} m above the origin, alt_m = {:.1}",
-                    area.origin.alt_m + f64::from(ground_m)
-                );
-                return Err(text.error_with_hint(&spans.start, why, up));
-            }
-            vehicle.start.z = ground_m;
+            let near_m = vehicle.radius_m + margins::max_touchdown_offset_m(simulation, vehicle);
+            vehicle.start.z = pad_ground_m(&grid, &area.origin, vehicle, near_m)
+                .map_err(|(why, hint)| text.error_with_hint(&spans.start, why, hint))?;
         }
         let terrain = Terrain {
             grid: Arc::new(grid),
@@ -183,5 +180,61 @@ impl UnreadTerrain {
         area.heights = Heights { max_picture_height_m: top_m, ..area.heights };
         area.terrain = Some(terrain);
         Ok(())
+    }
+}
+
+/// Height of the ground on which a vehicle stands, metres up in the mission frame.
+///
+/// # Errors
+/// What is wrong and what helps: the start's own height is another one, or there is a step within
+/// `near_m` of it.
+fn pad_ground_m(
+    grid: &HeightGrid,
+    origin: &Geodetic,
+    vehicle: &VehicleSection,
+    near_m: f32,
+) -> std::result::Result<f32, (String, String)> {
+    let (id, place) = (vehicle.id, vehicle.start.xy());
+    let ground_m = grid.height_at(&place).unwrap_or(0.0);
+    let off_m = vehicle.start.z - ground_m;
+    if off_m.abs() > MAX_PAD_HEIGHT_ERROR_M {
+        let why = format!("vehicle {id} starts {off_m:.1} m from the ground of area.terrain");
+        let altitude_m = origin.alt_m + f64::from(ground_m);
+        let up = format!(
+            "there the ground is {ground_m:.1} m above the origin, alt_m = {altitude_m:.1}"
+        );
+        return Err((why, up));
+    }
+    let step_m = |place: &Flat| {
+        let own_m = grid.height_at(place).unwrap_or(f32::INFINITY);
+        let range = grid.height_range_around_m(place, near_m).unwrap_or([own_m; 2]);
+        range.map(|height_m| (height_m - own_m).abs()).into_iter().fold(0.0, f32::max)
+    };
+    let found_m = step_m(&place);
+    if found_m <= MAX_STEP_AT_PAD_M {
+        return Ok(ground_m);
+    }
+    let why = format!(
+        "area.terrain has a step of {found_m:.1} m within {near_m:.1} m of vehicle {id}'s start"
+    );
+    Err((why, level_place_hint(&place, |beside| step_m(beside) <= MAX_STEP_AT_PAD_M)))
+}
+
+/// Says where the nearest level ground is, seen from `place`.
+fn level_place_hint(place: &Flat, is_level: impl Fn(&Flat) -> bool) -> String {
+    let aside = |ring: usize, direction: usize| {
+        let turned = std::f32::consts::TAU * direction as f32 / PLACE_SEARCH_DIRECTIONS as f32;
+        let aside = Flat::new(turned.cos(), turned.sin()) * (ring as f32 * PLACE_SEARCH_STEP_M);
+        // As precise as the hint states it.
+        aside.map(|m| (m * 10.0).round() / 10.0)
+    };
+    let mut places = (1..=PLACE_SEARCH_STEPS)
+        .flat_map(|ring| (0..PLACE_SEARCH_DIRECTIONS).map(move |k| aside(ring, k)));
+    match places.find(|aside| is_level(&(place + aside))) {
+        Some(aside) => {
+            let [east_m, north_m] = [aside.x, aside.y];
+            format!("move it by {east_m:.1} m east and {north_m:.1} m north: there is none")
+        }
+        None => "a vehicle over its pad may touch it: choose level ground".to_owned(),
     }
 }
