@@ -20,6 +20,7 @@ mod area_reports;
 mod divisions;
 mod echoes;
 mod estimate;
+mod holds;
 mod hostile;
 mod interruptions;
 mod paces;

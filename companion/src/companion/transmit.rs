@@ -61,7 +61,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let mut payload = [0; 133];
             let len = self.own_intent().encode(&mut payload);
             let header = self.links.intent_header(system, self.reported_path(), self.now);
-            self.guidance.note_intent_sent(self.now);
+            self.guidance.note_intent_sent(self.now, self.config.swarm_hz);
             return encode_tunnel(header, &payload[..len], out);
         }
         if link == Link::Swarm
@@ -425,7 +425,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 column = false;
                 add(setpoint);
             }
-            Follow if self.guidance.is_in_descent() => {
+            Follow if self.guidance.descends_or_will(&self.guidance_inputs(), self.now) => {
                 add(setpoint);
                 last.into_iter().for_each(|last| {
                     add(Point::new(last.x, last.y, self.guidance.planned_ground_m(plan)));

@@ -2,18 +2,20 @@
 //!
 //! Others must assume that a vehicle that stood half a second ago has begun to fly since. Two
 //! vehicles that stopped for each other would never continue. So a stopped vehicle reports no
-//! points ahead of its setpoint. It does not move again until [`HOLD_REPORT_LIFETIME`] and the
-//! delay of its messages have passed since the last such report, by when the others have heard new
-//! points. The vehicle that yields reports its hold at once, the other one only after standing for
+//! points ahead of its setpoint. It does not move again until [`MIN_REPORT_LIFETIME`], or
+//! [`REPORTS_BEFORE_MOVING`] periods of its reports if that is longer, and the delay of its messages
+//! have passed since the last such report, by when the others have heard new points. The vehicle that yields reports its hold at once, the other one only after standing for
 //! [`HOLD_AFTER_IF_FIRST`], so that it goes first.
 //!
 //! ENU metres.
 
 use crate::time::{Duration, Instant};
 
-/// Time after its last report of a hold for which others rely on it and this vehicle must not move,
-/// besides the messages' delay: with `FLK_SWARM_HZ` 5, the default, longer than three lost reports.
-const HOLD_REPORT_LIFETIME: Duration = Duration::from_millis(1000);
+/// Least time after its last report of a hold for which others rely on it and this vehicle must not
+/// move, besides the messages' delay.
+const MIN_REPORT_LIFETIME: Duration = Duration::from_millis(1000);
+/// Number of periods of reports in that time, at any `FLK_SWARM_HZ`: longer than three lost reports.
+const REPORTS_BEFORE_MOVING: u64 = 5;
 /// Time of standing after which a vehicle that yields reports that it holds.
 pub(super) const HOLD_AFTER_IF_YIELDING: Duration = Duration::from_millis(300);
 /// Time of standing after which a vehicle that goes first reports that it holds: time for the
@@ -27,8 +29,9 @@ pub(crate) struct Hold {
     standing_since: Option<Instant>,
     /// Whether the hold has begun: from then on the vehicle's intents report it.
     active: bool,
-    /// When the hold was last sent in an intent; `None` before.
-    reported_at: Option<Instant>,
+    /// Until when others rely on the hold that was last sent in an intent, besides the delay of
+    /// messages; `None` before.
+    relied_on_until: Option<Instant>,
     /// Delay with which others hear an intent.
     message_delay: Duration,
 }
@@ -55,13 +58,14 @@ impl Hold {
         self.active
     }
 
-    /// Notes that an intent with the hold was sent.
-    pub(crate) fn note_reported(&mut self, now: Instant) {
-        self.reported_at = Some(now);
+    /// Notes that an intent with the hold was sent, `report_hz` of which are sent each second.
+    pub(crate) fn note_reported(&mut self, now: Instant, report_hz: u8) {
+        let reports = Duration::from_millis(1000 * REPORTS_BEFORE_MOVING / u64::from(report_hz));
+        self.relied_on_until = Some(now + reports.max(MIN_REPORT_LIFETIME));
     }
 
     /// Whether other vehicles may still rely on the hold, so that this one must not move.
     pub(super) fn is_binding(&self, now: Instant) -> bool {
-        self.reported_at.is_some_and(|at| now < (at + HOLD_REPORT_LIFETIME) + self.message_delay)
+        self.relied_on_until.is_some_and(|until| now < until + self.message_delay)
     }
 }

@@ -102,10 +102,11 @@ impl Guidance {
         core::mem::take(&mut self.hold_changed)
     }
 
-    /// Notes that an intent was sent: it reports the hold, if there is one.
-    pub(crate) fn note_intent_sent(&mut self, now: Instant) {
+    /// Notes that an intent was sent, one of `report_hz` each second: it reports the hold, if there
+    /// is one.
+    pub(crate) fn note_intent_sent(&mut self, now: Instant, report_hz: u8) {
         if self.hold.is_reported() {
-            self.hold.note_reported(now);
+            self.hold.note_reported(now, report_hz);
         }
     }
 

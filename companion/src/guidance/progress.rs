@@ -386,6 +386,16 @@ impl Guidance {
         self.deconflict.method == Method::Algorithm2
     }
 
+    /// Whether the vehicle descends from the end of its path, or will once others no longer rely on
+    /// the hold that it has reported there.
+    pub(crate) fn descends_or_will<const W: usize, const G: usize>(
+        &self,
+        scene: &GuidanceInputs<'_, W, G>,
+        now: Instant,
+    ) -> bool {
+        self.is_in_descent() || (self.hold.is_binding(now) && self.may_begin_descent(scene))
+    }
+
     /// Whether the vehicle is in the descent from the end of its path, or of a guided landing.
     pub(crate) fn is_in_descent(&self) -> bool {
         self.phase == Phase::Descent
