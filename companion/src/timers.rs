@@ -40,6 +40,8 @@ pub(crate) enum Timer {
     /// From then on a vehicle on the ground that cannot make a commitment leaves its share to
     /// others.
     LeaveWithoutCommitment,
+    /// From then on no vehicle flies any more that could leave a part to a vehicle in reserve.
+    ReserveEnds,
     /// From then on the vehicle no longer waits above its pad for missing vehicles.
     StopWaitingForMissing,
     /// From then on "EKF origin # km away" may be sent again.

@@ -13,7 +13,7 @@ use host_sim::{scenario, swarm};
 
 /// Log texts that explain why a vehicle without a fault leaves its part undone: for example no
 /// majority hears it, or a failed vehicle hovers on its path.
-pub const EARLY_LANDING_TEXTS: [&str; 11] = [
+pub const EARLY_LANDING_TEXTS: [&str; 12] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
     "Vehicle on the path: planning the way home",
@@ -25,6 +25,7 @@ pub const EARLY_LANDING_TEXTS: [&str; 11] = [
     "No progress for 10 min: landing",
     "Start barred for 3 min: others take its part",
     "Climb takes too long: landing",
+    "Obstacle on the way back: seeking a place",
 ];
 
 /// Log text of a vehicle that lands beside its pad, since another one may lie or come down there.

@@ -112,6 +112,51 @@ fn what_cannot_start_leaves_its_share_to_the_others() {
     fly_all(draw, |result, log| is_not_whole(result) && !lands(log));
 }
 
+/// As above, with pads so near to each other that the gates of the others may wait for the vehicle
+/// that cannot start, and without another one in flight.
+#[test]
+fn what_cannot_start_keeps_no_other_on_its_pad() {
+    let draw = |random: &mut Pcg32| {
+        let count = 2 + (random.next_u32() % 4) as usize;
+        let apart_m = 3.0 + f64::from(random.next_u32() % 30) / 10.0;
+        let kind = ["gps-loss", "late-plan"][(random.next_u32() % 2) as usize];
+        let stuck = 1 + random.next_u32() as usize % count;
+        let pad = |k: usize| {
+            let [x, y] = [(k % 3) as f64 * apart_m, -20.0 - (k / 3) as f64 * apart_m];
+            format!("[[vehicles]]\nid = {}\nstart = [{x:.1}, {y:.1}, 0]\n", k + 1)
+        };
+        "[area]\npolygon = [[0, 0], [150, 10], [170, 90], [80, 120], [-10, 80]]\n\
+         camera = { fov_deg = 73.7, aspect = 1.5 }\nheight_m = 35.0\n\
+         [mission]\ncruise_mps = 5.0\n[simulation]\ntime_limit_s = 2400.0\n"
+            .to_owned()
+            + &(0..count).map(pad).collect::<String>()
+            + &fault(0.0, kind, stuck, "duration_s = 3000.0\n")
+    };
+    fly_all(draw, |result, _| is_not_whole(result));
+}
+
+/// Of small areas several vehicles have no part: once the others are home, the mission ends for
+/// them too.
+#[test]
+fn vehicles_in_reserve_end_once_no_other_flies() {
+    let draw = |random: &mut Pcg32| {
+        let [wide_m, high_m] = [0, 1].map(|_| 20 + random.next_u32() % 40);
+        let vehicles: String = (1..=5)
+            .map(|id| format!("[[vehicles]]\nid = {id}\nstart = [{}, -20, 0]\n", 5 * id))
+            .collect();
+        format!(
+            "[area]\npolygon = [[0, 0], [{wide_m}, 0], [{wide_m}, {high_m}], [0, {high_m}]]\n\
+             method = \"powell\"\ncamera = {{ fov_deg = 73.7, aspect = 1.5 }}\nheight_m = 70.0\n\
+             [mission]\ncruise_mps = 3.0\n[simulation]\nradio_loss = 0.2\n{vehicles}"
+        )
+    };
+    let waits = |result: &MissionResult, _: &str| {
+        let mut ends = result.vehicles.iter().map(|v| v.end.as_str());
+        is_not_whole(result) || ends.any(|end| !end.starts_with("Done"))
+    };
+    fly_all(draw, waits);
+}
+
 /// A pause during the take-offs delays the mission, but ends it for no vehicle.
 #[test]
 fn a_pause_in_the_start_ends_no_mission() {

@@ -169,8 +169,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let progress_m =
             self.guidance.reported_progress_m(self.mission.state(), &self.guidance_inputs());
         let ground_m = self.planned_ground_m();
+        let lowest_m = self
+            .mission
+            .plan()
+            .map_or(ground_m, |plan| self.guidance.lowest_planned_ground_m(plan));
         self.mission.switch_to_detour(detour, progress_m);
         self.mission.note_ground_below_start(ground_m);
+        if purpose.is_aside() {
+            self.mission.note_ground_below_end(lowest_m);
+        }
         let progress_at = self.guidance.last_progress_at();
         self.detours.adopt_detour(purpose, progress_m, self.now, progress_at, &mut self.timers);
         self.neighbours.mark_out_of_plan_avoided(self.now);

@@ -23,6 +23,9 @@ const MAX_STOP_BEYOND_PROMISE_M: f32 = 0.1;
 /// A vehicle within this distance before the place where it promised to hold has reached it,
 /// metres. Places that are nearer to each other than this count as the same.
 const AT_HOLD_WITHIN_M: f32 = 0.2;
+/// Time without a vehicle in flight, after one has ended its flight, after which none will fly any
+/// more that could leave a part to a vehicle in reserve.
+const RESERVE_ENDS_AFTER: Duration = Duration::from_secs(120);
 /// Time for which a vehicle on the ground that cannot make a commitment keeps its share; then it
 /// leaves the share to the others.
 pub(super) const LEAVE_WITHOUT_COMMITMENT_AFTER: Duration = Duration::from_secs(60);
@@ -61,6 +64,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         if !self.cannot_commit_on_ground() {
             self.timers.set(Timer::LeaveWithoutCommitment, now + LEAVE_WITHOUT_COMMITMENT_AFTER);
+        }
+        if self.plan_leaves_pad() || !self.has_flight_of_others_ended() {
+            self.timers.set(Timer::ReserveEnds, now + RESERVE_ENDS_AFTER);
         }
         if self.mission.state() != State::Dividing {
             self.timers.set(Timer::DivisionDue, now);
@@ -103,6 +109,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // after `DIVISION_RETRY_EVERY`.
             let _ = self.events.push_back(Event::PlanRequested(PlanKind::Division));
         }
+    }
+
+    /// Whether a vehicle has ended its flight, none may be missing, and no other one is in flight.
+    fn has_flight_of_others_ended(&self) -> bool {
+        let ended = |fleet: &Fleet<V>| fleet.has_any_ended() && !fleet.is_any_missing();
+        self.neighbours.fleet().is_some_and(ended)
+            && !self.neighbours.is_another_in_flight(self.now, LEASE)
     }
 
     /// This vehicle's report of itself to the fleet (`Fleet::step`).
@@ -172,18 +185,21 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether this vehicle, on the ground, cannot make a commitment, so that vehicles in flight
-    /// could not divide the area. Either it is ready or started and no majority hears it; or
-    /// another vehicle that takes part is in flight, and this one has no autopilot, position or
-    /// plan, is away from its pad, or hears another plan.
+    /// could not divide the area, and those that were started may wait for it. Either it is ready
+    /// or started and no majority hears it; or another vehicle that takes part is in flight or was
+    /// started, and this one has no autopilot, position or plan, is away from its pad, or hears
+    /// another plan.
     fn cannot_commit_on_ground(&self) -> bool {
         let Some(fleet) = self.neighbours.fleet() else { return false };
+        let state_is_before_plan = self.mission.state().is_before_plan();
         let lacks = match self.mission.state() {
-            state if state.is_before_plan() => true,
+            _ if state_is_before_plan => true,
             state if state.waits_on_pad_with_plan() && !fleet.has_lease(self.now) => return true,
             State::Ready => !self.is_at_pad() || self.hears_another_plan(),
             state => state.waits_on_pad_after_start() && self.hears_another_plan(),
         };
-        lacks && self.neighbours.is_another_in_flight(self.now, LEASE)
+        let started = state_is_before_plan && fleet.is_another_started();
+        lacks && (started || self.neighbours.is_another_in_flight(self.now, LEASE))
     }
 
     /// Whether this vehicle was not started: it may take part as a new vehicle.

@@ -76,7 +76,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a])
         };
         let room_below =
-            !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
+            !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m)
+                && !self.detours.is_obstacle_below(&t.position);
         let (over_field, sought_home) =
             (self.detours.home.can_turn_home(&view), self.detours.home.seeking_for(now));
         let sways = area && self.guidance.distance_to_setpoint_m(t) < MAX_SWAY_M;
@@ -218,6 +219,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.guidance.returning
                 && (!area || self.detours.home.is_seeking())
                 && !self.neighbours.hears_nobody(now),
+            way_back_barred: self.detours.is_way_back_barred(&view),
             pad_blocked_for: self.pad_blocked_for(),
             way_back_blocked_for_good_for: self.way_back_blocked_for_good_for(),
             join_barred: follow && self.guidance.is_join_barred(scene),
@@ -231,7 +233,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             landing_place_reached: follow && self.detours.lands_at_end() && at_end && standing,
             yielded_for: self.counted_hindrance(self.guidance.filter.yielded_for(now)),
             hindered_for: self.counted_hindrance(self.guidance.filter.hindered_for(now)),
-            no_neighbour_below: room_below,
+            room_below,
             outside_geofence: self.guidance.is_standing_at_fence()
                 || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
             path_blocked: self.detours.is_blocked(),
@@ -248,7 +250,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let needed = |fleet: &Fleet<V>| {
             // A committed division whose plan has not come yet may give it a part.
             let behind = fleet.division_count() > self.mission.division_count();
-            (behind || fleet.may_reserve_get_a_part())
+            let quiet = self.timers.is_due(Timer::ReserveEnds, self.now) && !fleet.is_dividing();
+            (behind || (fleet.may_reserve_get_a_part() && !quiet))
                 && fleet.lease_age(self.now) < MAX_RESERVE_UNHEARD
         };
         !self.plan_leaves_pad() && self.neighbours.fleet().is_some_and(needed)

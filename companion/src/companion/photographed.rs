@@ -10,7 +10,6 @@ use crate::link::OnDemandMessage;
 use crate::link::photographed::{self, PhotographedReport};
 use crate::mission::photographed::{FlightStage, PlanningPartners};
 use crate::state::State;
-use crate::swarm::fleet::Fleet;
 use crate::time::Duration;
 use crate::timers::Timer;
 
@@ -102,12 +101,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ours = report.mission_crc == self.config.mission_crc
             && self.config.roster.iter().any(|entry| entry.system_id == report.system_id);
         if ours && self.is_area_mission() && self.config.skips_photographed {
-            let under_way = || self.neighbours.fleet().is_some_and(Fleet::has_others_flight_begun);
             let planning = match self.mission.state() {
                 _ if !self.is_before_departure() => PlanningPartners::Nobody,
                 // Once started in a flight that others have begun, this vehicle keeps its plan
                 // whatever vehicles on the ground report.
-                State::Scheduled if under_way() => PlanningPartners::ThoseInFlight,
+                State::Scheduled if self.neighbours.is_flight_under_way(self.now) => {
+                    PlanningPartners::ThoseInFlight
+                }
                 _ => PlanningPartners::All,
             };
             self.mission.photographed_mut().handle_report(report, planning, self.now);

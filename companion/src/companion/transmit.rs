@@ -301,10 +301,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Height of the ground below this vehicle as far as its plan says, ENU up, metres. Without a
-    /// plan it stands on its pad: its own height, or that of its path's first point if less.
+    /// plan that is its own height if it stands disarmed, or else the lowest that is known.
     pub(super) fn planned_ground_m(&self) -> f32 {
-        let on_pad = || libm::fminf(self.mission.path_start().z, self.telemetry.position.z);
-        self.mission.plan().map_or_else(on_pad, |plan| self.guidance.planned_ground_m(plan))
+        if let Some(plan) = self.mission.plan() {
+            return self.guidance.planned_ground_m(plan);
+        }
+        let start_m = self.mission.path_start().z;
+        let own_m = self.telemetry.position_at.map_or(start_m, |_| self.telemetry.position.z);
+        let lowest_m = if self.telemetry.armed { self.guidance.lowest_ground_m() } else { own_m };
+        start_m.min(own_m).min(lowest_m)
     }
 
     /// This vehicle's intent, as it is reported to the swarm now.

@@ -3,8 +3,9 @@
 //! Others must assume that a vehicle that stood half a second ago has begun to fly since. Two
 //! vehicles that stopped for each other would never continue. So a stopped vehicle reports no
 //! points ahead of its setpoint. It does not move again until [`MIN_REPORT_LIFETIME`], or
-//! [`REPORTS_BEFORE_MOVING`] periods of its reports if that is longer, and the delay of its messages
-//! have passed since the last such report, by when the others have heard new points. The vehicle that yields reports its hold at once, the other one only after standing for
+//! [`REPORTS_BEFORE_MOVING`] periods of its reports if that is longer, and the delay of its
+//! messages have passed since the last such report, by when the others have heard new points. The
+//! vehicle that yields reports its hold at once, the other one only after standing for
 //! [`HOLD_AFTER_IF_FIRST`], so that it goes first.
 //!
 //! ENU metres.
@@ -14,7 +15,8 @@ use crate::time::{Duration, Instant};
 /// Least time after its last report of a hold for which others rely on it and this vehicle must not
 /// move, besides the messages' delay.
 const MIN_REPORT_LIFETIME: Duration = Duration::from_millis(1000);
-/// Number of periods of reports in that time, at any `FLK_SWARM_HZ`: longer than three lost reports.
+/// Number of periods of reports in that time, at any `FLK_SWARM_HZ`: longer than three lost
+/// reports.
 const REPORTS_BEFORE_MOVING: u64 = 5;
 /// Time of standing after which a vehicle that yields reports that it holds.
 pub(super) const HOLD_AFTER_IF_YIELDING: Duration = Duration::from_millis(300);

@@ -187,6 +187,11 @@ impl Guidance {
         }
     }
 
+    /// Height of the lowest ground between pads, ENU up, metres; ∞ if only that of pads is known.
+    pub(crate) fn lowest_ground_m(&self) -> f32 {
+        self.lowest_ground_m
+    }
+
     /// Lowest height of the ground that the plan or the mission gives, ENU up, metres.
     pub(crate) fn lowest_planned_ground_m<const W: usize, const G: usize>(
         &self,

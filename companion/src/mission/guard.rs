@@ -219,6 +219,8 @@ pub enum Guard {
     /// on the ground or lost has blocked the way home or the descent at the end of a coverage path.
     /// On the way home of a mission with goals, 5 s of the latter are enough.
     PadTaken,
+    /// A reported obstacle lies ahead on the way that the vehicle flies back, or below its end.
+    WayBackBarred,
     /// A place aside to land at was sought, but none exists, or the shell has not answered within
     /// the limit.
     NoPlaceAside,
@@ -414,6 +416,7 @@ impl Guard {
             Self::NoRoomHere => {
                 i.is_landing_blocked_for(limit) && i.in_setpoint_mode && i.may_seek_landing_aside
             }
+            Self::WayBackBarred => i.way_back_barred,
             Self::PadTaken => i.is_pad_blocked_for(limit) && i.may_seek_landing_aside,
             Self::NoPlaceAside => {
                 i.seeks_landing_aside && (i.plan_failed || i.time_in_state >= limit)
@@ -428,9 +431,9 @@ impl Guard {
             Self::Yielded => i.yielded_for >= limit && i.seeking_home_for.is_none(),
             Self::Hindered => i.hindered_for >= limit && i.seeking_home_for.is_none(),
             Self::BatteryCritical => i.battery_critical,
-            Self::BatteryLow => i.battery_low && i.no_neighbour_below && !i.lands_aside,
+            Self::BatteryLow => i.battery_low && i.room_below && !i.lands_aside,
             Self::OutsideGeofence => {
-                i.outside_geofence && (i.no_neighbour_below || i.stalled_for > MAX_WAIT_AT_FENCE)
+                i.outside_geofence && (i.room_below || i.stalled_for > MAX_WAIT_AT_FENCE)
             }
             Self::NeighboursSilent => i.unlinked_for > limit,
             Self::LeaseLost => i.is_coverage && i.unlinked_for > limit,
@@ -451,7 +454,7 @@ impl Guard {
             Self::OurTurn => i.our_turn_to_detour,
             Self::DetourReady => i.detour_ready,
             Self::DetourFailed => i.plan_failed,
-            Self::NoWayAround => i.detours_given_up && i.no_neighbour_below,
+            Self::NoWayAround => i.detours_given_up && i.room_below,
             Self::NoWayOn => i.detours_given_up && i.can_turn_back,
             Self::BelowLandingVehicle => i.waited_below_landing_for > limit,
             Self::Standing => i.standing,

@@ -197,6 +197,9 @@ pub struct GuardInputs {
     /// way there is known to be free of walls; it does not fly back yet, follows its setpoints, and
     /// hears another vehicle. In a coverage mission only while it seeks a path home.
     pub can_turn_back: bool,
+    /// Whether the vehicle flies back as it came, and a reported obstacle lies ahead on that way,
+    /// near where the vehicle can stop, or below its end.
+    pub way_back_barred: bool,
     /// Time for which the last leg of this vehicle has been blocked: on its way home the descent to
     /// its pad by any vehicle; the way home before that, and the descent at the end of a coverage
     /// path, by a vehicle that is on the ground or lost.
@@ -227,8 +230,9 @@ pub struct GuardInputs {
     pub battery_low: bool,
     /// Whether the battery's charge is below half of the configured limit.
     pub battery_critical: bool,
-    /// Whether no neighbour was last heard below this vehicle, near its vertical.
-    pub no_neighbour_below: bool,
+    /// Whether no neighbour was last heard below this vehicle, near its vertical, and no reported
+    /// obstacle is there.
+    pub room_below: bool,
     /// Whether the vehicle is outside its geofence, or stands at it.
     pub outside_geofence: bool,
     /// Whether an obstacle, or a vehicle that left the plan, is on the path ahead, or this vehicle

@@ -294,6 +294,7 @@ pub static TABLE: &[TransitionRow] = &[
     warning_row(&[Paused, AutopilotSilent], G::NeighboursSilent, secs(20), Land,  A::RequestLandMode,   "Neighbours silent while it stands: landing"),
     warning_row(&[TakeOff, Climb],   G::LeaseLost,       secs(20),   Land,        A::RequestLandMode,   "Neighbours silent in the climb: landing"),
     warning_row(&[Follow],           G::PadTaken,        secs(20),   Replanning,  A::RequestLanding,    "No room to land: seeking a place aside"),
+    warning_row(&[Follow],           G::WayBackBarred,   AT_ONCE,    Replanning,  A::RequestLanding,    "Obstacle on the way back: seeking a place"),
     info_row(&[Follow],              G::LandingPlaceReached, AT_ONCE, Land,        A::RequestLandMode,   "Landing aside"),
     warning_row(&[Follow],           G::PathBlocked,     AT_ONCE,    Blocked,     A::BrakeOnPath,       "Path blocked: waiting until all others stand"),
     warning_row(&[Follow, Blocked],  G::Unfollowed,      MAX_UNFOLLOWED, Land,    A::RequestLandMode,   "Setpoint not followed: landing"),

@@ -62,9 +62,9 @@ const INTERRUPTIONS: &[(&str, Shows)] = &[
     ("position jumps", |i| (i.position_age, i.position_jumped) = (MAX_POSITION_AGE, true)),
     ("autopilot silent", |i| i.heartbeat_age = Duration::from_secs(4)),
     ("disarmed", |i| (i.armed, i.airborne) = (false, false)),
-    ("battery low", |i| (i.battery_low, i.no_neighbour_below) = (true, true)),
+    ("battery low", |i| (i.battery_low, i.room_below) = (true, true)),
     ("battery critical", |i| (i.battery_low, i.battery_critical) = (true, true)),
-    ("outside the fence", |i| (i.outside_geofence, i.no_neighbour_below) = (true, true)),
+    ("outside the fence", |i| (i.outside_geofence, i.room_below) = (true, true)),
     ("neighbours silent", |i| i.unlinked_for = Duration::from_secs(11)),
 ];
 
@@ -304,6 +304,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
             (i.column_blocked_for, i.in_setpoint_mode, i.may_seek_landing_aside) =
                 (long, true, true);
         }
+        G::WayBackBarred => i.way_back_barred = true,
         G::PadTaken => (i.pad_blocked_for, i.may_seek_landing_aside) = (long, true),
         G::NoPlaceAside => (i.plan_failed, i.seeks_landing_aside) = (true, true),
         G::LandingPlaceReached => i.landing_place_reached = true,
@@ -313,8 +314,8 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::OutOfRange => (i.others_out_of_range, i.time_in_state) = (true, long),
         G::Hindered => i.hindered_for = long,
         G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
-        G::BatteryLow => (i.battery_low, i.no_neighbour_below) = (true, true),
-        G::OutsideGeofence => (i.outside_geofence, i.no_neighbour_below) = (true, true),
+        G::BatteryLow => (i.battery_low, i.room_below) = (true, true),
+        G::OutsideGeofence => (i.outside_geofence, i.room_below) = (true, true),
         G::NeighboursSilent => i.unlinked_for = long,
         G::LeaseLost => (i.is_coverage, i.unlinked_for) = (true, long),
         G::NotDivided => (i.time_in_state, i.division_overdue) = (long, true),
@@ -327,7 +328,7 @@ fn inputs_for(guard: Guard) -> GuardInputs {
         G::OurTurn => i.our_turn_to_detour = true,
         G::DetourReady => i.detour_ready = true,
         G::DetourFailed => i.plan_failed = true,
-        G::NoWayAround => (i.detours_given_up, i.no_neighbour_below) = (true, true),
+        G::NoWayAround => (i.detours_given_up, i.room_below) = (true, true),
         G::NoWayOn => (i.detours_given_up, i.can_turn_back) = (true, true),
         G::BelowLandingVehicle => i.waited_below_landing_for = long,
         G::Standing => i.standing = true,

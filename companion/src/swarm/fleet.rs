@@ -307,7 +307,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether another vehicle was started and takes part, as far as this one has heard, or as a
     /// vehicle that it hears has heard. One that fell silent in flight may still fly.
-    fn is_another_started(&self) -> bool {
+    pub(crate) fn is_another_started(&self) -> bool {
         self.other_started_ranks() | self.hears_started_bits & !self.own_bit() != 0
     }
 

@@ -20,6 +20,7 @@ use crate::{Companion, Config, Duration, Event, Instant, Link, PlanRequests};
 
 mod commands;
 mod flight;
+mod ground_station;
 mod mission;
 mod neighbour;
 mod planner;

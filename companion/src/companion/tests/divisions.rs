@@ -190,7 +190,7 @@ impl Watch {
         assert!(self.returns < 20, "waits on its way back: {said}");
         assert!(!self.ends || !(flies || state == Dividing), "an order is forgotten: {said}");
         let intent = b.companion.own_intent();
-        assert!(intent.ground_m < 0.1, "its ground is at {} m: {said}", intent.ground_m);
+        assert!(intent.ground_m.abs() < 0.1, "its ground is at {} m: {said}", intent.ground_m);
         // The ground is level at 0: a column reaches it.
         let descends =
             state.lands_or_landing_is_held() || (state == Follow && guidance.is_in_descent());

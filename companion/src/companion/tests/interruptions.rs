@@ -450,24 +450,7 @@ fn the_same_number_with_other_parameters_is_another_command_and_a_repeat_is_answ
 
 /// The ground station reports an obstacle of 0.5 m at `place`.
 fn obstacle(b: &mut Bench, place: Point) {
-    use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavFrame};
-    let place = planner_core::geo::frames::enu_to_geodetic(&ORIGIN, &place);
-    let data = COMMAND_INT_DATA {
-        command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
-        param1: 0.5,
-        x: (place.lat_deg * 1e7) as i32,
-        y: (place.lon_deg * 1e7) as i32,
-        z: place.alt_m as f32,
-        target_system: SYSTEM,
-        target_component: crate::COMPANION_COMPONENT,
-        frame: MavFrame::MAV_FRAME_GLOBAL,
-        ..Default::default()
-    };
-    let mut out = [0; crate::link::frame::MAX_FRAME_LEN];
-    let header = crate::link::frame::Header { system: 255, component: 190, sequence: 200 };
-    let len = crate::link::frame::encode(header, &data, &mut out);
-    b.companion.handle_bytes(Link::Swarm, b.now, &out[..len]);
-    b.drain();
+    b.report_obstacle(&place, 0.5);
 }
 
 #[test]

@@ -90,6 +90,7 @@ fn every_row_has_its_scene() {
         homeward::is_in_the_way_of_another,
         homeward::waits_for_nothing,
         homeward::finds_no_way,
+        homeward::meets_an_obstacle,
         resume::others_know_of_more,
         resume::another_plan_is_flown,
     ];

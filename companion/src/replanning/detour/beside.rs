@@ -27,7 +27,7 @@ pub(super) const BLOCKED_BEYOND_SAFETY_DISTANCE_M: f32 = 0.25;
 /// The vehicle photographs the path up to its stop; the detour leaves out up to this much of the
 /// path before the zone, and what the zone covers. It is the distance flown at 15 m/s while the
 /// zones of 32 vehicles are compared with the path.
-const BLOCKED_BEYOND_STOP_M: f32 = 8.0;
+pub(super) const BLOCKED_BEYOND_STOP_M: f32 = 8.0;
 /// Added to [`BLOCKED_BEYOND_STOP_M`] once the path is blocked, metres: the vehicle may have
 /// stopped a little sooner than expected.
 const BEYOND_STOP_HYSTERESIS_M: f32 = 4.0;

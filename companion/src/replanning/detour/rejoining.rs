@@ -2,6 +2,10 @@
 //!
 //! Constant work but for [`Detours::rejoin_place_from_aside`], once a search.
 
+use planner_core::Point;
+use planner_core::detour::{self, KeepOutZone};
+
+use super::beside::BLOCKED_BEYOND_STOP_M;
 use super::path_kind::{DetourPurpose, PathKind, RejoinPlace, RejoinPlaces};
 use super::{Detours, beside};
 use crate::guidance::PathSource;
@@ -110,6 +114,35 @@ impl Detours {
     pub(crate) fn begin_turn_back(&mut self) {
         self.give_up_plan();
         self.home.end();
+    }
+
+    /// Whether a reported obstacle bars the way back, up to a little beyond where the vehicle can
+    /// stop, or the descent at its end. All obstacles count: no planner led this way around any.
+    pub(crate) fn is_way_back_barred<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &DetourView<'_, V, W, G>,
+    ) -> bool {
+        let Some(plan) = view.mission.plan().filter(|_| view.guidance.returning) else {
+            return false;
+        };
+        let along_m = view.guidance.reference_along_m();
+        let until_m = view.guidance.braking_end_m().max(along_m) + BLOCKED_BEYOND_STOP_M;
+        let here = view.telemetry.position;
+        let bars = |obstacle: &KeepOutZone| {
+            let (climb_m, descent_m) = (plan.climb_m, plan.descent_m);
+            let ahead = along_m.max(0.0)..until_m;
+            detour::is_path_blocked(&plan.path, ahead, climb_m, descent_m, &here, obstacle)
+        };
+        !self.lands_at_end() && self.obstacles.all().iter().any(bars)
+    }
+
+    /// Whether a reported obstacle is anywhere below a place, seen from above.
+    pub(crate) fn is_obstacle_below(&self, place: &Point) -> bool {
+        let below = |obstacle: &KeepOutZone| {
+            let away = obstacle.from - place;
+            away.z <= 0.0 && away.xy().norm_squared() < obstacle.radius_m * obstacle.radius_m
+        };
+        self.obstacles.all().iter().any(below)
     }
 
     /// Makes the plan's path the one flown, if it has come again from the shell.

@@ -3,13 +3,13 @@
 //!
 //! Cost: a request lists every known keep-out zone.
 
-use planner_core::detour::{DetourGoal, DetourRequest, KeepOutZone};
+use planner_core::detour::{DetourGoal, DetourRequest, KeepOutZone, ZoneKind};
 use planner_core::flight::{VehiclePlan, Waypoint};
 use planner_core::{Length, Point};
 
 use super::beside::{self, BLOCKED_BEYOND_SAFETY_DISTANCE_M, DETOUR_MARGIN_M, REJOIN_SEARCH_PAUSE};
 use super::homeward::HOME_SEARCH_PAUSE;
-use super::path_kind::{DetourPurpose, PathKind};
+use super::path_kind::{DetourPurpose, PathKind, RejoinPlace};
 use super::{
     Detours, EARLY_GIVE_UP_AFTER_S, MAX_FAILED_SEARCHES, MAX_SEARCH_PAUSE_S, STUCK_AFTER,
     TURN_DELAY_PER_VEHICLE_S,
@@ -174,7 +174,16 @@ impl Detours {
         let along_m = view.guidance.reference_along_m();
         let [ahead, behind] = reference_leg_ends(view)?;
         let apart_m = view.config.safety_distance_m;
-        self.obstacles.all().iter().for_each(|obstacle| visit(*obstacle));
+        let z_m = view.telemetry.position.z;
+        self.obstacles.all().iter().for_each(|obstacle| {
+            // A place above an obstacle is none to land at.
+            let above_m = libm::fmaxf(z_m - obstacle.from.z, 0.0);
+            let to = obstacle.from + Point::new(0.0, 0.0, above_m);
+            visit(match requested == DetourPurpose::LandingAside && above_m > 0.0 {
+                true => KeepOutZone { to, kind: ZoneKind::LandingColumn, ..*obstacle },
+                false => *obstacle,
+            });
+        });
         match view.config.lost_vehicle_down_after_s {
             Some(_) if !requested.is_aside() => beside::visit_zones_of_others(view, &mut visit),
             _ => {
@@ -198,7 +207,7 @@ impl Detours {
             );
         }
         let here = self.start_of_detour(view)?;
-        let (goal, descent_m) = goal_and_descent_m(requested, view, plan, &here)?;
+        let (goal, descent_m) = goal_and_descent_m(requested, view, plan)?;
         let off_m = plan.path.point_at(along_m).map_or(0.0, |on| (on - here).length());
         let over_area = view.config.lost_vehicle_down_after_s.is_some();
         // From beside the leg the first way to its end has that much less room.
@@ -322,32 +331,24 @@ impl Detours {
     }
 }
 
-/// The goal of the path requested from `here`, and the depth of the descent at its end, metres;
-/// `None` if there is no goal.
+/// The goal of the path requested, and the depth of the descent from there, metres; `None` if there
+/// is no goal. The place where a path aside ends is known only once the path is.
 fn goal_and_descent_m<const V: usize, const W: usize, const G: usize>(
     requested: DetourPurpose,
     view: &DetourView<'_, V, W, G>,
     plan: &VehiclePlan<W, G>,
-    here: &Point,
 ) -> Option<(DetourGoal, f32)> {
-    let height_m = |place: &Point, ground_m: f32| libm::fmaxf(place.z - ground_m, 0.0);
-    let (goal, descent_m) = match view.config.lost_vehicle_down_after_s {
-        Some(_) => match requested.rejoin_place() {
-            Some(back) => {
-                let over = back.position;
-                let goal = DetourGoal::Point { end: over, layer_z_m: over.z };
-                (goal, height_m(&over, view.guidance.planned_ground_m(plan)))
-            }
-            None => view.mission.home_goal(),
-        },
-        None => match plan.task.goal() {
-            Some(goal) => (DetourGoal::RoadmapGoal(goal), plan.descent_m),
+    let (home, home_descent_m) = view.mission.home_goal();
+    if view.config.lost_vehicle_down_after_s.is_none() {
+        return match plan.task.goal() {
+            Some(goal) => Some((DetourGoal::RoadmapGoal(goal), home_descent_m)),
             // The flight ends over the vehicle's own pad.
-            None if plan.task.leaves_pad() => view.mission.home_goal(),
-            None => return None,
-        },
+            None => plan.task.leaves_pad().then_some((home, home_descent_m)),
+        };
+    }
+    let Some(RejoinPlace { position: over, .. }) = requested.rejoin_place() else {
+        return Some((home, home_descent_m));
     };
-    // A place aside is at the vehicle's height, not at the goal's, and over any ground.
-    let ground_m = view.guidance.lowest_planned_ground_m(plan);
-    Some((goal, if requested.is_aside() { height_m(here, ground_m) } else { descent_m }))
+    let above_m = over.z - view.guidance.planned_ground_m(plan);
+    Some((DetourGoal::Point { end: over, layer_z_m: over.z }, libm::fmaxf(above_m, 0.0)))
 }

@@ -82,10 +82,9 @@ impl<const V: usize> Fleet<V> {
         self.is_dividing() || others.any(|rank| self.vehicle_takes_part(rank))
     }
 
-    /// Whether another vehicle flies, or any vehicle has finished, left or was lost.
-    pub(crate) fn has_others_flight_begun(&self) -> bool {
-        let ended = |vehicle: &FleetVehicle| vehicle.entry.status != ShareStatus::Alive;
-        self.is_another_started() || self.vehicles.iter().any(ended)
+    /// Whether any vehicle has finished, left or was lost.
+    pub(crate) fn has_any_ended(&self) -> bool {
+        self.vehicles.iter().any(|vehicle| vehicle.entry.status != ShareStatus::Alive)
     }
 
     /// When the last of the vehicles that have been silent for 3 s, and so may be lost, is surely

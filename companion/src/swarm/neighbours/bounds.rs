@@ -151,3 +151,6 @@ pub(super) const NO_PLACE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 pub(super) const MAX_HEIGHT_DIFFERENCE_M: f32 = 1000.0;
 /// Age of a vehicle's own last message up to which relayed reports of that vehicle are ignored.
 pub(super) const HEARD_DIRECTLY_WITHIN: Duration = Duration::from_secs(1);
+/// Difference up to which a reported height of the ground is that of the area's lowest, metres:
+/// the reporting vehicle computes it from heights above it.
+pub(super) const GROUND_ROUNDING_M: f32 = 0.01;

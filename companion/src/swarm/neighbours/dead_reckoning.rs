@@ -301,7 +301,8 @@ impl NeighbourEntry {
     /// area's highest ground; but at least half of [`UnevenGround::min_height_above_ground_m`]
     /// below `place` if the neighbour was on its plan away from its pad.
     pub(super) fn max_ground_m(&self, field: AreaGround, place: &Point) -> f32 {
-        let Some(ground) = field.ground.filter(|ground| self.ground_m <= ground.low_m) else {
+        let lowest = |ground: &UnevenGround| self.ground_m <= ground.low_m + GROUND_ROUNDING_M;
+        let Some(ground) = field.ground.filter(lowest) else {
             return self.ground_m;
         };
         let away = self.pad.is_some_and(|pad| (pad - place).xy().length() > MAX_OVER_PAD_M);

@@ -82,6 +82,19 @@ impl<const V: usize> Neighbours<V> {
         self.entries[..self.roster_count].iter().any(|c| c.follows_other_plan && lately(c))
     }
 
+    /// Whether the flight of others has begun: one has finished, left or was lost, or one was
+    /// started and not all were heard lately on the ground.
+    pub(crate) fn is_flight_under_way(&self, now: Instant) -> bool {
+        let on_ground = |c: &NeighbourEntry| {
+            c.intent_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME)
+                && c.reports_any(GROUNDED)
+        };
+        let all_on_ground = || self.entries[..self.roster_count].iter().all(on_ground);
+        self.fleet.as_ref().is_some_and(|fleet| {
+            fleet.has_any_ended() || (fleet.is_another_started() && !all_on_ground())
+        })
+    }
+
     /// Whether another vehicle that takes part is in flight, heard within `missed_after`, and none
     /// may be lost and no division is under way: while a vehicle may be lost, each that lives is
     /// needed for a majority.

@@ -93,7 +93,7 @@ impl Bench {
             path.push(request.here, 1.2).unwrap();
             path.push(Point::new(13.0, 16.0, 2.0), 1.2).unwrap();
             path.push(GOAL, 1.2).unwrap();
-            Ok(VehiclePlan { path, climb_m: 0.0, ..plan() })
+            Ok(VehiclePlan { path, climb_m: 0.0, descent_m: request.descent_m, ..plan() })
         };
         self.answer_detour.map(|answer| answer.and_then(found))
     }

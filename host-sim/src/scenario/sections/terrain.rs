@@ -206,7 +206,7 @@ fn pad_ground_m(
         return Err((why, up));
     }
     let step_m = |place: &Flat| {
-        let own_m = grid.height_at(place).unwrap_or(f32::INFINITY);
+        let Some(own_m) = grid.height_at(place) else { return f32::INFINITY };
         let range = grid.height_range_around_m(place, near_m).unwrap_or([own_m; 2]);
         range.map(|height_m| (height_m - own_m).abs()).into_iter().fold(0.0, f32::max)
     };

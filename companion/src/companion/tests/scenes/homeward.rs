@@ -2,6 +2,8 @@
 //! blocked.
 
 use planner_core::flight::Gate;
+use rand_core::{Rng as _, SeedableRng as _};
+use rand_pcg::Pcg32;
 
 use super::State::*;
 use super::losses::over_a_field;
@@ -133,6 +135,67 @@ pub(super) fn finds_no_way(scenes: &mut Scenes) {
         is_home(b);
     };
     scenes.play(over_a_field(Follow), late, Aborted, 1.0);
+}
+
+/// An obstacle lies on the way back.
+pub(super) fn meets_an_obstacle(scenes: &mut Scenes) {
+    let turns_back = |b: &mut Bench| {
+        b.run(4.0);
+        b.answer_detour = detours::NO_WAY;
+        back(b);
+        b.run_until(Blocked, 2.0);
+        b.run_until(Follow, 30.0);
+        b.report_obstacle(&START, 0.5);
+        b.answer_detour = Some(Ok(()));
+        b.run_until(Land, 60.0);
+    };
+    scenes.play(over_a_field(Follow), turns_back, Aborted, 60.0);
+}
+
+/// Where an obstacle is reported, anywhere on the way back or at the pad, a vehicle that flies back
+/// as it came touches nothing, and lands where nothing is below.
+#[test]
+fn a_vehicle_that_flies_back_keeps_off_reported_obstacles() {
+    let mut met = 0;
+    for seed in 0..if cfg!(debug_assertions) { 60 } else { 400 } {
+        let mut rng = Pcg32::seed_from_u64(seed);
+        let mut real =
+            |low: f32, high: f32| low + (high - low) * (rng.next_u32() >> 8) as f32 / 16_777_216.0;
+        let mut b = over_a_field(Follow);
+        b.run(real(0.0, 14.0));
+        let flown_m = b.companion.guidance.reference_along_m();
+        let path = b.companion.mission.plan().expect("a plan").path.clone();
+        let up = Point::new(0.0, 0.0, real(-1.5, 0.5));
+        let place = path.point_at(real(-2.0, flown_m).max(0.0)).expect("it is on it") + up;
+        let radius_m = real(0.3, 2.0);
+        b.answer_detour = detours::NO_WAY;
+        back(&mut b);
+        b.run_until(Follow, 40.0);
+        b.run(real(0.0, 2.0));
+        if (b.enu - place).norm() < radius_m + 3.5 || b.state() != Follow {
+            continue;
+        }
+        b.report_obstacle(&place, radius_m);
+        b.answer_detour = Some(Ok(()));
+        let mut least_m = f32::INFINITY;
+        for _ in 0..20 * 240 {
+            b.tick();
+            least_m = least_m.min((b.enu - place).norm() - radius_m);
+            if b.state() == Aborted {
+                break;
+            }
+        }
+        let turned = "Obstacle on the way back: seeking a place";
+        met += usize::from(b.texts.iter().any(|text| text == turned));
+        let beside_m = (b.enu - place).xy().norm();
+        assert!(
+            least_m > 0.3 && b.state() == Aborted && beside_m > radius_m,
+            "seed {seed}: {least_m} m, {beside_m} m beside {radius_m} m: {:?} {:?}",
+            b.state(),
+            b.texts
+        );
+    }
+    assert!(met > 20, "{met} met an obstacle");
 }
 
 /// A vehicle that is paused on its path home continues on it.

@@ -94,6 +94,24 @@ fn only_what_others_on_the_ground_know_changes_the_plan() {
     assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 40, end: 50 }]);
 }
 
+/// Two vehicles that were started before they had heard each other's reports plan again, as long as
+/// both stand on the ground: else each would wait for the other's plan for good.
+#[test]
+fn whoever_was_started_plans_again_with_another_that_waits_on_its_pad_too() {
+    let mut bench = over_a_field(Scheduled);
+    bench.neighbour = bench.neighbour.map(|(place, _, along_m, crc)| {
+        (Point::new(place.x, place.y, 0.0), ON_PLAN | GROUNDED, along_m, !crc)
+    });
+    let mut roster = super::super::divisions::own_roster(&bench);
+    roster.has_started = true;
+    let bytes = super::super::divisions::bytes(&roster, 0);
+    bench.companion.handle_bytes(crate::Link::Swarm, bench.now, &bytes);
+    bench.run(1.0);
+    knows(&mut bench, 20, 0);
+    bench.run(1.0);
+    assert_eq!(bench.companion.excluded_waypoints(), [WaypointRange { first: 20, end: 30 }]);
+}
+
 /// Reports of vehicles that have landed do not change the plan of one that was started but still
 /// waits: it would fly another plan than the flight under way.
 #[test]
