@@ -8,6 +8,7 @@
 
 pub mod board;
 pub mod divisions;
+mod ending;
 pub mod faults;
 pub mod gateway;
 pub mod ground_station;
@@ -32,7 +33,7 @@ use self::gateway::Gateway;
 use self::ground_station::GroundStation;
 use self::radio::{Radio, RadioConfig};
 use self::referee::{DistanceSample, Referee};
-use self::simulated_vehicle::{PlanAnswer, SimulatedVehicle, is_finished, is_started};
+use self::simulated_vehicle::{PlanAnswer, SimulatedVehicle, is_finished};
 use self::step::STEP_US;
 use self::vehicles::vehicles_on_pads;
 use crate::coverage::check::Picture;
@@ -49,11 +50,6 @@ use crate::shortage;
 const GOAL_REACHED_WITHIN_M: f32 = 0.5;
 /// Horizontal distance from its pad beyond which a vehicle has left it, metres.
 const AWAY_FROM_PAD_M: f32 = 2.0;
-/// Simulated time after the last vehicle is done, before the simulation ends, seconds.
-const AFTERMATH_S: f64 = 1.0;
-/// Time without any armed vehicle, after all faults, after which no vehicle is expected to fly any
-/// more, seconds: longer than from a gate's opening to the take-off.
-const END_AFTER_STANDSTILL_S: f64 = 30.0;
 /// Greatest lag behind the wall clock that the simulation makes up for; a longer lag remains. If
 /// the simulation hurried, autopilots would pass seconds in which no companion in another process
 /// can send anything.
@@ -322,29 +318,6 @@ impl<'a> SimulationRun<'a> {
         let seen: Vec<_> = vehicles.iter().map(SimulatedVehicle::observation).collect();
         self.referee.observe(self.t_s, &seen);
         Ok(())
-    }
-
-    /// Sets the end of the simulation once no vehicle is expected to move any more.
-    fn update_end(&mut self) {
-        let (vehicles, plan) = (&self.vehicles, self.plan);
-        let started = self.ground_station.is_start_commanded();
-        let done = |i: usize| {
-            let at_rest = is_finished(vehicles[i].state()) || vehicles[i].is_powerless();
-            let has_no_goal = !plan.flights[i].task.leaves_pad();
-            at_rest
-                || (has_no_goal && started && !is_started(vehicles[i].state()))
-                || is_left_to_pilot(&vehicles[i])
-        };
-        let still = |v: &SimulatedVehicle| !v.autopilot.true_state().armed || is_left_to_pilot(v);
-        if !(self.script.has_no_change_left() && started && vehicles.iter().all(still)) {
-            self.last_active_s = self.t_s;
-        }
-        // In a coverage mission vehicles on the ground wait until a lost vehicle is down.
-        let still_s = END_AFTER_STANDSTILL_S + f64::from(vehicles[0].lost_vehicle_down_after_s());
-        let over = (0..vehicles.len()).all(done) || self.t_s - self.last_active_s > still_s;
-        if self.ends_at_s.is_infinite() && self.script.has_no_change_left() && over {
-            self.ends_at_s = self.t_s + AFTERMATH_S;
-        }
     }
 
     fn result(&self, command: &'static str) -> MissionResult {

@@ -1,24 +1,15 @@
 //! KML: the polygons of placemarks, also in documents and folders. Longitude first, then latitude.
 
+mod walk;
+
 use kml::Kml;
 use kml::types::{Geometry, LinearRing, Polygon};
 
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
-/// Most folders, documents and multi-geometries in a file, which bounds how deep they nest: a file
-/// with more is refused before it is parsed.
-const MAX_FOLDERS: usize = 64;
-
 /// The polygons of a KML text.
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
-    // The parser recurses for each folder and geometry within another one.
-    let nested = ["<Folder", "<Document", "<MultiGeometry"];
-    if nested.iter().map(|tag| text.matches(tag).count()).sum::<usize>() > MAX_FOLDERS {
-        return Err(AreaFileError::malformed(
-            "KML that can be read",
-            &"it has more than 64 folders",
-        ));
-    }
+    walk::check(text)?;
     let file: Kml<f64> =
         text.parse().map_err(|error: kml::Error| AreaFileError::malformed("KML", &error))?;
     let mut polygons = Polygons::default();
@@ -57,3 +48,6 @@ fn rings(polygon: &Polygon<f64>) -> Vec<RingXy> {
     let ring = |ring: &LinearRing<f64>| ring.coords.iter().map(|c| [c.x, c.y]).collect();
     std::iter::once(&polygon.outer).chain(&polygon.inner).map(ring).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -22,13 +22,15 @@ pub enum RingFault {
     HolesOverlap(usize, usize),
     /// A hole that does not lie wholly inside one outer ring.
     HoleNotInsideOuter(usize),
+    /// An outer ring that encloses next to nothing, whatever its holes.
+    OuterTooThin(usize),
     /// An outer ring whose holes leave nothing of it to photograph.
     OuterFilledByHoles(usize),
 }
 
 /// The first overlap of an area's rings, or hole that is not inside an outer ring, or outer ring
-/// that its holes fill; `None` if the rings are a valid area. Edges must not cross:
-/// [`planner_core::coverage::area::Area::new`] checks that.
+/// that is too thin or that its holes fill; `None` if the rings are a valid area. Edges must not
+/// cross: [`planner_core::coverage::area::Area::new`] checks that.
 pub fn find_ring_fault(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<RingFault> {
     let (outers, holes) = (rings_to_f64(outers), rings_to_f64(holes));
     if let Some((i, j)) = first_overlapping_pair(&outers) {
@@ -45,9 +47,14 @@ pub fn find_ring_fault(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<RingFaul
         };
         left_m2[own] -= hole.area_m2();
     }
-    let nothing =
-        |(ring, left_m2): (&RingF64, &f64)| *left_m2 < BORDER_TOLERANCE_M * ring.perimeter_m();
-    outers.iter().zip(&left_m2).position(nothing).map(RingFault::OuterFilledByHoles)
+    let is_nothing =
+        |area_m2: f64, ring: &RingF64| area_m2 < BORDER_TOLERANCE_M * ring.perimeter_m();
+    let empty = outers.iter().zip(&left_m2).position(|(ring, left)| is_nothing(*left, ring))?;
+    let outer = &outers[empty];
+    Some(match is_nothing(outer.area_m2(), outer) {
+        true => RingFault::OuterTooThin(empty),
+        false => RingFault::OuterFilledByHoles(empty),
+    })
 }
 
 /// Indices of the first two rings that overlap; rings that only share a border do not.

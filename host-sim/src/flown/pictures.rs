@@ -27,6 +27,9 @@ pub struct FlightFindings {
 /// lanes' direction. `None` without an area, or if companions trigger the camera: then there are
 /// real pictures to judge.
 ///
+/// Above terrain lanes follow a smoothed field, so over hollows they are higher above the ground
+/// than pictures need: a point counts by its height above that field.
+///
 /// # Errors
 /// As [`CoveragePlan::new`].
 pub fn track_points_as_pictures(
@@ -35,13 +38,17 @@ pub fn track_points_as_pictures(
 ) -> anyhow::Result<Option<Vec<Picture>>> {
     let area = scenario.area.as_ref().filter(|area| area.trigger == Trigger::None);
     let Some(area) = area else { return Ok(None) };
-    let along = CoveragePlan::plan_as_companions(scenario)?.tracks.lane_direction();
+    let planned = CoveragePlan::plan_as_companions(scenario)?;
+    let along = planned.tracks.lane_direction();
     let heading = along.y.atan2(along.x);
+    let following = planned.terrain_following;
+    // Half of the distance to the lowest transit layer is left for errors of the flight.
     let below_m = area.heights.layer_spacing_m / 2.0;
-    let above_m = below_m + area.terrain.as_ref().map_or(0.0, |terrain| terrain.tolerance_m);
-    let heights_m = area.picture_height_m - below_m..=area.picture_height_m + above_m;
-    let is_on_lanes =
-        |place: &Point| heights_m.contains(&(place.z - area.ground_height_m(&place.xy())));
+    let above_m = below_m + following.map_or(0.0, |following| following.tolerance_m);
+    let is_on_lanes = |place: &Point| {
+        let lane_m = following.map_or(area.picture_height_m, |f| f.min_path_z_m(&place.xy()));
+        (lane_m - below_m..=lane_m + above_m).contains(&place.z)
+    };
     let places = scenario.vehicles.iter().zip(tracks).flat_map(|(vehicle, track)| {
         let on_lanes = track.iter().filter(|(_, place)| is_on_lanes(place));
         on_lanes.map(|&(t_s, position)| Picture {
@@ -76,3 +83,6 @@ pub fn judge_pictures<const V: usize, const W: usize>(
         complete: findings.covered_share >= 1.0,
     })
 }
+
+#[cfg(test)]
+mod tests;

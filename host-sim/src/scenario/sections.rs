@@ -19,7 +19,7 @@ use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
 use toml::de::DeTable;
 
 use self::checks::VehicleSpans;
-use self::simulation::{read_deconfliction, read_fault, read_simulation};
+use self::simulation::{check_obstacle_count, read_deconfliction, read_fault, read_simulation};
 use self::values::{MAX_VEHICLE_ID, read_point};
 use super::error::ScenarioError;
 use super::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
@@ -105,7 +105,10 @@ fn read_faults(
     let Some(value) = root.get("faults") else { return Ok(Vec::new()) };
     let items = value.items()?;
     check_list_len(&value, items.len(), MAX_FAULTS, "faults")?;
-    items.iter().map(|v| read_fault(&v.table()?, &ids)).collect()
+    let faults: Vec<Fault> =
+        items.iter().map(|v| read_fault(&v.table()?, &ids)).collect::<Result<_>>()?;
+    check_obstacle_count(&faults, &items)?;
+    Ok(faults)
 }
 
 /// Hint at a usual mistake in text that is not TOML: `rest` is the text from the error on, `what`
@@ -316,6 +319,8 @@ fn read_geofence(value: &TomlValue<'_>) -> Result<Geofence> {
     Ok(Geofence { min, max })
 }
 
+/// What a coverage mission without an area lacks.
+const AREA_HINT: &str = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
 /// What a scenario without vehicles lacks.
 const VEHICLES_HINT: &str = "add a `[[vehicles]]` with `id` and `start` for each";
 

@@ -108,6 +108,13 @@ impl GroundStation {
         self.commands.push((vehicle, command, now_us + COMMAND_REPEATED_FOR_US));
     }
 
+    /// Whether the vehicle is being commanded to continue.
+    pub fn resumes(&self, vehicle: usize) -> bool {
+        self.commands
+            .iter()
+            .any(|&(of, command, _)| of == vehicle && command == OperatorCommand::Resume)
+    }
+
     /// Reports a spherical obstacle to all vehicles, each second from now on.
     pub fn report_obstacle(&mut self, centre: Geodetic, radius_m: f32) {
         self.obstacles.push((centre, radius_m));

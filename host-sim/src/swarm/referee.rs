@@ -7,6 +7,8 @@
 //! passing near it is no violation. Of the contacts, those of a vehicle that its pilot flies are
 //! marked: its companion sends it no setpoints.
 
+mod standstill;
+
 use planner_core::Point;
 use planner_core::map::segment::point_clearance;
 use planner_core::map::voxel::VoxelGrid;
@@ -17,16 +19,6 @@ use crate::terrain::HeightGrid;
 
 /// Rounding of positions, metres: an overlap of less than this is no contact.
 const CONTACT_ROUNDING_M: f32 = 1e-3;
-/// Time without progress in flight that counts as a deadlock, seconds.
-const DEADLOCK_S: f64 = 20.0;
-/// Longest wait for a vehicle out of radio range, seconds: 45 until it counts as lost, and a
-/// reserve.
-const MAX_OUT_OF_RANGE_WAIT_S: f64 = 60.0;
-/// Least increase of arc length along the path that counts as progress, metres.
-const MIN_COUNTED_PROGRESS_M: f32 = 0.1;
-/// Distance from its last place of progress at which a vehicle that reports no progress counts as
-/// moving, metres: more than it sways in hover.
-const MOVED_FROM_HOVER_M: f32 = 1.0;
 /// Time between two points of the recorded tracks and samples, seconds.
 const RECORD_EVERY_S: f64 = 0.2;
 
@@ -93,10 +85,12 @@ struct WatchedVehicle {
     best_progress_m: f32,
     /// Where the vehicle last made progress, or did not have to.
     progress_position: Point,
-    /// When that was, seconds.
+    /// When that was, seconds; moved on by the time that it stood by command since then.
     last_progress_s: f64,
     /// Whether its present standstill was counted as a deadlock.
     in_deadlock: bool,
+    /// Since when it stands by command in that standstill, seconds; `None` if it does not.
+    deadlock_held_since_s: Option<f64>,
     /// Recorded track: times in seconds, positions in ENU metres.
     track: Vec<(f32, Point)>,
 }
@@ -128,7 +122,8 @@ pub struct Referee<'a> {
     /// is known what became of the struck vehicle, and for their turn to fly around it.
     pub retracts_ended_deadlocks: bool,
     /// Whether a deadlock that ends by flying on within 60 s (`MAX_OUT_OF_RANGE_WAIT_S`) no longer
-    /// counts: where vehicles may be out of radio range, they wait until one counts as lost.
+    /// counts: where vehicles may be out of radio range, they wait until one counts as lost. Time
+    /// in which it stands by command is left out of the 60 s.
     pub retracts_out_of_range_waits: bool,
     /// Spherical obstacles that are in no map: centre and radius, metres.
     pub sphere_obstacles: Vec<(Point, f32)>,
@@ -192,6 +187,7 @@ impl<'a> Referee<'a> {
             progress_position: Point::zeros(),
             last_progress_s: 0.0,
             in_deadlock: false,
+            deadlock_held_since_s: None,
             track: Vec::new(),
         };
         Self {
@@ -407,45 +403,6 @@ impl<'a> Referee<'a> {
             format!("{what} vehicle {}", self.vehicles[wreck].id),
         ));
     }
-
-    /// Counts vehicle `i`'s standstill as a deadlock once it has lasted too long.
-    fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
-        let vehicle = &mut self.vehicles[i];
-        // Progress decreases only if it is now counted along another path.
-        let on_other_path = now
-            .progress_m
-            .filter(|progress_m| *progress_m < vehicle.best_progress_m - MOVED_FROM_HOVER_M);
-        if let Some(progress_m) = on_other_path {
-            vehicle.best_progress_m = progress_m - MOVED_FROM_HOVER_M;
-        }
-        let moved = match now.progress_m {
-            Some(progress_m) => progress_m > vehicle.best_progress_m + MIN_COUNTED_PROGRESS_M,
-            None => (now.position - vehicle.progress_position).norm() > MOVED_FROM_HOVER_M,
-        };
-        if now.phase != RefereePhase::Flying || now.holds_by_command || moved {
-            vehicle.best_progress_m =
-                now.progress_m.unwrap_or(f32::NEG_INFINITY).max(vehicle.best_progress_m);
-            vehicle.progress_position = now.position;
-            let stood_s = t_s - std::mem::replace(&mut vehicle.last_progress_s, t_s);
-            // A vehicle whose power fails may have waited for a good reason.
-            let ends = moved || now.phase != RefereePhase::Flying;
-            let waited = moved && stood_s <= MAX_OUT_OF_RANGE_WAIT_S;
-            let retracts = (ends && self.retracts_ended_deadlocks)
-                || (waited && self.retracts_out_of_range_waits);
-            if std::mem::take(&mut vehicle.in_deadlock) && retracts {
-                self.deadlocks -= 1;
-                let counted = |to: &&mut Incident| to.vehicle == i && to.text == no_progress_text();
-                if let Some(incident) = self.incidents.iter_mut().rfind(counted) {
-                    incident.retracted = true;
-                    incident.text = format!("stood for {stood_s:.0} s");
-                }
-            }
-        } else if t_s - vehicle.last_progress_s > DEADLOCK_S && !vehicle.in_deadlock {
-            vehicle.in_deadlock = true;
-            self.deadlocks += 1;
-            self.incidents.push(Incident::new(t_s, i, no_progress_text()));
-        }
-    }
 }
 
 /// Whether a body touches an obstacle cell of this grid whose top is above the body's centre.
@@ -472,11 +429,6 @@ fn touches_cell_beside(grid: &VoxelGrid<'_>, position: &Point, radius_m: f32) ->
             })
         })
     })
-}
-
-/// What the log says of a deadlock.
-fn no_progress_text() -> String {
-    format!("no progress for {DEADLOCK_S} s")
 }
 
 /// Greatest clearance to an obstacle that is measured exactly, metres.

@@ -51,6 +51,7 @@ fn rectangles_overlap_where_a_square_metre_says_so() {
             Some(RingFault::HolesOverlap(..)) => 2,
             Some(RingFault::HoleNotInsideOuter(_)) => 3,
             Some(RingFault::OuterFilledByHoles(_)) => 4,
+            Some(RingFault::OuterTooThin(_)) => panic!("seed {seed}: {outers:?}"),
         };
         assert_eq!(found, right, "seed {seed}: {outers:?} without {holes:?}");
         seen[found] += 1;

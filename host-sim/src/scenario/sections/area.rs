@@ -18,8 +18,8 @@ use super::checks::{VehicleSpans, check_margins};
 use super::obstacles::{FlightSettings, MapBesideArea};
 use super::terrain::UnreadTerrain;
 use super::{
-    CommonSettings, DEFAULT_ORIGIN, VEHICLES_HINT, empty_table, read_common, read_faults,
-    read_fence_and_ground_stations, read_geodetic, read_unsupported, read_vehicles,
+    AREA_HINT, CommonSettings, DEFAULT_ORIGIN, VEHICLES_HINT, empty_table, read_common,
+    read_faults, read_fence_and_ground_stations, read_geodetic, read_unsupported, read_vehicles,
     unsupported_error,
 };
 use crate::area::{self, AreaFormat, MAX_VERTICES, Polygons, RingXy};
@@ -66,10 +66,10 @@ pub(in crate::scenario) fn read_coverage_scenario(
 ) -> Result<Scenario> {
     let CommonSettings { seed, deconfliction, simulation, estimator_span } =
         read_common(text, root, (margins::PAIR_DEVIATION_COVERAGE_M, DEFAULT_AREA_TIME_LIMIT_S))?;
-    let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
     let map = MapBesideArea::from_root(root, folder)?;
     let origin = map.as_ref().and_then(MapBesideArea::origin);
-    let (mut area, terrain) = read_area(&root.required("area", hint)?.table()?, folder, origin)?;
+    let (mut area, terrain) =
+        read_area(&root.required("area", AREA_HINT)?.table()?, folder, origin)?;
     let mut unsupported = Vec::new();
     let vehicles = root.required("vehicles", VEHICLES_HINT)?;
     let mut vehicles = read_vehicles(&vehicles, Some(&area.origin), &mut unsupported)?;
@@ -453,3 +453,6 @@ fn place_in_mission_frame(
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

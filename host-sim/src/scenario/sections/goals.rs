@@ -11,15 +11,14 @@ use super::checks::{
     check_starts_apart,
 };
 use super::{
-    CommonSettings, DEFAULT_TIME_LIMIT_S, VEHICLES_HINT, check_list_len, empty_table, read_common,
-    read_faults, read_fence_and_ground_stations, read_map, read_place, read_roadmap,
+    AREA_HINT, CommonSettings, DEFAULT_TIME_LIMIT_S, VEHICLES_HINT, check_list_len, empty_table,
+    read_common, read_faults, read_fence_and_ground_stations, read_map, read_place, read_roadmap,
     read_unsupported, read_vehicles, unsupported_error,
 };
 use crate::capacity::MAX_VEHICLES;
 use crate::files;
 use crate::margins;
 use crate::quote::{printable, printable_path};
-use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Table, TomlSpan, TomlText, TomlValue};
 use crate::scenario::{AssignmentObjective, MissionMode, MissionSection, Scenario, VehicleSection};
 
@@ -29,6 +28,7 @@ pub(in crate::scenario) fn read_goals_scenario(
     root: &Table<'_>,
     folder: &Path,
 ) -> Result<Scenario> {
+    refuse_coverage_without_area(text, root)?;
     let mut unsupported = Vec::new();
     let CommonSettings { seed, deconfliction, simulation, estimator_span } =
         read_common(text, root, (margins::PAIR_DEVIATION_M, DEFAULT_TIME_LIMIT_S))?;
@@ -49,8 +49,8 @@ pub(in crate::scenario) fn read_goals_scenario(
         unsupported.push(unsupported_error(text, &area.span, "[area] beside [map]"));
     }
     let formation = read_unsupported(root, "formation", &mut unsupported)?;
-    if let Some(span) = &mode_span {
-        check_mode(text, root, mission.mode, span, &mut unsupported)?;
+    if let (Some(span), MissionMode::Formation) = (&mode_span, mission.mode) {
+        unsupported.push(unsupported_error(text, span, "this mission.mode"));
     }
     check_starts_apart(text, &vehicles, deconfliction.safety_distance_m)?;
     check_labelled_goals(text, &vehicles, &mission)?;
@@ -86,29 +86,15 @@ pub(in crate::scenario) fn read_goals_scenario(
     })
 }
 
-/// Refuses coverage mode, whose scenario needs `[area]`; notes formation mode as unsupported.
-fn check_mode(
-    text: TomlText<'_>,
-    root: &Table<'_>,
-    mode: MissionMode,
-    span: &TomlSpan,
-    unsupported: &mut Vec<ScenarioError>,
-) -> Result<()> {
-    match mode {
-        MissionMode::Coverage if root.get("area").is_none() => {
-            let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`, and leave out [map]";
-            return Err(text.error_with_hint(
-                span,
-                "mission.mode \"coverage\" needs an [area]",
-                hint,
-            ));
-        }
-        MissionMode::Formation => {
-            unsupported.push(unsupported_error(text, span, "this mission.mode"));
-        }
-        _ => {}
+/// Refuses coverage mode in a scenario that is read as one with goals, since it has no `[area]`.
+fn refuse_coverage_without_area(text: TomlText<'_>, root: &Table<'_>) -> Result<()> {
+    let mission = root.get("mission").and_then(|value| value.table().ok());
+    let Some(mode) = mission.and_then(|mission| mission.get("mode")) else { return Ok(()) };
+    if mode.str() != Ok("coverage") {
+        return Ok(());
     }
-    Ok(())
+    let why = "[area] is missing: mission.mode is \"coverage\"";
+    Err(text.error_with_hint(&mode.span, why, AREA_HINT))
 }
 
 /// Reads `[mission]`; the span is where its `mode` stands, if it is given.
@@ -211,3 +197,6 @@ fn read_goals_file(value: &TomlValue<'_>, folder: &Path) -> Result<Vec<(Point, S
     }
     Ok(goals)
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,13 +1,21 @@
 //! Reads the tables of how a mission is flown: deconfliction, simulation, faults.
 
 use companion::config::SAFETY_DISTANCE_M;
+use planner_core::Point;
 use planner_core::track::deconflict::Method;
 
 use super::values::{MAX_VEHICLE_ID, read_point};
-use crate::scenario::reader::{Result, Table};
+use crate::scenario::error::ScenarioError;
+use crate::scenario::reader::{Result, Table, TomlValue};
 use crate::scenario::types::{
     Deconfliction, FAULT_OBSTACLE, Fault, PositionErrors, Simulation, VEHICLE_FAULT_KINDS,
 };
+
+/// Most obstacles that a companion keeps: `MAX_OBSTACLES` of companion/src/replanning/obstacles.rs.
+const MAX_KNOWN_OBSTACLES: usize = 16;
+/// Greatest radius of an obstacle that companions accept, metres: `MAX_OBSTACLE_RADIUS_M` of
+/// companion/src/replanning/obstacles.rs.
+const MAX_REPORTED_RADIUS_M: f32 = 20.0;
 
 /// Reads `[deconfliction]`. The default of `separation_m` is the safety distance plus
 /// `pair_error_m`, by which two vehicles together deviate from their paths, metres.
@@ -73,7 +81,7 @@ pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
         radio_cut_direction: direction.transpose()?.map(str::to_owned),
         offset_m: table.get("offset_m").map(|v| read_point(&v)).transpose()?,
         obstacle_position: table.get("position").map(|v| read_point(&v)).transpose()?,
-        obstacle_radius_m: table.optional_f32("radius_m", 0.001..=1000.0)?,
+        obstacle_radius_m: read_obstacle_radius(table)?,
     };
     table.refuse_unknown_keys()?;
     if fault.kind == FAULT_OBSTACLE
@@ -85,3 +93,38 @@ pub(super) fn read_fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
     }
     Ok(fault)
 }
+
+/// Reads the radius of an obstacle, metres, which companions accept up to
+/// [`MAX_REPORTED_RADIUS_M`]; `None` if it is not given.
+fn read_obstacle_radius(table: &Table<'_>) -> Result<Option<f32>> {
+    let hint = "companions take obstacles of up to 20 m: give several in place of a larger one";
+    table
+        .optional_f32("radius_m", 0.001..=f64::from(MAX_REPORTED_RADIUS_M))
+        .map_err(|error| ScenarioError { hint: Some(hint.to_owned()), ..error })
+}
+
+/// Refuses more obstacles than a companion keeps; `items` are the faults in the scenario. An
+/// obstacle that appears where one was, no larger, is the same to a companion: it takes no place.
+pub(super) fn check_obstacle_count(faults: &[Fault], items: &[TomlValue<'_>]) -> Result<()> {
+    let obstacle = |(index, fault): (usize, &Fault)| {
+        Some((index, fault.at_s, fault.obstacle_position?, fault.obstacle_radius_m?))
+            .filter(|_| fault.kind == FAULT_OBSTACLE)
+    };
+    let mut appearing: Vec<_> = faults.iter().enumerate().filter_map(obstacle).collect();
+    appearing.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let mut known: Vec<(usize, Point, f32)> = Vec::new();
+    for (index, _, place, radius_m) in appearing {
+        if !known.iter().any(|(_, centre, known_m)| *centre == place && *known_m >= radius_m) {
+            known.push((index, place, radius_m));
+        }
+    }
+    let Some((first_lost, ..)) = known.get(MAX_KNOWN_OBSTACLES) else { return Ok(()) };
+    let fault = &items[*first_lost];
+    let why =
+        format!("faults holds {} obstacles; a companion keeps {MAX_KNOWN_OBSTACLES}", known.len());
+    let hint = "leave this one out, or give fewer and larger ones";
+    Err(fault.text.error_with_hint(&fault.span, why, hint))
+}
+
+#[cfg(test)]
+mod tests;

@@ -190,3 +190,78 @@ fn out_of_radio_range_only_a_short_wait_that_flying_on_ends_is_no_deadlock() {
         });
     }
 }
+
+/// A standstill of `stands_s` in flight, `held_s` by command and `stands_on_s` more, which then
+/// ends: flying on, or in `last` if that is another phase. Returns the deadlocks counted before and
+/// after that, and the last incident's text.
+fn deadlocks_with_pause(
+    referee: &mut Referee<'_>,
+    [stands_s, held_s, stands_on_s]: [i32; 3],
+    last: RefereePhase,
+) -> (u32, u32, String) {
+    let rests = at(5.0, 5.0, 5.0, RefereePhase::Grounded);
+    let hovers = at(2.0, 2.0, 5.0, RefereePhase::Flying);
+    let steps = 10 * (stands_s + held_s + stands_on_s);
+    for step in 0..steps {
+        let holds_by_command = (10 * stands_s..10 * (stands_s + held_s)).contains(&step);
+        let seen = Observation { holds_by_command, ..hovers };
+        referee.observe(f64::from(step) * 0.1, &[seen, rests]);
+    }
+    let before = referee.deadlocks;
+    let x = if last == RefereePhase::Flying { 2.5 } else { 2.0 };
+    referee.observe(f64::from(steps) * 0.1, &[at(x, 2.0, 5.0, last), rests]);
+    let text = referee.incidents.last().map_or(String::new(), |seen| seen.text.clone());
+    (before, referee.deadlocks, text)
+}
+
+/// A command to stand neither ends a deadlock nor is one: what counts is whether the vehicle flies
+/// on afterwards, and how long it stood without that command.
+#[test]
+fn a_wait_that_ends_after_a_pause_is_no_deadlock() {
+    let [flies, lands] = [RefereePhase::Flying, RefereePhase::TakeOffOrLanding];
+    for (seconds, last, [before, after], text) in [
+        ([25, 5, 0], flies, [1, 0], "stood for 25 s"),
+        ([25, 50, 10], flies, [1, 0], "stood for 35 s"),
+        ([25, 50, 30], flies, [1, 0], "stood for 55 s"),
+        ([25, 50, 10], lands, [1, 0], "stood for 35 s"),
+        ([15, 100, 15], flies, [0, 0], ""),
+        ([15, 100, 25], flies, [1, 0], "stood for 25 s"),
+    ] {
+        with_referee(|mut referee| {
+            referee.retracts_ended_deadlocks = true;
+            let found = deadlocks_with_pause(&mut referee, seconds, last);
+            assert_eq!(found, (before, after, text.to_owned()), "{seconds:?}, {last:?}");
+        });
+    }
+    for (seconds, after) in [([25, 100, 10], 0), ([25, 100, 40], 1), ([61, 10, 0], 1)] {
+        with_referee(|mut referee| {
+            referee.retracts_out_of_range_waits = true;
+            let found = deadlocks_with_pause(&mut referee, seconds, flies);
+            assert_eq!((found.0, found.1), (1, after), "{seconds:?}");
+        });
+    }
+}
+
+/// What a pilot does with a vehicle in a deadlock does not show that it would have flown on.
+#[test]
+fn a_vehicle_that_its_pilot_moves_is_still_in_its_deadlock() {
+    with_referee(|mut referee| {
+        referee.retracts_ended_deadlocks = true;
+        let rests = at(5.0, 5.0, 5.0, RefereePhase::Grounded);
+        for step in 0..900 {
+            let under_pilot = (300..600).contains(&step);
+            let x = 2.0 + 0.01 * (step.clamp(300, 600) - 300) as f32;
+            let seen = Observation {
+                progress_m: None,
+                holds_by_command: under_pilot,
+                flown_by_pilot: under_pilot,
+                ..at(x, 2.0, 5.0, RefereePhase::Flying)
+            };
+            referee.observe(f64::from(step) * 0.1, &[seen, rests]);
+        }
+        assert_eq!((referee.deadlocks, referee.incidents.len()), (1, 1));
+        let flies_on = Observation { progress_m: None, ..at(6.5, 2.0, 5.0, RefereePhase::Flying) };
+        referee.observe(90.0, &[flies_on, rests]);
+        assert_eq!(referee.deadlocks, 0);
+    });
+}

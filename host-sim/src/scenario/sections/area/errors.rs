@@ -23,6 +23,10 @@ pub(super) fn ring_fault_text_and_hint(
         RingFault::HoleNotInsideOuter(i) => {
             (format!("hole {i} reaches out of its polygon"), "draw it inside the border")
         }
+        RingFault::OuterTooThin(i) => (
+            format!("polygon {i} is too thin or too small"),
+            "check its corners and `coordinates`: a polygon is wider than a few centimetres",
+        ),
         RingFault::OuterFilledByHoles(i) => {
             (format!("holes leave nothing of polygon {i}"), "leave a hole out, or the polygon")
         }
