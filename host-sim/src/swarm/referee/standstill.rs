@@ -43,7 +43,10 @@ impl Referee<'_> {
             let until_s = vehicle.deadlock_held_since_s.take().unwrap_or(t_s);
             let stood_s = until_s - std::mem::replace(&mut vehicle.last_progress_s, t_s);
             if std::mem::take(&mut vehicle.in_deadlock) {
-                self.end_deadlock(i, stood_s, moved);
+                let waited = moved && stood_s <= MAX_OUT_OF_RANGE_WAIT_S;
+                if self.retracts_ended_deadlocks || (waited && self.retracts_out_of_range_waits) {
+                    self.retract_deadlock(i, stood_s);
+                }
             }
             return;
         }
@@ -57,13 +60,8 @@ impl Referee<'_> {
         }
     }
 
-    /// Ends vehicle `i`'s deadlock, in which it stood for `stood_s`, by flying on (`moved`) or off
-    /// its path; retracts it where such a wait is none.
-    fn end_deadlock(&mut self, i: usize, stood_s: f64, moved: bool) {
-        let waited = moved && stood_s <= MAX_OUT_OF_RANGE_WAIT_S;
-        if !(self.retracts_ended_deadlocks || (waited && self.retracts_out_of_range_waits)) {
-            return;
-        }
+    /// Retracts vehicle `i`'s deadlock, in which it stood for `stood_s`: it has ended.
+    fn retract_deadlock(&mut self, i: usize, stood_s: f64) {
         self.deadlocks -= 1;
         let counted = |to: &&mut Incident| to.vehicle == i && to.text == no_progress_text();
         if let Some(incident) = self.incidents.iter_mut().rfind(counted) {
