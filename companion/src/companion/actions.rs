@@ -83,7 +83,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 } else {
                     photographed.prepare_plan_of_new_round();
                 }
-                if let Some(fleet) = self.neighbours.fleet_mut() {
+                // Where a late plan is asked for again, the flight has begun already: what is known
+                // of it stays, and a vehicle that has left since stays so.
+                let again = from == State::Planning;
+                if let Some(fleet) = self.neighbours.fleet_mut().filter(|_| !again) {
                     if fleet.has_reported_leaving() {
                         // The vehicle takes part again. Others have to hear it first, so it keeps
                         // its share for at least this time though it cannot make a commitment yet.
