@@ -1,7 +1,7 @@
 use crate::scenario::parse;
 
 #[test]
-fn a_coverage_mission_without_an_area_is_told_so() {
+fn a_coverage_mission_without_an_area_is_refused_by_name() {
     let rest = "cruise_mps = 5.0\n[[vehicles]]\nid = 1\nstart = [0, -20, 0]\n";
     for map in ["", "[map]\nfile = \"builtin:building\"\n"] {
         let error =
