@@ -70,7 +70,8 @@ proptest! {
         prop_assert!(flown_m < brakes_m + stepped_m, "{brakes_m} {flown_m} {from:?}");
         let legs = |m: f32| path.waypoints().iter().filter(|w| w.along_m <= m).count();
         if legs(from.along_m + brakes_m) - legs(from.along_m) < BRAKING_LEGS {
-            prop_assert!(brakes_m < flown_m + stepped_m, "{brakes_m} {flown_m} {from:?}");
+            let most_m = flown_m + 0.05 + 0.12 * brakes_m;
+            prop_assert!(brakes_m < most_m, "{brakes_m} {flown_m} {from:?}");
         }
     }
 }
